@@ -1,0 +1,26 @@
+"""jbeamshell: differentiable beamshells on a rough foundation."""
+
+from jbeamshell.errors import InputError, UnconvergedError
+from jbeamshell.history import History, Status
+from jbeamshell.parts import Contact, Load, Model, Strip
+from jbeamshell.quasistatic import Newton, solve
+from jbeamshell.scene import Scene, read_scene, scene_to_toml, write_scene
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Contact",
+    "History",
+    "InputError",
+    "Load",
+    "Model",
+    "Newton",
+    "Scene",
+    "Status",
+    "Strip",
+    "UnconvergedError",
+    "read_scene",
+    "scene_to_toml",
+    "solve",
+    "write_scene",
+]

@@ -1,0 +1,120 @@
+r"""Section fields of one point to the strains of the beamshell.
+
+A section carries four fields: the tangential displacement ``v`` and the lift ``w`` of the contact
+point (bottom face), the rotation ``beta`` and the squeeze strain ``psi``.  With
+T = (cos beta, sin beta) and B = (-sin beta, cos beta), the material point at height s in [-H, H] is
+
+    x = X + v - (H+s)(1+psi) sin(beta),      y = w + (H+s)(1+psi) cos(beta),
+
+and the reference curve s = 0 has the strains (Libai & Simmonds 1998; Brink 2015, eqs. 3.22-3.23,
+with 3.39-3.40 extended by the lift and the squeeze strain)
+
+    e = (1+u_x') cos(beta) + u_y' sin(beta) - 1,   g = u_y' cos(beta) - (1+u_x') sin(beta),   k = beta'.
+
+Inserting u_x = v - H(1+psi) sin(beta), u_y = w + H(1+psi) cos(beta) - H leaves
+
+    e = v' cos(beta) + w' sin(beta) - 2 sin^2(beta/2) - H (1+psi) beta'
+    g = w' cos(beta) - (1+v') sin(beta) + H psi'
+
+in which nothing of order one cancels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+FIELDS = ("v", "w", "beta", "psi")
+
+
+class Strains(NamedTuple):
+    """Strains of one section.
+
+    Attributes
+    ----------
+    e : extension of the reference curve, dimensionless
+    g : shear, dimensionless
+    k : bending, beta', 1/length
+    psi : squeeze strain (relative change of height, positive when thickening), dimensionless
+    dpsi : psi', 1/length
+    """
+
+    e: Array
+    g: Array
+    k: Array
+    psi: Array
+    dpsi: Array
+
+
+def _rotation(beta: Array) -> tuple[Array, Array, Array]:
+    """sin(beta), cos(beta) and 1 - cos(beta), from the half angle so that the last cannot cancel."""
+    sin, cos = jnp.sin(0.5 * beta), jnp.cos(0.5 * beta)
+    versine = 2.0 * sin * sin
+    return 2.0 * sin * cos, 1.0 - versine, versine
+
+
+def exact_strains(section: Array, slope: Array, half_height: ArrayLike) -> Strains:
+    """Geometrically exact strains of one section.
+
+    Parameters
+    ----------
+    section : (4,) fields v, w, beta, psi
+    slope : (4,) their derivatives along X
+    half_height : H
+    """
+    _, _, beta, psi = section
+    dv, dw, dbeta, dpsi = slope
+    sin, cos, versine = _rotation(beta)
+    e = dv * cos + dw * sin - versine - half_height * (1.0 + psi) * dbeta
+    g = dw * cos - (1.0 + dv) * sin + half_height * dpsi
+    return Strains(e, g, dbeta, psi, dpsi)
+
+
+def linear_strains(section: Array, slope: Array, half_height: ArrayLike) -> Strains:
+    """Strains of one section for small displacements and rotations; see `exact_strains`."""
+    _, _, beta, psi = section
+    dv, dw, dbeta, dpsi = slope
+    return Strains(dv - half_height * dbeta, dw - beta + half_height * dpsi, dbeta, psi, dpsi)
+
+
+def exact_position(
+    section: Array, half_height: ArrayLike, height: ArrayLike
+) -> tuple[Array, Array]:
+    """Displacement (x, y) of the material point at ``height`` s above mid-height.
+
+    Parameters
+    ----------
+    section : (4,) fields v, w, beta, psi
+    half_height : H
+    height : s in [-H, H]
+    """
+    v, w, beta, psi = section
+    sin, _, versine = _rotation(beta)
+    arm = half_height + height
+    return v - arm * (1.0 + psi) * sin, w + arm * psi - arm * (1.0 + psi) * versine
+
+
+def linear_position(
+    section: Array, half_height: ArrayLike, height: ArrayLike
+) -> tuple[Array, Array]:
+    """Displacement (x, y) for small displacements and rotations; see `exact_position`."""
+    v, w, beta, psi = section
+    arm = half_height + height
+    return v - arm * beta, w + arm * psi
+
+
+class Kinematics(NamedTuple):
+    """A consistent pair of strains and positions."""
+
+    strains: Callable[[Array, Array, ArrayLike], Strains]
+    position: Callable[[Array, ArrayLike, ArrayLike], tuple[Array, Array]]
+
+
+KINEMATICS = {
+    "exact": Kinematics(exact_strains, exact_position),
+    "linear": Kinematics(linear_strains, linear_position),
+}

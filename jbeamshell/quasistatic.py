@@ -1,0 +1,369 @@
+"""Load paths: Newton's method at every load level, one scan over the path, a History out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+from jax.typing import ArrayLike
+
+from jbeamshell import block_tridiagonal
+from jbeamshell.closed_form import gross_slip_force
+from jbeamshell.equilibrium import Drive, Level, System, V
+from jbeamshell.errors import UnconvergedError
+from jbeamshell.friction import plastic_slip
+from jbeamshell.grid import ORDER
+from jbeamshell.history import History, Status, closed_cycles
+from jbeamshell.parts import require
+from jbeamshell.scene import Scene
+
+SLIPS = 0.5  # a node slips in a step when more than this part of its motion is inelastic
+PIECES = 8  # a load step that fails is walked in this many pieces
+
+
+class Newton(eqx.Module):
+    """Newton's method with a backtracking line search, differentiable at the root.
+
+    Attributes
+    ----------
+    tolerance : largest out-of-balance force at a node over mu F_N L; None is 1e-10 in double and
+        2e-5 in single precision
+    max_iterations : Newton iterations per load step
+    max_halvings : of one Newton step
+    """
+
+    tolerance: float | None = eqx.field(static=True, default=None)
+    max_iterations: int = eqx.field(static=True, default=60)
+    max_halvings: int = eqx.field(static=True, default=8)
+
+    def __check_init__(self) -> None:
+        good = self.tolerance is None or self.tolerance > 0.0
+        require("solver.tolerance", self.tolerance, good, "must be a positive number or None")
+
+    def tolerance_for(self, dtype: jnp.dtype) -> float:
+        """The tolerance in force at a precision."""
+        double = dtype == jnp.float64
+        tolerance = self.tolerance or (1e-10 if double else 2e-5)
+        require(
+            "solver.tolerance",
+            tolerance,
+            double or tolerance >= 1e-6,
+            "is beyond single precision; write jax.config.update('jax_enable_x64', True) first",
+        )
+        return tolerance
+
+    def solve(
+        self, residual: Callable[[Array], Array], guess: Array, enabled: Array
+    ) -> tuple[Array, tuple[Array, Array]]:
+        """Find a root of a residual whose rows couple to neighbouring rows only.
+
+        Parameters
+        ----------
+        residual : (n, m) to (n, m)
+        guess : (n, m)
+        enabled : false skips the iteration
+
+        Returns
+        -------
+        root : (n, m); forward and reverse derivatives by the implicit function theorem
+        iterations, error : count, and the largest residual left
+        """
+        tolerance = self.tolerance_for(guess.dtype)
+
+        def unfinished(state: tuple[Array, Array, Array]) -> Array:
+            _, r, count = state
+            return enabled & (jnp.max(jnp.abs(r)) > tolerance) & (count < self.max_iterations)
+
+        def iterate(function: Callable[[Array], Array], start: Array) -> tuple[Array, tuple]:
+            def improve(state: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+                x, r, count = state
+                _, linear = jax.linearize(function, x)
+                step = block_tridiagonal.solve(block_tridiagonal.jacobian(linear, x), -r)
+                x, r = self._search(function, x, r, step)
+                return x, r, count + 1
+
+            x, r, count = lax.while_loop(unfinished, improve, (start, function(start), 0))
+            # As a float: custom_root has no tangent for integers.
+            return x, (count.astype(x.dtype), jnp.max(jnp.abs(r)))
+
+        root, (count, error) = lax.custom_root(
+            residual, guess, iterate, block_tridiagonal.linear_solve, has_aux=True
+        )
+        return root, (count.astype(int), error)
+
+    def _search(
+        self, function: Callable[[Array], Array], x: Array, r: Array, step: Array
+    ) -> tuple[Array, Array]:
+        """Halve the step until the residual's norm falls (Armijo's rule)."""
+        before = jnp.sum(r * r)
+
+        def too_long(trial: tuple[Array, ...]) -> Array:
+            _, r_new, scale, halvings = trial
+            descends = jnp.sum(r_new * r_new) <= (1.0 - 1e-4 * scale) * before
+            return ~descends & (halvings < self.max_halvings)
+
+        def halve(trial: tuple[Array, ...]) -> tuple[Array, ...]:
+            _, _, scale, halvings = trial
+            x_new = x + 0.5 * scale * step
+            return x_new, function(x_new), 0.5 * scale, halvings + 1
+
+        full = (x + step, function(x + step), jnp.ones((), x.dtype), 0)
+        x_new, r_new, _, _ = lax.while_loop(too_long, halve, full)
+        return x_new, r_new
+
+
+class State(NamedTuple):
+    """Where a path stands: the level reached, u(L) after the pressure, and whether all went well."""
+
+    level: Level
+    rest: Array
+    sound: Array
+
+
+class Steps(NamedTuple):
+    """What every step of a path leaves behind, stacked along the first axis; see `History`."""
+
+    state: State
+    displacement: Array
+    slipping: Array
+    slip_work: Array
+    stored_energy: Array
+    iterations: Array
+    error: Array
+    status: Array
+
+
+def march(scene: Scene, start: State, targets: Array, rough: Array, solver: Newton) -> Steps:
+    """Walk a load path in one scan.
+
+    Parameters
+    ----------
+    scene : what is loaded
+    start : where the path starts
+    targets : (steps,) controlled load of every step
+    rough : (steps,) 1 with friction, 0 for the pressure step
+    solver : of one step
+    """
+    system = System(scene)
+
+    def step(state: State, drive: tuple[Array, Array]) -> tuple[State, Steps]:
+        return _step(system, state, Drive(drive[0], state.rest, drive[1]), solver)
+
+    return lax.scan(step, start, (targets, rough))[1]
+
+
+_march = eqx.filter_jit(march)
+
+
+def _step(system: System, state: State, drive: Drive, solver: Newton) -> tuple[State, Steps]:
+    before, order = state.level, ORDER[system.model.grid]
+    active = len(system.model.active)
+    blocks = (system.x.size + order - 1) // order
+    padding = (blocks * order - system.x.size) * active
+
+    def nodal(unknown: Array) -> Array:
+        return unknown.ravel()[padding:].reshape(-1, active)
+
+    def residual(unknown: Array) -> Array:
+        balance = system.advance(nodal(unknown), before, drive)[1]
+        return jnp.append(unknown.ravel()[:padding], balance.ravel()).reshape(unknown.shape)
+
+    # An element's later nodes share a block, so that blocks couple to their neighbours only.
+    guess = jnp.zeros((blocks, order * active), system.x.dtype)
+    change, (iterations, error) = solver.solve(residual, guess, state.sound)
+    after, _ = system.advance(nodal(change), before, drive)
+    sound = state.sound & (error <= solver.tolerance_for(system.x.dtype))
+    end = system.end_displacement(after.q)
+    rest = jnp.where(drive.rough > 0.0, state.rest, end)
+    failure = jnp.where(jnp.isfinite(error), Status.MAX_ITERATIONS, Status.NOT_FINITE)
+    status = jnp.where(state.sound, failure, Status.NOT_REACHED)
+    motion = after.q[:, V] - before.q[:, V]
+    inelastic = plastic_slip(motion, before.traction, after.traction, system.slip_stiffness)
+    kept = jax.tree.map(lambda new, old: jnp.where(sound, new, old), after, before)
+    new = State(kept, rest, sound)
+    return new, Steps(
+        state=new,
+        displacement=end - rest,
+        slipping=(jnp.abs(inelastic) > SLIPS * jnp.abs(motion)) & (drive.rough > 0.0),
+        slip_work=drive.rough * system.slip_work(before, after),
+        stored_energy=system.stored_energy(after),
+        iterations=iterations,
+        error=error,
+        status=jnp.where(sound, Status.CONVERGED, status),
+    )
+
+
+def solve(
+    scene: Scene,
+    path: ArrayLike | None = None,
+    *,
+    solver: Newton | None = None,
+    throw: bool = True,
+) -> History:
+    """Press the strip down, walk a load path, and report what happened.
+
+    Parameters
+    ----------
+    scene : what is loaded; may hold traced leaves, so `jax.grad` and `jax.vmap` go through
+    path : (steps,) loads after zero, F or u(L) by ``scene.load.control``; None is the scene's own
+        cycles
+    solver : settings of Newton's method
+    throw : whether a step without equilibrium raises; if not, read ``history.status``
+
+    Returns
+    -------
+    History
+        steps without equilibrium hold NaN.
+
+    Raises
+    ------
+    InputError
+        if the path makes no sense or exceeds gross slip under force control
+    UnconvergedError
+        if a step has no equilibrium, even when it is walked in smaller steps
+    """
+    solver = solver or Newton()
+    targets, cycles = _targets(scene, path)
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((scene, targets)))
+    if not traced:
+        _check_gross_slip(scene, targets)
+    targets = jnp.append(jnp.zeros_like(targets[:1]), targets)
+    rough = jnp.ones_like(targets).at[0].set(0.0)
+    steps = _march(scene, _rest(scene), targets, rough, solver)
+    if not traced and not bool(steps.state.sound[-1]):
+        steps = _recover(scene, steps, targets, rough, solver)
+    if throw:
+        steps = _raise_if_failed(steps, targets, traced)
+    return _history(scene, steps, cycles)
+
+
+def compile_for(
+    scene: Scene, path: ArrayLike | None = None, *, solver: Newton | None = None
+) -> None:
+    """Compile what `solve` needs, without solving anything."""
+    targets, _ = _targets(scene, path)
+    targets = jnp.append(jnp.zeros_like(targets[:1]), targets)
+    start = _rest(scene)._replace(sound=jnp.asarray(False))
+    steps = _march(scene, start, targets, jnp.ones_like(targets), solver or Newton())
+    jax.block_until_ready(_history(scene, steps, ()))
+
+
+def _targets(
+    scene: Scene, path: ArrayLike | None
+) -> tuple[Array, tuple[tuple[int, int, int], ...]]:
+    if path is None:
+        unit = scene.load.unit_path()
+        return scene.load.amplitude * jnp.asarray(unit), closed_cycles(np.append(0.0, unit))
+    dtype = scene.load.amplitude.dtype
+    targets = jnp.asarray(path, dtype)
+    require("path", np.shape(path), targets.ndim == 1 and targets.size > 0, "give a list of loads")
+    if isinstance(targets, jax.core.Tracer):
+        return targets, ()
+    values = np.asarray(targets)
+    good = bool(np.all(np.isfinite(values)))
+    require("path", values[~np.isfinite(values)], good, "must hold finite loads only")
+    return targets, closed_cycles(np.append(0.0, values))
+
+
+def _check_gross_slip(scene: Scene, targets: Array) -> None:
+    if scene.load.control != "force":
+        return
+    system = System(scene)
+    mean = jnp.sum(system.tributary * system.pressure) / scene.strip.length
+    limit = float(gross_slip_force(scene.contact.friction, mean, scene.strip.length))
+    largest = float(jnp.max(jnp.abs(targets)))
+    require(
+        "load.amplitude",
+        largest,
+        largest < limit,
+        f"must stay below gross slip, mu F_N L = {limit:.6g}; "
+        "set load.control to 'displacement' to go beyond",
+    )
+
+
+def _rest(scene: Scene) -> State:
+    dtype = scene.strip.length.dtype
+    nodes = jnp.zeros(scene.model.nodes, dtype)
+    level = Level(jnp.zeros((nodes.size, 4), dtype), nodes, nodes, nodes, nodes[0])
+    return State(level, nodes[0], jnp.asarray(True))
+
+
+def _recover(scene: Scene, steps: Steps, targets: Array, rough: Array, solver: Newton) -> Steps:
+    """Walk every failed step in pieces and go on from there."""
+    while not bool(steps.state.sound[-1]):
+        first = int(np.argmin(np.asarray(steps.state.sound)))
+        if first == 0:  # the pressure step: there is no smaller one
+            return steps
+        origin = jax.tree.map(lambda a: a[first - 1], steps.state)  # noqa: B023
+        share = jnp.arange(1, PIECES + 1) / PIECES
+        between = targets[first - 1] + share * (targets[first] - targets[first - 1])
+        pieces = _march(scene, origin, between, jnp.ones_like(between), solver)
+        if not bool(pieces.state.sound[-1]):
+            return steps
+        joined = jax.tree.map(lambda a: a[-1], pieces)._replace(
+            slip_work=jnp.sum(pieces.slip_work),
+            iterations=steps.iterations[first] + jnp.sum(pieces.iterations),
+            slipping=jnp.any(pieces.slipping, axis=0),
+        )
+        # Same shapes as the first march, so nothing compiles anew: the path's end is repeated.
+        rest = jnp.minimum(jnp.arange(targets.size) + first + 1, targets.size - 1)
+        tail = _march(scene, joined.state, targets[rest], rough[rest], solver)
+        count = targets.size - first - 1
+        steps = jax.tree.map(
+            lambda head, piece, end: jnp.concatenate([head[:first], piece[None], end[:count]]),  # noqa: B023
+            steps,
+            joined,
+            tail,
+        )
+    return steps
+
+
+def _raise_if_failed(steps: Steps, targets: Array, traced: bool) -> Steps:
+    advice = (
+        "take more load.steps_per_half_cycle, a lower contact.stick_stiffness, or fewer model.nodes"
+    )
+    if traced:
+        message = f"a load step found no equilibrium: {advice}"
+        return eqx.error_if(steps, ~steps.state.sound[-1], message)
+    sound = np.asarray(steps.state.sound)
+    if sound.all():
+        return steps
+    first = int(np.argmin(sound))
+    where = f"load step {first} of {sound.size - 1} (load {float(targets[first]):.6g})"
+    where = where if first else "the pressure step"
+    reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
+    raise UnconvergedError(
+        f"{where} found no equilibrium ({reason}, out of balance {float(steps.error[first]):.2g} of "
+        f"mu F_N L): {advice}"
+    )
+
+
+def _history(scene: Scene, steps: Steps, cycles: Sequence[tuple[int, int, int]]) -> History:
+    system = System(scene)
+    sound, level = steps.state.sound, steps.state.level
+
+    def masked(values: Array) -> Array:
+        return jnp.where(sound.reshape(-1, *[1] * (values.ndim - 1)), values, jnp.nan)
+
+    return History(
+        scene=scene,
+        x=system.x,
+        tributary=system.tributary,
+        force=masked(level.force),
+        displacement=masked(steps.displacement),
+        fields=masked(level.q),
+        traction=masked(level.traction),
+        reaction=masked(level.reaction),
+        slipping=steps.slipping,
+        slip_work=masked(steps.slip_work),
+        stored_energy=masked(steps.stored_energy),
+        iterations=steps.iterations,
+        error=steps.error,
+        status=steps.status,
+        cycles=tuple(cycles),
+    )

@@ -1,0 +1,277 @@
+"""A Scene: everything that defines a run, as a frozen pytree whose physical parameters are leaves.
+
+``Scene()`` is the standard strip.  Units are the user's own, as long as they are consistent; forces
+are per unit width.  Dotted keys ("strip.height_ratio") name the same things in the TOML file, on the
+command line and among the free parameters of a fit.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+import tomli_w
+
+from jbeamshell.energy import Energy, Homogeneous
+from jbeamshell.errors import InputError
+from jbeamshell.files import write_text
+from jbeamshell.friction import CappedTrial, ElasticSlip, FrictionLaw, SharpSlip, TanhIncrement
+from jbeamshell.parts import Contact, Load, Model, Strip, as_leaf, require
+
+SECTIONS = {"strip": Strip, "contact": Contact, "load": Load, "model": Model}
+
+# Keys that set a leaf through others, in the order in which they apply.
+DERIVED = {
+    "strip.half_height": "strip.height_ratio",
+    "strip.youngs_modulus": "strip.axial_stiffness",
+}
+
+NUMBERS = (
+    "strip.length",
+    "strip.height_ratio",
+    "strip.half_height",
+    "strip.axial_stiffness",
+    "strip.youngs_modulus",
+    "strip.poisson_ratio",
+    "strip.kappa_s",
+    "contact.friction",
+    "contact.pressure",
+    "contact.stick_stiffness",
+    "contact.smoothing",
+    "load.amplitude",
+)
+COUNTS = ("load.cycles", "load.steps_per_half_cycle", "model.nodes")
+WORDS = (
+    "strip.far_end",
+    "contact.law",
+    "load.control",
+    "model.fields",
+    "model.kinematics",
+    "model.grid",
+    "model.constants",
+)
+KEYS = NUMBERS + COUNTS + WORDS
+
+_LAWS: dict[str, type[FrictionLaw]] = {
+    "elastic-slip": ElasticSlip,
+    "smooth-cap": CappedTrial,
+    "tanh-increment": TanhIncrement,
+}
+
+
+class Scene(eqx.Module):
+    """A strip, its contact, its load and the model of it.
+
+    Attributes
+    ----------
+    strip, contact, load, model : the parts
+    energy : the user's own strain energy Phi(e, g, k, psi, psi') per unit length, any JAX function
+        of five scalars (an `equinox.Module` may carry parameters); None is the homogeneous section
+    """
+
+    strip: Strip = eqx.field(default_factory=Strip)
+    contact: Contact = eqx.field(default_factory=Contact)
+    load: Load = eqx.field(default_factory=Load)
+    model: Model = eqx.field(default_factory=Model)
+    energy: Energy | None = None
+
+    def __check_init__(self) -> None:
+        if self.energy is None:
+            return
+        probe = [jax.ShapeDtypeStruct((), self.strip.length.dtype)] * 5
+        try:
+            shape = jax.eval_shape(self.energy, *probe)
+        except TypeError as error:
+            raise InputError(
+                f"energy: must be a function of (e, g, k, psi, psi'); {error}"
+            ) from None
+        require(
+            "energy",
+            self.energy,
+            getattr(shape, "shape", None) == (),
+            f"must return one number, not {shape}",
+        )
+
+    def strain_energy(self) -> Energy:
+        """Phi(e, g, k, psi, psi') of this scene's section."""
+        if self.energy is not None:
+            return self.energy
+        strip = self.strip
+        return Homogeneous(
+            half_height=strip.half_height,
+            plane_modulus=strip.plane_modulus,
+            poisson_ratio=strip.poisson_ratio,
+            kappa_s=strip.kappa_s,
+            squeeze="psi" in self.model.fields,
+            constants=self.model.constants,
+        )
+
+    def get(self, key: str) -> Any:
+        """The value behind a dotted key, e.g. ``scene.get("strip.height_ratio")``."""
+        check_key(key)
+        section, name = key.split(".")
+        if key == "contact.law":
+            return _law_name(self.contact.law)
+        return getattr(getattr(self, section), name)
+
+    def replace(self, values: Mapping[str, Any]) -> Scene:
+        """A copy with other values, e.g. ``scene.replace({"contact.friction": 0.2})``.
+
+        Keys are those of the TOML file and the command line; values may be traced, so gradients and
+        batches reach every number through it.
+        """
+        for key, value in values.items():
+            check_key(key)
+            _check_type(key, value)
+            if DERIVED.get(key) in values:
+                raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")
+        parts: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
+        for key, value in values.items():
+            if key not in DERIVED:
+                section, name = key.split(".")
+                parts[section][name] = value
+        contact = parts["contact"]
+        if "law" in contact or "smoothing" in contact:
+            contact["law"] = _make_law(self.contact.law, contact)
+        # A number keeps its meaning when the control changes only if it is given anew.
+        if parts["load"].get("control", self.load.control) != self.load.control:
+            parts["load"].setdefault("amplitude", None)
+        fresh = {
+            section: dataclasses.replace(getattr(self, section), **changes) if changes else None
+            for section, changes in parts.items()
+        }
+        scene = dataclasses.replace(self, **{k: v for k, v in fresh.items() if v is not None})
+        for key in DERIVED:
+            if key in values:
+                scene = dataclasses.replace(
+                    scene, strip=_set_derived(scene.strip, key, values[key])
+                )
+        return scene
+
+
+def check_key(key: str) -> None:
+    """Raise `InputError` for a key that does not exist, with the nearest one that does."""
+    if key not in KEYS:
+        near = difflib.get_close_matches(key, KEYS, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"keys are {', '.join(KEYS)}"
+        raise InputError(f"unknown key {key!r}: {hint}")
+
+
+def _set_derived(strip: Strip, key: str, value: Any) -> Strip:
+    if not isinstance(value, jax.core.Tracer) and not (np.isfinite(value) and value > 0.0):
+        raise InputError(f"{key} = {value!r}: must be a positive number")
+    value = as_leaf(value)
+    if key == "strip.half_height":
+        return dataclasses.replace(strip, height_ratio=2.0 * value / strip.length)
+    plane = value / (1.0 - strip.poisson_ratio**2)
+    return dataclasses.replace(strip, axial_stiffness=plane * 2.0 * strip.half_height)
+
+
+def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:
+    name = contact.pop("law", None) or _law_name(current)
+    smoothing = contact.pop("smoothing", getattr(current, "smoothing", "sharp"))
+    if isinstance(name, FrictionLaw):
+        return name
+    if name not in _LAWS:
+        raise InputError(f"contact.law = {name!r}: choose {' or '.join(map(repr, _LAWS))}")
+    sharp = isinstance(smoothing, str) or (
+        not isinstance(smoothing, jax.core.Tracer) and bool(np.isposinf(smoothing))
+    )
+    if name == "elastic-slip":
+        return SharpSlip() if sharp else ElasticSlip(as_leaf(smoothing))
+    if name == "smooth-cap":
+        return CappedTrial() if sharp else CappedTrial(as_leaf(smoothing))
+    return TanhIncrement()
+
+
+def _law_name(law: FrictionLaw) -> Any:
+    if isinstance(law, SharpSlip):
+        return "elastic-slip"
+    return next((name for name, kind in _LAWS.items() if type(law) is kind), law)
+
+
+def _check_type(key: str, value: Any) -> None:
+    number = isinstance(value, int | float | np.number | np.ndarray | jax.Array)
+    number = number and not isinstance(value, bool)
+    if key == "contact.pressure" and isinstance(value, list | tuple):
+        rows = all(isinstance(r, list | tuple) and len(r) == 2 for r in value)
+        if not rows or not all(
+            isinstance(c, int | float) and not isinstance(c, bool) for r in value for c in r
+        ):
+            raise InputError(f"{key} = {value!r}: give a number or a table of [X, F_N] rows")
+        return
+    if key == "contact.smoothing" and value == "sharp":
+        return
+    if key in NUMBERS and not number:
+        raise InputError(f"{key} = {value!r}: must be a number")
+    if key == "model.fields":
+        if isinstance(value, str) or not all(isinstance(f, str) for f in value):
+            raise InputError(f"{key} = {value!r}: give a list such as ['v', 'beta', 'psi']")
+    elif key in WORDS and not isinstance(value, str | FrictionLaw):
+        raise InputError(f"{key} = {value!r}: must be a word")
+
+
+def scene_from_values(values: Mapping[str, Any]) -> Scene:
+    """A scene from dotted keys on top of the standard strip."""
+    if values.get("load.control") == "displacement" and "load.amplitude" not in values:
+        return Scene(load=Load("displacement"))  # says what is missing
+    return Scene().replace(values)
+
+
+def read_values(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The dotted keys of a TOML file, flat."""
+    try:
+        text = Path(path).read_bytes().decode("utf-8")
+        tables = tomllib.loads(text)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: is not a TOML file ({error})") from None
+    values: dict[str, Any] = {}
+    for section, table in tables.items():
+        if section not in SECTIONS:
+            raise InputError(
+                f"{path}: unknown section {section!r}; sections are {', '.join(SECTIONS)}"
+            )
+        if not isinstance(table, dict):
+            raise InputError(f"{path}: {section} must be a table: write [{section}] above its keys")
+        values |= {f"{section}.{name}": value for name, value in table.items()}
+    return values
+
+
+def read_scene(path: str | os.PathLike[str]) -> Scene:
+    """The scene described by a TOML file; what it leaves out is the standard strip's."""
+    return scene_from_values(read_values(path))
+
+
+def scene_to_toml(scene: Scene) -> str:
+    """TOML text that `read_scene` turns into the same scene, to the last bit."""
+    if scene.energy is not None or not isinstance(_law_name(scene.contact.law), str):
+        raise InputError(
+            "energy, law: a user's own function cannot be written to TOML; keep it in code"
+        )
+    tables: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
+    for key in KEYS:
+        if key in DERIVED:
+            continue
+        section, name = key.split(".")
+        value = scene.get(key)
+        if key in NUMBERS:
+            value = np.asarray(value, dtype=float).tolist()
+        if key == "contact.smoothing" and np.isinf(value):
+            value = "sharp"
+        tables[section][name] = list(value) if isinstance(value, tuple) else value
+    return tomli_w.dumps(tables)
+
+
+def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write the scene as TOML, whole or not at all."""
+    write_text(path, scene_to_toml(scene))
