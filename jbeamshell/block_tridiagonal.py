@@ -1,4 +1,4 @@
-"""Block-tridiagonal linear algebra for residuals that couple only neighbouring blocks.  No physics."""
+"""Linear algebra of residuals that couple only neighbouring blocks.  No physics."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def _product(a: Array, b: Array) -> Array:
 
 
 def _gauss_jordan(augmented: Array) -> Array:
-    """Columns x of [a, b] reduced to [1, x] for a small block (m, m + columns), without pivoting."""
+    """Columns x of [a, b] reduced to [1, x] for a block (m, m + columns), without pivoting."""
     m = augmented.shape[0]
     for k in range(m):
         row = augmented[k] / augmented[k, k]

@@ -9,7 +9,8 @@ from jax import Array
 def complementarity(reaction: Array, lift: Array, stiffness: Array) -> Array:
     """Zero exactly where w >= 0, R >= 0 and w R = 0: the smaller of R and (stiffness times) w.
 
-    Newton's method on it is the primal-dual active-set iteration (Hintermueller, Ito & Kunisch 2002).
+    Newton's method on it is the primal-dual active-set iteration (Hintermueller, Ito & Kunisch
+    2002).
 
     Parameters
     ----------

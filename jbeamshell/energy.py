@@ -18,8 +18,8 @@ from collections.abc import Callable
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 from jax import Array
-from jax.typing import ArrayLike
 
 from jbeamshell.closed_form import shear_coefficient
 from jbeamshell.kinematics import Strains
@@ -43,10 +43,10 @@ class Homogeneous(eqx.Module):
         (eq. 3.45, 1/16 of the consistent one) and squeeze-shear stiffness (eq. 4.73, 24 times)
     """
 
-    half_height: ArrayLike
-    plane_modulus: ArrayLike
-    poisson_ratio: ArrayLike
-    kappa_s: ArrayLike
+    half_height: Array = eqx.field(converter=jnp.asarray)
+    plane_modulus: Array = eqx.field(converter=jnp.asarray)
+    poisson_ratio: Array = eqx.field(converter=jnp.asarray)
+    kappa_s: Array = eqx.field(converter=jnp.asarray)
     squeeze: bool = eqx.field(static=True, default=True)
     constants: str = eqx.field(static=True, default="consistent")
 

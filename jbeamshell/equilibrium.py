@@ -16,6 +16,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from jbeamshell import grid
@@ -122,19 +123,32 @@ class System(eqx.Module):
 
     def potential(self, q: Array) -> Array:
         """Strain energy plus the potential of the dead pressure on the top face, Pi."""
-        elements = grid.gather(q, grid.ORDER[self.model.grid])
-        strain = jax.vmap(self._element_energy)(elements, self.lengths)
-        top = jax.vmap(lambda s: self._kinematics.position(s, self.half_height, self.half_height))
-        return jnp.sum(strain) + jnp.sum(self.tributary * self.pressure * top(q)[1])
+        top = jax.vmap(lambda *s: self._kinematics.position(s, self.half_height, self.half_height))
+        return self.strain_energy(q) + jnp.sum(self.tributary * self.pressure * top(*q.T)[1])
 
-    def _element_energy(self, q: Array, length: Array) -> Array:
-        def point(values: Array, squeeze: Array, slopes: Array) -> Array:
-            section = (values @ q).at[PSI].set(squeeze @ q[:, PSI])
-            strains = self._kinematics.strains(section, slopes @ q / length, self.half_height)
-            return self.energy(*strains)
+    def strain_energy(self, q: Array) -> Array:
+        """Elastic energy of the strip with nodal fields q (n, 4), per unit width."""
+        order = grid.ORDER[self.model.grid]
+        # Fields apart, points last: the compiler then works on whole vectors of elements.
+        nodal = tuple(grid.gather(column, order) for column in q.T)
+        return jnp.sum(jax.vmap(self._element_energy)(nodal, self.lengths))
 
-        rule = self._rule
-        return length * rule.weights @ jax.vmap(point)(rule.values, rule.squeeze, rule.slopes)
+    def _element_energy(self, nodal: tuple[Array, ...], length: Array) -> Array:
+        """Energy of an element from the nodal values (p+1,) of every field."""
+
+        def at(shape: np.ndarray, values: Array) -> Array:
+            return sum(float(s) * values[i] for i, s in enumerate(shape) if s != 0.0)
+
+        rule, energy = self._rule, jnp.zeros_like(length)
+        for point in range(rule.weights.size):
+            shapes = [rule.squeeze if field == PSI else rule.values for field in range(len(FIELDS))]
+            section = [
+                at(shape[point], values) for shape, values in zip(shapes, nodal, strict=True)
+            ]
+            slope = [at(rule.slopes[point], values) / length for values in nodal]
+            strains = self._kinematics.strains(section, slope, self.half_height)
+            energy = energy + float(rule.weights[point]) * length * self.energy(*strains)
+        return energy
 
     def end_displacement(self, q: Array) -> Array:
         """u(L): mid-height displacement of the loaded end, the conjugate of F."""

@@ -13,7 +13,7 @@ from jbeamshell.errors import InputError
 
 @contextlib.contextmanager
 def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A path to write to, renamed to ``path`` when the block ends well and removed when it does not."""
+    """A draft to write to, renamed to ``path`` when the block ends well, else removed."""
     target = Path(path)
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
@@ -24,7 +24,10 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield draft
         draft.chmod(0o666 & ~_umask())
-        draft.replace(target)
+        try:
+            draft.replace(target)
+        except OSError as error:
+            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
     finally:
         draft.unlink(missing_ok=True)
 

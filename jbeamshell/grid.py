@@ -1,7 +1,7 @@
 r"""Nodes along X and the rule that integrates an element.
 
-One family of rules: an element of order p has p+1 Gauss-Lobatto nodes, strains are collocated at its
-p Gauss points, and friction, contact and pressure act at the nodes with Lobatto weights.
+One family of rules: an element of order p has p+1 Gauss-Lobatto nodes, strains are collocated at
+its p Gauss points, and friction, contact and pressure act at the nodes with Lobatto weights.
 
 * ``finite-difference``: p = 1, the midpoint (box) scheme, second order.  The squeeze strain itself
   (not its slope) is taken at the two nodes instead of the midpoint; that keeps its matrix an
@@ -9,9 +9,9 @@ p Gauss points, and friction, contact and pressure act at the nodes with Lobatto
   length.
 * ``collocation``: p = 2, the two-point Gauss scheme, fourth order on smooth problems.
 
-Nodes are dense at the loaded end X = L, where the traction concentrates: the element size h(d) at the
-distance d from it grows from ``end`` H linearly (which is geometric grading) up to ``far`` L, and the
-node count scales all sizes together, so that doubling it halves every element.
+Nodes are dense at the loaded end X = L, where the traction concentrates: the element size h(d) at
+the distance d from it grows from ``end`` H linearly (which is geometric grading) up to ``far`` L,
+and the node count scales all sizes together, so that doubling it halves every element.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def vertices(elements: int, length: ArrayLike, half_height: ArrayLike) -> Array:
     count = total * jnp.arange(elements, -1, -1) / elements
     graded = end * jnp.expm1(GROWTH * jnp.minimum(count, at_turn)) / GROWTH
     distance = graded + far * jnp.maximum(count - at_turn, 0.0)
-    x = length - distance
+    x = jnp.asarray(length) - distance
     return x.at[0].set(0.0).at[-1].set(length)
 
 

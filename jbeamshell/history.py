@@ -155,6 +155,13 @@ class History(eqx.Module):
         return jnp.max(jnp.abs(self.loop[1]))
 
     @property
+    def closure(self) -> Array:
+        """How far the last loop ends from where it starts, over its width; zero when steady."""
+        force, displacement = self.loop
+        answer = displacement if self.scene.load.control == "force" else force
+        return (answer[-1] - answer[0]) / jnp.ptp(answer)
+
+    @property
     def slip_length(self) -> Array:
         """Largest length of contact that slipped in one step of the last cycle."""
         start, _, stop = self._last
@@ -229,6 +236,7 @@ FIGURES = (
     "peak_displacement",
     "slip_length",
     "reaction_min",
+    "closure",
 )
 
 

@@ -9,7 +9,9 @@ T = (cos beta, sin beta) and B = (-sin beta, cos beta), the material point at he
 and the reference curve s = 0 has the strains (Libai & Simmonds 1998; Brink 2015, eqs. 3.22-3.23,
 with 3.39-3.40 extended by the lift and the squeeze strain)
 
-    e = (1+u_x') cos(beta) + u_y' sin(beta) - 1,   g = u_y' cos(beta) - (1+u_x') sin(beta),   k = beta'.
+    e = (1+u_x') cos(beta) + u_y' sin(beta) - 1,
+    g = u_y' cos(beta) - (1+u_x') sin(beta),
+    k = beta'.
 
 Inserting u_x = v - H(1+psi) sin(beta), u_y = w + H(1+psi) cos(beta) - H leaves
 
@@ -51,7 +53,7 @@ class Strains(NamedTuple):
 
 
 def _rotation(beta: Array) -> tuple[Array, Array, Array]:
-    """sin(beta), cos(beta) and 1 - cos(beta), from the half angle so that the last cannot cancel."""
+    """sin(beta), cos(beta) and 1 - cos(beta); the half angle keeps the last from cancelling."""
     sin, cos = jnp.sin(0.5 * beta), jnp.cos(0.5 * beta)
     versine = 2.0 * sin * sin
     return 2.0 * sin * cos, 1.0 - versine, versine

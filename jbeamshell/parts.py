@@ -7,6 +7,7 @@ leaves of a pytree, words and counts are static.  Every part checks itself when 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,7 +19,7 @@ from jax import Array
 
 from jbeamshell.energy import CONSTANTS
 from jbeamshell.errors import InputError
-from jbeamshell.friction import ElasticSlip, FrictionLaw, SharpSlip
+from jbeamshell.friction import CappedTrial, ElasticSlip, FrictionLaw, SharpSlip
 from jbeamshell.grid import ORDER
 from jbeamshell.kinematics import FIELDS, KINEMATICS
 
@@ -33,16 +34,35 @@ MODELS = (
 )
 STANDARD_AMPLITUDE = 0.7855
 
+NUMBER = "must be a number"
+POSITIVE = "must be a positive number"
+SMOOTHING = "must be a number above 1, or 'sharp'"
+PRESSURE = "give a number or a table of [X, F_N] rows"
 
-def as_leaf(value: Any) -> Array:
-    """A floating-point leaf; arrays keep their precision."""
+
+def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
+    """A floating-point leaf from numbers or nested lists of them; arrays keep their precision."""
     if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jnp.floating):
         return value
-    return jnp.asarray(value, dtype=jnp.result_type(float))
+    require(key, value, _numeric(value), fix)
+    try:
+        return jnp.asarray(value, dtype=jnp.result_type(float))
+    except (ValueError, OverflowError):  # rows of different length; whole numbers beyond any float
+        raise InputError(f"{key} = {_shown(value)}: {fix}") from None
 
 
-def _leaf(default: float) -> Any:
-    return eqx.field(converter=as_leaf, default=default)
+def _numeric(value: Any) -> bool:
+    """Whether there are only numbers in a value, words and truths being none."""
+    if isinstance(value, list | tuple):
+        return all(map(_numeric, value))
+    if isinstance(value, np.ndarray | np.generic | jax.Array):
+        return value.dtype.kind in "fiu"
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _leaf(key: str, default: float, fix: str = NUMBER) -> Any:
+    convert = functools.partial(as_leaf, key=key, fix=fix)
+    return eqx.field(converter=convert, default=default)
 
 
 def _static(default: Any) -> Any:
@@ -61,13 +81,15 @@ def _shown(value: Any) -> str:
     return repr(value)
 
 
-def _require_number(key: str, value: Any, fix: str, low: float = 0.0, high: float = np.inf) -> None:
+def require_number(
+    key: str, value: Any, fix: str = POSITIVE, low: float = 0.0, high: float = np.inf
+) -> None:
     """A single number strictly between low and high; traced values are left to the solver."""
     if isinstance(value, jax.core.Tracer):
         return
     number = np.asarray(value)
     require(key, value, number.ndim == 0, f"give one number, not an array of shape {number.shape}")
-    require(key, value, bool(np.isfinite(number)) and low < number < high, fix)
+    require(key, value, bool(np.isfinite(number) and low < number < high), fix)
 
 
 def _require_choice(key: str, value: Any, choices: Sequence[Any]) -> None:
@@ -88,26 +110,25 @@ class Strip(eqx.Module):
         only) or "free"
     """
 
-    length: Array = _leaf(2.0)
-    height_ratio: Array = _leaf(0.1126)
-    axial_stiffness: Array = _leaf(3.4e4)
-    poisson_ratio: Array = _leaf(0.3)
-    kappa_s: Array = _leaf(0.44)
+    length: Array = _leaf("strip.length", 2.0)
+    height_ratio: Array = _leaf("strip.height_ratio", 0.1126)
+    axial_stiffness: Array = _leaf("strip.axial_stiffness", 3.4e4)
+    poisson_ratio: Array = _leaf("strip.poisson_ratio", 0.3)
+    kappa_s: Array = _leaf("strip.kappa_s", 0.44)
     far_end: str = _static("held")
 
     def __check_init__(self) -> None:
-        positive = "must be a positive number"
-        _require_number("strip.length", self.length, positive)
-        _require_number("strip.height_ratio", self.height_ratio, positive + " (H over L/2)")
-        _require_number("strip.axial_stiffness", self.axial_stiffness, positive + " (E' 2H)")
-        _require_number(
+        require_number("strip.length", self.length)
+        require_number("strip.height_ratio", self.height_ratio, POSITIVE + " (H over L/2)")
+        require_number("strip.axial_stiffness", self.axial_stiffness, POSITIVE + " (E' 2H)")
+        require_number(
             "strip.poisson_ratio",
             self.poisson_ratio,
             "must lie between -1 and 0.5 (both excluded)",
             -1.0,
             0.5,
         )
-        _require_number("strip.kappa_s", self.kappa_s, positive + "; 0.44 fits the squeeze layer")
+        require_number("strip.kappa_s", self.kappa_s, POSITIVE + "; 0.44 fits the squeeze layer")
         _require_choice("strip.far_end", self.far_end, FAR_ENDS)
 
     @property
@@ -143,19 +164,16 @@ class Contact(eqx.Module):
     law : one contact point's friction law
     """
 
-    friction: Array = _leaf(0.1)
-    pressure: Array = _leaf(10.0)
-    stick_stiffness: Array = _leaf(1000.0)
+    friction: Array = _leaf("contact.friction", 0.1)
+    pressure: Array = _leaf("contact.pressure", 10.0, PRESSURE)
+    stick_stiffness: Array = _leaf("contact.stick_stiffness", 1000.0)
     law: FrictionLaw = eqx.field(default_factory=SharpSlip)
 
     def __check_init__(self) -> None:
-        positive = "must be a positive number"
-        _require_number("contact.friction", self.friction, positive)
-        _require_number("contact.stick_stiffness", self.stick_stiffness, positive)
-        if isinstance(self.law, ElasticSlip):
-            _require_number(
-                "contact.smoothing", self.law.smoothing, "must exceed 1, or be 'sharp'", low=1.0
-            )
+        require_number("contact.friction", self.friction)
+        require_number("contact.stick_stiffness", self.stick_stiffness)
+        if isinstance(self.law, ElasticSlip | CappedTrial):
+            require_number("contact.smoothing", self.law.smoothing, SMOOTHING, low=1.0)
         if not isinstance(self.pressure, jax.core.Tracer):
             self._check_pressure(np.asarray(self.pressure))
 
@@ -163,9 +181,7 @@ class Contact(eqx.Module):
     def _check_pressure(pressure: np.ndarray) -> None:
         key = "contact.pressure"
         table = pressure.ndim == 2 and pressure.shape[1] == 2 and pressure.shape[0] >= 2
-        require(
-            key, pressure, pressure.ndim == 0 or table, "give a number or a table of [X, F_N] rows"
-        )
+        require(key, pressure, pressure.ndim == 0 or table, PRESSURE)
         values = pressure[:, 1] if table else pressure
         require(
             key,
@@ -209,7 +225,7 @@ class Load(eqx.Module):
         self,
         control: str = "force",
         amplitude: Any = None,
-        cycles: int = 1,
+        cycles: int = 2,
         steps_per_half_cycle: int = 40,
     ) -> None:
         _require_choice("load.control", control, CONTROLS)
@@ -222,12 +238,12 @@ class Load(eqx.Module):
             )
             amplitude = STANDARD_AMPLITUDE
         self.control = control
-        self.amplitude = as_leaf(amplitude)
+        self.amplitude = as_leaf(amplitude, "load.amplitude")
         self.cycles = cycles
         self.steps_per_half_cycle = steps_per_half_cycle
 
     def __check_init__(self) -> None:
-        _require_number("load.amplitude", self.amplitude, "must be a positive number")
+        require_number("load.amplitude", self.amplitude)
         _require_count("load.cycles", self.cycles, 1)
         _require_count("load.steps_per_half_cycle", self.steps_per_half_cycle, 2)
         require(
@@ -247,7 +263,7 @@ class Load(eqx.Module):
 
 def _require_count(key: str, value: Any, low: int, high: int = 10**6) -> None:
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    require(key, value, whole and low <= value <= high, f"must be a whole number, {low} or more")
+    require(key, value, whole and low <= value <= high, f"must be a whole number, {low} to {high}")
 
 
 class Model(eqx.Module):

@@ -23,11 +23,17 @@ from jbeamshell.parts import require
 from jbeamshell.scene import Scene
 
 SLIPS = 0.5  # a node slips in a step when more than this part of its motion is inelastic
-PIECES = 8  # a load step that fails is walked in this many pieces
+NUDGE = 1e-6  # of the cap: elastic traction with which a reversed step starts
+ROUNDING = 1e-9  # of the cap: less traction than this is no slip
+PIECES = (8, 64)  # a load step that fails is walked in so many pieces, or so many
 
 
 class Newton(eqx.Module):
-    """Newton's method with a backtracking line search, differentiable at the root.
+    """Newton's method with a non-monotone line search, differentiable at the root.
+
+    Friction's kinks raise the residual for an iteration or two, by no more than the friction force
+    itself; a search that forbids this stalls there.  So a step is halved only when the residual
+    grows by more than that.
 
     Attributes
     ----------
@@ -38,7 +44,7 @@ class Newton(eqx.Module):
     """
 
     tolerance: float | None = eqx.field(static=True, default=None)
-    max_iterations: int = eqx.field(static=True, default=60)
+    max_iterations: int = eqx.field(static=True, default=100)
     max_halvings: int = eqx.field(static=True, default=8)
 
     def __check_init__(self) -> None:
@@ -58,13 +64,18 @@ class Newton(eqx.Module):
         return tolerance
 
     def solve(
-        self, residual: Callable[[Array], Array], guess: Array, enabled: Array
+        self,
+        residual: Callable[[Array], Array],
+        limit: Callable[[Array, Array], Array],
+        guess: Array,
+        enabled: Array,
     ) -> tuple[Array, tuple[Array, Array]]:
         """Find a root of a residual whose rows couple to neighbouring rows only.
 
         Parameters
         ----------
-        residual : (n, m) to (n, m)
+        residual : (n, m) to (n, m), in units of the friction force mu F_N L
+        limit : from an iterate and the next one to the one to go on with
         guess : (n, m)
         enabled : false skips the iteration
 
@@ -84,7 +95,7 @@ class Newton(eqx.Module):
                 x, r, count = state
                 _, linear = jax.linearize(function, x)
                 step = block_tridiagonal.solve(block_tridiagonal.jacobian(linear, x), -r)
-                x, r = self._search(function, x, r, step)
+                x, r = self._search(function, lambda s: limit(x, x + s * step), r)
                 return x, r, count + 1
 
             x, r, count = lax.while_loop(unfinished, improve, (start, function(start), 0))
@@ -97,31 +108,42 @@ class Newton(eqx.Module):
         return root, (count.astype(int), error)
 
     def _search(
-        self, function: Callable[[Array], Array], x: Array, r: Array, step: Array
+        self, function: Callable[[Array], Array], along: Callable[[Array], Array], r: Array
     ) -> tuple[Array, Array]:
-        """Halve the step until the residual's norm falls (Armijo's rule)."""
-        before = jnp.sum(r * r)
+        """Halve the step until the residual grows by no more than the friction force."""
+        bound = jnp.linalg.norm(r) + 1.0
 
-        def too_long(trial: tuple[Array, ...]) -> Array:
-            _, r_new, scale, halvings = trial
-            descends = jnp.sum(r_new * r_new) <= (1.0 - 1e-4 * scale) * before
-            return ~descends & (halvings < self.max_halvings)
+        def too_long(trial: tuple[Array, Array, Array]) -> Array:
+            _, r_new, scale = trial
+            return ~(jnp.linalg.norm(r_new) <= bound) & (scale > 0.5**self.max_halvings)
 
-        def halve(trial: tuple[Array, ...]) -> tuple[Array, ...]:
-            _, _, scale, halvings = trial
-            x_new = x + 0.5 * scale * step
-            return x_new, function(x_new), 0.5 * scale, halvings + 1
+        def halve(trial: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+            scale = 0.5 * trial[2]
+            x = along(scale)
+            return x, function(x), scale
 
-        full = (x + step, function(x + step), jnp.ones((), x.dtype), 0)
-        x_new, r_new, _, _ = lax.while_loop(too_long, halve, full)
-        return x_new, r_new
+        one = jnp.ones((), r.dtype)
+        x, r, _ = lax.while_loop(too_long, halve, (along(one), function(along(one)), one))
+        return x, r
 
 
 class State(NamedTuple):
-    """Where a path stands: the level reached, u(L) after the pressure, and whether all went well."""
+    """Where a path stands.
+
+    Attributes
+    ----------
+    level : the level reached
+    rest : u(L) after the pressure
+    target, stride : the controlled load reached, and its last increment
+    change : (blocks, size) the last increment of the unknowns
+    sound : whether all steps so far found equilibrium
+    """
 
     level: Level
     rest: Array
+    target: Array
+    stride: Array
+    change: Array
     sound: Array
 
 
@@ -161,10 +183,8 @@ _march = eqx.filter_jit(march)
 
 
 def _step(system: System, state: State, drive: Drive, solver: Newton) -> tuple[State, Steps]:
-    before, order = state.level, ORDER[system.model.grid]
-    active = len(system.model.active)
-    blocks = (system.x.size + order - 1) // order
-    padding = (blocks * order - system.x.size) * active
+    before, active = state.level, len(system.model.active)
+    padding = state.change.size - system.x.size * active
 
     def nodal(unknown: Array) -> Array:
         return unknown.ravel()[padding:].reshape(-1, active)
@@ -173,9 +193,18 @@ def _step(system: System, state: State, drive: Drive, solver: Newton) -> tuple[S
         balance = system.advance(nodal(unknown), before, drive)[1]
         return jnp.append(unknown.ravel()[:padding], balance.ravel()).reshape(unknown.shape)
 
-    # An element's later nodes share a block, so that blocks couple to their neighbours only.
-    guess = jnp.zeros((blocks, order * active), system.x.dtype)
-    change, (iterations, error) = solver.solve(residual, guess, state.sound)
+    def limit(old: Array, new: Array) -> Array:
+        slip, was = nodal(new)[:, V], nodal(old)[:, V]
+        limited = jax.vmap(system.law.limit, in_axes=(0, 0, 0, 0, None))(
+            was, slip, before.traction, before.cap, system.slip_stiffness
+        )
+        fields = nodal(new).at[:, V].set(jnp.where(drive.rough > 0.0, limited, slip))
+        return jnp.append(new.ravel()[:padding], fields.ravel()).reshape(new.shape)
+
+    stride = drive.target - state.target
+    change, (iterations, error) = solver.solve(
+        residual, limit, _guess(system, state, stride), state.sound
+    )
     after, _ = system.advance(nodal(change), before, drive)
     sound = state.sound & (error <= solver.tolerance_for(system.x.dtype))
     end = system.end_displacement(after.q)
@@ -184,18 +213,31 @@ def _step(system: System, state: State, drive: Drive, solver: Newton) -> tuple[S
     status = jnp.where(state.sound, failure, Status.NOT_REACHED)
     motion = after.q[:, V] - before.q[:, V]
     inelastic = plastic_slip(motion, before.traction, after.traction, system.slip_stiffness)
+    noticeable = system.slip_stiffness * jnp.abs(inelastic) > ROUNDING * after.cap
     kept = jax.tree.map(lambda new, old: jnp.where(sound, new, old), after, before)
-    new = State(kept, rest, sound)
+    new = State(kept, rest, drive.target, stride, drive.rough * change, sound)
     return new, Steps(
         state=new,
         displacement=end - rest,
-        slipping=(jnp.abs(inelastic) > SLIPS * jnp.abs(motion)) & (drive.rough > 0.0),
+        slipping=noticeable & (jnp.abs(inelastic) > SLIPS * jnp.abs(motion)) & (drive.rough > 0.0),
         slip_work=drive.rough * system.slip_work(before, after),
         stored_energy=system.stored_energy(after),
         iterations=iterations,
         error=error,
         status=jnp.where(sound, Status.CONVERGED, status),
     )
+
+
+def _guess(system: System, state: State, stride: Array) -> Array:
+    """Continue the last increment; after a reversal only its direction, so that every node sticks.
+
+    The direction matters: at the Coulomb cap, going on slips and going back sticks.
+    """
+    moving = state.stride != 0.0
+    ratio = jnp.where(moving, stride / jnp.where(moving, state.stride, 1.0), 0.0)
+    traction = system.slip_stiffness * jnp.max(jnp.abs(state.change))
+    nudge = -NUDGE * jnp.mean(state.level.cap) / jnp.where(traction > 0.0, traction, 1.0)
+    return lax.stop_gradient(jnp.where(ratio < 0.0, nudge, ratio) * state.change)
 
 
 def solve(
@@ -228,10 +270,8 @@ def solve(
         if a step has no equilibrium, even when it is walked in smaller steps
     """
     solver = solver or Newton()
-    targets, cycles = _targets(scene, path)
-    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((scene, targets)))
-    if not traced:
-        _check_gross_slip(scene, targets)
+    targets, cycles = check(scene, path)
+    traced = _is_traced(scene, targets)
     targets = jnp.append(jnp.zeros_like(targets[:1]), targets)
     rough = jnp.ones_like(targets).at[0].set(0.0)
     steps = _march(scene, _rest(scene), targets, rough, solver)
@@ -240,6 +280,20 @@ def solve(
     if throw:
         steps = _raise_if_failed(steps, targets, traced)
     return _history(scene, steps, cycles)
+
+
+def check(
+    scene: Scene, path: ArrayLike | None = None
+) -> tuple[Array, tuple[tuple[int, int, int], ...]]:
+    """The load path and its closed cycles; raises `InputError` where `solve` would."""
+    targets, cycles = _targets(scene, path)
+    if not _is_traced(scene, targets):
+        _check_gross_slip(scene, targets)
+    return targets, cycles
+
+
+def _is_traced(scene: Scene, targets: Array) -> bool:
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((scene, targets)))
 
 
 def compile_for(
@@ -287,10 +341,13 @@ def _check_gross_slip(scene: Scene, targets: Array) -> None:
 
 
 def _rest(scene: Scene) -> State:
-    dtype = scene.strip.length.dtype
-    nodes = jnp.zeros(scene.model.nodes, dtype)
+    model, dtype = scene.model, scene.strip.length.dtype
+    nodes = jnp.zeros(model.nodes, dtype)
     level = Level(jnp.zeros((nodes.size, 4), dtype), nodes, nodes, nodes, nodes[0])
-    return State(level, nodes[0], jnp.asarray(True))
+    # An element's later nodes share a block, so that blocks couple to their neighbours only.
+    order = ORDER[model.grid]
+    change = jnp.zeros(((model.nodes + order - 1) // order, order * len(model.active)), dtype)
+    return State(level, nodes[0], nodes[0], nodes[0], change, jnp.asarray(True))
 
 
 def _recover(scene: Scene, steps: Steps, targets: Array, rough: Array, solver: Newton) -> Steps:
@@ -300,10 +357,8 @@ def _recover(scene: Scene, steps: Steps, targets: Array, rough: Array, solver: N
         if first == 0:  # the pressure step: there is no smaller one
             return steps
         origin = jax.tree.map(lambda a: a[first - 1], steps.state)  # noqa: B023
-        share = jnp.arange(1, PIECES + 1) / PIECES
-        between = targets[first - 1] + share * (targets[first] - targets[first - 1])
-        pieces = _march(scene, origin, between, jnp.ones_like(between), solver)
-        if not bool(pieces.state.sound[-1]):
+        pieces = _walk_in_pieces(scene, origin, targets[first - 1], targets[first], solver)
+        if pieces is None:
             return steps
         joined = jax.tree.map(lambda a: a[-1], pieces)._replace(
             slip_work=jnp.sum(pieces.slip_work),
@@ -321,6 +376,17 @@ def _recover(scene: Scene, steps: Steps, targets: Array, rough: Array, solver: N
             tail,
         )
     return steps
+
+
+def _walk_in_pieces(
+    scene: Scene, origin: State, begin: Array, end: Array, solver: Newton
+) -> Steps | None:
+    for count in PIECES:
+        targets = begin + jnp.arange(1, count + 1) / count * (end - begin)
+        pieces = _march(scene, origin, targets, jnp.ones_like(targets), solver)
+        if bool(pieces.state.sound[-1]):
+            return pieces
+    return None
 
 
 def _raise_if_failed(steps: Steps, targets: Array, traced: bool) -> Steps:

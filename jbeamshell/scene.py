@@ -1,8 +1,8 @@
 """A Scene: everything that defines a run, as a frozen pytree whose physical parameters are leaves.
 
 ``Scene()`` is the standard strip.  Units are the user's own, as long as they are consistent; forces
-are per unit width.  Dotted keys ("strip.height_ratio") name the same things in the TOML file, on the
-command line and among the free parameters of a fit.
+are per unit width.  Dotted keys ("strip.height_ratio") name the same things in the TOML file, on
+the command line and among the free parameters of a fit.
 """
 
 from __future__ import annotations
@@ -23,8 +23,24 @@ import tomli_w
 from jbeamshell.energy import Energy, Homogeneous
 from jbeamshell.errors import InputError
 from jbeamshell.files import write_text
-from jbeamshell.friction import CappedTrial, ElasticSlip, FrictionLaw, SharpSlip, TanhIncrement
-from jbeamshell.parts import Contact, Load, Model, Strip, as_leaf, require
+from jbeamshell.friction import (
+    LAWS,
+    CappedTrial,
+    ElasticSlip,
+    FrictionLaw,
+    SharpSlip,
+    TanhIncrement,
+)
+from jbeamshell.parts import (
+    SMOOTHING,
+    Contact,
+    Load,
+    Model,
+    Strip,
+    as_leaf,
+    require,
+    require_number,
+)
 
 SECTIONS = {"strip": Strip, "contact": Contact, "load": Load, "model": Model}
 
@@ -130,7 +146,7 @@ class Scene(eqx.Module):
         """
         for key, value in values.items():
             check_key(key)
-            _check_type(key, value)
+            _check_word(key, value)
             if DERIVED.get(key) in values:
                 raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")
         parts: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
@@ -166,9 +182,8 @@ def check_key(key: str) -> None:
 
 
 def _set_derived(strip: Strip, key: str, value: Any) -> Strip:
-    if not isinstance(value, jax.core.Tracer) and not (np.isfinite(value) and value > 0.0):
-        raise InputError(f"{key} = {value!r}: must be a positive number")
-    value = as_leaf(value)
+    value = as_leaf(value, key)
+    require_number(key, value)
     if key == "strip.half_height":
         return dataclasses.replace(strip, height_ratio=2.0 * value / strip.length)
     plane = value / (1.0 - strip.poisson_ratio**2)
@@ -176,20 +191,19 @@ def _set_derived(strip: Strip, key: str, value: Any) -> Strip:
 
 
 def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:
-    name = contact.pop("law", None) or _law_name(current)
-    smoothing = contact.pop("smoothing", getattr(current, "smoothing", "sharp"))
-    if isinstance(name, FrictionLaw):
-        return name
-    if name not in _LAWS:
-        raise InputError(f"contact.law = {name!r}: choose {' or '.join(map(repr, _LAWS))}")
-    sharp = isinstance(smoothing, str) or (
-        not isinstance(smoothing, jax.core.Tracer) and bool(np.isposinf(smoothing))
-    )
+    name = contact.pop("law", _law_name(current))
+    given = contact.pop("smoothing", None)
+    smoothing = getattr(current, "smoothing", "sharp") if given is None else given
+    m = np.inf if isinstance(smoothing, str) else smoothing
+    exponent = as_leaf(m, "contact.smoothing", SMOOTHING)
+    sharp = not isinstance(exponent, jax.core.Tracer) and bool(np.isposinf(exponent).all())
     if name == "elastic-slip":
-        return SharpSlip() if sharp else ElasticSlip(as_leaf(smoothing))
+        return SharpSlip() if sharp else ElasticSlip(exponent)
     if name == "smooth-cap":
-        return CappedTrial() if sharp else CappedTrial(as_leaf(smoothing))
-    return TanhIncrement()
+        return CappedTrial() if sharp else CappedTrial(exponent)
+    unused = given is None or sharp
+    require("contact.smoothing", given, unused, f"contact.law {name!r} has none; leave it out")
+    return name if isinstance(name, FrictionLaw) else TanhIncrement()
 
 
 def _law_name(law: FrictionLaw) -> Any:
@@ -198,25 +212,20 @@ def _law_name(law: FrictionLaw) -> Any:
     return next((name for name, kind in _LAWS.items() if type(law) is kind), law)
 
 
-def _check_type(key: str, value: Any) -> None:
-    number = isinstance(value, int | float | np.number | np.ndarray | jax.Array)
-    number = number and not isinstance(value, bool)
-    if key == "contact.pressure" and isinstance(value, list | tuple):
-        rows = all(isinstance(r, list | tuple) and len(r) == 2 for r in value)
-        if not rows or not all(
-            isinstance(c, int | float) and not isinstance(c, bool) for r in value for c in r
-        ):
-            raise InputError(f"{key} = {value!r}: give a number or a table of [X, F_N] rows")
-        return
-    if key == "contact.smoothing" and value == "sharp":
-        return
-    if key in NUMBERS and not number:
-        raise InputError(f"{key} = {value!r}: must be a number")
-    if key == "model.fields":
-        if isinstance(value, str) or not all(isinstance(f, str) for f in value):
-            raise InputError(f"{key} = {value!r}: give a list such as ['v', 'beta', 'psi']")
-    elif key in WORDS and not isinstance(value, str | FrictionLaw):
-        raise InputError(f"{key} = {value!r}: must be a word")
+def _check_word(key: str, value: Any) -> None:
+    """Types of the static values; numbers check theirs when they become leaves."""
+    if key == "contact.law":
+        known = isinstance(value, FrictionLaw) or value in LAWS
+        require(key, value, known, f"choose {' or '.join(map(repr, LAWS))}")
+    elif key == "contact.smoothing" and isinstance(value, str):
+        require(key, value, value == "sharp", SMOOTHING)
+    elif key == "model.fields":
+        words = isinstance(value, list | tuple) and all(isinstance(f, str) for f in value)
+        require(key, value, words, "give a list such as ['v', 'beta', 'psi']")
+    elif key in WORDS:
+        require(key, value, isinstance(value, str), "must be a word")
+    elif key in NUMBERS:
+        require(key, value, value is not None, "must be a number")
 
 
 def scene_from_values(values: Mapping[str, Any]) -> Scene:
@@ -224,6 +233,13 @@ def scene_from_values(values: Mapping[str, Any]) -> Scene:
     if values.get("load.control") == "displacement" and "load.amplitude" not in values:
         return Scene(load=Load("displacement"))  # says what is missing
     return Scene().replace(values)
+
+
+def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Dotted keys with others on top; half_height replaces height_ratio and the like."""
+    same = DERIVED | {primary: derived for derived, primary in DERIVED.items()}
+    displaced = {same[key] for key in overrides if key in same}
+    return {k: v for k, v in values.items() if k not in displaced} | dict(overrides)
 
 
 def read_values(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -1,0 +1,187 @@
+"""The command line: a thin skin over the library."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import tomllib
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+
+from jbeamshell import __version__
+from jbeamshell.errors import InputError, UnconvergedError
+
+BAD_INPUT, UNCONVERGED, INTERRUPTED = 2, 3, 130
+EXAMPLE_START = {"contact.friction": 0.15, "strip.height_ratio": 0.2}
+EXAMPLE_FREE = "contact.friction,strip.height_ratio"
+CLOSES = 1e-3  # of its width: a loop that ends further off is not steady yet
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    jax.config.update("jax_enable_x64", True)
+    try:
+        return options.run(options)
+    except InputError as error:
+        return _complain(error, BAD_INPUT)
+    except UnconvergedError as error:
+        return _complain(error, UNCONVERGED)
+    except KeyboardInterrupt:
+        return _complain("interrupted: nothing was written", INTERRUPTED)
+
+
+def _complain(error: object, code: int) -> int:
+    print(f"jbeamshell: {' '.join(str(error).split())}", file=sys.stderr)
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="jbeamshell",
+        description="Beamshells on a rough foundation: hysteresis by micro-slip, and fits to it.",
+        epilog="exit codes: 0 done, 2 bad input, 3 a load step or a fit did not converge",
+    )
+    parser.add_argument("--version", action="version", version=f"jbeamshell {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="load a strip to and fro and report its hysteresis")
+    run.add_argument("scene", nargs="?", metavar="SCENE.toml", help="default: the standard strip")
+    run.set_defaults(run=_run)
+
+    fit = commands.add_parser("fit", help="fit a strip's parameters to a loop")
+    fit.add_argument(
+        "data", nargs="?", metavar="DATA.csv", help="default: the finite-element loops that ship"
+    )
+    fit.add_argument("--scene", metavar="SCENE.toml", help="what stays fixed; default standard")
+    fit.add_argument(
+        "--free", metavar="KEY,KEY,...", default=EXAMPLE_FREE, help=f"default {EXAMPLE_FREE}"
+    )
+    fit.add_argument(
+        "--start",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="where a free parameter starts",
+    )
+    fit.set_defaults(run=_fit)
+    for command in (run, fit):
+        command.add_argument(
+            "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key"
+        )
+        command.add_argument("--json", action="store_true", help="print the result as JSON")
+        command.add_argument("--out", metavar="DIR", help="write tables and pictures there")
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    from jbeamshell import output, quasistatic
+
+    scene = _scene(options.scene, options.set)
+    quasistatic.check(scene)
+    folder = output.make_folder(options.out) if options.out else None
+    _say("compiling ...")
+    begin = time.perf_counter()
+    quasistatic.compile_for(scene)
+    compiled = time.perf_counter()
+    _say(f"compiled in {compiled - begin:.1f} s, solving ...")
+    history = jax.block_until_ready(quasistatic.solve(scene))
+    finished = time.perf_counter()
+    timing = {"wall_s": finished - compiled, "compile_s": compiled - begin}
+    figures = history.figures() | timing
+    if abs(figures["closure"]) > CLOSES:
+        _warn("the last loop does not close: give more load.cycles for a steady one")
+    if figures["reaction_min"] < 0.0:
+        _warn(
+            f"tension at the contact (reaction_min = {figures['reaction_min']:.4g}): the lift is "
+            "frozen; add w to model.fields for unilateral contact, or take fewer model.nodes"
+        )
+    print(output.as_json(figures) if options.json else history, end="" if options.json else "\n")
+    if folder is not None:
+        _say_written(output.write_run(folder, history, figures))
+    return 0
+
+
+def _fit(options: argparse.Namespace) -> int:
+    from tqdm import tqdm
+
+    from jbeamshell import identify, loops, output
+    from jbeamshell.example import example_loops
+
+    settings = _assignments(options.set)
+    start = _assignments(options.start)
+    data = loops.read_loops(options.data) if options.data else example_loops()
+    if not options.data:
+        start = EXAMPLE_START | start
+    free = [key.strip() for key in options.free.split(",") if key.strip()]
+    for key in start:
+        if key not in free:
+            raise InputError(f"--start {key}: is not among the free keys {', '.join(free)}")
+    scene = _scene(options.scene, [])
+    chosen = "load.control" in settings or options.scene
+    driver = identify.driver_of(data)
+    if not chosen and driver != scene.load.control:
+        settings |= {"load.control": driver, "load.amplitude": 1.0}
+        _say(f"the {driver} drives these loops (set load.control to override)")
+    scene = scene.replace(settings | start) if settings or start else scene
+    folder = output.make_folder(options.out) if options.out else None
+
+    begin = time.perf_counter()
+    with tqdm(total=identify.MAX_ITERATIONS, disable=None, file=sys.stderr, unit="step") as bar:
+
+        def progress(line: str) -> None:
+            bar.set_postfix_str(line)
+            bar.update()
+
+        result = identify.fit(data, scene, free, progress=progress)
+    wall = time.perf_counter() - begin
+    figures = result.figures() | {"wall_s": wall}
+    print(output.as_json(figures) if options.json else result, end="" if options.json else "\n")
+    if folder is not None:
+        _say_written(output.write_fit(folder, result, figures))
+    return 0
+
+
+def _scene(path: str | None, assignments: Sequence[str]) -> Any:
+    from jbeamshell.scene import overridden, read_values, scene_from_values
+
+    values = read_values(path) if path else {}
+    return scene_from_values(overridden(values, _assignments(assignments)))
+
+
+def _assignments(texts: Sequence[str]) -> dict[str, Any]:
+    values = {}
+    for text in texts:
+        key, separator, value = text.partition("=")
+        if not separator:
+            raise InputError(f"{text!r}: write KEY=VALUE, such as contact.friction=0.2")
+        values[key.strip()] = _value(value.strip())
+    return values
+
+
+def _value(text: str) -> Any:
+    """A TOML value; what is none is a word, and commas between words make a list."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return [word.strip() for word in text.split(",")] if "," in text else text
+
+
+def _say(text: str) -> None:
+    if sys.stderr.isatty():
+        print(text, file=sys.stderr)
+
+
+def _warn(text: str) -> None:
+    print(f"jbeamshell: warning: {text}", file=sys.stderr)
+
+
+def _say_written(paths: Sequence[Any]) -> None:
+    print("wrote " + ", ".join(map(str, paths)), file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

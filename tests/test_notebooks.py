@@ -1,0 +1,60 @@
+"""The notebooks run from top to bottom, and are committed with what they show."""
+
+import os
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+import jbeamshell
+
+FOLDER = Path(__file__).parents[1] / "notebooks"
+NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
+
+
+def code_cells(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def test_there_are_notebooks():
+    assert NOTEBOOKS
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+class TestNotebook:
+    def test_runs(self, path, monkeypatch):
+        places = [str(Path(jbeamshell.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, places)))
+        monkeypatch.delenv("MPLBACKEND", raising=False)  # the notebook's own, as users see it
+        notebook = nbformat.read(path, as_version=4)
+        for cell in code_cells(notebook):
+            cell.outputs, cell.execution_count = [], None
+        NotebookClient(
+            notebook,
+            timeout=120,
+            kernel_name="python3",
+            resources={"metadata": {"path": str(FOLDER)}},
+        ).execute()
+        assert pictures(notebook) == pictures(nbformat.read(path, as_version=4)) > 0
+
+    def test_is_committed_with_its_outputs(self, path):
+        cells = code_cells(nbformat.read(path, as_version=4))
+        counts = [cell.execution_count for cell in cells]
+        assert counts == list(range(1, len(cells) + 1)), "run it from top to bottom and save it"
+        kinds = {
+            output.get("name", output.output_type) for cell in cells for output in cell.outputs
+        }
+        assert not kinds & {"error", "stderr"}
+
+    def test_is_small_and_carries_no_trace_of_the_machine(self, path):
+        notebook = nbformat.read(path, as_version=4)
+        assert path.stat().st_size < 1_000_000
+        assert notebook.metadata.kernelspec.name == "python3"
+        assert not any(cell.metadata for cell in notebook.cells)
+
+
+def pictures(notebook):
+    """How many pictures the notebook shows."""
+    outputs = [output for cell in code_cells(notebook) for output in cell.outputs]
+    return sum("image/png" in output.get("data", {}) for output in outputs)

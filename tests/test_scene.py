@@ -1,0 +1,394 @@
+"""Scenes: TOML to the last bit, clear refusals, and gradients that reach every number."""
+
+import pathlib
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from jbeamshell import Contact, InputError, Load, Model, Scene, Strip, read_scene, scene_to_toml
+from jbeamshell.files import written_whole
+from jbeamshell.friction import CappedTrial, ElasticSlip, FrictionLaw, SharpSlip, TanhIncrement
+from jbeamshell.parts import FAR_ENDS, MODELS
+from jbeamshell.scene import DERIVED, KEYS, NUMBERS, write_scene
+
+TABLE = [[0.0, 3.0], [0.7, 0.0], [2.0, 12.5]]
+
+# --- files --------------------------------------------------------------------------------------
+
+positive = st.floats(1e-200, 1e200)
+
+
+@st.composite
+def tables(draw):
+    x = sorted(draw(st.sets(st.floats(-1e3, 1e3), min_size=2, max_size=5)))
+    pressure = draw(st.lists(st.floats(0, 1e3), min_size=len(x) - 1, max_size=len(x) - 1))
+    return [list(row) for row in zip(x, [*pressure, 1.0], strict=True)]
+
+
+@st.composite
+def values_of_all_keys(draw):
+    law = draw(st.sampled_from(["elastic-slip", "smooth-cap", "tanh-increment"]))
+    smoothing = st.just("sharp") if law == "tanh-increment" else st.floats(1.01, 1e3)
+    return {
+        "strip.length": draw(positive),
+        "strip.height_ratio": draw(positive),
+        "strip.axial_stiffness": draw(positive),
+        "strip.poisson_ratio": draw(st.floats(-0.99999, 0.49999)),
+        "strip.kappa_s": draw(positive),
+        "strip.far_end": draw(st.sampled_from(FAR_ENDS)),
+        "contact.friction": draw(positive),
+        "contact.pressure": draw(positive | tables()),
+        "contact.stick_stiffness": draw(positive),
+        "contact.smoothing": draw(smoothing | st.just("sharp")),
+        "contact.law": law,
+        "load.control": draw(st.sampled_from(["force", "displacement"])),
+        "load.amplitude": draw(positive),
+        "load.cycles": draw(st.integers(1, 1000)),
+        "load.steps_per_half_cycle": 2 * draw(st.integers(1, 1000)),
+        "model.fields": draw(st.sampled_from(MODELS)),
+        "model.kinematics": draw(st.sampled_from(["exact", "linear"])),
+        "model.grid": draw(st.sampled_from(["finite-difference", "collocation"])),
+        "model.nodes": 2 * draw(st.integers(1, 1000)) + 1,
+        "model.constants": draw(st.sampled_from(["consistent", "printed"])),
+    }
+
+
+def same(one, other):
+    """Equal structure, words and bits."""
+    return jax.tree.structure(one) == jax.tree.structure(other) and all(
+        a.dtype == b.dtype and np.array_equal(a, b)
+        for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True)
+    )
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return tmp_path_factory.mktemp("scenes") / "scene.toml"
+
+
+@given(values=values_of_all_keys())
+def test_toml_keeps_every_bit(path, values):
+    assert set(values) == set(KEYS) - set(DERIVED)
+    scene = Scene().replace(values)
+    write_scene(scene, path)
+    again = read_scene(path)
+    assert same(again, scene)
+    for key, value in values.items():
+        if key != "contact.smoothing":  # the traps have no sharp end
+            got = again.get(key)
+            assert np.array_equal(got, value), key
+
+
+def test_an_empty_file_is_the_standard_strip(path):
+    path.write_text("")
+    assert same(read_scene(path), Scene())
+
+
+def test_a_readable_file(path):
+    path.write_text(
+        "[strip]\nhalf_height = 0.5\nlength = 4\n[contact]\nsmoothing = 8\n"
+        f"pressure = {TABLE}\n[model]\nfields = ['v', 'beta']\n"
+    )
+    scene = read_scene(path)
+    assert (scene.strip.height_ratio, scene.contact.smoothing) == (0.25, 8.0)
+    assert scene.model.fields == ("v", "beta")
+    np.testing.assert_allclose(
+        scene.contact.pressure_at(jnp.array([-1.0, 0.35, 0.7, 1.35, 9.0])), [3, 1.5, 0, 6.25, 12.5]
+    )
+
+
+def test_own_functions_stay_in_code():
+    for own in (Scene(energy=lambda *strains: strains[0] ** 2), Scene(contact=Contact(law=Own()))):
+        with pytest.raises(InputError, match="cannot be written to TOML"):
+            scene_to_toml(own)
+
+
+class Own(FrictionLaw):
+    """A user's law."""
+
+    def traction(self, dv, t_n, cap, k_t):
+        return t_n
+
+
+def test_written_whole_or_not_at_all(tmp_path):
+    target = tmp_path / "scene.toml"
+    target.write_text("old")
+
+    def interrupted(error):
+        with written_whole(target) as draft:
+            draft.write_text("half a")
+            assert target.read_text() == "old"
+            assert draft.parent == tmp_path  # so that the renaming stays on one file system
+            raise error
+
+    for error in (OSError("disk full"), KeyboardInterrupt()):
+        with pytest.raises(type(error)):
+            interrupted(error)
+        assert target.read_text() == "old"
+        assert list(tmp_path.iterdir()) == [target]
+    with written_whole(target) as draft:
+        draft.write_text("new")
+    assert target.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_renaming_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
+    target = tmp_path / "scene.toml"
+    target.write_text("old")
+
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(pathlib.Path, "replace", refuse)
+    with pytest.raises(InputError, match="cannot be written"):
+        write_scene(Scene(), target)
+    assert target.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize("name", ["missing/scene.toml", "."])
+def test_places_that_cannot_be_written(tmp_path, name):
+    with pytest.raises(InputError, match=r"cannot be written \((No such file|Is a dir)"):
+        write_scene(Scene(), tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+# --- keys ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("derived", DERIVED)
+@pytest.mark.parametrize("value", [0.37, 5e4])
+def test_derived_keys_are_read_back(derived, value):
+    before = Scene().replace({"strip.length": 3.0, "strip.poisson_ratio": 0.2})
+    scene = before.replace({derived: value})
+    np.testing.assert_allclose(scene.get(derived), value, rtol=1e-15)
+    assert scene.get(DERIVED[derived]) != before.get(DERIVED[derived])
+    for key in set(NUMBERS) - {*DERIVED, DERIVED[derived], "contact.smoothing"}:
+        assert scene.get(key) == before.get(key)
+
+
+def test_derived_keys_apply_after_what_they_depend_on():
+    values = {"strip.youngs_modulus": 7e4, "strip.half_height": 0.2, "strip.poisson_ratio": 0.1}
+    scene = Scene().replace(values | {"strip.length": 5.0})
+    for key, value in values.items():
+        np.testing.assert_allclose(scene.get(key), value, rtol=1e-15)
+    np.testing.assert_allclose(scene.strip.axial_stiffness, 7e4 / (1 - 0.01) * 0.4, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("values", "law"),
+    [
+        ({}, SharpSlip()),
+        ({"contact.smoothing": 8}, ElasticSlip(8.0)),
+        ({"contact.smoothing": np.inf}, SharpSlip()),
+        ({"contact.law": "smooth-cap"}, CappedTrial()),
+        ({"contact.law": "smooth-cap", "contact.smoothing": 8}, CappedTrial(8.0)),
+        ({"contact.law": "tanh-increment"}, TanhIncrement()),
+        ({"contact.law": Own()}, Own()),
+    ],
+)
+def test_friction_laws_by_name(values, law):
+    got = Scene().replace(values).contact.law
+    assert type(got) is type(law)
+    assert jax.tree.leaves(got) == jax.tree.leaves(law)
+
+
+def test_a_law_keeps_its_exponent():
+    smooth = Scene().replace({"contact.smoothing": 8})
+    assert smooth.replace({"contact.friction": 0.2}).contact.smoothing == 8
+    assert smooth.replace({"contact.law": "smooth-cap"}).contact.law.smoothing == 8
+    assert smooth.replace({"contact.smoothing": "sharp"}).contact.smoothing == np.inf
+
+
+@pytest.mark.parametrize(
+    ("key", "near"),
+    [
+        ("strip.hight_ratio", "strip.height_ratio"),
+        ("contact.mu_friction", "contact.friction"),
+        ("friction", "contact.friction"),
+        ("model.node", "model.nodes"),
+        ("load.steps", "load."),
+    ],
+)
+def test_unknown_keys_name_the_nearest(key, near):
+    for ask in (Scene().get, lambda k: Scene().replace({k: 1.0})):
+        with pytest.raises(InputError, match=rf"unknown key '{key}': did you mean '{near}"):
+            ask(key)
+
+
+# --- bad input ----------------------------------------------------------------------------------
+
+SIZES = ["length", "height_ratio", "half_height", "axial_stiffness", "youngs_modulus", "kappa_s"]
+POSITIVE = [f"strip.{name}" for name in SIZES] + [
+    "contact.friction",
+    "contact.stick_stiffness",
+    "load.amplitude",
+]
+FLOATS = [-2.0, 0.0, float("nan"), float("inf")]
+NO_NUMBERS = ["2.0", True, [1.0, 2.0], np.array([1.0, 2.0]), None, {"a": 1}, 10**400, 1j]
+BAD = [
+    *[(key, value, "must be a positive number") for key in POSITIVE for value in FLOATS],
+    *[(key, value, "number") for key in NUMBERS for value in NO_NUMBERS],
+    *[("strip.poisson_ratio", value, "between -1 and 0.5") for value in (-1.0, 0.5, 0.7, np.nan)],
+    *[("contact.smoothing", value, "above 1, or 'sharp'") for value in (1, -8.0, np.nan, "blunt")],
+    ("contact.pressure", 0.0, "press the strip down"),
+    ("contact.pressure", -1.0, "press the strip down"),
+    ("contact.pressure", [], r"table of \[X, F_N\] rows"),
+    ("contact.pressure", [[0.0, 1.0]], r"table of \[X, F_N\] rows"),
+    ("contact.pressure", [[0.0, 1.0], [2.0]], r"table of \[X, F_N\] rows"),
+    ("contact.pressure", [[0.0, 1.0, 2.0]] * 2, r"table of \[X, F_N\] rows"),
+    ("contact.pressure", [[0.0, 1.0], [1.0, True]], r"table of \[X, F_N\] rows"),
+    ("contact.pressure", [[1.0, 1.0], [0.0, 2.0]], "X must increase"),
+    ("contact.pressure", [[0.0, 1.0], [0.0, 2.0]], "X must increase"),
+    ("contact.pressure", [[0.0, 1.0], [1.0, -0.1]], "nowhere negative"),
+    ("contact.pressure", [[0.0, 0.0], [1.0, 0.0]], "somewhere positive"),
+    ("contact.pressure", [[0.0, 1.0], [np.nan, 1.0]], "finite"),
+    ("load.cycles", 0, "whole number, 1 to"),
+    ("load.cycles", 1.5, "whole number, 1 to"),
+    ("load.steps_per_half_cycle", 0, "whole number, 2 to"),
+    ("load.steps_per_half_cycle", 7, "must be even"),
+    ("model.nodes", 2, "whole number, 3 to"),
+    ("model.nodes", 41.0, "whole number, 3 to"),
+    ("model.nodes", True, "whole number, 3 to"),
+    ("model.nodes", "many", "whole number, 3 to"),
+    ("model.fields", ["v", "psi"], "make no model; choose"),
+    ("model.fields", ["beta"], "make no model; choose"),
+    ("model.fields", [], "make no model; choose"),
+    ("model.fields", ["v", "theta"], "fields are v, w, beta, psi"),
+    ("model.fields", "v", "give a list"),
+    ("model.fields", 3, "give a list"),
+    ("model.kinematics", "euler", "choose 'exact' or 'linear'"),
+    ("model.grid", 3, "must be a word"),
+    ("model.constants", "print", "choose 'consistent' or 'printed'"),
+    ("strip.far_end", "glued", "choose 'held' or 'pinned' or 'free'"),
+    ("load.control", "stress", "choose 'force' or 'displacement'"),
+    ("contact.law", "coulomb", "choose 'elastic-slip' or"),
+    ("contact.law", 3, "choose 'elastic-slip' or"),
+]
+
+
+def shown(value):
+    """A value as a message spells it."""
+    return repr(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+@pytest.mark.parametrize(("key", "value", "fix"), BAD)
+def test_bad_values_are_refused(key, value, fix):
+    with pytest.raises(InputError, match=fix) as caught:
+        Scene().replace({key: value})
+    told = str(caught.value)
+    number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+    assert told.startswith(f"{key} = ")
+    assert shown(value) in told or (number and shown(float(value)) in told)
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda: Strip(length="long"), "strip.length = 'long': must be a number"),
+        (lambda: Strip(kappa_s=-1), "strip.kappa_s = -1.0: must be a positive"),
+        (lambda: Contact(pressure="high"), "contact.pressure = 'high': give a number or a table"),
+        (lambda: Contact(law=CappedTrial(0.5)), "contact.smoothing = 0.5: must be a number above"),
+        (lambda: Load(amplitude=True), "load.amplitude = True: must be a number"),
+        (lambda: Load("displacement"), "load.amplitude = None: give the end displacement's"),
+        (lambda: Model(fields=("v", "psi")), r"model.fields = \['v', 'psi'\]: make no model"),
+    ],
+)
+def test_parts_check_themselves(make, told):
+    with pytest.raises(InputError, match=told):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        (
+            {"strip.half_height": 0.1, "strip.height_ratio": 0.1},
+            "strip.half_height and strip.height_ratio say the same thing",
+        ),
+        (
+            {"strip.axial_stiffness": 1e4, "strip.youngs_modulus": 1e4},
+            "strip.youngs_modulus and strip.axial_stiffness say the same thing",
+        ),
+        ({"model.grid": "collocation", "model.nodes": 40}, "model.nodes = 40: must be odd"),
+        ({"load.control": "displacement"}, "load.amplitude = None: give the end displacement's"),
+        (
+            {"contact.law": "tanh-increment", "contact.smoothing": 8.0},
+            "contact.smoothing = 8.0: contact.law 'tanh-increment' has none",
+        ),
+        ({"contact.law": Own(), "contact.smoothing": 8.0}, "contact.smoothing = 8.0: contact.law"),
+    ],
+)
+def test_values_that_do_not_go_together(values, told):
+    with pytest.raises(InputError, match=told):
+        Scene().replace(values)
+
+
+def test_an_amplitude_does_not_outlive_its_control():
+    moved = Scene().replace({"load.control": "displacement", "load.amplitude": 1e-5})
+    assert moved.replace({"contact.friction": 0.2}).load.amplitude == 1e-5
+    assert moved.replace({"load.control": "force"}).load.amplitude == Load().amplitude
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (b"[strip\n", "is not a TOML file"),
+        (b"\xff\xfe", "is not a TOML file"),
+        (b"[stripe]\nlength = 2.0", "unknown section 'stripe'; sections are strip, contact"),
+        (b"strip = 3", r"strip must be a table: write \[strip\]"),
+        (b"[strip]\nlenght = 2.0", "unknown key 'strip.lenght': did you mean 'strip.length'"),
+        (b"[strip]\nlength = 'two'", "strip.length = 'two': must be a number"),
+        (b"[strip]\nlength = 2024-01-01", "strip.length = .*: must be a number"),
+        (b"[load]\ncontrol = 'displacement'", "load.amplitude = None: give the end displacement"),
+    ],
+)
+def test_bad_files(path, text, told):
+    path.write_bytes(text)
+    with pytest.raises(InputError, match=told):
+        read_scene(path)
+
+
+@pytest.mark.parametrize(("name", "reason"), [("no.toml", "No such file"), (".", "Is a directory")])
+def test_files_that_cannot_be_read(tmp_path, name, reason):
+    with pytest.raises(InputError, match=rf"cannot be read \({reason}"):
+        read_scene(tmp_path / name)
+
+
+# --- gradients and batches ----------------------------------------------------------------------
+
+SMOOTH = Scene().replace({"contact.smoothing": 16.0})
+
+
+@pytest.mark.parametrize("key", NUMBERS)
+def test_gradients_and_batches_reach_every_number(key):
+    def weight(value):
+        leaves = jax.tree.leaves(SMOOTH.replace({key: value}))
+        return sum((i + 1.0) * jnp.log(leaf) for i, leaf in enumerate(leaves))
+
+    value = SMOOTH.get(key)
+    around = value * jnp.array([0.999999, 1.0, 1.000001])
+    below, here, above = jax.vmap(weight)(around)
+    np.testing.assert_allclose(here, weight(value), rtol=1e-14)
+    slope = jax.grad(weight)(value) * value
+    np.testing.assert_allclose(slope, (above - below) / 2e-6, rtol=1e-7)
+    assert abs(slope) > 0.5
+
+
+def test_gradients_reach_a_pressure_table():
+    def pressure(table):
+        scene = Scene().replace({"contact.pressure": table})
+        return scene.contact.pressure_at(jnp.array([1.35]))[0]
+
+    slope = jax.jit(jax.grad(pressure))(jnp.asarray(TABLE))
+    np.testing.assert_allclose(slope[:, 1], [0, 0.5, 0.5], rtol=1e-12)
+
+
+def test_the_load_path_turns_at_the_amplitude():
+    path = Load(cycles=3, steps_per_half_cycle=4).unit_path()
+    once = [0.5, 0, -0.5, -1, -0.5, 0, 0.5, 1]
+    np.testing.assert_allclose(path, [0.5, 1, *once * 3])
