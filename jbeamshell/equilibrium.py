@@ -1,8 +1,8 @@
 r"""Equilibrium of a scene at one load level: the one place where everything meets.
 
 Elastic energy and pressure have a potential Pi; friction has none, because its cap depends on the
-solution.  With q_i the fields of node i, l_i its tributary length, t its friction traction and F the
-end force, conjugate to the mid-height displacement u(L) of the loaded end,
+solution.  With q_i the fields of node i, l_i its tributary length, t its friction traction and F
+the end force, conjugate to the mid-height displacement u(L) of the loaded end,
 
     dPi/dq_i + l_i t_i (in the row of v_i) - F du(L)/dq_i = 0,        R_i = (dPi/dw_i)/l_i.
 
@@ -137,7 +137,7 @@ class System(eqx.Module):
         """Energy of an element from the nodal values (p+1,) of every field."""
 
         def at(shape: np.ndarray, values: Array) -> Array:
-            return sum(float(s) * values[i] for i, s in enumerate(shape) if s != 0.0)
+            return jnp.asarray(sum(float(s) * values[i] for i, s in enumerate(shape) if s != 0.0))
 
         rule, energy = self._rule, jnp.zeros_like(length)
         for point in range(rule.weights.size):

@@ -1,4 +1,4 @@
-"""History: what a load path did to the strip, step by step, and the figures engineers read off it."""
+"""History: what a load path did to the strip, and the figures engineers read off it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Status(enum.IntEnum):
 
 
 class History(eqx.Module):
-    """Result of a load path; index 0 of every step axis is the strip after the pressure, before load.
+    """Result of a load path; step 0 is the strip after the pressure, before any load.
 
     Steps that did not converge, and those after them, hold NaN.
 
@@ -119,7 +119,8 @@ class History(eqx.Module):
         """Area of the last loop, with each branch integrated by parabolas."""
         start, turn, stop = self._last
         down, up = slice(start, turn + 1), slice(turn, stop + 1)
-        return sum(branch_work(self.force[b], self.displacement[b]) for b in (down, up))
+        there, back = (branch_work(self.force[b], self.displacement[b]) for b in (down, up))
+        return there + back
 
     @property
     def dissipation_ratio(self) -> Array:

@@ -5,7 +5,7 @@ The only file that imports jaxopt.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -151,7 +151,7 @@ def fit(
     evaluate = _Evaluation(scene, tuple(free), task, solver or Newton())
 
     start = np.array([_unbound(key, float(scene.get(key))) for key in free])
-    residual, jacobian = evaluate(start)
+    _, jacobian = evaluate(start)
     if not evaluate.sound(start):
         raise UnconvergedError(
             "the model finds no equilibrium at the start values: start closer, or lower "

@@ -23,7 +23,7 @@ in which nothing of order one cancels.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -31,6 +31,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 FIELDS = ("v", "w", "beta", "psi")
+Section = Array | Sequence[Array]  # the four fields of one section, or their derivatives along X
 
 
 class Strains(NamedTuple):
@@ -59,7 +60,7 @@ def _rotation(beta: Array) -> tuple[Array, Array, Array]:
     return 2.0 * sin * cos, 1.0 - versine, versine
 
 
-def exact_strains(section: Array, slope: Array, half_height: ArrayLike) -> Strains:
+def exact_strains(section: Section, slope: Section, half_height: ArrayLike) -> Strains:
     """Geometrically exact strains of one section.
 
     Parameters
@@ -76,7 +77,7 @@ def exact_strains(section: Array, slope: Array, half_height: ArrayLike) -> Strai
     return Strains(e, g, dbeta, psi, dpsi)
 
 
-def linear_strains(section: Array, slope: Array, half_height: ArrayLike) -> Strains:
+def linear_strains(section: Section, slope: Section, half_height: ArrayLike) -> Strains:
     """Strains of one section for small displacements and rotations; see `exact_strains`."""
     _, _, beta, psi = section
     dv, dw, dbeta, dpsi = slope
@@ -84,7 +85,7 @@ def linear_strains(section: Array, slope: Array, half_height: ArrayLike) -> Stra
 
 
 def exact_position(
-    section: Array, half_height: ArrayLike, height: ArrayLike
+    section: Section, half_height: ArrayLike, height: ArrayLike
 ) -> tuple[Array, Array]:
     """Displacement (x, y) of the material point at ``height`` s above mid-height.
 
@@ -101,7 +102,7 @@ def exact_position(
 
 
 def linear_position(
-    section: Array, half_height: ArrayLike, height: ArrayLike
+    section: Section, half_height: ArrayLike, height: ArrayLike
 ) -> tuple[Array, Array]:
     """Displacement (x, y) for small displacements and rotations; see `exact_position`."""
     v, w, beta, psi = section
@@ -112,8 +113,8 @@ def linear_position(
 class Kinematics(NamedTuple):
     """A consistent pair of strains and positions."""
 
-    strains: Callable[[Array, Array, ArrayLike], Strains]
-    position: Callable[[Array, ArrayLike, ArrayLike], tuple[Array, Array]]
+    strains: Callable[[Section, Section, ArrayLike], Strains]
+    position: Callable[[Section, ArrayLike, ArrayLike], tuple[Array, Array]]
 
 
 KINEMATICS = {

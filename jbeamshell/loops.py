@@ -37,7 +37,8 @@ class Loop(NamedTuple):
     @property
     def closed(self) -> bool:
         """Whether it ends where it starts: a steady loop, not a first loading."""
-        return all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) for c in (self.force, self.displacement))
+        columns = (self.force, self.displacement)
+        return all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) for c in columns)
 
     def thinned(self, points: int, driver: str) -> Loop:
         """About ``points`` of the loop's points, even along the driving column; turns are kept."""
@@ -137,9 +138,10 @@ def _numbers(
             try:
                 table[i, j] = float(cell)
             except ValueError:
+                title = header[column].strip()
                 fix = "write numbers with a decimal point"
                 if i == 0:
-                    fix = f"if it is a row of units, put them into the header: '{header[column]} [{cell}]'"
+                    fix = f"if it is a row of units, put them into the header: '{title} [{cell}]'"
                 raise InputError(
                     f"{name}: row {i + 2}, column {header[column]!r} holds {cell!r}: {fix}"
                 ) from None
@@ -152,7 +154,7 @@ def _unit_factors(titles: Sequence[str], name: str) -> list[float]:
         return [1.0] * len(units)
     import pint  # only files with units pay for it
 
-    registry = pint.UnitRegistry()
+    registry: pint.UnitRegistry = pint.UnitRegistry()
     factors = []
     for title, unit, base in zip(titles, units, QUANTITIES.values(), strict=True):
         if unit is None:

@@ -98,7 +98,9 @@ class Newton(eqx.Module):
                 x, r = self._search(function, lambda s: limit(x, x + s * step), r)
                 return x, r, count + 1
 
-            x, r, count = lax.while_loop(unfinished, improve, (start, function(start), 0))
+            x, r, count = lax.while_loop(
+                unfinished, improve, (start, function(start), jnp.asarray(0))
+            )
             # As a float: custom_root has no tangent for integers.
             return x, (count.astype(x.dtype), jnp.max(jnp.abs(r)))
 
@@ -403,9 +405,9 @@ def _raise_if_failed(steps: Steps, targets: Array, traced: bool) -> Steps:
     where = f"load step {first} of {sound.size - 1} (load {float(targets[first]):.6g})"
     where = where if first else "the pressure step"
     reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
+    error = float(steps.error[first])
     raise UnconvergedError(
-        f"{where} found no equilibrium ({reason}, out of balance {float(steps.error[first]):.2g} of "
-        f"mu F_N L): {advice}"
+        f"{where} found no equilibrium ({reason}, out of balance {error:.2g} of mu F_N L): {advice}"
     )
 
 

@@ -80,7 +80,8 @@ def test_bar_hysteresis_closes_and_encloses_the_cubic_law():
     unload, reload = force[:points], force[points - 1 :]
 
     assert force.shape == displacement.shape == (2 * points - 1,)
-    assert (jnp.diff(unload) < 0).all() and (jnp.diff(reload) > 0).all()
+    assert (jnp.diff(unload) < 0).all()
+    assert (jnp.diff(reload) > 0).all()
     tip = cf.bar_backbone(amplitude, EA, Q)
     ends = displacement[jnp.array([0, points - 1, -1])]
     np.testing.assert_allclose(ends, tip * np.array([1, -1, 1]), rtol=1e-12)
