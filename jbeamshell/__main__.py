@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 import tomllib
@@ -31,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UnconvergedError as error:
         return _complain(error, UNCONVERGED)
     except KeyboardInterrupt:
-        return _complain("interrupted: nothing was written", INTERRUPTED)
+        return _complain("interrupted; no file is left half-written", INTERRUPTED)
 
 
 def _complain(error: object, code: int) -> int:
@@ -79,10 +80,12 @@ def _parser() -> argparse.ArgumentParser:
 
 def _run(options: argparse.Namespace) -> int:
     from jbeamshell import output, quasistatic
+    from jbeamshell.scene import overridden, read_values, scene_from_values
 
-    scene = _scene(options.scene, options.set)
+    values = read_values(options.scene) if options.scene else {}
+    scene = scene_from_values(overridden(values, _assignments(options.set)))
     quasistatic.check(scene)
-    folder = output.make_folder(options.out) if options.out else None
+    folder = output.check_folder(options.out) if options.out else None
     _say("compiling ...")
     begin = time.perf_counter()
     quasistatic.compile_for(scene)
@@ -99,7 +102,7 @@ def _run(options: argparse.Namespace) -> int:
             f"tension at the contact (reaction_min = {figures['reaction_min']:.4g}): the lift is "
             "frozen; add w to model.fields for unilateral contact, or take fewer model.nodes"
         )
-    print(output.as_json(figures) if options.json else history, end="" if options.json else "\n")
+    _print(output.as_json(figures) if options.json else f"{history}\n")
     if folder is not None:
         _say_written(output.write_run(folder, history, figures))
     return 0
@@ -110,24 +113,30 @@ def _fit(options: argparse.Namespace) -> int:
 
     from jbeamshell import identify, loops, output
     from jbeamshell.example import example_loops
+    from jbeamshell.parts import CONTROLS
+    from jbeamshell.scene import overridden, read_values, scene_from_values
 
-    settings = _assignments(options.set)
-    start = _assignments(options.start)
-    data = loops.read_loops(options.data) if options.data else example_loops()
-    if not options.data:
-        start = EXAMPLE_START | start
     free = [key.strip() for key in options.free.split(",") if key.strip()]
+    start = _assignments(options.start)
     for key in start:
         if key not in free:
             raise InputError(f"--start {key}: is not among the free keys {', '.join(free)}")
-    scene = _scene(options.scene, [])
-    chosen = "load.control" in settings or options.scene
-    driver = identify.driver_of(data)
-    if not chosen and driver != scene.load.control:
-        settings |= {"load.control": driver, "load.amplitude": 1.0}
+    values: dict[str, Any] = {}
+    if not options.data:
+        values |= {key: value for key, value in EXAMPLE_START.items() if key in free}
+    values = overridden(values, read_values(options.scene) if options.scene else {})
+    values = overridden(overridden(values, _assignments(options.set)), start)
+    data = loops.read_loops(options.data) if options.data else example_loops()
+    if "load.control" not in values:
+        driver = values["load.control"] = identify.driver_of(data)
         _say(f"the {driver} drives these loops (set load.control to override)")
-    scene = scene.replace(settings | start) if settings or start else scene
-    folder = output.make_folder(options.out) if options.out else None
+        if driver != "force":
+            values.pop("load.amplitude", None)
+    if "load.amplitude" not in values and values["load.control"] in CONTROLS:
+        drives = [getattr(loop, values["load.control"]) for loop in data]
+        values["load.amplitude"] = max(float(abs(drive).max()) for drive in drives)
+    scene = scene_from_values(values)
+    folder = output.check_folder(options.out) if options.out else None
 
     begin = time.perf_counter()
     with tqdm(total=identify.MAX_ITERATIONS, disable=None, file=sys.stderr, unit="step") as bar:
@@ -139,17 +148,10 @@ def _fit(options: argparse.Namespace) -> int:
         result = identify.fit(data, scene, free, progress=progress)
     wall = time.perf_counter() - begin
     figures = result.figures() | {"wall_s": wall}
-    print(output.as_json(figures) if options.json else result, end="" if options.json else "\n")
+    _print(output.as_json(figures) if options.json else f"{result}\n")
     if folder is not None:
         _say_written(output.write_fit(folder, result, figures))
     return 0
-
-
-def _scene(path: str | None, assignments: Sequence[str]) -> Any:
-    from jbeamshell.scene import overridden, read_values, scene_from_values
-
-    values = read_values(path) if path else {}
-    return scene_from_values(overridden(values, _assignments(assignments)))
 
 
 def _assignments(texts: Sequence[str]) -> dict[str, Any]:
@@ -159,15 +161,28 @@ def _assignments(texts: Sequence[str]) -> dict[str, Any]:
         if not separator:
             raise InputError(f"{text!r}: write KEY=VALUE, such as contact.friction=0.2")
         values[key.strip()] = _value(value.strip())
+    if isinstance(values.get("model.fields"), str):  # a single one, without a comma
+        values["model.fields"] = [values["model.fields"]]
     return values
 
 
 def _value(text: str) -> Any:
-    """A TOML value; what is none is a word, and commas between words make a list."""
+    """A TOML value; else a number such as .5, a word, or words in a list with commas between."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
+        pass
+    try:
+        return float(text)
+    except ValueError:
         return [word.strip() for word in text.split(",")] if "," in text else text
+
+
+def _print(text: str) -> None:
+    try:
+        print(text, end="", flush=True)
+    except BrokenPipeError:  # a reader such as head has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _say(text: str) -> None:

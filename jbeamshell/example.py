@@ -38,5 +38,9 @@ def example_loops(
     loops = read_loops(data_folder() / f"loops_eta{height_ratio:.4f}.csv")
     if amplitudes is None:
         return loops
-    wanted = {f"A = {amplitude:g}" for amplitude in amplitudes}
-    return [loop for loop in loops if loop.label in wanted]
+    by_label = {loop.label: loop for loop in loops}
+    wanted = [f"A = {amplitude:g}" for amplitude in amplitudes]
+    for label in wanted:
+        if label not in by_label:
+            raise InputError(f"amplitudes: there is no {label}; there are {', '.join(by_label)}")
+    return [by_label[label] for label in wanted]

@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.loops import Loop
-from jbeamshell.quasistatic import Newton, solve
+from jbeamshell.quasistatic import Newton, check, solve
 from jbeamshell.scene import NUMBERS, Scene, check_key
 
 POINTS = 96  # of a loop that the model is run through
 MAX_ITERATIONS = 40
 APPROACH = 8  # load steps from zero to the first point of the data
+FLAT = 1e-9  # relative gain in cost at which a fit has settled
 HOPELESS = 10.0  # residual, in ranges, of a trial without equilibrium: never accepted
 
 
@@ -79,8 +80,8 @@ class Fit(NamedTuple):
         from jbeamshell import plotting
 
         return plotting.overlay(
-            [(d.force, d.displacement, d.label) for d in self.data],
-            [(m.force, m.displacement, m.label) for m in self.model],
+            [(d.force, d.displacement, "data") for d in self.data],
+            [(m.force, m.displacement, f"model, {m.label}") for m in self.model],
             axes,
         )
 
@@ -130,14 +131,15 @@ def fit(
     solver : settings of Newton's method
     points : thin each loop to about so many points
     max_iterations : of the Levenberg-Marquardt method
-    tolerance : relative change of the parameters at which it stops
+    tolerance : relative change of the parameters at which it stops (a flat cost stops it too)
     progress : called with one line per iteration
     throw : whether an unfinished fit raises; if not, read ``status``
 
     Raises
     ------
     InputError
-        for keys that cannot be fitted, or that the loops do not depend on
+        for keys that cannot be fitted, or that the loops do not depend on, and for forces beyond
+        gross slip at the start values
     UnconvergedError
         if the iteration does not settle, or the model finds no equilibrium at the start
     """
@@ -148,6 +150,8 @@ def fit(
     driver = scene.load.control
     data = [loop.thinned(points, driver) for loop in data]
     task = _task(data, driver)
+    for path in task.path:
+        check(scene, path)
     evaluate = _Evaluation(scene, tuple(free), task, solver or Newton())
 
     start = np.array([_unbound(key, float(scene.get(key))) for key in free])
@@ -173,17 +177,20 @@ def fit(
     params = jnp.asarray(start)
     state = method.init_state(params)
     status = "max_iterations"
-    for iteration in range(1, max_iterations + 1):
+    for _ in range(max_iterations):
+        before = float(state.value)
         params, state = method.update(params, state)
         if progress:
-            progress(_line(iteration, max_iterations, free, params, state.residual))
-        if float(jnp.max(jnp.abs(state.delta))) < tolerance:
+            progress(_line(free, params, state.residual))
+        gained = before - float(state.value)  # nothing when the step was refused
+        if float(jnp.max(jnp.abs(state.delta))) < tolerance or 0.0 < gained < FLAT * before:
             status = "converged"
             break
     if throw and status != "converged":
         raise UnconvergedError(
-            f"the fit has not settled after {max_iterations} iterations: start closer, free fewer "
-            "parameters, or allow more iterations"
+            f"the fit has not settled after {max_iterations} iterations, at "
+            f"{_line(free, params, state.residual)}: start closer, free fewer parameters, or allow "
+            "more iterations"
         )
     return _result(scene, free, np.asarray(params), evaluate, data, task, driver, status)
 
@@ -255,15 +262,19 @@ def scene_at(scene: Scene, free: Sequence[str], params: Array) -> Scene:
 
 
 def _bound(key: str, p: Any) -> Any:
-    """From the whole real line to where the parameter lives: positive, or nu in (-1, 0.5)."""
+    """From the whole real line to where it lives: positive, m above 1, nu in (-1, 0.5)."""
     if key == "strip.poisson_ratio":
         return -1.0 + 1.5 / (1.0 + jnp.exp(-p))
+    if key == "contact.smoothing":
+        return 1.0 + jnp.exp(p)
     return jnp.exp(p)
 
 
 def _unbound(key: str, value: float) -> float:
     if key == "strip.poisson_ratio":
         return float(np.log((value + 1.0) / (0.5 - value)))
+    if key == "contact.smoothing":
+        return float(np.log(value - 1.0))
     return float(np.log(value))
 
 
@@ -325,8 +336,9 @@ def _result(
     compared = np.asarray(task.weight) > 0.0
     freedom = max(int(compared.sum()) - params.size, 1)
     noise = float(residual @ residual) / freedom
-    covariance = noise * np.linalg.pinv(jacobian.T @ jacobian)
-    sigma = np.sqrt(np.diag(covariance))
+    inverse = np.linalg.pinv(jacobian.T @ jacobian)
+    spread = np.sqrt(np.diag(inverse))
+    sigma = np.sqrt(noise) * spread
     scale = np.array(
         [
             float(jax.grad(lambda p, k=key: _bound(k, p))(x))
@@ -345,7 +357,7 @@ def _result(
         scene=scene.replace({k: float(_bound(k, p)) for k, p in zip(free, params, strict=True)}),
         values={k: float(_bound(k, p)) for k, p in zip(free, params, strict=True)},
         errors={k: float(e) for k, e in zip(free, scale * sigma, strict=True)},
-        correlation=covariance / np.outer(sigma, sigma),
+        correlation=inverse / np.outer(spread, spread),
         misfit=float(np.sqrt(np.mean(per_loop[compared] ** 2))),
         misfits=[
             float(np.sqrt(np.mean(r[m] ** 2))) for r, m in zip(per_loop, compared, strict=True)
@@ -357,8 +369,8 @@ def _result(
     )
 
 
-def _line(iteration: int, most: int, free: Sequence[str], params: Array, residual: Array) -> str:
-    values = "  ".join(
+def _line(free: Sequence[str], params: Array, residual: Array) -> str:
+    values = ", ".join(
         f"{k} = {float(_bound(k, p)):.6g}" for k, p in zip(free, params, strict=True)
     )
-    return f"step {iteration} of at most {most}: cost {float(jnp.sum(residual**2)):.4g}  {values}"
+    return f"{values}, cost {float(jnp.sum(residual**2)):.4g}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.errors import InputError
 
-QUANTITIES = {"force": "N", "displacement": "m"}
+# What they are measured in; a force per width is as good, as the model is of unit width.
+QUANTITIES = {"force": ("N", "N/m"), "displacement": ("m",)}
 GROUP_COLUMNS = ("loop", "a", "amplitude")
 FEWEST_POINTS = 8
 CLOSED = 0.05  # of the range: a loop whose ends lie closer than this is taken as closed
@@ -78,8 +79,9 @@ def read_loops(path: str | os.PathLike[str]) -> list[Loop]:
     """Loops of a table with a header row.
 
     One column's name must contain "force", another's "displacement".  A unit in brackets or after
-    an underscore ("force [kN]", "displacement_mm") converts the column to N and m; without units the
-    numbers are in the Scene's own.  A column "loop", "A" or "amplitude" separates several loops.
+    an underscore ("force [kN]", "displacement_mm") converts the column to N and m; without units
+    the numbers are in the Scene's own.  A column "loop", "A" or "amplitude" separates several
+    loops; it holds numbers.  Lines that start with "#" are comments.
 
     Parameters
     ----------
@@ -96,81 +98,115 @@ def read_loops(path: str | os.PathLike[str]) -> list[Loop]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file: give a CSV table") from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    if not lines:
-        raise InputError(f"{path}: is empty: give a header and rows of force and displacement")
-    delimiter = max(",;\t", key=lines[0].count)
-    header, *rows = list(csv.reader(lines, delimiter=delimiter))
+        raise InputError(f"{path}: is not text in UTF-8: save it as a CSV table in UTF-8") from None
+    header, rows = _rows(text, name)
     columns = {quantity: _find_column(header, quantity, name) for quantity in QUANTITIES}
-    group = next((i for i, h in enumerate(header) if h.strip().lower() in GROUP_COLUMNS), None)
+    if len(set(columns.values())) < len(columns):
+        raise InputError(
+            f"{name}: its first row is one column: separate columns by commas, semicolons or tabs"
+        )
+    if not rows:
+        raise InputError(f"{name}: holds a header only: give rows of force and displacement")
+    names = [re.sub(r"[\[(].*", "", title).strip().lower() for title in header]
+    group = next((i for i, title in enumerate(names) if title in GROUP_COLUMNS), None)
     wanted = [columns[q] for q in QUANTITIES] + ([] if group is None else [group])
     table = _numbers(rows, header, wanted, name)
-    factors = _unit_factors([header[columns[q]] for q in QUANTITIES], name)
+    factors = _unit_factors({q: header[columns[q]] for q in QUANTITIES}, name)
     force, displacement = table[:, 0] * factors[0], table[:, 1] * factors[1]
     if group is None:
         return [make_loop(force, displacement, name)]
     marks = table[:, 2]
-    return [
-        make_loop(force[marks == m], displacement[marks == m], f"{header[group].strip()} = {m:g}")
-        for m in dict.fromkeys(marks.tolist())
+    found = []
+    for mark in dict.fromkeys(marks.tolist()):
+        label, own = f"{header[group].strip()} = {mark:g}", marks == mark
+        try:
+            found.append(make_loop(force[own], displacement[own], label))
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from None
+    return found
+
+
+def _rows(text: str, name: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The header, and every further row with its line number."""
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
     ]
+    if not lines:
+        raise InputError(f"{name}: is empty: give a header and rows of force and displacement")
+    delimiter = max(",;\t", key=lines[0][1].count)
+    reader = csv.reader([line for _, line in lines], delimiter=delimiter)
+    try:
+        (_, header), *rows = [(lines[reader.line_num - 1][0], row) for row in reader]
+    except csv.Error as error:
+        line = lines[reader.line_num - 1][0]
+        raise InputError(f"{name}: line {line} is no row of a table ({error})") from None
+    return header, rows
 
 
 def _find_column(header: Sequence[str], quantity: str, name: str) -> int:
     found = [i for i, title in enumerate(header) if quantity in title.lower()]
     tangential = [i for i in found if "normal" not in header[i].lower()]
     if len(tangential) != 1:
-        held = ", ".join(repr(h.strip()) for h in header)
+        held = ", ".join(repr(h.strip()) for h in header)[:200]
+        fix = "rename the others" if tangential else "name it there"
         raise InputError(
-            f"{name}: needs one column named {quantity!r} in its first row, which holds {held}"
+            f"{name}: needs one column named {quantity!r} in its first row, which holds {held}: "
+            f"{fix}"
         )
     return tangential[0]
 
 
 def _numbers(
-    rows: list[list[str]], header: Sequence[str], wanted: list[int], name: str
+    rows: list[tuple[int, list[str]]], header: Sequence[str], wanted: list[int], name: str
 ) -> NDArray[np.float64]:
     table = np.empty((len(rows), len(wanted)))
-    for i, row in enumerate(rows):
+    for i, (line, row) in enumerate(rows):
         for j, column in enumerate(wanted):
-            cell = row[column].strip() if column < len(row) else ""
+            cell, title = row[column].strip() if column < len(row) else "", header[column].strip()
+            fix = "give a finite number, with a decimal point"
             try:
                 table[i, j] = float(cell)
             except ValueError:
-                title = header[column].strip()
-                fix = "write numbers with a decimal point"
-                if i == 0:
-                    fix = f"if it is a row of units, put them into the header: '{title} [{cell}]'"
-                raise InputError(
-                    f"{name}: row {i + 2}, column {header[column]!r} holds {cell!r}: {fix}"
-                ) from None
+                table[i, j] = np.nan
+                if i == 0 and j < len(QUANTITIES) and cell[:1] not in "+-.0123456789":
+                    unit = f"'{title} [{cell.strip('[()]')}]'"
+                    fix = f"if it is a row of units, put them into the header: {unit}"
+            if not np.isfinite(table[i, j]):
+                raise InputError(f"{name}: line {line}, column {title!r} holds {cell!r}: {fix}")
     return table
 
 
-def _unit_factors(titles: Sequence[str], name: str) -> list[float]:
-    units = [_unit(title) for title in titles]
-    if not any(units):
+def _unit_factors(titles: Mapping[str, str], name: str) -> list[float]:
+    units = {quantity: _unit(title) for quantity, title in titles.items()}
+    if not any(units.values()):
         return [1.0] * len(units)
     import pint  # only files with units pay for it
 
     registry: pint.UnitRegistry = pint.UnitRegistry()
-    factors = []
-    for title, unit, base in zip(titles, units, QUANTITIES.values(), strict=True):
-        if unit is None:
-            raise InputError(
-                f"{name}: column {title!r} names no unit but another does: write '{title} [{base}]'"
-            )
+
+    def factor(unit: str, base: str) -> float | None:
         try:
-            factors.append(float(registry.Quantity(1.0, unit).to(base).magnitude))
-        except (pint.errors.PintError, AttributeError, ValueError):
-            # A force per width is as good: the model is of unit width.
-            try:
-                factors.append(float(registry.Quantity(1.0, unit).to(f"{base}/m").magnitude))
-            except (pint.errors.PintError, AttributeError, ValueError):
-                raise InputError(
-                    f"{name}: column {title!r}: unit {unit!r} does not convert to {base}"
-                ) from None
+            return float(registry.Quantity(1.0, unit).to(base).magnitude)
+        except Exception:  # whatever pint's parser stumbles over, it is no unit
+            return None
+
+    factors = []
+    for quantity, unit in units.items():
+        title, bases = titles[quantity].strip(), QUANTITIES[quantity]
+        if unit is None:
+            fix = f"write '{title} [{bases[0]}]'"
+            raise InputError(
+                f"{name}: column {title!r} names no unit but the other one does: {fix}"
+            )
+        found = next((f for f in (factor(unit, base) for base in bases) if f), None)
+        if found is None:
+            raise InputError(
+                f"{name}: column {title!r}: {unit!r} is no unit of {quantity}: write one in "
+                f"brackets, such as '{quantity} [{bases[0]}]'"
+            )
+        factors.append(found)
     return factors
 
 

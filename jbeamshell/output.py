@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import csv
+import io
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,7 +18,7 @@ from jbeamshell.errors import InputError
 from jbeamshell.files import write_text
 from jbeamshell.history import History
 from jbeamshell.identify import Fit
-from jbeamshell.scene import write_scene
+from jbeamshell.scene import scene_to_toml
 
 
 def as_json(figures: Mapping[str, Any]) -> str:
@@ -23,31 +26,41 @@ def as_json(figures: Mapping[str, Any]) -> str:
     return json.dumps(figures, indent=2, allow_nan=False) + "\n"
 
 
-def make_folder(path: str | os.PathLike[str]) -> Path:
-    """The folder, made if need be."""
+def check_folder(path: str | os.PathLike[str]) -> Path:
+    """The folder, if it is there or can be made; nothing is made yet."""
     folder = Path(path)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        ground = next(p for p in (folder, *folder.parents) if p.exists())
     except OSError as error:
         raise InputError(f"--out {path}: cannot be made ({error.strerror})") from None
+    if not ground.is_dir():
+        raise InputError(f"--out {path}: {ground} is a file: name a folder")
+    if not os.access(ground, os.W_OK | os.X_OK):
+        raise InputError(f"--out {path}: {ground} cannot be written to: name another folder")
     return folder
 
 
 def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> list[Path]:
-    """Write loop.csv, profiles.csv, loop.png, profiles.png, scene.toml and result.json."""
-    write_text(folder / "loop.csv", loop_table(history))
-    write_text(folder / "profiles.csv", profile_table(history, turning_steps(history)))
-    plotting.save(history.plot().figure, folder / "loop.png")
-    plotting.save(np.ravel(history.plot_profiles())[0].figure, folder / "profiles.png")
-    if history.scene.energy is None:
-        write_scene(history.scene, folder / "scene.toml")
-    write_text(folder / "result.json", as_json(figures))
-    return sorted(p for p in folder.iterdir() if p.suffix in {".csv", ".png", ".toml", ".json"})
+    """Write loop.csv, profiles.csv, scene.toml, result.json, loop.png and profiles.png.
+
+    A scene with a user's own energy or law has no scene.toml.
+    """
+    texts = {
+        "loop.csv": loop_table(history),
+        "profiles.csv": profile_table(history, turning_steps(history)),
+        "result.json": as_json(figures),
+    }
+    with contextlib.suppress(InputError):
+        texts["scene.toml"] = scene_to_toml(history.scene)
+    pictures = {
+        "loop.png": history.plot().figure,
+        "profiles.png": np.ravel(history.plot_profiles())[0].figure,
+    }
+    return _write(folder, texts, pictures)
 
 
 def write_fit(folder: Path, result: Fit, figures: Mapping[str, Any]) -> list[Path]:
-    """Write overlay.png, overlay.csv, scene.toml (fitted) and result.json."""
-    plotting.save(result.plot().figure, folder / "overlay.png")
+    """Write overlay.csv, scene.toml (fitted), result.json and overlay.png."""
     rows = [
         (data.label, *values)
         for data, model in zip(result.data, result.model, strict=True)
@@ -56,10 +69,26 @@ def write_fit(folder: Path, result: Fit, figures: Mapping[str, Any]) -> list[Pat
         )
     ]
     header = ("loop", "force", "displacement", "model_force", "model_displacement")
-    write_text(folder / "overlay.csv", _table(header, rows))
-    write_scene(result.scene, folder / "scene.toml")
-    write_text(folder / "result.json", as_json(figures))
-    return [folder / n for n in ("overlay.png", "overlay.csv", "scene.toml", "result.json")]
+    texts = {
+        "overlay.csv": _table(header, rows),
+        "scene.toml": scene_to_toml(result.scene),
+        "result.json": as_json(figures),
+    }
+    return _write(folder, texts, {"overlay.png": result.plot().figure})
+
+
+def _write(folder: Path, texts: Mapping[str, str], pictures: Mapping[str, Any]) -> list[Path]:
+    """Write what is complete by now; so what cannot be put into words leaves no file behind."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made ({error.strerror})") from None
+    for name, text in texts.items():
+        write_text(folder / name, text)
+    for name, figure in pictures.items():
+        plotting.save(figure, folder / name)
+        plotting.plt.close(figure)
+    return [folder / name for name in (*texts, *pictures)]
 
 
 def turning_steps(history: History) -> list[int]:
@@ -95,8 +124,8 @@ def profile_table(history: History, steps: Sequence[int]) -> str:
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    def cell(value: Any) -> str:
-        text = repr(value) if isinstance(value, float) else str(value)
-        return f'"{text}"' if "," in text else text
-
-    return "\n".join([",".join(header), *(",".join(map(cell, row)) for row in rows)]) + "\n"
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue()

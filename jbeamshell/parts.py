@@ -7,6 +7,7 @@ leaves of a pytree, words and counts are static.  Every part checks itself when 
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Sequence
 from typing import Any
@@ -45,8 +46,12 @@ def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
     if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jnp.floating):
         return value
     require(key, value, _numeric(value), fix)
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value))
+    # Plain numbers stay concrete inside jit too, where they must still be checked.
+    concrete = contextlib.nullcontext() if traced else jax.ensure_compile_time_eval()
     try:
-        return jnp.asarray(value, dtype=jnp.result_type(float))
+        with concrete:
+            return jnp.asarray(value, dtype=jnp.result_type(float))
     except (ValueError, OverflowError):  # rows of different length; whole numbers beyond any float
         raise InputError(f"{key} = {_shown(value)}: {fix}") from None
 

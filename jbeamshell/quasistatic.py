@@ -24,7 +24,7 @@ from jbeamshell.scene import Scene
 
 SLIPS = 0.5  # a node slips in a step when more than this part of its motion is inelastic
 NUDGE = 1e-6  # of the cap: elastic traction with which a reversed step starts
-ROUNDING = 1e-9  # of the cap: less traction than this is no slip
+ROUNDING = 1e-9  # of the cap, or of gross slip: less than this is no difference
 PIECES = (8, 64)  # a load step that fails is walked in so many pieces, or so many
 
 
@@ -336,7 +336,7 @@ def _check_gross_slip(scene: Scene, targets: Array) -> None:
     require(
         "load.amplitude",
         largest,
-        largest < limit,
+        largest < (1.0 - ROUNDING) * limit,
         f"must stay below gross slip, mu F_N L = {limit:.6g}; "
         "set load.control to 'displacement' to go beyond",
     )

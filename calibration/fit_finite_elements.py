@@ -1,0 +1,107 @@
+"""Fit friction and height ratio (and the stick stiffness) to finite-element loops of five strips.
+
+The true values are mu = 0.1 and the eta of the file, so what is left is the model's bias.  Writes
+fitted_finite_elements.json and finite_elements.png beside this file:
+
+    python calibration/fit_finite_elements.py
+"""
+
+import json
+import platform
+import time
+from pathlib import Path
+
+import jax
+
+jax.config.update("jax_enable_x64", True)
+
+import jaxlib  # noqa: E402
+import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
+
+import jbeamshell as jb  # noqa: E402
+from jbeamshell import identify, plotting  # noqa: E402
+from jbeamshell.example import HEIGHT_RATIOS, example_loops  # noqa: E402
+from jbeamshell.files import write_text  # noqa: E402
+
+HERE = Path(__file__).parent
+FREE = {
+    "mu, eta": ("contact.friction", "strip.height_ratio"),
+    "mu, eta, alpha": ("contact.friction", "strip.height_ratio", "contact.stick_stiffness"),
+}
+TRUE_FRICTION = 0.1
+
+
+def study(height_ratio: float, free: tuple[str, ...]) -> tuple[identify.Fit, dict]:
+    """Fit one strip from a start that is half as high again and half as rough again."""
+    start = {"contact.friction": 0.15, "strip.height_ratio": 1.5 * height_ratio}
+    if "contact.stick_stiffness" in free:
+        start["contact.stick_stiffness"] = 30.0
+    begin = time.perf_counter()
+    fit = identify.fit(example_loops(height_ratio), jb.Scene().replace(start), free)
+    bias = {
+        "contact.friction": fit.values["contact.friction"] / TRUE_FRICTION - 1.0,
+        "strip.height_ratio": fit.values["strip.height_ratio"] / height_ratio - 1.0,
+    }
+    seconds = time.perf_counter() - begin
+    return fit, fit.figures() | {"relative_bias": bias, "wall_s_with_compilation": seconds}
+
+
+def main() -> None:
+    """Run all fits, print a table, write the record and the picture."""
+    record, fits = {}, {}
+    for height_ratio in HEIGHT_RATIOS:
+        record[f"{height_ratio:g}"] = {}
+        for name, free in FREE.items():
+            fit, figures = study(height_ratio, free)
+            record[f"{height_ratio:g}"][name] = figures
+            fits[height_ratio, name] = fit
+            bias = figures["relative_bias"]
+            print(
+                f"eta {height_ratio:<7g} free {name:15s} "
+                f"mu {100 * bias['contact.friction']:+.2f} %  "
+                f"eta {100 * bias['strip.height_ratio']:+.2f} %  "
+                f"misfit {100 * fit.misfit:.3f} %  {fit.model_runs} runs"
+            )
+    machine = {
+        "jax": jax.__version__,
+        "jaxlib": jaxlib.__version__,
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "dtype": "float64",
+    }
+    text = json.dumps({"provenance": machine, "true_friction": TRUE_FRICTION, "fits": record})
+    write_text(HERE / "fitted_finite_elements.json", json.dumps(json.loads(text), indent=1) + "\n")
+    plotting.save(picture(fits[0.1126, "mu, eta"]), HERE / "finite_elements.png")
+
+
+def picture(fit: identify.Fit) -> plt.Figure:
+    """The fitted loops over the finite elements, and what sticks and slips at the peak."""
+    with plotting.style():
+        figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2))
+        fit.plot(left)
+        values = fit.values
+        left.set_title(
+            f"fitted: $\\mu$ = {values['contact.friction']:.4f} (true 0.1), "
+            f"$\\eta$ = {values['strip.height_ratio']:.4f} (true 0.1126)"
+        )
+        history = jb.solve(fit.scene.replace({"load.amplitude": 1.0}))
+        start, turn, _ = history.cycles[-1]
+        shades = plotting.colours(5)
+        for step, shade in zip(np.linspace(start, turn, 5).astype(int), shades, strict=True):
+            cap = history.scene.contact.friction * 10.0
+            force = float(history.force[step])
+            right.plot(
+                history.x, history.traction[step] / cap, color=shade, label=f"F = {force:.2g}"
+            )
+        right.set(
+            xlabel="$X$  [length]",
+            ylabel="friction traction  $t/\\mu F_N$",
+            title="unloading from $F$ = 1: slip comes back from the loaded end",
+        )
+        right.legend()
+    return figure
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,49 @@
+"""Imports inside the package point downwards, and heavy libraries stay where they belong."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import jbeamshell
+
+PACKAGE = Path(jbeamshell.__file__).parent
+# fmt: off
+UPWARDS = [
+    "errors", "files", "kinematics", "closed_form", "energy", "friction", "contact", "grid",
+    "parts", "scene", "block_tridiagonal", "equilibrium", "history", "quasistatic", "loops",
+    "example", "identify", "plotting", "output", "__init__", "__main__",
+]
+# fmt: on
+ONLY = {"matplotlib": "plotting", "jaxopt": "identify", "pint": "loops"}
+
+
+def imports(module):
+    """What a module imports: (dotted name, whether at its top) each."""
+    for node in ast.walk(ast.parse((PACKAGE / f"{module}.py").read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.col_offset == 0) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module}: relative import"
+            yield from ((f"{node.module}.{a.name}", node.col_offset == 0) for a in node.names)
+
+
+def test_every_module_has_its_place():
+    assert sorted(UPWARDS) == sorted(path.stem for path in PACKAGE.glob("*.py"))
+
+
+@pytest.mark.parametrize("module", UPWARDS)
+def test_imports_point_downwards(module):
+    below = UPWARDS[: UPWARDS.index(module)]
+    for name, at_top in imports(module):
+        package, *rest = name.split(".")
+        if package == "jbeamshell" and at_top:
+            assert (rest[0] if rest[0] in UPWARDS else "__init__") in below, name
+        assert ONLY.get(package, module) == module, name
+
+
+def test_what_the_order_rests_on_is_seen():
+    assert ("jbeamshell.grid", True) in imports("equilibrium")
+    assert ("jbeamshell.plotting", False) in imports("history")
+    assert ("jaxopt", True) in imports("identify")
+    assert ("pint", False) in imports("loops")

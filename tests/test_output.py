@@ -1,0 +1,199 @@
+"""What a run or a fit leaves behind: every number to the last bit, whole files, nothing stray."""
+
+import csv
+import io
+import json
+import os
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import output, plotting
+from jbeamshell.energy import Homogeneous
+from jbeamshell.errors import InputError
+from jbeamshell.identify import Fit
+from jbeamshell.loops import Loop
+
+COARSE = {
+    "model.nodes": 21,
+    "model.kinematics": "linear",
+    "load.steps_per_half_cycle": 8,
+    "load.cycles": 1,
+}
+RUN_FILES = {"loop.csv", "profiles.csv", "result.json", "scene.toml", "loop.png", "profiles.png"}
+FIT_FILES = {"overlay.csv", "overlay.png", "result.json", "scene.toml"}
+
+
+@pytest.fixture(scope="module")
+def history():
+    return jb.solve(jb.Scene().replace(COARSE))
+
+
+@pytest.fixture
+def result():
+    """A fit of two loops with numbers that decimals cannot hold, under awkward names."""
+    random = np.random.default_rng(3)
+    data, model = (
+        [Loop(*random.standard_normal((2, n)) * 1e-7, label) for n, label in sizes]
+        for sizes in [[(5, "A = 1, left"), (4, 'the "old" rig')]] * 2
+    )
+    scene = jb.Scene().replace({"contact.friction": 1.0 / 3.0})
+    values = {"contact.friction": 1.0 / 3.0}
+    return Fit(
+        scene, values, values, np.eye(1), 0.1, [0.1, 0.2], data, model, "converged", model_runs=5
+    )
+
+
+def rows_of(text):
+    header, *rows = csv.reader(io.StringIO(text))
+    return header, rows
+
+
+def names(folder):
+    return {path.name for path in folder.iterdir()}
+
+
+def is_png(path):
+    return path.read_bytes().startswith(b"\x89PNG\r\n")
+
+
+# --- tables -------------------------------------------------------------------------------------
+
+
+def test_the_loop_table_keeps_every_bit(history):
+    header, rows = rows_of(output.loop_table(history))
+    assert header == [
+        *("step", "force", "displacement", "friction_work", "newton_iterations", "error")
+    ]
+    table = np.array(rows, dtype=float).T
+    assert table.shape == (6, 21)
+    np.testing.assert_array_equal(table[0], np.arange(21))
+    np.testing.assert_array_equal(table[1], history.force)
+    np.testing.assert_array_equal(table[2], history.displacement)
+    np.testing.assert_array_equal(table[3], np.cumsum(history.slip_work))
+    np.testing.assert_array_equal(table[4], history.iterations)
+    np.testing.assert_array_equal(table[5], history.error)
+    assert [row[4] for row in rows] == [str(int(i)) for i in history.iterations]
+
+
+def test_the_profile_table_keeps_every_bit(history):
+    steps = output.turning_steps(history)
+    assert steps == [0, 4, 12, 20]  # the pressure, the first peak, the turn, the end
+    header, rows = rows_of(output.profile_table(history, steps))
+    names = ["step", "force", "x", "slip", "w", "beta", "psi", "traction", "reaction", "slipping"]
+    assert header == names
+    assert len(rows) == 4 * 21
+    columns = dict(zip(header, zip(*rows, strict=True), strict=True))
+    assert set(columns["slipping"]) == {"True", "False"}
+    flags = np.array([c == "True" for c in columns["slipping"]]).reshape(4, 21)
+    np.testing.assert_array_equal(flags, history.slipping[np.array(steps)])
+    for name in names[3:-1]:
+        column = np.array(columns[name], dtype=float).reshape(4, 21)
+        np.testing.assert_array_equal(column, getattr(history, name)[np.array(steps)])
+    for name, values in (("x", [history.x] * 4), ("force", history.force[np.array(steps), None])):
+        column = np.array(columns[name], dtype=float).reshape(4, 21)
+        np.testing.assert_array_equal(column, np.broadcast_to(values, (4, 21)))
+
+
+def test_json_refuses_what_is_no_number():
+    third = 1.0 / 3.0
+    assert json.loads(output.as_json({"a": third, "b": [1, "c"]})) == {"a": third, "b": [1, "c"]}
+    for value in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="not JSON compliant"):
+            output.as_json({"a": [value]})
+
+
+# --- folders ------------------------------------------------------------------------------------
+
+
+def test_a_run_in_a_folder(history, tmp_path):
+    folder = tmp_path / "new" / "run"
+    open_figures = plt.get_fignums()
+    paths = output.write_run(folder, history, history.figures())
+    assert plt.get_fignums() == open_figures
+    assert {path.name for path in paths} == names(folder) == RUN_FILES
+    assert len(paths) == len(RUN_FILES)
+    assert (folder / "loop.csv").read_text() == output.loop_table(history)
+    assert (folder / "profiles.csv").read_text().count("\n") == 1 + 4 * 21
+    assert json.loads((folder / "result.json").read_text()) == history.figures()
+    assert jb.scene_to_toml(jb.read_scene(folder / "scene.toml")) == jb.scene_to_toml(history.scene)
+    assert is_png(folder / "loop.png")
+    assert is_png(folder / "profiles.png")
+
+
+def test_only_what_was_written_is_listed(history, tmp_path):
+    (tmp_path / "measured.csv").write_text("mine")
+    (tmp_path / "loop.csv").write_text("old")
+    paths = output.write_run(tmp_path, history, {})
+    assert {path.name for path in paths} == RUN_FILES
+    assert names(tmp_path) == RUN_FILES | {"measured.csv"}
+    assert (tmp_path / "measured.csv").read_text() == "mine"
+    assert (tmp_path / "loop.csv").read_text() == output.loop_table(history)
+
+
+def test_a_run_of_ones_own_energy_has_no_scene_file(history, tmp_path):
+    own = Homogeneous(0.1126, 1.5e5, 0.3, 0.44)
+    scene = jb.Scene(history.scene.strip, model=history.scene.model, energy=own)
+    paths = output.write_run(tmp_path, jb.History(**vars(history) | {"scene": scene}), {})
+    assert {path.name for path in paths} == names(tmp_path) == RUN_FILES - {"scene.toml"}
+
+
+def test_a_fit_in_a_folder(result, tmp_path):
+    folder = tmp_path / "fit"
+    open_figures = plt.get_fignums()
+    paths = output.write_fit(folder, result, result.figures())
+    assert plt.get_fignums() == open_figures
+    assert {path.name for path in paths} == names(folder) == FIT_FILES
+    header, rows = rows_of((folder / "overlay.csv").read_text())
+    assert header == ["loop", "force", "displacement", "model_force", "model_displacement"]
+    for i, (data, model) in enumerate(zip(result.data, result.model, strict=True)):
+        own = [row for row in rows if row[0] == data.label]
+        assert len(own) == (5, 4)[i]
+        table = np.array([row[1:] for row in own], dtype=float).T
+        np.testing.assert_array_equal(table, [*data[:2], *model[:2]])
+    assert jb.read_scene(folder / "scene.toml").contact.friction == 1.0 / 3.0
+    assert json.loads((folder / "result.json").read_text())["misfit"] == 0.1
+    assert is_png(folder / "overlay.png")
+
+
+def test_what_cannot_be_written_leaves_nothing(history, result, tmp_path):
+    folder = tmp_path / "out"
+    for write, what in ((output.write_run, history), (output.write_fit, result)):
+        with pytest.raises(ValueError, match="not JSON compliant"):
+            write(folder, what, {"loss_factor": np.nan})
+        assert not folder.exists()
+
+
+def test_an_interrupted_picture_leaves_whole_files(history, tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plotting.Figure, "savefig", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        output.write_run(tmp_path, history, {})
+    assert names(tmp_path) == {name for name in RUN_FILES if not name.endswith(".png")}
+    plt.close("all")
+
+
+def test_folders_are_checked_before_anything_is_made(tmp_path):
+    for folder in (tmp_path, tmp_path / "new", tmp_path / "new" / "nested"):
+        assert output.check_folder(folder) == folder
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["file", "file/below", "file/below/deeper"])
+def test_a_file_is_no_folder(tmp_path, name):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError, match=rf"--out .*{name}: .*/file is a file: name a folder"):
+        output.check_folder(tmp_path / name)
+    assert names(tmp_path) == {"file"}
+
+
+def test_folders_that_cannot_be_made(tmp_path, monkeypatch):
+    with pytest.raises(InputError, match=r"--out .*: cannot be made \(File name too long"):
+        output.check_folder(tmp_path / ("long" * 100))
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(InputError, match=r"--out .*new: .* cannot be written to: name another"):
+        output.check_folder(tmp_path / "new")

@@ -1,0 +1,194 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import closed_form, quasistatic
+from jbeamshell.friction import ElasticSlip
+
+SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
+KEYS = ("contact.friction", "strip.height_ratio", "strip.kappa_s", "contact.stick_stiffness")
+AT = jnp.array([0.1, 0.1126, 0.44, 1000.0])
+
+
+def test_bar_limit_gives_backbone_and_cubic_law():
+    history = jb.solve(jb.Scene().replace({"strip.height_ratio": 0.001}))
+    start = history.cycles[0][0]
+    loading = history.force[1 : start + 1]
+    backbone = closed_form.bar_backbone(loading, 3.4e4, 1.0)
+    assert float(history.dissipation_ratio) == pytest.approx(1.0, abs=2e-3)
+    assert float(jnp.max(jnp.abs(history.displacement[1 : start + 1] - backbone))) < 2e-3 * float(
+        backbone[-1]
+    )
+
+
+def test_steps_do_not_matter():
+    dissipation = [
+        float(jb.solve(jb.Scene().replace({"load.steps_per_half_cycle": n})).dissipation)
+        for n in (20, 40, 80, 160)
+    ]
+    error = np.abs(np.array(dissipation) / dissipation[-1] - 1.0)
+    assert error[0] < 5e-3
+    assert error[1] < 2e-3
+
+
+@pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-13), (16.0, 1e-4)])
+def test_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
+    scene = jb.Scene().replace({"model.nodes": 41, "contact.smoothing": smoothing})
+    history = jb.solve(scene, [*np.linspace(0.07, 0.7, 10), *[0.6, 0.7] * 100])
+    peaks = np.asarray(history.displacement[10::2])
+    assert abs(peaks[-1] - peaks[0]) / 100 < drift * peaks[0]
+    work = 0.7 * peaks[0]
+    assert float(jnp.sum(jnp.abs(history.slip_work[11:]))) / 100 < drift * work
+
+
+@pytest.mark.parametrize("smoothing", ["sharp", 8.0, 32.0])
+def test_smoothing_does_not_change_the_dissipation(smoothing):
+    scene = jb.Scene().replace(SMALL | {"contact.smoothing": smoothing})
+    assert float(jb.solve(scene).dissipation_ratio) == pytest.approx(0.7695, abs=2e-3)
+
+
+@pytest.mark.parametrize(("grid", "order"), [("finite-difference", 2.0), ("collocation", 4.0)])
+def test_order_of_convergence_in_the_grid(grid, order):
+    """A stuck strip on its elastic foundation is smooth: no slip front spoils the order."""
+
+    def end(nodes):
+        scene = jb.Scene().replace(
+            {
+                "model.grid": grid,
+                "model.nodes": nodes,
+                "model.kinematics": "linear",
+                "contact.friction": 100.0,
+                "contact.stick_stiffness": 3.0,
+            }
+        )
+        return float(jb.solve(scene, np.array([1.0])).displacement[-1])
+
+    values = np.array([end(nodes) for nodes in (21, 41, 81, 161)])
+    rate = np.log2(np.abs(np.diff(values)[:-1] / np.diff(values)[1:]))
+    assert rate[-1] == pytest.approx(order, abs=0.3)
+
+
+# --- gradients ------------------------------------------------------------------------------------
+
+
+def dissipation(values, **more):
+    scene = jb.Scene().replace(SMALL | more | dict(zip(KEYS, values, strict=True)))
+    return jb.solve(scene, throw=False).dissipation
+
+
+@pytest.mark.parametrize("smoothing", ["sharp", 16.0])
+def test_gradients_have_taylor_slope_two(smoothing):
+    function = jax.jit(lambda p: dissipation(p, **{"contact.smoothing": smoothing}))
+    value, gradient = jax.jit(
+        jax.value_and_grad(lambda p: dissipation(p, **{"contact.smoothing": smoothing}))
+    )(AT)
+    for i in range(len(KEYS)):
+        direction = jnp.zeros(4).at[i].set(AT[i])
+        # Small enough that no node changes between sticking and slipping on the way.
+        sizes = np.array([4e-4, 2e-4, 1e-4, 5e-5])
+        rest = [
+            abs(float(function(AT + h * direction) - value - h * gradient @ direction))
+            for h in sizes
+        ]
+        slope = np.polyfit(np.log(sizes), np.log(rest), 1)[0]
+        assert slope == pytest.approx(2.0, abs=0.1), KEYS[i]
+
+
+def test_forward_and_reverse_agree_and_batches_equal_loops():
+    reverse, forward = jax.jit(jax.grad(dissipation))(AT), jax.jit(jax.jacfwd(dissipation))(AT)
+    np.testing.assert_allclose(forward, reverse, rtol=1e-8)
+    points = AT * jnp.array([[1.0], [1.1], [0.8]])
+    batch = jax.jit(jax.vmap(dissipation))(points)
+    single = jnp.stack([jax.jit(dissipation)(p) for p in points])
+    np.testing.assert_allclose(batch, single, rtol=1e-10)
+
+
+def test_gradient_reaches_every_number_of_a_scene():
+    table = jnp.array([[0.0, 10.0], [1.0, 9.0], [2.0, 10.0]])
+    scene = jb.Scene(
+        contact=jb.Contact(pressure=table, law=ElasticSlip(16.0)),
+        load=jb.Load(steps_per_half_cycle=20, cycles=1),
+        model=jb.Model(nodes=41),
+    )
+    gradient = jax.jit(jax.grad(lambda s: jb.solve(s, throw=False).dissipation))(scene)
+    leaves = jax.tree.leaves(gradient)
+    assert len(leaves) == len(jax.tree.leaves(scene))
+    assert all(bool(jnp.all(jnp.isfinite(leaf)) and jnp.any(leaf != 0.0)) for leaf in leaves)
+
+
+# --- failure --------------------------------------------------------------------------------------
+
+
+def test_an_unconverged_step_is_never_silent():
+    lame = jb.Newton(max_iterations=1, tolerance=1e-12)
+    scene = jb.Scene().replace(SMALL)
+    with pytest.raises(jb.UnconvergedError, match=r"load step \d+ of 50 .* found no equilibrium"):
+        jb.solve(scene, solver=lame)
+    history = jb.solve(scene, solver=lame, throw=False)
+    first = int(np.argmax(np.asarray(history.status) > 0))
+    assert not history.converged
+    assert history.status[first] == jb.Status.MAX_ITERATIONS
+    assert set(np.asarray(history.status[first + 1 :]).tolist()) == {jb.Status.NOT_REACHED}
+    assert bool(jnp.all(jnp.isnan(history.force[first:])))
+    assert bool(jnp.all(jnp.isfinite(history.force[:first])))
+    assert bool(jnp.isnan(history.dissipation))
+
+
+def test_inside_a_transformation_the_failure_is_loud_too():
+    lame = jb.Newton(max_iterations=1)
+    run = jax.jit(
+        lambda mu: (
+            jb.solve(jb.Scene().replace(SMALL | {"contact.friction": mu}), solver=lame).dissipation
+        )
+    )
+    with pytest.raises(Exception, match="a load step found no equilibrium"):
+        jax.block_until_ready(run(0.1))
+
+
+def test_a_failed_step_is_walked_in_pieces(monkeypatch):
+    """The recovered path ends where a path with small steps ends."""
+    scene = jb.Scene().replace(SMALL | {"contact.smoothing": 16.0})
+    path = np.array([0.9, -0.9, 0.9])
+    eager = jb.Newton(max_iterations=100)
+    fine = jb.solve(
+        scene,
+        np.concatenate([np.linspace(a, b, 9)[1:] for a, b in ((0, 0.9), (0.9, -0.9), (-0.9, 0.9))]),
+        solver=eager,
+    )
+    needed = int(jnp.max(fine.iterations))
+    history = jb.solve(scene, path, solver=jb.Newton(max_iterations=needed))
+    plain = jb.solve(scene, path, solver=eager)
+    assert int(jnp.max(plain.iterations)) > needed  # the whole step takes more than is allowed
+    np.testing.assert_allclose(history.force[1:], path)
+    assert float(history.displacement[-1]) == pytest.approx(float(fine.displacement[-1]), rel=1e-6)
+    assert float(jnp.sum(history.slip_work)) == pytest.approx(
+        float(jnp.sum(fine.slip_work)), rel=1e-6
+    )
+
+
+def test_single_precision_says_what_it_cannot_do():
+    with pytest.raises(jb.InputError, match="single precision"):
+        jb.Newton(tolerance=1e-9).tolerance_for(jnp.dtype("float32"))
+
+
+@pytest.mark.parametrize("path", [[], [[0.1]], [0.1, np.nan], [0.1, np.inf]])
+def test_paths_that_are_none(path):
+    with pytest.raises(jb.InputError, match="path"):
+        jb.solve(jb.Scene(), path)
+
+
+def test_beyond_gross_slip_force_control_is_refused():
+    with pytest.raises(jb.InputError, match=r"load.amplitude = 2.5.*'displacement'"):
+        jb.solve(jb.Scene().replace({"load.amplitude": 2.5}))
+    with pytest.raises(jb.InputError, match="gross slip"):
+        jb.solve(jb.Scene(), [1.0, 2.0])
+
+
+def test_compiling_alone_solves_nothing():
+    scene = jb.Scene().replace(SMALL)
+    quasistatic.compile_for(scene)
+    size = quasistatic._march._cached._cache_size()
+    jb.solve(scene)
+    assert quasistatic._march._cached._cache_size() == size
