@@ -168,6 +168,7 @@ class System(eqx.Module):
             columns[field] = active[:, column]
         return jnp.stack(columns, axis=1)
 
+    @eqx.filter_jit  # traced once for its several uses in a solver
     def advance(self, change: Array, before: Level, drive: Drive) -> tuple[Level, Array]:
         """The level after a change of the active fields, and the out-of-balance forces there.
 

@@ -287,7 +287,7 @@ class Model(eqx.Module):
     fields: tuple[str, ...] = eqx.field(static=True, default=("v", "beta", "psi"), converter=tuple)
     kinematics: str = _static("exact")
     grid: str = _static("finite-difference")
-    nodes: int = _static(81)
+    nodes: int = _static(161)
     constants: str = _static("consistent")
 
     def __check_init__(self) -> None:

@@ -302,11 +302,11 @@ def compile_for(
     scene: Scene, path: ArrayLike | None = None, *, solver: Newton | None = None
 ) -> None:
     """Compile what `solve` needs, without solving anything."""
-    targets, _ = _targets(scene, path)
+    targets, cycles = _targets(scene, path)
     targets = jnp.append(jnp.zeros_like(targets[:1]), targets)
     start = _rest(scene)._replace(sound=jnp.asarray(False))
     steps = _march(scene, start, targets, jnp.ones_like(targets), solver or Newton())
-    jax.block_until_ready(_history(scene, steps, ()))
+    jax.block_until_ready(_history(scene, steps, cycles))
 
 
 def _targets(
@@ -329,9 +329,7 @@ def _targets(
 def _check_gross_slip(scene: Scene, targets: Array) -> None:
     if scene.load.control != "force":
         return
-    system = System(scene)
-    mean = jnp.sum(system.tributary * system.pressure) / scene.strip.length
-    limit = float(gross_slip_force(scene.contact.friction, mean, scene.strip.length))
+    limit = float(_gross_slip(scene))
     largest = float(jnp.max(jnp.abs(targets)))
     require(
         "load.amplitude",
@@ -340,6 +338,13 @@ def _check_gross_slip(scene: Scene, targets: Array) -> None:
         f"must stay below gross slip, mu F_N L = {limit:.6g}; "
         "set load.control to 'displacement' to go beyond",
     )
+
+
+@eqx.filter_jit
+def _gross_slip(scene: Scene) -> Array:
+    system, length = System(scene), scene.strip.length
+    mean = jnp.sum(system.tributary * system.pressure) / length
+    return gross_slip_force(scene.contact.friction, mean, length)
 
 
 def _rest(scene: Scene) -> State:
@@ -411,6 +416,7 @@ def _raise_if_failed(steps: Steps, targets: Array, traced: bool) -> Steps:
     )
 
 
+@eqx.filter_jit
 def _history(scene: Scene, steps: Steps, cycles: Sequence[tuple[int, int, int]]) -> History:
     system = System(scene)
     sound, level = steps.state.sound, steps.state.level

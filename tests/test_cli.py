@@ -264,7 +264,7 @@ def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
     hasty = functools.partial(identify.fit, max_iterations=1)
     monkeypatch.setattr(identify, "fit", hasty)
     line = refused("fit", planted, *FIT, "--json", code=3)
-    assert line.startswith("the fit has not settled after 1 iterations: start closer")
+    assert line.startswith("the fit has not settled after 1 iterations, at contact.friction = ")
 
 
 def test_fit_driven_by_the_displacement(cli, closed, tmp_path):
