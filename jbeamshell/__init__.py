@@ -2,8 +2,9 @@
 
 from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.history import History, Status
+from jbeamshell.newton import Newton
 from jbeamshell.parts import Contact, Load, Model, Strip
-from jbeamshell.quasistatic import Newton, solve
+from jbeamshell.quasistatic import solve
 from jbeamshell.scene import Scene, read_scene, scene_to_toml, write_scene
 
 __version__ = "0.1.0"

@@ -97,7 +97,7 @@ def _run(options: argparse.Namespace) -> int:
     figures = history.figures() | timing
     if abs(figures["closure"]) > CLOSES:
         _warn("the last loop does not close: give more load.cycles for a steady one")
-    if figures["reaction_min"] < 0.0:
+    if figures["reaction_min"] < 0.0 and "w" not in scene.model.fields:
         _warn(
             f"tension at the contact (reaction_min = {figures['reaction_min']:.4g}): the lift is "
             "frozen; add w to model.fields for unilateral contact, or take fewer model.nodes"

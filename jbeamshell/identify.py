@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.loops import Loop
-from jbeamshell.quasistatic import Newton, check, solve
+from jbeamshell.newton import Newton
+from jbeamshell.quasistatic import check, solve
 from jbeamshell.scene import NUMBERS, Scene, check_key
 
 POINTS = 96  # of a loop that the model is run through

@@ -11,8 +11,8 @@ PACKAGE = Path(jbeamshell.__file__).parent
 # fmt: off
 UPWARDS = [
     "errors", "files", "kinematics", "closed_form", "energy", "friction", "contact", "grid",
-    "parts", "scene", "block_tridiagonal", "equilibrium", "history", "quasistatic", "loops",
-    "example", "identify", "plotting", "output", "__init__", "__main__",
+    "parts", "scene", "block_tridiagonal", "newton", "equilibrium", "history", "quasistatic",
+    "loops", "example", "identify", "plotting", "output", "__init__", "__main__",
 ]
 # fmt: on
 ONLY = {"matplotlib": "plotting", "jaxopt": "identify", "pint": "loops"}
