@@ -15,21 +15,19 @@ from jbeamshell.errors import InputError
 def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A draft to write to, renamed to ``path`` when the block ends well, else removed."""
     target = Path(path)
+    draft = None
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
         os.close(handle)
-    except OSError as error:
-        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
-    draft = Path(name)
-    try:
+        draft = Path(name)
         yield draft
         draft.chmod(0o666 & ~_umask())
-        try:
-            draft.replace(target)
-        except OSError as error:
-            raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+        draft.replace(target)
+    except OSError as error:  # no folder, no permission, a full disk
+        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
     finally:
-        draft.unlink(missing_ok=True)
+        if draft is not None:
+            draft.unlink(missing_ok=True)
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

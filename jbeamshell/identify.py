@@ -25,7 +25,7 @@ from jbeamshell.scene import NUMBERS, Scene, check_key
 POINTS = 96  # of a loop that the model is run through
 MAX_ITERATIONS = 40
 APPROACH = 8  # load steps from zero to the first point of the data
-FLAT = 1e-9  # relative gain in cost at which a fit has settled
+FLAT = 1e-6  # relative gain in cost at which a fit has settled
 HOPELESS = 10.0  # residual, in ranges, of a trial without equilibrium: never accepted
 
 

@@ -5,11 +5,8 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell import closed_form, quasistatic
-from jbeamshell.friction import ElasticSlip
 
 SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
-KEYS = ("contact.friction", "strip.height_ratio", "strip.kappa_s", "contact.stick_stiffness")
-AT = jnp.array([0.1, 0.1126, 0.44, 1000.0])
 
 
 def test_bar_limit_gives_backbone_and_cubic_law():
@@ -34,14 +31,27 @@ def test_steps_do_not_matter():
     assert error[1] < 2e-3
 
 
+@pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-12), (16.0, 1e-4)])
+def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
+    scene = jb.Scene().replace({"model.nodes": 41, "contact.smoothing": smoothing})
+    history = jb.solve(scene.replace({"strip.height_ratio": 0.4}), [0.05, 0.1, *[-0.1, 0.1] * 100])
+    cap = history.scene.contact.friction * history.reaction
+    assert 0.5 < float(jnp.max(jnp.abs(history.traction / cap))) < 0.8
+    peaks = np.asarray(history.displacement[2::2])
+    assert np.ptp(peaks) < drift * peaks[0]
+    assert float(jnp.sum(jnp.abs(history.slip_work))) / 100 < drift * 0.1 * peaks[0]
+
+
 @pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-13), (16.0, 1e-4)])
-def test_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
+def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
     scene = jb.Scene().replace({"model.nodes": 41, "contact.smoothing": smoothing})
     history = jb.solve(scene, [*np.linspace(0.07, 0.7, 10), *[0.6, 0.7] * 100])
     peaks = np.asarray(history.displacement[10::2])
-    assert abs(peaks[-1] - peaks[0]) / 100 < drift * peaks[0]
-    work = 0.7 * peaks[0]
-    assert float(jnp.sum(jnp.abs(history.slip_work[11:]))) / 100 < drift * work
+    creep = abs(peaks[-1] - peaks[0]) / peaks[0] / 100
+    assert creep < drift
+    assert (creep > 1e-6) == (smoothing != "sharp")
+    work = float(jnp.sum(jnp.abs(history.slip_work[11:]))) / 100
+    assert work < drift * 0.7 * peaks[0]
 
 
 @pytest.mark.parametrize("smoothing", ["sharp", 8.0, 32.0])
@@ -69,54 +79,6 @@ def test_order_of_convergence_in_the_grid(grid, order):
     values = np.array([end(nodes) for nodes in (21, 41, 81, 161)])
     rate = np.log2(np.abs(np.diff(values)[:-1] / np.diff(values)[1:]))
     assert rate[-1] == pytest.approx(order, abs=0.3)
-
-
-# --- gradients ------------------------------------------------------------------------------------
-
-
-def dissipation(values, **more):
-    scene = jb.Scene().replace(SMALL | more | dict(zip(KEYS, values, strict=True)))
-    return jb.solve(scene, throw=False).dissipation
-
-
-@pytest.mark.parametrize("smoothing", ["sharp", 16.0])
-def test_gradients_have_taylor_slope_two(smoothing):
-    function = jax.jit(lambda p: dissipation(p, **{"contact.smoothing": smoothing}))
-    value, gradient = jax.jit(
-        jax.value_and_grad(lambda p: dissipation(p, **{"contact.smoothing": smoothing}))
-    )(AT)
-    for i in range(len(KEYS)):
-        direction = jnp.zeros(4).at[i].set(AT[i])
-        # Small enough that no node changes between sticking and slipping on the way.
-        sizes = np.array([4e-4, 2e-4, 1e-4, 5e-5])
-        rest = [
-            abs(float(function(AT + h * direction) - value - h * gradient @ direction))
-            for h in sizes
-        ]
-        slope = np.polyfit(np.log(sizes), np.log(rest), 1)[0]
-        assert slope == pytest.approx(2.0, abs=0.1), KEYS[i]
-
-
-def test_forward_and_reverse_agree_and_batches_equal_loops():
-    reverse, forward = jax.jit(jax.grad(dissipation))(AT), jax.jit(jax.jacfwd(dissipation))(AT)
-    np.testing.assert_allclose(forward, reverse, rtol=1e-8)
-    points = AT * jnp.array([[1.0], [1.1], [0.8]])
-    batch = jax.jit(jax.vmap(dissipation))(points)
-    single = jnp.stack([jax.jit(dissipation)(p) for p in points])
-    np.testing.assert_allclose(batch, single, rtol=1e-10)
-
-
-def test_gradient_reaches_every_number_of_a_scene():
-    table = jnp.array([[0.0, 10.0], [1.0, 9.0], [2.0, 10.0]])
-    scene = jb.Scene(
-        contact=jb.Contact(pressure=table, law=ElasticSlip(16.0)),
-        load=jb.Load(steps_per_half_cycle=20, cycles=1),
-        model=jb.Model(nodes=41),
-    )
-    gradient = jax.jit(jax.grad(lambda s: jb.solve(s, throw=False).dissipation))(scene)
-    leaves = jax.tree.leaves(gradient)
-    assert len(leaves) == len(jax.tree.leaves(scene))
-    assert all(bool(jnp.all(jnp.isfinite(leaf)) and jnp.any(leaf != 0.0)) for leaf in leaves)
 
 
 # --- failure --------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 """Scenes: TOML to the last bit, clear refusals, and gradients that reach every number."""
 
+import errno
 import pathlib
 
 import jax
@@ -125,7 +126,7 @@ def test_written_whole_or_not_at_all(tmp_path):
             assert draft.parent == tmp_path  # so that the renaming stays on one file system
             raise error
 
-    for error in (OSError("disk full"), KeyboardInterrupt()):
+    for error in (RuntimeError("no picture"), KeyboardInterrupt()):
         with pytest.raises(type(error)):
             interrupted(error)
         assert target.read_text() == "old"
@@ -392,3 +393,15 @@ def test_the_load_path_turns_at_the_amplitude():
     path = Load(cycles=3, steps_per_half_cycle=4).unit_path()
     once = [0.5, 0, -0.5, -1, -0.5, 0, 0.5, 1]
     np.testing.assert_allclose(path, [0.5, 1, *once * 3])
+
+
+def test_a_full_disk_leaves_the_old_file_and_one_clear_line(tmp_path):
+    target = tmp_path / "result.json"
+    target.write_text("old")
+    with (
+        pytest.raises(InputError, match=r"result\.json: cannot be written \(No space left"),
+        written_whole(target),
+    ):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
+    assert target.read_text() == "old"

@@ -1,0 +1,58 @@
+"""Derivatives of a whole load path: Taylor slopes, forward against reverse, batches."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.friction import ElasticSlip
+
+SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
+KEYS = ("contact.friction", "strip.height_ratio", "strip.kappa_s", "contact.stick_stiffness")
+AT = jnp.array([0.1, 0.1126, 0.44, 1000.0])
+
+
+def dissipation(values, **more):
+    scene = jb.Scene().replace(SMALL | more | dict(zip(KEYS, values, strict=True)))
+    return jb.solve(scene, throw=False).dissipation
+
+
+@pytest.mark.parametrize("smoothing", ["sharp", 16.0])
+def test_gradients_have_taylor_slope_two(smoothing):
+    function = jax.jit(lambda p: dissipation(p, **{"contact.smoothing": smoothing}))
+    value, gradient = jax.jit(
+        jax.value_and_grad(lambda p: dissipation(p, **{"contact.smoothing": smoothing}))
+    )(AT)
+    for i in range(len(KEYS)):
+        direction = jnp.zeros(4).at[i].set(AT[i])
+        # Small enough that no node changes between sticking and slipping on the way.
+        sizes = np.array([4e-4, 2e-4, 1e-4, 5e-5])
+        rest = [
+            abs(float(function(AT + h * direction) - value - h * gradient @ direction))
+            for h in sizes
+        ]
+        slope = np.polyfit(np.log(sizes), np.log(rest), 1)[0]
+        assert slope == pytest.approx(2.0, abs=0.1), KEYS[i]
+
+
+def test_forward_and_reverse_agree_and_batches_equal_loops():
+    reverse, forward = jax.jit(jax.grad(dissipation))(AT), jax.jit(jax.jacfwd(dissipation))(AT)
+    np.testing.assert_allclose(forward, reverse, rtol=1e-8)
+    points = AT * jnp.array([[1.0], [1.1], [0.8]])
+    batch = jax.jit(jax.vmap(dissipation))(points)
+    single = jnp.stack([jax.jit(dissipation)(p) for p in points])
+    np.testing.assert_allclose(batch, single, rtol=1e-10)
+
+
+def test_gradient_reaches_every_number_of_a_scene():
+    table = jnp.array([[0.0, 10.0], [1.0, 9.0], [2.0, 10.0]])
+    scene = jb.Scene(
+        contact=jb.Contact(pressure=table, law=ElasticSlip(16.0)),
+        load=jb.Load(steps_per_half_cycle=20, cycles=1),
+        model=jb.Model(nodes=41),
+    )
+    gradient = jax.jit(jax.grad(lambda s: jb.solve(s, throw=False).dissipation))(scene)
+    leaves = jax.tree.leaves(gradient)
+    assert len(leaves) == len(jax.tree.leaves(scene))
+    assert all(bool(jnp.all(jnp.isfinite(leaf)) and jnp.any(leaf != 0.0)) for leaf in leaves)
