@@ -24,7 +24,7 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         draft.chmod(0o666 & ~_umask())
         draft.replace(target)
     except OSError as error:  # no folder, no permission, a full disk
-        raise InputError(f"{target}: cannot be written ({error.strerror})") from None
+        raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
     finally:
         if draft is not None:
             draft.unlink(missing_ok=True)

@@ -152,7 +152,7 @@ class TestSave:
             raise OSError("disk full")
 
         monkeypatch.setattr(figure, "savefig", half)
-        with pytest.raises(OSError, match="disk full"):
+        with pytest.raises(InputError, match="disk full"):
             plotting.save(figure, path)
         assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("loop.png", "old")]
 
