@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import ast
 import os
 import sys
 import time
 import tomllib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -19,6 +21,7 @@ BAD_INPUT, UNCONVERGED, INTERRUPTED = 2, 3, 130
 EXAMPLE_START = {"contact.friction": 0.15, "strip.height_ratio": 0.2}
 EXAMPLE_FREE = "contact.friction,strip.height_ratio"
 CLOSES = 1e-3  # of its width: a loop that ends further off is not steady yet
+ROUNDING = 1e-9  # of the pressure: less tension than this is none
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,15 +52,25 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"jbeamshell {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    run = commands.add_parser("run", help="load a strip to and fro and report its hysteresis")
-    run.add_argument("scene", nargs="?", metavar="SCENE.toml", help="default: the standard strip")
+    run = commands.add_parser("run", help="press a strip down, load it to and fro, and report")
+    run.add_argument(
+        "scene",
+        nargs="?",
+        metavar="NAME|SCENE.toml",
+        help="a scene that ships or one's own; default: the standard strip",
+    )
     run.set_defaults(run=_run)
+
+    listing = commands.add_parser("scenes", help="list the scenes that ship")
+    listing.set_defaults(run=_scenes)
 
     fit = commands.add_parser("fit", help="fit a strip's parameters to a loop")
     fit.add_argument(
         "data", nargs="?", metavar="DATA.csv", help="default: the finite-element loops that ship"
     )
-    fit.add_argument("--scene", metavar="SCENE.toml", help="what stays fixed; default standard")
+    fit.add_argument(
+        "--scene", metavar="NAME|SCENE.toml", help="what stays fixed; default standard"
+    )
     fit.add_argument(
         "--free", metavar="KEY,KEY,...", default=EXAMPLE_FREE, help=f"default {EXAMPLE_FREE}"
     )
@@ -73,17 +86,17 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key"
         )
-        command.add_argument("--json", action="store_true", help="print the result as JSON")
         command.add_argument("--out", metavar="DIR", help="write tables and pictures there")
+    for command in (run, listing, fit):
+        command.add_argument("--json", action="store_true", help="print the result as JSON")
     return parser
 
 
 def _run(options: argparse.Namespace) -> int:
     from jbeamshell import output, quasistatic
-    from jbeamshell.scene import overridden, read_values, scene_from_values
+    from jbeamshell.scene import overridden, scene_from_values
 
-    values = read_values(options.scene) if options.scene else {}
-    scene = scene_from_values(overridden(values, _assignments(options.set)))
+    scene = scene_from_values(overridden(_values_of(options.scene), _assignments(options.set)))
     quasistatic.check(scene)
     folder = output.check_folder(options.out) if options.out else None
     _say("compiling ...")
@@ -95,16 +108,27 @@ def _run(options: argparse.Namespace) -> int:
     finished = time.perf_counter()
     timing = {"wall_s": finished - compiled, "compile_s": compiled - begin}
     figures = history.figures() | timing
-    if abs(figures["closure"]) > CLOSES:
+    if abs(figures.get("closure", 0.0)) > CLOSES:
         _warn("the last loop does not close: give more load.cycles for a steady one")
-    if figures["reaction_min"] < 0.0 and "w" not in scene.model.fields:
+    reaction = float(history.reaction_min)
+    glued = "w" not in scene.model.fields
+    if glued and reaction < -ROUNDING * float(scene.contact.largest_pressure):
         _warn(
-            f"tension at the contact (reaction_min = {figures['reaction_min']:.4g}): the lift is "
-            "frozen; add w to model.fields for unilateral contact, or take fewer model.nodes"
+            f"tension at the contact (reaction_min = {reaction:.4g}): the lift is frozen; add w to "
+            "model.fields for unilateral contact, or take fewer model.nodes"
         )
     _print(output.as_json(figures) if options.json else f"{history}\n")
     if folder is not None:
         _say_written(output.write_run(folder, history, figures))
+    return 0
+
+
+def _scenes(options: argparse.Namespace) -> int:
+    from jbeamshell import output, scenes
+
+    summaries = {name: scenes.summary(name) for name in scenes.NAMES}
+    lines = [f"{name:15s} {text}\n" for name, text in summaries.items()]
+    _print(output.as_json(summaries) if options.json else "".join(lines))
     return 0
 
 
@@ -114,7 +138,7 @@ def _fit(options: argparse.Namespace) -> int:
     from jbeamshell import identify, loops, output
     from jbeamshell.example import example_loops
     from jbeamshell.parts import CONTROLS
-    from jbeamshell.scene import overridden, read_values, scene_from_values
+    from jbeamshell.scene import overridden, scene_from_values
 
     free = [key.strip() for key in options.free.split(",") if key.strip()]
     start = _assignments(options.start)
@@ -124,7 +148,7 @@ def _fit(options: argparse.Namespace) -> int:
     values: dict[str, Any] = {}
     if not options.data:
         values |= {key: value for key, value in EXAMPLE_START.items() if key in free}
-    values = overridden(values, read_values(options.scene) if options.scene else {})
+    values = overridden(values, _values_of(options.scene))
     values = overridden(overridden(values, _assignments(options.set)), start)
     data = loops.read_loops(options.data) if options.data else example_loops()
     if "load.control" not in values:
@@ -154,6 +178,18 @@ def _fit(options: argparse.Namespace) -> int:
     return 0
 
 
+def _values_of(scene: str | None) -> dict[str, Any]:
+    """Dotted values of a file, or of a scene that ships by its name."""
+    from jbeamshell import scenes
+    from jbeamshell.scene import read_values
+
+    if not scene:
+        return {}
+    path = Path(scene)
+    is_file = path.suffix == ".toml" or path.name != scene or os.path.isfile(scene)
+    return read_values(path) if is_file else scenes.values_of(scene)
+
+
 def _assignments(texts: Sequence[str]) -> dict[str, Any]:
     values = {}
     for text in texts:
@@ -167,14 +203,14 @@ def _assignments(texts: Sequence[str]) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """A TOML value; else a number such as .5, a word, or words in a list with commas between."""
+    """A TOML value; else a number such as .5, a list of them, a word, or words between commas."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         pass
     try:
-        return float(text)
-    except ValueError:
+        return ast.literal_eval(text) if text.startswith("[") else float(text)
+    except (ValueError, SyntaxError):
         return [word.strip() for word in text.split(",")] if "," in text else text
 
 

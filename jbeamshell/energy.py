@@ -1,11 +1,14 @@
 r"""Strain energy per unit length, Phi(e, g, k, psi, psi'), and the forces conjugate to the strains.
 
 A strain energy is any JAX function of five scalars that returns a scalar; `forces` and the
-solver's tangent come from it by automatic differentiation.  The homogeneous section in plane
-strain (Brink 2015, eqs. 4.59-4.68, with the bending and squeeze-shear constants made consistent):
+solver's tangent come from it by automatic differentiation.  The homogeneous section (Brink 2015,
+eqs. 4.59-4.68, with the bending and squeeze-shear constants made consistent):
 
-    Phi = H C11 (e + lam psi/C11)^2 + H E' psi^2 + kappa G H g^2 + D k^2/2 + S psi'^2/2
+    Phi = H C11 (e + nu' psi)^2 + H E' psi^2 + kappa G H g^2 + D k^2/2 + S psi'^2/2
     D = (2/3) E' H^3,   S = (2/3) kappa_s G H^3,   kappa = 10(1+nu)/(12+11nu)   (Cowper 1966)
+
+with C11 = E'/(1-nu'^2), and E' = E/(1-nu^2), nu' = nu/(1-nu) in plane strain; E and nu in plane
+stress.
 
 Without a squeeze field sigma_y = 0 is condensed instead (chapter III):
 
@@ -27,20 +30,22 @@ from jbeamshell.kinematics import Strains
 Energy = Callable[[Array, Array, Array, Array, Array], Array]
 
 CONSTANTS = ("consistent", "printed")
+PLANES = ("strain", "stress")
 
 
 class Homogeneous(eqx.Module):
-    """Strain energy of a homogeneous section in plane strain.
+    """Strain energy of a homogeneous section.
 
     Attributes
     ----------
     half_height : H, length
-    plane_modulus : E' = E/(1-nu^2), stress
+    plane_modulus : E', stress: E/(1-nu^2) in plane strain, E in plane stress
     poisson_ratio : nu
     kappa_s : squeeze-shear factor
     squeeze : whether psi is a field; if not, sigma_y = 0 is condensed
     constants : "consistent", or "printed" for the dissertation's own bending stiffness
         (eq. 3.45, 1/16 of the consistent one) and squeeze-shear stiffness (eq. 4.73, 24 times)
+    plane : "strain" or "stress"
     """
 
     half_height: Array = eqx.field(converter=jnp.asarray)
@@ -49,11 +54,12 @@ class Homogeneous(eqx.Module):
     kappa_s: Array = eqx.field(converter=jnp.asarray)
     squeeze: bool = eqx.field(static=True, default=True)
     constants: str = eqx.field(static=True, default="consistent")
+    plane: str = eqx.field(static=True, default="strain")
 
     @property
     def shear_modulus(self) -> Array:
         """G = E/(2(1+nu)), stress."""
-        return 0.5 * (1.0 - self.poisson_ratio) * self.plane_modulus
+        return shear_modulus(self.plane_modulus, self.poisson_ratio, self.plane)
 
     @property
     def bending_stiffness(self) -> Array:
@@ -74,10 +80,17 @@ class Homogeneous(eqx.Module):
         bending = 0.5 * self.bending_stiffness * k**2
         if not self.squeeze:
             return h * plane * e**2 + shear + bending
-        coupling = nu / (1.0 - nu)
+        coupling = nu / (1.0 - nu) if self.plane == "strain" else nu
         c11 = plane / (1.0 - coupling**2)
         squeeze = h * plane * psi**2 + 0.5 * self.squeeze_stiffness * dpsi**2
         return h * c11 * (e + coupling * psi) ** 2 + squeeze + shear + bending
+
+
+def shear_modulus(plane_modulus: Array, poisson_ratio: Array, plane: str) -> Array:
+    """G from E' and nu, stress."""
+    if plane == "strain":
+        return 0.5 * (1.0 - poisson_ratio) * plane_modulus
+    return 0.5 * plane_modulus / (1.0 + poisson_ratio)
 
 
 def forces(energy: Energy, strains: Strains) -> Strains:

@@ -18,17 +18,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.typing import ArrayLike
 
 from jbeamshell import grid
-from jbeamshell.contact import complementarity
-from jbeamshell.energy import Energy
+from jbeamshell.contact import Absent, Compliance, NormalLaw, Rigid
+from jbeamshell.energy import Energy, forces
 from jbeamshell.friction import FrictionLaw
-from jbeamshell.kinematics import FIELDS, KINEMATICS, Kinematics
-from jbeamshell.parts import Model
+from jbeamshell.kinematics import FIELDS, KINEMATICS, Kinematics, Strains, turned
+from jbeamshell.parts import Contact, Model
 from jbeamshell.scene import Scene
 
 V, W, BETA, PSI = range(len(FIELDS))
 CAP_FLOOR = 1e-6  # of mu F_N: gradients need a cap that is not zero
+ROUNDING = 0.05  # of the approach under the mean pressure, over which a compliant contact closes
 
 
 class Level(NamedTuple):
@@ -56,11 +58,13 @@ class Drive(NamedTuple):
     Attributes
     ----------
     target : F, or u(L) from the unloaded end's rest, whichever is controlled
+    pressure : part of the pressures that acts
     rest : u(L) after the pressure, from which displacements are counted
     rough : 1 with friction, 0 in the pressure step before it (which ends at F = 0)
     """
 
     target: Array
+    pressure: Array
     rest: Array
     rough: Array
 
@@ -73,8 +77,10 @@ class System(eqx.Module):
     x : (n,) node positions
     lengths : (elements,) element lengths
     tributary : (n,) contact length l_i of each node
-    pressure : (n,) F_N at the nodes
+    load, bottom_load : (n,) nodal forces of the pressures on the top and the bottom face
     half_height : H
+    curvature : alpha' before loading, None where the strip is straight
+    youngs_modulus : E, None where there are layers
     friction : mu
     slip_stiffness : k_t, traction per slip
     stiffness_scale, force_scale : make support rows forces, and residuals dimensionless
@@ -82,14 +88,17 @@ class System(eqx.Module):
 
     energy: Energy
     law: FrictionLaw
+    normal: NormalLaw
     x: Array
     lengths: Array
     tributary: Array
-    pressure: Array
+    load: Array
+    bottom_load: Array
     half_height: Array
+    curvature: Array | None
+    youngs_modulus: Array | None
     friction: Array
     slip_stiffness: Array
-    contact_scale: Array
     stiffness_scale: Array
     force_scale: Array
     model: Model = eqx.field(static=True)
@@ -99,16 +108,31 @@ class System(eqx.Module):
     def __init__(self, scene: Scene) -> None:
         strip, contact, self.model = scene.strip, scene.contact, scene.model
         order = grid.ORDER[self.model.grid]
-        ends = grid.vertices((self.model.nodes - 1) // order, strip.length, strip.half_height)
+        ends = grid.vertices(
+            (self.model.nodes - 1) // order,
+            strip.length,
+            strip.half_height,
+            self.model.end_size,
+            _steps(contact, strip.length),
+        )
         self.energy, self.law = scene.strain_energy(), contact.law
         self.x, self.lengths = grid.nodes(self._rule, ends), jnp.diff(ends)
         self.tributary = grid.tributary_lengths(self._rule, ends)
-        self.pressure = contact.pressure_at(self.x)
+        self.load = grid.nodal_loads(self._rule, ends, contact.pressure)
+        self.bottom_load = grid.nodal_loads(self._rule, ends, contact.bottom_pressure)
         self.half_height, self.friction = strip.half_height, contact.friction
+        self.curvature, self.youngs_modulus = strip.curvature, strip.youngs_modulus
         self.slip_stiffness = contact.stick_stiffness * strip.shear_modulus / strip.half_height
-        self.contact_scale = strip.plane_modulus / strip.half_height
-        self.stiffness_scale = strip.axial_stiffness / strip.length
-        self.force_scale = self.friction * jnp.sum(self.tributary * self.pressure)
+        self.stiffness_scale = strip.stretching_stiffness / strip.length
+        pressing = jnp.sum(self.load)
+        self.force_scale = pressing * jnp.where(self.friction > 0.0, self.friction, 1.0)
+        stiffness = strip.plane_modulus / strip.half_height
+        self.normal = Rigid(stiffness)
+        if contact.normal == "none":
+            self.normal = Absent()
+        elif contact.normal == "compliant":
+            stiffness = contact.normal_stiffness * stiffness
+            self.normal = Compliance(stiffness, ROUNDING * pressing / strip.length / stiffness)
         self.far_end, self.control = strip.far_end, scene.load.control
 
     @property
@@ -119,42 +143,114 @@ class System(eqx.Module):
     def _kinematics(self) -> Kinematics:
         return KINEMATICS[self.model.kinematics]
 
+    # --- geometry -------------------------------------------------------------------------------
+
+    def _angle(self, x: Array) -> Array:
+        """Alpha of the undeformed strip at X; its mid-height is an arc that is level at X = 0."""
+        return jnp.asarray(self.curvature) * x
+
+    def gap(self, q: Array) -> Array:
+        """Height of the bottom face above the foundation, (n,)."""
+        lift = q[:, W]
+        if self.curvature is None:
+            return lift
+        half = 0.5 * self._angle(self.x)
+        ratio = jnp.sinc(half / jnp.pi)  # of chord to arc: curvature may go to zero
+        rise = 0.5 * self.curvature * self.x**2 * ratio**2
+        return lift + rise + 2.0 * self.half_height * jnp.sin(half) ** 2
+
+    def _moved(self, q: Array, x: Array, height: ArrayLike) -> tuple[Array, Array]:
+        """Displacement (x, y) at ``height`` above mid-height of sections q (n, 4) at X = x (n,)."""
+
+        def position(*section: Array) -> tuple[Array, Array]:
+            return self._kinematics.position(section, self.half_height, height)
+
+        if self.curvature is None:
+            return jax.vmap(position)(*q.T)
+        angle = self._angle(x)
+        local = turned(q[:, V], q[:, W], angle)
+        return turned(*jax.vmap(position)(*local, q[:, BETA], q[:, PSI]), -angle)
+
     # --- potential ------------------------------------------------------------------------------
 
-    def potential(self, q: Array) -> Array:
-        """Strain energy plus the potential of the dead pressure on the top face, Pi."""
-        top = jax.vmap(lambda *s: self._kinematics.position(s, self.half_height, self.half_height))
-        return self.strain_energy(q) + jnp.sum(self.tributary * self.pressure * top(*q.T)[1])
+    def potential(self, q: Array, pressure: ArrayLike) -> Array:
+        """Strain energy plus the potential of the dead pressures, of which a part acts, Pi."""
+        return self.strain_energy(q) + pressure * self.sinking(q)
+
+    def sinking(self, q: Array) -> Array:
+        """Conjugate of the pressures' part that acts: dead loads times their displacement."""
+        top = self._moved(q, self.x, self.half_height)[1]
+        return jnp.sum(self.load * top) - jnp.sum(self.bottom_load * q[:, W])
 
     def strain_energy(self, q: Array) -> Array:
         """Elastic energy of the strip with nodal fields q (n, 4), per unit width."""
-        order = grid.ORDER[self.model.grid]
+
+        def energy(nodal: tuple[Array, ...], start: Array, length: Array) -> Array:
+            points = self._strains(nodal, start, length)
+            weights = self._rule.weights.tolist()
+            return length * sum(w * self.energy(*s) for w, s in zip(weights, points, strict=True))
+
+        return jnp.sum(jax.vmap(energy)(*self._elements(q)))
+
+    def section_forces(self, q: Array) -> Strains:
+        """Mean N, Q, M, chi and xi of every element, (elements,) each."""
+
+        def mean(nodal: tuple[Array, ...], start: Array, length: Array) -> Strains:
+            points = self._strains(nodal, start, length)
+            weights = self._rule.weights.tolist()
+            each = [forces(self.energy, s) for s in points]
+            if self.model.squeeze == "assumed":
+                stretch = 2.0 * self.half_height * jnp.asarray(self.youngs_modulus)
+                each = [f._replace(psi=stretch * s.psi) for f, s in zip(each, points, strict=True)]
+            return jax.tree.map(
+                lambda *f: jnp.asarray(sum(w * a for w, a in zip(weights, f, strict=True))), *each
+            )
+
+        return jax.vmap(mean)(*self._elements(q))
+
+    @property
+    def middles(self) -> Array:
+        """Middle of every element, (elements,)."""
+        return self._starts + 0.5 * self.lengths
+
+    @property
+    def _starts(self) -> Array:
+        return self.x[: -1 : grid.ORDER[self.model.grid]]
+
+    def _elements(self, q: Array) -> tuple[tuple[Array, ...], Array, Array]:
         # Fields apart, points last: the compiler then works on whole vectors of elements.
-        nodal = tuple(grid.gather(column, order) for column in q.T)
-        return jnp.sum(jax.vmap(self._element_energy)(nodal, self.lengths))
+        order = grid.ORDER[self.model.grid]
+        return tuple(grid.gather(column, order) for column in q.T), self._starts, self.lengths
 
-    def _element_energy(self, nodal: tuple[Array, ...], length: Array) -> Array:
-        """Energy of an element from the nodal values (p+1,) of every field."""
+    def _strains(self, nodal: tuple[Array, ...], start: Array, length: Array) -> list[Strains]:
+        """Strains at an element's points from the nodal values (p+1,) of every field."""
 
-        def at(shape: np.ndarray, values: Array) -> Array:
+        def at(shape: np.ndarray, values: Array | np.ndarray) -> Array:
             return jnp.asarray(sum(float(s) * values[i] for i, s in enumerate(shape) if s != 0.0))
 
-        rule, energy = self._rule, jnp.zeros_like(length)
+        rule, strains = self._rule, []
+        shapes = [rule.squeeze if field == PSI else rule.values for field in range(len(FIELDS))]
         for point in range(rule.weights.size):
-            shapes = [rule.squeeze if field == PSI else rule.values for field in range(len(FIELDS))]
-            section = [
-                at(shape[point], values) for shape, values in zip(shapes, nodal, strict=True)
-            ]
+            section = [at(shape[point], v) for shape, v in zip(shapes, nodal, strict=True)]
             slope = [at(rule.slopes[point], values) / length for values in nodal]
-            strains = self._kinematics.strains(section, slope, self.half_height)
-            energy = energy + float(rule.weights[point]) * length * self.energy(*strains)
-        return energy
+            if self.curvature is not None:
+                angle = self._angle(start + at(rule.values[point], rule.nodes) * length)
+                slope[V], slope[W] = turned(slope[V], slope[W], angle)
+            strains.append(
+                self._kinematics.strains(section, slope, self.half_height, self.curvature)
+            )
+        return strains
 
     def end_displacement(self, q: Array) -> Array:
         """u(L): mid-height displacement of the loaded end, the conjugate of F."""
-        return self._kinematics.position(q[-1], self.half_height, 0.0)[0]
+        return self._moved(q[-1:], self.x[-1:], 0.0)[0][0]
 
     # --- residual -------------------------------------------------------------------------------
+
+    @property
+    def cap_floor(self) -> Array:
+        """Cap of a point without reaction."""
+        return CAP_FLOOR * self.force_scale / jnp.sum(self.tributary)
 
     def rest(self) -> Level:
         """The strip before anything acts on it."""
@@ -185,15 +281,23 @@ class System(eqx.Module):
         """
         increment = self.embed(change)
         q = before.q + increment
-        forces = jax.grad(self.potential)(q)
-        reaction = forces[:, W] / self.tributary
-        floor = CAP_FLOOR * self.force_scale / jnp.sum(self.tributary)
-        cap = jnp.maximum(self.friction * reaction, floor)
+        forces = jax.grad(self.potential)(q, drive.pressure)
+        pressed, gap = forces[:, W] / self.tributary, self.gap(q)
+        reaction = jax.vmap(self.normal.reaction)(pressed, gap)
+        cap = jnp.maximum(self.friction * reaction, self.cap_floor)
         slip = jax.vmap(self.law.traction, in_axes=(0, 0, 0, None))
-        traction = drive.rough * slip(increment[:, V], before.traction, cap, self.slip_stiffness)
+        rough = jnp.where(self.friction > 0.0, drive.rough, 0.0)
+        # No reaction, no traction; not even the floor, whose sign would flip for ever.
+        closed = jnp.clip(cap / self.cap_floor - 1.0, 0.0, 1.0)
+        traction = slip(increment[:, V], before.traction, cap, self.slip_stiffness)
+        traction = rough * closed * traction
         forces = forces.at[:, V].add(self.tributary * traction)
-        contact = complementarity(reaction, q[:, W], self.contact_scale)
+        contact = jax.vmap(self.normal.residual)(pressed, gap)
         forces = forces.at[:, W].set(self.tributary * contact)
+        if self.model.squeeze == "assumed":
+            mean = 0.5 * (drive.pressure * self.load / self.tributary + reaction)
+            assumed = jnp.asarray(self.youngs_modulus) * q[:, PSI] + mean
+            forces = forces.at[:, PSI].set(2.0 * self.half_height * self.tributary * assumed)
 
         conjugate = jax.grad(self.end_displacement)(q)[-1]
         prescribed = jnp.asarray(self.control == "displacement") & (drive.rough > 0.0)
@@ -211,6 +315,8 @@ class System(eqx.Module):
 
     def _support(self, forces: Array, q: Array, rough: Array) -> Array:
         """Replace the balance of held fields at X = 0 by their support condition."""
+        if isinstance(self.normal, Absent):
+            forces = forces.at[0, W].set(self.stiffness_scale * q[0, W])
         held_v = forces.at[0, V].set(self.stiffness_scale * q[0, V])
         if self.far_end == "free":  # held by friction alone, so only once there is friction
             return jnp.where(rough > 0.0, forces, held_v)
@@ -230,9 +336,19 @@ class System(eqx.Module):
             after.cap,
             self.slip_stiffness,
         )
-        return jnp.sum(self.tributary * work)
+        rubs = (self.friction > 0.0) & (jnp.maximum(before.cap, after.cap) > 2.0 * self.cap_floor)
+        return jnp.sum(self.tributary * jnp.where(rubs, work, 0.0))
 
-    def stored_energy(self, level: Level) -> Array:
-        """Potential Pi plus the elastic energy of the contact's shear compliance."""
+    def stored_energy(self, level: Level, pressure: Array) -> Array:
+        """Potential Pi plus the elastic energy of the contact's compliance."""
         sliders = level.traction**2 / (2.0 * self.slip_stiffness)
-        return self.potential(level.q) + jnp.sum(self.tributary * sliders)
+        layer = jax.vmap(self.normal.energy)(self.gap(level.q))
+        return self.potential(level.q, pressure) + jnp.sum(self.tributary * (sliders + layer))
+
+
+def _steps(contact: Contact, length: Array) -> Array | None:
+    """Positions at which a pressure jumps; None where both are single numbers."""
+    tables = [p for p in (contact.pressure, contact.bottom_pressure) if p.ndim == 2]
+    if not tables:
+        return None
+    return jnp.sort(jnp.concatenate([grid.table_steps(table, length) for table in tables]))

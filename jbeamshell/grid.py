@@ -9,9 +9,10 @@ its p Gauss points, and friction, contact and pressure act at the nodes with Lob
   length.
 * ``collocation``: p = 2, the two-point Gauss scheme, fourth order on smooth problems.
 
-Nodes are graded at the loaded end X = L, where the traction concentrates: the element size at the
-distance d from it goes linearly (which is geometric grading) from a part of H to a part of L, and
-the node count scales all sizes together, so that doubling it halves every element.
+Nodes are graded at the loaded end X = L, where the traction concentrates, and at steps of the
+pressure: the element size at the distance d from there goes linearly (which is geometric grading)
+from a part of H to a part of L, and the node count scales all sizes together, so that doubling it
+halves every element.
 """
 
 from __future__ import annotations
@@ -61,12 +62,8 @@ def element_rule(name: str) -> Rule:
     order = ORDER[name]
     inner = legendre.Legendre.basis(order).deriv().roots()
     nodes = 0.5 * (1.0 + np.concatenate([[-1.0], np.sort(inner), [1.0]]))
-    points, weights = legendre.leggauss(order)
-    points, weights = 0.5 * (1.0 + points), 0.5 * weights
-    shapes = []
-    for i, node in enumerate(nodes):
-        shape = Polynomial.fromroots(np.delete(nodes, i))
-        shapes.append(shape / shape(node))
+    points, weights = _gauss(order)
+    shapes = _shapes(nodes)
     values = np.stack([shape(points) for shape in shapes], axis=1)
     slopes = np.stack([shape.deriv()(points) for shape in shapes], axis=1)
     node_weights = np.array([shape.integ()(1.0) for shape in shapes])
@@ -77,30 +74,101 @@ def element_rule(name: str) -> Rule:
     return Rule(nodes, node_weights, weights, values, squeeze, slopes)
 
 
-def vertices(elements: int, length: ArrayLike, half_height: ArrayLike) -> Array:
-    """End points of the elements, graded towards X = L.
+def _gauss(order: int) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points and weights on [0, 1]."""
+    points, weights = legendre.leggauss(order)
+    return 0.5 * (1.0 + points), 0.5 * weights
+
+
+def _shapes(nodes: np.ndarray) -> list[Polynomial]:
+    """Lagrange's polynomials of an element's nodes."""
+    shapes = [Polynomial.fromroots(np.delete(nodes, i)) for i in range(nodes.size)]
+    return [shape / shape(node) for shape, node in zip(shapes, nodes, strict=True)]
+
+
+def vertices(
+    elements: int,
+    length: ArrayLike,
+    half_height: ArrayLike,
+    end_size: float = END_SIZE,
+    steps: Array | None = None,
+) -> Array:
+    """End points of the elements, graded towards X = L and towards the steps of the load.
 
     Parameters
     ----------
     elements : number of elements
     length : L
     half_height : H
+    end_size : size of the smallest elements before scaling, over H
+    steps : (k,) increasing positions of the steps, in [0, L]; they need not fall on nodes
 
     Returns
     -------
-    (elements + 1,) increasing positions from 0 to L; smooth in L and H.
+    (elements + 1,) increasing positions from 0 to L; smooth in L, H and the steps.
     """
-    far, end = FAR_SIZE * jnp.asarray(length), END_SIZE * jnp.asarray(half_height)
+    length = jnp.asarray(length)
+    far, end = FAR_SIZE * length, end_size * jnp.asarray(half_height)
     rate = jnp.where(far >= end, GROWTH, -GROWTH)
-    # Equidistribute int dd/h(d), h = end + rate d up to far: a logarithm, then a straight line.
-    turn = jnp.minimum((far - end) / rate, length)
-    at_turn = jnp.log1p(rate * turn / end) / rate
-    total = at_turn + (length - turn) / far
-    count = total * jnp.arange(elements, -1, -1) / elements
-    graded = end * jnp.expm1(rate * jnp.minimum(count, at_turn)) / rate
-    distance = graded + far * jnp.maximum(count - at_turn, 0.0)
-    x: Array = jnp.asarray(length) - distance
+    # Elements between a focus and the distance d: int dd/h(d) with h = end + rate d up to far,
+    # a logarithm and then a straight line.
+    turn = (far - end) / rate
+
+    def count(distance: Array) -> Array:
+        near = jnp.minimum(distance, turn)
+        return jnp.log1p(rate * near / end) / rate + (distance - near) / far
+
+    at_turn = count(turn)
+
+    def reach(elements: Array) -> Array:
+        near = jnp.minimum(elements, at_turn)
+        return end * jnp.expm1(rate * near) / rate + far * (elements - near)
+
+    foci = length[None] if steps is None else jnp.append(steps, length)
+    # Pieces run to and from a focus by turns: 0, first focus, half way to the next one, and so on.
+    half_way = 0.5 * (foci[:-1] + foci[1:])
+    edges = jnp.append(0.0, jnp.append(jnp.stack([foci[:-1], half_way], 1).ravel(), length))
+    counts = jnp.append(0.0, jnp.cumsum(count(jnp.diff(edges))))
+    target = counts[-1] * jnp.arange(elements + 1) / elements
+    piece = jnp.clip(jnp.searchsorted(counts, target, side="right") - 1, 0, edges.size - 2)
+    away = edges[piece] + reach(target - counts[piece])
+    towards = edges[piece + 1] - reach(counts[piece + 1] - target)
+    x = jnp.where(piece % 2 == 1, away, towards)
     return x.at[0].set(0.0).at[-1].set(length)
+
+
+def table_steps(table: Array, length: ArrayLike) -> Array:
+    """Positions (rows - 1,) at which a table of (X, value) rows jumps; L stands for no jump."""
+    return jnp.sort(jnp.where(jnp.diff(table[:, 0]) > 0.0, length, table[1:, 0]))
+
+
+def nodal_loads(rule: Rule, ends: Array, load: Array) -> Array:
+    """Integrals of a distributed load times the nodes' shape functions, (n,).
+
+    Parameters
+    ----------
+    rule : of the elements
+    ends : (elements + 1,) their end points
+    load : load per length: one number, or a table (rows, 2) of X and value, linear in between, two
+        rows of the same X making a step; exact, wherever the steps fall
+    """
+    if load.ndim == 0:
+        return load * tributary_lengths(rule, ends)
+    table = jnp.concatenate([load[:1], load, load[-1:]])  # it goes on with its end values
+    x, value = table[:, 0].at[0].min(ends[0]).at[-1].max(ends[-1]), table[:, 1]
+    run = jnp.where(jnp.diff(x) > 0.0, jnp.diff(x), 1.0)
+    begin, size = ends[:-1, None], jnp.diff(ends)[:, None]
+    low = jnp.maximum(begin, x[:-1])
+    cut = jnp.maximum(jnp.minimum(begin + size, x[1:]) - low, 0.0)  # (elements, rows + 1)
+    total = jnp.zeros((ends.size - 1, rule.nodes.size), ends.dtype)
+    for point, weight in zip(*_gauss(2), strict=True):  # linear times quadratic is exact
+        at = low + point * cut
+        along = jnp.clip((at - x[:-1]) / run, 0.0, 1.0)
+        part = weight * cut * (value[:-1] + along * jnp.diff(value))
+        inside = (at - begin) / size
+        shapes = jnp.stack([jnp.polyval(s.coef[::-1], inside) for s in _shapes(rule.nodes)], -1)
+        total = total + jnp.sum(part[..., None] * shapes, axis=1)
+    return scatter(total)
 
 
 def nodes(rule: Rule, ends: Array) -> Array:

@@ -6,12 +6,15 @@ import enum
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from jbeamshell import closed_form
+from jbeamshell.cycles import branch_work
 from jbeamshell.errors import InputError
+from jbeamshell.kinematics import Strains
 from jbeamshell.scene import Scene
 
 
@@ -25,7 +28,9 @@ class Status(enum.IntEnum):
 
 
 class History(eqx.Module):
-    """Result of a load path; step 0 is the strip after the pressure, before any load.
+    """Result of a load path: the pressing down without friction, then the loads.
+
+    With ``load.pressure_steps`` = 1, step 0 is the strip after the pressure, before any load.
 
     Steps that did not converge, and those after them, hold NaN.
 
@@ -33,15 +38,22 @@ class History(eqx.Module):
     ----------
     scene : the scene that was solved
     x : (n,) node positions X, from the far end to the loaded end
+    middles : (elements,) middle of every element, where the section forces are
     tributary : (n,) contact length of each node
+    load : (n,) nodal forces of the whole pressure on the top face
     force : (steps+1,) end force F per unit width
     displacement : (steps+1,) mid-height displacement u(L) since the pressure, conjugate to F
     fields : (steps+1, n, 4) v, w, beta, psi
+    gap : (steps+1, n) height of the strip's bottom face over the foundation
+    sections : (steps+1, elements) section forces N, Q, M, chi and xi in the places of e, g, k, psi
+        and psi'
     traction : (steps+1, n) friction traction on the foundation (positive on a pull)
     reaction : (steps+1, n) normal reaction R, positive in compression
     slipping : (steps+1, n) whether the node slipped in the step
     slip_work : (steps+1,) work dissipated by friction in each step, per unit width
-    stored_energy : (steps+1,) strain energy, pressure potential and elastic slip energy
+    stored_energy : (steps+1,) strain energy, pressure potential and elastic energy of the contact
+    pressure : (steps+1,) part of the pressures that acts
+    sinking : (steps+1,) its conjugate: the pressures' forces times their displacement
     iterations : (steps+1,) Newton iterations
     error : (steps+1,) largest out-of-balance force over mu F_N L
     status : (steps+1,) codes of `Status`
@@ -50,19 +62,30 @@ class History(eqx.Module):
 
     scene: Scene
     x: Array
+    middles: Array
     tributary: Array
+    load: Array
     force: Array
     displacement: Array
     fields: Array
+    gap: Array
+    sections: Strains
     traction: Array
     reaction: Array
     slipping: Array
     slip_work: Array
     stored_energy: Array
+    pressure: Array
+    sinking: Array
     iterations: Array
     error: Array
     status: Array
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
+
+    @property
+    def pressed(self) -> int:
+        """The step at which the whole pressure acts, before any load."""
+        return self.scene.load.pressure_steps - 1
 
     # --- profiles -------------------------------------------------------------------------------
 
@@ -89,7 +112,70 @@ class History(eqx.Module):
     @property
     def slip(self) -> Array:
         """Tangential displacement of the contact since the pressure, (steps+1, n)."""
-        return self.v - self.v[0]
+        return self.v - self.v[self.pressed]
+
+    @property
+    def squeeze_stress(self) -> Array:
+        """Mean of sigma_y over the height, chi/(2H), compression negative, (steps+1, elements)."""
+        return self.sections.psi / (2.0 * self.scene.strip.half_height)
+
+    @property
+    def squeeze_couple(self) -> Array:
+        """Moment xi of the shear stress about mid-height, (steps+1, elements)."""
+        return self.sections.dpsi
+
+    # --- contact at every step --------------------------------------------------------------------
+
+    @property
+    def touching(self) -> Array:
+        """Whether the node is in contact, (steps+1, n)."""
+        if self.scene.contact.normal == "none":
+            return jnp.zeros(self.gap.shape, bool)
+        if self.scene.contact.normal == "compliant":
+            return self.gap <= 0.0
+        strip = self.scene.strip  # the same weight as in the search for the contact
+        return self.reaction > self.gap * strip.plane_modulus / strip.half_height
+
+    @property
+    def contact_end(self) -> Array:
+        """X at which the contact ends, (steps+1,).
+
+        The nodal force of the last node that touches fills a part of its share of the contact, with
+        the reaction continued from the nodes before: the shell's reaction ends in a jump.
+        """
+        return _contact_ends(self.x, self.tributary, self.touching, self.reaction)
+
+    @property
+    def curvature(self) -> Array:
+        """K = beta' at X = 0, 1/length, (steps+1,)."""
+        return (self.beta[:, 1] - self.beta[:, 0]) / (self.x[1] - self.x[0])
+
+    @property
+    def tip_deflection(self) -> Array:
+        """Height of the bottom face at X = L over that at X = 0, (steps+1,)."""
+        return self.gap[:, -1] - self.gap[:, 0]
+
+    @property
+    def lift_slope(self) -> Array:
+        """Angle of the end section at X = L to the foundation's normal, rad, (steps+1,)."""
+        strip = self.scene.strip
+        before = 0.0 if strip.curvature is None else strip.curvature * strip.length
+        return before + self.beta[:, -1]
+
+    @property
+    def reaction_max(self) -> Array:
+        """Largest normal reaction, (steps+1,)."""
+        return jnp.max(self.reaction, axis=1)
+
+    @property
+    def reaction_max_at(self) -> Array:
+        """X of the largest normal reaction, (steps+1,)."""
+        return self.x[jnp.argmax(self.reaction, axis=1)]
+
+    @property
+    def squeeze_stress_max(self) -> Array:
+        """Largest compression chi/(2H) of any section, positive, (steps+1,)."""
+        return jnp.max(-self.squeeze_stress, axis=1)
 
     # --- figures of the last cycle --------------------------------------------------------------
 
@@ -125,18 +211,16 @@ class History(eqx.Module):
     @property
     def dissipation_ratio(self) -> Array:
         """Dissipation over that of the one-dimensional bar, (2/3) A^3/(E'2H q)."""
-        strip, force = self.scene.strip, self.loop[0]
+        stiffness, force = self.scene.strip.stretching_stiffness, self.loop[0]
         amplitude = 0.5 * (jnp.max(force) - jnp.min(force))
         return self.dissipation / closed_form.cubic_law(
-            amplitude, strip.axial_stiffness, self.friction_per_length
+            amplitude, stiffness, self.friction_per_length
         )
 
     @property
     def friction_per_length(self) -> Array:
         """q: mean of mu F_N along the strip, force per length and width."""
-        pressure = self.scene.contact.pressure_at(self.x)
-        mean = jnp.sum(self.tributary * pressure) / jnp.sum(self.tributary)
-        return self.scene.contact.friction * mean
+        return self.scene.contact.friction * jnp.sum(self.load) / jnp.sum(self.tributary)
 
     @property
     def secant_stiffness(self) -> Array:
@@ -175,11 +259,14 @@ class History(eqx.Module):
 
     @property
     def energy_imbalance(self) -> Array:
-        """External work less stored and dissipated energy since the start, (steps+1,)."""
-        mean = 0.5 * (self.force[1:] + self.force[:-1])
-        work = jnp.cumsum(mean * jnp.diff(self.displacement))
+        """External work less stored and dissipated energy since the first step, (steps+1,).
+
+        The work includes that of a change of the pressures.
+        """
+        force, sinking = (0.5 * (a[1:] + a[:-1]) for a in (self.force, self.sinking))
+        work = jnp.cumsum(force * jnp.diff(self.displacement) + sinking * jnp.diff(self.pressure))
         kept = self.stored_energy - self.stored_energy[0] + jnp.cumsum(self.slip_work)
-        return jnp.append(jnp.zeros_like(work[:1]), work) - kept
+        return jnp.append(0.0, work) - kept
 
     # --- reports --------------------------------------------------------------------------------
 
@@ -189,19 +276,33 @@ class History(eqx.Module):
         return bool(np.all(np.asarray(self.status) == Status.CONVERGED))
 
     def figures(self) -> dict[str, Any]:
-        """The figures of the last cycle by name, as plain numbers."""
+        """The figures of the last cycle and of the contact at the last step, as plain numbers."""
         worst = Status(int(np.max(np.asarray(self.status))))
-        figures: dict[str, Any] = {name: float(getattr(self, name)) for name in FIGURES}
+        names = (*(FIGURES if self.cycles else ()), *self._contact_figures)
+        figures: dict[str, Any] = {k: float(v) for k, v in _last_values(self, names).items()}
         figures["newton_iterations"] = int(np.sum(np.asarray(self.iterations)))
         figures["status"] = worst.name.lower()
         return figures
 
+    @property
+    def _contact_figures(self) -> tuple[str, ...]:
+        """Names of the figures that mean something in this scene."""
+        fields, founded = self.scene.model.fields, self.scene.contact.normal != "none"
+        names: tuple[str, ...] = () if founded else ("tip_deflection", "curvature")
+        if "w" in fields and founded:
+            names += ("contact_end", "tip_deflection", "lift_slope")
+        if founded:
+            names += ("reaction_max", "reaction_max_at")
+        return (*names, "squeeze_stress_max") if "psi" in fields else names
+
     def __str__(self) -> str:
         strip, load = self.scene.strip, self.scene.load
+        what = f"{load.control} amplitude {float(jnp.max(jnp.abs(self._driver))):.4g}"
+        if not self.cycles and not jnp.any(self._driver):
+            what = f"pressed by {float(jnp.sum(self.load)):.4g}"
         lines = [
-            f"{len(self.status) - 1} steps of {' '.join(self.scene.model.fields)} on "
-            f"{self.x.size} nodes, eta = {float(strip.height_ratio):.4g}, "
-            f"{load.control} amplitude {float(jnp.max(jnp.abs(self._driver))):.4g}"
+            f"{self.force.size} levels of {' '.join(self.scene.model.fields)} on "
+            f"{self.x.size} nodes, eta = {float(strip.height_ratio):.4g}, {what}"
         ]
         lines += [
             f"  {name.replace('_', ' '):20s} {value:.6g}"
@@ -227,6 +328,20 @@ class History(eqx.Module):
 
         return plotting.profiles(self, steps, axes)
 
+    def plot_contact(
+        self, steps: Any = None, axes: Any = None, reference: Any = None, **options: Any
+    ) -> Any:
+        """Draw reaction, gap, squeeze and rotation along X; see `plotting.contact`."""
+        from jbeamshell import plotting
+
+        return plotting.contact(self, steps, axes, reference, **options)
+
+    def plot_contact_map(self, axes: Any = None, **options: Any) -> Any:
+        """Draw what sticks, slips and is lifted along the path; see `plotting.contact_map`."""
+        from jbeamshell import plotting
+
+        return plotting.contact_map(self, axes, **options)
+
 
 FIGURES = (
     "dissipation",
@@ -241,41 +356,28 @@ FIGURES = (
 )
 
 
-def branch_work(force: Array, displacement: Array) -> Array:
-    """Integral of F du along a smooth branch, exact where both are parabolas of the step number.
-
-    Parameters
-    ----------
-    force, displacement : (steps+1,) along the branch; an odd last step is taken as straight
-    """
-    even = 2 * ((force.shape[0] - 1) // 2)
-    f, u = force[: even + 1], displacement[: even + 1]
-    f0, f1, f2, u0, u1, u2 = f[:-2:2], f[1::2], f[2::2], u[:-2:2], u[1::2], u[2::2]
-    at0, at1, at2 = -1.5 * u0 + 2.0 * u1 - 0.5 * u2, 0.5 * (u2 - u0), 0.5 * u0 - 2.0 * u1 + 1.5 * u2
-    work = jnp.sum(f0 * at0 + 4.0 * f1 * at1 + f2 * at2) / 3.0  # Simpson's rule on F du/dstep
-    if even + 1 < force.shape[0]:
-        work = work + 0.5 * (force[-2] + force[-1]) * (displacement[-1] - displacement[-2])
-    return work
+@eqx.filter_jit
+def _last_values(history: History, names: tuple[str, ...]) -> dict[str, Array]:
+    """Figures of the last cycle or, where there is one for every step, of the last step."""
+    return {name: jnp.ravel(getattr(history, name))[-1] for name in names}
 
 
-def turning_points(path: np.ndarray) -> list[int]:
-    """Indices of a load path's start, reversals and end; (steps,) to a list."""
-    moves = np.flatnonzero(np.diff(path)) + 1
-    signs = np.sign(path[moves] - path[moves - 1])
-    turns = moves[:-1][signs[1:] != signs[:-1]] if moves.size else []
-    return [0, *map(int, turns), len(path) - 1]
+@jax.jit
+def _contact_ends(x: Array, tributary: Array, touching: Array, reaction: Array) -> Array:
+    last = x.size - 1
+    share_begins = jnp.cumsum(tributary) - tributary
 
+    def end(touching: Array, reaction: Array) -> Array:
+        j = last - jnp.argmax(touching[::-1])
+        before, outer = jnp.maximum(j - 1, 1), jnp.minimum(j + 1, last)
+        slope = (reaction[before] - reaction[before - 1]) / (x[before] - x[before - 1])
+        force, begin = reaction[j] * tributary[j], share_begins[j]
+        width = tributary[j]
+        for _ in range(3):
+            level = reaction[before] + slope * (begin + 0.5 * width - x[before])
+            width = jnp.where(level > 0.0, force / jnp.where(level > 0.0, level, 1.0), width)
+            width = jnp.clip(width, 0.0, x[outer] - begin)
+        found = jnp.where(j == last, x[last], begin + width)
+        return jnp.where(jnp.any(touching), found, 0.0)
 
-def closed_cycles(path: np.ndarray) -> tuple[tuple[int, int, int], ...]:
-    """Cycles of a load path that return to the load they started from: (start, turn, end) each."""
-    turns = turning_points(path)
-    close = 1e-6 * np.ptp(path)
-    cycles, i = [], 0
-    while i + 2 < len(turns):
-        a, b, c = turns[i : i + 3]
-        if abs(path[c] - path[a]) <= close:
-            cycles.append((a, b, c))
-            i += 2
-        else:
-            i += 1
-    return tuple(cycles)
+    return jax.vmap(end)(touching, reaction)

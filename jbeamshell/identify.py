@@ -1,4 +1,4 @@
-"""Parameters from loops: least squares on the response, with standard errors.
+"""Parameters from measurements: least squares on the response, with standard errors.
 
 The only file that imports jaxopt.
 """
@@ -13,20 +13,21 @@ import jax
 import jax.numpy as jnp
 import jaxopt
 import numpy as np
-from jax import Array, lax
+from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.loops import Loop
 from jbeamshell.newton import Newton
-from jbeamshell.quasistatic import check, solve
+from jbeamshell.observations import Experiment, Observation, SqueezeCurve, observe
 from jbeamshell.scene import NUMBERS, Scene, check_key
+
+Measurement = Loop | SqueezeCurve
 
 POINTS = 96  # of a loop that the model is run through
 MAX_ITERATIONS = 40
-APPROACH = 8  # load steps from zero to the first point of the data
 FLAT = 1e-6  # relative gain in cost at which a fit has settled
-HOPELESS = 10.0  # residual, in ranges, of a trial without equilibrium: never accepted
+SIGNED = ("strip.deviation", "strip.curvature")  # all others keep their sign
 
 
 class Fit(NamedTuple):
@@ -39,10 +40,10 @@ class Fit(NamedTuple):
         model leaves unexplained as independent noise, so a model that is wrong makes them too small
     correlation : (p, p) of the fitted values, in the order of ``values``
     misfit : root mean square of the residual over the range of the response
-    misfits : the same for every loop
-    data, model : the loops fitted, thinned, and the model's at the same points
+    misfits : the same for every measurement
+    data, model : the measurements fitted, loops thinned, and the model's at the same points
     status : "converged" or "max_iterations"
-    model_runs : how often the model was run through all loops, derivatives included
+    model_runs : how often the model was run through all measurements, derivatives included
     """
 
     scene: Scene
@@ -51,8 +52,8 @@ class Fit(NamedTuple):
     correlation: NDArray[np.float64]
     misfit: float
     misfits: list[float]
-    data: list[Loop]
-    model: list[Loop]
+    data: list[Any]
+    model: list[Any]
     status: str
     model_runs: int
 
@@ -77,22 +78,25 @@ class Fit(NamedTuple):
         }
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw data and model; returns the axes."""
+        """Draw data and model; returns the axes, which are a pair for a mixture: loops first."""
         from jbeamshell import plotting
 
-        return plotting.overlay(
-            [(d.force, d.displacement, "data") for d in self.data],
-            [(m.force, m.displacement, f"model, {m.label}") for m in self.model],
-            axes,
-        )
+        def pairs(kind: type) -> list[tuple[Any, Any]]:
+            both = zip(self.data, self.model, strict=True)
+            return [(d, m) for d, m in both if isinstance(d, kind)]
 
-
-class _Task(NamedTuple):
-    """Loops as load paths of one length: what is prescribed, compared, and with which weight."""
-
-    path: Array  # (loops, steps)
-    response: Array  # (loops, steps)
-    weight: Array  # (loops, steps), 1 over the response's range where compared, else 0
+        loops, curves = pairs(Loop), pairs(SqueezeCurve)
+        mixed = bool(loops and curves)
+        left, right = ((None, None) if axes is None else axes) if mixed else (axes, axes)
+        drawn = []
+        if loops:
+            data = [(d.force, d.displacement, "data") for d, _ in loops]
+            model = [(m.force, m.displacement, f"model, {m.label}") for _, m in loops]
+            drawn.append(plotting.overlay(data, model, left))
+        if curves:
+            data, model = map(list, zip(*curves, strict=True))
+            drawn.append(plotting.squeeze_fit(data, model, right))
+        return drawn if mixed else drawn[0]
 
 
 def driver_of(loops: Sequence[Loop]) -> str:
@@ -107,7 +111,7 @@ def driver_of(loops: Sequence[Loop]) -> str:
 
 
 def fit(
-    loops: Loop | Sequence[Loop],
+    data: Measurement | Sequence[Measurement],
     scene: Scene,
     free: Sequence[str],
     *,
@@ -118,15 +122,16 @@ def fit(
     progress: Callable[[str], None] | None = None,
     throw: bool = True,
 ) -> Fit:
-    """Least squares of a scene's parameters on measured or computed loops.
+    """Least squares of a scene's parameters on measured or computed curves.
 
-    The model is driven by the column that ``scene.load.control`` names and compared in the other,
-    relative to its range.  A closed loop is run twice, so that its second pass is steady; anything
-    else is run once, from rest.
+    A loop drives the model by the column that ``scene.load.control`` names and is compared in the
+    other; a squeeze curve is compared under the scene's pressures alone.  Every measurement counts
+    relative to its own range, with its own number of points, and all are of this one scene: what
+    differs between them, such as another pressure or height, needs a fit of its own.
 
     Parameters
     ----------
-    loops : the data
+    data : a `Loop`, a `SqueezeCurve`, or a list of them, mixed or not
     scene : start values, and everything that stays fixed
     free : keys of the parameters to fit, e.g. ("contact.friction", "strip.height_ratio")
     solver : settings of Newton's method
@@ -139,50 +144,48 @@ def fit(
     Raises
     ------
     InputError
-        for keys that cannot be fitted, or that the loops do not depend on, and for forces beyond
-        gross slip at the start values
+        for keys that cannot be fitted, or that the data do not depend on; for measurements that the
+        scene cannot answer, such as forces beyond gross slip at the start values
     UnconvergedError
         if the iteration does not settle, or the model finds no equilibrium at the start
     """
-    data = [loops] if isinstance(loops, Loop) else list(loops)
     _check_free(scene, free)
-    if not data:
-        raise InputError("loops: no loop given; read one with read_loops")
+    # A Loop is a tuple itself.
+    given = [data] if isinstance(data, Loop) or not isinstance(data, Sequence) else data
+    if not given:
+        raise InputError("data: no measurement given; read loops with read_loops")
     driver = scene.load.control
-    data = [loop.thinned(points, driver) for loop in data]
-    task = _task(data, driver)
-    for path in task.path:
-        check(scene, path)
-    evaluate = _Evaluation(scene, tuple(free), task, solver or Newton())
+    whole = [d.thinned(points, driver) if isinstance(d, Loop) else d for d in given]
+    observations = [observe(d, scene) for d in whole]
+    evaluate = _Evaluation(scene, tuple(free), Experiment(observations), solver or Newton())
 
-    start = np.array([_unbound(key, float(scene.get(key))) for key in free])
-    _, jacobian = evaluate(start)
-    if not evaluate.sound(start):
+    params = jnp.zeros(len(free))
+    jacobian = evaluate(params).jacobian
+    if not evaluate(params).sound:
         raise UnconvergedError(
             "the model finds no equilibrium at the start values: start closer, or lower "
             "contact.stick_stiffness"
         )
     for key, column in zip(free, jacobian.T, strict=True):
         if not np.any(np.abs(column) > 1e-9):
-            raise InputError(f"free {key!r}: the loops do not depend on it; leave it out")
+            raise InputError(f"free {key!r}: the data do not depend on it; leave it out")
 
     method = jaxopt.LevenbergMarquardt(
-        residual_fun=lambda p: jnp.asarray(evaluate(np.asarray(p))[0]),
+        residual_fun=lambda p: jnp.asarray(evaluate(p).residual),
         materialize_jac=True,
         solver="cholesky",
         damping_parameter=1e-3,
         jit=False,
     )
     # Its last release forgets a jac_fun argument when the Jacobian is materialised.
-    method._jac_fun = lambda p: jnp.asarray(evaluate(np.asarray(p))[1])
-    params = jnp.asarray(start)
+    method._jac_fun = lambda p: jnp.asarray(evaluate(p).jacobian)
     state = method.init_state(params)
     status = "max_iterations"
     for _ in range(max_iterations):
         before = float(state.value)
         params, state = method.update(params, state)
         if progress:
-            progress(_line(free, params, state.residual))
+            progress(_line(scene, free, params, state.residual))
         gained = before - float(state.value)  # nothing when the step was refused
         if float(jnp.max(jnp.abs(state.delta))) < tolerance or 0.0 < gained < FLAT * before:
             status = "converged"
@@ -190,93 +193,101 @@ def fit(
     if throw and status != "converged":
         raise UnconvergedError(
             f"the fit has not settled after {max_iterations} iterations, at "
-            f"{_line(free, params, state.residual)}: start closer, free fewer parameters, or allow "
-            "more iterations"
+            f"{_line(scene, free, params, state.residual)}: start closer, free fewer parameters, "
+            "or allow more iterations"
         )
-    return _result(scene, free, np.asarray(params), evaluate, data, task, driver, status)
+    return _result(scene, free, params, evaluate, whole, observations, status)
+
+
+def fit_kappa_s(curve: Measurement | Sequence[Measurement], scene: Scene, **options: Any) -> Fit:
+    """`fit` of the squeeze-shear factor alone, to the squeeze stress over an edge of the pressure.
+
+    The squeeze strain decays from there within lam = H sqrt(kappa_s (1-nu)/6) in plane strain
+    (Brink 2015, section 4.7.2).  Elasticity (Filon 1903) does not decay so and turns into a little
+    tension, so what is fitted is the width of a layer, and depends on where one looks.
+
+    Parameters
+    ----------
+    curve : a `SqueezeCurve`, or several
+    scene : start value, and everything that stays fixed
+    options : of `fit`
+    """
+    return fit(curve, scene, ("strip.kappa_s",), **options)
+
+
+class _Point(NamedTuple):
+    """The model at a point of the search space.
+
+    Attributes
+    ----------
+    residual, jacobian : (measurements * n,), (measurements * n, p)
+    predictions : (measurements, n)
+    sound : whether every load step found equilibrium
+    """
+
+    residual: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
+    predictions: NDArray[np.float64]
+    sound: bool
 
 
 class _Evaluation:
     """Residual and Jacobian at a point together, remembered: the optimiser asks for them apart."""
 
-    def __init__(self, scene: Scene, free: tuple[str, ...], task: _Task, solver: Newton) -> None:
-        self._scene, self._free, self._task, self._solver = scene, free, task, solver
-        self._known: dict[bytes, tuple[NDArray, NDArray, NDArray, bool]] = {}
+    def __init__(
+        self, scene: Scene, free: tuple[str, ...], experiment: Experiment, solver: Newton
+    ) -> None:
+        self._fixed = (scene, free, experiment, solver)
+        self._known: dict[bytes, _Point] = {}
 
     @property
     def runs(self) -> int:
         """Points at which the model was run."""
         return len(self._known)
 
-    def __call__(self, params: NDArray) -> tuple[NDArray, NDArray]:
-        return self._at(params)[:2]
-
-    def prediction(self, params: NDArray) -> NDArray:
-        """The response (loops, steps)."""
-        return self._at(params)[2]
-
-    def sound(self, params: NDArray) -> bool:
-        """Whether every step found equilibrium."""
-        return self._at(params)[3]
-
-    def _at(self, params: NDArray) -> tuple[NDArray, NDArray, NDArray, bool]:
-        key = params.tobytes()
+    def __call__(self, params: Array) -> _Point:
+        key = np.asarray(params).tobytes()
         if key not in self._known:
-            jacobian, (residual, response, sound) = _linearised(
-                jnp.asarray(params), self._scene, self._free, self._task, self._solver
-            )
-            self._known[key] = (
-                np.asarray(residual),
-                np.asarray(jacobian),
-                np.asarray(response),
-                bool(sound),
+            rows, jacobian, predictions, sound = _linearised(params, *self._fixed)
+            self._known[key] = _Point(
+                np.asarray(rows), np.asarray(jacobian), np.asarray(predictions), bool(sound)
             )
         return self._known[key]
 
 
 @eqx.filter_jit
 def _linearised(
-    params: Array, scene: Scene, free: tuple[str, ...], task: _Task, solver: Newton
-) -> tuple[Array, tuple[Array, Array, Array]]:
+    params: Array, scene: Scene, free: tuple[str, ...], experiment: Experiment, solver: Newton
+) -> tuple[Array, Array, Array, Array]:
     def residual(params: Array) -> tuple[Array, tuple[Array, Array, Array]]:
-        trial = scene_at(scene, free, params)
+        rows, predictions, sound = experiment.residual(scene_at(scene, free, params), solver)
+        return rows.ravel(), (rows.ravel(), predictions, sound)
 
-        def run(path: Array) -> tuple[Array, Array]:
-            history = solve(trial, path, solver=solver, throw=False)
-            answers = {"force": history.displacement, "displacement": history.force}
-            sound = jnp.all(history.status == 0)
-            return answers[scene.load.control][1:], sound
-
-        response, sound = lax.map(run, task.path)
-        misfit = jnp.where(
-            sound[:, None], (response - task.response) * task.weight, HOPELESS * (task.weight > 0)
-        ).ravel()
-        return misfit, (misfit, response, jnp.all(sound))
-
-    return jax.jacfwd(residual, has_aux=True)(params)
+    jacobian, (rows, predictions, sound) = jax.jacfwd(residual, has_aux=True)(params)
+    return rows, jacobian, predictions, sound
 
 
 def scene_at(scene: Scene, free: Sequence[str], params: Array) -> Scene:
-    """The scene with its free parameters at a point of the unbounded search space."""
-    values = {key: _bound(key, p) for key, p in zip(free, params, strict=True)}
-    return scene.replace(values)
+    """The scene with its free parameters at a point of the search space, where it is at zero."""
+    return scene.replace(_values(scene, free, params))
 
 
-def _bound(key: str, p: Any) -> Any:
-    """From the whole real line to where it lives: positive, m above 1, nu in (-1, 0.5)."""
+def _values(scene: Scene, free: Sequence[str], params: Any) -> dict[str, Any]:
+    return {key: _bound(key, scene.get(key), p) for key, p in zip(free, params, strict=True)}
+
+
+def _bound(key: str, start: Any, p: Any) -> Any:
+    """From the whole real line, zero being the start, to where a parameter lives.
+
+    The real line for those of either sign, m above 1, nu in (-1, 0.5), positive for all others.
+    """
+    if key in SIGNED:
+        return start * (1.0 + p)
     if key == "strip.poisson_ratio":
-        return -1.0 + 1.5 / (1.0 + jnp.exp(-p))
+        return -1.0 + 1.5 / (1.0 + (0.5 - start) / (1.0 + start) * jnp.exp(-p))
     if key == "contact.smoothing":
-        return 1.0 + jnp.exp(p)
-    return jnp.exp(p)
-
-
-def _unbound(key: str, value: float) -> float:
-    if key == "strip.poisson_ratio":
-        return float(np.log((value + 1.0) / (0.5 - value)))
-    if key == "contact.smoothing":
-        return float(np.log(value - 1.0))
-    return float(np.log(value))
+        return 1.0 + (start - 1.0) * jnp.exp(p)
+    return start * jnp.exp(p)
 
 
 def _check_free(scene: Scene, free: Sequence[str]) -> None:
@@ -286,92 +297,63 @@ def _check_free(scene: Scene, free: Sequence[str]) -> None:
         check_key(key)
         if key not in NUMBERS or key == "load.amplitude":
             raise InputError(f"free {key!r}: is not a parameter of the strip or the contact")
-        if np.ndim(scene.get(key)) > 0:
+        start = scene.get(key)
+        if start is None:
+            raise InputError(f"free {key!r}: the scene has none; give it a number to start from")
+        if np.ndim(start) > 0:
             raise InputError(f"free {key!r}: is a table; only a single number can be fitted")
-        if not np.isfinite(scene.get(key)):
+        if not np.isfinite(start):
             raise InputError(
                 f"free {key!r}: is 'sharp'; give it a number to start from, such as 16"
             )
+        if start == 0.0 and key != "strip.poisson_ratio":
+            raise InputError(f"free {key!r}: is 0; give it another number to start from")
     if len(set(free)) < len(free):
         raise InputError(f"free {list(free)}: names a key twice")
-
-
-def _task(loops: Sequence[Loop], driver: str) -> _Task:
-    answer = "displacement" if driver == "force" else "force"
-    paths, responses, weights = [], [], []
-    for loop in loops:
-        drive, response = getattr(loop, driver), getattr(loop, answer)
-        approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
-        passes = 2 if loop.closed else 1
-        paths.append(np.concatenate([approach, *[drive] * passes]))
-        skipped = APPROACH + (passes - 1) * drive.size
-        responses.append(np.append(np.zeros(skipped), response))
-        weights.append(np.append(np.zeros(skipped), np.full(drive.size, 1.0 / np.ptp(response))))
-    longest = max(map(len, paths))
-    # A path that stands still adds nothing, so shorter ones wait at their end.
-    pad = [longest - len(p) for p in paths]
-    return _Task(
-        jnp.asarray(
-            np.stack([np.append(p, np.full(k, p[-1])) for p, k in zip(paths, pad, strict=True)])
-        ),
-        jnp.asarray(
-            np.stack([np.append(r, np.zeros(k)) for r, k in zip(responses, pad, strict=True)])
-        ),
-        jnp.asarray(
-            np.stack([np.append(w, np.zeros(k)) for w, k in zip(weights, pad, strict=True)])
-        ),
-    )
 
 
 def _result(
     scene: Scene,
     free: Sequence[str],
-    params: NDArray,
+    params: Array,
     evaluate: _Evaluation,
-    data: list[Loop],
-    task: _Task,
-    driver: str,
+    data: list[Any],
+    observations: Sequence[Observation],
     status: str,
 ) -> Fit:
-    residual, jacobian = evaluate(params)
-    compared = np.asarray(task.weight) > 0.0
-    freedom = max(int(compared.sum()) - params.size, 1)
-    noise = float(residual @ residual) / freedom
-    inverse = np.linalg.pinv(jacobian.T @ jacobian)
+    point = evaluate(params)
+    compared = [np.flatnonzero(np.asarray(o.weight)) for o in observations]
+    rows = [row[i] for row, i in zip(point.residual.reshape(len(data), -1), compared, strict=True)]
+    noise = np.sum(point.residual**2) / max(sum(map(len, rows)) - len(free), 1)
+    inverse = np.linalg.pinv(point.jacobian.T @ point.jacobian)
     spread = np.sqrt(np.diag(inverse))
-    sigma = np.sqrt(noise) * spread
-    scale = np.array(
-        [
-            float(jax.grad(lambda p, k=key: _bound(k, p))(x))
-            for key, x in zip(free, params, strict=True)
-        ]
-    )
-    response = evaluate.prediction(params)
-    model = [
-        Loop(loop.force, answer[mask], loop.label)
-        if driver == "force"
-        else Loop(answer[mask], loop.displacement, loop.label)
-        for loop, answer, mask in zip(data, response, compared, strict=True)
-    ]
-    per_loop = residual.reshape(compared.shape)
+    slopes = jax.jvp(lambda p: _values(scene, free, p), (params,), (jnp.ones(len(free)),))[1]
+    values = {key: float(value) for key, value in _values(scene, free, params).items()}
+    errors = np.abs([float(slopes[key]) for key in free]) * np.sqrt(noise) * spread
+
+    def answered(measurement: Any, observation: Observation, answer: NDArray) -> Any:
+        column = observation.column(scene)
+        return eqx.tree_at(lambda m: getattr(m, column), measurement, answer)
+
     return Fit(
-        scene=scene.replace({k: float(_bound(k, p)) for k, p in zip(free, params, strict=True)}),
-        values={k: float(_bound(k, p)) for k, p in zip(free, params, strict=True)},
-        errors={k: float(e) for k, e in zip(free, scale * sigma, strict=True)},
+        scene=scene.replace(values),
+        values=values,
+        errors=dict(zip(free, errors.tolist(), strict=True)),
         correlation=inverse / np.outer(spread, spread),
-        misfit=float(np.sqrt(np.mean(per_loop[compared] ** 2))),
-        misfits=[
-            float(np.sqrt(np.mean(r[m] ** 2))) for r, m in zip(per_loop, compared, strict=True)
-        ],
+        misfit=float(np.sqrt(np.mean(np.concatenate(rows) ** 2))),
+        misfits=[float(np.sqrt(np.mean(row**2))) for row in rows],
         data=data,
-        model=model,
+        model=[
+            answered(measurement, observation, prediction[i])
+            for measurement, observation, prediction, i in zip(
+                data, observations, point.predictions, compared, strict=True
+            )
+        ],
         status=status,
         model_runs=evaluate.runs,
     )
 
 
-def _line(free: Sequence[str], params: Array, residual: Array) -> str:
-    values = ", ".join(
-        f"{k} = {float(_bound(k, p)):.6g}" for k, p in zip(free, params, strict=True)
-    )
+def _line(scene: Scene, free: Sequence[str], params: Array, residual: Array) -> str:
+    values = ", ".join(f"{k} = {float(v):.6g}" for k, v in _values(scene, free, params).items())
     return f"{values}, cost {float(jnp.sum(residual**2)):.4g}"

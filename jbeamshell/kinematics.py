@@ -19,6 +19,15 @@ Inserting u_x = v - H(1+psi) sin(beta), u_y = w + H(1+psi) cos(beta) - H leaves
     g = w' cos(beta) - (1+v') sin(beta) + H psi'
 
 in which nothing of order one cancels.
+
+A strip that is curved before loading has the angle alpha(X) and the curvature alpha' (Libai &
+Simmonds 1998; Brink 2015, eqs. 2.25-2.28).  In the frame of the undeformed section, into which
+`turned` takes displacements and slopes, the same derivation gives
+
+    e = v' cos(beta) + w' sin(beta) - 2 (1+H alpha') sin^2(beta/2) - H (1+psi) beta' - H psi alpha'
+    g = w' cos(beta) - (1+H alpha' + v') sin(beta) + H psi'
+
+where primes are derivatives along the undeformed mid-height curve.
 """
 
 from __future__ import annotations
@@ -60,28 +69,45 @@ def _rotation(beta: Array) -> tuple[Array, Array, Array]:
     return 2.0 * sin * cos, 1.0 - versine, versine
 
 
-def exact_strains(section: Section, slope: Section, half_height: ArrayLike) -> Strains:
+def turned(x: Array, y: Array, angle: ArrayLike) -> tuple[Array, Array]:
+    """Components of the vector (x, y) in axes turned by an angle, counter-clockwise, rad."""
+    sin, cos = jnp.sin(angle), jnp.cos(angle)
+    return x * cos + y * sin, y * cos - x * sin
+
+
+def exact_strains(
+    section: Section, slope: Section, half_height: ArrayLike, curvature: ArrayLike | None = None
+) -> Strains:
     """Geometrically exact strains of one section.
 
     Parameters
     ----------
     section : (4,) fields v, w, beta, psi
-    slope : (4,) their derivatives along X
+    slope : (4,) their derivatives along X, in the frame of the undeformed section
     half_height : H
+    curvature : alpha' of the undeformed strip, 1/length; None is a straight one
     """
     _, _, beta, psi = section
     dv, dw, dbeta, dpsi = slope
     sin, cos, versine = _rotation(beta)
     e = dv * cos + dw * sin - versine - half_height * (1.0 + psi) * dbeta
     g = dw * cos - (1.0 + dv) * sin + half_height * dpsi
+    if curvature is not None:
+        e = e - half_height * curvature * (versine + psi)
+        g = g - half_height * curvature * sin
     return Strains(e, g, dbeta, psi, dpsi)
 
 
-def linear_strains(section: Section, slope: Section, half_height: ArrayLike) -> Strains:
+def linear_strains(
+    section: Section, slope: Section, half_height: ArrayLike, curvature: ArrayLike | None = None
+) -> Strains:
     """Strains of one section for small displacements and rotations; see `exact_strains`."""
     _, _, beta, psi = section
     dv, dw, dbeta, dpsi = slope
-    return Strains(dv - half_height * dbeta, dw - beta + half_height * dpsi, dbeta, psi, dpsi)
+    e, g = dv - half_height * dbeta, dw - beta + half_height * dpsi
+    if curvature is not None:
+        e, g = e - half_height * curvature * psi, g - half_height * curvature * beta
+    return Strains(e, g, dbeta, psi, dpsi)
 
 
 def exact_position(
@@ -91,7 +117,7 @@ def exact_position(
 
     Parameters
     ----------
-    section : (4,) fields v, w, beta, psi
+    section : (4,) fields v, w, beta, psi; v, w and the result in the undeformed section's frame
     half_height : H
     height : s in [-H, H]
     """
@@ -113,7 +139,7 @@ def linear_position(
 class Kinematics(NamedTuple):
     """A consistent pair of strains and positions."""
 
-    strains: Callable[[Section, Section, ArrayLike], Strains]
+    strains: Callable[..., Strains]
     position: Callable[[Section, ArrayLike, ArrayLike], tuple[Array, Array]]
 
 

@@ -29,7 +29,7 @@ class Newton(eqx.Module):
     """
 
     tolerance: float | None = eqx.field(static=True, default=None)
-    max_iterations: int = eqx.field(static=True, default=100)
+    max_iterations: int = eqx.field(static=True, default=200)
     max_halvings: int = eqx.field(static=True, default=8)
 
     def __check_init__(self) -> None:

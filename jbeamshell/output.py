@@ -7,11 +7,12 @@ import csv
 import io
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from jbeamshell import plotting
 from jbeamshell.errors import InputError
@@ -41,21 +42,29 @@ def check_folder(path: str | os.PathLike[str]) -> Path:
 
 
 def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> list[Path]:
-    """Write loop.csv, profiles.csv, scene.toml, result.json, loop.png and profiles.png.
+    """Write the tables, the scene, the figures as JSON, and the pictures that show something.
 
-    A scene with a user's own energy or law has no scene.toml.
+    These are loop.csv, profiles.csv, sections.csv, scene.toml and result.json; loop.png of a path
+    that goes on after the pressure, profiles.png if friction acts on it, and contact.png if w or
+    psi is a field.  A scene with a user's own energy or law has no scene.toml.
     """
+    steps = turning_steps(history)
     texts = {
         "loop.csv": loop_table(history),
-        "profiles.csv": profile_table(history, turning_steps(history)),
+        "profiles.csv": profile_table(history, steps),
+        "sections.csv": section_table(history, steps),
         "result.json": as_json(figures),
     }
     with contextlib.suppress(InputError):
         texts["scene.toml"] = scene_to_toml(history.scene)
-    pictures = {
-        "loop.png": history.plot().figure,
-        "profiles.png": np.ravel(history.plot_profiles())[0].figure,
-    }
+    scene, drawn = history.scene, {}
+    if history.force.size > history.pressed + 1:
+        drawn["loop.png"] = history.plot()
+        if float(scene.contact.friction) > 0.0:
+            drawn["profiles.png"] = history.plot_profiles()
+    if {"w", "psi"} & set(scene.model.fields):
+        drawn["contact.png"] = plotting.contact(history)
+    pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
     return _write(folder, texts, pictures)
 
 
@@ -92,35 +101,64 @@ def _write(folder: Path, texts: Mapping[str, str], pictures: Mapping[str, Any]) 
 
 
 def turning_steps(history: History) -> list[int]:
-    """Steps of the pressure, the first peak, and the last cycle's start, turn and end."""
-    marks = [0, *(i for cycle in (history.cycles[:1] + history.cycles[-1:]) for i in cycle)]
+    """Steps to look at: the end of the pressing, the first peak, the last cycle's turns and end.
+
+    A path without a cycle has its end instead, and the pressing's first and middle step.
+    """
+    pressed, end = history.pressed, history.force.size - 1
+    marks = [pressed]
+    if history.cycles:
+        marks += [history.cycles[0][0], *history.cycles[-1]]
+    else:
+        marks += [0, pressed // 2, end]
     return sorted(set(marks))
 
 
 def loop_table(history: History) -> str:
-    """CSV of the load path: step, force, displacement, work of friction, and how it converged."""
-    columns = (
-        range(history.force.size),
-        history.force,
-        history.displacement,
-        np.cumsum(history.slip_work),
-        history.iterations,
-        history.error,
-    )
-    header = ("step", "force", "displacement", "friction_work", "newton_iterations", "error")
-    return _table(header, zip(*(np.asarray(c).tolist() for c in columns), strict=True))
+    """CSV of the load path: what acts and answers, work of friction, and how it converged.
+
+    With unilateral contact also where the contact ends.
+    """
+    columns = {
+        "step": range(history.force.size),
+        "force": history.force,
+        "displacement": history.displacement,
+        "pressure": history.pressure,
+        "friction_work": np.cumsum(history.slip_work),
+    }
+    scene = history.scene
+    if "w" in scene.model.fields and scene.contact.normal != "none":
+        columns["contact_end"] = history.contact_end
+    columns |= {"newton_iterations": history.iterations, "error": history.error}
+    rows = zip(*(np.asarray(c).tolist() for c in columns.values()), strict=True)
+    return _table(tuple(columns), rows)
 
 
 def profile_table(history: History, steps: Sequence[int]) -> str:
-    """CSV of the fields along X at chosen steps."""
-    names = ("slip", "w", "beta", "psi", "traction", "reaction", "slipping")
-    x = np.asarray(history.x).tolist()
-    rows: list[tuple[Any, ...]] = []
-    for step in steps:
-        fields = [np.asarray(getattr(history, name)[step]).tolist() for name in names]
-        load = float(history.force[step])
-        rows += [(step, load, *values) for values in zip(x, *fields, strict=True)]
+    """CSV of the fields and the contact at the nodes at chosen steps."""
+    names = ("slip", "w", "beta", "psi", "gap", "traction", "reaction", "slipping")
+    columns = {name: getattr(history, name) for name in names}
+    loads = {step: float(history.force[step]) for step in steps}
+    rows = ((step, loads[step], *row) for step, *row in _along(history.x, columns, steps))
     return _table(("step", "force", "x", *names), rows)
+
+
+def section_table(history: History, steps: Sequence[int]) -> str:
+    """CSV of the section forces and the mean squeeze stress of the elements at chosen steps."""
+    names = ("N", "Q", "M", "chi", "xi")
+    columns = dict(zip(names, history.sections, strict=True))
+    columns["squeeze_stress"] = history.squeeze_stress
+    return _table(("step", "x", *columns), _along(history.middles, columns, steps))
+
+
+def _along(
+    x: ArrayLike, columns: Mapping[str, ArrayLike], steps: Sequence[int]
+) -> Iterator[tuple[Any, ...]]:
+    """Step, X and the columns' (steps, points) values, for chosen steps."""
+    tables = [np.asarray(column) for column in columns.values()]
+    for step in steps:
+        values = [table[step].tolist() for table in tables]
+        yield from ((step, *row) for row in zip(np.asarray(x).tolist(), *values, strict=True))
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:

@@ -18,14 +18,17 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.energy import CONSTANTS
+from jbeamshell.energy import CONSTANTS, PLANES, shear_modulus
 from jbeamshell.errors import InputError
 from jbeamshell.friction import CappedTrial, ElasticSlip, FrictionLaw, SharpSlip
-from jbeamshell.grid import ORDER
+from jbeamshell.grid import END_SIZE, ORDER
 from jbeamshell.kinematics import FIELDS, KINEMATICS
+from jbeamshell.laminate import Laminate, check_layers
 
 FAR_ENDS = ("held", "pinned", "free")
 CONTROLS = ("force", "displacement")
+NORMALS = ("rigid", "compliant", "none")
+SQUEEZES = ("field", "assumed")
 MODELS = (
     ("v",),
     ("v", "beta"),
@@ -34,11 +37,15 @@ MODELS = (
     ("v", "w", "beta", "psi"),
 )
 STANDARD_AMPLITUDE = 0.7855
+STANDARD = {"axial_stiffness": 3.4e4, "poisson_ratio": 0.3}
+TINY = np.finfo(float).tiny
 
 NUMBER = "must be a number"
 POSITIVE = "must be a positive number"
 SMOOTHING = "must be a number above 1, or 'sharp'"
-PRESSURE = "give a number or a table of [X, F_N] rows"
+LAYERS = "give [thickness, E, nu] of every layer, from the bottom to the top"
+NOT_NEGATIVE = "must be a number, not negative"
+PRESSURE = "give a number or a table of [X, pressure] rows"
 
 
 def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
@@ -81,6 +88,8 @@ def require(key: str, value: Any, holds: bool, fix: str) -> None:
 
 
 def _shown(value: Any) -> str:
+    if isinstance(value, jax.core.Tracer):
+        return "a traced value"
     if isinstance(value, jax.Array | np.ndarray):
         value = np.asarray(value).tolist()
     return repr(value)
@@ -97,7 +106,8 @@ def require_number(
     require(key, value, bool(np.isfinite(number) and low < number < high), fix)
 
 
-def _require_choice(key: str, value: Any, choices: Sequence[Any]) -> None:
+def require_choice(key: str, value: Any, choices: Sequence[Any]) -> None:
+    """Raise `InputError` with the choices unless the value is one of them."""
     require(key, value, value in choices, "choose " + " or ".join(map(repr, choices)))
 
 
@@ -108,33 +118,78 @@ class Strip(eqx.Module):
     ----------
     length : L
     height_ratio : eta = H/(L/2), with H the HALF height
-    axial_stiffness : E' 2H, force per unit width, E' = E/(1-nu^2)
-    poisson_ratio : nu
+    axial_stiffness : E' 2H, force per unit width; E' = E/(1-nu^2) in plane strain, E in plane
+        stress; None when there are layers
+    poisson_ratio : nu; None when there are layers
     kappa_s : squeeze-shear factor
     far_end : support at X = 0: "held" (v = beta = 0), "pinned" (v = 0: held at the contact point
         only) or "free"
+    layers : (n, 3) thickness, E and nu of every layer from the bottom to the top; None is a
+        homogeneous strip
+    deviation : height above the middle of the curve at which a laminate's shear is split from its
+        squeeze-shear (the base-reference deviation)
+    plane : "strain" or "stress"
+    curvature : alpha' before loading, 1/length, positive when the ends point up; None is straight
     """
 
-    length: Array = _leaf("strip.length", 2.0)
-    height_ratio: Array = _leaf("strip.height_ratio", 0.1126)
-    axial_stiffness: Array = _leaf("strip.axial_stiffness", 3.4e4)
-    poisson_ratio: Array = _leaf("strip.poisson_ratio", 0.3)
-    kappa_s: Array = _leaf("strip.kappa_s", 0.44)
-    far_end: str = _static("held")
+    length: Array
+    height_ratio: Array
+    axial_stiffness: Array | None
+    poisson_ratio: Array | None
+    kappa_s: Array
+    far_end: str = eqx.field(static=True)
+    layers: Array | None
+    deviation: Array
+    plane: str = eqx.field(static=True)
+    curvature: Array | None
+
+    def __init__(
+        self,
+        length: Any = 2.0,
+        height_ratio: Any = 0.1126,
+        axial_stiffness: Any = None,
+        poisson_ratio: Any = None,
+        kappa_s: Any = 0.44,
+        far_end: str = "held",
+        layers: Any = None,
+        deviation: Any = 0.0,
+        plane: str = "strain",
+        curvature: Any = None,
+    ) -> None:
+        self.length = as_leaf(length, "strip.length")
+        self.height_ratio = as_leaf(height_ratio, "strip.height_ratio")
+        material = {"axial_stiffness": axial_stiffness, "poisson_ratio": poisson_ratio}
+        for name, value in material.items():
+            key, twice = f"strip.{name}", layers is not None and value is not None
+            require(key, value, not twice, "strip.layers say it already; leave it out")
+            if layers is None:
+                material[name] = as_leaf(STANDARD[name] if value is None else value, key)
+        self.axial_stiffness = material["axial_stiffness"]
+        self.poisson_ratio = material["poisson_ratio"]
+        self.kappa_s = as_leaf(kappa_s, "strip.kappa_s")
+        self.far_end = far_end
+        self.layers = None if layers is None else as_leaf(layers, "strip.layers", LAYERS)
+        self.deviation = as_leaf(deviation, "strip.deviation")
+        self.plane = plane
+        bend = None if curvature is None else as_leaf(curvature, "strip.curvature")
+        straight = bend is None or (not isinstance(bend, jax.core.Tracer) and not np.any(bend))
+        self.curvature = None if straight else bend
 
     def __check_init__(self) -> None:
         require_number("strip.length", self.length)
         require_number("strip.height_ratio", self.height_ratio, POSITIVE + " (H over L/2)")
-        require_number("strip.axial_stiffness", self.axial_stiffness, POSITIVE + " (E' 2H)")
-        require_number(
-            "strip.poisson_ratio",
-            self.poisson_ratio,
-            "must lie between -1 and 0.5 (both excluded)",
-            -1.0,
-            0.5,
-        )
+        require_choice("strip.plane", self.plane, PLANES)
+        if self.layers is not None:
+            check_layers(self.layers, 2.0 * self.half_height, self.plane)
+        else:
+            require_number("strip.axial_stiffness", self.axial_stiffness, POSITIVE + " (E' 2H)")
+            between = "must lie between -1 and 0.5 (both excluded)"
+            require_number("strip.poisson_ratio", self.poisson_ratio, between, -1.0, 0.5)
         require_number("strip.kappa_s", self.kappa_s, POSITIVE + "; 0.44 fits the squeeze layer")
-        _require_choice("strip.far_end", self.far_end, FAR_ENDS)
+        require_number("strip.deviation", self.deviation, NUMBER, -np.inf)
+        require_choice("strip.far_end", self.far_end, FAR_ENDS)
+        if self.curvature is not None:
+            require_number("strip.curvature", self.curvature, NUMBER, -np.inf)
 
     @property
     def half_height(self) -> Array:
@@ -142,72 +197,107 @@ class Strip(eqx.Module):
         return 0.5 * self.height_ratio * self.length
 
     @property
-    def plane_modulus(self) -> Array:
-        """E' = E/(1-nu^2), stress."""
-        return self.axial_stiffness / (2.0 * self.half_height)
+    def section(self) -> Laminate | None:
+        """The laminated section; None for a homogeneous strip."""
+        if self.layers is None:
+            return None
+        return Laminate(self.layers, self.kappa_s, self.deviation, self.plane)
 
     @property
-    def youngs_modulus(self) -> Array:
-        """E, stress."""
+    def stretching_stiffness(self) -> Array:
+        """E' 2H, or its sum over the layers, force per unit width."""
+        if self.section is not None:
+            return self.section.stretching_stiffness
+        return jnp.asarray(self.axial_stiffness)
+
+    @property
+    def plane_modulus(self) -> Array:
+        """E' (of the mean stiffness where there are layers), stress."""
+        return self.stretching_stiffness / (2.0 * self.half_height)
+
+    @property
+    def youngs_modulus(self) -> Array | None:
+        """E, stress; None when there are layers."""
+        if self.poisson_ratio is None:
+            return None
+        if self.plane == "stress":
+            return self.plane_modulus
         return self.plane_modulus * (1.0 - self.poisson_ratio**2)
 
     @property
     def shear_modulus(self) -> Array:
-        """G, stress."""
-        return 0.5 * (1.0 - self.poisson_ratio) * self.plane_modulus
+        """G (the mean over the height where there are layers), stress."""
+        if self.section is not None:
+            return self.section.mean_shear_modulus
+        return shear_modulus(self.plane_modulus, jnp.asarray(self.poisson_ratio), self.plane)
 
 
 class Contact(eqx.Module):
     """The rough foundation and what presses the strip onto it.
 
+    A pressure is one number, or a table (n, 2) of X and pressure, linear in between, going on with
+    its end values; two rows of the same X make a step.  It acts exactly, wherever its steps fall.
+
     Attributes
     ----------
-    friction : mu
-    pressure : F_N on the top face, stress, positive pressing down: a number, or a table (n, 2) of
-        X and F_N, linear in between
+    friction : mu; 0 is a frictionless foundation
+    pressure : F_N on the top face, stress, positive pressing down
+    bottom_pressure : on the bottom face, stress, positive pressing up
     stick_stiffness : alpha; the elastic slip stiffness is k_t = alpha G/H
     law : one contact point's friction law
+    normal : "rigid" (gap >= 0, R >= 0 where the lift w is a field, else glued), "compliant" (a
+        layer that lets derivatives pass) or "none" (no foundation)
+    normal_stiffness : k_n of the compliant layer in units of E'/H
     """
 
     friction: Array = _leaf("contact.friction", 0.1)
     pressure: Array = _leaf("contact.pressure", 10.0, PRESSURE)
+    bottom_pressure: Array = _leaf("contact.bottom_pressure", 0.0, PRESSURE)
     stick_stiffness: Array = _leaf("contact.stick_stiffness", 1000.0)
     law: FrictionLaw = eqx.field(default_factory=SharpSlip)
+    normal: str = _static("rigid")
+    normal_stiffness: Array = _leaf("contact.normal_stiffness", 50.0)
 
     def __check_init__(self) -> None:
-        require_number("contact.friction", self.friction)
+        require_number("contact.friction", self.friction, NOT_NEGATIVE, low=-TINY)
         require_number("contact.stick_stiffness", self.stick_stiffness)
         if isinstance(self.law, ElasticSlip | CappedTrial):
             require_number("contact.smoothing", self.law.smoothing, SMOOTHING, low=1.0)
+        require_choice("contact.normal", self.normal, NORMALS)
+        require_number("contact.normal_stiffness", self.normal_stiffness)
+        for key in ("pressure", "bottom_pressure"):
+            pressure = getattr(self, key)
+            if not isinstance(pressure, jax.core.Tracer):
+                _check_pressure(f"contact.{key}", np.asarray(pressure))
         if not isinstance(self.pressure, jax.core.Tracer):
-            self._check_pressure(np.asarray(self.pressure))
-
-    @staticmethod
-    def _check_pressure(pressure: np.ndarray) -> None:
-        key = "contact.pressure"
-        table = pressure.ndim == 2 and pressure.shape[1] == 2 and pressure.shape[0] >= 2
-        require(key, pressure, pressure.ndim == 0 or table, PRESSURE)
-        values = pressure[:, 1] if table else pressure
-        require(
-            key,
-            pressure,
-            bool(np.all(np.isfinite(pressure)) and np.all(values >= 0.0) and np.any(values > 0.0)),
-            "must press the strip down: finite, nowhere negative, somewhere positive",
-        )
-        if table:
-            order = bool(np.all(np.diff(pressure[:, 0]) > 0.0))
-            require(key, pressure, order, "its X must increase from row to row")
+            presses = bool(np.any(_values(np.asarray(self.pressure)) > 0.0))
+            require("contact.pressure", self.pressure, presses, "must press somewhere")
 
     @property
     def smoothing(self) -> Array:
         """The exponent m of the friction law; infinity for the sharp slider."""
         return getattr(self.law, "smoothing", jnp.asarray(np.inf))
 
-    def pressure_at(self, x: Array) -> Array:
-        """F_N at the positions x; a table continues with its end values."""
-        if self.pressure.ndim == 0:
-            return jnp.broadcast_to(self.pressure, x.shape)
-        return jnp.interp(x, self.pressure[:, 0], self.pressure[:, 1])
+    @property
+    def largest_pressure(self) -> Array:
+        """Largest F_N on the top face."""
+        return jnp.max(self.pressure[:, 1]) if self.pressure.ndim else self.pressure
+
+
+def _values(pressure: np.ndarray) -> np.ndarray:
+    return pressure[:, 1] if pressure.ndim == 2 else pressure
+
+
+def _check_pressure(key: str, pressure: np.ndarray) -> None:
+    table = pressure.ndim == 2 and pressure.shape[1] == 2 and pressure.shape[0] >= 2
+    require(key, pressure, pressure.ndim == 0 or table, PRESSURE)
+    compressive = bool(np.all(np.isfinite(pressure)) and np.all(_values(pressure) >= 0.0))
+    require(key, pressure, compressive, "must be finite and nowhere negative (no tension)")
+    if table:
+        run = np.diff(pressure[:, 0])
+        require(key, pressure, bool(np.all(run >= 0.0)), "its X must not decrease from row to row")
+        thrice = bool(np.any((run[1:] == 0.0) & (run[:-1] == 0.0)))
+        require(key, pressure, not thrice, "gives one X three times; two rows make a step")
 
 
 class Load(eqx.Module):
@@ -217,14 +307,16 @@ class Load(eqx.Module):
     ----------
     control : "force" (F, force per unit width) or "displacement" (u(L), mid-height face average)
     amplitude : A, of the controlled quantity; no default under displacement control
-    cycles : full cycles A, -A, A after the first loading 0 to A
+    cycles : full cycles A, -A, A after the first loading 0 to A; 0 is the pressure alone
     steps_per_half_cycle : equal load steps from -A to A
+    pressure_steps : equal steps in which the pressure is applied, without friction
     """
 
     control: str = eqx.field(static=True)
     amplitude: Array
     cycles: int = eqx.field(static=True)
     steps_per_half_cycle: int = eqx.field(static=True)
+    pressure_steps: int = eqx.field(static=True)
 
     def __init__(
         self,
@@ -232,13 +324,14 @@ class Load(eqx.Module):
         amplitude: Any = None,
         cycles: int = 2,
         steps_per_half_cycle: int = 40,
+        pressure_steps: int = 1,
     ) -> None:
-        _require_choice("load.control", control, CONTROLS)
+        require_choice("load.control", control, CONTROLS)
         if amplitude is None:
             require(
                 "load.amplitude",
                 None,
-                control == "force",
+                control == "force" or cycles == 0,
                 "give the end displacement's amplitude under displacement control",
             )
             amplitude = STANDARD_AMPLITUDE
@@ -246,10 +339,12 @@ class Load(eqx.Module):
         self.amplitude = as_leaf(amplitude, "load.amplitude")
         self.cycles = cycles
         self.steps_per_half_cycle = steps_per_half_cycle
+        self.pressure_steps = pressure_steps
 
     def __check_init__(self) -> None:
         require_number("load.amplitude", self.amplitude)
-        _require_count("load.cycles", self.cycles, 1)
+        _require_count("load.cycles", self.cycles, 0)
+        _require_count("load.pressure_steps", self.pressure_steps, 1)
         _require_count("load.steps_per_half_cycle", self.steps_per_half_cycle, 2)
         require(
             "load.steps_per_half_cycle",
@@ -261,6 +356,8 @@ class Load(eqx.Module):
     def unit_path(self) -> np.ndarray:
         """Load levels after zero for unit amplitude: 0 to 1, then ``cycles`` times 1, -1, 1."""
         half = self.steps_per_half_cycle
+        if self.cycles == 0:
+            return np.zeros(0)
         down = 1.0 - 2.0 * np.arange(1, half + 1) / half
         first = np.arange(1, half // 2 + 1) / (half // 2)
         return np.concatenate([first, *[down, -down] * self.cycles])
@@ -282,6 +379,10 @@ class Model(eqx.Module):
     grid : "finite-difference" (second order) or "collocation" (fourth)
     nodes : nodes along X
     constants : "consistent" or "printed" (the dissertation's own)
+    squeeze : "field" (psi has its own balance) or "assumed" (psi = -(F_N + R)/(2E), the earlier
+        theory of Brink 2015, section 4.2, without Poisson's effect)
+    end_size : size of the smallest elements, at the loaded end and at steps of the pressure, over
+        H, before the node count scales all sizes
     """
 
     fields: tuple[str, ...] = eqx.field(static=True, default=("v", "beta", "psi"), converter=tuple)
@@ -289,6 +390,8 @@ class Model(eqx.Module):
     grid: str = _static("finite-difference")
     nodes: int = _static(161)
     constants: str = _static("consistent")
+    squeeze: str = _static("field")
+    end_size: float = _static(END_SIZE)
 
     def __check_init__(self) -> None:
         unknown = [f for f in self.fields if f not in FIELDS]
@@ -299,9 +402,15 @@ class Model(eqx.Module):
             self.fields in MODELS,
             "make no model; choose " + " or ".join(str(list(m)) for m in MODELS),
         )
-        _require_choice("model.kinematics", self.kinematics, tuple(KINEMATICS))
-        _require_choice("model.grid", self.grid, tuple(ORDER))
-        _require_choice("model.constants", self.constants, CONSTANTS)
+        require_choice("model.kinematics", self.kinematics, tuple(KINEMATICS))
+        require_choice("model.grid", self.grid, tuple(ORDER))
+        require_choice("model.constants", self.constants, CONSTANTS)
+        require_choice("model.squeeze", self.squeeze, SQUEEZES)
+        both = self.squeeze == "field" or {"w", "psi"} <= set(self.fields)
+        require("model.squeeze", self.squeeze, both, "needs w and psi in model.fields")
+        number = isinstance(self.end_size, int | float) and not isinstance(self.end_size, bool)
+        require("model.end_size", self.end_size, number, POSITIVE + " (of H)")
+        require_number("model.end_size", self.end_size, POSITIVE + " (of H)")
         _require_count("model.nodes", self.nodes, 3)
         require(
             "model.nodes",

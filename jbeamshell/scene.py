@@ -17,6 +17,7 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 import tomli_w
 
@@ -58,23 +59,38 @@ NUMBERS = (
     "strip.youngs_modulus",
     "strip.poisson_ratio",
     "strip.kappa_s",
+    "strip.layers",
+    "strip.deviation",
+    "strip.curvature",
     "contact.friction",
     "contact.pressure",
+    "contact.bottom_pressure",
     "contact.stick_stiffness",
     "contact.smoothing",
+    "contact.normal_stiffness",
     "load.amplitude",
 )
-COUNTS = ("load.cycles", "load.steps_per_half_cycle", "model.nodes")
+SETTINGS = (
+    "load.cycles",
+    "load.steps_per_half_cycle",
+    "load.pressure_steps",
+    "model.nodes",
+    "model.end_size",
+)
 WORDS = (
     "strip.far_end",
+    "strip.plane",
     "contact.law",
+    "contact.normal",
     "load.control",
     "model.fields",
     "model.kinematics",
     "model.grid",
     "model.constants",
+    "model.squeeze",
 )
-KEYS = NUMBERS + COUNTS + WORDS
+KEYS = NUMBERS + SETTINGS + WORDS
+OPTIONAL = ("strip.layers", "strip.curvature")  # may be None
 
 _LAWS: dict[str, type[FrictionLaw]] = {
     "elastic-slip": ElasticSlip,
@@ -100,6 +116,7 @@ class Scene(eqx.Module):
     energy: Energy | None = None
 
     def __check_init__(self) -> None:
+        self._check_contact()
         if self.energy is None:
             return
         probe = [jax.ShapeDtypeStruct((), self.strip.length.dtype)] * 5
@@ -121,14 +138,52 @@ class Scene(eqx.Module):
         if self.energy is not None:
             return self.energy
         strip = self.strip
+        squeeze = "psi" in self.model.fields and self.model.squeeze == "field"
+        if strip.section is not None:
+            return dataclasses.replace(
+                strip.section, squeeze=squeeze, constants=self.model.constants
+            )
         return Homogeneous(
             half_height=strip.half_height,
             plane_modulus=strip.plane_modulus,
-            poisson_ratio=strip.poisson_ratio,
+            poisson_ratio=jnp.asarray(strip.poisson_ratio),
             kappa_s=strip.kappa_s,
-            squeeze="psi" in self.model.fields,
+            squeeze=squeeze,
             constants=self.model.constants,
+            plane=strip.plane,
         )
+
+    def _check_contact(self) -> None:
+        """What the parts cannot see alone: a strip that nothing holds, a load off the strip."""
+        strip, contact, fields = self.strip, self.contact, self.model.fields
+        lift = "w" in fields
+        needs = "needs w in model.fields"
+        require("contact.normal", contact.normal, lift or contact.normal == "rigid", needs)
+        require("strip.curvature", strip.curvature, lift or strip.curvature is None, needs)
+        layered = self.model.squeeze == "assumed" and strip.layers is not None
+        require("model.squeeze", "assumed", not layered, "is for a homogeneous strip")
+        if contact.normal == "none":
+            held = strip.far_end == "held"
+            fix = "is all that holds a strip without a foundation: take 'held' (rigid-body motion)"
+            require("strip.far_end", strip.far_end, held, fix)
+        leaves = (strip.length, contact.friction, contact.pressure, contact.bottom_pressure)
+        if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+            return
+        rough = float(contact.friction) > 0.0 or strip.far_end != "free"
+        fix = "nothing holds the strip along X without friction (rigid-body motion): give "
+        require("contact.friction", 0.0, rough, fix + "strip.far_end or friction")
+        length = float(strip.length)
+        down, moment = _resultant("contact.pressure", contact.pressure, length)
+        require("contact.pressure", contact.pressure, down > 0.0, "must press somewhere")
+        up, lifting = _resultant("contact.bottom_pressure", contact.bottom_pressure, length)
+        total, moment = down - up, moment - lifting
+        if contact.normal != "none":
+            fix = "nothing holds the strip down (rigid-body motion): press more on top"
+            require("contact.bottom_pressure", contact.bottom_pressure, total > 0.0, fix)
+            upright = strip.far_end == "held" or not lift
+            inside = upright or 0.0 <= moment <= total * length
+            fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
+            require("contact.bottom_pressure", contact.bottom_pressure, inside, fix)
 
     def get(self, key: str) -> Any:
         """The value behind a dotted key, e.g. ``scene.get("strip.height_ratio")``."""
@@ -154,6 +209,15 @@ class Scene(eqx.Module):
             if key not in DERIVED:
                 section, name = key.split(".")
                 parts[section][name] = value
+        if "strip.half_height" in values:
+            height = as_leaf(values["strip.half_height"], "strip.half_height")
+            require_number("strip.half_height", height)
+            length = parts["strip"].get("length", self.strip.length)
+            parts["strip"]["height_ratio"] = 2.0 * height / as_leaf(length, "strip.length")
+        if parts["strip"].get("layers") is not None:
+            # The layers say what the stiffness and nu are; giving both is refused by the strip.
+            for name in ("axial_stiffness", "poisson_ratio"):
+                parts["strip"].setdefault(name, None)
         contact = parts["contact"]
         if "law" in contact or "smoothing" in contact:
             contact["law"] = _make_law(self.contact.law, contact)
@@ -165,12 +229,26 @@ class Scene(eqx.Module):
             for section, changes in parts.items()
         }
         scene = dataclasses.replace(self, **{k: v for k, v in fresh.items() if v is not None})
-        for key in DERIVED:
-            if key in values:
-                scene = dataclasses.replace(
-                    scene, strip=_set_derived(scene.strip, key, values[key])
-                )
+        if "strip.youngs_modulus" in values:
+            strip = _with_youngs_modulus(scene.strip, values["strip.youngs_modulus"])
+            scene = dataclasses.replace(scene, strip=strip)
         return scene
+
+
+def _resultant(key: str, pressure: Any, length: float) -> tuple[float, float]:
+    """Force of a pressure on the strip and its moment about X = 0."""
+    table = np.asarray(pressure, dtype=float)
+    if table.ndim == 0:
+        return float(table) * length, 0.5 * float(table) * length**2
+    x, p = table.T
+    off = (x < 0.0) | (x > length * (1.0 + 1e-12))
+    fix = f"lies off the strip, whose X runs from 0 to {length:.6g}"
+    require(key, x[off], not np.any(off), fix)
+    x, p = np.concatenate([[0.0], x, [length]]), np.pad(p, 1, mode="edge")
+    run, begin, end = np.diff(x), p[:-1], p[1:]
+    middle = 0.5 * (x[1:] + x[:-1])
+    force = 0.5 * run * (begin + end)
+    return float(np.sum(force)), float(np.sum(force * middle + run**2 * (end - begin) / 12.0))
 
 
 def check_key(key: str) -> None:
@@ -181,12 +259,13 @@ def check_key(key: str) -> None:
         raise InputError(f"unknown key {key!r}: {hint}")
 
 
-def _set_derived(strip: Strip, key: str, value: Any) -> Strip:
+def _with_youngs_modulus(strip: Strip, value: Any) -> Strip:
+    key = "strip.youngs_modulus"
     value = as_leaf(value, key)
     require_number(key, value)
-    if key == "strip.half_height":
-        return dataclasses.replace(strip, height_ratio=2.0 * value / strip.length)
-    plane = value / (1.0 - strip.poisson_ratio**2)
+    require(key, value, strip.layers is None, "strip.layers say it already; leave it out")
+    nu = jnp.asarray(strip.poisson_ratio)
+    plane = value if strip.plane == "stress" else value / (1.0 - nu**2)
     return dataclasses.replace(strip, axial_stiffness=plane * 2.0 * strip.half_height)
 
 
@@ -224,7 +303,7 @@ def _check_word(key: str, value: Any) -> None:
         require(key, value, words, "give a list such as ['v', 'beta', 'psi']")
     elif key in WORDS:
         require(key, value, isinstance(value, str), "must be a word")
-    elif key in NUMBERS:
+    elif key in NUMBERS and key not in OPTIONAL:
         require(key, value, value is not None, "must be a number")
 
 
@@ -280,6 +359,8 @@ def scene_to_toml(scene: Scene) -> str:
             continue
         section, name = key.split(".")
         value = scene.get(key)
+        if value is None:  # no layers, no curvature
+            continue
         if key in NUMBERS:
             value = np.asarray(value, dtype=float).tolist()
         if key == "contact.smoothing" and np.isinf(value):

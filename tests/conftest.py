@@ -1,12 +1,28 @@
 """Settings of the whole test run."""
 
 import os
+import shutil
+import tempfile
 
 import hypothesis
 import jax
+import pytest
 
 os.environ["MPLBACKEND"] = "Agg"  # children of the tests inherit it
+# Workers and children share what they compile; the run's own folder, so nothing stale is used.
+CACHE = "JAX_COMPILATION_CACHE_DIR"
+OWNER = CACHE not in os.environ
+if OWNER:
+    os.environ[CACHE] = tempfile.mkdtemp(prefix="jbeamshell-tests-")
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.5"
+jax.config.update("jax_compilation_cache_dir", os.environ[CACHE])
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
 jax.config.update("jax_enable_x64", True)
 
 hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 hypothesis.settings.load_profile("repeatable")
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if OWNER:
+        shutil.rmtree(os.environ[CACHE], ignore_errors=True)

@@ -10,9 +10,10 @@ import jbeamshell
 PACKAGE = Path(jbeamshell.__file__).parent
 # fmt: off
 UPWARDS = [
-    "errors", "files", "kinematics", "closed_form", "energy", "friction", "contact", "grid",
-    "parts", "scene", "block_tridiagonal", "newton", "equilibrium", "history", "quasistatic",
-    "loops", "example", "identify", "plotting", "output", "__init__", "__main__",
+    "errors", "files", "kinematics", "closed_form", "elasticity", "energy", "laminate", "friction",
+    "contact", "grid", "parts", "scene", "scenes", "block_tridiagonal", "newton", "equilibrium",
+    "cycles", "history", "quasistatic", "loops", "example", "observations", "identify", "plotting",
+    "output", "__init__", "__main__",
 ]
 # fmt: on
 ONLY = {"matplotlib": "plotting", "jaxopt": "identify", "pint": "loops"}
@@ -20,7 +21,9 @@ ONLY = {"matplotlib": "plotting", "jaxopt": "identify", "pint": "loops"}
 
 def imports(module):
     """What a module imports: (dotted name, whether at its top) each."""
-    for node in ast.walk(ast.parse((PACKAGE / f"{module}.py").read_text(encoding="utf-8"))):
+    file = PACKAGE / f"{module}.py"
+    file = file if file.exists() else PACKAGE / module / "__init__.py"
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from ((alias.name, node.col_offset == 0) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -29,7 +32,9 @@ def imports(module):
 
 
 def test_every_module_has_its_place():
-    assert sorted(UPWARDS) == sorted(path.stem for path in PACKAGE.glob("*.py"))
+    rooms = [path.stem for path in PACKAGE.glob("*.py")]
+    rooms += [path.parent.name for path in PACKAGE.glob("*/__init__.py")]
+    assert sorted(UPWARDS) == sorted(rooms)
 
 
 @pytest.mark.parametrize("module", UPWARDS)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell import __main__, identify, quasistatic
+from jbeamshell import __main__, identify, quasistatic, scenes
 from jbeamshell.loops import read_loops
 
 # One shape for nearly everything, so that it compiles once.
@@ -31,10 +31,11 @@ OFF = {"contact.friction": 0.084, "strip.height_ratio": 0.26}  # by 30 %
 FIGURES = {
     *("dissipation", "dissipation_loop", "dissipation_ratio", "secant_stiffness", "loss_factor"),
     *("peak_displacement", "slip_length", "reaction_min", "closure", "newton_iterations"),
-    *("status", "wall_s", "compile_s"),
+    *("reaction_max", "reaction_max_at", "squeeze_stress_max", "status", "wall_s", "compile_s"),
 }
 TIMES = {"wall_s", "compile_s"}
-RUN_FILES = {"loop.csv", "profiles.csv", "result.json", "scene.toml", "loop.png", "profiles.png"}
+TABLES = {"loop.csv", "profiles.csv", "sections.csv", "result.json", "scene.toml"}
+RUN_FILES = TABLES | {"loop.png", "profiles.png", "contact.png"}
 FIT_FILES = {"overlay.csv", "overlay.png", "result.json", "scene.toml"}
 
 
@@ -123,8 +124,7 @@ def test_run_leaves_what_runs_again_to_the_last_bit(cli, tmp_path):
     assert all(str(folder / name) in err for name in RUN_FILES)
     first = json.loads(out)
     assert json.loads((folder / "result.json").read_text()) == first
-    assert is_png(folder / "loop.png")
-    assert is_png(folder / "profiles.png")
+    assert all(is_png(path) for path in folder.glob("*.png"))
     with (folder / "loop.csv").open(newline="") as table:
         rows = list(csv.DictReader(table))
     assert len(rows) == 21
@@ -151,12 +151,12 @@ def test_set_overrides_the_file_and_an_alias_its_twin(cli, tmp_path):
 
 
 def test_words_numbers_and_lists_of_the_command_line():
-    texts = ["a = 3", "b=.5", "c=8.", "d=inf", "e=free", "f=v,beta", "g=[1, [2, 3]]", 'h="v"']
+    texts = ["a = 3", "b=.5", "c=8.", "d=inf", "e=free", "f=v,beta", "g=[1, [.2, 3.]]", 'h="v"']
     values = __main__._assignments([*texts, "i=a=b", "model.fields=v", "k=true"])
     assert values == dict(
         zip(
             "abcdefghi",
-            [3, 0.5, 8.0, np.inf, "free", ["v", "beta"], [1, [2, 3]], "v", "a=b"],
+            [3, 0.5, 8.0, np.inf, "free", ["v", "beta"], [1, [0.2, 3.0]], "v", "a=b"],
             strict=True,
         ),
         **{"model.fields": ["v"], "k": True},
@@ -165,9 +165,9 @@ def test_words_numbers_and_lists_of_the_command_line():
 
 
 def test_what_to_be_wary_of_is_told_on_stderr(cli, monkeypatch):
-    figures = jb.History.figures
-    suspect = {"closure": -0.01, "reaction_min": -2.5}
+    figures, suspect = jb.History.figures, {"closure": -0.01}
     monkeypatch.setattr(jb.History, "figures", lambda history: figures(history) | suspect)
+    monkeypatch.setattr(jb.History, "reaction_min", -2.5)
     code, out, err = cli("run", *BASE, "--json")
     assert code == 0
     assert set(json.loads(out)) == FIGURES
@@ -183,6 +183,92 @@ def test_a_reader_that_leaves_early_costs_no_files(monkeypatch, tmp_path):
         monkeypatch.setattr(sys, "stdout", pipe)
         assert __main__.main(["run", *BASE, "--out", str(tmp_path)]) == 0
     assert names(tmp_path) == RUN_FILES
+
+
+# --- scenes that ship ---------------------------------------------------------------------------
+
+PRESSED = {"newton_iterations", "status", *TIMES}
+
+
+def test_scenes_are_listed_with_a_line_each(cli):
+    code, out, err = cli("scenes")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert [line.split()[0] for line in lines] == list(scenes.NAMES)
+    assert all(len(line) < 110 and line.endswith(".") for line in lines)
+    code, out, err = cli("scenes", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == {name: scenes.summary(name) for name in scenes.NAMES}
+
+
+def test_a_bent_laminate_by_name(cli):
+    code, out, err = cli("run", "bimaterial", "--json", "--set", "model.nodes=41")
+    assert (code, err) == (0, "")
+    figures = json.loads(out)
+    assert set(figures) == {"curvature", "tip_deflection", "squeeze_stress_max"} | PRESSED
+    curvature = 0.0312604e-4  # per mm, at 1e-4 of the soft layer's modulus
+    assert figures["curvature"] == pytest.approx(curvature, rel=1e-5)
+    assert figures["tip_deflection"] == pytest.approx(0.5 * curvature * 100.0**2, rel=1e-5)
+    assert figures["squeeze_stress_max"] == pytest.approx(0.209)
+
+
+def test_a_scene_without_cycles_by_name(cli, tmp_path):
+    code, out, err = cli("run", "block", "--json", "--set", "model.nodes=41", "--out", tmp_path)
+    assert code == 0
+    assert "warning" not in err
+    figures = json.loads(out)
+    contact = {"contact_end", "tip_deflection", "lift_slope", "reaction_max", "reaction_max_at"}
+    assert set(figures) == contact | {"squeeze_stress_max"} | PRESSED
+    assert figures["contact_end"] == 1.0
+    assert figures["reaction_max"] == pytest.approx(100.0)
+    assert figures["squeeze_stress_max"] == pytest.approx(100.0)
+    assert names(tmp_path) == TABLES | {"contact.png"}
+    assert is_png(tmp_path / "contact.png")
+    with (tmp_path / "loop.csv").open(newline="") as table:
+        (row,) = csv.DictReader(table)
+    assert (row["force"], row["pressure"], row["contact_end"]) == ("0.0", "1.0", "1.0")
+
+
+def test_the_standard_strip_without_cycles(cli):
+    pressure = [[0.0, 10.0], [1.0, 10.0], [1.0, 0.0], [2.0, 0.0]]
+    settings = COARSE | {"load.cycles": 0, "contact.pressure": pressure}
+    code, out, err = cli("run", "standard", *options(settings), "--json")
+    assert code == 0
+    figures = json.loads(out)
+    assert set(figures) == {"reaction_max", "reaction_max_at", "squeeze_stress_max"} | PRESSED
+    # It cannot lift, so the part that nothing presses is pulled down.
+    assert re.fullmatch(r"jbeamshell: warning: tension at the contact \([^\n]*\n", err)
+    assert "add w to model.fields" in err
+
+
+def test_a_file_goes_before_a_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "receding").mkdir()
+    assert __main__._values_of("receding") == scenes.values_of("receding")
+    (tmp_path / "block").write_text("[strip]\nlength = 3.0\n")
+    assert __main__._values_of("block") == {"strip.length": 3.0}
+    assert __main__._values_of(None) == {}
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        ("recedng", "unknown scene 'recedng': did you mean 'receding'? (`jbeamshell scenes` lists"),
+        ("point_load", "unknown scene 'point_load': did you mean 'point-load'? (`jbeamshell scen"),
+        (
+            "block.tml",
+            "unknown scene 'block.tml': did you mean 'block'? (`jbeamshell scenes` lists",
+        ),
+        ("xyz", "unknown scene 'xyz': scenes are standard, bimaterial, squeezed, receding, reced"),
+        ("receding.toml", "receding.toml: cannot be read (No such file"),
+        ("./receding", "receding: cannot be read (No such file"),
+        (".", ".: cannot be read (Is a directory)"),
+        ("long" * 100, "unknown scene 'long"),
+    ],
+)
+@pytest.mark.parametrize("command", [["run"], ["fit", "--scene"]])
+def test_unknown_scenes_are_refused(refused, command, word, told):
+    assert refused(*command, word).startswith(told)
 
 
 # --- fit ----------------------------------------------------------------------------------------
@@ -378,13 +464,25 @@ def test_the_smooth_column_drives(asked, noisy, tmp_path):
         ("strip.length=nan", "strip.length = nan: must be a positive number"),
         ("strip.youngs_modulus=-3", "strip.youngs_modulus = -3.0: must be a positive number"),
         ("strip.axial_stiffness=0", "strip.axial_stiffness = 0.0: must be a positive number"),
-        ("contact.friction=-.1", "contact.friction = -0.1: must be a positive number"),
-        ("contact.friction=0", "contact.friction = 0.0: must be a positive number"),
+        ("contact.friction=-.1", "contact.friction = -0.1: must be a number, not negative"),
+        ("contact.normal=compliant", "contact.normal = 'compliant': needs w in model.fields"),
+        ("contact.pressure=[[0,1],[1,-1]]", "must be finite and nowhere negative (no tension)"),
+        ("contact.pressure=[[0,1],[1,nan]]", "must be finite and nowhere negative (no tension)"),
+        ("contact.pressure=[[1,1],[0,1]]", "its X must not decrease from row to row"),
+        ("contact.pressure=[[0,1],[2.5,1]]", "contact.pressure = [2.5]: lies off the strip, whose"),
+        ("contact.pressure=[[0,1],[1,1],[1,2],[1,3]]", "gives one X three times; two rows make a"),
+        ("strip.curvature=.1", "strip.curvature = 0.1: needs w in model.fields"),
+        ("strip.layers=steel", "strip.layers = 'steel': give [thickness, E, nu] of every layer"),
+        ("strip.layers=[[1, 2, .3]]", "add up to 1, but the height 2H is 0.2252; make them equal"),
+        ("strip.layers=[[1, 2, 0.3]]", "add up to 1, but the height 2H is 0.2252; make them equal"),
+        ("strip.layers=[[0.2252, 2, 0.5]]", "nu = 0.5 is incompressible: C11 is infinite; give"),
+        ("model.squeeze=assumed", "model.squeeze = 'assumed': needs w and psi in model.fields"),
         ("contact.smoothing=blunt", "contact.smoothing = 'blunt': must be a number above 1, or"),
         ("strip.poisson_ratio=0.5", "strip.poisson_ratio = 0.5: must lie between -1 and 0.5"),
         ("strip.poisson_ratio=-1", "strip.poisson_ratio = -1.0: must lie between -1 and 0.5"),
         ("strip.far_end=glued", "strip.far_end = 'glued': choose 'held' or 'pinned' or 'free'"),
-        ("load.cycles=1.5", "load.cycles = 1.5: must be a whole number, 1 to"),
+        ("load.cycles=1.5", "load.cycles = 1.5: must be a whole number, 0 to"),
+        ("load.cycles=-1", "load.cycles = -1: must be a whole number, 0 to"),
         ("load.control=displacement", "load.amplitude = None: give the end displacement's"),
         ("model.fields=v,psi", "model.fields = ['v', 'psi']: make no model; choose ['v'] or"),
         ("model.fields=psi", "model.fields = ['psi']: make no model; choose ['v'] or"),
@@ -400,6 +498,49 @@ def test_the_smooth_column_drives(asked, noisy, tmp_path):
 )
 def test_bad_settings_are_refused(refused, setting, told):
     assert told in refused("run", "--set", setting)
+
+
+LIFTING = {"model.fields": "v,w,beta,psi"}
+LAYERS = {"strip.layers": [[0.1, 1e4, 0.3], [0.1252, 1e5, 0.2]]}
+TIPPING = {"contact.bottom_pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 19.0], [2.0, 19.0]]}
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (
+            LIFTING | {"contact.normal": "compliant", "contact.normal_stiffness": 0},
+            "contact.normal_stiffness = 0.0: must be a positive number",
+        ),
+        (
+            LIFTING | {"contact.bottom_pressure": 10},
+            "contact.bottom_pressure = 10.0: nothing holds the strip down (rigid-body motion)",
+        ),
+        (
+            LIFTING | TIPPING | {"strip.far_end": "pinned"},
+            ": the strip tips over (rigid-body motio",
+        ),
+        (
+            LIFTING | {"contact.normal": "none", "strip.far_end": "free"},
+            "strip.far_end = 'free': is all that holds a strip without a foundation: take 'held'",
+        ),
+        (
+            {"contact.friction": 0, "strip.far_end": "free"},
+            "contact.friction = 0.0: nothing holds the strip along X without friction",
+        ),
+        *[
+            (LAYERS | {key: value}, f"{key} = {value}: strip.layers say it already; leave it out")
+            for key, value in [
+                ("strip.axial_stiffness", 1e4),
+                ("strip.youngs_modulus", 1e4),
+                ("strip.poisson_ratio", 0.3),
+            ]
+        ],
+        (LIFTING | LAYERS | {"model.squeeze": "assumed"}, "'assumed': is for a homogeneous strip"),
+    ],
+)
+def test_settings_that_do_not_go_together_are_refused(refused, settings, told):
+    assert told in refused("run", *options(settings))
 
 
 def test_settings_that_say_the_same_are_refused(refused):
@@ -438,7 +579,7 @@ def test_bad_scenes_are_refused(refused, tmp_path, command, content, told):
         (["--start", "strip.kappa_s=1"], "--start strip.kappa_s: is not among the free keys cont"),
         (["--start", "contact.friction"], "'contact.friction': write KEY=VALUE, such as"),
         (["--start", "contact.friction=high"], "contact.friction = 'high': must be a number"),
-        (["--start", "contact.friction=-1"], "contact.friction = -1.0: must be a positive number"),
+        (["--start", "contact.friction=-1"], "contact.friction = -1.0: must be a number, not"),
         (["--set", "load.control=stress"], "load.control = 'stress': choose 'force' or 'displ"),
         (["--set", "load.control=a,b"], "load.control = ['a', 'b']: must be a word"),
         (["--set", "contact.pressure=1"], "must stay below gross slip, mu F_N L = 0.3; set load."),
@@ -451,7 +592,7 @@ def test_bad_fits_are_refused(refused, words, told):
 def test_free_keys_that_the_loops_do_not_depend_on(refused, planted):
     bar = options({"model.fields": "v", "model.nodes": 5, "model.kinematics": "linear"})
     line = refused("fit", planted, *bar, "--free", "strip.kappa_s")
-    assert line == "free 'strip.kappa_s': the loops do not depend on it; leave it out"
+    assert line == "free 'strip.kappa_s': the data do not depend on it; leave it out"
 
 
 @pytest.mark.parametrize(

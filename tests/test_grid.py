@@ -1,11 +1,16 @@
-"""Element rules integrate to their order; nodes are graded, nested and smooth in the geometry."""
+"""Element rules integrate to their order; nodes are graded, nested and smooth in the geometry;
+loads are exact wherever they step.
+"""
 
 import functools
+import itertools
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from jbeamshell import grid
 from jbeamshell.grid import element_rule
@@ -146,3 +151,151 @@ def test_vertices_are_smooth_in_the_geometry(eta):
         for slope, by in zip(slopes, 1e-6 * np.diag([2.0, eta]), strict=True):
             forth, back = (vertices(12, 2.0 + s * by[0], eta + s * by[1]) for s in (1, -1))
             np.testing.assert_allclose(slope, (forth - back) / (2 * by.sum()), atol=1e-6)
+
+
+# --- steps of the load --------------------------------------------------------------------------
+
+STEPS = [(0.7,), (0.7, 1.1), (0.02, 1.99), (0.0, 1.2), (0.5, 2.0)]
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def vertices_at(elements, steps=None):
+    return grid.vertices(elements, 2.0, 0.05, 0.1, steps)
+
+
+@pytest.mark.parametrize("steps", STEPS)
+def test_every_element_takes_its_share_of_the_size_it_should_have(steps):
+    """The size goes linearly with the distance from the next step or the loaded end, up to L/60."""
+    steps = jnp.array(steps)
+    x = np.asarray(vertices_at(120, steps))
+    assert (x[0], x[-1], x.size) == (0.0, 2.0, 121)
+    assert (np.diff(x) > 0).all()
+    fine = np.linspace(0.0, 2.0, 400_001)
+    distance = np.min(np.abs(fine - np.append(steps, 2.0)[:, None]), axis=0)
+    size = np.minimum(0.1 * 0.05 + grid.GROWTH * distance, grid.FAR_SIZE * 2.0)
+    middle = 0.5 * (1.0 / size[1:] + 1.0 / size[:-1])
+    count = np.interp(x, fine, np.append(0.0, np.cumsum(middle * np.diff(fine))))
+    np.testing.assert_allclose(count, count[-1] * np.arange(121) / 120, rtol=1e-6, atol=1e-6)
+    for step in steps:  # the smallest elements are there
+        assert np.diff(x)[np.argmin(np.abs(x[1:-1] - step))] < 1.2 * np.diff(x).min()
+
+
+@pytest.mark.parametrize("steps", STEPS)
+def test_doubling_the_count_halves_every_element_between_steps_too(steps):
+    coarse, fine = vertices_at(60, jnp.array(steps)), vertices_at(120, jnp.array(steps))
+    np.testing.assert_allclose(fine[::2], coarse, atol=2e-14)
+
+
+def test_a_load_without_a_step_leaves_the_grid_alone():
+    unmoved = vertices_at(60, jnp.array([2.0, 2.0]))
+    np.testing.assert_allclose(unmoved, vertices_at(60), atol=1e-15)
+    smooth = jnp.array([[0.0, 1.0], [0.4, 2.0], [2.0, 0.0]])
+    np.testing.assert_array_equal(grid.table_steps(smooth, 2.0), [2.0, 2.0])
+    stepped = jnp.array([[0.0, 1.0], [0.4, 2.0], [0.4, 1.0], [0.9, 0.0], [0.9, 1.0]])
+    np.testing.assert_array_equal(grid.table_steps(stepped, 2.0), [0.4, 0.9, 2.0, 2.0])
+
+
+def test_the_single_focus_is_geometric_and_then_uniform():
+    """With sizes e + g d at the distance d from the end, d = e (exp(g n) - 1)/g after n of them."""
+    x = vertices_at(60)
+    end, far = 0.1 * 0.05, grid.FAR_SIZE * 2.0
+    turn = (far - end) / grid.GROWTH
+    at_turn = np.log(far / end) / grid.GROWTH
+    total = at_turn + (2.0 - turn) / far
+    n = total * np.arange(60, -1, -1) / 60
+    near = end * np.expm1(grid.GROWTH * np.minimum(n, at_turn)) / grid.GROWTH
+    np.testing.assert_allclose(x, 2.0 - near - far * np.maximum(n - at_turn, 0.0), atol=1e-14)
+
+
+def test_vertices_are_smooth_in_the_steps():
+    slope = jax.jacrev(functools.partial(vertices_at, 60))(jnp.array([0.7, 1.1]))
+    for i, by in enumerate(1e-6 * np.eye(2)):
+        forth, back = (vertices_at(60, jnp.array([0.7, 1.1]) + s * by) for s in (1, -1))
+        np.testing.assert_allclose(slope[:, i], (forth - back) / 2e-6, atol=1e-6)
+
+
+# --- loads --------------------------------------------------------------------------------------
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def loads(name, ends, table):
+    return grid.nodal_loads(element_rule(name), ends, table)
+
+
+def integrals(name, ends, table):
+    """Loads by numpy: quadrature on every piece between vertices and rows of the table."""
+    rule = element_rule(name)
+    (x, value), ends = np.asarray(table).T, np.asarray(ends)
+    cuts = np.unique(np.concatenate([ends, np.clip(x, ends[0], ends[-1])]))
+    points, weights = np.polynomial.legendre.leggauss(3)
+    order = grid.ORDER[name]
+    total = np.zeros(order * (ends.size - 1) + 1)
+    for low, high in itertools.pairwise(cuts):
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        element = np.searchsorted(ends, middle) - 1
+        begin, size = ends[element], ends[element + 1] - ends[element]
+        # The table's line on this piece, steps at its ends being no part of it.
+        row = np.searchsorted(x, middle)
+        left, right = max(row - 1, 0), min(row, x.size - 1)
+        run = x[right] - x[left]
+        rise = (value[right] - value[left]) / run if 0 < row < x.size else 0.0
+        for point, weight in zip(middle + half * points, half * weights, strict=True):
+            inside = (point - begin) / size
+            shape = [
+                np.prod([(inside - b) / (a - b) for b in rule.nodes if b != a]) for a in rule.nodes
+            ]
+            load = value[left] + rise * (point - x[left])
+            total[order * element : order * (element + 1) + 1] += weight * load * np.array(shape)
+    return total
+
+
+places = st.integers(0, 2000).map(lambda i: i * 1e-3) | st.sampled_from([0.0, 0.25, 0.5, 2.0])
+NODES = np.array([0.0, 0.25, 0.5, 0.6, 1.0, 1.7, 2.0])
+
+
+@rules
+@given(
+    st.lists(places, min_size=3, max_size=3, unique=True),
+    st.integers(0, 2),
+    st.lists(st.floats(0.0, 10.0), min_size=4, max_size=4),
+)
+def test_loads_are_exact_wherever_they_step(name, x, step, value):
+    x = sorted([*x, x[step]])  # one step; at a node, between nodes, at an end
+    table = jnp.stack([jnp.array(x), jnp.array(value)], axis=1)
+    got, exact = loads(name, NODES, table), integrals(name, NODES, table)
+    np.testing.assert_allclose(got, exact, rtol=1e-12, atol=1e-13)
+
+
+@rules
+def test_the_force_and_its_moment_do_not_depend_on_the_nodes(name):
+    step = jnp.array([[0.0, 3.0], [0.7, 3.0], [0.7, 1.0], [2.0, 1.0]])
+    for elements in (3, 41):
+        ends = vertices(elements, 2.0, 0.1)
+        got, x = loads(name, ends, step), grid.nodes(element_rule(name), ends)
+        np.testing.assert_allclose(got.sum(), 2.1 + 1.3, rtol=1e-13)
+        np.testing.assert_allclose(got @ x, 2.1 * 0.35 + 1.3 * 1.35, rtol=1e-13)
+
+
+@rules
+def test_a_table_goes_on_with_its_end_values(name):
+    short = jnp.array([[0.55, 3.0], [0.6, 3.0], [0.6, 5.0], [0.9, 5.0]])
+    whole = short.at[0, 0].set(0.0).at[-1, 0].set(2.0)
+    np.testing.assert_allclose(loads(name, NODES, short), loads(name, NODES, whole), atol=1e-15)
+    for load in (jnp.array(7.0), jnp.array([[0.3, 7.0], [0.3, 7.0], [0.3, 7.0], [1.0, 7.0]])):
+        lengths = grid.tributary_lengths(element_rule(name), jnp.asarray(NODES))
+        np.testing.assert_allclose(loads(name, NODES, load), 7.0 * lengths, rtol=1e-14)
+
+
+@rules
+@pytest.mark.parametrize("at", [0.7, 0.5, 0.93])  # 0.5 is a vertex
+def test_loads_are_differentiable_in_where_they_step(name, at):
+    def stepped(at):
+        table = jnp.array([[0.0, 3.0], [0.0, 3.0], [0.0, 1.0], [2.0, 1.0]])
+        return loads(name, NODES, table.at[1:3, 0].set(at))
+
+    slope = jax.jacrev(stepped)(at)
+    forth, back = stepped(at + 1e-6), stepped(at - 1e-6)
+    np.testing.assert_allclose(slope, (forth - back) / 2e-6, atol=5e-5)
+    # The step moves by a strip of the height of 3 - 1 at X = at.
+    x = grid.nodes(element_rule(name), jnp.asarray(NODES))
+    np.testing.assert_allclose([slope.sum(), slope @ x], [2.0, 2.0 * at], rtol=1e-12)

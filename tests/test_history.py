@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.history import branch_work, closed_cycles, turning_points
+from jbeamshell.cycles import branch_work, closed_cycles, turning_points
 
 
 def test_branch_work_is_exact_for_parabolas_and_beats_the_trapezoid():

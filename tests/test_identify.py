@@ -1,11 +1,11 @@
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell import identify
+from jbeamshell import identify, plotting
 from jbeamshell.example import example_loops
-from jbeamshell.loops import make_loop
+from jbeamshell.loops import Loop, make_loop
+from jbeamshell.observations import SqueezeCurve
 
 FREE = ("contact.friction", "strip.height_ratio")
 MODEL = {
@@ -61,24 +61,46 @@ def test_displacement_drives_as_well(planted):
     np.testing.assert_allclose(list(fit.values.values()), TRUTH, rtol=1e-4)
 
 
-def test_several_loops_of_different_length_and_a_first_loading(planted):
-    force, displacement, start = planted
-    pull = jb.solve(jb.Scene().replace(MODEL), np.linspace(0.1, 1.2, 12))
-    first = make_loop(pull.force, pull.displacement, "pull")
+def test_a_mixture_of_loops_a_first_loading_and_a_squeeze_curve():
+    """Of one strip, clamped harder at its far part; three lengths, in no order of kinds."""
+    clamped = [[0.0, 10.0], [1.4, 10.0], [1.4, 6.0], [2.0, 6.0]]
+    scene = jb.Scene().replace(MODEL | {"contact.pressure": clamped})
+    cycle = jb.solve(scene)
+    force, displacement = map(np.asarray, cycle.loop)
+    pull = jb.solve(scene, np.linspace(0.1, 1.2, 12))
     loop = make_loop(force, displacement, "loop")
+    first = make_loop(pull.force, pull.displacement, "pull")
+    x = np.linspace(1.0, 1.9, 19)
+    stress = np.interp(x, cycle.middles, cycle.squeeze_stress[cycle.pressed])
     assert loop.closed
     assert not first.closed
-    fit = identify.fit([loop, first], start, FREE)
-    np.testing.assert_allclose(list(fit.values.values()), TRUTH, rtol=1e-5)
-    assert set(fit.figures()["misfits"]) == {"loop", "pull"}
+    start = dict(zip((*FREE, "strip.kappa_s"), (0.12, 0.1, 0.8), strict=True))
+    fit = identify.fit([loop, SqueezeCurve(x, stress), first], scene.replace(start), list(start))
+    np.testing.assert_allclose(list(fit.values.values()), [*TRUTH, 0.44], rtol=1e-5)
+    assert list(fit.figures()["misfits"]) == ["loop", "squeeze", "pull"]
+    assert [type(d) for d in fit.model] == [Loop, SqueezeCurve, Loop]
+    np.testing.assert_allclose(fit.model[1].stress, stress, rtol=1e-6)
+    np.testing.assert_allclose(fit.model[2].displacement, first.displacement, atol=1e-10)
+    loops, curves = fit.plot()
+    assert len(loops.lines) == 4
+    assert len(curves.lines) == 2
+    plotting.plt.close("all")
 
 
-@pytest.mark.parametrize("key", ["strip.poisson_ratio", "contact.friction"])
-def test_search_space_is_unbounded_and_comes_back(key):
-    for value in (0.01, 0.3, 0.45):
-        assert float(identify._bound(key, identify._unbound(key, value))) == pytest.approx(value)
-    assert float(identify._bound("strip.poisson_ratio", jnp.asarray(-20.0))) > -1.0
-    assert float(identify._bound("strip.poisson_ratio", jnp.asarray(20.0))) < 0.5
+@pytest.mark.parametrize(
+    ("key", "start", "low", "high"),
+    [
+        ("contact.friction", 0.1, 0.0, np.inf),
+        ("strip.poisson_ratio", 0.3, -1.0, 0.5),
+        ("strip.poisson_ratio", 0.0, -1.0, 0.5),
+        ("contact.smoothing", 16.0, 1.0, np.inf),
+        ("strip.curvature", -2e-4, -np.inf, np.inf),
+    ],
+)
+def test_the_search_space_is_unbounded_and_begins_at_the_start(key, start, low, high):
+    assert float(identify._bound(key, start, 0.0)) == pytest.approx(start, abs=1e-15)
+    for far in (-20.0, 20.0):
+        assert low < float(identify._bound(key, start, far)) < high
 
 
 def test_finite_element_loops_are_recovered_with_small_bias():
@@ -101,6 +123,8 @@ def test_finite_element_loops_are_recovered_with_small_bias():
         (("load.amplitude",), "not a parameter"),
         (("contact.smoothing",), "'sharp'"),
         (("contact.friction", "contact.friction"), "twice"),
+        (("strip.layers",), "the scene has none"),
+        (("contact.bottom_pressure",), "is 0"),
     ],
 )
 def test_keys_that_cannot_be_fitted(free, message, planted):

@@ -5,6 +5,7 @@ import io
 import json
 import os
 
+import jax
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -22,13 +23,23 @@ COARSE = {
     "load.steps_per_half_cycle": 8,
     "load.cycles": 1,
 }
-RUN_FILES = {"loop.csv", "profiles.csv", "result.json", "scene.toml", "loop.png", "profiles.png"}
+TABLES = {"loop.csv", "profiles.csv", "sections.csv", "result.json", "scene.toml"}
+RUN_FILES = TABLES | {"loop.png", "profiles.png", "contact.png"}
 FIT_FILES = {"overlay.csv", "overlay.png", "result.json", "scene.toml"}
 
 
 @pytest.fixture(scope="module")
 def history():
     return jb.solve(jb.Scene().replace(COARSE))
+
+
+def pressed(history, steps, **values):
+    """The start of a history, as if nothing but pressing had been asked for."""
+    scene = history.scene.replace({"load.cycles": 0, "load.pressure_steps": steps} | values)
+    kept = {"x", "middles", "tributary", "load"}
+    path = {k: v for k, v in vars(history).items() if k not in kept | {"scene", "cycles"}}
+    path = jax.tree.map(lambda a: a[:steps], path)
+    return jb.History(**vars(history) | path | {"scene": scene, "cycles": ()})
 
 
 @pytest.fixture
@@ -64,25 +75,39 @@ def is_png(path):
 
 def test_the_loop_table_keeps_every_bit(history):
     header, rows = rows_of(output.loop_table(history))
-    assert header == [
-        *("step", "force", "displacement", "friction_work", "newton_iterations", "error")
-    ]
-    table = np.array(rows, dtype=float).T
-    assert table.shape == (6, 21)
-    np.testing.assert_array_equal(table[0], np.arange(21))
-    np.testing.assert_array_equal(table[1], history.force)
-    np.testing.assert_array_equal(table[2], history.displacement)
-    np.testing.assert_array_equal(table[3], np.cumsum(history.slip_work))
-    np.testing.assert_array_equal(table[4], history.iterations)
-    np.testing.assert_array_equal(table[5], history.error)
-    assert [row[4] for row in rows] == [str(int(i)) for i in history.iterations]
+    columns = dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+    expected = {
+        "step": np.arange(21),
+        "force": history.force,
+        "displacement": history.displacement,
+        "pressure": np.ones(21),
+        "friction_work": np.cumsum(history.slip_work),
+        "newton_iterations": history.iterations,
+        "error": history.error,
+    }
+    assert header == list(expected)
+    for name, values in expected.items():
+        np.testing.assert_array_equal(columns[name], values)
+    assert [row[5] for row in rows] == [str(int(i)) for i in history.iterations]
+
+
+def test_the_loop_table_says_where_unilateral_contact_ends(history):
+    lifting = pressed(history, 3, **{"model.fields": ["v", "w", "beta", "psi"]})
+    header, rows = rows_of(output.loop_table(lifting))
+    assert header.index("contact_end") == 5
+    np.testing.assert_array_equal([float(row[5]) for row in rows], lifting.contact_end)
+    hanging = pressed(
+        history, 3, **{"model.fields": ["v", "w", "beta", "psi"], "contact.normal": "none"}
+    )
+    assert "contact_end" not in rows_of(output.loop_table(hanging))[0]
 
 
 def test_the_profile_table_keeps_every_bit(history):
     steps = output.turning_steps(history)
     assert steps == [0, 4, 12, 20]  # the pressure, the first peak, the turn, the end
     header, rows = rows_of(output.profile_table(history, steps))
-    names = ["step", "force", "x", "slip", "w", "beta", "psi", "traction", "reaction", "slipping"]
+    names = ["step", "force", "x", "slip", "w", "beta", "psi", "gap"]
+    names += ["traction", "reaction", "slipping"]
     assert header == names
     assert len(rows) == 4 * 21
     columns = dict(zip(header, zip(*rows, strict=True), strict=True))
@@ -95,6 +120,30 @@ def test_the_profile_table_keeps_every_bit(history):
     for name, values in (("x", [history.x] * 4), ("force", history.force[np.array(steps), None])):
         column = np.array(columns[name], dtype=float).reshape(4, 21)
         np.testing.assert_array_equal(column, np.broadcast_to(values, (4, 21)))
+
+
+def test_the_section_table_keeps_every_bit(history):
+    steps = [0, 12]
+    header, rows = rows_of(output.section_table(history, steps))
+    assert header == ["step", "x", "N", "Q", "M", "chi", "xi", "squeeze_stress"]
+    columns = dict(zip(header, np.array(rows, dtype=float).reshape(2, 20, 8).T, strict=True))
+    np.testing.assert_array_equal(columns["step"].T, np.repeat(steps, 20).reshape(2, 20))
+    np.testing.assert_array_equal(columns["x"].T, [history.middles] * 2)
+    for name, values in zip(header[2:], (*history.sections, history.squeeze_stress), strict=True):
+        np.testing.assert_array_equal(columns[name].T, values[np.array(steps)])
+    # Under the pressure alone the mean stress over the height is the pressure.
+    np.testing.assert_allclose(columns["squeeze_stress"].T[0], -10.0, rtol=1e-9)
+
+
+def test_steps_to_look_at(history):
+    several = {"cycles": ((4, 12, 20), (20, 28, 36), (36, 44, 52)), "force": np.zeros(53)}
+    assert output.turning_steps(jb.History(**vars(history) | several)) == [0, 4, 36, 44, 52]
+    for steps, shown in [(1, [0]), (2, [0, 1]), (20, [0, 9, 19])]:
+        assert output.turning_steps(pressed(history, steps)) == shown
+    # Pressed in steps, then loaded one way.
+    scene = history.scene.replace({"load.pressure_steps": 5})
+    one_way = jb.History(**vars(history) | {"cycles": (), "scene": scene})
+    assert output.turning_steps(one_way) == [0, 2, 4, 20]
 
 
 def test_json_refuses_what_is_no_number():
@@ -119,8 +168,28 @@ def test_a_run_in_a_folder(history, tmp_path):
     assert (folder / "profiles.csv").read_text().count("\n") == 1 + 4 * 21
     assert json.loads((folder / "result.json").read_text()) == history.figures()
     assert jb.scene_to_toml(jb.read_scene(folder / "scene.toml")) == jb.scene_to_toml(history.scene)
-    assert is_png(folder / "loop.png")
-    assert is_png(folder / "profiles.png")
+    assert (folder / "sections.csv").read_text().count("\n") == 1 + 4 * 20
+    assert all(is_png(path) for path in folder.glob("*.png"))
+
+
+@pytest.mark.parametrize(
+    ("values", "pictures"),
+    [
+        ({}, {"contact.png"}),
+        ({"model.fields": ["v", "w", "beta"]}, {"contact.png"}),
+        ({"model.fields": ["v", "beta"]}, set()),
+    ],
+)
+def test_a_run_that_only_presses_has_no_loop_to_draw(history, tmp_path, values, pictures):
+    paths = output.write_run(tmp_path, pressed(history, 3, **values), {})
+    assert {path.name for path in paths} == names(tmp_path) == TABLES | pictures
+
+
+def test_a_run_without_friction_has_no_traction_to_draw(history, tmp_path):
+    scene = history.scene.replace({"contact.friction": 0.0})
+    smooth = jb.History(**vars(history) | {"scene": scene})
+    output.write_run(tmp_path, smooth, {})
+    assert names(tmp_path) == RUN_FILES - {"profiles.png"}
 
 
 def test_only_what_was_written_is_listed(history, tmp_path):
