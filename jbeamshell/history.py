@@ -219,8 +219,10 @@ class History(eqx.Module):
 
     @property
     def friction_per_length(self) -> Array:
-        """q: mean of mu F_N along the strip, force per length and width."""
-        return self.scene.contact.friction * jnp.sum(self.load) / jnp.sum(self.tributary)
+        """q: mean of mu F_N where the strip is pressed, force per length and width."""
+        # Weighted by the pressure itself, so that what is not pressed does not count.
+        mean = jnp.sum(self.load**2 / self.tributary) / jnp.sum(self.load)
+        return self.scene.contact.friction * mean
 
     @property
     def secant_stiffness(self) -> Array:

@@ -23,6 +23,13 @@ hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=Tr
 hypothesis.settings.load_profile("repeatable")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _forget_compiled_code():
+    """A worker that kept every compiled program would take gigabytes."""
+    yield
+    jax.clear_caches()
+
+
 def pytest_sessionfinish(session: pytest.Session) -> None:
     if OWNER:
         shutil.rmtree(os.environ[CACHE], ignore_errors=True)

@@ -65,13 +65,11 @@ def test_a_mixture_of_loops_a_first_loading_and_a_squeeze_curve():
     """Of one strip, clamped harder at its far part; three lengths, in no order of kinds."""
     clamped = [[0.0, 10.0], [1.4, 10.0], [1.4, 6.0], [2.0, 6.0]]
     scene = jb.Scene().replace(MODEL | {"contact.pressure": clamped})
-    cycle = jb.solve(scene)
-    force, displacement = map(np.asarray, cycle.loop)
-    pull = jb.solve(scene, np.linspace(0.1, 1.2, 12))
-    loop = make_loop(force, displacement, "loop")
-    first = make_loop(pull.force, pull.displacement, "pull")
+    history = jb.solve(scene)
+    loop, pull = make_loop(*history.loop, "loop"), slice(1, 13)
+    first = make_loop(history.force[pull], history.displacement[pull], "pull")
     x = np.linspace(1.0, 1.9, 19)
-    stress = np.interp(x, cycle.middles, cycle.squeeze_stress[cycle.pressed])
+    stress = np.interp(x, history.middles, history.squeeze_stress[history.pressed])
     assert loop.closed
     assert not first.closed
     start = dict(zip((*FREE, "strip.kappa_s"), (0.12, 0.1, 0.8), strict=True))
