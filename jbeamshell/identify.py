@@ -5,11 +5,10 @@ The only file that imports jaxopt.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import jaxopt
 import numpy as np
@@ -17,86 +16,30 @@ from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError, UnconvergedError
+from jbeamshell.experiment import Experiment, Specimen
 from jbeamshell.loops import Loop
+from jbeamshell.measurements import Measurement
 from jbeamshell.newton import Newton
-from jbeamshell.observations import Experiment, Observation, SqueezeCurve, observe
-from jbeamshell.scene import NUMBERS, Scene, check_key
+from jbeamshell.parameters import FARTHEST, Parameter, Space, as_parameters, search_space
+from jbeamshell.problem import Point, Problem
+from jbeamshell.results import Fit, fit_at
+from jbeamshell.scene import Scene
+from jbeamshell.uncertainty import check_level
 
-Measurement = Loop | SqueezeCurve
+__all__ = ["Fit", "Parameter", "Specimen", "driver_of", "fit", "fit_kappa_s", "profile"]
 
 POINTS = 96  # of a loop that the model is run through
 MAX_ITERATIONS = 40
 FLAT = 1e-6  # relative gain in cost at which a fit has settled
-SIGNED = ("strip.deviation", "strip.curvature")  # all others keep their sign
+METHODS = ("levenberg-marquardt", "l-bfgs-b")
+STARTS = 3  # of a search between bounds
+SCREENED = 4  # points tried for each start beside the given one
+NO_INFLUENCE = 1e-9  # largest change of a residual, for a unit step, that is rounding
+PROFILE_POINTS = 8  # at most, to either side
+PROFILED = 0.02  # of its root: so well the ends of a profile's interval are found
 
-
-class Fit(NamedTuple):
-    """Result of a fit.
-
-    Attributes
-    ----------
-    scene : the scene with the fitted values
-    values, errors : fitted value and standard error (one sigma) by key; the errors take what the
-        model leaves unexplained as independent noise, so a model that is wrong makes them too small
-    correlation : (p, p) of the fitted values, in the order of ``values``
-    misfit : root mean square of the residual over the range of the response
-    misfits : the same for every measurement
-    data, model : the measurements fitted, loops thinned, and the model's at the same points
-    status : "converged" or "max_iterations"
-    model_runs : how often the model was run through all measurements, derivatives included
-    """
-
-    scene: Scene
-    values: dict[str, float]
-    errors: dict[str, float]
-    correlation: NDArray[np.float64]
-    misfit: float
-    misfits: list[float]
-    data: list[Any]
-    model: list[Any]
-    status: str
-    model_runs: int
-
-    def __str__(self) -> str:
-        lines = [
-            f"  {key:28s} {value:.6g} +- {self.errors[key]:.2g}"
-            for key, value in self.values.items()
-        ]
-        lines.append(f"  misfit {100 * self.misfit:.3g} % of the range")
-        lines.append(f"  {self.status} after {self.model_runs} model runs")
-        return "\n".join(lines)
-
-    def figures(self) -> dict[str, Any]:
-        """The result as plain numbers."""
-        return {
-            "values": {k: {"value": v, "error": self.errors[k]} for k, v in self.values.items()},
-            "correlation": self.correlation.tolist(),
-            "misfit": self.misfit,
-            "misfits": {d.label: m for d, m in zip(self.data, self.misfits, strict=True)},
-            "status": self.status,
-            "model_runs": self.model_runs,
-        }
-
-    def plot(self, axes: Any = None) -> Any:
-        """Draw data and model; returns the axes, which are a pair for a mixture: loops first."""
-        from jbeamshell import plotting
-
-        def pairs(kind: type) -> list[tuple[Any, Any]]:
-            both = zip(self.data, self.model, strict=True)
-            return [(d, m) for d, m in both if isinstance(d, kind)]
-
-        loops, curves = pairs(Loop), pairs(SqueezeCurve)
-        mixed = bool(loops and curves)
-        left, right = ((None, None) if axes is None else axes) if mixed else (axes, axes)
-        drawn = []
-        if loops:
-            data = [(d.force, d.displacement, "data") for d, _ in loops]
-            model = [(m.force, m.displacement, f"model, {m.label}") for _, m in loops]
-            drawn.append(plotting.overlay(data, model, left))
-        if curves:
-            data, model = map(list, zip(*curves, strict=True))
-            drawn.append(plotting.squeeze_fit(data, model, right))
-        return drawn if mixed else drawn[0]
+Evaluate = Callable[[NDArray[np.float64]], Point]
+Report = Callable[[NDArray[np.float64], float], None]
 
 
 def driver_of(loops: Sequence[Loop]) -> str:
@@ -111,10 +54,14 @@ def driver_of(loops: Sequence[Loop]) -> str:
 
 
 def fit(
-    data: Measurement | Sequence[Measurement],
-    scene: Scene,
-    free: Sequence[str],
+    data: Measurement | Specimen | Sequence[Measurement] | Sequence[Specimen],
+    scene: Scene | None = None,
+    free: Sequence[str | Parameter] = (),
     *,
+    method: str = METHODS[0],
+    starts: int | None = None,
+    noise: float | None = None,
+    save: str | os.PathLike[str] | None = None,
     solver: Newton | None = None,
     points: int = POINTS,
     max_iterations: int = MAX_ITERATIONS,
@@ -124,19 +71,29 @@ def fit(
 ) -> Fit:
     """Least squares of a scene's parameters on measured or computed curves.
 
-    A loop drives the model by the column that ``scene.load.control`` names and is compared in the
-    other; a squeeze curve is compared under the scene's pressures alone.  Every measurement counts
-    relative to its own range, with its own number of points, and all are of this one scene: what
-    differs between them, such as another pressure or height, needs a fit of its own.
+    A loop or a backbone drives the model by the column that ``scene.load.control`` names and is
+    compared in the other; a squeeze curve is compared under the scene's pressures alone;
+    dissipation and stiffness are compared by their logarithms.  Where measurements carry noise, or
+    ``noise`` is given, residuals are divided by it; else every measurement counts relative to its
+    own range, and the noise is estimated from what is left.
 
     Parameters
     ----------
-    data : a `Loop`, a `SqueezeCurve`, or a list of them, mixed or not
-    scene : start values, and everything that stays fixed
-    free : keys of the parameters to fit, e.g. ("contact.friction", "strip.height_ratio")
+    data : a measurement or a list of them, mixed or not; or `Specimen`, one or several, which bring
+        their own scenes
+    scene : start values, and everything that stays fixed; None with specimens
+    free : what to fit: keys such as "contact.friction", or `Parameter` with bounds, scale, prior,
+        and whether every specimen has a value of its own
+    method : "levenberg-marquardt", or "l-bfgs-b", which may end on a bound
+    starts : searches, from the given start and from the best of some points spread between the
+        bounds (a factor e to either side where there are none); None is 3 if all parameters have
+        two bounds, else 1
+    noise : standard deviation of measurements without noise, as a part of their range
+    save : file that keeps every model run, written whole after each; if it is there, the fit goes
+        on from it
     solver : settings of Newton's method
     points : thin each loop to about so many points
-    max_iterations : of the Levenberg-Marquardt method
+    max_iterations : of each search
     tolerance : relative change of the parameters at which it stops (a flat cost stops it too)
     progress : called with one line per iteration
     throw : whether an unfinished fit raises; if not, read ``status``
@@ -144,59 +101,56 @@ def fit(
     Raises
     ------
     InputError
-        for keys that cannot be fitted, or that the data do not depend on; for measurements that the
-        scene cannot answer, such as forces beyond gross slip at the start values
+        for parameters that cannot be fitted, or that the data do not depend on; for measurements
+        that the scene cannot answer, such as forces beyond gross slip at the start values; for a
+        saved state of another fit
     UnconvergedError
-        if the iteration does not settle, or the model finds no equilibrium at the start
+        if the search does not settle, or the model finds no equilibrium at the start
+    KeyboardInterrupt
+        when interrupted, with a message that says what was saved
     """
-    _check_free(scene, free)
-    # A Loop is a tuple itself.
-    given = [data] if isinstance(data, Loop) or not isinstance(data, Sequence) else data
-    if not given:
-        raise InputError("data: no measurement given; read loops with read_loops")
-    driver = scene.load.control
-    whole = [d.thinned(points, driver) if isinstance(d, Loop) else d for d in given]
-    observations = [observe(d, scene) for d in whole]
-    evaluate = _Evaluation(scene, tuple(free), Experiment(observations), solver or Newton())
+    if method not in METHODS:
+        raise InputError(f"method = {method!r}: choose {' or '.join(map(repr, METHODS))}")
+    if starts is not None and (not isinstance(starts, int) or starts < 1):
+        raise InputError(f"starts = {starts!r}: give a whole number, 1 or more")
+    parameters = as_parameters(free)
+    specimens = _specimens(data, scene)
+    labels = [specimen.label for specimen in specimens]
+    scenes = dict(zip(labels, [specimen.scene for specimen in specimens], strict=True))
+    space, begun = search_space(parameters, scenes)
+    specimens = [specimen._replace(scene=begun[specimen.label]) for specimen in specimens]
+    experiment = Experiment(specimens, points=points, noise=noise)
+    problem = Problem(experiment, space, solver or Newton(), save)
+    if starts is None:
+        starts = STARTS if all(parameter.bounded for parameter in parameters) else 1
 
-    params = jnp.zeros(len(free))
-    jacobian = evaluate(params).jacobian
-    if not evaluate(params).sound:
-        raise UnconvergedError(
-            "the model finds no equilibrium at the start values: start closer, or lower "
-            "contact.stick_stiffness"
-        )
-    for key, column in zip(free, jacobian.T, strict=True):
-        if not np.any(np.abs(column) > 1e-9):
-            raise InputError(f"free {key!r}: the data do not depend on it; leave it out")
-
-    method = jaxopt.LevenbergMarquardt(
-        residual_fun=lambda p: jnp.asarray(evaluate(p).residual),
-        materialize_jac=True,
-        solver="cholesky",
-        damping_parameter=1e-3,
-        jit=False,
-    )
-    # Its last release forgets a jac_fun argument when the Jacobian is materialised.
-    method._jac_fun = lambda p: jnp.asarray(evaluate(p).jacobian)
-    state = method.init_state(params)
-    status = "max_iterations"
-    for _ in range(max_iterations):
-        before = float(state.value)
-        params, state = method.update(params, state)
+    def report(values: NDArray[np.float64], cost: float) -> None:
         if progress:
-            progress(_line(scene, free, params, state.residual))
-        gained = before - float(state.value)  # nothing when the step was refused
-        if float(jnp.max(jnp.abs(state.delta))) < tolerance or 0.0 < gained < FLAT * before:
-            status = "converged"
-            break
+            progress(f"{space.described(values)}, cost {cost:.4g}")
+
+    search = _levenberg_marquardt if method == METHODS[0] else _l_bfgs_b
+    try:
+        _check_start(problem, space)
+        ends = [
+            search(problem, space, start, max_iterations, tolerance, report)
+            for start in _starts(problem, space, starts)
+        ]
+    except KeyboardInterrupt:
+        kept = "nothing was saved: give save=, a file, to go on from it another time"
+        if problem.saved_in:
+            kept = f"all are in {problem.saved_in}: call fit again as before to go on from there"
+        raise KeyboardInterrupt(f"interrupted after {problem.runs} model runs; {kept}") from None
+    ends.sort(key=lambda end: problem(space, end[0]).cost)
+    best, status = ends[0]
     if throw and status != "converged":
+        values, cost = space.values(best), problem(space, best).cost
         raise UnconvergedError(
             f"the fit has not settled after {max_iterations} iterations, at "
-            f"{_line(scene, free, params, state.residual)}: start closer, free fewer parameters, "
+            f"{space.described(values)}, cost {cost:.4g}: start closer, free fewer parameters, "
             "or allow more iterations"
         )
-    return _result(scene, free, params, evaluate, whole, observations, status)
+    minima = [(space.values(end), problem(space, end).cost) for end, _ in ends]
+    return fit_at(problem, space, best, labels, status, minima)
 
 
 def fit_kappa_s(curve: Measurement | Sequence[Measurement], scene: Scene, **options: Any) -> Fit:
@@ -215,145 +169,246 @@ def fit_kappa_s(curve: Measurement | Sequence[Measurement], scene: Scene, **opti
     return fit(curve, scene, ("strip.kappa_s",), **options)
 
 
-class _Point(NamedTuple):
-    """The model at a point of the search space.
+class Profile(NamedTuple):
+    """The profile likelihood of one parameter: the best that all others can do beside it.
 
     Attributes
     ----------
-    residual, jacobian : (measurements * n,), (measurements * n, p)
-    predictions : (measurements, n)
-    sound : whether every load step found equilibrium
+    name : of the parameter
+    values : (points,) increasing
+    rises : (points,) of the cost over that of the minimum, over the noise squared
+    interval : where the rise reaches that of the level; a bound of the parameter, or infinity,
+        where it never does
+    level : of confidence
     """
 
-    residual: NDArray[np.float64]
-    jacobian: NDArray[np.float64]
-    predictions: NDArray[np.float64]
-    sound: bool
+    name: str
+    values: NDArray[np.float64]
+    rises: NDArray[np.float64]
+    interval: tuple[float, float]
+    level: float
 
 
-class _Evaluation:
-    """Residual and Jacobian at a point together, remembered: the optimiser asks for them apart."""
+def profile(
+    result: Fit,
+    name: str,
+    *,
+    level: float = 0.95,
+    max_iterations: int = MAX_ITERATIONS,
+    tolerance: float = 1e-4,
+) -> Profile:
+    """Profile likelihood of a fitted parameter, and the interval that it gives.
 
-    def __init__(
-        self, scene: Scene, free: tuple[str, ...], experiment: Experiment, solver: Newton
-    ) -> None:
-        self._fixed = (scene, free, experiment, solver)
-        self._known: dict[bytes, _Point] = {}
+    Unlike the intervals of `Fit`, it asks the model itself how far the parameter may go, all others
+    following; so it is right where these are only good for little noise.
 
-    @property
-    def runs(self) -> int:
-        """Points at which the model was run."""
-        return len(self._known)
+    Parameters
+    ----------
+    result : of `fit`
+    name : one of ``result.values``
+    level : of confidence
+    max_iterations, tolerance : of the fit of the others
 
-    def __call__(self, params: Array) -> _Point:
-        key = np.asarray(params).tobytes()
-        if key not in self._known:
-            rows, jacobian, predictions, sound = _linearised(params, *self._fixed)
-            self._known[key] = _Point(
-                np.asarray(rows), np.asarray(jacobian), np.asarray(predictions), bool(sound)
-            )
-        return self._known[key]
-
-
-@eqx.filter_jit
-def _linearised(
-    params: Array, scene: Scene, free: tuple[str, ...], experiment: Experiment, solver: Newton
-) -> tuple[Array, Array, Array, Array]:
-    def residual(params: Array) -> tuple[Array, tuple[Array, Array, Array]]:
-        rows, predictions, sound = experiment.residual(scene_at(scene, free, params), solver)
-        return rows.ravel(), (rows.ravel(), predictions, sound)
-
-    jacobian, (rows, predictions, sound) = jax.jacfwd(residual, has_aux=True)(params)
-    return rows, jacobian, predictions, sound
-
-
-def scene_at(scene: Scene, free: Sequence[str], params: Array) -> Scene:
-    """The scene with its free parameters at a point of the search space, where it is at zero."""
-    return scene.replace(_values(scene, free, params))
-
-
-def _values(scene: Scene, free: Sequence[str], params: Any) -> dict[str, Any]:
-    return {key: _bound(key, scene.get(key), p) for key, p in zip(free, params, strict=True)}
-
-
-def _bound(key: str, start: Any, p: Any) -> Any:
-    """From the whole real line, zero being the start, to where a parameter lives.
-
-    The real line for those of either sign, m above 1, nu in (-1, 0.5), positive for all others.
+    Raises
+    ------
+    InputError
+        for a name that was not fitted, or that ended at its bound
     """
-    if key in SIGNED:
-        return start * (1.0 + p)
-    if key == "strip.poisson_ratio":
-        return -1.0 + 1.5 / (1.0 + (0.5 - start) / (1.0 + start) * jnp.exp(-p))
-    if key == "contact.smoothing":
-        return 1.0 + (start - 1.0) * jnp.exp(p)
-    return start * jnp.exp(p)
+    check_level(level)
+    if name not in result.values or result.problem is None or result.uncertainty is None:
+        raise InputError(f"profile {name!r}: was not fitted; names are {', '.join(result.values)}")
+    problem, uncertainty = result.problem, result.uncertainty
+    space, best = uncertainty.space, uncertainty.point
+    entry = space.names.index(name)
+    if uncertainty.held[entry]:
+        raise InputError(f"profile {name!r}: it ended at its bound; give it more room")
+    others = np.delete(np.arange(best.size), entry)
+    along = uncertainty.inverse[:, entry] / uncertainty.inverse[entry, entry]
+    least, wanted = problem(space, best).cost, uncertainty.quantile(level)
+
+    def root_at(step: float) -> float:
+        """Square root of the rise, which is about linear in the step."""
+        whole = best + step * along
+
+        def evaluate(part: NDArray[np.float64]) -> Point:
+            point = problem(space, np.insert(part, entry, whole[entry]))
+            return point._replace(jacobian=point.jacobian[:, others])
+
+        if others.size:
+            end, _ = _marquardt(evaluate, whole[others], max_iterations, tolerance)
+            cost = evaluate(end).cost
+        else:
+            cost = evaluate(np.zeros(0)).cost
+        return float(np.sqrt(max(cost - least, 0.0)) / uncertainty.sigma)
+
+    spread = float(np.sqrt(uncertainty.covariance[entry, entry]))
+    known, ends = {0.0: 0.0}, []
+    for side in (-1.0, 1.0):
+        end = _crossing(root_at, wanted, side, min(wanted * spread, 2.0), known)
+        bound = space.bijections[entry][1 if side < 0.0 else 2]
+        ends.append(bound if end is None else space.bijections[entry].value(best[entry] + end))
+    steps = sorted(known, key=lambda step: space.bijections[entry].value(best[entry] + step))
+    values = np.array([space.bijections[entry].value(best[entry] + step) for step in steps])
+    rises = np.array([known[step] ** 2 for step in steps])
+    return Profile(name, values, rises, (min(ends), max(ends)), level)
 
 
-def _check_free(scene: Scene, free: Sequence[str]) -> None:
-    if not free:
-        raise InputError("free: name at least one key, such as contact.friction")
-    for key in free:
-        check_key(key)
-        if key not in NUMBERS or key == "load.amplitude":
-            raise InputError(f"free {key!r}: is not a parameter of the strip or the contact")
-        start = scene.get(key)
-        if start is None:
-            raise InputError(f"free {key!r}: the scene has none; give it a number to start from")
-        if np.ndim(start) > 0:
-            raise InputError(f"free {key!r}: is a table; only a single number can be fitted")
-        if not np.isfinite(start):
+def _crossing(
+    root_at: Callable[[float], float],
+    wanted: float,
+    side: float,
+    step: float,
+    known: dict[float, float],
+) -> float | None:
+    """Signed step at which a rising function of it reaches a value; None if it never does."""
+    inside, outside = (0.0, 0.0), None
+    for _ in range(PROFILE_POINTS):
+        if step > FARTHEST:
+            return None
+        root = known[side * step] = root_at(side * step)
+        if abs(root - wanted) < PROFILED * wanted:
+            return side * step
+        if root < wanted:
+            inside = (step, root)
+        else:
+            outside = (step, root)
+        if outside is None:
+            step *= 2.0
+            continue
+        part = (wanted - inside[1]) / (outside[1] - inside[1])
+        step = inside[0] + np.clip(part, 0.1, 0.9) * (outside[0] - inside[0])
+    return None if outside is None else side * float(step)
+
+
+def _specimens(data: Any, scene: Scene | None) -> list[Specimen]:
+    """Specimens with labels, no two alike."""
+    given = [data] if isinstance(data, Specimen) else data
+    several = isinstance(given, Sequence) and not isinstance(given, Loop)
+    own = several and len(given) > 0 and all(isinstance(item, Specimen) for item in given)
+    if not own:
+        if scene is None:
             raise InputError(
-                f"free {key!r}: is 'sharp'; give it a number to start from, such as 16"
+                "scene: give one, or a Specimen (a scene with its data) in place of data"
             )
-        if start == 0.0 and key != "strip.poisson_ratio":
-            raise InputError(f"free {key!r}: is 0; give it another number to start from")
-    if len(set(free)) < len(free):
-        raise InputError(f"free {list(free)}: names a key twice")
+        return [Specimen(scene, data)]
+    if scene is not None:
+        raise InputError("scene: the specimens bring their own; leave it out")
+    numbered = [
+        specimen._replace(label=specimen.label or f"specimen {number}")
+        for number, specimen in enumerate(given, 1)
+    ]
+    labels = [specimen.label for specimen in numbered]
+    twice = [label for label in labels if labels.count(label) > 1]
+    if twice:
+        raise InputError(f"specimens: two have the label {twice[0]!r}: give each its own")
+    return numbered
 
 
-def _result(
-    scene: Scene,
-    free: Sequence[str],
-    params: Array,
-    evaluate: _Evaluation,
-    data: list[Any],
-    observations: Sequence[Observation],
-    status: str,
-) -> Fit:
-    point = evaluate(params)
-    compared = [np.flatnonzero(np.asarray(o.weight)) for o in observations]
-    rows = [row[i] for row, i in zip(point.residual.reshape(len(data), -1), compared, strict=True)]
-    noise = np.sum(point.residual**2) / max(sum(map(len, rows)) - len(free), 1)
-    inverse = np.linalg.pinv(point.jacobian.T @ point.jacobian)
-    spread = np.sqrt(np.diag(inverse))
-    slopes = jax.jvp(lambda p: _values(scene, free, p), (params,), (jnp.ones(len(free)),))[1]
-    values = {key: float(value) for key, value in _values(scene, free, params).items()}
-    errors = np.abs([float(slopes[key]) for key in free]) * np.sqrt(noise) * spread
+def _check_start(problem: Problem, space: Space) -> None:
+    point = problem(space, np.zeros(len(space.names)))
+    if not point.sound:
+        raise UnconvergedError(
+            "the model finds no equilibrium at the start values: start closer, or lower "
+            "contact.stick_stiffness"
+        )
+    for name, column in zip(space.names, point.jacobian.T, strict=True):
+        if not np.any(np.abs(column) > NO_INFLUENCE):
+            raise InputError(f"free {name!r}: the data do not depend on it; leave it out")
 
-    def answered(measurement: Any, observation: Observation, answer: NDArray) -> Any:
-        column = observation.column(scene)
-        return eqx.tree_at(lambda m: getattr(m, column), measurement, answer)
 
-    return Fit(
-        scene=scene.replace(values),
-        values=values,
-        errors=dict(zip(free, errors.tolist(), strict=True)),
-        correlation=inverse / np.outer(spread, spread),
-        misfit=float(np.sqrt(np.mean(np.concatenate(rows) ** 2))),
-        misfits=[float(np.sqrt(np.mean(row**2))) for row in rows],
-        data=data,
-        model=[
-            answered(measurement, observation, prediction[i])
-            for measurement, observation, prediction, i in zip(
-                data, observations, point.predictions, compared, strict=True
-            )
-        ],
-        status=status,
-        model_runs=evaluate.runs,
+def _starts(problem: Problem, space: Space, count: int) -> list[NDArray[np.float64]]:
+    """The given start, and the best of a Latin hypercube of others."""
+    size = len(space.names)
+    start = np.zeros(size)
+    if count == 1:
+        return [start]
+    random, tried = np.random.default_rng(0), SCREENED * (count - 1)
+    cells = np.stack([random.permutation(tried) for _ in range(size)], axis=1)
+    parts = (cells + random.uniform(size=cells.shape)) / tried
+    straight, box = space.straight()
+    low, high = np.clip(box, -1.0, 1.0).T
+    bounded = np.array([parameter.bounded for parameter in space.parameters])
+    low, high = np.where(bounded, box[:, 0], low), np.where(bounded, box[:, 1], high)
+    spread = [space.point(straight.values(low + part * (high - low))) for part in parts]
+    spread.sort(key=lambda point: problem(space, point).cost)
+    return [start, *spread[: count - 1]]
+
+
+def _levenberg_marquardt(
+    problem: Problem,
+    space: Space,
+    start: NDArray[np.float64],
+    max_iterations: int,
+    tolerance: float,
+    report: Report,
+) -> tuple[NDArray[np.float64], str]:
+    """Where the search ends, and how: in the unbounded space."""
+
+    def line(params: NDArray[np.float64], cost: float) -> None:
+        report(space.values(params), cost)
+
+    return _marquardt(lambda p: problem(space, p), start, max_iterations, tolerance, line)
+
+
+def _marquardt(
+    evaluate: Evaluate,
+    start: NDArray[np.float64],
+    max_iterations: int,
+    tolerance: float,
+    report: Report | None = None,
+) -> tuple[NDArray[np.float64], str]:
+    method = jaxopt.LevenbergMarquardt(
+        residual_fun=lambda p: jnp.asarray(evaluate(np.asarray(p)).residual),
+        materialize_jac=True,
+        solver="cholesky",
+        damping_parameter=1e-3,
+        jit=False,
     )
+    # Its last release forgets a jac_fun argument when the Jacobian is materialised.
+    method._jac_fun = lambda p: jnp.asarray(evaluate(np.asarray(p)).jacobian)
+    params: Any = jnp.asarray(start)
+    state = method.init_state(params)
+    for _ in range(max_iterations):
+        before = float(state.value)
+        params, state = method.update(params, state)
+        if report:
+            report(np.asarray(params), float(jnp.sum(state.residual**2)))
+        gained = before - float(state.value)  # nothing when the step was refused
+        if float(jnp.max(jnp.abs(state.delta))) < tolerance or 0.0 < gained < FLAT * before:
+            return np.asarray(params), "converged"
+    return np.asarray(params), "max_iterations"
 
 
-def _line(scene: Scene, free: Sequence[str], params: Array, residual: Array) -> str:
-    values = ", ".join(f"{k} = {float(v):.6g}" for k, v in _values(scene, free, params).items())
-    return f"{values}, cost {float(jnp.sum(residual**2)):.4g}"
+def _l_bfgs_b(
+    problem: Problem,
+    space: Space,
+    start: NDArray[np.float64],
+    max_iterations: int,
+    tolerance: float,
+    report: Report,
+) -> tuple[NDArray[np.float64], str]:
+    """Where the search ends, and how: in a box, whose sides it may reach."""
+    straight, box = space.straight()
+    begin = np.clip(straight.point(space.values(start)), *box.T)
+    scale = 1.0 / problem(straight, begin).cost  # its tolerances are absolute
+
+    def value_and_gradient(params: Array) -> tuple[float, NDArray[np.float64]]:
+        point = problem(straight, np.asarray(params))
+        return scale * point.cost, 2.0 * scale * point.residual @ point.jacobian
+
+    def callback(params: Array) -> None:
+        at = np.asarray(params)
+        report(straight.values(at), problem(straight, at).cost)
+
+    method = jaxopt.ScipyBoundedMinimize(
+        fun=value_and_gradient,
+        value_and_grad=True,
+        method="L-BFGS-B",
+        maxiter=max_iterations,
+        options={"ftol": tolerance**2, "gtol": tolerance},
+        callback=callback,
+        jit=False,
+    )
+    params, state = method.run(jnp.asarray(begin), bounds=tuple(map(jnp.asarray, box.T)))
+    end = space.point(straight.values(np.asarray(params)))
+    return end, "converged" if bool(state.success) else "max_iterations"

@@ -1,23 +1,17 @@
-"""Measured or computed loops of force over displacement, read from tables."""
+"""Measured or computed loops of force over displacement."""
 
 from __future__ import annotations
 
-import csv
-import os
-import re
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.errors import InputError
+from jbeamshell.recordings import FEWEST_POINTS as FEWEST_POINTS
+from jbeamshell.recordings import FilePath, read_recordings, recording_from_arrays
+from jbeamshell.reversals import find_turns
 
-# What they are measured in; a force per width is as good, as the model is of unit width.
-QUANTITIES = {"force": ("N", "N/m"), "displacement": ("m",)}
-GROUP_COLUMNS = ("loop", "a", "amplitude")
-FEWEST_POINTS = 8
 CLOSED = 0.05  # of the range: a loop whose ends lie closer than this is taken as closed
 
 
@@ -29,17 +23,39 @@ class Loop(NamedTuple):
     force : (points,) per unit width
     displacement : (points,) of the loaded end
     label : for pictures and messages
+    noise : standard deviation of a single sample of the column that answers, estimated from the
+        scatter of repeated cycles; None if there were none
+    cycles : how many cycles this loop is the mean of
+    dropped : rows of the data that lacked a number and were left out
+    scatter : (points,) standard deviation over the cycles of the column that answers, at each
+        point; None if there were no repeated cycles
+    notes : one line on each thing that was done to the data
     """
 
     force: NDArray[np.float64]
     displacement: NDArray[np.float64]
     label: str
+    noise: float | None = None
+    cycles: int = 1
+    dropped: int = 0
+    scatter: NDArray[np.float64] | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def closed(self) -> bool:
         """Whether it ends where it starts: a steady loop, not a first loading."""
         columns = (self.force, self.displacement)
         return all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) for c in columns)
+
+    @property
+    def standard_error(self) -> float | None:
+        """Of the answering column's points: the scatter of the cycles over the root of their number.
+
+        None where there were no repeated cycles.
+        """
+        if self.scatter is None:
+            return None
+        return float(np.sqrt(np.mean(self.scatter**2) / self.cycles))
 
     def thinned(self, points: int, driver: str) -> Loop:
         """About ``points`` of the loop's points, even along the driving column; turns are kept."""
@@ -48,171 +64,52 @@ class Loop(NamedTuple):
         drive = getattr(self, driver)
         travel = np.append(0.0, np.cumsum(np.abs(np.diff(drive))))
         even = np.searchsorted(travel, np.linspace(0.0, travel[-1], points))
-        keep = np.unique([0, *even, np.argmax(drive), np.argmin(drive), drive.size - 1])
-        return Loop(self.force[keep], self.displacement[keep], self.label)
+        ends = [0, np.argmax(drive), np.argmin(drive), drive.size - 1]
+        keep = np.unique([*ends, *even, *find_turns(drive)])
+        return self._replace(
+            force=self.force[keep],
+            displacement=self.displacement[keep],
+            scatter=None if self.scatter is None else self.scatter[keep],
+        )
 
 
 def make_loop(force: ArrayLike, displacement: ArrayLike, label: str = "loop") -> Loop:
-    """A checked loop from two arrays (points,)."""
-    columns = {}
-    for name, values in (("force", force), ("displacement", displacement)):
-        column = np.asarray(values, dtype=float)
-        if column.ndim != 1 or column.size < FEWEST_POINTS:
-            raise InputError(
-                f"{label}: {name} has shape {column.shape}: give {FEWEST_POINTS} points or more"
-            )
-        bad = np.flatnonzero(~np.isfinite(column))
-        if bad.size:
-            raise InputError(
-                f"{label}: {name} is not finite at {bad.size} of {column.size} points "
-                f"(first at point {bad[0] + 1}): remove or repair them"
-            )
-        if np.ptp(column) == 0.0:
-            raise InputError(f"{label}: {name} is constant ({column[0]:g}): no loop to fit")
-        columns[name] = column
-    if columns["force"].size != columns["displacement"].size:
-        raise InputError(f"{label}: force and displacement differ in length: give pairs of points")
-    return Loop(columns["force"], columns["displacement"], label)
+    """A checked loop from two arrays (points,); points with NaN are dropped and counted."""
+    recording = recording_from_arrays(force, displacement, label)
+    return Loop(
+        recording.force,
+        recording.displacement,
+        label,
+        dropped=recording.dropped,
+        notes=recording.notes,
+    )
 
 
-def read_loops(path: str | os.PathLike[str]) -> list[Loop]:
-    """Loops of a table with a header row.
+def read_loops(
+    paths: FilePath | Sequence[FilePath],
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    decimal: str | None = None,
+) -> list[Loop]:
+    """Loops of one file or several, as they stand there: `read_recordings` says what it reads.
 
-    One column's name must contain "force", another's "displacement".  A unit in brackets or after
-    an underscore ("force [kN]", "displacement_mm") converts the column to N and m; without units
-    the numbers are in the Scene's own.  A column "loop", "A" or "amplitude" separates several
-    loops; it holds numbers.  Lines that start with "#" are comments.
+    A recording of many noisy cycles makes one long loop; `steady_loops` makes of it one mean loop
+    per amplitude.
 
     Parameters
     ----------
-    path : CSV file; commas, semicolons or tabs
+    paths : the file, or several
+    columns : name of a column by "force" or "displacement", where names alone do not tell
+    units : unit by the same, such as {"force": "kN"}, whatever the header says
+    decimal : "," or ".", where the numbers alone do not tell
 
     Raises
     ------
     InputError
         naming the file, the line or column, and the fix
     """
-    name = Path(path).name
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not text in UTF-8: save it as a CSV table in UTF-8") from None
-    header, rows = _rows(text, name)
-    columns = {quantity: _find_column(header, quantity, name) for quantity in QUANTITIES}
-    if len(set(columns.values())) < len(columns):
-        raise InputError(
-            f"{name}: its first row is one column: separate columns by commas, semicolons or tabs"
-        )
-    if not rows:
-        raise InputError(f"{name}: holds a header only: give rows of force and displacement")
-    names = [re.sub(r"[\[(].*", "", title).strip().lower() for title in header]
-    group = next((i for i, title in enumerate(names) if title in GROUP_COLUMNS), None)
-    wanted = [columns[q] for q in QUANTITIES] + ([] if group is None else [group])
-    table = _numbers(rows, header, wanted, name)
-    factors = _unit_factors({q: header[columns[q]] for q in QUANTITIES}, name)
-    force, displacement = table[:, 0] * factors[0], table[:, 1] * factors[1]
-    if group is None:
-        return [make_loop(force, displacement, name)]
-    marks = table[:, 2]
-    found = []
-    for mark in dict.fromkeys(marks.tolist()):
-        label, own = f"{header[group].strip()} = {mark:g}", marks == mark
-        try:
-            found.append(make_loop(force[own], displacement[own], label))
-        except InputError as error:
-            raise InputError(f"{name}: {error}") from None
-    return found
-
-
-def _rows(text: str, name: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The header, and every further row with its line number."""
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
+    recordings = read_recordings(paths, columns=columns, units=units, decimal=decimal)
+    return [
+        Loop(r.force, r.displacement, r.label, dropped=r.dropped, notes=r.notes) for r in recordings
     ]
-    if not lines:
-        raise InputError(f"{name}: is empty: give a header and rows of force and displacement")
-    delimiter = max(",;\t", key=lines[0][1].count)
-    reader = csv.reader([line for _, line in lines], delimiter=delimiter)
-    try:
-        (_, header), *rows = [(lines[reader.line_num - 1][0], row) for row in reader]
-    except csv.Error as error:
-        line = lines[reader.line_num - 1][0]
-        raise InputError(f"{name}: line {line} is no row of a table ({error})") from None
-    return header, rows
-
-
-def _find_column(header: Sequence[str], quantity: str, name: str) -> int:
-    found = [i for i, title in enumerate(header) if quantity in title.lower()]
-    tangential = [i for i in found if "normal" not in header[i].lower()]
-    if len(tangential) != 1:
-        held = ", ".join(repr(h.strip()) for h in header)[:200]
-        fix = "rename the others" if tangential else "name it there"
-        raise InputError(
-            f"{name}: needs one column named {quantity!r} in its first row, which holds {held}: "
-            f"{fix}"
-        )
-    return tangential[0]
-
-
-def _numbers(
-    rows: list[tuple[int, list[str]]], header: Sequence[str], wanted: list[int], name: str
-) -> NDArray[np.float64]:
-    table = np.empty((len(rows), len(wanted)))
-    for i, (line, row) in enumerate(rows):
-        for j, column in enumerate(wanted):
-            cell, title = row[column].strip() if column < len(row) else "", header[column].strip()
-            fix = "give a finite number, with a decimal point"
-            try:
-                table[i, j] = float(cell)
-            except ValueError:
-                table[i, j] = np.nan
-                if i == 0 and j < len(QUANTITIES) and cell[:1] not in "+-.0123456789":
-                    unit = f"'{title} [{cell.strip('[()]')}]'"
-                    fix = f"if it is a row of units, put them into the header: {unit}"
-            if not np.isfinite(table[i, j]):
-                raise InputError(f"{name}: line {line}, column {title!r} holds {cell!r}: {fix}")
-    return table
-
-
-def _unit_factors(titles: Mapping[str, str], name: str) -> list[float]:
-    units = {quantity: _unit(title) for quantity, title in titles.items()}
-    if not any(units.values()):
-        return [1.0] * len(units)
-    import pint  # only files with units pay for it
-
-    registry: pint.UnitRegistry = pint.UnitRegistry()
-
-    def factor(unit: str, base: str) -> float | None:
-        try:
-            return float(registry.Quantity(1.0, unit).to(base).magnitude)
-        except Exception:  # whatever pint's parser stumbles over, it is no unit
-            return None
-
-    factors = []
-    for quantity, unit in units.items():
-        title, bases = titles[quantity].strip(), QUANTITIES[quantity]
-        if unit is None:
-            fix = f"write '{title} [{bases[0]}]'"
-            raise InputError(
-                f"{name}: column {title!r} names no unit but the other one does: {fix}"
-            )
-        found = next((f for f in (factor(unit, base) for base in bases) if f), None)
-        if found is None:
-            raise InputError(
-                f"{name}: column {title!r}: {unit!r} is no unit of {quantity}: write one in "
-                f"brackets, such as '{quantity} [{bases[0]}]'"
-            )
-        factors.append(found)
-    return factors
-
-
-def _unit(title: str) -> str | None:
-    bracket = re.search(r"[\[(]([^\])]*)[\])]", title)
-    if bracket:
-        return bracket.group(1).strip() or None
-    tail = re.fullmatch(r".*(?:force|displacement)[ _]+(\S+)", title.strip(), re.IGNORECASE)
-    return tail.group(1) if tail else None

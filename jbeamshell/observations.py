@@ -1,26 +1,33 @@
-"""What is measured, and how the model answers it.
+"""How the model answers what is measured.
 
-A measurement is what a test left behind: a `Loop`, or a `SqueezeCurve`.  `observe` makes of it an
-`Observation`: the run of the model that answers it, and the weights that make residuals
-dimensionless.  Observations hold arrays only, so those of one kind run as one batch, compiled once.
+A measurement is what a test left behind: a `Loop`, or a curve of `jbeamshell.measurements`.
+`observe` makes of it an `Observation`: the run of the model that answers it, and the weights that
+make residuals dimensionless.  Observations hold arrays only, so those of one kind run as one batch,
+compiled once.
 """
 
 from __future__ import annotations
 
 import abc
 import functools
-from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import FEWEST_POINTS, Loop
+from jbeamshell.loops import Loop
+from jbeamshell.measurements import (
+    Backbone,
+    DissipationCurve,
+    SqueezeCurve,
+    StiffnessCurve,
+    noise_of,
+    response_of,
+)
 from jbeamshell.newton import Newton
 from jbeamshell.quasistatic import check, solve
 from jbeamshell.scene import Scene
@@ -28,65 +35,7 @@ from jbeamshell.scene import Scene
 APPROACH = 8  # load steps from zero to the first point of a loop
 ROUNDING = 1e-6  # of L: so far tables may round a position off the strip
 HOPELESS = 10.0  # residual, in ranges, of a trial without equilibrium: never accepted
-
-
-class SqueezeCurve(eqx.Module):
-    """Mean of sigma_y over the height along a strip under its pressures, before any end load.
-
-    Attributes
-    ----------
-    x : (points,) increasing positions X
-    stress : (points,) mean of sigma_y over the height, compression negative
-    label : for pictures and messages
-    """
-
-    x: NDArray[np.float64]
-    stress: NDArray[np.float64]
-    label: str = eqx.field(static=True)
-
-    def __init__(self, x: ArrayLike, stress: ArrayLike, label: str = "squeeze") -> None:
-        self.x, self.stress = np.asarray(x, dtype=float), np.asarray(stress, dtype=float)
-        self.label = label
-
-    def __check_init__(self) -> None:
-        for name, column in (("x", self.x), ("stress", self.stress)):
-            if column.ndim != 1 or column.size < FEWEST_POINTS:
-                fix = f"give {FEWEST_POINTS} points or more"
-                raise InputError(f"{self.label}: {name} has shape {column.shape}: {fix}")
-            bad = np.flatnonzero(~np.isfinite(column))
-            if bad.size:
-                raise InputError(
-                    f"{self.label}: {name} is {column[bad[0]]} at point {bad[0] + 1}: remove or "
-                    "repair it"
-                )
-        if self.x.size != self.stress.size:
-            raise InputError(
-                f"{self.label}: x and stress have {self.x.size} and {self.stress.size} points: "
-                "give pairs"
-            )
-        back = np.flatnonzero(np.diff(self.x) <= 0.0)
-        if back.size:
-            before, after = self.x[back[0] : back[0] + 2]
-            raise InputError(
-                f"{self.label}: x goes from {before:g} to {after:g} at point {back[0] + 2}: it "
-                "must increase; sort the points and keep one of each position"
-            )
-        if np.ptp(self.stress) == 0.0:
-            raise InputError(
-                f"{self.label}: stress is constant ({self.stress[0]:g}): measure over an edge of "
-                "the pressure, where it changes"
-            )
-        strongest = self.stress[np.argmax(np.abs(self.stress))]
-        if strongest > 0.0:
-            raise InputError(
-                f"{self.label}: stress is mostly tension (up to {strongest:g}): compression is "
-                "negative; change the sign"
-            )
-
-    def between(self, low: float, high: float) -> SqueezeCurve:
-        """The part of the curve with low < x < high."""
-        inside = (self.x > low) & (self.x < high)
-        return SqueezeCurve(self.x[inside], self.stress[inside], self.label)
+NOTHING = 1e-6  # of what was measured: a model that dissipates less has a logarithm all the same
 
 
 class Observation(eqx.Module):
@@ -95,17 +44,22 @@ class Observation(eqx.Module):
     Attributes
     ----------
     measured : what the prediction is compared with
-    weight : of the difference, in the mean 1 over the range of what was measured; 0 where nothing
-        is compared
+    weight : of the difference: 1 over the noise where that is known, else in the mean 1 over the
+        range of what was measured; 0 where nothing is compared
     """
 
     measured: Array
     weight: Array
 
+    @property
+    def span(self) -> float:
+        """The range of what was measured, in which misfits are counted."""
+        return float(np.ptp(np.asarray(self.measured)[np.asarray(self.weight) > 0.0]))
+
     @staticmethod
-    @abc.abstractmethod
-    def column(scene: Scene) -> str:
-        """Name of the measurement's column that the model answers."""
+    def answer(prediction: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The measurement's column from the prediction, which may be on another scale."""
+        return prediction
 
     @abc.abstractmethod
     def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
@@ -126,7 +80,9 @@ class Observation(eqx.Module):
         """The weighted difference (n,), the prediction (n,), and whether it is sound."""
         prediction, sound = self.predict(scene, solver)
         difference = (prediction - self.measured) * self.weight
-        hopeless = jnp.where(self.weight > 0.0, HOPELESS, 0.0)
+        # A weight of 1 over the noise makes the range a large residual itself.
+        ranges = jnp.maximum(1.0, self.weight * jnp.ptp(self.measured))
+        hopeless = jnp.where(self.weight > 0.0, HOPELESS * ranges, 0.0)
         return jnp.where(sound, difference, hopeless), prediction, sound
 
 
@@ -143,36 +99,56 @@ class LoadPath(Observation):
 
     path: Array
 
-    @staticmethod
-    def column(scene: Scene) -> str:
-        """The one that does not drive."""
-        return "displacement" if scene.load.control == "force" else "force"
-
     @classmethod
     def of(cls, loop: Loop, scene: Scene) -> LoadPath:
         """The path of a loop; raises `InputError` for forces beyond gross slip."""
-        drive, response = getattr(loop, scene.load.control), getattr(loop, cls.column(scene))
+        return cls._through(loop, scene, passes=2 if loop.closed else 1)
+
+    @classmethod
+    def of_backbone(cls, backbone: Backbone, scene: Scene) -> LoadPath:
+        """The path of a first loading; raises `InputError` for one that turns back as well."""
+        drive = getattr(backbone, scene.load.control)
+        steps = np.diff(drive, prepend=0.0) * np.sign(drive[-1])
+        back = np.flatnonzero(steps[1:] <= 0.0)
+        if back.size or steps[0] < 0.0:
+            at = back[0] + 2 if back.size else 1
+            raise InputError(
+                f"{backbone.label}: {scene.load.control} = {drive[at - 1]:g} turns back at point "
+                f"{at}: a backbone only goes on from rest; give a Loop instead"
+            )
+        return cls._through(backbone, scene, passes=1)
+
+    @classmethod
+    def _through(cls, measurement: Loop | Backbone, scene: Scene, passes: int) -> LoadPath:
+        drive = getattr(measurement, scene.load.control)
+        response = getattr(measurement, response_of(measurement, scene))
         approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
-        passes = 2 if loop.closed else 1
         path = np.concatenate([approach, *[drive] * passes])
         check(scene, path)
         unseen = np.zeros(path.size - drive.size)
-        weight = np.full(drive.size, 1.0 / np.ptp(response))
+        noise = noise_of(measurement)
+        if noise is not None and np.min(noise) >= np.ptp(response):
+            raise InputError(
+                f"{measurement.label}: noise = {np.min(noise):.3g} is more than the range of the "
+                f"{response_of(measurement, scene)}, {np.ptp(response):.3g}: give the noise of that "
+                "column, in its units"
+            )
+        weight = np.full(drive.size, 1.0 / np.ptp(response)) if noise is None else 1.0 / noise
         columns = (np.append(unseen, response), np.append(unseen, weight), path)
         return cls(*map(jnp.asarray, columns))
 
     def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
         """The column that answers, (n,)."""
         history = solve(scene, self.path, solver=solver, throw=False)
-        answer = getattr(history, self.column(scene))[history.pressed + 1 :]
-        return answer, jnp.all(history.status == 0)
+        column = "displacement" if scene.load.control == "force" else "force"
+        return getattr(history, column)[history.pressed + 1 :], jnp.all(history.status == 0)
 
 
 class Squeezed(Observation):
     """The squeeze stress at given positions under the scene's whole pressure.
 
     A point counts with the length it stands for, so that the misfit is that of the curve and does
-    not hang on where a mesh or a test has its points.
+    not hang on where a mesh or a test has its points; with measured noise every point counts by it.
 
     Attributes
     ----------
@@ -180,11 +156,6 @@ class Squeezed(Observation):
     """
 
     x: Array
-
-    @staticmethod
-    def column(scene: Scene) -> str:
-        """The stress, whatever drives."""
-        return "stress"
 
     @classmethod
     def of(cls, curve: SqueezeCurve, scene: Scene) -> Squeezed:
@@ -204,6 +175,7 @@ class Squeezed(Observation):
             )
         share = np.gradient(curve.x)
         weight = np.sqrt(share / np.mean(share)) / np.ptp(curve.stress)
+        weight = weight if curve.noise is None else 1.0 / curve.noise
         return cls(*map(jnp.asarray, (curve.stress, weight, curve.x)))
 
     def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
@@ -213,13 +185,60 @@ class Squeezed(Observation):
         return stress, jnp.all(history.status == 0)
 
 
+class Sweep(Observation):
+    """Logarithm of a figure of the steady cycle at several amplitudes.
+
+    Attributes
+    ----------
+    amplitude : (n,) of what ``scene.load.control`` names
+    stiff : (n,) whether the figure is the secant stiffness; else it is the dissipation
+    """
+
+    amplitude: Array
+    stiff: Array
+
+    @property
+    def span(self) -> float:
+        """One: a difference of logarithms is relative already."""
+        return 1.0
+
+    @staticmethod
+    def answer(prediction: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The figure itself."""
+        return np.exp(prediction)
+
+    @classmethod
+    def of(cls, curve: DissipationCurve | StiffnessCurve, scene: Scene) -> Sweep:
+        """The runs for a curve; raises `InputError` for forces beyond gross slip."""
+        figure = getattr(curve, response_of(curve, scene))
+        check(scene, np.sort(curve.amplitude))
+        weight = np.ones(figure.size) if curve.noise is None else figure / curve.noise
+        stiff = np.full(figure.size, isinstance(curve, StiffnessCurve))
+        return cls(*map(jnp.asarray, (np.log(figure), weight, curve.amplitude, stiff)))
+
+    def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
+        """Logarithms of the figure, (n,)."""
+        cycles = max(scene.load.cycles, 1)
+
+        def one(point: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+            amplitude, stiff, measured = point
+            to = {"load.amplitude": amplitude, "load.cycles": cycles}
+            history = solve(scene.replace(to), solver=solver, throw=False)
+            figure = jnp.where(stiff, history.secant_stiffness, history.dissipation)
+            least = NOTHING * jnp.exp(measured)
+            return jnp.log(jnp.maximum(figure, least)), jnp.all(history.status == 0)
+
+        logarithms, sound = lax.map(one, (self.amplitude, self.stiff, self.measured))
+        return logarithms, jnp.all(sound)
+
+
 @functools.singledispatch
 def observe(measurement: Any, scene: Scene) -> Observation:
     """The run of a scene that answers a measurement.
 
     Parameters
     ----------
-    measurement : a `Loop` or a `SqueezeCurve`
+    measurement : a `Loop`, or a curve of `jbeamshell.measurements`
     scene : what the measurement is of
 
     Raises
@@ -228,59 +247,14 @@ def observe(measurement: Any, scene: Scene) -> Observation:
         if the scene cannot answer it
     """
     kind = type(measurement).__name__
-    raise InputError(f"data: a {kind} is no measurement: give a Loop, a SqueezeCurve, or a list")
+    raise InputError(
+        f"data: a {kind} is no measurement: give a Loop, a SqueezeCurve, a Backbone, a "
+        "DissipationCurve, a StiffnessCurve, or a list"
+    )
 
 
 observe.register(Loop, LoadPath.of)
+observe.register(Backbone, LoadPath.of_backbone)
 observe.register(SqueezeCurve, Squeezed.of)
-
-
-class Experiment(eqx.Module):
-    """Several observations of one scene, run kind by kind.
-
-    Attributes
-    ----------
-    batches : one observation per kind, its arrays (members, n); shorter members wait at their end,
-        which adds nothing: a path that stands still, or a position looked up again
-    places : for every member of every batch its place among the observations
-    """
-
-    batches: list[Observation]
-    places: tuple[int, ...] = eqx.field(static=True)
-
-    def __init__(self, observations: Sequence[Observation]) -> None:
-        kinds: dict[type, list[int]] = {}
-        for place, observation in enumerate(observations):
-            kinds.setdefault(type(observation), []).append(place)
-        self.batches = [_stacked([observations[i] for i in of_kind]) for of_kind in kinds.values()]
-        self.places = tuple(place for of_kind in kinds.values() for place in of_kind)
-
-    def residual(self, scene: Scene, solver: Newton) -> tuple[Array, Array, Array]:
-        """Weighted differences and predictions, (observations, n) each, and whether all is sound.
-
-        Parameters
-        ----------
-        scene : what is run; may hold traced leaves
-        solver : settings of Newton's method
-        """
-        answers = [lax.map(lambda o: o.residual(scene, solver), batch) for batch in self.batches]
-        residuals, predictions, sound = zip(*answers, strict=True)
-        all_sound = jnp.all(jnp.concatenate(sound))
-        return self._in_order(residuals), self._in_order(predictions), all_sound
-
-    def _in_order(self, batches: Sequence[Array]) -> Array:
-        """Rows of all batches, filled up with zeros, in the order of the observations."""
-        longest = max(batch.shape[1] for batch in batches)
-        rows = [jnp.pad(batch, ((0, 0), (0, longest - batch.shape[1]))) for batch in batches]
-        return jnp.concatenate(rows)[np.argsort(self.places)]
-
-
-def _stacked(members: Sequence[Observation]) -> Observation:
-    longest = max(member.weight.size for member in members)
-
-    def filled(member: Observation) -> Observation:
-        more = (0, longest - member.weight.size)
-        longer = jax.tree.map(lambda a: np.pad(a, more, mode="edge"), member)
-        return eqx.tree_at(lambda o: o.weight, longer, np.pad(member.weight, more))
-
-    return jax.tree.map(lambda *arrays: jnp.stack(arrays), *map(filled, members))
+observe.register(DissipationCurve, Sweep.of)
+observe.register(StiffnessCurve, Sweep.of)

@@ -12,7 +12,8 @@ PACKAGE = Path(jbeamshell.__file__).parent
 UPWARDS = [
     "errors", "files", "kinematics", "closed_form", "elasticity", "energy", "laminate", "friction",
     "contact", "grid", "parts", "scene", "scenes", "block_tridiagonal", "newton", "equilibrium",
-    "cycles", "history", "quasistatic", "loops", "example", "observations", "identify", "plotting",
+    "cycles", "history", "quasistatic", "loops", "example", "measurements", "observations",
+    "parameters", "experiment", "problem", "uncertainty", "results", "identify", "plotting",
     "output", "__init__", "__main__",
 ]
 # fmt: on

@@ -1,0 +1,260 @@
+"""Which columns of a table are the force and the displacement, and what they are measured in.
+
+The only file that imports pint.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from jbeamshell.errors import InputError
+
+# What they are measured in; a force per width is as good, as the model is of unit width.
+QUANTITIES = {"force": ("N", "N/m"), "displacement": ("m",)}
+FURTHER = {"time": ("s",), "normal_force": ("N", "N/m")}
+GROUPS = ("loop", "a", "amplitude")
+
+# Names that count only where no column has the quantity's own.
+SYNONYMS = {
+    "force": {"load"},
+    "displacement": {"disp", "displ", "slip", "position", "stroke", "extension", "deflection"},
+}
+SHORT = {
+    "force": {"f", "ft", "fx", "f_t", "f_x"},
+    "displacement": {"u", "ux", "u_x"},
+    "time": {"t"},
+    "normal_force": {"fn", "normal"},
+}
+NORMAL = ("normal", "clamp", "preload", "pretension")
+COUNTERS = {"step", "number", "no", "case", "cycle", "rate", "time"}  # of a load, no forces
+
+# A unit: letters, powers of one digit, products and quotients.  Sums and towers are none.
+TERM = r"[^\W\d_]+(?:(?:\^|\*\*)?-?[1-4]|[²³])?|[%°]"
+UNIT = re.compile(rf"(?:{TERM})(?:(?: ?[/*·.] ?| )(?:{TERM}))*")
+# Units after a space or an underscore, where other words stand too.
+TAIL = re.compile(
+    r"(?:[GMkcmuµμn]?N(?:/[cmuµμn]?m)?|[kdcmuµμnp]?m|[mkuµμn]?s|sec|%|rad|deg|in|inch|ft|mil|"  # noqa: RUF001
+    r"thou|micron|k?lbf?|kip|[kg]?gf|dyn|"
+    r"(?:giga|mega|kilo|centi|milli|micro|nano)?(?:newton|met(?:er|re)|second)s?)"
+)
+
+
+def find_columns(
+    titles: Sequence[str], chosen: Mapping[str, str], name: str, place: str
+) -> dict[str, int]:
+    """Where force and displacement are, and time, normal force and group, if there.
+
+    A title with the quantity's own name counts; only where there is none, one with another word for
+    it.  A column of a normal force or a preload is never the force.
+
+    Parameters
+    ----------
+    titles : of the columns
+    chosen : title by quantity, for those that are not to be found by name
+    name, place : of the table and the titles, for messages
+
+    Returns
+    -------
+    column by "force", "displacement", and where there is just one, "time", "normal_force", "group"
+
+    Raises
+    ------
+    InputError
+        if there is no column for a quantity, or more than one
+    """
+    known = (*QUANTITIES, *FURTHER)
+    for quantity in chosen:
+        if quantity not in known:
+            raise InputError(f"columns: {quantity!r} is no quantity: choose among {known}")
+    held = _listed(titles)
+    columns: dict[str, int] = {}
+    for quantity in known:
+        if quantity in chosen:
+            columns[quantity] = _chosen(titles, quantity, chosen[quantity], name, held)
+            continue
+        found = _candidates(titles, quantity)
+        if len(found) == 1:
+            columns[quantity] = found[0]
+        elif quantity in QUANTITIES:
+            needed = f"{name}: needs one column named {quantity!r} {place}, which holds {held}: "
+            if not found:
+                raise InputError(f"{needed}name it there, or choose it with the argument columns")
+            rivals = _listed([titles[i] for i in found])
+            choice = f"columns={{{quantity!r}: {titles[found[0]].strip()[:60]!r}}}"
+            raise InputError(f"{needed}choose among {rivals[:90]} with the argument {choice}")
+    if columns["force"] == columns["displacement"]:
+        whole = titles[columns["force"]].strip()[:60]
+        raise InputError(
+            f"{name}: its first row is one column: separate columns by commas, semicolons or tabs"
+            if len(titles) == 1
+            else f"{name}: {whole!r} cannot be both force and displacement: name one of them"
+        )
+    bare = [_bare(title).strip().lower() for title in titles]
+    group = next((i for i, title in enumerate(bare) if title in GROUPS), None)
+    if group is not None and group not in columns.values():
+        columns["group"] = group
+    return columns
+
+
+def is_header(titles: Sequence[str], chosen: Mapping[str, str]) -> bool:
+    """Whether a row of cells holds a title for the force and another for the displacement."""
+    if not any(re.search(r"[^\W\d_]", title) for title in titles):
+        return False
+    try:
+        find_columns(titles, chosen, "", "")
+    except InputError:
+        # A header all the same, if only too many columns are named: to be told, not skipped.
+        wanted = [q for q in QUANTITIES if q not in chosen]
+        return len(titles) > 1 and all(_candidates(titles, q) for q in wanted) and bool(wanted)
+    return True
+
+
+def unit_factors(
+    titles: Mapping[str, str],
+    below: Mapping[str, str | None],
+    given: Mapping[str, str],
+    name: str,
+) -> dict[str, float | None]:
+    """Factors that convert each column to N (or N/m), m and s.
+
+    Parameters
+    ----------
+    titles : by quantity: a unit in brackets or after an underscore or space is the column's
+    below : units from a row below the header
+    given : units that count whatever the titles say
+    name : of the table, for messages
+
+    Returns
+    -------
+    factor by quantity; None for a time or normal force in no unit that goes with the others
+
+    Raises
+    ------
+    InputError
+        for a unit that is none of the quantity, or that only one of force and displacement has
+    """
+    units: dict[str, str | None] = {}
+    for quantity, title in titles.items():
+        own, row = unit_of(title), below.get(quantity)
+        if own and row and own != row and quantity not in given:
+            raise InputError(
+                f"{name}: column {title!r} has the unit {row!r} in the row below the header: "
+                "leave one of them"
+            )
+        units[quantity] = given.get(quantity) or own or row
+    named = [bool(units[q]) for q in QUANTITIES]
+    factors: dict[str, float | None] = {}
+    for quantity, unit in units.items():
+        title = titles[quantity][:60]
+        bases = QUANTITIES.get(quantity) or FURTHER[quantity]
+        found = 1.0 if unit is None else _factor(unit, bases)
+        if quantity in FURTHER:
+            mixed = quantity == "normal_force" and bool(unit) != named[0]
+            factors[quantity] = None if mixed else found
+        elif any(named) and unit is None:
+            raise InputError(
+                f"{name}: column {title!r} names no unit but the other one does: write "
+                f"'{title} [{bases[0]}]'"
+            )
+        elif found is None:
+            raise InputError(
+                f"{name}: column {title!r}: {str(unit)[:40]!r} is no unit of {quantity}: write one "
+                f"in brackets, such as '{quantity} [{bases[0]}]', or give it in the argument units"
+            )
+        else:
+            factors[quantity] = found
+    return factors
+
+
+def unit_of(title: str) -> str | None:
+    """The unit a title names, in brackets or at its end; None if none."""
+    bracket = re.findall(r"\[([^\]]*)\]", title) or re.findall(r"\(([^)]*)\)", title)
+    if bracket:
+        unit = bracket[-1].strip()
+        return None if unit in ("", "-", "1") else unit
+    tail = re.fullmatch(r".*[^\W_].*?[ _]+(\S+?)\s*", title)
+    return tail.group(1) if tail and TAIL.fullmatch(tail.group(1)) else None
+
+
+def _candidates(titles: Sequence[str], quantity: str) -> list[int]:
+    own = [i for i, title in enumerate(titles) if _named(title, quantity)]
+    if own:
+        return own
+    return [i for i, title in enumerate(titles) if _meant(title, quantity)]
+
+
+def _named(title: str, quantity: str) -> bool:
+    lower = title.lower()
+    normal = any(word in lower for word in NORMAL)
+    if quantity == "time":
+        return "time" in _words(title)
+    if quantity == "normal_force":
+        return normal and "force" in lower
+    return quantity in lower and not (quantity == "force" and normal)
+
+
+def _meant(title: str, quantity: str) -> bool:
+    words, lower = _words(title), title.lower()
+    if _bare(title).strip().lower() in SHORT[quantity]:
+        return True
+    normal = any(word in lower for word in NORMAL)
+    if quantity == "normal_force":
+        return normal and "load" in words
+    others = [q for q in QUANTITIES if q != quantity]
+    if any(_named(title, other) for other in others) or normal or COUNTERS & words:
+        return False
+    return bool(SYNONYMS.get(quantity, set()) & words)
+
+
+def _words(title: str) -> set[str]:
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", _bare(title))
+    return set(re.findall(r"[a-z]+", spaced.lower()))
+
+
+def _bare(title: str) -> str:
+    return re.sub(r"\[[^\]]*\]?|\([^)]*\)?", " ", title)
+
+
+def _chosen(titles: Sequence[str], quantity: str, title: str, name: str, held: str) -> int:
+    keys: list[Any] = [str.strip, lambda t: t.strip().lower(), lambda t: _bare(t).strip().lower()]
+    found: list[int] = []
+    for key in keys:
+        found = [i for i, t in enumerate(titles) if key(t) == key(str(title))]
+        if len(found) == 1:
+            return found[0]
+    fix = "rename them, they are alike" if found else "choose one of these"
+    raise InputError(
+        f"{name}: columns has {quantity!r}: {str(title)[:60]!r}, but the table holds {held}: {fix}"
+    )
+
+
+def _listed(titles: Sequence[str]) -> str:
+    return ", ".join(repr(title.strip()) for title in titles)[:200]
+
+
+def _factor(unit: str, bases: Sequence[str]) -> float | None:
+    if unit in bases:
+        return 1.0
+    if len(unit) > 32 or not UNIT.fullmatch(unit):
+        return None
+    registry = _registry()
+    for base in bases:
+        try:
+            factor = float(registry.Quantity(1.0, unit).to(base).magnitude)
+        except Exception:  # whatever pint's parser stumbles over, it is no unit
+            continue
+        if np.isfinite(factor) and factor > 0.0:
+            return factor
+    return None
+
+
+@functools.cache
+def _registry() -> Any:
+    import pint  # only files with units other than N and m pay for it
+
+    return pint.UnitRegistry()

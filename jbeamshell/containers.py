@@ -1,0 +1,152 @@
+"""Columns of numbers from MATLAB and NumPy files; nothing in a file is ever executed."""
+
+from __future__ import annotations
+
+import io
+import os
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jbeamshell.errors import InputError
+from jbeamshell.tables import LARGEST, Table, TextTable, read_bytes
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+FEW = 8  # a matrix with no more rows than this, and more columns, lies on its side
+
+
+class ArrayTable(Table):
+    """Columns of a MATLAB or NumPy file.
+
+    Parameters
+    ----------
+    path : file that ends in .mat, .npz or .npy
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.name = Path(path).name
+        self.place = "in its variables"
+        data, suffix = read_bytes(path), Path(path).suffix.lower()
+        if suffix == ".mat" and HDF5 in data[:1024]:
+            raise InputError(
+                f"{self.name}: is a MATLAB file of version 7.3: save it with save(..., '-v7')"
+            )
+        reader = {".mat": _matlab, ".npz": _archive, ".npy": _array}[suffix]
+        try:
+            columns = [column for item in reader(data) for column in _columns(*item)]
+        except Exception as error:  # whatever a parser stumbles over in a broken file
+            reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
+            raise InputError(
+                f"{self.name}: is no {suffix} file of numbers ({reason}): save it anew"
+            ) from None
+        if not columns:
+            raise InputError(f"{self.name}: holds no columns of numbers: give named vectors")
+        self.titles = [title for title, _ in columns]
+        self._columns = [column for _, column in columns]
+
+    def units(self, wanted: Sequence[int]) -> list[str | None]:
+        return [None] * len(wanted)
+
+    def numbers(self, wanted: Sequence[int], optional: Sequence[int] = ()) -> NDArray[np.float64]:
+        first = wanted[0]
+        size = self._columns[first].size
+        found = []
+        for i in [*wanted, *optional]:
+            column = self._columns[i]
+            if column.size != size and i in wanted:
+                raise InputError(
+                    f"{self.name}: {self.titles[first]!r} has {size} values, {self.titles[i]!r} "
+                    f"{column.size}: give columns of one length"
+                )
+            bad = np.flatnonzero(np.isinf(column))
+            if bad.size and i in wanted:
+                raise InputError(
+                    f"{self.name}: {self.titles[i]!r} is infinite at {self.where(bad[0])}: give a "
+                    "finite number, or NaN for a missing one"
+                )
+            whole = column.size == size and not bad.size
+            found.append(column if whole else np.full(size, np.nan))
+        return np.column_stack(found)
+
+    def where(self, row: int) -> str:
+        return f"element {row + 1}"
+
+
+def read_table(
+    path: str | os.PathLike[str],
+    recognised: Callable[[Sequence[str]], bool],
+    decimal: str | None = None,
+) -> Table:
+    """The table in a file, by the end of its name; all but .mat, .npz and .npy is text.
+
+    Parameters
+    ----------
+    path : the file
+    recognised : whether a row of titles is the header of a table of text
+    decimal : mark of the numbers in text, "." or ","; None finds out
+
+    Raises
+    ------
+    InputError
+        naming the file, what is wrong with it, and the fix
+    """
+    if Path(path).suffix.lower() in (".mat", ".npz", ".npy"):
+        return ArrayTable(path)
+    return TextTable(path, recognised, decimal)
+
+
+def _matlab(data: bytes) -> Iterator[tuple[str, Any]]:
+    from scipy.io import loadmat  # only files of MATLAB's pay for it
+
+    for name, value in loadmat(io.BytesIO(data)).items():
+        if name.startswith("__"):
+            continue
+        if isinstance(value, np.ndarray) and value.dtype.names:  # a struct, or a row of them
+            elements = value.ravel()
+            for i, element in enumerate(elements):
+                own = name if elements.size == 1 else f"{name}({i + 1})"
+                yield from ((f"{own}.{field}", element[field]) for field in value.dtype.names)
+        else:
+            yield name, value
+
+
+def _archive(data: bytes) -> Iterator[tuple[str, Any]]:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        if sum(member.file_size for member in archive.infolist()) > LARGEST:
+            raise ValueError(f"more than {LARGEST // 10**6} MB when unpacked")
+        for member in archive.infolist():
+            with archive.open(member) as file:
+                try:
+                    array = np.lib.format.read_array(file, allow_pickle=False)
+                except ValueError as error:
+                    if "allow_pickle" in str(error):  # remarks beside the numbers, left closed
+                        continue
+                    raise
+            yield member.filename.removesuffix(".npy"), array
+
+
+def _array(data: bytes) -> Iterator[tuple[str, Any]]:
+    array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    if array.dtype.names:
+        yield from ((name, array[name]) for name in array.dtype.names)
+    else:
+        yield "", array
+
+
+def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """The vectors in a variable; text, single numbers and what else is no table gives none."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or array.ndim > 2 or array.size < 2:
+        return
+    if 1 in array.shape or array.ndim == 1:
+        yield name or "column 1", array.ravel().astype(float)
+        return
+    kind = "column"
+    if array.shape[0] <= FEW < array.shape[1]:
+        kind, array = "row", array.T
+    for j, column in enumerate(array.T, 1):
+        yield f"{name} {kind} {j}".strip(), column.astype(float)

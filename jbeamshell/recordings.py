@@ -1,0 +1,228 @@
+"""Recordings of a test: force and displacement in the order they were measured."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jbeamshell.columns import FURTHER, QUANTITIES, find_columns, is_header, unit_factors
+from jbeamshell.containers import read_table
+from jbeamshell.errors import InputError
+
+FEWEST_POINTS = 8
+HUGE = 1e100  # squares and quotients of anything smaller are finite
+
+FilePath = str | os.PathLike[str]
+
+
+class Recording(NamedTuple):
+    """What a test left behind.
+
+    Attributes
+    ----------
+    force : (points,) in N or N/m, or in the Scene's own unit
+    displacement : (points,) in m, or in the Scene's own unit
+    label : for pictures and messages
+    time : (points,) in s, or None
+    normal_force : (points,) in N or N/m, or None
+    dropped : rows that lacked a number and were left out
+    notes : one line on each thing that was done to the data
+    """
+
+    force: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    label: str
+    time: NDArray[np.float64] | None = None
+    normal_force: NDArray[np.float64] | None = None
+    dropped: int = 0
+    notes: tuple[str, ...] = ()
+
+
+def recording_from_arrays(
+    force: ArrayLike,
+    displacement: ArrayLike,
+    label: str = "recording",
+    *,
+    time: ArrayLike | None = None,
+    normal_force: ArrayLike | None = None,
+) -> Recording:
+    """A checked recording; points with NaN for force or displacement are dropped and counted.
+
+    Parameters
+    ----------
+    force, displacement : (points,)
+    label : for pictures and messages
+    time, normal_force : (points,) if they were recorded
+
+    Raises
+    ------
+    InputError
+        for arrays that are no columns of one length, that hold too few points or an infinite one,
+        or that are constant
+    """
+    given = {"force": force, "displacement": displacement}
+    given |= {"time": time} if time is not None else {}
+    given |= {"normal_force": normal_force} if normal_force is not None else {}
+    columns = {}
+    for name, values in given.items():
+        try:
+            columns[name] = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{label}: {name} is no array of numbers: give one") from None
+        if columns[name].ndim != 1 or columns[name].size < FEWEST_POINTS:
+            raise InputError(
+                f"{label}: {name} has shape {columns[name].shape}: give {FEWEST_POINTS} points or "
+                "more"
+            )
+        if columns[name].size != columns["force"].size:
+            raise InputError(f"{label}: force and {name} differ in length: give pairs of points")
+        infinite = np.flatnonzero(np.abs(columns[name]) > HUGE)
+        if infinite.size:
+            raise InputError(
+                f"{label}: {name} is infinite or above {HUGE:g} at {infinite.size} of "
+                f"{columns[name].size} points (first at point {infinite[0] + 1}): repair them"
+            )
+    whole = ~(np.isnan(columns["force"]) | np.isnan(columns["displacement"]))
+    dropped = int(whole.size - np.count_nonzero(whole))
+    if 2 * dropped > whole.size:
+        raise InputError(
+            f"{label}: {dropped} of {whole.size} rows lack a number for force or displacement: "
+            "record or export them again"
+        )
+    columns = {name: column[whole] for name, column in columns.items()}
+    for name in QUANTITIES:
+        column = columns[name]
+        if column.size < FEWEST_POINTS:
+            raise InputError(
+                f"{label}: {column.size} rows are left without the {dropped} that lack a number: "
+                f"give {FEWEST_POINTS} or more"
+            )
+        if np.ptp(column) < 1.0 / HUGE:
+            raise InputError(f"{label}: {name} is constant ({column[0]:g}): no loop to fit")
+    notes = () if not dropped else (f"{dropped} of {whole.size} rows lack a number: left out",)
+    return Recording(
+        columns["force"],
+        columns["displacement"],
+        label,
+        columns.get("time"),
+        columns.get("normal_force"),
+        dropped,
+        notes,
+    )
+
+
+def read_recordings(
+    paths: FilePath | Sequence[FilePath],
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    decimal: str | None = None,
+) -> list[Recording]:
+    """Recordings from one file or several.
+
+    Text: separated by commas, semicolons or tabs, with a header, with decimal points or commas.
+    Its first lines may be anything; lines that start with "#" or "%" are comments; the row below
+    the header may hold units.  MATLAB (.mat, up to version 7.2): vectors, columns of matrices and
+    fields of structs.  NumPy: .npz and .npy.
+
+    One column's name contains "force" (a normal force is none), another's "displacement"; failing
+    these, "load", "slip", "stroke", "position" and the like will do.  A unit in brackets or after
+    an underscore ("force [kN]", "displacement_mm") converts the column to N and m; without units
+    the numbers are in the Scene's own.  A column "loop", "A" or "amplitude" separates several
+    recordings; it holds numbers.  Rows without force or displacement are left out and counted.
+
+    Parameters
+    ----------
+    paths : the file, or several; labels are the files' names
+    columns : name of a column by "force", "displacement", "time" or "normal_force", where names
+        alone do not tell
+    units : unit by the same, such as {"force": "kN"}, whatever the header says
+    decimal : "," or ".", where the numbers alone do not tell
+
+    Raises
+    ------
+    InputError
+        naming the file, the line or column, and the fix
+    """
+    if decimal not in (None, ",", "."):
+        raise InputError(f"decimal = {decimal!r}: give ',' or '.'")
+    for quantity in units or {}:
+        if quantity not in (*QUANTITIES, *FURTHER):
+            raise InputError(f"units: {quantity!r} is no quantity: give force and displacement")
+    if isinstance(paths, str | os.PathLike):
+        return _read(paths, None, columns or {}, units or {}, decimal)
+    if not paths:
+        raise InputError("no file given: name at least one")
+    found = []
+    for path, label in zip(paths, _labels(paths), strict=True):
+        found += _read(path, label, columns or {}, units or {}, decimal)
+    return found
+
+
+def _labels(paths: Sequence[FilePath]) -> list[str]:
+    """The files' names, with as much of their folders as tells them apart."""
+    whole = [Path(path).absolute() for path in paths]
+    for i, path in enumerate(whole):
+        if path in whole[:i]:
+            raise InputError(f"{paths[i]}: is given twice: it would count double")
+    names = [path.name for path in whole]
+    if len(set(names)) == len(names):
+        return names
+    common = os.path.commonpath([path.parent for path in whole])
+    return [path.relative_to(common).as_posix() for path in whole]
+
+
+def _read(
+    path: FilePath,
+    label: str | None,
+    chosen: Mapping[str, str],
+    given: Mapping[str, str],
+    decimal: str | None,
+) -> list[Recording]:
+    table = read_table(path, lambda titles: is_header(titles, chosen), decimal)
+    columns = find_columns(table.titles, chosen, table.name, table.place)
+    below = dict(zip(columns, table.units(list(columns.values())), strict=True))
+    titles = {q: table.titles[i] for q, i in columns.items() if q != "group"}
+    must = ["force", "displacement", *(["group"] if "group" in columns else [])]
+    may = [q for q in columns if q not in must]
+    rows = table.numbers([columns[q] for q in must], [columns[q] for q in may])
+    factors = unit_factors(titles, below, given, table.name)
+    arrays: dict[str, NDArray[np.float64] | None] = {}
+    for quantity, column in zip((*must, *may), rows.T, strict=True):
+        factor = factors.get(quantity, 1.0)
+        empty = quantity in may and bool(np.all(np.isnan(column)))
+        arrays[quantity] = None if factor is None or empty else column * factor
+    if "group" not in columns:
+        everything = np.full(rows.shape[0], True)
+        return [_recording(arrays, everything, label or table.name)]
+    marks, title = rows[:, 2], table.titles[columns["group"]].strip()
+    unmarked = np.flatnonzero(np.isnan(marks))
+    if unmarked.size:
+        raise InputError(
+            f"{table.name}: {table.where(int(unmarked[0]))}, column {title!r} holds no number: "
+            "every row needs one, as it tells the loops apart"
+        )
+    found = []
+    for mark in dict.fromkeys(marks.tolist()):
+        own = f"{title} = {mark:g}"
+        try:
+            found.append(_recording(arrays, marks == mark, f"{label}: {own}" if label else own))
+        except InputError as error:
+            raise InputError(str(error) if label else f"{table.name}: {error}") from None
+    return found
+
+
+def _recording(
+    arrays: Mapping[str, NDArray[np.float64] | None], own: NDArray[np.bool_], label: str
+) -> Recording:
+    columns: dict[str, Any] = {
+        quantity: None if column is None else column[own]
+        for quantity, column in arrays.items()
+        if quantity != "group"
+    }
+    return recording_from_arrays(label=label, **columns)

@@ -1,0 +1,257 @@
+"""What a fit found: values with their uncertainty, how well they do, and words of warning."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jbeamshell.loops import Loop
+from jbeamshell.measurements import SqueezeCurve
+from jbeamshell.parameters import Space
+from jbeamshell.problem import Point, Problem
+from jbeamshell.scene import Scene
+from jbeamshell.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
+
+TOO_WRONG = 2.0  # misfit over noise beyond which the model, not the noise, is what is left
+
+
+class Fit(NamedTuple):
+    """Result of a fit.
+
+    Attributes
+    ----------
+    scene : the scene with the fitted values, ready to run; of several specimens the first
+    values, errors : fitted value and standard error (one sigma) by key, "key[specimen]" where every
+        specimen has its own; where the noise was not measured, the errors take what the model
+        leaves unexplained as independent noise, so a model that is wrong makes them too small
+    correlation : (n, n) of the fitted values, in the order of ``values``
+    misfit : root mean square of the residual over the range of the response
+    misfits : the same for every measurement
+    data, model : the measurements fitted, loops thinned, and the model's at the same points
+    status : "converged" or "max_iterations"
+    model_runs : how often the model was run through all measurements, derivatives included
+    labels : of the measurements, no two alike
+    scenes : of every specimen by its label, with the fitted values
+    intervals : 95 % interval by key
+    warnings : what to know before using the values
+    minima : values and cost where each start ended, the best first
+    uncertainty : what the data leave open, for other levels and questions
+    problem : what was solved, for `bands` and `identify.profile`
+    """
+
+    scene: Scene
+    values: dict[str, float]
+    errors: dict[str, float]
+    correlation: NDArray[np.float64]
+    misfit: float
+    misfits: list[float]
+    data: list[Any]
+    model: list[Any]
+    status: str
+    model_runs: int
+    labels: Sequence[str] = ()
+    scenes: dict[str, Scene] = {}  # noqa: RUF012 - never changed
+    intervals: dict[str, tuple[float, float]] = {}  # noqa: RUF012
+    warnings: Sequence[str] = ()
+    minima: Sequence[tuple[dict[str, float], float]] = ()
+    uncertainty: Uncertainty | None = None
+    problem: Problem | None = None
+
+    def __str__(self) -> str:
+        lines = [
+            f"  {key:28s} {value:.6g} +- {self.errors[key]:.2g}"
+            for key, value in self.values.items()
+        ]
+        lines.append(f"  misfit {100 * self.misfit:.3g} % of the range")
+        lines.append(f"  {self.status} after {self.model_runs} model runs")
+        return "\n".join([*lines, *(f"  {warning}" for warning in self.warnings)])
+
+    def figures(self) -> dict[str, Any]:
+        """The result as plain numbers, fit for JSON: an end at infinity is None."""
+        labels = self.labels or [d.label for d in self.data]
+        values: dict[str, dict[str, Any]] = {
+            key: {"value": value, "error": _finite(self.errors[key])}
+            for key, value in self.values.items()
+        }
+        for level in LEVELS if self.uncertainty is not None else ():
+            for key, ends in self.intervals_at(level).items():
+                values[key][f"interval_{100 * level:.0f}"] = [_finite(end) for end in ends]
+        figures = {
+            "values": values,
+            "correlation": self.correlation.tolist(),
+            "misfit": self.misfit,
+            "misfits": dict(zip(labels, self.misfits, strict=True)),
+            "status": self.status,
+            "model_runs": self.model_runs,
+            "warnings": list(self.warnings),
+        }
+        if self.uncertainty is not None:
+            u = self.uncertainty
+            figures["noise"] = {"of_the_range": u.noise, "measured": u.freedom is None}
+            figures["fisher"] = [
+                {
+                    "eigenvalue": direction.eigenvalue,
+                    "direction": dict(zip(self.values, direction.vector.tolist(), strict=True)),
+                }
+                for direction in u.directions()
+            ]
+            figures["minima"] = [{"values": values, "cost": cost} for values, cost in self.minima]
+        return figures
+
+    def intervals_at(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Confidence interval of every value at another level."""
+        ends = self._uncertainty.intervals(level).tolist()
+        return {key: (low, high) for key, (low, high) in zip(self.values, ends, strict=True)}
+
+    def bands(self, level: float = 0.95, *, noise: bool = False) -> list[tuple[Any, Any]]:
+        """Lower and upper end of the model's answer to every measurement.
+
+        Parameters
+        ----------
+        level : of confidence, point by point
+        noise : whether to cover a single measurement with its noise; else the model alone
+        """
+        problem, uncertainty = self._problem, self._uncertainty
+        point, experiment = self._point, problem.experiment
+        per_noise = 1.0 / experiment.weight
+        rows = experiment.weight.size
+        plain = point.jacobian[:rows] * (per_noise / experiment.emphasis)[:, None]
+        own = uncertainty.sigma * per_noise if noise else None
+        width = band_widths(uncertainty, plain, level, own)
+        ends = (experiment.answered(point.prediction + side * width) for side in (-1.0, 1.0))
+        return list(zip(*ends, strict=True))
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw data and model; returns the axes, which are a pair for a mixture: loops first."""
+        from jbeamshell import plotting
+
+        def pairs(kind: type) -> list[tuple[Any, Any]]:
+            both = zip(self.data, self.model, strict=True)
+            return [(d, m) for d, m in both if isinstance(d, kind)]
+
+        loops, curves = pairs(Loop), pairs(SqueezeCurve)
+        mixed = bool(loops and curves)
+        left, right = ((None, None) if axes is None else axes) if mixed else (axes, axes)
+        drawn = []
+        if loops:
+            data = [(d.force, d.displacement, "data") for d, _ in loops]
+            model = [(m.force, m.displacement, f"model, {m.label}") for _, m in loops]
+            drawn.append(plotting.overlay(data, model, left))
+        if curves:
+            data, model = map(list, zip(*curves, strict=True))
+            drawn.append(plotting.squeeze_fit(data, model, right))
+        return drawn if mixed else drawn[0]
+
+    @property
+    def _uncertainty(self) -> Uncertainty:
+        if self.uncertainty is None:
+            raise ValueError("this result was made by hand: it has no uncertainty to ask")
+        return self.uncertainty
+
+    @property
+    def _problem(self) -> Problem:
+        if self.problem is None:
+            raise ValueError("this result was made by hand: it has no problem to ask")
+        return self.problem
+
+    @property
+    def _point(self) -> Point:
+        return self._problem(self._uncertainty.space, self._uncertainty.point)
+
+
+def fit_at(
+    problem: Problem,
+    space: Space,
+    at: NDArray[np.float64],
+    labels: Sequence[str],
+    status: str,
+    minima: Sequence[tuple[NDArray[np.float64], float]],
+) -> Fit:
+    """The result of a problem whose search ended somewhere.
+
+    Parameters
+    ----------
+    problem : what was solved
+    space : search space, n entries
+    at : (n,) where the search ended
+    labels : of the specimens
+    status : how it ended
+    minima : values and cost where each start ended
+    """
+    experiment = problem.experiment
+    point, values = problem(space, at), space.values(at)
+    rows = experiment.weight.size
+    uncertainty = uncertainty_of(
+        space,
+        at,
+        point.residual,
+        point.jacobian,
+        emphasis=experiment.emphasis,
+        relative=experiment.relative,
+        noisy=experiment.noisy,
+    )
+    plain = point.residual[:rows] / experiment.emphasis
+    relative = plain * experiment.relative
+    scenes = {
+        label: scene.replace(space.of(values, specimen))
+        for specimen, (label, scene) in enumerate(zip(labels, experiment.scenes, strict=True))
+    }
+    named = dict(zip(space.names, values.tolist(), strict=True))
+    ends = uncertainty.intervals().tolist()
+    return Fit(
+        scene=next(iter(scenes.values())),
+        values=named,
+        errors=dict(zip(space.names, uncertainty.errors.tolist(), strict=True)),
+        correlation=uncertainty.correlation,
+        misfit=float(np.sqrt(np.mean(relative**2))),
+        misfits=[float(np.sqrt(np.mean(relative[own] ** 2))) for own in experiment.slices],
+        data=experiment.measurements,
+        model=experiment.answered(point.prediction),
+        status=status,
+        model_runs=problem.runs,
+        labels=experiment.labels,
+        scenes=scenes,
+        intervals={k: (low, high) for k, (low, high) in zip(space.names, ends, strict=True)},
+        warnings=_warnings(problem, uncertainty, values, plain, minima),
+        minima=[(dict(zip(space.names, v.tolist(), strict=True)), cost) for v, cost in minima],
+        uncertainty=uncertainty,
+        problem=problem,
+    )
+
+
+def _warnings(
+    problem: Problem,
+    uncertainty: Uncertainty,
+    values: NDArray[np.float64],
+    plain: NDArray[np.float64],
+    minima: Sequence[tuple[NDArray[np.float64], float]],
+) -> list[str]:
+    space, warnings = uncertainty.space, []
+    for name, bijection, value in zip(space.names, space.bijections, values, strict=True):
+        bound = bijection.held_by(float(value))
+        if bound is not None:
+            warnings.append(
+                f"{name} = {value:.6g} ends at its bound {bound:g}: it has no error, and others are "
+                "as if it were fixed"
+            )
+    excess = float(np.sqrt(np.sum(plain**2) / max(plain.size - values.size, 1)))
+    if problem.experiment.noisy and excess > TOO_WRONG:
+        warnings.append(
+            f"the model leaves {excess:.2g} times the measured noise unexplained: it is wrong in "
+            "some way, and the errors are too small by that much or more"
+        )
+    costs = [cost for _, cost in minima]
+    others = [cost for cost in costs if cost > 1.01 * costs[0]]
+    if others:
+        warnings.append(
+            f"{len(others)} of {len(costs)} starts ended in worse minima (cost {others[0]:.4g} and "
+            f"more, against {costs[0]:.4g}): the problem has several"
+        )
+    return warnings + uncertainty.words()
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

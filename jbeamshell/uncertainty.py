@@ -1,0 +1,226 @@
+"""What data leave open: covariance, intervals, the directions nobody can tell, and bands.
+
+All from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where most
+parameters are logarithms, mapped out through the parameters' bijections.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from jbeamshell.errors import InputError
+from jbeamshell.parameters import Space
+
+LEVELS = (0.68, 0.95)
+LEAST = 1e-14  # of the largest eigenvalue of J'J: smaller ones are rounding
+HARDLY, NOT = 0.1, 0.5  # relative standard errors from which a parameter is hardly, not known
+TAKES_PART = 0.3  # in a direction, relative to its largest component
+STEP = 0.1  # relative change by which a direction is described
+
+
+class Direction(NamedTuple):
+    """An eigenvector of the Fisher information.
+
+    Attributes
+    ----------
+    eigenvalue : of the information in the search space; 1 over the variance along the vector
+    vector : (n,) of unit length in the search space
+    """
+
+    eigenvalue: float
+    vector: NDArray[np.float64]
+
+
+class Uncertainty(NamedTuple):
+    """Gaussian uncertainty of a fit's parameters.
+
+    Attributes
+    ----------
+    space : search space, n entries
+    point : (n,) of the minimum
+    inverse : (n, n) covariance in the search space for residuals of unit noise
+    held : (n,) whether the value ended at a bound; it then counts as fixed, and has no error
+    sigma : noise of the residuals: 1 where it was measured, else estimated from what is left
+    freedom : rows less parameters where the noise was estimated; None where it was measured
+    noise : the noise as a part of the responses' range, in the mean
+    """
+
+    space: Space
+    point: NDArray[np.float64]
+    inverse: NDArray[np.float64]
+    held: NDArray[np.bool_]
+    sigma: float
+    freedom: int | None
+    noise: float
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """(n, n) in the search space."""
+        return self.sigma**2 * self.inverse
+
+    @property
+    def errors(self) -> NDArray[np.float64]:
+        """Standard errors (n,) of the parameters; NaN for those held by a bound."""
+        errors = np.abs(self.space.slopes(self.point)) * self._spread
+        return np.where(self.held, np.nan, errors)
+
+    @property
+    def correlation(self) -> NDArray[np.float64]:
+        """(n, n) of the parameters, in the search space."""
+        spread = np.where(self.held, 1.0, np.sqrt(np.diag(self.inverse)))
+        return np.where(np.eye(spread.size) > 0.0, 1.0, self.inverse / np.outer(spread, spread))
+
+    def intervals(self, level: float = 0.95) -> NDArray[np.float64]:
+        """Confidence intervals (n, 2) of the parameters at a level, within their bounds.
+
+        Student's distribution where the noise was estimated, else the normal one.
+        """
+        width = self.quantile(level) * self._spread
+        ends = [self.space.values(self.point + side * width) for side in (-1.0, 1.0)]
+        return np.where(self.held[:, None], np.nan, np.sort(np.transpose(ends), axis=1))
+
+    def quantile(self, level: float) -> float:
+        """Standard errors to either side of a value within which a level lies."""
+        check_level(level)
+        upper = 0.5 * (1.0 + level)
+        if self.freedom is None:
+            return float(stats.norm.ppf(upper))
+        return float(stats.t.ppf(upper, self.freedom))
+
+    def at_noise(self, noise: float) -> Uncertainty:
+        """What noise of another size, a part of the responses' range, would leave open."""
+        if not (np.isfinite(noise) and noise > 0.0):
+            raise InputError(f"noise = {noise}: give a positive part of the range, such as 0.01")
+        per_sigma = self.noise / self.sigma
+        return self._replace(sigma=noise / per_sigma, noise=noise, freedom=None)
+
+    def directions(self) -> list[Direction]:
+        """Eigenvectors of the Fisher information of what no bound holds, the least known first."""
+        free = np.flatnonzero(~self.held)
+        variances, vectors = np.linalg.eigh(self.covariance[np.ix_(free, free)])
+        whole = np.zeros((free.size, self.held.size))
+        whole[:, free] = vectors.T
+        pairs = zip(variances[::-1], whole[::-1], strict=True)
+        return [Direction(1.0 / max(v, np.finfo(float).tiny), vector) for v, vector in pairs]
+
+    def words(self, level: float = 0.95) -> list[str]:
+        """What the data cannot tell, in sentences; none when they fix everything."""
+        low_high = self.intervals(level)
+        values, noise = self.space.values(self.point), f"{100.0 * self.noise:.2g} % noise"
+        relative = self.errors / self._sizes(values)
+        sentences = []
+        for name, share, (low, high) in zip(self.space.names, relative, low_high, strict=True):
+            where = f"anywhere between {low:.2g} and {high:.2g} ({100.0 * level:g} %)"
+            if share >= HARDLY:
+                how = "not" if share >= NOT else "hardly"
+                begin = f"{name} is {how} identifiable from these data"
+                sentences.append(f"{begin}: {noise} leaves it {where}")
+        sentences += self._trades(values)
+        return sentences
+
+    def _trades(self, values: NDArray[np.float64]) -> list[str]:
+        """Combinations of parameters that change the response by less than the noise."""
+        sizes, slopes = self._sizes(values), self.space.slopes(self.point)
+        sentences = []
+        for eigenvalue, vector in self.directions():
+            change = vector * slopes / sizes  # relative, for a unit step
+            largest = np.max(np.abs(change))
+            if largest < HARDLY * np.sqrt(eigenvalue):
+                continue
+            change = STEP * change / change[np.argmax(np.abs(change))]
+            part = np.flatnonzero(np.abs(change) >= TAKES_PART * STEP)
+            if part.size > 1:
+                names = " and ".join(self.space.names[i] for i in part)
+                steps = " with ".join(
+                    f"{100.0 * abs(change[i]):.2g} % {'more' if change[i] > 0 else 'less'} "
+                    f"{self.space.names[i]}"
+                    for i in part
+                )
+                sentences.append(
+                    f"{names} trade off: {steps} changes the response by less than the noise, so "
+                    "only another combination of them is known"
+                )
+        return sentences
+
+    @property
+    def _spread(self) -> NDArray[np.float64]:
+        return np.sqrt(np.diag(self.covariance))
+
+    def _sizes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What parameters are counted in: themselves, or their start where they come near zero."""
+        starts = np.array([bijection.start for bijection in self.space.bijections])
+        logs = np.array([bijection.log for bijection in self.space.bijections])
+        sizes = np.where(logs, np.abs(values), np.maximum(np.abs(values), np.abs(starts)))
+        return np.where(sizes > 0.0, sizes, 1.0)
+
+
+def uncertainty_of(
+    space: Space,
+    point: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
+    *,
+    emphasis: NDArray[np.float64],
+    relative: NDArray[np.float64],
+    noisy: bool,
+) -> Uncertainty:
+    """Uncertainty from the residuals at a minimum.
+
+    Parameters
+    ----------
+    space : search space, n entries
+    point : (n,) of the minimum
+    residual, jacobian : (rows,) and (rows, n), priors at the end
+    emphasis : factors of the rows without priors that say nothing of their noise
+    relative : of the same rows, from residuals to parts of the range
+    noisy : whether the residuals are in units of measured noise
+    """
+    values = space.values(point)
+    pairs = zip(space.bijections, values.tolist(), strict=True)
+    held = np.array([bijection.held_by(value) is not None for bijection, value in pairs])
+    free = np.ix_(~held, ~held)
+    eigenvalues, vectors = np.linalg.eigh((jacobian.T @ jacobian)[free])
+    # Directions that nothing depends on are open, not known: a pseudo-inverse would hide them.
+    safe = np.maximum(eigenvalues, LEAST * np.max(eigenvalues, initial=0.0))
+    inverse = np.zeros((point.size, point.size))
+    inverse[free] = (vectors / safe) @ vectors.T
+    factors = np.append(emphasis, np.ones(residual.size - emphasis.size))
+    if np.any(factors != 1.0):
+        meat = jacobian.T @ (factors[:, None] ** 2 * jacobian)
+        inverse = inverse @ meat @ inverse
+    freedom = max(residual.size - point.size, 1)
+    sigma = 1.0 if noisy else float(np.sqrt(np.sum((residual / factors) ** 2) / freedom))
+    noise = sigma * float(np.sqrt(np.mean(relative**2)))
+    # A model that repeats its own data to the last bit leaves no noise to divide by.
+    sigma, noise = (max(size, np.finfo(float).tiny ** 0.25) for size in (sigma, noise))
+    return Uncertainty(space, point, inverse, held, sigma, None if noisy else freedom, noise)
+
+
+def check_level(level: float) -> None:
+    """Raise `InputError` for a level of confidence that is none."""
+    if not 0.0 < level < 1.0:
+        raise InputError(f"level = {level}: give a part of one, such as 0.95")
+
+
+def band_widths(
+    uncertainty: Uncertainty,
+    jacobian: NDArray[np.float64],
+    level: float,
+    noise: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Half widths (rows,) of the band about a prediction.
+
+    Parameters
+    ----------
+    uncertainty : of the parameters
+    jacobian : (rows, n) of the prediction with respect to the search space
+    level : of confidence
+    noise : (rows,) of a single measurement, to be covered as well; None is the model alone
+    """
+    variance = np.einsum("ri,ij,rj->r", jacobian, uncertainty.covariance, jacobian)
+    variance = np.maximum(variance, 0.0) + (0.0 if noise is None else noise**2)
+    return uncertainty.quantile(level) * np.sqrt(variance)
