@@ -38,7 +38,7 @@ TERM = r"[^\W\d_]+(?:(?:\^|\*\*)?-?[1-4]|[²³])?|[%°]"
 UNIT = re.compile(rf"(?:{TERM})(?:(?: ?[/*·.] ?| )(?:{TERM}))*")
 # Units after a space or an underscore, where other words stand too.
 TAIL = re.compile(
-    r"(?:[GMkcmuµμn]?N(?:/[cmuµμn]?m)?|[kdcmuµμnp]?m|[mkuµμn]?s|sec|%|rad|deg|in|inch|ft|mil|"  # noqa: RUF001
+    r"(?:[GMkcmuµμn]?N(?:/[cmuµμn]?m)?|[kdcmuµμnp]?m|[mkuµμn]?s|sec|%|rad|deg|in|inch|ft|mil|"
     r"thou|micron|k?lbf?|kip|[kg]?gf|dyn|"
     r"(?:giga|mega|kilo|centi|milli|micro|nano)?(?:newton|met(?:er|re)|second)s?)"
 )
@@ -94,8 +94,8 @@ def find_columns(
             if len(titles) == 1
             else f"{name}: {whole!r} cannot be both force and displacement: name one of them"
         )
-    bare = [_bare(title).strip().lower() for title in titles]
-    group = next((i for i, title in enumerate(bare) if title in GROUPS), None)
+    plain = [bare(title).strip().lower() for title in titles]
+    group = next((i for i, title in enumerate(plain) if title in GROUPS), None)
     if group is not None and group not in columns.values():
         columns["group"] = group
     return columns
@@ -152,7 +152,7 @@ def unit_factors(
     for quantity, unit in units.items():
         title = titles[quantity][:60]
         bases = QUANTITIES.get(quantity) or FURTHER[quantity]
-        found = 1.0 if unit is None else _factor(unit, bases)
+        found = 1.0 if unit is None else factor_of(unit, bases)
         if quantity in FURTHER:
             mixed = quantity == "normal_force" and bool(unit) != named[0]
             factors[quantity] = None if mixed else found
@@ -200,7 +200,7 @@ def _named(title: str, quantity: str) -> bool:
 
 def _meant(title: str, quantity: str) -> bool:
     words, lower = _words(title), title.lower()
-    if _bare(title).strip().lower() in SHORT[quantity]:
+    if bare(title).strip().lower() in SHORT[quantity]:
         return True
     normal = any(word in lower for word in NORMAL)
     if quantity == "normal_force":
@@ -212,16 +212,17 @@ def _meant(title: str, quantity: str) -> bool:
 
 
 def _words(title: str) -> set[str]:
-    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", _bare(title))
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare(title))
     return set(re.findall(r"[a-z]+", spaced.lower()))
 
 
-def _bare(title: str) -> str:
+def bare(title: str) -> str:
+    """A title without its unit in brackets."""
     return re.sub(r"\[[^\]]*\]?|\([^)]*\)?", " ", title)
 
 
 def _chosen(titles: Sequence[str], quantity: str, title: str, name: str, held: str) -> int:
-    keys: list[Any] = [str.strip, lambda t: t.strip().lower(), lambda t: _bare(t).strip().lower()]
+    keys: list[Any] = [str.strip, lambda t: t.strip().lower(), lambda t: bare(t).strip().lower()]
     found: list[int] = []
     for key in keys:
         found = [i for i, t in enumerate(titles) if key(t) == key(str(title))]
@@ -237,7 +238,8 @@ def _listed(titles: Sequence[str]) -> str:
     return ", ".join(repr(title.strip()) for title in titles)[:200]
 
 
-def _factor(unit: str, bases: Sequence[str]) -> float | None:
+def factor_of(unit: str, bases: Sequence[str]) -> float | None:
+    """What converts a unit to the first base that goes with it; None if none does."""
     if unit in bases:
         return 1.0
     if len(unit) > 32 or not UNIT.fullmatch(unit):

@@ -105,13 +105,19 @@ def _matlab(data: bytes) -> Iterator[tuple[str, Any]]:
     for name, value in loadmat(io.BytesIO(data)).items():
         if name.startswith("__"):
             continue
-        if isinstance(value, np.ndarray) and value.dtype.names:  # a struct, or a row of them
-            elements = value.ravel()
-            for i, element in enumerate(elements):
-                own = name if elements.size == 1 else f"{name}({i + 1})"
-                yield from ((f"{own}.{field}", element[field]) for field in value.dtype.names)
-        else:
-            yield name, value
+        yield from _fields(name, value)
+
+
+def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """A variable, or the fields of a struct, of a row of structs, of structs in structs."""
+    if not (isinstance(value, np.ndarray) and value.dtype.names):
+        yield name, value
+        return
+    elements = value.ravel()
+    for i, element in enumerate(elements, 1):
+        own = name if elements.size == 1 else f"{name}({i})"
+        for field in value.dtype.names:
+            yield from _fields(f"{own}.{field}", element[field])
 
 
 def _archive(data: bytes) -> Iterator[tuple[str, Any]]:

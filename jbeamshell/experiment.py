@@ -1,20 +1,22 @@
 """Several specimens and what was measured on them: the model's residuals and their derivatives.
 
-A specimen is a scene with its measurements.  Runs of one kind on scenes of one structure are one
-batch, compiled once and walked one after the other; each knows its own few parameters only, so a
-fit of many specimens costs no more per run than that of one.
+A specimen is a scene with its measurements.  Runs of one kind and length on scenes of one structure
+are compiled once and walked side by side, one on each core; each knows its own few parameters only,
+so a fit of many specimens costs no more per run than that of one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
+from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError
@@ -33,11 +35,13 @@ class Specimen(NamedTuple):
     scene : start values, and everything that stays fixed
     data : a measurement or several
     label : for messages, and to tell values of its own from those of others
+    weights : factors of the measurements' residuals, besides the curves' own; none are all 1
     """
 
     scene: Scene
     data: Measurement | Sequence[Measurement]
     label: str = ""
+    weights: Sequence[float] = ()
 
     @property
     def measurements(self) -> list[Measurement]:
@@ -45,21 +49,6 @@ class Specimen(NamedTuple):
         # A Loop is a tuple itself.
         one = isinstance(self.data, Loop) or not isinstance(self.data, Sequence)
         return [self.data] if one else list(self.data)  # type: ignore[list-item, arg-type]
-
-
-class Batch(NamedTuple):
-    """Observations of one kind on scenes of one structure, stacked.
-
-    Attributes
-    ----------
-    observations, scenes : arrays with a leading axis of members; shorter members wait at their end,
-        which adds nothing: a path that stands still, or a position looked up again
-    places : (members,) of the measurements among all
-    """
-
-    observations: Observation
-    scenes: Scene
-    places: tuple[int, ...]
 
 
 class Answer(NamedTuple):
@@ -114,7 +103,8 @@ class Experiment:
         Raises
         ------
         InputError
-            for measurements that a scene cannot answer; if only some carry noise
+            for measurements that a scene cannot answer; if only some carry noise; for weights that
+            are not positive or not as many as the measurements
         """
         if noise is not None and not (np.isfinite(noise) and noise > 0.0):
             raise InputError(f"noise = {noise}: give a positive part of the range, such as 0.01")
@@ -122,6 +112,7 @@ class Experiment:
         self.measurements: list[Any] = []
         self.owners: list[int] = []
         observations: list[Observation] = []
+        weights = [_checked_weights(specimen) for specimen in specimens]
         for owner, specimen in enumerate(specimens):
             driver = specimen.scene.load.control
             if not specimen.measurements:
@@ -147,14 +138,21 @@ class Experiment:
             for end, compared in zip(ends, self._compared, strict=True)
         ]
         sizes = [compared.size for compared in self._compared]
-        self.emphasis = np.repeat([weight_of(m) for m in self.measurements], sizes)
+        own = [weight_of(measurement) for measurement in self.measurements]
+        self.emphasis = np.repeat(np.multiply(own, np.concatenate(weights)), sizes)
         self.weight = np.concatenate(
             [np.asarray(o.weight)[i] for o, i in zip(observations, self._compared, strict=True)]
         )
         spans = np.repeat([o.span for o in observations], sizes)
-        own = np.repeat([noise_of(m) is not None for m in self.measurements], sizes)
-        self.relative = np.where(own, 1.0 / (self.weight * spans), noise or 1.0)
-        self._batches = self._stack()
+        known = np.repeat([noise_of(m) is not None for m in self.measurements], sizes)
+        self.relative = np.where(known, 1.0 / (self.weight * spans), noise or 1.0)
+        self._runs = [
+            (_filled(observation), self.scenes[owner])
+            for observation, owner in zip(observations, self.owners, strict=True)
+        ]
+        shapes = [_shape(run) for run in self._runs]
+        self._firsts = [shapes.index(shape) for shape in dict.fromkeys(shapes)]
+        self._compiled: set[Any] = set()
 
     def __call__(self, keys: tuple[str, ...], table: NDArray[np.float64], solver: Newton) -> Answer:
         """The model's answer to all measurements.
@@ -165,18 +163,53 @@ class Experiment:
         table : (specimens, k) values
         solver : settings of Newton's method
         """
-        columns: list[Any] = [None] * len(self.measurements)
-        all_sound = True
-        for batch in self._batches:
-            values = jnp.asarray(table[[self.owners[place] for place in batch.places]])
-            answers = _answers(values, batch.observations, batch.scenes, keys, solver)
-            *arrays, sound = map(np.asarray, answers)
-            all_sound &= bool(np.all(sound))
-            for member, place in enumerate(batch.places):
-                compared = self._compared[place]
-                columns[place] = [array[member][compared] for array in arrays]
+        return self._joined(self._walked(_answer, table, keys, solver))
+
+    def together(
+        self, keys: tuple[str, ...], tables: NDArray[np.float64], solver: Newton
+    ) -> list[Answer]:
+        """The same for several tables, (tables, specimens, k), each measurement's as one batch."""
+        answers = self._walked(_answers, np.swapaxes(tables, 0, 1), keys, solver)
+        return [
+            self._joined([tuple(array[entry] for array in arrays) for arrays in answers])
+            for entry in range(len(tables))
+        ]
+
+    def _walked(
+        self,
+        function: Callable[..., tuple[Array, ...]],
+        values: NDArray[np.float64],
+        keys: tuple[str, ...],
+        solver: Newton,
+    ) -> list[tuple[NDArray[Any], ...]]:
+        """What a function makes of every run and its specimen's values, (specimens, ...)."""
+
+        def one(place: int) -> tuple[NDArray[Any], ...]:
+            own = jnp.asarray(values[self.owners[place]])
+            return tuple(map(np.asarray, function(own, *self._runs[place], keys, solver)))
+
+        # Each shape once at first: threads that miss the same compiled code all compile it.
+        asked, done = (function, values.shape[1:], keys, solver), {}
+        if asked not in self._compiled:
+            done = {place: one(place) for place in self._firsts}
+            self._compiled.add(asked)
+        rest = [place for place in range(len(self._runs)) if place not in done]
+        pool = ThreadPoolExecutor(os.cpu_count())
+        try:
+            done |= dict(zip(rest, pool.map(one, rest), strict=True))
+        finally:
+            pool.shutdown(cancel_futures=True)
+        return [done[place] for place in range(len(self._runs))]
+
+    def _joined(self, answers: Sequence[tuple[NDArray[Any], ...]]) -> Answer:
+        """One answer from those of the runs."""
+        sound = all(bool(answer[-1]) for answer in answers)
+        columns = [
+            [array[compared] for array in answer[:-1]]
+            for answer, compared in zip(answers, self._compared, strict=True)
+        ]
         residual, jacobian, prediction = map(np.concatenate, zip(*columns, strict=True))
-        return Answer(residual, jacobian, prediction, all_sound)
+        return Answer(residual, jacobian, prediction, sound)
 
     def answered(self, prediction: NDArray[np.float64]) -> list[Any]:
         """Measurements (the model's) from compared points (rows,)."""
@@ -208,78 +241,65 @@ class Experiment:
             for observation, has in zip(observations, known, strict=True)
         ]
 
-    def _stack(self) -> list[Batch]:
-        alike: dict[Any, list[int]] = {}
-        for place, (observation, owner) in enumerate(
-            zip(self.observations, self.owners, strict=True)
-        ):
-            key = type(observation), _structure(self.scenes[owner])
-            alike.setdefault(key, []).append(place)
-        return [
-            Batch(
-                _stacked([self.observations[place] for place in places]),
-                _stacked_scenes([self.scenes[self.owners[place]] for place in places]),
-                tuple(places),
-            )
-            for places in alike.values()
-        ]
 
-
-@eqx.filter_jit
-def _answers(
-    values: Array, observations: Observation, scenes: Scene, keys: tuple[str, ...], solver: Newton
+def _answer_of(
+    values: Array, observation: Observation, scene: Scene, keys: tuple[str, ...], solver: Newton
 ) -> tuple[Array, Array, Array, Array]:
-    """Residuals, their derivatives, predictions and soundness of a batch, (members, ...) each."""
-    arrays, rest = eqx.partition(scenes, eqx.is_array)
+    """Residual (n,), its derivatives (n, k), prediction (n,) and soundness of a run."""
 
-    def one(member: tuple[Array, Observation, Any]) -> tuple[Array, Array, Array, Array]:
-        own, observation, leaves = member
-        scene = eqx.combine(leaves, rest)
+    def residual(own: Array) -> tuple[Array, tuple[Array, Array, Array]]:
+        at = scene.replace(dict(zip(keys, own, strict=True)))
+        rows, prediction, sound = observation.residual(at, solver)
+        return rows, (rows, prediction, sound)
 
-        def residual(own: Array) -> tuple[Array, tuple[Array, Array, Array]]:
-            at = scene.replace(dict(zip(keys, own, strict=True)))
-            rows, prediction, sound = observation.residual(at, solver)
-            return rows, (rows, prediction, sound)
-
-        jacobian, (rows, prediction, sound) = jax.jacfwd(residual, has_aux=True)(own)
-        return rows, jacobian, prediction, sound
-
-    return lax.map(one, (values, observations, arrays))
+    jacobian, (rows, prediction, sound) = jax.jacfwd(residual, has_aux=True)(values)
+    return rows, jacobian, prediction, sound
 
 
-def _structure(scene: Scene) -> Any:
-    """What must be equal for scenes to be stacked."""
-    arrays, rest = eqx.partition(scene, eqx.is_array)
+_answer = eqx.filter_jit(_answer_of)
+_answers = eqx.filter_jit(eqx.filter_vmap(_answer_of, in_axes=(0, None, None, None, None)))
+
+
+def _shape(run: tuple[Observation, Scene]) -> Any:
+    """What must be equal for runs to share what is compiled."""
+    arrays, rest = eqx.partition(run, eqx.is_array)
     shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in jax.tree.leaves(arrays))
-    return jax.tree.structure(scene), tuple(jax.tree.leaves(rest)), shapes
+    return jax.tree.structure(run), tuple(jax.tree.leaves(rest)), shapes
 
 
-def _stacked_scenes(scenes: Sequence[Scene]) -> Scene:
-    arrays = [eqx.filter(scene, eqx.is_array) for scene in scenes]
-    rest = eqx.filter(scenes[0], eqx.is_array, inverse=True)
-    return eqx.combine(jax.tree.map(lambda *leaves: jnp.stack(leaves), *arrays), rest)
+def _filled(observation: Observation) -> Observation:
+    """Longer by what adds nothing: a path that stands still, or a position looked up again.
 
-
-def _stacked(members: Sequence[Observation]) -> Observation:
-    longest = max(member.weight.size for member in members)
-
-    def filled(member: Observation) -> Observation:
-        more = (0, longest - member.weight.size)
-        longer = jax.tree.map(lambda a: np.pad(a, more, mode="edge"), member)
-        return eqx.tree_at(lambda o: o.weight, longer, np.pad(member.weight, more))
-
-    return jax.tree.map(lambda *arrays: jnp.stack(arrays), *map(filled, members))
+    Loops thin to about as many points; lengths of one step let them share what is compiled.
+    """
+    more = (0, -observation.weight.size % observation.length_step)
+    longer = jax.tree.map(lambda column: jnp.pad(column, more, mode="edge"), observation)
+    return eqx.tree_at(lambda o: o.weight, longer, jnp.pad(observation.weight, more))
 
 
 def _with_column(measurement: Any, column: str, values: NDArray[np.float64]) -> Any:
     return eqx.tree_at(lambda m: getattr(m, column), measurement, values)
 
 
+def _checked_weights(specimen: Specimen) -> NDArray[np.float64]:
+    """One factor for each of the measurements."""
+    count, where = len(specimen.measurements), f" of {specimen.label!r}" if specimen.label else ""
+    weights = np.ones(count) if len(specimen.weights) == 0 else np.asarray(specimen.weights, float)
+    if weights.shape != (count,) or not np.all(np.isfinite(weights) & (weights > 0.0)):
+        raise InputError(
+            f"weights{where} = {list(specimen.weights)}: give one positive number for each of the "
+            f"{count} measurements"
+        )
+    return weights
+
+
 def _distinct(names: Sequence[str]) -> list[str]:
     """Names with a number behind those that came before."""
-    seen: dict[str, int] = {}
-    distinct = []
+    distinct: list[str] = []
     for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        distinct.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+        fresh, number = name, 1
+        while fresh in distinct:
+            number += 1
+            fresh = f"{name} ({number})"
+        distinct.append(fresh)
     return distinct

@@ -1,45 +1,73 @@
-"""Parameters from measurements: least squares on the response, with standard errors.
-
-The only file that imports jaxopt.
-"""
+"""Parameters from measurements: least squares on the response, with standard errors."""
 
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
-import jaxopt
 import numpy as np
-from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.experiment import Experiment, Specimen
+from jbeamshell.likelihood import Profile, profile
 from jbeamshell.loops import Loop
 from jbeamshell.measurements import Measurement
 from jbeamshell.newton import Newton
-from jbeamshell.parameters import FARTHEST, Parameter, Space, as_parameters, search_space
-from jbeamshell.problem import Point, Problem
+from jbeamshell.parameters import Parameter, Space, as_parameters, search_space
+from jbeamshell.problem import Problem
 from jbeamshell.results import Fit, fit_at
 from jbeamshell.scene import Scene
-from jbeamshell.uncertainty import check_level
+from jbeamshell.search import ADAM_STEPS, SEARCHES, Limits
 
-__all__ = ["Fit", "Parameter", "Specimen", "driver_of", "fit", "fit_kappa_s", "profile"]
+__all__ = [
+    "Fit",
+    "Parameter",
+    "Profile",
+    "Progress",
+    "Specimen",
+    "driver_of",
+    "fit",
+    "fit_kappa_s",
+    "profile",
+]
 
 POINTS = 96  # of a loop that the model is run through
 MAX_ITERATIONS = 40
-FLAT = 1e-6  # relative gain in cost at which a fit has settled
-METHODS = ("levenberg-marquardt", "l-bfgs-b")
-STARTS = 3  # of a search between bounds
+METHODS = tuple(SEARCHES)
+STARTS = 3  # of searches between bounds
+ADAM_STARTS = 8
 SCREENED = 4  # points tried for each start beside the given one
 NO_INFLUENCE = 1e-9  # largest change of a residual, for a unit step, that is rounding
-PROFILE_POINTS = 8  # at most, to either side
-PROFILED = 0.02  # of its root: so well the ends of a profile's interval are found
 
-Evaluate = Callable[[NDArray[np.float64]], Point]
-Report = Callable[[NDArray[np.float64], float], None]
+
+class Progress(NamedTuple):
+    """How far a fit is.
+
+    Attributes
+    ----------
+    search, searches : number of the search, and how many there will be; 0 while starts are tried
+    step : of the search, or of the starts tried
+    cost : sum of the squared residuals
+    values : parameters by name
+    elapsed : seconds since the fit began
+    left : seconds it may still take, if every search goes on to its last iteration
+    """
+
+    search: int
+    searches: int
+    step: int
+    cost: float
+    values: dict[str, float]
+    elapsed: float
+    left: float
+
+    def __str__(self) -> str:
+        at = f"search {self.search} of {self.searches}, step" if self.search else "start"
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in self.values.items())
+        return f"{at} {self.step}, cost {self.cost:.4g}, at most {self.left:.0f} s left: {values}"
 
 
 def driver_of(loops: Sequence[Loop]) -> str:
@@ -58,6 +86,7 @@ def fit(
     scene: Scene | None = None,
     free: Sequence[str | Parameter] = (),
     *,
+    weights: Sequence[float] = (),
     method: str = METHODS[0],
     starts: int | None = None,
     noise: float | None = None,
@@ -66,7 +95,7 @@ def fit(
     points: int = POINTS,
     max_iterations: int = MAX_ITERATIONS,
     tolerance: float = 1e-7,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
     throw: bool = True,
 ) -> Fit:
     """Least squares of a scene's parameters on measured or computed curves.
@@ -84,18 +113,19 @@ def fit(
     scene : start values, and everything that stays fixed; None with specimens
     free : what to fit: keys such as "contact.friction", or `Parameter` with bounds, scale, prior,
         and whether every specimen has a value of its own
-    method : "levenberg-marquardt", or "l-bfgs-b", which may end on a bound
-    starts : searches, from the given start and from the best of some points spread between the
-        bounds (a factor e to either side where there are none); None is 3 if all parameters have
-        two bounds, else 1
+    weights : factors of the measurements' residuals, besides the curves' own; none are all 1
+    method : "levenberg-marquardt"; "l-bfgs-b", which may end on a bound; or "adam", which goes down
+        from all starts side by side and settles the best by Levenberg-Marquardt
+    starts : searches, from the given start and from others spread between the bounds (a factor e to
+        either side where there are none), for adam all of them, else the best of four times as
+        many; None is 8 for adam, else 3 if all parameters have two bounds, else 1
     noise : standard deviation of measurements without noise, as a part of their range
-    save : file that keeps every model run, written whole after each; if it is there, the fit goes
-        on from it
+    save : file that keeps every model run, as it ends; if it is there, the fit goes on from it
     solver : settings of Newton's method
     points : thin each loop to about so many points
     max_iterations : of each search
     tolerance : relative change of the parameters at which it stops (a flat cost stops it too)
-    progress : called with one line per iteration
+    progress : called after every step; as text, a `Progress` is one line
     throw : whether an unfinished fit raises; if not, read ``status``
 
     Raises
@@ -114,7 +144,7 @@ def fit(
     if starts is not None and (not isinstance(starts, int) or starts < 1):
         raise InputError(f"starts = {starts!r}: give a whole number, 1 or more")
     parameters = as_parameters(free)
-    specimens = _specimens(data, scene)
+    specimens = _specimens(data, scene, weights)
     labels = [specimen.label for specimen in specimens]
     scenes = dict(zip(labels, [specimen.scene for specimen in specimens], strict=True))
     space, begun = search_space(parameters, scenes)
@@ -122,25 +152,40 @@ def fit(
     experiment = Experiment(specimens, points=points, noise=noise)
     problem = Problem(experiment, space, solver or Newton(), save)
     if starts is None:
-        starts = STARTS if all(parameter.bounded for parameter in parameters) else 1
+        bounded = all(parameter.bounded for parameter in parameters)
+        starts = ADAM_STARTS if method == "adam" else STARTS if bounded else 1
+    searches = 1 if method == "adam" else starts
+    screened = 0 if starts == 1 else (1 if method == "adam" else SCREENED) * (starts - 1)
+    noisy = experiment.weight.size if experiment.noisy else 0
+    limits, begin = Limits(max_iterations, tolerance, noisy), time.perf_counter()
+    done, most = 0, max_iterations + ADAM_STEPS
+    if method != "adam":
+        most = screened + searches * max_iterations
 
-    def report(values: NDArray[np.float64], cost: float) -> None:
+    def report(search: int, step: int, values: NDArray[np.float64], cost: float) -> None:
+        nonlocal done
+        done += 1
+        elapsed = time.perf_counter() - begin
+        left = elapsed / done * max(most - done, 0)
+        named = dict(zip(space.names, values.tolist(), strict=True))
         if progress:
-            progress(f"{space.described(values)}, cost {cost:.4g}")
+            progress(Progress(search, searches, step, cost, named, elapsed, left))
 
-    search = _levenberg_marquardt if method == METHODS[0] else _l_bfgs_b
     try:
         _check_start(problem, space)
-        ends = [
-            search(problem, space, start, max_iterations, tolerance, report)
-            for start in _starts(problem, space, starts)
-        ]
+        spread = _spread(space, screened)
+        if method != "adam" and spread:
+            for number, point in enumerate(spread, 1):
+                report(0, number, space.values(point), problem(space, point).cost)
+            spread = sorted(spread, key=lambda point: problem(space, point).cost)[: starts - 1]
+        begun_at = [np.zeros(len(space.names)), *spread]
+        ends = SEARCHES[method](problem, space, begun_at, limits, report)
     except KeyboardInterrupt:
         kept = "nothing was saved: give save=, a file, to go on from it another time"
         if problem.saved_in:
             kept = f"all are in {problem.saved_in}: call fit again as before to go on from there"
         raise KeyboardInterrupt(f"interrupted after {problem.runs} model runs; {kept}") from None
-    ends.sort(key=lambda end: problem(space, end[0]).cost)
+    ends.sort(key=lambda end: problem(space, end.point).cost)
     best, status = ends[0]
     if throw and status != "converged":
         values, cost = space.values(best), problem(space, best).cost
@@ -149,7 +194,7 @@ def fit(
             f"{space.described(values)}, cost {cost:.4g}: start closer, free fewer parameters, "
             "or allow more iterations"
         )
-    minima = [(space.values(end), problem(space, end).cost) for end, _ in ends]
+    minima = [(space.values(end.point), problem(space, end.point).cost) for end in ends]
     return fit_at(problem, space, best, labels, status, minima)
 
 
@@ -169,130 +214,21 @@ def fit_kappa_s(curve: Measurement | Sequence[Measurement], scene: Scene, **opti
     return fit(curve, scene, ("strip.kappa_s",), **options)
 
 
-class Profile(NamedTuple):
-    """The profile likelihood of one parameter: the best that all others can do beside it.
-
-    Attributes
-    ----------
-    name : of the parameter
-    values : (points,) increasing
-    rises : (points,) of the cost over that of the minimum, over the noise squared
-    interval : where the rise reaches that of the level; a bound of the parameter, or infinity,
-        where it never does
-    level : of confidence
-    """
-
-    name: str
-    values: NDArray[np.float64]
-    rises: NDArray[np.float64]
-    interval: tuple[float, float]
-    level: float
-
-
-def profile(
-    result: Fit,
-    name: str,
-    *,
-    level: float = 0.95,
-    max_iterations: int = MAX_ITERATIONS,
-    tolerance: float = 1e-4,
-) -> Profile:
-    """Profile likelihood of a fitted parameter, and the interval that it gives.
-
-    Unlike the intervals of `Fit`, it asks the model itself how far the parameter may go, all others
-    following; so it is right where these are only good for little noise.
-
-    Parameters
-    ----------
-    result : of `fit`
-    name : one of ``result.values``
-    level : of confidence
-    max_iterations, tolerance : of the fit of the others
-
-    Raises
-    ------
-    InputError
-        for a name that was not fitted, or that ended at its bound
-    """
-    check_level(level)
-    if name not in result.values or result.problem is None or result.uncertainty is None:
-        raise InputError(f"profile {name!r}: was not fitted; names are {', '.join(result.values)}")
-    problem, uncertainty = result.problem, result.uncertainty
-    space, best = uncertainty.space, uncertainty.point
-    entry = space.names.index(name)
-    if uncertainty.held[entry]:
-        raise InputError(f"profile {name!r}: it ended at its bound; give it more room")
-    others = np.delete(np.arange(best.size), entry)
-    along = uncertainty.inverse[:, entry] / uncertainty.inverse[entry, entry]
-    least, wanted = problem(space, best).cost, uncertainty.quantile(level)
-
-    def root_at(step: float) -> float:
-        """Square root of the rise, which is about linear in the step."""
-        whole = best + step * along
-
-        def evaluate(part: NDArray[np.float64]) -> Point:
-            point = problem(space, np.insert(part, entry, whole[entry]))
-            return point._replace(jacobian=point.jacobian[:, others])
-
-        if others.size:
-            end, _ = _marquardt(evaluate, whole[others], max_iterations, tolerance)
-            cost = evaluate(end).cost
-        else:
-            cost = evaluate(np.zeros(0)).cost
-        return float(np.sqrt(max(cost - least, 0.0)) / uncertainty.sigma)
-
-    spread = float(np.sqrt(uncertainty.covariance[entry, entry]))
-    known, ends = {0.0: 0.0}, []
-    for side in (-1.0, 1.0):
-        end = _crossing(root_at, wanted, side, min(wanted * spread, 2.0), known)
-        bound = space.bijections[entry][1 if side < 0.0 else 2]
-        ends.append(bound if end is None else space.bijections[entry].value(best[entry] + end))
-    steps = sorted(known, key=lambda step: space.bijections[entry].value(best[entry] + step))
-    values = np.array([space.bijections[entry].value(best[entry] + step) for step in steps])
-    rises = np.array([known[step] ** 2 for step in steps])
-    return Profile(name, values, rises, (min(ends), max(ends)), level)
-
-
-def _crossing(
-    root_at: Callable[[float], float],
-    wanted: float,
-    side: float,
-    step: float,
-    known: dict[float, float],
-) -> float | None:
-    """Signed step at which a rising function of it reaches a value; None if it never does."""
-    inside, outside = (0.0, 0.0), None
-    for _ in range(PROFILE_POINTS):
-        if step > FARTHEST:
-            return None
-        root = known[side * step] = root_at(side * step)
-        if abs(root - wanted) < PROFILED * wanted:
-            return side * step
-        if root < wanted:
-            inside = (step, root)
-        else:
-            outside = (step, root)
-        if outside is None:
-            step *= 2.0
-            continue
-        part = (wanted - inside[1]) / (outside[1] - inside[1])
-        step = inside[0] + np.clip(part, 0.1, 0.9) * (outside[0] - inside[0])
-    return None if outside is None else side * float(step)
-
-
-def _specimens(data: Any, scene: Scene | None) -> list[Specimen]:
+def _specimens(data: Any, scene: Scene | None, weights: Sequence[float]) -> list[Specimen]:
     """Specimens with labels, no two alike."""
     given = [data] if isinstance(data, Specimen) else data
     several = isinstance(given, Sequence) and not isinstance(given, Loop)
-    own = several and len(given) > 0 and all(isinstance(item, Specimen) for item in given)
-    if not own:
+    if not (several and any(isinstance(item, Specimen) for item in given)):
         if scene is None:
             raise InputError(
                 "scene: give one, or a Specimen (a scene with its data) in place of data"
             )
-        return [Specimen(scene, data)]
-    if scene is not None:
-        raise InputError("scene: the specimens bring their own; leave it out")
+        return [Specimen(scene, data, weights=weights)]
+    if not all(isinstance(item, Specimen) for item in given):
+        raise InputError("data: mixes specimens with measurements: make each a Specimen")
+    for name, brought in {"scene": scene is not None, "weights": len(weights) > 0}.items():
+        if brought:
+            raise InputError(f"{name}: the specimens bring their own; leave it out")
     numbered = [
         specimen._replace(label=specimen.label or f"specimen {number}")
         for number, specimen in enumerate(given, 1)
@@ -311,104 +247,21 @@ def _check_start(problem: Problem, space: Space) -> None:
             "the model finds no equilibrium at the start values: start closer, or lower "
             "contact.stick_stiffness"
         )
-    for name, column in zip(space.names, point.jacobian.T, strict=True):
+    data = point.jacobian[: point.prediction.size]
+    for name, column in zip(space.names, data.T, strict=True):
         if not np.any(np.abs(column) > NO_INFLUENCE):
-            raise InputError(f"free {name!r}: the data do not depend on it; leave it out")
+            raise InputError(
+                f"free {name!r}: the data do not depend on it at its start; leave it out"
+            )
 
 
-def _starts(problem: Problem, space: Space, count: int) -> list[NDArray[np.float64]]:
-    """The given start, and the best of a Latin hypercube of others."""
-    size = len(space.names)
-    start = np.zeros(size)
-    if count == 1:
-        return [start]
-    random, tried = np.random.default_rng(0), SCREENED * (count - 1)
-    cells = np.stack([random.permutation(tried) for _ in range(size)], axis=1)
-    parts = (cells + random.uniform(size=cells.shape)) / tried
+def _spread(space: Space, count: int) -> list[NDArray[np.float64]]:
+    """A Latin hypercube of points."""
+    random = np.random.default_rng(0)
+    cells = np.stack([random.permutation(count) for _ in space.names], axis=1)
+    parts = (cells + random.uniform(size=cells.shape)) / max(count, 1)
     straight, box = space.straight()
-    low, high = np.clip(box, -1.0, 1.0).T
+    near = np.clip(box, -1.0, 1.0)
     bounded = np.array([parameter.bounded for parameter in space.parameters])
-    low, high = np.where(bounded, box[:, 0], low), np.where(bounded, box[:, 1], high)
-    spread = [space.point(straight.values(low + part * (high - low))) for part in parts]
-    spread.sort(key=lambda point: problem(space, point).cost)
-    return [start, *spread[: count - 1]]
-
-
-def _levenberg_marquardt(
-    problem: Problem,
-    space: Space,
-    start: NDArray[np.float64],
-    max_iterations: int,
-    tolerance: float,
-    report: Report,
-) -> tuple[NDArray[np.float64], str]:
-    """Where the search ends, and how: in the unbounded space."""
-
-    def line(params: NDArray[np.float64], cost: float) -> None:
-        report(space.values(params), cost)
-
-    return _marquardt(lambda p: problem(space, p), start, max_iterations, tolerance, line)
-
-
-def _marquardt(
-    evaluate: Evaluate,
-    start: NDArray[np.float64],
-    max_iterations: int,
-    tolerance: float,
-    report: Report | None = None,
-) -> tuple[NDArray[np.float64], str]:
-    method = jaxopt.LevenbergMarquardt(
-        residual_fun=lambda p: jnp.asarray(evaluate(np.asarray(p)).residual),
-        materialize_jac=True,
-        solver="cholesky",
-        damping_parameter=1e-3,
-        jit=False,
-    )
-    # Its last release forgets a jac_fun argument when the Jacobian is materialised.
-    method._jac_fun = lambda p: jnp.asarray(evaluate(np.asarray(p)).jacobian)
-    params: Any = jnp.asarray(start)
-    state = method.init_state(params)
-    for _ in range(max_iterations):
-        before = float(state.value)
-        params, state = method.update(params, state)
-        if report:
-            report(np.asarray(params), float(jnp.sum(state.residual**2)))
-        gained = before - float(state.value)  # nothing when the step was refused
-        if float(jnp.max(jnp.abs(state.delta))) < tolerance or 0.0 < gained < FLAT * before:
-            return np.asarray(params), "converged"
-    return np.asarray(params), "max_iterations"
-
-
-def _l_bfgs_b(
-    problem: Problem,
-    space: Space,
-    start: NDArray[np.float64],
-    max_iterations: int,
-    tolerance: float,
-    report: Report,
-) -> tuple[NDArray[np.float64], str]:
-    """Where the search ends, and how: in a box, whose sides it may reach."""
-    straight, box = space.straight()
-    begin = np.clip(straight.point(space.values(start)), *box.T)
-    scale = 1.0 / problem(straight, begin).cost  # its tolerances are absolute
-
-    def value_and_gradient(params: Array) -> tuple[float, NDArray[np.float64]]:
-        point = problem(straight, np.asarray(params))
-        return scale * point.cost, 2.0 * scale * point.residual @ point.jacobian
-
-    def callback(params: Array) -> None:
-        at = np.asarray(params)
-        report(straight.values(at), problem(straight, at).cost)
-
-    method = jaxopt.ScipyBoundedMinimize(
-        fun=value_and_gradient,
-        value_and_grad=True,
-        method="L-BFGS-B",
-        maxiter=max_iterations,
-        options={"ftol": tolerance**2, "gtol": tolerance},
-        callback=callback,
-        jit=False,
-    )
-    params, state = method.run(jnp.asarray(begin), bounds=tuple(map(jnp.asarray, box.T)))
-    end = space.point(straight.values(np.asarray(params)))
-    return end, "converged" if bool(state.success) else "max_iterations"
+    low, high = np.where(bounded[:, None], box, near).T
+    return [space.point(straight.values(low + part * (high - low))) for part in parts]

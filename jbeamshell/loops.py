@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.recordings import FEWEST_POINTS as FEWEST_POINTS
 from jbeamshell.recordings import FilePath, read_recordings, recording_from_arrays
-from jbeamshell.reversals import find_turns
+from jbeamshell.reversals import find_driver, find_turns
 
 CLOSED = 0.05  # of the range: a loop whose ends lie closer than this is taken as closed
 
@@ -30,6 +30,7 @@ class Loop(NamedTuple):
     scatter : (points,) standard deviation over the cycles of the column that answers, at each
         point; None if there were no repeated cycles
     notes : one line on each thing that was done to the data
+    driver : "force" or "displacement", whichever drove the test; None where nobody looked
     """
 
     force: NDArray[np.float64]
@@ -40,6 +41,7 @@ class Loop(NamedTuple):
     dropped: int = 0
     scatter: NDArray[np.float64] | None = None
     notes: tuple[str, ...] = ()
+    driver: str | None = None
 
     @property
     def closed(self) -> bool:
@@ -49,7 +51,7 @@ class Loop(NamedTuple):
 
     @property
     def standard_error(self) -> float | None:
-        """Of the answering column's points: the scatter of the cycles over the root of their number.
+        """Of a point of the answering column: the cycles' scatter over the root of their number.
 
         None where there were no repeated cycles.
         """
@@ -113,3 +115,9 @@ def read_loops(
     return [
         Loop(r.force, r.displacement, r.label, dropped=r.dropped, notes=r.notes) for r in recordings
     ]
+
+
+def driver_of(loops: Sequence[Loop]) -> str:
+    """Which column drove a test, "force" or "displacement", by most of its loops."""
+    drivers = [loop.driver or find_driver(loop.force, loop.displacement) for loop in loops]
+    return "displacement" if 2 * drivers.count("displacement") > len(drivers) else "force"

@@ -2,7 +2,7 @@
 
 A measurement is what a test left behind: a `Loop`, or a curve of `jbeamshell.measurements`.
 `observe` makes of it an `Observation`: the run of the model that answers it, and the weights that
-make residuals dimensionless.  Observations hold arrays only, so those of one kind run as one batch,
+make residuals dimensionless.  Observations hold arrays only, so those of one kind and length are
 compiled once.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import abc
 import functools
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -32,14 +32,16 @@ from jbeamshell.newton import Newton
 from jbeamshell.quasistatic import check, solve
 from jbeamshell.scene import Scene
 
+LENGTH_STEP = 32  # where points to fill up cost next to nothing
 APPROACH = 8  # load steps from zero to the first point of a loop
+RUN_IN = 32  # and about so many through a closed loop, before it is compared
 ROUNDING = 1e-6  # of L: so far tables may round a position off the strip
 HOPELESS = 10.0  # residual, in ranges, of a trial without equilibrium: never accepted
 NOTHING = 1e-6  # of what was measured: a model that dissipates less has a logarithm all the same
 
 
 class Observation(eqx.Module):
-    """A run of the model that answers a measurement, (n,) each; batches have an axis before it.
+    """A run of the model that answers a measurement, (n,) each.
 
     Attributes
     ----------
@@ -50,6 +52,7 @@ class Observation(eqx.Module):
 
     measured: Array
     weight: Array
+    length_step: ClassVar[int] = 1  # runs are filled up to multiples of it
 
     @property
     def span(self) -> float:
@@ -89,20 +92,23 @@ class Observation(eqx.Module):
 class LoadPath(Observation):
     """One column of a loop as the answer to the other, which ``scene.load.control`` names.
 
-    A closed loop is run twice, so that its second pass is steady; anything else is run once, from
-    rest.
+    A closed loop is run through twice, in larger steps at first, so that its second pass is steady;
+    anything else is run once, from rest.
 
     Attributes
     ----------
-    path : (n,) the load: an approach from zero, then the loop's points once or twice
+    path : (n,) the load: an approach from zero, a closed loop's run-in, then the points
     """
 
     path: Array
+    length_step: ClassVar[int] = LENGTH_STEP
 
     @classmethod
     def of(cls, loop: Loop, scene: Scene) -> LoadPath:
         """The path of a loop; raises `InputError` for forces beyond gross slip."""
-        return cls._through(loop, scene, passes=2 if loop.closed else 1)
+        control = scene.load.control
+        run_in = getattr(loop.thinned(RUN_IN, control), control) if loop.closed else np.zeros(0)
+        return cls._through(loop, scene, run_in)
 
     @classmethod
     def of_backbone(cls, backbone: Backbone, scene: Scene) -> LoadPath:
@@ -116,22 +122,24 @@ class LoadPath(Observation):
                 f"{backbone.label}: {scene.load.control} = {drive[at - 1]:g} turns back at point "
                 f"{at}: a backbone only goes on from rest; give a Loop instead"
             )
-        return cls._through(backbone, scene, passes=1)
+        return cls._through(backbone, scene, np.zeros(0))
 
     @classmethod
-    def _through(cls, measurement: Loop | Backbone, scene: Scene, passes: int) -> LoadPath:
+    def _through(
+        cls, measurement: Loop | Backbone, scene: Scene, run_in: NDArray[np.float64]
+    ) -> LoadPath:
         drive = getattr(measurement, scene.load.control)
         response = getattr(measurement, response_of(measurement, scene))
         approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
-        path = np.concatenate([approach, *[drive] * passes])
+        path = np.concatenate([approach, run_in, drive])
         check(scene, path)
         unseen = np.zeros(path.size - drive.size)
         noise = noise_of(measurement)
         if noise is not None and np.min(noise) >= np.ptp(response):
             raise InputError(
-                f"{measurement.label}: noise = {np.min(noise):.3g} is more than the range of the "
-                f"{response_of(measurement, scene)}, {np.ptp(response):.3g}: give the noise of that "
-                "column, in its units"
+                f"{measurement.label}: noise = {np.min(noise):.3g} is more than the range of "
+                f"{response_of(measurement, scene)}, {np.ptp(response):.3g}: give the noise of "
+                "that column, in its units"
             )
         weight = np.full(drive.size, 1.0 / np.ptp(response)) if noise is None else 1.0 / noise
         columns = (np.append(unseen, response), np.append(unseen, weight), path)
@@ -156,6 +164,7 @@ class Squeezed(Observation):
     """
 
     x: Array
+    length_step: ClassVar[int] = LENGTH_STEP
 
     @classmethod
     def of(cls, curve: SqueezeCurve, scene: Scene) -> Squeezed:

@@ -18,8 +18,19 @@ from jbeamshell import plotting
 from jbeamshell.errors import InputError
 from jbeamshell.files import write_text
 from jbeamshell.history import History
-from jbeamshell.identify import Fit
+from jbeamshell.likelihood import Profile
+from jbeamshell.loops import Loop
+from jbeamshell.measurements import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.results import Fit
 from jbeamshell.scene import scene_to_toml
+
+# Table of a fit: types of its measurements, columns of the data, columns of the model.
+TABLES: dict[str, tuple[tuple[type, ...], tuple[str, ...], tuple[str, ...]]] = {
+    "overlay.csv": ((Loop, Backbone), ("force", "displacement"), ("force", "displacement")),
+    "squeeze.csv": ((SqueezeCurve,), ("x", "stress"), ("stress",)),
+    "dissipation.csv": ((DissipationCurve,), ("amplitude", "dissipation"), ("dissipation",)),
+    "stiffness.csv": ((StiffnessCurve,), ("amplitude", "stiffness"), ("stiffness",)),
+}
 
 
 def as_json(figures: Mapping[str, Any]) -> str:
@@ -68,22 +79,47 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
     return _write(folder, texts, pictures)
 
 
-def write_fit(folder: Path, result: Fit, figures: Mapping[str, Any]) -> list[Path]:
-    """Write overlay.csv, scene.toml (fitted), result.json and overlay.png."""
-    rows = [
-        (data.label, *values)
-        for data, model in zip(result.data, result.model, strict=True)
-        for values in zip(
-            data.force, data.displacement, model.force, model.displacement, strict=True
-        )
-    ]
-    header = ("loop", "force", "displacement", "model_force", "model_displacement")
-    texts = {
-        "overlay.csv": _table(header, rows),
-        "scene.toml": scene_to_toml(result.scene),
-        "result.json": as_json(figures),
-    }
-    return _write(folder, texts, {"overlay.png": result.plot().figure})
+def write_fit(
+    folder: Path, result: Fit, figures: Mapping[str, Any], profiles: Sequence[Profile] = ()
+) -> list[Path]:
+    """Write the tables, the fitted scene, the figures as JSON, and the pictures.
+
+    These are overlay.csv of loops and backbones, squeeze.csv, dissipation.csv and stiffness.csv of
+    the other curves, as far as there are any; scene.toml, or scene_1.toml and so on of several
+    specimens; result.json, overlay.png and residuals.png; profiles.csv where there are profiles.
+    """
+    texts: dict[str, str] = {}
+    for name, (types, given, answered) in TABLES.items():
+        pairs = [p for p in zip(result.data, result.model, strict=True) if isinstance(p[0], types)]
+        rows = [
+            (data.label, *values)
+            for data, model in pairs
+            for values in zip(
+                *(getattr(data, column).tolist() for column in given),
+                *(getattr(model, column).tolist() for column in answered),
+                strict=True,
+            )
+        ]
+        if pairs:
+            first = "loop" if Loop in types else "curve"
+            header = (first, *given, *(f"model_{column}" for column in answered))
+            texts[name] = _table(header, rows)
+    scenes = list(result.scenes.values()) or [result.scene]
+    for number, scene in enumerate(scenes, 1):
+        name = "scene.toml" if len(scenes) == 1 else f"scene_{number}.toml"
+        with contextlib.suppress(InputError):
+            texts[name] = scene_to_toml(scene)
+    if profiles:
+        rows = [
+            (profile.name, *pair)
+            for profile in profiles
+            for pair in zip(profile.values.tolist(), profile.rises.tolist(), strict=True)
+        ]
+        texts["profiles.csv"] = _table(("parameter", "value", "rise"), rows)
+    texts["result.json"] = as_json(figures)
+    drawn = {"overlay.png": result.plot(), "residuals.png": result.plot_residuals()}
+    pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
+    return _write(folder, texts, pictures)
 
 
 def _write(folder: Path, texts: Mapping[str, str], pictures: Mapping[str, Any]) -> list[Path]:

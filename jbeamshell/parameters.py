@@ -149,6 +149,8 @@ class Bijection(NamedTuple):
             point = -np.log((high - t) / (high - start)) if t < high else FARTHEST
         else:
             point = (t - start) / self._unit
+            if not self.log:
+                return float(point)
         return float(np.clip(point, -FARTHEST, FARTHEST))
 
     def straight(self) -> tuple[Bijection, tuple[float, float]]:
@@ -179,8 +181,9 @@ class Bijection(NamedTuple):
 
     def _at(self, point: float) -> tuple[float, float]:
         """The scaled parameter and its derivative."""
-        p = float(np.clip(point, -FARTHEST, FARTHEST))
         start, low, high = map(self._scaled, (self.start, self.low, self.high))
+        endless = not (self.log or np.isfinite(low) or np.isfinite(high))
+        p = float(point) if endless else float(np.clip(point, -FARTHEST, FARTHEST))
         if np.isfinite(low) and np.isfinite(high):
             part = expit(logit((start - low) / (high - low)) + p)
             return low + (high - low) * part, (high - low) * part * (1.0 - part)

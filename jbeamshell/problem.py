@@ -1,7 +1,8 @@
 """The least-squares problem of a fit, every model run remembered and, on request, saved.
 
 An optimiser that is started again asks for the same points again, so an interrupted fit goes on
-where it was by walking the same way through what is remembered.
+where it was by walking the same way through what is remembered.  The file of the state is one line
+of JSON that says whose state it is, and one more for every run.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ import hashlib
 import json
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -79,11 +81,12 @@ class Problem:
         self._known: dict[bytes, Answer] = {}
         self._path = None if save is None else Path(save)
         if self._path is not None:
-            self._mark = _fingerprint(experiment, space.keys, solver)
+            mark = _fingerprint(experiment, space.keys, solver)
+            self._header = json.dumps({"format": FORMAT, "fingerprint": mark})
             if self._path.exists():
                 self._restore()
             else:
-                self._save()
+                write_text(self._path, self._header + "\n")
 
     @property
     def runs(self) -> int:
@@ -97,13 +100,24 @@ class Problem:
 
     def __call__(self, space: Space, point: ArrayLike) -> Point:
         """Residual and Jacobian together, remembered: optimisers ask for them apart."""
-        values, slopes = space.values(point), space.slopes(point)
-        key = values.tobytes()
-        if key not in self._known:
-            self._known[key] = self.experiment(space.keys, values[space.table], self.solver)
-            if self._path is not None:
-                self._save()
-        answer, experiment = self._known[key], self.experiment
+        values = space.values(point)
+        if values.tobytes() not in self._known:
+            answer = self.experiment(space.keys, values[space.table], self.solver)
+            self._learn([(values, answer)])
+        return self._point(space, point, values)
+
+    def together(self, space: Space, points: Sequence[ArrayLike]) -> list[Point]:
+        """The same at several points, whose models run side by side."""
+        several = [space.values(point) for point in points]
+        if any(values.tobytes() not in self._known for values in several):
+            tables = np.stack([values[space.table] for values in several])
+            answers = self.experiment.together(space.keys, tables, self.solver)
+            self._learn(list(zip(several, answers, strict=True)))
+        pairs = zip(points, several, strict=True)
+        return [self._point(space, point, values) for point, values in pairs]
+
+    def _point(self, space: Space, point: ArrayLike, values: NDArray[np.float64]) -> Point:
+        answer, experiment = self._known[values.tobytes()], self.experiment
         jacobian = np.zeros((answer.residual.size + len(self.priors), values.size))
         for rows, owner in zip(experiment.slices, experiment.owners, strict=True):
             jacobian[rows, space.table[owner]] = answer.jacobian[rows]
@@ -113,45 +127,52 @@ class Problem:
             beliefs.append((values[entry] - mean) / deviation)
             jacobian[row, entry] = 1.0 / deviation
         residual = np.append(answer.residual * experiment.emphasis, beliefs)
-        return Point(residual, jacobian * slopes, answer.prediction, answer.sound)
+        return Point(residual, jacobian * space.slopes(point), answer.prediction, answer.sound)
 
-    def _save(self) -> None:
-        runs = [
-            {"values": _packed(np.frombuffer(key)), "sound": answer.sound}
-            | {name: _packed(getattr(answer, name)) for name in Answer._fields[:3]}
-            for key, answer in self._known.items()
-        ]
-        state = {"format": FORMAT, "fingerprint": self._mark, "runs": runs}
-        write_text(str(self._path), json.dumps(state) + "\n")
+    def _learn(self, runs: Sequence[tuple[NDArray[np.float64], Answer]]) -> None:
+        self._known |= {values.tobytes(): answer for values, answer in runs}
+        if self._path is None:
+            return
+        lines = "".join(_line(values, answer) for values, answer in runs)
+        try:
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(lines)
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"save {self._path}: cannot be written ({reason})") from None
 
     def _restore(self) -> None:
-        fix = "delete it, or save elsewhere"
+        path, fix = Path(str(self._path)), "delete it, or save elsewhere"
         try:
-            state = json.loads(Path(str(self._path)).read_text(encoding="utf-8"))
+            # What follows the last newline was being written when the power went.
+            header, *lines = path.read_text(encoding="utf-8").split("\n")[:-1]
+            state = json.loads(header)
             if state["format"] != FORMAT:
                 raise ValueError
-            runs = [(_unpacked(run["values"]), run) for run in state["runs"]]
-            known = {
-                values.tobytes(): Answer(
-                    _unpacked(run["residual"]),
-                    _unpacked(run["jacobian"]).reshape(-1, _columns(self.experiment, run)),
-                    _unpacked(run["prediction"]),
-                    bool(run["sound"]),
-                )
-                for values, run in runs
-            }
+            runs = [_run(line, self.experiment.weight.size) for line in lines]
         except OSError as error:
-            raise InputError(f"save {self._path}: cannot be read ({error.strerror})") from None
+            raise InputError(f"save {path}: cannot be read ({error.strerror})") from None
         except (ValueError, KeyError, TypeError):
-            raise InputError(f"save {self._path}: is no state of a fit: {fix}") from None
-        if state["fingerprint"] != self._mark:
-            raise InputError(f"save {self._path}: is the state of another fit: {fix}")
-        self._known = known
+            raise InputError(f"save {path}: is no state of a fit: {fix}") from None
+        if header != self._header:
+            raise InputError(f"save {path}: is the state of another fit: {fix}")
+        self._known = {values.tobytes(): answer for values, answer in runs}
+        write_text(path, "\n".join([header, *lines, ""]))
 
 
-def _columns(experiment: Experiment, run: dict[str, str]) -> int:
-    """Columns of a saved Jacobian."""
-    return _unpacked(run["jacobian"]).size // experiment.weight.size
+def _line(values: NDArray[np.float64], answer: Answer) -> str:
+    arrays = {"values": values} | {name: getattr(answer, name) for name in Answer._fields[:3]}
+    packed: dict[str, Any] = {name: _packed(array) for name, array in arrays.items()}
+    return json.dumps(packed | {"sound": answer.sound}) + "\n"
+
+
+def _run(line: str, rows: int) -> tuple[NDArray[np.float64], Answer]:
+    run = json.loads(line)
+    residual, prediction = (
+        _unpacked(run[name]).reshape(rows) for name in ("residual", "prediction")
+    )
+    jacobian = _unpacked(run["jacobian"]).reshape(rows, -1)
+    return _unpacked(run["values"]), Answer(residual, jacobian, prediction, bool(run["sound"]))
 
 
 def _packed(array: NDArray[np.float64]) -> str:
@@ -168,6 +189,8 @@ def _fingerprint(experiment: Experiment, keys: tuple[str, ...], solver: Newton) 
     for part in (experiment.scenes, experiment.observations):
         digest.update(re.sub(r"0x[0-9a-f]+", "", str(jax.tree.structure(part))).encode())
         for leaf in jax.tree.leaves(part):
-            array = isinstance(leaf, jax.Array | np.ndarray)
-            digest.update(np.asarray(leaf).tobytes() if array else type(leaf).__name__.encode())
+            if isinstance(leaf, jax.Array | np.ndarray):
+                digest.update(f"{leaf.dtype}{leaf.shape}".encode() + np.asarray(leaf).tobytes())
+            else:
+                digest.update(type(leaf).__name__.encode())
     return digest.hexdigest()

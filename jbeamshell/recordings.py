@@ -159,12 +159,12 @@ def read_recordings(
     if not paths:
         raise InputError("no file given: name at least one")
     found = []
-    for path, label in zip(paths, _labels(paths), strict=True):
+    for path, label in zip(paths, labels_of(paths), strict=True):
         found += _read(path, label, columns or {}, units or {}, decimal)
     return found
 
 
-def _labels(paths: Sequence[FilePath]) -> list[str]:
+def labels_of(paths: Sequence[FilePath]) -> list[str]:
     """The files' names, with as much of their folders as tells them apart."""
     whole = [Path(path).absolute() for path in paths]
     for i, path in enumerate(whole):
@@ -196,7 +196,8 @@ def _read(
     for quantity, column in zip((*must, *may), rows.T, strict=True):
         factor = factors.get(quantity, 1.0)
         empty = quantity in may and bool(np.all(np.isnan(column)))
-        arrays[quantity] = None if factor is None or empty else column * factor
+        with np.errstate(over="ignore"):  # infinite numbers are told by their place, below
+            arrays[quantity] = None if factor is None or empty else column * factor
     if "group" not in columns:
         everything = np.full(rows.shape[0], True)
         return [_recording(arrays, everything, label or table.name)]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.loops import Loop
-from jbeamshell.measurements import SqueezeCurve
+from jbeamshell.measurements import AmplitudeCurve, response_of
 from jbeamshell.parameters import Space
 from jbeamshell.problem import Point, Problem
 from jbeamshell.scene import Scene
@@ -124,26 +125,42 @@ class Fit(NamedTuple):
         ends = (experiment.answered(point.prediction + side * width) for side in (-1.0, 1.0))
         return list(zip(*ends, strict=True))
 
+    @property
+    def columns(self) -> list[str]:
+        """Name of the column of every measurement that the model answers."""
+        owners = [0] * len(self.data) if self.problem is None else self.problem.experiment.owners
+        scenes = list(self.scenes.values()) or [self.scene]
+        return [response_of(d, scenes[owner]) for d, owner in zip(self.data, owners, strict=True)]
+
+    @property
+    def residuals(self) -> list[NDArray[np.float64]]:
+        """Model less data over its range, (points,) each; logarithms for amplitude curves."""
+        left = []
+        for data, model, column in zip(self.data, self.model, self.columns, strict=True):
+            given, answer = getattr(data, column), getattr(model, column)
+            relative = isinstance(data, AmplitudeCurve)
+            left.append(np.log(answer / given) if relative else (answer - given) / np.ptp(given))
+        return left
+
     def plot(self, axes: Any = None) -> Any:
-        """Draw data and model; returns the axes, which are a pair for a mixture: loops first."""
-        from jbeamshell import plotting
+        """Draw model over data; returns the axes, a list where there are several kinds of data."""
+        from jbeamshell import fit_pictures
 
-        def pairs(kind: type) -> list[tuple[Any, Any]]:
-            both = zip(self.data, self.model, strict=True)
-            return [(d, m) for d, m in both if isinstance(d, kind)]
+        drawn = fit_pictures.overlay(self, axes)
+        return drawn[0] if len(drawn) == 1 else drawn
 
-        loops, curves = pairs(Loop), pairs(SqueezeCurve)
-        mixed = bool(loops and curves)
-        left, right = ((None, None) if axes is None else axes) if mixed else (axes, axes)
-        drawn = []
-        if loops:
-            data = [(d.force, d.displacement, "data") for d, _ in loops]
-            model = [(m.force, m.displacement, f"model, {m.label}") for _, m in loops]
-            drawn.append(plotting.overlay(data, model, left))
-        if curves:
-            data, model = map(list, zip(*curves, strict=True))
-            drawn.append(plotting.squeeze_fit(data, model, right))
-        return drawn if mixed else drawn[0]
+    def plot_residuals(self, axes: Any = None) -> Any:
+        """Draw model less data; returns the axes as `plot` does."""
+        from jbeamshell import fit_pictures
+
+        drawn = fit_pictures.residuals(self, axes)
+        return drawn[0] if len(drawn) == 1 else drawn
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write tables, pictures, scenes and figures into a folder; returns the files' paths."""
+        from jbeamshell import output
+
+        return output.write_fit(Path(folder), self, self.figures())
 
     @property
     def _uncertainty(self) -> Uncertainty:
@@ -234,8 +251,8 @@ def _warnings(
         bound = bijection.held_by(float(value))
         if bound is not None:
             warnings.append(
-                f"{name} = {value:.6g} ends at its bound {bound:g}: it has no error, and others are "
-                "as if it were fixed"
+                f"{name} = {value:.6g} ends at its bound {bound:g}: it has no error, and others "
+                "are as if it were fixed"
             )
     excess = float(np.sqrt(np.sum(plain**2) / max(plain.size - values.size, 1)))
     if problem.experiment.noisy and excess > TOO_WRONG:

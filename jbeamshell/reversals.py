@@ -11,7 +11,7 @@ SMALLEST = 0.05  # of the range: a move back that is smaller is no reversal
 NESTED = 0.1  # of both its neighbours: a move back that is smaller is a back-slip
 GROSS_SLIP = 0.02  # of the secant stiffness: where the tangent is lower, everything slides
 SLIDING = 0.1  # of the way: where more of it slides, the displacement drives
-CALM = 0.01  # to and fro, over the way from turn to turn, of a column without noise
+CALM = 0.001  # to and fro, over the way from turn to turn, of a column without noise
 
 Floats = NDArray[np.float64]
 

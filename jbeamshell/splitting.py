@@ -7,11 +7,20 @@ from typing import NamedTuple
 import numpy as np
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import Loop
-from jbeamshell.recordings import Recording
-from jbeamshell.reversals import SMALLEST, Floats, Path, extremes, find_driver, smoothed_path
+from jbeamshell.loops import CLOSED, Loop
+from jbeamshell.recordings import Recording, recording_from_arrays
+from jbeamshell.reversals import (
+    SMALLEST,
+    Floats,
+    Path,
+    extremes,
+    find_driver,
+    noise_of,
+    smoothed_path,
+)
 
 ALIKE = 0.05  # of a cycle's range: levels that differ by less belong together
+MORE = 1.1  # times the points in cycles that make the other column the driver
 COMPLETE = 0.02  # of the branch beside it: an end that misses a turn by less is one
 
 
@@ -21,16 +30,26 @@ class Cycle(NamedTuple):
     Attributes
     ----------
     start, turn, end : points of the recording
-    low, high : levels of the driving column
+    levels : of the driving column at the start, the turn and the end; where the recording begins or
+        ends shortly before a turn, that of the turn opposite
     group : number of its amplitude group, by increasing amplitude
     """
 
     start: int
     turn: int
     end: int
-    low: float
-    high: float
-    group: int
+    levels: tuple[float, float, float]
+    group: int = 0
+
+    @property
+    def low(self) -> float:
+        """Lower level of the driving column."""
+        return min(0.5 * (self.levels[0] + self.levels[2]), self.levels[1])
+
+    @property
+    def high(self) -> float:
+        """Upper level of the driving column."""
+        return max(0.5 * (self.levels[0] + self.levels[2]), self.levels[1])
 
 
 class Cycles(NamedTuple):
@@ -93,7 +112,8 @@ def split_cycles(
     Parameters
     ----------
     recording : of one test
-    driver : "force" or "displacement"; None finds out
+    driver : "force" or "displacement"; None takes the column that `find_driver` does, or the other
+        if that repeats its levels over a good part more of the recording
     smallest : range of the smallest cycle to be found, over the whole range
 
     Raises
@@ -107,13 +127,15 @@ def split_cycles(
         raise InputError(f"smallest = {smallest}: give a share of the range between 0 and 1")
     if isinstance(recording, Loop):
         loop = recording
-        recording = Recording(loop.force, loop.displacement, loop.label)
-        recording = recording._replace(dropped=loop.dropped, notes=loop.notes)
-    driver = driver or find_driver(recording.force, recording.displacement)
+        recording = recording_from_arrays(loop.force, loop.displacement, loop.label)
+        recording = recording._replace(
+            dropped=loop.dropped + recording.dropped, notes=(*loop.notes, *recording.notes)
+        )
+    driver = driver or _driver(recording, smallest)
     path = smoothed_path(getattr(recording, driver), smallest)
     turns, inner = _turns(path.smooth, path.band)
     cycles = _cycles(path.smooth, turns, path.noise)
-    if not cycles and inner and (start := _once_round(recording, path.smooth, inner)) is not None:
+    if not cycles and (start := _once_round(recording, inner)) is not None:
         rolled = _rolled(recording, start)
         smooth = np.append(path.smooth[start:], path.smooth[1 : start + 1])
         path = path._replace(smooth=smooth)
@@ -133,6 +155,17 @@ def split_cycles(
     )
 
 
+def _driver(recording: Recording, smallest: float) -> str:
+    first = find_driver(recording.force, recording.displacement)
+    second = "displacement" if first == "force" else "force"
+    within = {}
+    for name in (first, second):
+        path = smoothed_path(getattr(recording, name), smallest)
+        turns, _ = _turns(path.smooth, path.band)
+        within[name] = sum(c.end - c.start for c in _cycles(path.smooth, turns, path.noise))
+    return second if within[second] > MORE * within[first] else first
+
+
 def _turns(path: Floats, band: float) -> tuple[list[int], list[int]]:
     """All turns, ends that complete a branch included, and those inside the path."""
     found = extremes(path, band)
@@ -149,10 +182,12 @@ def _cycles(path: Floats, turns: list[int], noise: float) -> list[Cycle]:
     cycles, i = [], 0
     while i + 2 < len(turns):
         a, b, c = turns[i : i + 3]
-        levels = path[a], path[b], path[c]
-        if abs(levels[2] - levels[0]) <= ALIKE * abs(levels[1] - levels[0]) + 3.0 * noise:
-            ends = 0.5 * (levels[0] + levels[2])
-            cycles.append(Cycle(a, b, c, min(ends, levels[1]), max(ends, levels[1]), 0))
+        start, middle, end = float(path[a]), float(path[b]), float(path[c])
+        if abs(end - start) <= ALIKE * abs(middle - start) + 3.0 * noise:
+            outer = start if abs(start - middle) > abs(end - middle) else end
+            start = outer if a == 0 else start
+            end = outer if c == path.size - 1 else end
+            cycles.append(Cycle(a, b, c, (start, middle, end)))
             i += 2
         else:
             i += 1
@@ -178,10 +213,11 @@ def _clusters(values: Floats, gap: Floats) -> list[np.ndarray]:
     return [np.sort(own) for own in np.split(order, parted)]
 
 
-def _once_round(recording: Recording, path: Floats, inner: list[int]) -> int | None:
+def _once_round(recording: Recording, inner: list[int]) -> int | None:
     """The turn to start from, if the recording is one cycle that starts between its turns."""
-    once = len(inner) == 2 and Loop(recording.force, recording.displacement, "").closed
-    return inner[0] if once else None
+    columns = (recording.force, recording.displacement)
+    once = all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) + 4.0 * noise_of(c) for c in columns)
+    return inner[0] if once and len(inner) == 2 else None
 
 
 def _rolled(recording: Recording, start: int) -> Recording:

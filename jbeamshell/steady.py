@@ -14,7 +14,9 @@ STEADY = 0.01  # of the range of the response: cycles that lie closer repeat
 PARTS = 16  # of a loop, the means over which are compared
 POINTS = 200  # of a mean loop at most
 FEWEST = 8  # knots of a branch
-STIFFNESS = 0.05  # of the curve against kinks, in samples: bridges gaps, hardly felt elsewhere
+# Of the curve against kinks, per sample at a knot.  It bridges gaps; and with this much of it the
+# heights of white noise scatter like independent means of the samples around each knot.
+STIFFNESS = 0.02
 DRIFTS = ("keep", "linear", "cycle")
 
 
@@ -55,6 +57,10 @@ def steady_loops(
     """
     if drift not in DRIFTS:
         raise InputError(f"drift = {drift!r}: choose among {DRIFTS}")
+    if not 0.0 <= steady < np.inf:
+        raise InputError(f"steady = {steady}: give a part of the range, such as {STEADY}")
+    if not 2 * FEWEST < points < np.inf:
+        raise InputError(f"points = {points}: give more than {2 * FEWEST}")
     found = split_cycles(recording, driver, smallest=smallest)
     if drift != "keep":
         found = _without_drift(found, drift, smallest)
@@ -98,12 +104,12 @@ class _ClosedCurve:
         cell = np.clip(np.searchsorted(self.knots, phase, "right") - 1, 0, self.size - 1)
         right = (phase - self.knots[cell]) / np.diff(self.knots)[cell]
         left, after = 1.0 - right, (cell + 1) % self.size
-        matrix, vector = self._smoothness.copy(), np.zeros(self.size)
+        matrix, vector = self._smoothness * (phase.size / self.size), np.zeros(self.size)
         for i, a in ((cell, left), (after, right)):
             np.add.at(vector, i, a * values)
             for j, b in ((cell, left), (after, right)):
                 np.add.at(matrix, (i, j), a * b)
-        return np.linalg.solve(matrix, vector)
+        return np.asarray(np.linalg.solve(matrix, vector))
 
     def at(self, phase: Floats, heights: Floats) -> Floats:
         """The curve with such heights at the knots, (size,), at phases of any shape."""
@@ -118,12 +124,13 @@ class _ClosedCurve:
 def _phases(found: Cycles, cycle: Cycle) -> tuple[np.ndarray, Floats]:
     """Points of a cycle, without its back-slips, and their phases, (samples,) each."""
     points, phases = [], []
-    for first, last in ((cycle.start, cycle.turn), (cycle.turn, cycle.end)):
-        path = found.path[first:last]
-        way = (path - path[0]) / (found.path[last] - path[0])  # 0 to 1, whichever way it runs
-        slack = 4.0 * found.noise / abs(found.path[last] - path[0])
+    start, middle, end = cycle.levels
+    branches = (cycle.start, cycle.turn, start, middle), (cycle.turn, cycle.end, middle, end)
+    for first, last, here, there in branches:
+        way = (found.path[first:last] - here) / (there - here)  # 0 to 1, whichever way it runs
+        slack = 4.0 * found.noise / abs(there - here)
         ahead = way >= np.maximum.accumulate(way) - slack
-        rising = found.path[last] > path[0]
+        rising = there > here
         points.append(first + np.flatnonzero(ahead))
         phases.append(float(rising) + np.clip(way[ahead], 0.0, 1.0))
     return np.concatenate(points), np.concatenate(phases)
@@ -134,7 +141,7 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
     samples = [_phases(found, cycle) for cycle in cycles]
     response = found.response
     per_cycle = float(np.median([phase.size for _, phase in samples]))
-    knots = int(np.clip(per_cycle // 2, FEWEST, max(points // 2, FEWEST)))
+    knots = int(np.clip(per_cycle // 2, FEWEST, (points - 1) // 2))
     curve = _ClosedCurve(np.concatenate([phase for _, phase in samples]), knots)
     heights = np.array([curve.through(phase, response[i]) for i, phase in samples])
     repeats, limit = _repeating(curve, heights, steady, noise_of(response), per_cycle)
@@ -162,7 +169,8 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
         cycles=int(own.size),
         dropped=recording.dropped,
         scatter=scatter,
-        notes=(*recording.notes, *_notes(found, curve, heights, repeats, limit)),
+        notes=(*recording.notes, *_notes(found, number, curve, heights, repeats, limit)),
+        driver=found.driver,
         **columns,
     )
 
@@ -181,13 +189,23 @@ def _repeating(
 
 
 def _notes(
-    found: Cycles, curve: _ClosedCurve, heights: Floats, repeats: np.ndarray, limit: float
+    found: Cycles,
+    number: int,
+    curve: _ClosedCurve,
+    heights: Floats,
+    repeats: np.ndarray,
+    limit: float,
 ) -> list[str]:
     """What was averaged, what was left out, and whether the mean hides a drift."""
-    count = len(repeats)
+    count, own = len(repeats), f"{found.driver}-driven cycle"
     if count == 1:
-        return ["one cycle only: neither its noise is known nor whether it is steady"]
-    notes = [f"mean of {np.count_nonzero(repeats)} of {count} cycles"]
+        (only,) = found.group(number)
+        gap = abs(found.response[only.end] - found.response[only.start])
+        return [
+            f"one {own} only, whose {found.answer} returns to within {gap:.2g}: neither its noise "
+            "is known nor whether it is steady"
+        ]
+    notes = [f"mean of {np.count_nonzero(repeats)} of {count} {own}s"]
     left = ", ".join(str(i + 1) for i in np.flatnonzero(~repeats))
     if left:
         notes[0] += (
@@ -198,7 +216,9 @@ def _notes(
     slope = _slope(turn, levels)
     drift, error = slope * levels.size, np.std(levels - slope * turn) * np.sqrt(12.0 / levels.size)
     if levels.size > 3 and abs(drift) > max(STEADY * float(np.ptp(heights)), 3.0 * error):
-        notes.append(f"the {found.answer} drifts by {drift:.2g} meanwhile: see drift='linear'")
+        notes.append(
+            f"the {found.answer} drifts by {drift:.2g} meanwhile: the argument drift removes it"
+        )
     return notes
 
 
@@ -219,7 +239,7 @@ def _without_drift(found: Cycles, drift: str, smallest: float) -> Cycles:
         column = getattr(recording, name)
         if drift == "cycle":
             middle = [np.median(level[groups == g]) for g in range(found.groups)]
-            wander = np.interp(clock, middles, level - np.array(middle)[groups])
+            wander = _through(clock, middles, level - np.array(middle)[groups])
         else:
             wander = _common_slope(found, groups, middles, level, clock, column) * (
                 clock - clock[0]
@@ -254,6 +274,16 @@ def _common_slope(
         (column[c.end] - column[c.start]) / (clock[c.end] - clock[c.start]) for c in found.cycles
     ]
     return float(np.median(gaps))
+
+
+def _through(clock: Floats, middles: Floats, offsets: Floats) -> Floats:
+    """Straight lines from offset to offset, drawn on to both ends of the clock."""
+    if offsets.size == 1:
+        return np.full(clock.shape, offsets[0])
+    slopes = np.diff(offsets) / np.diff(middles)
+    before = np.minimum(clock - middles[0], 0.0) * slopes[0]
+    after = np.maximum(clock - middles[-1], 0.0) * slopes[-1]
+    return np.interp(clock, middles, offsets) + before + after
 
 
 def _slope(x: Floats, y: Floats) -> float:

@@ -52,7 +52,10 @@ class Table(abc.ABC):
 
     @abc.abstractmethod
     def units(self, wanted: Sequence[int]) -> list[str | None]:
-        """What a row of units says about the wanted columns; None where there is no such row."""
+        """What a row of units says about the wanted columns; None where there is no such row.
+
+        To be asked for before the numbers, which start below such a row.
+        """
 
     @abc.abstractmethod
     def numbers(self, wanted: Sequence[int], optional: Sequence[int] = ()) -> NDArray[np.float64]:
@@ -201,7 +204,7 @@ class TextTable(Table):
                         place = f"line {number}, column {self.titles[i]!r}"
                         raise InputError(
                             f"{self.name}: {place} holds {cell[:40]!r}: "
-                            f"{self._fix(number, i, cell, str(error))}"
+                            f"{self._fix(cells, i, str(error))}"
                         ) from None
                     value = np.nan
                 columns[j].append(value)
@@ -216,10 +219,12 @@ class TextTable(Table):
             )
         return np.column_stack([np.frombuffer(column) for column in columns])
 
-    def _fix(self, number: int, column: int, cell: str, reason: str) -> str:
+    def _fix(self, cells: list[str], column: int, reason: str) -> str:
         if reason == ONE_MARK:
             return reason
-        if not WORD.match(cell) or next(self._rows())[0] != number:
+        cell = cells[column].strip()
+        numbers = any(DIGITS.fullmatch(other.strip()) for other in cells)
+        if numbers or not WORD.match(cell) or next(self._rows())[1] != cells:
             return "give a finite number, or leave the cell empty"
         unit = f"'{self.titles[column]} [{cell.strip('[()]')[:40]}]'"
         return f"if it is a row of units, put them into the header: {unit}"
@@ -244,10 +249,11 @@ class _Reader:
     def __call__(self, cell: str) -> float:
         """The number; NaN for a missing one; raises ValueError with the reason."""
         plain = cell
-        if "," in cell or "." in cell and cell.lower() not in MISSING:
+        if "," in cell or ("." in cell and cell.lower() not in MISSING):
             mark = "," if "," in cell else "."
             # A comma beside a point would separate thousands, or the point would.
-            if (self._mark or mark) != mark or "," in cell and "." in cell or cell.count(mark) > 1:
+            both = "," in cell and "." in cell
+            if (self._mark or mark) != mark or both or cell.count(mark) > 1:
                 raise ValueError(ONE_MARK if DIGITS.fullmatch(cell) else "")
             plain = cell.replace(",", ".")
         try:

@@ -12,12 +12,14 @@ PACKAGE = Path(jbeamshell.__file__).parent
 UPWARDS = [
     "errors", "files", "kinematics", "closed_form", "elasticity", "energy", "laminate", "friction",
     "contact", "grid", "parts", "scene", "scenes", "block_tridiagonal", "newton", "equilibrium",
-    "cycles", "history", "quasistatic", "loops", "example", "measurements", "observations",
-    "parameters", "experiment", "problem", "uncertainty", "results", "identify", "plotting",
-    "output", "__init__", "__main__",
+    "cycles", "history", "quasistatic", "tables", "columns", "containers", "reversals",
+    "recordings", "loops", "splitting", "steady", "example", "measurements", "curve_files",
+    "observations", "parameters", "experiment", "problem", "search", "uncertainty", "results",
+    "likelihood", "identify", "plan", "plotting", "fit_pictures", "output", "terminal",
+    "fit_command", "__init__", "__main__",
 ]
 # fmt: on
-ONLY = {"matplotlib": "plotting", "jaxopt": "identify", "pint": "loops"}
+ONLY = {"matplotlib": "plotting", "jaxopt": "search", "optax": "search", "pint": "columns"}
 
 
 def imports(module):
@@ -51,5 +53,6 @@ def test_imports_point_downwards(module):
 def test_what_the_order_rests_on_is_seen():
     assert ("jbeamshell.grid", True) in imports("equilibrium")
     assert ("jbeamshell.plotting", False) in imports("history")
-    assert ("jaxopt", True) in imports("identify")
-    assert ("pint", False) in imports("loops")
+    assert ("jaxopt", True) in imports("search")
+    assert ("optax", True) in imports("search")
+    assert ("pint", False) in imports("columns")

@@ -1,14 +1,22 @@
-"""Squeeze curves: what is refused, and kappa_s from them."""
+"""Curves and how the model answers them: what is refused, and kappa_s from squeeze curves."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
+import toy
 
 import jbeamshell as jb
 from jbeamshell import identify, scenes
 from jbeamshell.elasticity import squeeze_decay_length, squeeze_step
 from jbeamshell.example import data_folder
-from jbeamshell.observations import HOPELESS, Experiment, Observation, SqueezeCurve, observe
+from jbeamshell.loops import Loop
+from jbeamshell.measurements import (
+    Backbone,
+    DissipationCurve,
+    SqueezeCurve,
+    StiffnessCurve,
+    noise_of,
+)
+from jbeamshell.observations import HOPELESS, observe
 
 X = np.linspace(45.0, 55.0, 11)
 STRESS = np.linspace(-100.0, 0.0, 11)
@@ -76,24 +84,6 @@ def test_noise_is_covered_by_the_standard_error(fitted):
     assert np.abs(np.mean(scores)) < 3.0 / np.sqrt(8)
 
 
-def test_the_misfit_has_a_gradient_of_taylor_slope_two(measured):
-    scene, free = scenes.squeezed().replace(FAST | {"strip.kappa_s": 1.0}), ("strip.kappa_s",)
-    experiment = Experiment([observe(measured, scene)])
-
-    def misfit(p):
-        residual, jacobian, _, sound = identify._linearised(
-            jnp.asarray([p]), scene, free, experiment, jb.Newton()
-        )
-        assert bool(sound)
-        return float(residual @ residual), float(2.0 * residual @ jacobian[:, 0])
-
-    value, gradient = misfit(0.3)
-    sizes = np.array([4e-3, 2e-3, 1e-3, 5e-4])
-    rest = [abs(misfit(0.3 + h)[0] - value - h * gradient) for h in sizes]
-    slope = np.polyfit(np.log(sizes), np.log(rest), 1)[0]
-    assert slope == pytest.approx(2.0, abs=0.02)
-
-
 def test_a_point_counts_with_the_length_it_stands_for():
     x = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 4.5, 5.0, 5.5, 6.0])
     square = np.asarray(observe(SqueezeCurve(x, x - 10.0), scenes.squeezed()).weight) ** 2
@@ -139,41 +129,71 @@ def test_what_is_no_measurement():
         identify.fit([], jb.Scene(), ("contact.friction",))
 
 
-# --- several ----------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("kind", "columns", "message"),
+    [
+        (Backbone, ([0.0, 1.0], [0.0, 1.0]), r"force has shape \(2,\): give 3 points or more"),
+        (Backbone, ([1.0, 2.0, 3.0], [1.0, 1.0, 1.0]), r"displacement is constant \(1\): no load"),
+        (DissipationCurve, ([], []), r"amplitude has shape \(0,\): give 1 point or more"),
+        (DissipationCurve, ([1.0, 2.0], [1.0, 0.0]), "dissipation is 0 at point 2: it must be"),
+        (StiffnessCurve, ([1.0, -2.0], [1.0, 1.0]), "amplitude is -2 at point 2: it must be"),
+        (StiffnessCurve, ([1.0], [np.nan]), "stiffness is nan at point 1"),
+        (StiffnessCurve, ([1.0, 2.0], [1.0]), "amplitude and stiffness have 2 and 1 points"),
+    ],
+)
+def test_further_curves_that_are_refused(kind, columns, message):
+    with pytest.raises(jb.InputError, match=message):
+        kind(*columns)
 
 
-class Doubled(Observation):
-    """A model that answers with twice the measurement."""
-
-    @staticmethod
-    def column(scene):
-        return "stress"
-
-    def predict(self, scene, solver):
-        return 2.0 * self.measured, jnp.all(self.measured < 90.0)
-
-
-class Tripled(Doubled):
-    def predict(self, scene, solver):
-        return 3.0 * self.measured, jnp.asarray(True)
-
-
-def make(kind, *measured):
-    return kind(jnp.asarray(measured), jnp.full(len(measured), 0.5))
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"noise": 0.0}, "squeeze: noise is 0 at point 1: give a positive"),
+        ({"noise": [1.0, 2.0]}, r"noise has shape \(2,\): give one number, or one for each"),
+        ({"noise": np.where(X == 50.0, np.inf, 1.0)}, "noise is inf at point 6"),
+        ({"weight": 0.0}, "weight = 0.0: must be a positive number"),
+        ({"weight": np.nan}, "weight = nan"),
+    ],
+)
+def test_noise_and_weights_that_are_refused(options, message):
+    with pytest.raises(jb.InputError, match=message):
+        SqueezeCurve(X, STRESS, **options)
 
 
-def test_observations_run_kind_by_kind_and_come_back_in_order():
-    several = [make(Doubled, 1.0), make(Tripled, 2.0, 3.0, 4.0), make(Doubled, 5.0, 6.0)]
-    rows, predictions, sound = Experiment(several).residual(jb.Scene(), jb.Newton())
-    np.testing.assert_array_equal(rows, [[0.5, 0.0, 0.0], [2.0, 3.0, 4.0], [2.5, 3.0, 0.0]])
-    np.testing.assert_array_equal(predictions[1], [6.0, 9.0, 12.0])
-    np.testing.assert_array_equal(predictions[2, :2], [10.0, 12.0])
-    assert bool(sound)
+def test_noise_goes_with_the_part_of_a_curve():
+    noise = np.linspace(1.0, 2.0, 11)
+    part = SqueezeCurve(X, STRESS, noise=noise, weight=2.0).between(46.5, 54.5)
+    np.testing.assert_array_equal(part.noise, noise[2:10])
+    assert part.weight == 2.0
+    np.testing.assert_allclose(observe(part, scenes.squeezed()).weight, 1.0 / noise[2:10])
+
+
+def test_noise_of_a_mean_loop_is_that_of_the_mean():
+    column = np.linspace(0.0, 1.0, 9)
+    assert noise_of(Loop(column, column, "one")) is None
+    np.testing.assert_allclose(noise_of(Loop(column, column, "9", noise=0.3, cycles=9)), 0.1)
+    scatter = np.full(9, 0.6)
+    np.testing.assert_allclose(
+        noise_of(Loop(column, column, "4", noise=0.3, cycles=4, scatter=scatter)), 0.3
+    )
+
+
+def test_a_backbone_only_goes_on():
+    up = Backbone([0.1, 0.3, 0.2], [1.0, 2.0, 3.0])
+    with pytest.raises(jb.InputError, match=r"force = 0.2 turns back at point 3: .* give a Loop"):
+        observe(up, jb.Scene())
+    down = observe(Backbone([-0.1, -0.2, -0.3], [-1.0, -2.0, -3.0]), jb.Scene())
+    assert np.all(np.diff(down.path) <= 0.0)
+    with pytest.raises(jb.InputError, match="must stay below gross slip"):
+        observe(DissipationCurve([0.5, 5.0], [1.0, 1.0]), jb.Scene())
 
 
 def test_a_trial_without_equilibrium_is_hopeless_where_it_is_compared():
-    rows, _, sound = Experiment([make(Doubled, 91.0), make(Doubled, 1.0, 2.0)]).residual(
-        jb.Scene(), jb.Newton()
-    )
-    np.testing.assert_array_equal(rows, [[HOPELESS, 0.0], [0.5, 1.0]])
+    formula = observe(toy.readings(), toy.scene(**{"contact.friction": 60.0}))
+    rows, _, sound = formula.residual(toy.scene(**{"contact.friction": 60.0}), jb.Newton())
+    np.testing.assert_array_equal(rows, HOPELESS)
     assert not bool(sound)
+    noisy = observe(toy.readings(1e-3, known=True), toy.scene())
+    rows, _, _ = noisy.residual(toy.scene(**{"contact.friction": 60.0}), jb.Newton())
+    np.testing.assert_allclose(rows, HOPELESS * np.ptp(noisy.measured) / 1e-3)

@@ -25,7 +25,7 @@ COARSE = {
 }
 TABLES = {"loop.csv", "profiles.csv", "sections.csv", "result.json", "scene.toml"}
 RUN_FILES = TABLES | {"loop.png", "profiles.png", "contact.png"}
-FIT_FILES = {"overlay.csv", "overlay.png", "result.json", "scene.toml"}
+FIT_FILES = {"overlay.csv", "overlay.png", "residuals.png", "result.json", "scene.toml"}
 
 
 @pytest.fixture(scope="module")
@@ -225,6 +225,7 @@ def test_a_fit_in_a_folder(result, tmp_path):
     assert jb.read_scene(folder / "scene.toml").contact.friction == 1.0 / 3.0
     assert json.loads((folder / "result.json").read_text())["misfit"] == 0.1
     assert is_png(folder / "overlay.png")
+    assert is_png(folder / "residuals.png")
 
 
 def test_what_cannot_be_written_leaves_nothing(history, result, tmp_path):

@@ -1,0 +1,142 @@
+"""Curves in files: dissipation or stiffness over amplitude, squeeze stress along a strip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from jbeamshell.columns import bare, factor_of, unit_of
+from jbeamshell.containers import read_table
+from jbeamshell.errors import InputError
+from jbeamshell.measurements import Curve, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.recordings import FilePath, labels_of
+
+# What the columns of a kind of curve are measured in, all per unit width.
+QUANTITIES: dict[str, dict[str, tuple[str, ...]]] = {
+    "dissipation": {"amplitude": ("N/m", "m"), "dissipation": ("J/m",)},
+    "stiffness": {"amplitude": ("N/m", "m"), "stiffness": ("N/m^2",)},
+    "squeeze": {"x": ("m",), "stress": ("N/m^2",)},
+}
+MAKERS: dict[str, Callable[..., Curve]] = {
+    "dissipation": DissipationCurve,
+    "stiffness": StiffnessCurve,
+    "squeeze": SqueezeCurve,
+}
+
+
+def read_curves(
+    paths: FilePath | Sequence[FilePath],
+    kind: str,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    decimal: str | None = None,
+) -> list[tuple[Curve, tuple[str, ...]]]:
+    """Curves of one kind from one file or several, of the formats that `read_recordings` reads.
+
+    Columns are found by their names, "amplitude" and "dissipation", "amplitude" and "stiffness",
+    "x" and "stress", with units or not; all forces are per width.  A column "noise" holds the
+    standard deviation of the second, in its unit.
+
+    Parameters
+    ----------
+    paths : the file, or several; labels are the files' names
+    kind : "dissipation", "stiffness" or "squeeze"
+    columns : name of a column by what is in it
+    units : unit by the same, whatever the header says
+    decimal : "," or ".", where the numbers alone do not tell
+
+    Returns
+    -------
+    each curve, with a line on each thing that was done to the data
+
+    Raises
+    ------
+    InputError
+        naming the file, the line or column, and the fix
+    """
+    if kind not in QUANTITIES:
+        raise InputError(f"kind = {kind!r}: choose among {', '.join(map(repr, QUANTITIES))}")
+    known = (*QUANTITIES[kind], "noise")
+    for name, given in (("columns", columns or {}), ("units", units or {})):
+        for quantity in given:
+            if quantity not in known:
+                raise InputError(f"{name}: {quantity!r} is unknown: choose among {known}")
+    files = list(paths) if isinstance(paths, Sequence) and not isinstance(paths, str) else [paths]
+    return [
+        _read(path, label, kind, columns or {}, units or {}, decimal)
+        for path, label in zip(files, labels_of(files), strict=True)
+    ]
+
+
+def _read(
+    path: FilePath,
+    label: str,
+    kind: str,
+    chosen: Mapping[str, str],
+    given: Mapping[str, str],
+    decimal: str | None,
+) -> tuple[Curve, tuple[str, ...]]:
+    wanted = QUANTITIES[kind]
+
+    def places(titles: Sequence[str]) -> dict[str, int]:
+        names = [bare(title).strip().lower() for title in titles]
+        asked = {quantity: chosen.get(quantity, quantity) for quantity in (*wanted, "noise")}
+        asked = {quantity: bare(title).strip().lower() for quantity, title in asked.items()}
+        return {quantity: names.index(t) for quantity, t in asked.items() if t in names}
+
+    table = read_table(path, lambda titles: set(wanted) <= set(places(titles)), decimal)
+    found = places(table.titles)
+    held = ", ".join(repr(title.strip()) for title in table.titles)[:200]
+    for quantity in (*wanted, *chosen):
+        if quantity not in found:
+            name = chosen.get(quantity, quantity)
+            raise InputError(
+                f"{table.name}: needs a column {name!r} {table.place}, which holds {held}: name it "
+                "there, or choose it with the argument columns"
+            )
+    below = dict(zip(found, table.units(list(found.values())), strict=True))
+    rows = table.numbers(
+        [found[quantity] for quantity in wanted], [found[q] for q in found if q == "noise"]
+    )
+    titles = {quantity: table.titles[place] for quantity, place in found.items()}
+    factors = _factors(wanted, titles, below, given, table.name)
+    whole = ~np.isnan(rows).any(axis=1)
+    rows = rows[whole] * factors
+    notes = ()
+    if not whole.all():
+        notes = (f"{np.count_nonzero(~whole)} of {whole.size} rows lack a number: left out",)
+    noise = rows[:, 2] if rows.shape[1] > 2 else None
+    return MAKERS[kind](rows[:, 0], rows[:, 1], label, noise), notes
+
+
+def _factors(
+    wanted: Mapping[str, tuple[str, ...]],
+    titles: Mapping[str, str],
+    below: Mapping[str, Any],
+    given: Mapping[str, str],
+    name: str,
+) -> list[float]:
+    """Factors of the columns; the noise is in the unit of what it belongs to, unless it has one."""
+    units = {q: given.get(q) or unit_of(title) or below[q] for q, title in titles.items()}
+    first, second = wanted
+    if bool(units[first]) != bool(units[second]):
+        without = first if units[second] else second
+        raise InputError(
+            f"{name}: column {titles[without]!r} names no unit but the other one does: write "
+            f"'{without} [{wanted[without][0]}]'"
+        )
+    factors = {}
+    for quantity, unit in units.items():
+        bases = wanted[second if quantity == "noise" else quantity]
+        unit = unit or (units[second] if quantity == "noise" else None)
+        factor = 1.0 if unit is None else factor_of(unit, bases)
+        if factor is None:
+            raise InputError(
+                f"{name}: column {titles[quantity]!r}: {str(unit)[:40]!r} is no unit of "
+                f"{quantity}: write one in brackets, such as '{quantity} [{bases[0]}]'"
+            )
+        factors[quantity] = factor
+    return [factors[quantity] for quantity in (*wanted, "noise") if quantity in factors]

@@ -1,0 +1,170 @@
+"""Bounds, scales and ties: the way from an unbounded search space to the scene and back."""
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given
+
+import jbeamshell as jb
+from jbeamshell.parameters import Parameter, as_parameters, search_space
+
+MU = "contact.friction"
+INTERVALS = (
+    (None, None, "log"),
+    (None, None, "linear"),
+    (0.01, None, "log"),
+    (0.01, None, "linear"),
+    (None, 3.0, "log"),
+    (0.01, 3.0, "log"),
+    (0.01, 3.0, "linear"),
+)
+
+
+@st.composite
+def bijections(draw):
+    low, high, scale = draw(st.sampled_from(INTERVALS))
+    start = draw(st.floats(0.011, 2.9))
+    return Parameter(MU, low=low, high=high, scale=scale).bijection(start)
+
+
+@given(bijections(), st.floats(0.0102, 2.99))
+def test_there_and_back(bijection, value):
+    assert bijection.value(bijection.point(value)) == pytest.approx(value, rel=1e-9)
+    free, (low, high) = bijection.straight()
+    assert low < free.point(value) < high
+    assert free.value(free.point(value)) == pytest.approx(value, rel=1e-12)
+
+
+@given(bijections(), st.floats(-6.0, 6.0))
+def test_every_point_lies_within_the_bounds_and_slopes_are_derivatives(bijection, point):
+    assert bijection.low <= bijection.value(point) <= bijection.high
+    step = 1e-5
+    rise = bijection.value(point + step) - bijection.value(point - step)
+    # Differences lose what they take from numbers of another size.
+    rounding = 1e-10 * abs(bijection.value(point))
+    assert rise / (2.0 * step) == pytest.approx(bijection.slope(point), rel=1e-6, abs=rounding)
+    assert bijection.slope(point) > 0.0
+
+
+@given(bijections())
+def test_zero_is_the_start(bijection):
+    assert bijection.value(0.0) == pytest.approx(bijection.start, rel=1e-14)
+    assert bijection.point(bijection.start) == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("key", "start", "low", "high"),
+    [
+        ("strip.poisson_ratio", 0.3, -1.0, 0.5),
+        ("strip.poisson_ratio", 0.0, -1.0, 0.5),
+        ("contact.smoothing", 16.0, 1.0, np.inf),
+        ("strip.curvature", -2e-4, -np.inf, np.inf),
+        ("strip.youngs_modulus", 2e11, 0.0, np.inf),
+    ],
+)
+def test_where_parameters_live(key, start, low, high):
+    bijection = Parameter(key).bijection(start)
+    assert bijection.value(0.0) == pytest.approx(start, rel=1e-15, abs=1e-15)
+    for far in (-20.0, 20.0):
+        assert low < bijection.value(far) < high
+    for farthest in (-1e6, 1e6):
+        assert np.isfinite(bijection.value(farthest))
+
+
+def test_what_stands_at_a_bound():
+    bijection = Parameter(MU, low=0.1, high=10.0).bijection(1.0)
+    assert bijection.held_by(0.1001) == 0.1
+    assert bijection.held_by(9.99) == 10.0
+    assert bijection.held_by(0.12) is None
+    assert Parameter(MU).bijection(1.0).held_by(1e-12) is None  # of a logarithm zero is no end
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"key": "contact.fricton"}, "did you mean 'contact.friction'"),
+        ({"key": "model.nodes"}, "is not a parameter"),
+        ({"key": "load.amplitude"}, "is not a parameter"),
+        ({"start": np.nan}, "start = nan: give a finite number"),
+        ({"low": True}, "low = True: give a finite number"),
+        ({"low": -0.1}, "low = -0.1: the parameter lives between 0 and inf"),
+        ({"key": "strip.poisson_ratio", "high": 0.6}, r"high = 0.6: .* between -1 and 0.5"),
+        ({"low": 2.0, "high": 1.0}, "low = 2.0: must lie below high = 1"),
+        ({"scale": "cubic"}, "scale = 'cubic': choose 'log' or 'linear'"),
+        ({"key": "strip.curvature", "scale": "log"}, "scale = 'log': needs positive values"),
+        ({"prior": 0.1}, "prior = 0.1: give"),
+        ({"prior": (0.1, 0.0)}, r"prior = \(0.1, 0.0\): give"),
+    ],
+)
+def test_parameters_that_make_no_sense(options, message):
+    with pytest.raises(jb.InputError, match=message):
+        Parameter(**{"key": MU} | options)
+
+
+@pytest.mark.parametrize(
+    ("free", "message"),
+    [((), "name at least one"), ((MU, Parameter(MU)), "twice"), ((3,), "free 3: give a key")],
+)
+def test_lists_that_make_no_sense(free, message):
+    with pytest.raises(jb.InputError, match=message):
+        as_parameters(free)
+
+
+def space_of(free, **scenes):
+    return search_space(as_parameters(free), scenes)
+
+
+def test_shared_and_own_values():
+    two = {label: jb.Scene().replace({"strip.kappa_s": k}) for label, k in (("a", 0.3), ("b", 0.6))}
+    free = (Parameter("strip.kappa_s", each=True), Parameter(MU, start=0.2))
+    space, begun = space_of(free, **two)
+    assert space.names == ("strip.kappa_s[a]", "strip.kappa_s[b]", MU)
+    np.testing.assert_allclose(space.values(np.zeros(3)), [0.3, 0.6, 0.2])
+    assert space.of([1.0, 2.0, 3.0], 1) == {"strip.kappa_s": 2.0, MU: 3.0}
+    assert float(begun["b"].contact.friction) == 0.2
+    points = np.array([-1.0, 0.5, 2.0])
+    np.testing.assert_allclose(space.point(space.values(points)), points)
+    assert space_of(free, alone=jb.Scene())[0].names == ("strip.kappa_s", MU)
+
+
+@pytest.mark.parametrize(
+    ("key", "expected"),
+    [
+        ("strip.height_ratio", 0.1126),
+        ("strip.half_height", 0.1126),
+        ("strip.youngs_modulus", 3.4e4 / (2 * 0.1126) * (1.0 - 0.3**2)),
+        ("contact.stick_stiffness", 1000.0),
+        ("strip.kappa_s", 0.44),
+        (MU, 0.1),
+    ],
+)
+def test_what_users_fit_starts_from_the_scene(key, expected):
+    space, _ = space_of(key, one=jb.Scene())
+    assert space.values([0.0])[0] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("free", "message"),
+    [
+        (("contact.smoothing",), "'sharp'; give it a number"),
+        (("strip.curvature",), "the scene has none"),
+        (("contact.bottom_pressure",), "is 0; give it another"),
+        ((Parameter(MU, low=0.2),), "start = 0.1: must lie between low = 0.2 and high = inf"),
+        ((Parameter(MU, start=0.5, high=0.4),), "start = 0.5: must lie between"),
+    ],
+)
+def test_starts_that_make_no_sense(free, message):
+    with pytest.raises(jb.InputError, match=message):
+        space_of(free, one=jb.Scene())
+
+
+def test_a_shared_parameter_needs_one_start():
+    other = jb.Scene().replace({MU: 0.3})
+    with pytest.raises(jb.InputError, match=r"shared, but the specimens start from 0.1 to 0.3"):
+        space_of(MU, a=jb.Scene(), b=other)
+
+
+def test_a_table_is_no_number():
+    rows = [[0.0, 10.0], [2.0, 5.0]]
+    with pytest.raises(jb.InputError, match="is a table"):
+        space_of("contact.pressure", one=jb.Scene().replace({"contact.pressure": rows}))

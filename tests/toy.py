@@ -1,0 +1,63 @@
+"""A measurement that a formula answers, so that tests of fits need no load steps."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+import jbeamshell as jb
+from jbeamshell.measurements import Curve, _noise
+from jbeamshell.observations import Observation, observe
+
+X = np.linspace(0.05, 1.0, 20)
+TRUTH = {"contact.friction": 0.1, "strip.height_ratio": 0.2, "strip.kappa_s": 0.44}
+KEYS = tuple(TRUTH)
+START = {"contact.friction": 0.2, "strip.height_ratio": 0.1, "strip.kappa_s": 0.3}
+
+
+def formula(x, mu, eta, kappa_s):
+    """Linear in mu and kappa_s, not in eta; numbers or traced."""
+    return mu * (1.0 - jnp.exp(-x / eta)) + 0.2 * kappa_s * x
+
+
+class Readings(Curve):
+    x: np.ndarray
+    y: np.ndarray
+    label: str = eqx.field(static=True)
+    noise: np.ndarray | None
+    weight: float = eqx.field(static=True)
+
+    def __init__(self, x, y, label="toy", noise=None, weight=1.0):
+        self.x, self.y, self.label, self.weight = np.asarray(x), np.asarray(y), label, weight
+        self.noise = _noise(noise, self.x)
+
+    def __check_init__(self):
+        self._check(1, x=self.x, y=self.y)
+
+    def response(self, scene):
+        return "y"
+
+
+class Formula(Observation):
+    x: Array
+
+    def predict(self, scene, solver):
+        return formula(self.x, *(scene.get(key) for key in KEYS)), scene.contact.friction < 50.0
+
+
+@observe.register
+def _(measurement: Readings, scene):
+    weight = 1.0 / np.ptp(measurement.y) if measurement.noise is None else 1.0 / measurement.noise
+    weight = np.broadcast_to(weight, measurement.x.shape)
+    return Formula(*map(jnp.asarray, (measurement.y, weight, measurement.x)))
+
+
+def scene(**values):
+    return jb.Scene().replace(START | {key: values[key] for key in values})
+
+
+def readings(noise=0.0, seed=0, known=False, label="toy", weight=1.0, **truth):
+    """The formula at the truth, with Gaussian noise that the measurement knows or not."""
+    y = np.asarray(formula(X, *(TRUTH | truth).values()))
+    y = y + noise * np.random.default_rng(seed).standard_normal(X.size)
+    return Readings(X, y, label, noise if known else None, weight)
