@@ -1,8 +1,9 @@
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell import identify, plotting
+from jbeamshell import identify
 from jbeamshell.example import example_loops
 from jbeamshell.loops import Loop, make_loop
 from jbeamshell.observations import SqueezeCurve
@@ -82,7 +83,7 @@ def test_a_mixture_of_loops_a_first_loading_and_a_squeeze_curve():
     loops, curves = fit.plot()
     assert len(loops.lines) == 4
     assert len(curves.lines) == 2
-    plotting.plt.close("all")
+    plt.close("all")
 
 
 @pytest.mark.parametrize(
