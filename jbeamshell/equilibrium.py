@@ -184,29 +184,17 @@ class System(eqx.Module):
 
     def strain_energy(self, q: Array) -> Array:
         """Elastic energy of the strip with nodal fields q (n, 4), per unit width."""
-
-        def energy(nodal: tuple[Array, ...], start: Array, length: Array) -> Array:
-            points = self._strains(nodal, start, length)
-            weights = self._rule.weights.tolist()
-            return length * sum(w * self.energy(*s) for w, s in zip(weights, points, strict=True))
-
-        return jnp.sum(jax.vmap(energy)(*self._elements(q)))
+        density = jax.vmap(jax.vmap(self.energy))(*self._strains(q))
+        return jnp.sum(self._rule.weights[:, None] * self.lengths * density)
 
     def section_forces(self, q: Array) -> Strains:
         """Mean N, Q, M, chi and xi of every element, (elements,) each."""
-
-        def mean(nodal: tuple[Array, ...], start: Array, length: Array) -> Strains:
-            points = self._strains(nodal, start, length)
-            weights = self._rule.weights.tolist()
-            each = [forces(self.energy, s) for s in points]
-            if self.model.squeeze == "assumed":
-                stretch = 2.0 * self.half_height * jnp.asarray(self.youngs_modulus)
-                each = [f._replace(psi=stretch * s.psi) for f, s in zip(each, points, strict=True)]
-            return jax.tree.map(
-                lambda *f: jnp.asarray(sum(w * a for w, a in zip(weights, f, strict=True))), *each
-            )
-
-        return jax.vmap(mean)(*self._elements(q))
+        strains = self._strains(q)
+        each = jax.vmap(jax.vmap(lambda s: forces(self.energy, s)))(strains)
+        if self.model.squeeze == "assumed":
+            stretch = 2.0 * self.half_height * jnp.asarray(self.youngs_modulus)
+            each = each._replace(psi=stretch * strains.psi)
+        return jax.tree.map(lambda f: jnp.sum(self._rule.weights[:, None] * f, axis=0), each)
 
     @property
     def middles(self) -> Array:
@@ -217,29 +205,23 @@ class System(eqx.Module):
     def _starts(self) -> Array:
         return self.x[: -1 : grid.ORDER[self.model.grid]]
 
-    def _elements(self, q: Array) -> tuple[tuple[Array, ...], Array, Array]:
-        # Fields apart, points last: the compiler then works on whole vectors of elements.
-        order = grid.ORDER[self.model.grid]
-        return tuple(grid.gather(column, order) for column in q.T), self._starts, self.lengths
+    def _strains(self, q: Array) -> Strains:
+        """Strains at all points of all elements, (points, elements) each."""
 
-    def _strains(self, nodal: tuple[Array, ...], start: Array, length: Array) -> list[Strains]:
-        """Strains at an element's points from the nodal values (p+1,) of every field."""
+        def at(shape: np.ndarray, values: Array) -> Array:
+            # Elements last, and no matrix product: the compiler works on whole vectors of them.
+            return jnp.asarray(sum(s[:, None] * v for s, v in zip(shape.T, values.T, strict=True)))
 
-        def at(shape: np.ndarray, values: Array | np.ndarray) -> Array:
-            return jnp.asarray(sum(float(s) * values[i] for i, s in enumerate(shape) if s != 0.0))
-
-        rule, strains = self._rule, []
+        rule, order = self._rule, grid.ORDER[self.model.grid]
+        nodal = [grid.gather(column, order) for column in q.T]
         shapes = [rule.squeeze if field == PSI else rule.values for field in range(len(FIELDS))]
-        for point in range(rule.weights.size):
-            section = [at(shape[point], v) for shape, v in zip(shapes, nodal, strict=True)]
-            slope = [at(rule.slopes[point], values) / length for values in nodal]
-            if self.curvature is not None:
-                angle = self._angle(start + at(rule.values[point], rule.nodes) * length)
-                slope[V], slope[W] = turned(slope[V], slope[W], angle)
-            strains.append(
-                self._kinematics.strains(section, slope, self.half_height, self.curvature)
-            )
-        return strains
+        section = [at(shape, values) for shape, values in zip(shapes, nodal, strict=True)]
+        slope = [at(rule.slopes, values) / self.lengths for values in nodal]
+        if self.curvature is not None:
+            inside = rule.values @ rule.nodes
+            angle = self._angle(self._starts + inside[:, None] * self.lengths)
+            slope[V], slope[W] = turned(slope[V], slope[W], angle)
+        return self._kinematics.strains(section, slope, self.half_height, self.curvature)
 
     def end_displacement(self, q: Array) -> Array:
         """u(L): mid-height displacement of the loaded end, the conjugate of F."""

@@ -132,7 +132,7 @@ def _write(folder: Path, texts: Mapping[str, str], pictures: Mapping[str, Any]) 
         write_text(folder / name, text)
     for name, figure in pictures.items():
         plotting.save(figure, folder / name)
-        plotting.plt.close(figure)
+        plotting.close(figure)
     return [folder / name for name in (*texts, *pictures)]
 
 

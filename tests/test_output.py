@@ -9,9 +9,10 @@ import jax
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import jbeamshell as jb
-from jbeamshell import output, plotting
+from jbeamshell import output
 from jbeamshell.energy import Homogeneous
 from jbeamshell.errors import InputError
 from jbeamshell.identify import Fit
@@ -240,7 +241,7 @@ def test_an_interrupted_picture_leaves_whole_files(history, tmp_path, monkeypatc
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plotting.Figure, "savefig", interrupted)
+    monkeypatch.setattr(Figure, "savefig", interrupted)
     with pytest.raises(KeyboardInterrupt):
         output.write_run(tmp_path, history, {})
     assert names(tmp_path) == {name for name in RUN_FILES if not name.endswith(".png")}

@@ -1,0 +1,26 @@
+"""Pictures of a history: the loop, the profiles along X, the contact, and a fit over its data.
+
+The only package that imports matplotlib.  Every function draws into the axes it is given or into
+new ones, returns them, and neither shows them nor changes matplotlib's settings.  `style` dresses
+figures of your own alike.
+"""
+
+from jbeamshell.plotting.contacts import contact as contact
+from jbeamshell.plotting.contacts import contact_map as contact_map
+from jbeamshell.plotting.fits import overlay as overlay
+from jbeamshell.plotting.fits import squeeze_fit as squeeze_fit
+from jbeamshell.plotting.paths import loop as loop
+from jbeamshell.plotting.paths import profiles as profiles
+from jbeamshell.plotting.style import DATA as DATA
+from jbeamshell.plotting.style import DISPLACEMENT as DISPLACEMENT
+from jbeamshell.plotting.style import DOTS as DOTS
+from jbeamshell.plotting.style import FAINT as FAINT
+from jbeamshell.plotting.style import FORCE as FORCE
+from jbeamshell.plotting.style import PALETTE as PALETTE
+from jbeamshell.plotting.style import POSITION as POSITION
+from jbeamshell.plotting.style import SQUEEZE as SQUEEZE
+from jbeamshell.plotting.style import STYLE as STYLE
+from jbeamshell.plotting.style import close as close
+from jbeamshell.plotting.style import colours as colours
+from jbeamshell.plotting.style import save as save
+from jbeamshell.plotting.style import style as style

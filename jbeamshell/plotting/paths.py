@@ -1,0 +1,139 @@
+"""The loop of a history, and its profiles along X."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike
+
+from jbeamshell.errors import InputError
+from jbeamshell.history import History
+from jbeamshell.plotting.steps import checked_steps, default_steps, load_label
+from jbeamshell.plotting.style import (
+    DATA,
+    DISPLACEMENT,
+    FAINT,
+    FORCE,
+    PALETTE,
+    POSITION,
+    colours,
+    single,
+    style,
+)
+
+
+def loop(history: History, axes: Axes | None = None) -> Axes:
+    """Draw end force over end displacement: the whole path, its last closed cycle emphasised.
+
+    Parameters
+    ----------
+    history : History
+        A solved load path.
+    axes : matplotlib.axes.Axes, optional
+        Where to draw; new axes when not given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn into.
+    """
+    with style():
+        axes = single(axes)
+        closed = bool(history.cycles)
+        axes.plot(
+            np.asarray(history.displacement),
+            np.asarray(history.force),
+            color=FAINT if closed else PALETTE[0],
+            linewidth=1.1 if closed else 1.6,
+            label="path",
+        )
+        if closed:
+            force, displacement = map(np.asarray, history.loop)
+            axes.plot(displacement, force, color=PALETTE[0], linewidth=2.0, label="last cycle")
+        axes.set(xlabel=DISPLACEMENT, ylabel=FORCE)
+        axes.legend(loc="upper left")
+    return axes
+
+
+def profiles(
+    history: History, steps: Sequence[int] | None = None, axes: ArrayLike | None = None
+) -> np.ndarray:
+    """Draw slip, rotation, friction traction and normal reaction along X at chosen steps.
+
+    Parameters
+    ----------
+    history : History
+        A solved load path.
+    steps : sequence of int, optional
+        Indices into the path, 0 being the strip before the load and -1 its end. When not given: the
+        zero crossings and turning points of the last cycle, or four steps of a path without one.
+    axes : array_like of matplotlib.axes.Axes, optional
+        Four axes, for slip, rotation, traction and reaction; a new figure when not given.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+        The axes drawn into, in the shape they came in, or (2, 2).
+
+    Raises
+    ------
+    InputError
+        If a step lies outside the path, or there are not four axes.
+
+    Notes
+    -----
+    Traction and reaction are shown over mu F_N and F_N; a pressure that varies along X counts with
+    its largest value. Without friction the traction has no such measure and is shown as it is. Dots
+    mark the contact points that slipped in the step.
+    """
+    chosen = checked_steps(history, default_steps(history) if steps is None else steps)
+    contact = history.scene.contact
+    pressure = float(contact.largest_pressure)
+    cap = float(contact.friction) * pressure
+    squeezes = "psi" in history.scene.model.fields
+    with style():
+        grid = _four(axes)
+        slip, rotation, traction, reaction = grid.ravel()
+        x = np.asarray(history.x)
+        for step, colour in zip(chosen, colours(len(chosen)), strict=True):
+            slip.plot(x, np.asarray(history.slip[step]), color=colour)
+            rotation.plot(x, np.asarray(history.beta[step]), color=colour)
+            if squeezes:
+                change = np.asarray(history.psi[step] - history.psi[history.pressed])
+                rotation.plot(x, change, color=colour, linestyle="--", linewidth=1.1)
+            moving, share = np.asarray(history.slipping[step]), np.asarray(history.traction[step])
+            share = share / cap if cap > 0.0 else share
+            traction.plot(x, share, color=colour, label=load_label(history, step))
+            traction.plot(x[moving], share[moving], "o", color=colour, markersize=3.2)
+            reaction.plot(x, np.asarray(history.reaction[step]) / pressure, color=colour)
+        varies = contact.pressure.ndim > 0
+        over = r"\max F_N" if varies else "F_N"
+        slip.set(title="slip", ylabel="$v - v_p$  [length]")
+        rotation.set(title="rotation", ylabel=r"$\beta$  [rad]")
+        share_of = rf"$t\,/\,\mu {over}$  [1]" if cap > 0.0 else "$t$  [stress]"
+        traction.set(title="friction traction", ylabel=share_of)
+        reaction.set(title="normal reaction", ylabel=rf"$R\,/\,{over}$  [1]")
+        if squeezes:
+            rotation.set(title="rotation and squeeze strain")
+            rotation.set_ylabel(r"$\beta$  [rad],  $\psi - \psi_p$  [1]")
+            kinds = [Line2D([], [], color=DATA), Line2D([], [], color=DATA, linestyle="--")]
+            rotation.legend(kinds, [r"$\beta$", r"$\psi - \psi_p$"], loc="best")
+        for panel in grid.ravel():
+            panel.set(xlabel=POSITION)
+        dot = Line2D([], [], color=DATA, marker="o", linestyle="", markersize=3.2)
+        handles, labels = traction.get_legend_handles_labels()
+        traction.legend([*handles, dot], [*labels, "slips"], loc="best")
+    return grid
+
+
+def _four(axes: ArrayLike | None) -> np.ndarray:
+    if axes is None:
+        return plt.subplots(2, 2, figsize=(9.0, 6.0), sharex=True)[1]
+    grid = np.asarray(axes, dtype=object)
+    if grid.size != 4:
+        raise InputError(f"axes: profiles need four, not {grid.size}")
+    return grid

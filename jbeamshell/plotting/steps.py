@@ -1,0 +1,64 @@
+"""Steps of a history that are worth drawing, and what they are called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from jbeamshell.cycles import turning_points
+from jbeamshell.errors import InputError
+from jbeamshell.history import History
+
+
+def checked_steps(history: History, steps: Sequence[int]) -> list[int]:
+    """Indices into the path from its start; raises `InputError` for one that lies outside."""
+    count = history.force.shape[0]
+    for step in steps:
+        if not -count <= step < count:
+            raise InputError(f"steps: {step} is not on the path, whose steps are 0 to {count - 1}")
+    return [int(step) % count for step in steps]
+
+
+def default_steps(history: History) -> list[int]:
+    """Zero crossings and turns of the last cycle, or steps spread over a path without one."""
+    force, pressed = np.asarray(history.force), history.pressed
+    if not history.cycles:
+        if pressed + 1 == force.size:
+            return _four_steps(-1, pressed)
+        turns = turning_points(force)[1:]
+        return turns if len(turns) > 1 else _four_steps(pressed, turns[0])
+    start, turn, stop = history.cycles[-1]
+    chosen = []
+    for first, last in ((start, turn), (turn, stop)):
+        if force[first] * force[last] < 0.0:
+            chosen.append(first + int(np.argmin(np.abs(force[first : last + 1]))))
+        chosen.append(last)
+    return chosen
+
+
+def default_contact_steps(history: History) -> list[int]:
+    """The pressed strip and the last cycle's turns; the end of a path without one."""
+    if history.cycles:
+        return [history.pressed, *history.cycles[-1][1:]]
+    last = history.force.size - 1
+    return _four_steps(-1, last) if history.pressed == last else [last]
+
+
+def _four_steps(start: int, stop: int) -> list[int]:
+    """Up to four steps after the start, the last one being the stop."""
+    steps = np.linspace(start, stop, 5)[1:].round().astype(int)
+    return sorted(set(np.maximum(steps, start + 1).tolist()))
+
+
+def load_label(history: History, step: int) -> str:
+    """The load of a step, and at a zero crossing which way it was going."""
+    force, part = float(history.force[step]), float(history.pressure[step])
+    if history.pressed + 1 == history.force.size:
+        return f"{100.0 * part:.3g} % of $F_N$"
+    if step <= history.pressed or abs(force) > 1e-9 * float(
+        np.nanmax(np.abs(np.asarray(history.force)))
+    ):
+        load = f"$F = {force:.4g}$"
+        return load if part == 1.0 else f"{load}, {100.0 * part:.3g} % of $F_N$"
+    return "$F = 0$, " + ("rising" if force > float(history.force[step - 1]) else "falling")

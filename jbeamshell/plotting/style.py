@@ -1,0 +1,119 @@
+"""How pictures look, and how they are saved."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from jbeamshell.errors import InputError
+from jbeamshell.files import written_whole
+
+STYLE: dict[Any, Any] = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": "0.4",
+    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.use_mathtext": True,
+    "axes.grid": True,
+    "axes.labelsize": 10,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 10,
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 90,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.7,
+    "legend.fontsize": 9,
+    "legend.frameon": False,
+    "lines.linewidth": 1.6,
+    "xtick.color": "0.3",
+    "xtick.labelsize": 9,
+    "ytick.color": "0.3",
+    "ytick.labelsize": 9,
+}
+# Okabe and Ito's palette, told apart by colour-blind readers too.
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+DATA = "0.15"
+FAINT = "0.65"
+DOTS: dict[str, Any] = {
+    "color": DATA,
+    "linestyle": "",
+    "marker": "o",
+    "markersize": 2.4,
+    "markeredgewidth": 0.0,
+    "zorder": 3.0,
+}
+FORCE = "$F$  [force per width]"
+DISPLACEMENT = "$u(L)$  [length]"
+POSITION = "$X$  [length]"
+SQUEEZE = r"$\chi\,/\,2H$  [stress]"
+
+
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """Settings `STYLE` for the figures made in a ``with`` block."""
+    # Not plt.rc_context: it would also restore what a notebook sets when it makes its first figure.
+    before = {key: plt.rcParams[key] for key in STYLE}
+    plt.rcParams.update(STYLE)
+    try:
+        yield
+    finally:
+        plt.rcParams.update(before)
+
+
+def colours(count: int) -> list[Any]:
+    """Colours of a family of curves, in the order of its parameter.
+
+    Parameters
+    ----------
+    count : int
+        Number of curves.
+
+    Returns
+    -------
+    list
+        Matplotlib colours: the palette for a few curves, viridis without its palest part for many.
+    """
+    if count <= len(PALETTE):
+        return list(PALETTE[:count])
+    return list(plt.get_cmap("viridis")(np.linspace(0.0, 0.92, count)))
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure to a file, whole or not at all.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        The figure; of axes it is ``axes.figure``.
+    path : str or path
+        File to write; its suffix (.png, .pdf, .svg, ...) chooses the format.
+
+    Raises
+    ------
+    InputError
+        If the suffix is no format that matplotlib writes, or the file cannot be written.
+    """
+    suffix = Path(path).suffix.removeprefix(".").lower()
+    formats = sorted(figure.canvas.get_supported_filetypes())
+    if suffix not in formats:
+        raise InputError(f"{path}: end the name in .{' or .'.join(formats)}")
+    with written_whole(path) as draft:
+        figure.savefig(draft, format=suffix, dpi=200)
+
+
+def single(axes: Axes | None) -> Axes:
+    """The axes, or new ones."""
+    return plt.subplots(figsize=(5.6, 4.0))[1] if axes is None else axes
+
+
+def close(figure: Figure) -> None:
+    """Let go of a figure that is saved; matplotlib keeps it otherwise."""
+    plt.close(figure)
