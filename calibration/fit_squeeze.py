@@ -28,8 +28,8 @@ from jbeamshell import identify, plotting, scenes  # noqa: E402
 from jbeamshell.elasticity import best_kappa_s, squeeze_decay_length  # noqa: E402
 from jbeamshell.example import data_folder, example_loops  # noqa: E402
 from jbeamshell.files import write_text  # noqa: E402
-from jbeamshell.loops import Loop, make_loop  # noqa: E402
-from jbeamshell.observations import SqueezeCurve  # noqa: E402
+from jbeamshell.identify.observations import SqueezeCurve  # noqa: E402
+from jbeamshell.measured.loops import Loop, make_loop  # noqa: E402
 
 HERE = Path(__file__).parent
 EDGE = 50.0  # mm, where the pressure ends

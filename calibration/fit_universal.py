@@ -28,7 +28,7 @@ import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify, plotting  # noqa: E402
 from jbeamshell.example import HEIGHT_RATIOS, data_folder  # noqa: E402
 from jbeamshell.files import write_text  # noqa: E402
-from jbeamshell.measurements import DissipationCurve  # noqa: E402
+from jbeamshell.measured.curves import DissipationCurve  # noqa: E402
 
 HERE = Path(__file__).parent
 FREE = ("strip.kappa_s", "contact.stick_stiffness")
@@ -43,7 +43,9 @@ STRONG = 0.3  # of the cubic law: strips that dissipate more are what a joint is
 def curve(height_ratio: float) -> tuple[DissipationCurve, np.ndarray]:
     """Dissipation of a strip by finite elements, and its ratio to the cubic law."""
     with (data_folder() / "energy.csv").open(newline="", encoding="utf-8") as file:
-        rows = [[float(r[name]) for name in ("eta", "A", "D", "ratio")] for r in csv.DictReader(file)]
+        rows = [
+            [float(r[name]) for name in ("eta", "A", "D", "ratio")] for r in csv.DictReader(file)
+        ]
     own = [row for row in rows if row[0] == height_ratio and row[1] >= LEAST_AMPLITUDE]
     _, amplitude, dissipation, ratio = np.transpose(own)
     return DissipationCurve(amplitude, dissipation, f"eta = {height_ratio:g}"), ratio
@@ -129,9 +131,7 @@ def picture(fit: identify.Fit, record: list[dict]) -> plt.Figure:
     with plotting.style():
         figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2))
         shades = plotting.colours(len(HEIGHT_RATIOS))
-        for data, model, eta, shade in zip(
-            fit.data, fit.model, HEIGHT_RATIOS, shades, strict=True
-        ):
+        for data, model, eta, shade in zip(fit.data, fit.model, HEIGHT_RATIOS, shades, strict=True):
             ratio = curve(eta)[1]
             left.loglog(data.amplitude, ratio, **plotting.DOTS | {"markersize": 4.0})
             left.loglog(

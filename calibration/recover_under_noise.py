@@ -1,4 +1,4 @@
-"""How well planted parameters come back from noisy loops, and whether the intervals keep their word.
+"""How well planted parameters come back from noisy loops, and whether intervals keep their word.
 
 The model's own loops of one strip at three amplitudes get independent noise of 0.1, 1 and 5 % of
 their range, fifty times each, and mu, eta, kappa_s and alpha are fitted to each set, the noise
@@ -29,7 +29,7 @@ from tqdm import tqdm  # noqa: E402
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify, plotting  # noqa: E402
 from jbeamshell.files import write_text  # noqa: E402
-from jbeamshell.loops import Loop, make_loop  # noqa: E402
+from jbeamshell.measured.loops import Loop, make_loop  # noqa: E402
 
 HERE = Path(__file__).parent
 TRUTH = {
@@ -92,7 +92,7 @@ def recovered(loops: list[Loop]) -> dict:
 
 
 def likelihood_root(fit: identify.Fit, loops: list[Loop], key: str) -> float:
-    """Root of the rise of the cost, in units of the noise, when a parameter is held at the truth."""
+    """Root of the rise of the cost, in units of the noise, of a parameter held at the truth."""
     others = tuple(name for name in TRUTH if name != key)
     scene = fit.scene.replace({key: TRUTH[key]})
     held = identify.fit(loops, scene, others, throw=False)

@@ -6,7 +6,7 @@ from importlib import resources
 from pathlib import Path
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import Loop, read_loops
+from jbeamshell.measured.loops import Loop, read_loops
 
 EXAMPLE_AMPLITUDES = (0.3247, 0.5851, 1.0, 1.6)
 HEIGHT_RATIOS = (0.0305, 0.0511, 0.1126, 0.2358, 0.4)

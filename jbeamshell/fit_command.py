@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from jbeamshell.errors import InputError
-from jbeamshell.terminal import assignments, pairs, put, say, say_written, warn
+from jbeamshell.terminal import assignments, pairs, put, say, say_written
 
 EXAMPLE_START = {"contact.friction": 0.15, "strip.height_ratio": 0.2}
 EXAMPLE_FREE = "contact.friction,strip.height_ratio"
@@ -46,7 +46,7 @@ def add_to(commands: Any) -> argparse.ArgumentParser:
         fit.add_argument(f"--{name}", action="append", default=[], metavar=metavar, help=text)
     words = {
         "kind": "of the data: loop (default), backbone, dissipation, stiffness or squeeze",
-        "cycles": "steady: average the steady cycles; recorded: take all as it stands; default auto",
+        "cycles": "steady: average the steady ones; recorded: take all as it stands; default auto",
         "drift": "keep (default), linear or cycle: what to remove from a recording",
         "method": "levenberg-marquardt (default), l-bfgs-b or adam",
         "decimal": "decimal sign, where the numbers alone do not tell",
@@ -82,30 +82,26 @@ def run(options: argparse.Namespace) -> int:
         say(note)
     folder = output.check_folder(options.out) if options.out else None
     begin = time.perf_counter()
-    with tqdm(total=identify.MAX_ITERATIONS, disable=None, file=sys.stderr, unit="step") as bar:
+    with tqdm(disable=None, file=sys.stderr, unit="step") as bar:
 
-        def progress(line: str) -> None:
-            bar.set_postfix_str(line)
+        def progress(now: object) -> None:
+            bar.set_postfix_str(str(now))
             bar.update()
 
         result = identify.fit(
             plan.specimens, free=plan.free, save=options.save, progress=progress, **plan.options
         )
-    say("profile likelihoods ..." if options.profile else "")
+    names = [name for name in result.values if name.partition("[")[0] in options.profile]
     profiles = [
         identify.profile(result, name)
-        for name in result.values
-        if name.partition("[")[0] in options.profile
+        for name in tqdm(names, desc="profiles", disable=None if names else True)
     ]
     wall = time.perf_counter() - begin
     figures = result.figures() | {"notes": plan.notes, "wall_s": wall}
     if profiles:
-        figures["profiles"] = {p.name: p.figures() for p in profiles}
-    put(
-        output.as_json(figures)
-        if options.json
-        else "".join(f"{part}\n" for part in (result, *profiles))
-    )
+        figures["profiles"] = {profile.name: profile.figures() for profile in profiles}
+    parts = (result, *profiles)
+    put(output.as_json(figures) if options.json else "".join(f"{part}\n" for part in parts))
     if folder is not None:
         say_written(output.write_fit(folder, result, figures, profiles))
     return 0
@@ -113,7 +109,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _plan(options: argparse.Namespace) -> Any:
     """The plan of a file, or of the options."""
-    from jbeamshell import plan
+    from jbeamshell.identify import plan
 
     if any(name.endswith(".toml") for name in options.data):
         return _plan_of_file(options)
@@ -135,7 +131,7 @@ def _plan(options: argparse.Namespace) -> Any:
 
 def _plan_of_file(options: argparse.Namespace) -> Any:
     """The plan of a file; options may change how it is solved, not what it says."""
-    from jbeamshell import plan
+    from jbeamshell.identify import plan
 
     if len(options.data) > 1:
         raise InputError(f"{' '.join(options.data)}: give one plan, or files of data")
@@ -150,14 +146,15 @@ def _plan_of_file(options: argparse.Namespace) -> Any:
 
 def _example(values: dict[str, Any]) -> Any:
     """The finite-element loops that ship."""
-    from jbeamshell import plan
+    from jbeamshell import scenes
     from jbeamshell.example import example_loops
+    from jbeamshell.identify import plan
     from jbeamshell.scene import overridden
 
-    if "scene" not in values:
-        start = {key: value for key, value in EXAMPLE_START.items() if key in values["free"]}
-        values = values | {"set": overridden(start, values["set"])}
-    return plan.plan_for(values, example_loops())
+    start = {key: value for key, value in EXAMPLE_START.items() if key in values["free"]}
+    scene = values.pop("scene", None)
+    below = overridden(start, scenes.values_from(scene) if scene else {})
+    return plan.plan_for(values | {"set": overridden(below, values["set"])}, example_loops())
 
 
 def _given(options: argparse.Namespace, name: str) -> bool:
@@ -166,7 +163,10 @@ def _given(options: argparse.Namespace, name: str) -> bool:
 
 def _free(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
     """Tables of the free parameters."""
-    keys = [key.strip() for key in (options.free or EXAMPLE_FREE).split(",") if key.strip()]
+    words = EXAMPLE_FREE if options.free is None else options.free
+    keys = [key.strip() for key in words.split(",") if key.strip()]
+    if len(set(keys)) < len(keys):
+        raise InputError(f"--free {words}: names a key twice")
     free: dict[str, dict[str, Any]] = {key: {} for key in keys}
 
     def table(option: str, key: str) -> dict[str, Any]:

@@ -18,10 +18,10 @@ from jbeamshell import plotting
 from jbeamshell.errors import InputError
 from jbeamshell.files import write_text
 from jbeamshell.history import History
-from jbeamshell.likelihood import Profile
-from jbeamshell.loops import Loop
-from jbeamshell.measurements import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
-from jbeamshell.results import Fit
+from jbeamshell.identify.likelihood import Profile
+from jbeamshell.identify.results import Fit
+from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.loops import Loop
 from jbeamshell.scene import scene_to_toml
 
 # Table of a fit: types of its measurements, columns of the data, columns of the model.
@@ -86,7 +86,7 @@ def write_fit(
 
     These are overlay.csv of loops and backbones, squeeze.csv, dissipation.csv and stiffness.csv of
     the other curves, as far as there are any; scene.toml, or scene_1.toml and so on of several
-    specimens; result.json, overlay.png and residuals.png; profiles.csv where there are profiles.
+    specimens; result.json, overlay.png and residuals.png; profiles.csv and profiles.png if asked.
     """
     texts: dict[str, str] = {}
     for name, (types, given, answered) in TABLES.items():
@@ -118,6 +118,8 @@ def write_fit(
         texts["profiles.csv"] = _table(("parameter", "value", "rise"), rows)
     texts["result.json"] = as_json(figures)
     drawn = {"overlay.png": result.plot(), "residuals.png": result.plot_residuals()}
+    if profiles:
+        drawn["profiles.png"] = plotting.likelihoods(profiles)
     pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
     return _write(folder, texts, pictures)
 

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import Loop, make_loop, read_loops
-from jbeamshell.recordings import recording_from_arrays
-from jbeamshell.reversals import find_driver, find_turns
-from jbeamshell.splitting import split_cycles
-from jbeamshell.steady import steady_loops
+from jbeamshell.measured.loops import Loop, make_loop, read_loops
+from jbeamshell.measured.recordings import recording_from_arrays
+from jbeamshell.measured.reversals import find_driver, find_turns
+from jbeamshell.measured.splitting import split_cycles
+from jbeamshell.measured.steady import steady_loops
 
 DRIVERS = ("force", "displacement")
 NOISES = (0.001, 0.01, 0.05)

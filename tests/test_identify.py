@@ -4,20 +4,21 @@ import itertools
 import json
 import os
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import scipy.optimize
 from toy import KEYS, START, Formula, X, formula, readings, scene
 
 import jbeamshell as jb
-from jbeamshell import identify, plotting
+from jbeamshell import identify
 from jbeamshell.example import example_loops
-from jbeamshell.experiment import Experiment
-from jbeamshell.identify import Parameter, Specimen
-from jbeamshell.loops import Loop, make_loop
-from jbeamshell.measurements import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
-from jbeamshell.parameters import as_parameters, search_space
-from jbeamshell.problem import Problem
+from jbeamshell.identify.experiment import Experiment
+from jbeamshell.identify.fitting import Parameter, Specimen
+from jbeamshell.identify.parameters import as_parameters, search_space
+from jbeamshell.identify.problem import Problem
+from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.loops import Loop, make_loop
 
 MU, ETA, KAPPA = KEYS
 METHODS = ("levenberg-marquardt", "l-bfgs-b", "adam")
@@ -378,12 +379,12 @@ def test_a_mixture_of_everything(tmp_path):
     panels = fit.plot()
     assert len(panels) == len(fit.plot_residuals()) == 4
     assert len(panels[0].lines) == 6
-    plotting.plt.close("all")
+    plt.close("all")
     names = {path.name for path in fit.save(tmp_path)}
     assert {"overlay.csv", "squeeze.csv", "dissipation.csv", "stiffness.csv"} < names
     with pytest.raises(jb.InputError, match="these data need 4, not 1"):
-        fit.plot(plotting.plt.figure().subplots())
-    plotting.plt.close("all")
+        fit.plot(plt.figure().subplots())
+    plt.close("all")
 
 
 def test_finite_element_loops_are_recovered_with_small_bias():

@@ -5,8 +5,7 @@ import pytest
 
 from jbeamshell.errors import InputError
 from jbeamshell.example import EXAMPLE_AMPLITUDES, HEIGHT_RATIOS, example_loops
-from jbeamshell.identify import driver_of
-from jbeamshell.loops import FEWEST_POINTS, Loop, make_loop
+from jbeamshell.measured.loops import FEWEST_POINTS, Loop, driver_of, make_loop
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 13)
 FORCE, DISPLACEMENT = 3.0 * np.cos(PHASE), 0.25 * np.cos(PHASE - 0.3)

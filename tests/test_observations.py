@@ -8,15 +8,15 @@ import jbeamshell as jb
 from jbeamshell import identify, scenes
 from jbeamshell.elasticity import squeeze_decay_length, squeeze_step
 from jbeamshell.example import data_folder
-from jbeamshell.loops import Loop
-from jbeamshell.measurements import (
+from jbeamshell.identify.observations import HOPELESS, observe
+from jbeamshell.measured.curves import (
     Backbone,
     DissipationCurve,
     SqueezeCurve,
     StiffnessCurve,
     noise_of,
 )
-from jbeamshell.observations import HOPELESS, observe
+from jbeamshell.measured.loops import Loop
 
 X = np.linspace(45.0, 55.0, 11)
 STRESS = np.linspace(-100.0, 0.0, 11)
@@ -177,6 +177,13 @@ def test_noise_of_a_mean_loop_is_that_of_the_mean():
     np.testing.assert_allclose(
         noise_of(Loop(column, column, "4", noise=0.3, cycles=4, scatter=scatter)), 0.3
     )
+
+
+def test_noise_belongs_to_the_column_that_answered():
+    column = np.linspace(0.0, 1.0, 9)
+    loop = Loop(column, column, "mean", noise=0.3, driver="displacement")
+    with pytest.raises(jb.InputError, match=r"set load\.control to 'displacement'"):
+        observe(loop, jb.Scene())
 
 
 def test_a_backbone_only_goes_on():

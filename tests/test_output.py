@@ -15,8 +15,8 @@ import jbeamshell as jb
 from jbeamshell import output
 from jbeamshell.energy import Homogeneous
 from jbeamshell.errors import InputError
-from jbeamshell.identify import Fit
-from jbeamshell.loops import Loop
+from jbeamshell.identify.fitting import Fit
+from jbeamshell.measured.loops import Loop
 
 COARSE = {
     "model.nodes": 21,

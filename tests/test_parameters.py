@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 
 import jbeamshell as jb
-from jbeamshell.parameters import Parameter, as_parameters, search_space
+from jbeamshell.identify.parameters import Parameter, as_parameters, search_space
 
 MU = "contact.friction"
 INTERVALS = (

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from jbeamshell.curve_files import read_curves
 from jbeamshell.errors import InputError
-from jbeamshell.loops import Loop
-from jbeamshell.measurements import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
-from jbeamshell.plan import Source, plan_from_values, read_plan
+from jbeamshell.identify.plan import Source, plan_from_values, read_plan
+from jbeamshell.measured.curve_files import read_curves
+from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.loops import Loop
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 101)
 

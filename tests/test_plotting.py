@@ -1,7 +1,6 @@
 """Pictures: what is drawn is what was solved, with its axes labelled, and files are whole."""
 
 import dataclasses
-from types import SimpleNamespace
 
 import jax
 import matplotlib.pyplot as plt
@@ -11,6 +10,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell import plotting
 from jbeamshell.errors import InputError
+from jbeamshell.identify import Profile
 
 COARSE = {
     "model.nodes": 21,
@@ -320,35 +320,23 @@ class TestContactMap:
             plotting.contact_map(with_scene(clamped, contact_normal="none"))
 
 
-class TestSqueezeFit:
-    def test_draws_data_as_dots_and_the_model_as_a_line(self):
-        x = np.linspace(0.0, 1.0, 5)
-        data = [SimpleNamespace(x=x, stress=-x, label="measured")]
-        model = [SimpleNamespace(x=x, stress=-(x**2), label="measured")]
-        axes = plotting.squeeze_fit(data, model)
-        line, dots = axes.get_lines()
-        np.testing.assert_array_equal(line.get_ydata(), model[0].stress)
-        np.testing.assert_array_equal(dots.get_ydata(), data[0].stress)
-        assert (line.get_linestyle(), dots.get_linestyle()) == ("-", "None")
-        assert [t.get_text() for t in axes.get_legend().get_texts()] == [
-            "model, measured",
-            "measured",
-        ]
-        assert all(labels(axes))
+class TestLikelihoods:
+    PROFILES = (
+        Profile("mu", np.array([0.1, 0.2, 0.4]), np.array([4.0, 0.0, 5.0]), (0.11, 0.38), 0.95),
+        Profile("kappa_s", np.array([0.1, 0.2]), np.array([4.0, 0.0]), (0.11, np.inf), 0.68),
+    )
 
+    def test_draws_each_with_the_ends_of_its_interval(self):
+        mu, kappa_s = plotting.likelihoods(self.PROFILES)
+        np.testing.assert_array_equal(mu.get_lines()[0].get_ydata(), [4.0, 0.0, 5.0])
+        assert [line.get_xdata()[0] for line in mu.get_lines()[1:]] == [0.11, 0.38]
+        assert len(kappa_s.get_lines()) == 2  # the other end is at infinity
+        assert kappa_s.get_title() == "68 %: 0.11 to inf"
+        assert all(labels(mu))
 
-class TestOverlay:
-    def test_draws_data_as_dots_and_the_model_as_lines(self):
-        data = [(np.arange(3.0), np.arange(3.0) ** 2, "measured")] * 2
-        model = [(np.arange(3.0), np.arange(3.0), "a"), (np.arange(3.0), -np.arange(3.0), "b")]
-        axes = plotting.overlay(data, model, title="fit")
-        styles = [(line.get_linestyle(), line.get_marker()) for line in axes.get_lines()]
-        assert styles == [("-", "None")] * 2 + [("None", "o")] * 2
-        np.testing.assert_array_equal(axes.get_lines()[2].get_xdata(), data[0][1])
-        legend = [text.get_text() for text in axes.get_legend().get_texts()]
-        assert legend == ["a", "b", "measured"]
-        assert all(labels(axes))
-        assert axes.get_title() == "fit"
+    def test_needs_axes_for_each(self):
+        with pytest.raises(InputError, match="there are 2 to draw, not 1"):
+            plotting.likelihoods(self.PROFILES, plt.subplots()[1])
 
 
 class TestStyle:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from jbeamshell.errors import InputError
-from jbeamshell.recordings import FEWEST_POINTS, read_recordings, recording_from_arrays
+from jbeamshell.measured.recordings import FEWEST_POINTS, read_recordings, recording_from_arrays
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 13)
 FORCE, DISPLACEMENT = 3.0 * np.cos(PHASE), 0.25 * np.cos(PHASE - 0.3)

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import read_loops
-from jbeamshell.recordings import read_recordings
+from jbeamshell.measured.loops import read_loops
+from jbeamshell.measured.recordings import read_recordings
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 13)
 FORCE, DISPLACEMENT = 3.0 * np.cos(PHASE), 0.25 * np.cos(PHASE - 0.3)

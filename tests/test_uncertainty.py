@@ -6,7 +6,7 @@ from toy import KEYS, TRUTH, Readings, X, formula, readings, scene
 
 import jbeamshell as jb
 from jbeamshell import identify
-from jbeamshell.identify import Parameter
+from jbeamshell.identify.fitting import Parameter
 
 MU, ETA, KAPPA = KEYS
 NOISE = 2e-3

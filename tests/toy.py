@@ -6,8 +6,8 @@ import numpy as np
 from jax import Array
 
 import jbeamshell as jb
-from jbeamshell.measurements import Curve, _noise
-from jbeamshell.observations import Observation, observe
+from jbeamshell.identify.observations import Observation, observe
+from jbeamshell.measured.curves import Curve, _noise
 
 X = np.linspace(0.05, 1.0, 20)
 TRUTH = {"contact.friction": 0.1, "strip.height_ratio": 0.2, "strip.kappa_s": 0.44}

@@ -7,8 +7,9 @@ figures of your own alike.
 
 from jbeamshell.plotting.contacts import contact as contact
 from jbeamshell.plotting.contacts import contact_map as contact_map
+from jbeamshell.plotting.fits import likelihoods as likelihoods
 from jbeamshell.plotting.fits import overlay as overlay
-from jbeamshell.plotting.fits import squeeze_fit as squeeze_fit
+from jbeamshell.plotting.fits import residuals as residuals
 from jbeamshell.plotting.paths import loop as loop
 from jbeamshell.plotting.paths import profiles as profiles
 from jbeamshell.plotting.style import DATA as DATA

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import os
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +133,13 @@ def named(name: str) -> Scene:
 def values_of(name: str) -> dict[str, Any]:
     """Dotted values of the scene of a name; what they leave out is the standard strip's."""
     return read_values(_file(name))
+
+
+def values_from(word: str, folder: Path = Path()) -> dict[str, Any]:
+    """Dotted values of a scene of a name, or of a file in a folder."""
+    path = Path(word)
+    is_file = path.suffix == ".toml" or path.name != word or os.path.isfile(folder / path)
+    return read_values(folder / path) if is_file else values_of(word)
 
 
 def summary(name: str) -> str:

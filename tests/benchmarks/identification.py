@@ -32,8 +32,8 @@ from scipy.optimize import differential_evolution, minimize  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify  # noqa: E402
-from jbeamshell.experiment import Experiment  # noqa: E402
-from jbeamshell.loops import Loop, make_loop  # noqa: E402
+from jbeamshell.identify.experiment import Experiment  # noqa: E402
+from jbeamshell.measured.loops import Loop, make_loop  # noqa: E402
 
 ROUNDS = 2
 CAP = 1500  # runs of the model

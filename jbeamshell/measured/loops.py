@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.recordings import FEWEST_POINTS as FEWEST_POINTS
-from jbeamshell.recordings import FilePath, read_recordings, recording_from_arrays
-from jbeamshell.reversals import find_driver, find_turns
+from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
+from jbeamshell.measured.recordings import FilePath, read_recordings, recording_from_arrays
+from jbeamshell.measured.reversals import find_driver, find_turns
 
 CLOSED = 0.05  # of the range: a loop whose ends lie closer than this is taken as closed
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import FEWEST_POINTS, Loop
+from jbeamshell.measured.loops import FEWEST_POINTS, Loop
 from jbeamshell.scene import Scene
 
 FEWEST_OF_BACKBONE = 3

@@ -1,6 +1,6 @@
 """How the model answers what is measured.
 
-A measurement is what a test left behind: a `Loop`, or a curve of `jbeamshell.measurements`.
+A measurement is what a test left behind: a `Loop`, or a curve of `jbeamshell.measured.curves`.
 `observe` makes of it an `Observation`: the run of the model that answers it, and the weights that
 make residuals dimensionless.  Observations hold arrays only, so those of one kind and length are
 compiled once.
@@ -19,8 +19,7 @@ from jax import Array, lax
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import Loop
-from jbeamshell.measurements import (
+from jbeamshell.measured.curves import (
     Backbone,
     DissipationCurve,
     SqueezeCurve,
@@ -28,6 +27,7 @@ from jbeamshell.measurements import (
     noise_of,
     response_of,
 )
+from jbeamshell.measured.loops import Loop
 from jbeamshell.newton import Newton
 from jbeamshell.quasistatic import check, solve
 from jbeamshell.scene import Scene
@@ -135,6 +135,13 @@ class LoadPath(Observation):
         check(scene, path)
         unseen = np.zeros(path.size - drive.size)
         noise = noise_of(measurement)
+        driver = getattr(measurement, "driver", None) or scene.load.control
+        if noise is not None and driver != scene.load.control:
+            raise InputError(
+                f"{measurement.label}: its {driver} drives, so its noise is not that of the "
+                f"{driver}, which load.control = {scene.load.control!r} makes the model answer: "
+                f"set load.control to {driver!r}"
+            )
         if noise is not None and np.min(noise) >= np.ptp(response):
             raise InputError(
                 f"{measurement.label}: noise = {np.min(noise):.3g} is more than the range of "
@@ -247,7 +254,7 @@ def observe(measurement: Any, scene: Scene) -> Observation:
 
     Parameters
     ----------
-    measurement : a `Loop`, or a curve of `jbeamshell.measurements`
+    measurement : a `Loop`, or a curve of `jbeamshell.measured.curves`
     scene : what the measurement is of
 
     Raises

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.measurements import AmplitudeCurve, response_of
-from jbeamshell.parameters import Space
-from jbeamshell.problem import Point, Problem
+from jbeamshell.identify.parameters import Space
+from jbeamshell.identify.problem import Point, Problem
+from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
+from jbeamshell.measured.curves import AmplitudeCurve, response_of
 from jbeamshell.scene import Scene
-from jbeamshell.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
 
 TOO_WRONG = 2.0  # misfit over noise beyond which the model, not the noise, is what is left
 
@@ -144,16 +144,16 @@ class Fit(NamedTuple):
 
     def plot(self, axes: Any = None) -> Any:
         """Draw model over data; returns the axes, a list where there are several kinds of data."""
-        from jbeamshell import fit_pictures
+        from jbeamshell import plotting
 
-        drawn = fit_pictures.overlay(self, axes)
+        drawn = plotting.overlay(self, axes)
         return drawn[0] if len(drawn) == 1 else drawn
 
     def plot_residuals(self, axes: Any = None) -> Any:
         """Draw model less data; returns the axes as `plot` does."""
-        from jbeamshell import fit_pictures
+        from jbeamshell import plotting
 
-        drawn = fit_pictures.residuals(self, axes)
+        drawn = plotting.residuals(self, axes)
         return drawn[0] if len(drawn) == 1 else drawn
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import Loop
-from jbeamshell.recordings import Recording
-from jbeamshell.reversals import SMALLEST, Floats, noise_of
-from jbeamshell.splitting import Cycle, Cycles, split_cycles
+from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.recordings import Recording
+from jbeamshell.measured.reversals import SMALLEST, Floats, noise_of
+from jbeamshell.measured.splitting import Cycle, Cycles, split_cycles
 
 STEADY = 0.01  # of the range of the response: cycles that lie closer repeat
 PARTS = 16  # of a loop, the means over which are compared

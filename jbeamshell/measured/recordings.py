@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.columns import FURTHER, QUANTITIES, find_columns, is_header, unit_factors
-from jbeamshell.containers import read_table
 from jbeamshell.errors import InputError
+from jbeamshell.measured.columns import FURTHER, QUANTITIES, find_columns, is_header, unit_factors
+from jbeamshell.measured.containers import read_table
 
 FEWEST_POINTS = 8
 HUGE = 1e100  # squares and quotients of anything smaller are finite

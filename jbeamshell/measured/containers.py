@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError
-from jbeamshell.tables import LARGEST, Table, TextTable, read_bytes
+from jbeamshell.measured.tables import LARGEST, Table, TextTable, read_bytes
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 FEW = 8  # a matrix with no more rows than this, and more columns, lies on its side

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from jbeamshell.errors import InputError
-from jbeamshell.parameters import Space
+from jbeamshell.identify.parameters import Space
 
 LEVELS = (0.68, 0.95)
 LEAST = 1e-14  # of the largest eigenvalue of J'J: smaller ones are rounding

@@ -11,28 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError, UnconvergedError
-from jbeamshell.experiment import Experiment, Specimen
-from jbeamshell.likelihood import Profile, profile
-from jbeamshell.loops import Loop
-from jbeamshell.measurements import Measurement
+from jbeamshell.identify.experiment import Experiment, Specimen
+from jbeamshell.identify.parameters import Parameter, Space, as_parameters, search_space
+from jbeamshell.identify.problem import Problem
+from jbeamshell.identify.results import Fit, fit_at
+from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, Limits
+from jbeamshell.measured.curves import Measurement
+from jbeamshell.measured.loops import Loop
 from jbeamshell.newton import Newton
-from jbeamshell.parameters import Parameter, Space, as_parameters, search_space
-from jbeamshell.problem import Problem
-from jbeamshell.results import Fit, fit_at
 from jbeamshell.scene import Scene
-from jbeamshell.search import ADAM_STEPS, SEARCHES, Limits
-
-__all__ = [
-    "Fit",
-    "Parameter",
-    "Profile",
-    "Progress",
-    "Specimen",
-    "driver_of",
-    "fit",
-    "fit_kappa_s",
-    "profile",
-]
 
 POINTS = 96  # of a loop that the model is run through
 MAX_ITERATIONS = 40
@@ -68,17 +55,6 @@ class Progress(NamedTuple):
         at = f"search {self.search} of {self.searches}, step" if self.search else "start"
         values = ", ".join(f"{name} = {value:.6g}" for name, value in self.values.items())
         return f"{at} {self.step}, cost {self.cost:.4g}, at most {self.left:.0f} s left: {values}"
-
-
-def driver_of(loops: Sequence[Loop]) -> str:
-    """Which column drove the test: the smoother one; the force where neither is rough."""
-
-    def roughness(column: NDArray[np.float64]) -> float:
-        return float(np.sqrt(np.mean(np.diff(column, 3) ** 2)) / np.ptp(column))
-
-    force = np.mean([roughness(loop.force) for loop in loops])
-    displacement = np.mean([roughness(loop.displacement) for loop in loops])
-    return "displacement" if displacement < 0.5 * force and force > 1e-3 else "force"
 
 
 def fit(

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import CLOSED, Loop
-from jbeamshell.recordings import Recording, recording_from_arrays
-from jbeamshell.reversals import (
+from jbeamshell.measured.loops import CLOSED, Loop
+from jbeamshell.measured.recordings import Recording, recording_from_arrays
+from jbeamshell.measured.reversals import (
     SMALLEST,
     Floats,
     Path,

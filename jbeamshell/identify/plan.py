@@ -32,18 +32,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jbeamshell import scenes
-from jbeamshell.curve_files import read_curves
 from jbeamshell.errors import InputError
-from jbeamshell.experiment import Specimen
-from jbeamshell.identify import driver_of
-from jbeamshell.loops import Loop
-from jbeamshell.measurements import AmplitudeCurve, Backbone, Measurement
-from jbeamshell.parameters import Parameter
+from jbeamshell.identify.experiment import Specimen
+from jbeamshell.identify.parameters import Parameter
+from jbeamshell.measured.curve_files import read_curves
+from jbeamshell.measured.curves import AmplitudeCurve, Backbone, Measurement
+from jbeamshell.measured.loops import Loop, driver_of
+from jbeamshell.measured.recordings import Recording, read_recordings
+from jbeamshell.measured.splitting import split_cycles
+from jbeamshell.measured.steady import DRIFTS, steady_loops
 from jbeamshell.parts import CONTROLS
-from jbeamshell.recordings import Recording, read_recordings
-from jbeamshell.scene import overridden, read_values, scene_from_values
-from jbeamshell.splitting import split_cycles
-from jbeamshell.steady import DRIFTS, steady_loops
+from jbeamshell.scene import overridden, scene_from_values
 
 KINDS = ("loop", "backbone", "dissipation", "stiffness", "squeeze")
 CYCLES = ("auto", "steady", "recorded")
@@ -248,7 +247,7 @@ def _base(scene: Any, folder: Path) -> dict[str, Any]:
         return {}
     if not isinstance(scene, str):
         raise InputError(f"scene = {scene!r}: give the name of one that ships, or a file")
-    return read_values(folder / scene) if scene.endswith(".toml") else scenes.values_of(scene)
+    return scenes.values_from(scene, folder)
 
 
 def _source(table: Mapping[str, Any], label: Any) -> Source:

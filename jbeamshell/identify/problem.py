@@ -22,10 +22,10 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError
-from jbeamshell.experiment import Answer, Experiment
 from jbeamshell.files import write_text
+from jbeamshell.identify.experiment import Answer, Experiment
+from jbeamshell.identify.parameters import Space
 from jbeamshell.newton import Newton
-from jbeamshell.parameters import Space
 
 FORMAT = "jbeamshell fit 1"
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError
-from jbeamshell.parameters import FARTHEST
-from jbeamshell.problem import Point
-from jbeamshell.results import Fit
-from jbeamshell.search import Limits, minimise
-from jbeamshell.uncertainty import check_level
+from jbeamshell.identify.parameters import FARTHEST
+from jbeamshell.identify.problem import Point
+from jbeamshell.identify.results import Fit
+from jbeamshell.identify.search import Limits, minimise
+from jbeamshell.identify.uncertainty import check_level
 
 MOST_POINTS = 8  # to either side
 CLOSE = 0.02  # of its root: so well the ends of an interval are found

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from jbeamshell.columns import bare, factor_of, unit_of
-from jbeamshell.containers import read_table
 from jbeamshell.errors import InputError
-from jbeamshell.measurements import Curve, DissipationCurve, SqueezeCurve, StiffnessCurve
-from jbeamshell.recordings import FilePath, labels_of
+from jbeamshell.measured.columns import bare, factor_of, unit_of
+from jbeamshell.measured.containers import read_table
+from jbeamshell.measured.curves import Curve, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.recordings import FilePath, labels_of
 
 # What the columns of a kind of curve are measured in, all per unit width.
 QUANTITIES: dict[str, dict[str, tuple[str, ...]]] = {
@@ -105,7 +105,7 @@ def _read(
     factors = _factors(wanted, titles, below, given, table.name)
     whole = ~np.isnan(rows).any(axis=1)
     rows = rows[whole] * factors
-    notes = ()
+    notes: tuple[str, ...] = ()
     if not whole.all():
         notes = (f"{np.count_nonzero(~whole)} of {whole.size} rows lack a number: left out",)
     noise = rows[:, 2] if rows.shape[1] > 2 else None

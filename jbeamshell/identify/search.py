@@ -15,8 +15,8 @@ import optax
 from jax import Array
 from numpy.typing import NDArray
 
-from jbeamshell.parameters import Space
-from jbeamshell.problem import Point, Problem
+from jbeamshell.identify.parameters import Space
+from jbeamshell.identify.problem import Point, Problem
 
 DAMPING = 1e-4  # first damping, of a Gauss-Newton step in parameters of equal influence
 REACH = 1.0  # of a step in the search space, for most parameters a factor e

@@ -20,10 +20,10 @@ from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError
-from jbeamshell.loops import Loop
-from jbeamshell.measurements import Measurement, noise_of, response_of, weight_of
+from jbeamshell.identify.observations import Observation, observe
+from jbeamshell.measured.curves import Measurement, noise_of, response_of, weight_of
+from jbeamshell.measured.loops import Loop
 from jbeamshell.newton import Newton
-from jbeamshell.observations import Observation, observe
 from jbeamshell.scene import Scene
 
 

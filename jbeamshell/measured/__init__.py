@@ -1,0 +1,21 @@
+"""What tests leave behind: files, recordings of many cycles, steady loops, and curves.
+
+`read_loops` takes a file as it stands; `read_recordings` and `steady_loops` average the cycles of a
+noisy one; `Loop`, `Backbone`, `DissipationCurve`, `StiffnessCurve` and `SqueezeCurve` are what
+`jbeamshell.identify` compares a model with.
+"""
+
+from jbeamshell.measured.curve_files import read_curves as read_curves
+from jbeamshell.measured.curves import Backbone as Backbone
+from jbeamshell.measured.curves import DissipationCurve as DissipationCurve
+from jbeamshell.measured.curves import Measurement as Measurement
+from jbeamshell.measured.curves import SqueezeCurve as SqueezeCurve
+from jbeamshell.measured.curves import StiffnessCurve as StiffnessCurve
+from jbeamshell.measured.loops import Loop as Loop
+from jbeamshell.measured.loops import make_loop as make_loop
+from jbeamshell.measured.loops import read_loops as read_loops
+from jbeamshell.measured.recordings import Recording as Recording
+from jbeamshell.measured.recordings import read_recordings as read_recordings
+from jbeamshell.measured.recordings import recording_from_arrays as recording_from_arrays
+from jbeamshell.measured.splitting import split_cycles as split_cycles
+from jbeamshell.measured.steady import steady_loops as steady_loops
