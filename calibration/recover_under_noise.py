@@ -132,7 +132,7 @@ def main() -> None:
     """Run all fits, print a table, write the record and the picture."""
     begin, loops, everything, record = time.perf_counter(), clean_loops(), {}, []
     points = sum(loop.force.size for loop in loops)
-    with tqdm(total=len(NOISES) * REPEATS, disable=None, unit="fit") as bar:
+    with tqdm(total=len(NOISES) * REPEATS, disable=None, unit="set") as bar:
         for noise in NOISES:
             everything[noise] = []
             for seed in range(REPEATS):

@@ -61,6 +61,12 @@ def add_to(commands: Any) -> argparse.ArgumentParser:
     for name, (kind, text) in numbers.items():
         fit.add_argument(f"--{name}", type=kind, metavar="NUMBER", help=text)
     fit.add_argument(
+        "--centre",
+        action="store_true",
+        default=None,
+        help="take the zeros of the sensors from closed loops",
+    )
+    fit.add_argument(
         "--save", metavar="FILE", help="keep every model run there, and go on from what it holds"
     )
     fit.set_defaults(run=run)
@@ -121,7 +127,7 @@ def _plan(options: argparse.Namespace) -> Any:
     if not options.data:
         return _example(values)
     specimen: dict[str, Any] = {"data": options.data}
-    for name in ("kind", "cycles", "drift", "width", "decimal"):
+    for name in ("kind", "cycles", "drift", "centre", "width", "decimal"):
         if _given(options, name):
             specimen[name] = getattr(options, name)
     specimen["columns"] = pairs(options.column, "force=FT")

@@ -98,3 +98,15 @@ def test_the_driver_is_the_smoother_column():
     assert driver_of([Loop(force, displacement + 0.5 * noise, "")]) == "force"
     assert driver_of([Loop(force + 6.0 * noise, displacement, "")]) == "displacement"
     assert driver_of(example_loops()) == "force"
+
+
+def test_a_centred_loop_has_lost_its_zeros_and_nothing_else():
+    phase = np.linspace(0.0, 2.0 * np.pi, 400)
+    displacement, force = np.cos(phase), 3.0 * np.cos(phase + 0.4)
+    loop = make_loop(force + 0.7, displacement - 0.2)._replace(driver="displacement")
+    centred = loop.centred()
+    np.testing.assert_allclose(centred.displacement, displacement, atol=1e-4)
+    np.testing.assert_allclose(centred.force, force, atol=1e-3)
+    assert "zeros of the sensors: displacement -0.2 and force 0.7" in centred.notes[-1]
+    with pytest.raises(InputError, match="is not closed"):
+        make_loop(force[:200], displacement[:200]).centred()

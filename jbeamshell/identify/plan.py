@@ -78,6 +78,7 @@ class Source:
     cycles : of recordings: "steady" averages the steady cycles of every amplitude, "recorded" takes
         all as it stands, "auto" averages where cycles repeat or what drives them is noisy
     driver, drift : see `steady_loops`
+    centre : whether to take the zeros of the sensors from closed loops, see `Loop.centred`
     width : of the specimen, by which forces, works and stiffnesses are divided
     columns, units, decimal : see `read_recordings`
     label : of the specimen
@@ -89,6 +90,7 @@ class Source:
     cycles: str = "auto"
     driver: str | None = None
     drift: str = "keep"
+    centre: bool = False
     width: float = 1.0
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -105,6 +107,8 @@ class Source:
             if value not in known:
                 names = ", ".join(repr(word) for word in known if word)
                 raise InputError(f"{name} = {value!r}: choose among {names}")
+        if not isinstance(self.centre, bool):
+            raise InputError(f"centre = {self.centre!r}: give true or false")
         number = isinstance(self.width, int | float) and not isinstance(self.width, bool)
         if not (number and np.isfinite(self.width) and self.width > 0.0):
             raise InputError(f"width = {self.width!r}: give a positive number")
@@ -127,7 +131,9 @@ class Source:
                 pull = per_width.force, per_width.displacement, per_width.label
                 yield Backbone(*pull), per_width.notes
             else:
-                yield from ((loop, loop.notes) for loop in self._loops(per_width))
+                loops = self._loops(per_width)
+                loops = [loop.centred() for loop in loops] if self.centre else loops
+                yield from ((loop, loop.notes) for loop in loops)
 
     def _loops(self, recording: Recording) -> list[Loop]:
         whole = Loop(

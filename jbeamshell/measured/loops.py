@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jbeamshell.errors import InputError
 from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
 from jbeamshell.measured.recordings import FilePath, read_recordings, recording_from_arrays
 from jbeamshell.measured.reversals import find_driver, find_turns
@@ -58,6 +59,32 @@ class Loop(NamedTuple):
         if self.scatter is None:
             return None
         return float(np.sqrt(np.mean(self.scatter**2) / self.cycles))
+
+    def centred(self) -> Loop:
+        """Both columns without the zeros of their sensors, for a loop that is its own mirror image.
+
+        The middle of the range of what drives, and the mean of the answer along its way, are put
+        to zero.
+
+        Raises
+        ------
+        InputError
+            for a loop that is not closed, whose zeros mean something
+        """
+        if not self.closed:
+            raise InputError(f"{self.label}: is not closed: its zeros are where it started")
+        driver = self.driver or find_driver(self.force, self.displacement)
+        drive = getattr(self, driver)
+        way = np.abs(np.diff(drive))
+        middle = 0.5 * (np.max(drive) + np.min(drive))
+        shifted, told = {driver: drive - middle}, [f"{driver} {middle:.3g}"]
+        answer = "displacement" if driver == "force" else "force"
+        column = getattr(self, answer)
+        mean = float(np.sum(0.5 * (column[1:] + column[:-1]) * way) / np.sum(way))
+        shifted[answer] = column - mean
+        told.append(f"{answer} {mean:.3g}")
+        note = f"taken away as zeros of the sensors: {' and '.join(told)}"
+        return self._replace(**shifted, notes=(*self.notes, note))
 
     def thinned(self, points: int, driver: str) -> Loop:
         """About ``points`` of the loop's points, even along the driving column; turns are kept."""
