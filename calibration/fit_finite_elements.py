@@ -26,6 +26,8 @@ from jbeamshell.files import write_text  # noqa: E402
 
 HERE = Path(__file__).parent
 FREE = {
+    "mu": ("contact.friction",),
+    "eta": ("strip.height_ratio",),
     "mu, eta": ("contact.friction", "strip.height_ratio"),
     "mu, eta, alpha": ("contact.friction", "strip.height_ratio", "contact.stick_stiffness"),
 }
@@ -34,16 +36,13 @@ TRUE_FRICTION = 0.1
 
 def study(height_ratio: float, free: tuple[str, ...]) -> tuple[identify.Fit, dict]:
     """Fit one strip from a start that is half as high again and half as rough again."""
-    start = {"contact.friction": 0.15, "strip.height_ratio": 1.5 * height_ratio}
-    if "contact.stick_stiffness" in free:
-        start["contact.stick_stiffness"] = 30.0
+    truth = {"contact.friction": TRUE_FRICTION, "strip.height_ratio": height_ratio}
+    start = {key: 1.5 * value for key, value in truth.items()} | {"contact.stick_stiffness": 30.0}
     begin = time.perf_counter()
-    loops, scene = example_loops(height_ratio), jb.Scene().replace(start)
+    scene = jb.Scene().replace(truth | {key: start[key] for key in free})
+    loops = example_loops(height_ratio)
     fit = identify.fit(loops, scene, free, throw=False)  # the record says how each ended
-    bias = {
-        "contact.friction": fit.values["contact.friction"] / TRUE_FRICTION - 1.0,
-        "strip.height_ratio": fit.values["strip.height_ratio"] / height_ratio - 1.0,
-    }
+    bias = {key: fit.values[key] / truth[key] - 1.0 for key in truth if key in free}
     seconds = time.perf_counter() - begin
     return fit, fit.figures() | {"relative_bias": bias, "wall_s_with_compilation": seconds}
 
@@ -57,11 +56,13 @@ def main() -> None:
             fit, figures = study(height_ratio, free)
             record[f"{height_ratio:g}"][name] = figures
             fits[height_ratio, name] = fit
-            bias = figures["relative_bias"]
+            bias = [
+                f"{symbol} {100 * figures['relative_bias'][key]:+.2f} %  "
+                for symbol, key in zip(("mu", "eta"), FREE["mu, eta"], strict=True)
+                if key in free
+            ]
             print(
-                f"eta {height_ratio:<7g} free {name:15s} "
-                f"mu {100 * bias['contact.friction']:+.2f} %  "
-                f"eta {100 * bias['strip.height_ratio']:+.2f} %  "
+                f"eta {height_ratio:<7g} free {name:15s} {''.join(bias)}"
                 f"misfit {100 * fit.misfit:.3f} %  {fit.model_runs} runs, {fit.status}"
             )
     machine = {

@@ -258,7 +258,7 @@ def test_a_file_goes_before_a_name(tmp_path, monkeypatch):
             "block.tml",
             "unknown scene 'block.tml': did you mean 'block'? (`jbeamshell scenes` lists",
         ),
-        ("xyz", "unknown scene 'xyz': scenes are standard, bimaterial, squeezed, receding, reced"),
+        ("xyz", "unknown scene 'xyz': scenes are standard, calibrated, bimaterial, squeezed"),
         ("receding.toml", "receding.toml: cannot be read (No such file"),
         ("./receding", "receding: cannot be read (No such file"),
         (".", ".: cannot be read (Is a directory)"),
@@ -361,6 +361,45 @@ def test_fit_driven_by_the_displacement(cli, closed, tmp_path):
         assert values[key]["value"] == pytest.approx(value, rel=1e-2)
     load = tomllib.loads((tmp_path / "scene.toml").read_text())["load"]
     assert (load["control"], load["amplitude"]) == ("displacement", 2e-5)
+
+
+def test_a_plan_of_two_strips_is_fitted_profiled_saved_and_resumed(cli, closed, tmp_path):
+    plan = tmp_path / "plan.toml"
+    settings = "".join(f'"{key}" = {json.dumps(value)}\n' for key, value in COARSE.items())
+    plan.write_text(
+        f"[set]\n{settings}"
+        f"""
+        [free."contact.friction"]
+        start = 0.084
+        [free."strip.height_ratio"]
+        start = 0.26
+        each = true
+        [[specimen]]
+        label = "a"
+        data = ["{closed}"]
+        [[specimen]]
+        label = "b"
+        data = ["{closed}"]
+        """
+    )
+    words = ("fit", plan, "--json", "--save", tmp_path / "state", "--profile", "contact.friction")
+    code, out, _ = cli(*words, "--noise", 0.001, "--out", tmp_path / "out")
+    assert code == 0
+    figures = json.loads(out)
+    keys = ["contact.friction", "strip.height_ratio[a]", "strip.height_ratio[b]"]
+    assert list(figures["values"]) == keys
+    for key, value in zip(keys, (0.12, 0.2, 0.2), strict=True):
+        assert figures["values"][key]["value"] == pytest.approx(value, rel=1e-2)
+    low, high = figures["profiles"]["contact.friction"]["interval"]
+    assert low < figures["values"]["contact.friction"]["value"] < high
+    made = names(tmp_path / "out")
+    assert {"scene_1.toml", "scene_2.toml", "profiles.csv", "profiles.png"} < made
+    # The state holds every run: the same again asks the model nothing.
+    states = (tmp_path / "state").read_text()
+    code, out, _ = cli(*words, "--noise", 0.001)
+    assert code == 0
+    assert json.loads(out)["values"] == figures["values"]
+    assert (tmp_path / "state").read_text() == states
 
 
 # --- what a fit is asked to do --------------------------------------------------------------------
@@ -581,6 +620,18 @@ def test_bad_scenes_are_refused(refused, tmp_path, command, content, told):
         (["--start", "contact.friction"], "'contact.friction': write KEY=VALUE, such as"),
         (["--start", "contact.friction=high"], "start = 'high': give a finite number"),
         (["--start", "contact.friction=-1"], "contact.friction = -1.0: must be a number, not"),
+        (["--bounds", "contact.friction=0.2"], "--bounds contact.friction=0.2: write two numbers"),
+        (["--bounds", "contact.friction=0.2:0.3"], "start = 0.15: must lie between low = 0.2"),
+        (["--prior", "contact.friction=0.1:a"], "write two numbers and a colon between"),
+        (["--profile", "strip.kappa_s"], "--profile strip.kappa_s: is not among the free keys"),
+        (["--noise", "-1"], "noise = -1.0: give a positive part of the range"),
+        (["--starts", "0"], "starts = 0: give a whole number, 1 or more"),
+        (["--method", "simplex"], "method = 'simplex': choose"),
+        (["plan.toml"], "plan.toml: cannot be read (No such file"),
+        (["plan.toml", "a.csv"], "plan.toml a.csv: give one plan, or files of data"),
+        (["plan.toml", "--kind", "loop"], "--kind: plan.toml is a plan; say so in there"),
+        (["a.csv", "--kind", "lop"], "kind = 'lop': choose among 'loop', 'backbone'"),
+        (["a.csv", "--unit", "kN"], "'kN': write KEY=VALUE, such as force=kN"),
         (["--set", "load.control=stress"], "load.control = 'stress': choose 'force' or 'displ"),
         (["--set", "load.control=a,b"], "load.control = ['a', 'b']: must be a word"),
         (["--set", "contact.pressure=1"], "must stay below gross slip, mu F_N L = 0.3; set load."),

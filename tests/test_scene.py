@@ -168,7 +168,7 @@ def test_the_scenes_that_ship_are_the_files():
 def test_unknown_scenes_name_the_nearest(ask):
     with pytest.raises(InputError, match=r"unknown scene 'recedng': did you mean 'receding'\? \("):
         ask("recedng")
-    with pytest.raises(InputError, match=r"unknown scene 'xyz': scenes are standard, bimaterial,"):
+    with pytest.raises(InputError, match=r"unknown scene 'xyz': scenes are standard, calibrated,"):
         ask("xyz")
 
 

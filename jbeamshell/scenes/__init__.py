@@ -31,6 +31,16 @@ def standard() -> Scene:
     return named("standard")
 
 
+def calibrated() -> Scene:
+    """The standard strip with constants fitted once to finite elements, for thick strips too.
+
+    One kappa_s, one alpha and m = 8 for all heights: the dissipation is then within 11 % (rms) of
+    finite elements for eta = .03 to .4 and A from .3 up, and within 2 % where it exceeds .3 of the
+    cubic law, nu being .3 (`calibration/fit_universal.py`).  Set the height as you like.
+    """
+    return named("calibrated")
+
+
 def bimaterial() -> Scene:
     """Two layers, squeezed evenly on both faces: the strip bends towards the stiffer one.
 
@@ -112,6 +122,7 @@ _FUNCTIONS = {
     function.__name__.replace("_", "-"): function
     for function in (
         standard,
+        calibrated,
         bimaterial,
         squeezed,
         receding,
