@@ -12,8 +12,8 @@ PACKAGE = Path(jbeamshell.__file__).parent
 UPWARDS = [
     "errors", "files", "kinematics", "closed_form", "elasticity", "energy", "sections", "laminate",
     "friction", "contact", "grid", "parts", "scene", "scenes", "block_tridiagonal", "newton",
-    "equilibrium", "cycles", "history", "quasistatic", "measured", "example", "identify", "plotting", "output",
-    "terminal", "fit_command", "__init__", "__main__",
+    "equilibrium", "cycles", "history", "quasistatic", "measured", "example", "identify",
+    "plotting", "output", "terminal", "fit_command", "__init__", "__main__",
 ]
 INSIDE = {
     "measured": [
