@@ -27,6 +27,7 @@ from jbeamshell.friction import FrictionLaw
 from jbeamshell.kinematics import FIELDS, KINEMATICS, Kinematics, Strains, turned
 from jbeamshell.parts import Contact, Model
 from jbeamshell.scene import Scene
+from jbeamshell.sections import Hierarchic
 
 V, W, BETA, PSI = range(len(FIELDS))
 CAP_FLOOR = 1e-6  # of mu F_N: gradients need a cap that is not zero
@@ -38,7 +39,7 @@ class Level(NamedTuple):
 
     Attributes
     ----------
-    q : (n, 4) nodal fields v, w, beta, psi
+    q : (n, m) nodal fields v, w, beta, psi, and those of a hierarchic section
     traction : (n,) friction traction t, positive along v (on the foundation)
     cap : (n,) Coulomb cap mu R
     reaction : (n,) normal reaction R
@@ -74,6 +75,8 @@ class System(eqx.Module):
 
     Attributes
     ----------
+    energy : Phi of the beamshell
+    section : of order p, in place of the beamshell's; None where that is meant
     x : (n,) node positions
     lengths : (elements,) element lengths
     tributary : (n,) contact length l_i of each node
@@ -87,6 +90,7 @@ class System(eqx.Module):
     """
 
     energy: Energy
+    section: Hierarchic | None
     law: FrictionLaw
     normal: NormalLaw
     x: Array
@@ -116,6 +120,7 @@ class System(eqx.Module):
             _steps(contact, strip.length),
         )
         self.energy, self.law = scene.strain_energy(), contact.law
+        self.section = scene.hierarchic_section()
         self.x, self.lengths = grid.nodes(self._rule, ends), jnp.diff(ends)
         self.tributary = grid.tributary_lengths(self._rule, ends)
         self.load = grid.nodal_loads(self._rule, ends, contact.pressure)
@@ -166,7 +171,7 @@ class System(eqx.Module):
             return self._kinematics.position(section, self.half_height, height)
 
         if self.curvature is None:
-            return jax.vmap(position)(*q.T)
+            return jax.vmap(position)(*q[:, : len(FIELDS)].T)
         angle = self._angle(x)
         local = turned(q[:, V], q[:, W], angle)
         return turned(*jax.vmap(position)(*local, q[:, BETA], q[:, PSI]), -angle)
@@ -184,13 +189,19 @@ class System(eqx.Module):
 
     def strain_energy(self, q: Array) -> Array:
         """Elastic energy of the strip with nodal fields q (n, 4), per unit width."""
-        density = jax.vmap(jax.vmap(self.energy))(*self._strains(q))
+        if self.section is None:
+            density = jax.vmap(jax.vmap(self.energy))(*self._strains(q))
+        else:
+            density = jax.vmap(jax.vmap(self.section.energy))(*self._sections(q))
         return jnp.sum(self._rule.weights[:, None] * self.lengths * density)
 
     def section_forces(self, q: Array) -> Strains:
         """Mean N, Q, M, chi and xi of every element, (elements,) each."""
         strains = self._strains(q)
-        each = jax.vmap(jax.vmap(lambda s: forces(self.energy, s)))(strains)
+        if self.section is None:
+            each = jax.vmap(jax.vmap(lambda s: forces(self.energy, s)))(strains)
+        else:
+            each = jax.vmap(jax.vmap(self.section.forces))(*self._sections(q))
         if self.model.squeeze == "assumed":
             stretch = 2.0 * self.half_height * jnp.asarray(self.youngs_modulus)
             each = each._replace(psi=stretch * strains.psi)
@@ -205,8 +216,8 @@ class System(eqx.Module):
     def _starts(self) -> Array:
         return self.x[: -1 : grid.ORDER[self.model.grid]]
 
-    def _strains(self, q: Array) -> Strains:
-        """Strains at all points of all elements, (points, elements) each."""
+    def _sections(self, q: Array) -> tuple[list[Array], list[Array]]:
+        """Fields and their slopes at all points of all elements, (points, elements) each."""
 
         def at(shape: np.ndarray, values: Array) -> Array:
             # Elements last, and no matrix product: the compiler works on whole vectors of them.
@@ -214,17 +225,30 @@ class System(eqx.Module):
 
         rule, order = self._rule, grid.ORDER[self.model.grid]
         nodal = [grid.gather(column, order) for column in q.T]
-        shapes = [rule.squeeze if field == PSI else rule.values for field in range(len(FIELDS))]
+        # The beamshell's squeeze strain is integrated at the nodes, lest it oscillate.
+        shapes = [rule.values] * len(nodal)
+        if self.section is None:
+            shapes[PSI] = rule.squeeze
         section = [at(shape, values) for shape, values in zip(shapes, nodal, strict=True)]
         slope = [at(rule.slopes, values) / self.lengths for values in nodal]
         if self.curvature is not None:
             inside = rule.values @ rule.nodes
             angle = self._angle(self._starts + inside[:, None] * self.lengths)
             slope[V], slope[W] = turned(slope[V], slope[W], angle)
-        return self._kinematics.strains(section, slope, self.half_height, self.curvature)
+        return section, slope
+
+    def _strains(self, q: Array) -> Strains:
+        """The beamshell's strains at all points of all elements, (points, elements) each."""
+        section, slope = self._sections(q)
+        straight = slice(len(FIELDS))
+        return self._kinematics.strains(
+            section[straight], slope[straight], self.half_height, self.curvature
+        )
 
     def end_displacement(self, q: Array) -> Array:
-        """u(L): mid-height displacement of the loaded end, the conjugate of F."""
+        """u(L) of the loaded end, the conjugate of F: the mean over the height, or mid-height."""
+        if self.section is not None:
+            return self.section.mean_displacement(q[-1])
         return self._moved(q[-1:], self.x[-1:], 0.0)[0][0]
 
     # --- residual -------------------------------------------------------------------------------
@@ -237,11 +261,12 @@ class System(eqx.Module):
     def rest(self) -> Level:
         """The strip before anything acts on it."""
         zero = jnp.zeros_like(self.x)
-        return Level(jnp.zeros((self.x.size, len(FIELDS)), zero.dtype), zero, zero, zero, zero[0])
+        fields = jnp.zeros((self.x.size, self.model.width), zero.dtype)
+        return Level(fields, zero, zero, zero, zero[0])
 
     def embed(self, active: Array) -> Array:
-        """Active fields (n, m) to all four (n, 4); frozen ones are zero."""
-        columns = [jnp.zeros_like(self.x)] * len(FIELDS)
+        """Active fields to all fields of the sections, (n, m); frozen ones are zero."""
+        columns = [jnp.zeros_like(self.x)] * self.model.width
         for column, field in enumerate(self.model.active):
             columns[field] = active[:, column]
         return jnp.stack(columns, axis=1)
@@ -290,8 +315,9 @@ class System(eqx.Module):
             jnp.where(prescribed, self.stiffness_scale * gap, forces[-1, V])
         )
         forces = self._support(forces, q, drive.rough)
-        per_force = jnp.array([1.0, 1.0, 1.0, 1.0]).at[BETA].set(1.0 / self.half_height)
-        per_force = per_force.at[PSI].set(1.0 / self.half_height)
+        per_force = (
+            jnp.ones(self.model.width).at[jnp.array([BETA, PSI])].set(1.0 / self.half_height)
+        )
         residual = (forces * per_force / self.force_scale)[:, list(self.model.active)]
         return Level(q, traction, cap, reaction, force), residual
 
@@ -304,7 +330,9 @@ class System(eqx.Module):
             return jnp.where(rough > 0.0, forces, held_v)
         if self.far_end == "pinned":
             return held_v
-        return held_v.at[0, BETA].set(self.stiffness_scale * self.half_height**2 * q[0, BETA])
+        along = slice(len(FIELDS), None, 2)  # of a hierarchic section: its displacements along X
+        held = held_v.at[0, along].set(self.stiffness_scale * q[0, along])
+        return held.at[0, BETA].set(self.stiffness_scale * self.half_height**2 * q[0, BETA])
 
     # --- energies of a step -----------------------------------------------------------------------
 

@@ -43,7 +43,7 @@ class History(eqx.Module):
     load : (n,) nodal forces of the whole pressure on the top face
     force : (steps+1,) end force F per unit width
     displacement : (steps+1,) mid-height displacement u(L) since the pressure, conjugate to F
-    fields : (steps+1, n, 4) v, w, beta, psi
+    fields : (steps+1, n, m) v, w, beta, psi, and those of a hierarchic section
     gap : (steps+1, n) height of the strip's bottom face over the foundation
     sections : (steps+1, elements) section forces N, Q, M, chi and xi in the places of e, g, k, psi
         and psi'

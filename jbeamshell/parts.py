@@ -24,6 +24,7 @@ from jbeamshell.friction import CappedTrial, ElasticSlip, FrictionLaw, SharpSlip
 from jbeamshell.grid import END_SIZE, ORDER
 from jbeamshell.kinematics import FIELDS, KINEMATICS
 from jbeamshell.laminate import Laminate, check_layers
+from jbeamshell.sections import LARGEST_ORDER
 
 FAR_ENDS = ("held", "pinned", "free")
 CONTROLS = ("force", "displacement")
@@ -381,6 +382,7 @@ class Model(eqx.Module):
     constants : "consistent" or "printed" (the dissertation's own)
     squeeze : "field" (psi has its own balance) or "assumed" (psi = -(F_N + R)/(2E), the earlier
         theory of Brink 2015, section 4.2, without Poisson's effect)
+    order : 0 is the beamshell; p from 1 up is a section of order p, see `jbeamshell.sections`
     end_size : size of the smallest elements, at the loaded end and at steps of the pressure, over
         H, before the node count scales all sizes
     """
@@ -391,6 +393,7 @@ class Model(eqx.Module):
     nodes: int = _static(161)
     constants: str = _static("consistent")
     squeeze: str = _static("field")
+    order: int = _static(0)
     end_size: float = _static(END_SIZE)
 
     def __check_init__(self) -> None:
@@ -408,6 +411,10 @@ class Model(eqx.Module):
         require_choice("model.squeeze", self.squeeze, SQUEEZES)
         both = self.squeeze == "field" or {"w", "psi"} <= set(self.fields)
         require("model.squeeze", self.squeeze, both, "needs w and psi in model.fields")
+        _require_count("model.order", self.order, 0, LARGEST_ORDER)
+        straight = {"beta", "psi"} <= set(self.fields) and self.squeeze == "field"
+        fix = "needs beta and psi in model.fields, and the squeeze strain as a field"
+        require("model.order", self.order, self.order == 0 or straight, fix)
         number = isinstance(self.end_size, int | float) and not isinstance(self.end_size, bool)
         require("model.end_size", self.end_size, number, POSITIVE + " (of H)")
         require_number("model.end_size", self.end_size, POSITIVE + " (of H)")
@@ -421,5 +428,10 @@ class Model(eqx.Module):
 
     @property
     def active(self) -> tuple[int, ...]:
-        """Positions of the active fields among (v, w, beta, psi)."""
-        return tuple(FIELDS.index(f) for f in self.fields)
+        """Positions of the active fields among (v, w, beta, psi, and a section's further ones)."""
+        return (*(FIELDS.index(f) for f in self.fields), *range(len(FIELDS), self.width))
+
+    @property
+    def width(self) -> int:
+        """How many fields a section has, active or not."""
+        return len(FIELDS) + 2 * max(self.order - 1, 0)

@@ -291,7 +291,7 @@ def _gross_slip(scene: Scene) -> Array:
 def _rest(scene: Scene, contact: ArrayLike | None = None) -> State:
     model, dtype = scene.model, scene.strip.length.dtype
     nodes = jnp.zeros(model.nodes, dtype)
-    level = Level(jnp.zeros((nodes.size, 4), dtype), nodes, nodes, nodes, nodes[0])
+    level = Level(jnp.zeros((nodes.size, model.width), dtype), nodes, nodes, nodes, nodes[0])
     # An element's later nodes share a block, so that blocks couple to their neighbours only.
     order, width = ORDER[model.grid], len(model.active)
     blocks = (model.nodes + order - 1) // order

@@ -42,6 +42,7 @@ from jbeamshell.parts import (
     require,
     require_number,
 )
+from jbeamshell.sections import Hierarchic
 
 SECTIONS = {"strip": Strip, "contact": Contact, "load": Load, "model": Model}
 
@@ -75,6 +76,7 @@ SETTINGS = (
     "load.steps_per_half_cycle",
     "load.pressure_steps",
     "model.nodes",
+    "model.order",
     "model.end_size",
 )
 WORDS = (
@@ -153,6 +155,20 @@ class Scene(eqx.Module):
             plane=strip.plane,
         )
 
+    def hierarchic_section(self) -> Hierarchic | None:
+        """The section of order p; None where the beamshell's is meant."""
+        strip, model = self.strip, self.model
+        if model.order == 0:
+            return None
+        return Hierarchic(
+            half_height=strip.half_height,
+            plane_modulus=strip.plane_modulus,
+            poisson_ratio=jnp.asarray(strip.poisson_ratio),
+            order=model.order,
+            kinematics=model.kinematics,
+            plane=strip.plane,
+        )
+
     def _check_contact(self) -> None:
         """What the parts cannot see alone: a strip that nothing holds, a load off the strip."""
         strip, contact, fields = self.strip, self.contact, self.model.fields
@@ -160,6 +176,9 @@ class Scene(eqx.Module):
         needs = "needs w in model.fields"
         require("contact.normal", contact.normal, lift or contact.normal == "rigid", needs)
         require("strip.curvature", strip.curvature, lift or strip.curvature is None, needs)
+        plain = self.energy is None and strip.layers is None and strip.curvature is None
+        fix = "is for a straight homogeneous strip without an energy of its own; take 0"
+        require("model.order", self.model.order, self.model.order == 0 or plain, fix)
         layered = self.model.squeeze == "assumed" and strip.layers is not None
         require("model.squeeze", "assumed", not layered, "is for a homogeneous strip")
         if contact.normal == "none":

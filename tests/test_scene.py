@@ -72,6 +72,9 @@ def values_of_all_keys(draw):
     presses_up = positive | tables(length) if normal == "none" else st.just(0.0)
     curvature = {"strip.curvature": draw(positive)} if lifting and draw(st.booleans()) else {}
     assumed = lifting and squeezing and not layered
+    squeeze = draw(st.sampled_from(["field", "assumed"] if assumed else ["field"]))
+    plain = squeeze == "field" and not layered and not curvature
+    order = draw(st.integers(0, 12)) if plain and {"beta", "psi"} <= set(fields) else 0
     return (
         material
         | curvature
@@ -101,7 +104,8 @@ def values_of_all_keys(draw):
             "model.nodes": 2 * draw(st.integers(1, 1000)) + 1,
             "model.end_size": draw(positive),
             "model.constants": draw(st.sampled_from(["consistent", "printed"])),
-            "model.squeeze": draw(st.sampled_from(["field", "assumed"] if assumed else ["field"])),
+            "model.squeeze": squeeze,
+            "model.order": order,
         }
     )
 
