@@ -1,5 +1,6 @@
 """Curves and how the model answers them: what is refused, and kappa_s from squeeze curves."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 import toy
@@ -16,7 +17,7 @@ from jbeamshell.measured.curves import (
     StiffnessCurve,
     noise_of,
 )
-from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.loops import Loop, make_loop
 
 X = np.linspace(45.0, 55.0, 11)
 STRESS = np.linspace(-100.0, 0.0, 11)
@@ -184,6 +185,24 @@ def test_noise_belongs_to_the_column_that_answered():
     loop = Loop(column, column, "mean", noise=0.3, driver="displacement")
     with pytest.raises(jb.InputError, match=r"set load\.control to 'displacement'"):
         observe(loop, jb.Scene())
+
+
+def test_a_free_zero_is_put_where_it_fits():
+    scene = jb.Scene().replace(
+        FAST | {"model.nodes": 21, "load.steps_per_half_cycle": 8, "load.amplitude": 1.0}
+    )
+    loop = make_loop(*map(np.asarray, jb.solve(scene).loop))
+    shifted = loop._replace(displacement=loop.displacement + 1e-5)
+    misfits = []
+    for free_zero in (False, True):
+        one = observe(shifted._replace(free_zero=free_zero), scene)
+        rows, answer, _ = one.residual(scene, jb.Newton())
+        misfits.append(float(jnp.max(jnp.abs(rows))))
+        compared = np.asarray(one.weight) > 0.0
+        off = np.mean(np.asarray(answer)[compared] - shifted.displacement)
+        assert off == pytest.approx(0.0 if free_zero else -1e-5, abs=1e-10)
+    assert misfits[0] > 0.1
+    assert misfits[1] < 1e-6
 
 
 def test_a_backbone_only_goes_on():

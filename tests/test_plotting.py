@@ -328,9 +328,11 @@ class TestLikelihoods:
 
     def test_draws_each_with_the_ends_of_its_interval(self):
         mu, kappa_s = plotting.likelihoods(self.PROFILES)
-        np.testing.assert_array_equal(mu.get_lines()[0].get_ydata(), [4.0, 0.0, 5.0])
-        assert [line.get_xdata()[0] for line in mu.get_lines()[1:]] == [0.11, 0.38]
-        assert len(kappa_s.get_lines()) == 2  # the other end is at infinity
+        np.testing.assert_array_equal(mu.get_lines()[1].get_ydata(), [4.0, 0.0, 5.0])
+        assert [line.get_xdata()[0] for line in mu.get_lines()[2:]] == [0.11, 0.38]
+        assert len(kappa_s.get_lines()) == 3  # the other end is at infinity
+        parabola = np.interp(0.3, *mu.get_lines()[0].get_data())
+        assert parabola == pytest.approx(5.0 * 0.5**2, rel=0.01)
         assert kappa_s.get_title() == "68 %: 0.11 to inf"
         assert all(labels(mu))
 

@@ -17,6 +17,7 @@ from jbeamshell.identify.uncertainty import check_level
 
 MOST_POINTS = 8  # to either side
 CLOSE = 0.02  # of its root: so well the ends of an interval are found
+NUDGE = 0.5  # in the search space: most that the others move before they are fitted
 FARTHEST_FIRST = 2.0  # step in the search space, however little is known
 
 
@@ -90,9 +91,14 @@ def profile(
     along = uncertainty.inverse[:, entry] / uncertainty.inverse[entry, entry]
     least, wanted = problem(space, best).cost, uncertainty.quantile(level)
 
+    found = {0.0: best}
+
     def root_at(step: float) -> float:
         """Square root of the rise, which is about linear in the step."""
-        whole = best + step * along
+        # From the nearest step known, and not far at once: what is open would run away.
+        nearest = min(found, key=lambda known: abs(known - step))
+        whole = found[nearest] + np.clip((step - nearest) * along, -NUDGE, NUDGE)
+        whole[entry] = best[entry] + step
 
         def evaluate(part: NDArray[np.float64]) -> Point:
             point = problem(space, np.insert(part, entry, whole[entry]))
@@ -102,9 +108,9 @@ def profile(
             end = minimise(
                 evaluate, whole[others], Limits(max_iterations, tolerance, uncertainty.sigma**2)
             )
-            cost = evaluate(end.point).cost
-        else:
-            cost = evaluate(np.zeros(0)).cost
+            whole[others] = end.point
+        cost = evaluate(whole[others]).cost
+        found[step] = whole
         return float(np.sqrt(max(cost - least, 0.0)) / uncertainty.sigma)
 
     spread = float(np.sqrt(uncertainty.covariance[entry, entry]))

@@ -98,9 +98,12 @@ class LoadPath(Observation):
     Attributes
     ----------
     path : (n,) the load: an approach from zero, a closed loop's run-in, then the points
+    free_zero : whether the zero of what answers is unknown, so that the model's is put where it
+        fits best
     """
 
     path: Array
+    free_zero: bool = eqx.field(static=True, default=False)
     length_step: ClassVar[int] = LENGTH_STEP
 
     @classmethod
@@ -149,14 +152,22 @@ class LoadPath(Observation):
                 "that column, in its units"
             )
         weight = np.full(drive.size, 1.0 / np.ptp(response)) if noise is None else 1.0 / noise
-        columns = (np.append(unseen, response), np.append(unseen, weight), path)
-        return cls(*map(jnp.asarray, columns))
+        return cls(
+            jnp.asarray(np.append(unseen, response)),
+            jnp.asarray(np.append(unseen, weight)),
+            jnp.asarray(path),
+            getattr(measurement, "free_zero", False),
+        )
 
     def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
         """The column that answers, (n,)."""
         history = solve(scene, self.path, solver=solver, throw=False)
         column = "displacement" if scene.load.control == "force" else "force"
-        return getattr(history, column)[history.pressed + 1 :], jnp.all(history.status == 0)
+        answer = getattr(history, column)[history.pressed + 1 :]
+        if self.free_zero:
+            share = self.weight**2 / jnp.sum(self.weight**2)
+            answer = answer - jnp.sum(share * (answer - self.measured))
+        return answer, jnp.all(history.status == 0)
 
 
 class Squeezed(Observation):

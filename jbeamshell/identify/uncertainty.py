@@ -125,7 +125,7 @@ class Uncertainty(NamedTuple):
     def _trades(self, values: NDArray[np.float64]) -> list[str]:
         """Combinations of parameters that change the response by less than the noise."""
         sizes, slopes = self._sizes(values), self.space.slopes(self.point)
-        sentences = []
+        sentences, named = [], set()
         for eigenvalue, vector in self.directions():
             change = vector * slopes / sizes  # relative, for a unit step
             largest = np.max(np.abs(change))
@@ -133,7 +133,9 @@ class Uncertainty(NamedTuple):
                 continue
             change = STEP * change / change[np.argmax(np.abs(change))]
             part = np.flatnonzero(np.abs(change) >= TAKES_PART * STEP)
-            if part.size > 1:
+            # The least known direction speaks for all that mix the same parameters.
+            if part.size > 1 and tuple(part) not in named:
+                named.add(tuple(part))
                 names = " and ".join(self.space.names[i] for i in part)
                 steps = " with ".join(
                     f"{100.0 * abs(change[i]):.2g} % {'more' if change[i] > 0 else 'less'} "

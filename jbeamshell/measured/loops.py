@@ -32,6 +32,7 @@ class Loop(NamedTuple):
         point; None if there were no repeated cycles
     notes : one line on each thing that was done to the data
     driver : "force" or "displacement", whichever drove the test; None where nobody looked
+    free_zero : whether the zero of the column that answers is unknown, as after taking away a drift
     """
 
     force: NDArray[np.float64]
@@ -43,6 +44,7 @@ class Loop(NamedTuple):
     scatter: NDArray[np.float64] | None = None
     notes: tuple[str, ...] = ()
     driver: str | None = None
+    free_zero: bool = False
 
     @property
     def closed(self) -> bool:
@@ -61,10 +63,10 @@ class Loop(NamedTuple):
         return float(np.sqrt(np.mean(self.scatter**2) / self.cycles))
 
     def centred(self) -> Loop:
-        """Both columns without the zeros of their sensors, for a loop that is its own mirror image.
+        """The loop without the zeros of its sensors.
 
-        The middle of the range of what drives, and the mean of the answer along its way, are put
-        to zero.
+        What drives is shifted to the middle of its range, and the answer by its mean along the way;
+        as a model's loop need not have its mean there, a fit is told by ``free_zero`` not to mind.
 
         Raises
         ------
@@ -74,17 +76,14 @@ class Loop(NamedTuple):
         if not self.closed:
             raise InputError(f"{self.label}: is not closed: its zeros are where it started")
         driver = self.driver or find_driver(self.force, self.displacement)
-        drive = getattr(self, driver)
-        way = np.abs(np.diff(drive))
-        middle = 0.5 * (np.max(drive) + np.min(drive))
-        shifted, told = {driver: drive - middle}, [f"{driver} {middle:.3g}"]
         answer = "displacement" if driver == "force" else "force"
-        column = getattr(self, answer)
+        drive, column = getattr(self, driver), getattr(self, answer)
+        middle = 0.5 * float(np.max(drive) + np.min(drive))
+        way = np.abs(np.diff(drive))
         mean = float(np.sum(0.5 * (column[1:] + column[:-1]) * way) / np.sum(way))
-        shifted[answer] = column - mean
-        told.append(f"{answer} {mean:.3g}")
-        note = f"taken away as zeros of the sensors: {' and '.join(told)}"
-        return self._replace(**shifted, notes=(*self.notes, note))
+        note = f"taken away as zeros of the sensors: {driver} {middle:.3g} and {answer} {mean:.3g}"
+        shifted = {driver: drive - middle, answer: column - mean}
+        return self._replace(**shifted, notes=(*self.notes, note), free_zero=True)
 
     def thinned(self, points: int, driver: str) -> Loop:
         """About ``points`` of the loop's points, even along the driving column; turns are kept."""

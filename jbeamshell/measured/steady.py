@@ -64,7 +64,9 @@ def steady_loops(
     found = split_cycles(recording, driver, smallest=smallest)
     if drift != "keep":
         found = _without_drift(found, drift, smallest)
-    return [_mean_loop(found, number, steady, points) for number in range(found.groups)]
+    loops = [_mean_loop(found, number, steady, points) for number in range(found.groups)]
+    # Where a straight line crosses zero is known no better than its slope.
+    return [loop._replace(free_zero=drift != "keep") for loop in loops]
 
 
 class _ClosedCurve:
@@ -171,7 +173,8 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
         scatter=scatter,
         notes=(*recording.notes, *_notes(found, number, curve, heights, repeats, limit)),
         driver=found.driver,
-        **columns,
+        force=columns["force"],
+        displacement=columns["displacement"],
     )
 
 

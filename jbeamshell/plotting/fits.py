@@ -148,7 +148,12 @@ def likelihoods(profiles: Sequence[Profile], axes: Any = None) -> list[Axes]:
     with style():
         panels = _checked_axes(len(profiles), axes)
         for profile, panel in zip(profiles, panels, strict=True):
-            panel.plot(profile.values, profile.rises, "o-", color=PALETTE[0], markersize=4.0)
+            # The root of the rise is about straight to either side of the minimum.
+            side = np.sign(profile.values - profile.values[np.argmin(profile.rises)])
+            fine = np.linspace(profile.values[0], profile.values[-1], 200)
+            root = np.interp(fine, profile.values, side * np.sqrt(profile.rises))
+            panel.plot(fine, root**2, color=PALETTE[0])
+            panel.plot(profile.values, profile.rises, "o", color=PALETTE[0], markersize=4.0)
             for end in profile.interval:
                 if np.isfinite(end):
                     panel.axvline(end, color=PALETTE[1], linestyle=":", linewidth=1.2)
