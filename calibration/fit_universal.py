@@ -155,6 +155,7 @@ def picture(fit: identify.Fit, record: list[dict]) -> plt.Figure:
         ):
             right.loglog(places, [100 * f[name] for f in record], "o-", color=shade, label=label)
         right.set_xticks(places, [f"{m:g}" for m in places])
+        right.set_yticks((2, 5, 10, 20), ("2", "5", "10", "20"))
         right.minorticks_off()
         right.set(
             xlabel="smoothing $m$ of Coulomb's law",

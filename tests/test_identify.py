@@ -393,6 +393,15 @@ def test_finite_element_loops_are_recovered_with_small_bias():
         MODEL | {"model.nodes": 81, "contact.smoothing": "sharp", MU: 0.15, ETA: 0.2}
     )
     fit = identify.fit(example_loops(), start, FREE)
+    problem, space = fit.problem, fit.uncertainty.space
+    theirs = scipy.optimize.least_squares(
+        lambda point: problem(space, point).residual,
+        fit.uncertainty.point + 0.02,
+        jac=lambda point: problem(space, point).jacobian,
+        xtol=1e-12,
+        ftol=1e-12,
+    )
+    np.testing.assert_allclose(space.values(theirs.x), list(fit.values.values()), rtol=1e-6)
     assert fit.values[MU] == pytest.approx(0.1, rel=0.01)
     assert fit.values[ETA] == pytest.approx(0.1126, rel=0.03)
     assert fit.misfit < 0.01
