@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from jbeamshell.identify.parameters import Space
 from jbeamshell.identify.problem import Point, Problem
 
-DAMPING = 1e-2  # first damping, of a Gauss-Newton step in parameters of equal influence
+DAMPING = 1e-4  # first damping, of a Gauss-Newton step in parameters of equal influence
 REACH = 1.0  # of a step in the search space, for most parameters a factor e
 FLAT = 1e-6  # relative gain in cost at which a search has settled
 ADAM_STEPS = 25
