@@ -76,7 +76,7 @@ def test_order_of_convergence_in_the_grid(grid, order):
         )
         return float(jb.solve(scene, np.array([1.0])).displacement[-1])
 
-    values = np.array([end(nodes) for nodes in (21, 41, 81, 161)])
+    values = np.array([end(nodes) for nodes in (41, 81, 161)])
     rate = np.log2(np.abs(np.diff(values)[:-1] / np.diff(values)[1:]))
     assert rate[-1] == pytest.approx(order, abs=0.3)
 
