@@ -7,7 +7,6 @@ fitted_finite_elements.json and finite_elements.png beside this file:
 """
 
 import json
-import platform
 import time
 from pathlib import Path
 
@@ -15,9 +14,9 @@ import jax
 
 jax.config.update("jax_enable_x64", True)
 
-import jaxlib  # noqa: E402
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from provenance import provenance  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify, plotting  # noqa: E402
@@ -65,14 +64,7 @@ def main() -> None:
                 f"eta {height_ratio:<7g} free {name:15s} {''.join(bias)}"
                 f"misfit {100 * fit.misfit:.3f} %  {fit.model_runs} runs, {fit.status}"
             )
-    machine = {
-        "jax": jax.__version__,
-        "jaxlib": jaxlib.__version__,
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "dtype": "float64",
-    }
-    text = json.dumps({"provenance": machine, "true_friction": TRUE_FRICTION, "fits": record})
+    text = json.dumps({"provenance": provenance(), "true_friction": TRUE_FRICTION, "fits": record})
     write_text(HERE / "fitted_finite_elements.json", json.dumps(json.loads(text), indent=1) + "\n")
     plotting.save(picture(fits[0.1126, "mu, eta"]), HERE / "finite_elements.png")
 

@@ -10,7 +10,6 @@ fitted_squeeze.json and squeeze.png beside this file; takes about ten minutes:
 """
 
 import json
-import platform
 import time
 from pathlib import Path
 
@@ -18,9 +17,9 @@ import jax
 
 jax.config.update("jax_enable_x64", True)
 
-import jaxlib  # noqa: E402
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from provenance import provenance  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -28,8 +27,7 @@ from jbeamshell import identify, plotting, scenes  # noqa: E402
 from jbeamshell.elasticity import best_kappa_s, squeeze_decay_length  # noqa: E402
 from jbeamshell.example import data_folder, example_loops  # noqa: E402
 from jbeamshell.files import write_text  # noqa: E402
-from jbeamshell.identify.observations import SqueezeCurve  # noqa: E402
-from jbeamshell.measured.loops import Loop, make_loop  # noqa: E402
+from jbeamshell.measured import Loop, SqueezeCurve, make_loop  # noqa: E402
 
 HERE = Path(__file__).parent
 EDGE = 50.0  # mm, where the pressure ends
@@ -162,15 +160,8 @@ def main() -> None:
             f"lam = {figures['decay_length_mm']:.4f} mm, rms {figures['rms_MPa']:.3f} MPa"
         )
     print(*(record["verdict"] for record in loops.values()), sep="\n")
-    machine = {
-        "jax": jax.__version__,
-        "jaxlib": jaxlib.__version__,
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "dtype": "float64",
-    }
     truth = {"contact.friction": TRUE_FRICTION, "strip.kappa_s": TRUE_KAPPA_S, "noise": NOISE}
-    text = {"provenance": machine, "squeeze": squeeze, "truth": truth, "loops": loops}
+    text = {"provenance": provenance(), "squeeze": squeeze, "truth": truth, "loops": loops}
     write_text(HERE / "fitted_squeeze.json", json.dumps(text, indent=1, allow_nan=False) + "\n")
     best = {constants: fits[WINDOW, GRIDS[-1], constants] for constants in START}
     plotting.save(picture(best, squeeze, loops), HERE / "squeeze.png")

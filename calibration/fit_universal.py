@@ -11,7 +11,6 @@ fitted_universal.json and universal.png beside this file; takes some minutes:
 
 import csv
 import json
-import platform
 import time
 from pathlib import Path
 
@@ -19,9 +18,9 @@ import jax
 
 jax.config.update("jax_enable_x64", True)
 
-import jaxlib  # noqa: E402
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from provenance import provenance  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -114,14 +113,12 @@ def main() -> None:
             f"({figures['cells'][1]}), unseen strip {100 * figures['rms_unseen']:.2f} %; "
             f"{fits[smoothing].model_runs} runs, {fits[smoothing].status}"
         )
-    machine = {
-        "jax": jax.__version__,
-        "jaxlib": jaxlib.__version__,
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "dtype": "float64",
+    text = {
+        "provenance": provenance(),
+        "chosen_smoothing": CHOSEN,
+        "unseen": UNSEEN,
+        "fits": record,
     }
-    text = {"provenance": machine, "chosen_smoothing": CHOSEN, "unseen": UNSEEN, "fits": record}
     write_text(HERE / "fitted_universal.json", json.dumps(text, indent=1, allow_nan=False) + "\n")
     plotting.save(picture(fits[CHOSEN], record), HERE / "universal.png")
 

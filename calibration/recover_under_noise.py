@@ -15,7 +15,6 @@ of an hour on two cores, a process for each:
 import json
 import multiprocessing
 import os
-import platform
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
@@ -24,9 +23,9 @@ import jax
 
 jax.config.update("jax_enable_x64", True)
 
-import jaxlib  # noqa: E402
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from provenance import provenance  # noqa: E402
 from scipy import stats  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
@@ -168,14 +167,7 @@ def main() -> None:
                 f"likelihood {100 * told['likelihood_holds_68']:.0f} and "
                 f"{100 * told['likelihood_holds_95']:.0f} %"
             )
-    machine = {
-        "jax": jax.__version__,
-        "jaxlib": jaxlib.__version__,
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "dtype": "float64",
-        "wall_s": time.perf_counter() - begin,
-    }
+    machine = provenance() | {"wall_s": time.perf_counter() - begin}
     text = {"provenance": machine, "truth": TRUTH, "amplitudes": AMPLITUDES, "noises": record}
     write_text(HERE / "recovered_under_noise.json", json.dumps(text, indent=1) + "\n")
     plotting.save(picture(everything), HERE / "recovered_under_noise.png")
