@@ -147,6 +147,8 @@ def study(recording: Recording) -> tuple[dict, identify.Fit, tuple[Loop, np.ndar
             f"{100 * left:.2f} %\n{fit}",
             flush=True,
         )
+    if not fits:
+        raise InputError(f"{recording.label}: the model finds no equilibrium along these cycles")
     # The simplest that is as good as any.
     least = min(fit.misfit for fit in fits.values())
     best = next(name for name, fit in fits.items() if fit.misfit < 1.1 * least)

@@ -80,8 +80,7 @@ class Homogeneous(eqx.Module):
         bending = 0.5 * self.bending_stiffness * k**2
         if not self.squeeze:
             return h * plane * e**2 + shear + bending
-        coupling = nu / (1.0 - nu) if self.plane == "strain" else nu
-        c11 = plane / (1.0 - coupling**2)
+        coupling, c11 = plane_stiffness(plane, nu, self.plane)
         squeeze = h * plane * psi**2 + 0.5 * self.squeeze_stiffness * dpsi**2
         return h * c11 * (e + coupling * psi) ** 2 + squeeze + shear + bending
 
@@ -91,6 +90,13 @@ def shear_modulus(plane_modulus: Array, poisson_ratio: Array, plane: str) -> Arr
     if plane == "strain":
         return 0.5 * (1.0 - poisson_ratio) * plane_modulus
     return 0.5 * plane_modulus / (1.0 + poisson_ratio)
+
+
+def plane_stiffness(plane_modulus: Array, poisson_ratio: Array, plane: str) -> tuple[Array, Array]:
+    """Nu' and C11 = E'/(1-nu'^2), stress: sigma_x = C11 (eps_x + nu' eps_y)."""
+    nu = poisson_ratio
+    coupling = nu / (1.0 - nu) if plane == "strain" else nu
+    return coupling, plane_modulus / (1.0 - coupling**2)
 
 
 def forces(energy: Energy, strains: Strains) -> Strains:

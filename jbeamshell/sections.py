@@ -27,7 +27,7 @@ import numpy as np
 from jax import Array
 from numpy.polynomial import legendre
 
-from jbeamshell.energy import shear_modulus
+from jbeamshell.energy import plane_stiffness, shear_modulus
 from jbeamshell.kinematics import FIELDS, KINEMATICS, Section, Strains
 
 LARGEST_ORDER = 12
@@ -120,8 +120,7 @@ class Hierarchic(eqx.Module):
             eyy = eyy + 0.5 * (ux_y**2 + uy_y**2)
             shear = shear + ux_x * ux_y + uy_x * uy_y
         nu = self.poisson_ratio
-        coupling = nu / (1.0 - nu) if self.plane == "strain" else nu
-        c11 = self.plane_modulus / (1.0 - coupling**2)
+        coupling, c11 = plane_stiffness(self.plane_modulus, nu, self.plane)
         stretch = 0.5 * c11 * (exx + coupling * eyy) ** 2 + 0.5 * self.plane_modulus * eyy**2
         modulus = shear_modulus(self.plane_modulus, nu, self.plane)
         return stretch + 0.5 * modulus * shear**2

@@ -416,3 +416,26 @@ def test_what_a_scene_cannot_answer(planted):
     noisy = Loop(np.asarray(force), np.asarray(displacement), "rig", noise=1.0)
     with pytest.raises(jb.InputError, match="rig: noise = 1 is more than the range of disp"):
         identify.fit(noisy, start, FREE)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"points": 3}, "points = 3: give a whole number, 8 or more"),
+        ({"max_iterations": "a"}, "max_iterations = 'a': give a whole number, 1 or more"),
+        ({"starts": True}, "starts = True: give a whole number, 1 or more"),
+        ({"tolerance": -1.0}, r"tolerance = -1\.0: give a positive number, such as 1e-7"),
+        ({"noise": "a"}, "noise = 'a': give a positive part of the range"),
+    ],
+)
+def test_options_that_make_no_sense(options, told):
+    with pytest.raises(jb.InputError, match=told):
+        identify.fit(readings(), scene(), KEYS, **options)
+
+
+def test_a_profile_says_that_the_others_did_not_settle():
+    fit = identify.fit(readings(1e-3), scene(), KEYS)
+    assert identify.profile(fit, KEYS[0]).settled
+    hasty = identify.profile(fit, KEYS[0], max_iterations=1, tolerance=1e-12)
+    assert not hasty.settled
+    assert "did not settle" in str(hasty)

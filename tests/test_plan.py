@@ -72,7 +72,7 @@ def test_specimens_share_what_the_plan_says_and_keep_their_own(folder):
     assert (thin.label, other.label) == ("thin", "2")
     assert [specimen.scene.get("strip.length") for specimen in plan.specimens] == [3.0, 3.0]
     assert thin.scene.get("strip.height_ratio") == 0.05
-    assert [p.key for p in plan.free] == list(("contact.friction", "strip.height_ratio"))
+    assert [p.key for p in plan.free] == ["contact.friction", "strip.height_ratio"]
     assert plan.free[0].prior == (0.2, 0.05)
     assert plan.free[1].each
     assert plan.options == {"noise": 0.01, "starts": 2}
@@ -164,6 +164,12 @@ def test_curves_that_cannot_be_read_say_why(tmp_path, text, message):
         ({"specimen": [{"data": ["none.csv"]}]}, r"none\.csv: cannot be read"),
         ({"free": {"contact.friction": {"lo": 1}}}, "'lo' is unknown"),
         ({"free": {"contact.friction": 0.1}}, "must be a table"),
+        ({"free": {"contact.friction": {"each": 3}}}, "each = 3: give true or false"),
+        ({"specimen": [{"data": [3]}]}, r"data = \[3\]: list its files"),
+        (
+            {"specimen": [{"data": ["loop.csv"], "units": {"force": 3}}]},
+            r"units\.force = 3: give a word",
+        ),
         ({"set": 3}, "set = 3: must be a table"),
         ({"set": {"strip.lenght": 1.0}}, r"strip\.lenght"),
         ({"scene": "standrad"}, "did you mean 'standard'"),

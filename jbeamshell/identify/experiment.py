@@ -106,8 +106,6 @@ class Experiment:
             for measurements that a scene cannot answer; if only some carry noise; for weights that
             are not positive or not as many as the measurements
         """
-        if noise is not None and not (np.isfinite(noise) and noise > 0.0):
-            raise InputError(f"noise = {noise}: give a positive part of the range, such as 0.01")
         self.scenes = [specimen.scene for specimen in specimens]
         self.measurements: list[Any] = []
         self.owners: list[int] = []

@@ -17,7 +17,7 @@ from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit, fit_at
 from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, Limits
 from jbeamshell.measured.curves import Measurement
-from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.loops import FEWEST_POINTS, Loop
 from jbeamshell.newton import Newton
 from jbeamshell.scene import Scene
 
@@ -117,8 +117,15 @@ def fit(
     """
     if method not in METHODS:
         raise InputError(f"method = {method!r}: choose {' or '.join(map(repr, METHODS))}")
-    if starts is not None and (not isinstance(starts, int) or starts < 1):
-        raise InputError(f"starts = {starts!r}: give a whole number, 1 or more")
+    _check_counts(
+        starts=(1 if starts is None else starts, 1),
+        points=(points, FEWEST_POINTS),
+        max_iterations=(max_iterations, 1),
+    )
+    _check_sizes(
+        noise=(1.0 if noise is None else noise, "a positive part of the range, such as 0.01"),
+        tolerance=(tolerance, "a positive number, such as 1e-7"),
+    )
     parameters = as_parameters(free)
     specimens = _specimens(data, scene, weights)
     labels = [specimen.label for specimen in specimens]
@@ -188,6 +195,22 @@ def fit_kappa_s(curve: Measurement | Sequence[Measurement], scene: Scene, **opti
     options : of `fit`
     """
     return fit(curve, scene, ("strip.kappa_s",), **options)
+
+
+def _check_counts(**given: Any) -> None:
+    """Options that are whole numbers; each with the least it may be."""
+    for name, (value, least) in given.items():
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        if not (whole and value >= least):
+            raise InputError(f"{name} = {value!r}: give a whole number, {least} or more")
+
+
+def _check_sizes(**given: Any) -> None:
+    """Options that are positive numbers; each with what to give."""
+    for name, (value, fix) in given.items():
+        number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        if not (number and np.isfinite(value) and value > 0.0):
+            raise InputError(f"{name} = {value!r}: give {fix}")
 
 
 def _specimens(data: Any, scene: Scene | None, weights: Sequence[float]) -> list[Specimen]:

@@ -32,6 +32,8 @@ class Profile(NamedTuple):
     interval : where the rise reaches that of the level; a bound of the parameter, or infinity,
         where it never does
     level : of confidence
+    settled : whether all others settled at every point; if not, rises are too large there, and the
+        interval may be too short
     """
 
     name: str
@@ -39,15 +41,18 @@ class Profile(NamedTuple):
     rises: NDArray[np.float64]
     interval: tuple[float, float]
     level: float
+    settled: bool = True
 
     def __str__(self) -> str:
         low, high = self.interval
-        return f"  {self.name}: {100.0 * self.level:g} % profile interval {low:.6g} to {high:.6g}"
+        line = f"  {self.name}: {100.0 * self.level:g} % profile interval {low:.6g} to {high:.6g}"
+        return line if self.settled else f"{line}; the others did not settle, so it may be short"
 
     def figures(self) -> dict[str, Any]:
         """The profile as plain numbers, fit for JSON: an end at infinity is None."""
         return {
             "level": self.level,
+            "settled": self.settled,
             "interval": [end if np.isfinite(end) else None for end in self.interval],
             "values": self.values.tolist(),
             "rises": self.rises.tolist(),
@@ -91,10 +96,11 @@ def profile(
     along = uncertainty.inverse[:, entry] / uncertainty.inverse[entry, entry]
     least, wanted = problem(space, best).cost, uncertainty.quantile(level)
 
-    found = {0.0: best}
+    found, settled = {0.0: best}, True
 
     def root_at(step: float) -> float:
         """Square root of the rise, which is about linear in the step."""
+        nonlocal settled
         # From the nearest step known, and not far at once: what is open would run away.
         nearest = min(found, key=lambda known: abs(known - step))
         whole = found[nearest] + np.clip((step - nearest) * along, -NUDGE, NUDGE)
@@ -109,6 +115,7 @@ def profile(
                 evaluate, whole[others], Limits(max_iterations, tolerance, uncertainty.sigma**2)
             )
             whole[others] = end.point
+            settled &= end.status == "converged"
         cost = evaluate(whole[others]).cost
         found[step] = whole
         return float(np.sqrt(max(cost - least, 0.0)) / uncertainty.sigma)
@@ -122,7 +129,7 @@ def profile(
     steps = sorted(known, key=lambda step: space.bijections[entry].value(best[entry] + step))
     values = np.array([space.bijections[entry].value(best[entry] + step) for step in steps])
     rises = np.array([known[step] ** 2 for step in steps])
-    return Profile(name, values, rises, (min(ends), max(ends)), level)
+    return Profile(name, values, rises, (min(ends), max(ends)), level, settled)
 
 
 def _crossing(

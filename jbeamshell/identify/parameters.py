@@ -66,6 +66,7 @@ class Parameter:
         for name in ("start", "low", "high"):
             value = getattr(self, name)
             self._require(name, value, value is None or _is_number(value), "give a finite number")
+        self._require("each", self.each, isinstance(self.each, bool), "give true or false")
         self._check_prior()
         fix = "choose 'log' or 'linear'"
         self._require("scale", self.scale, self.scale is None or self.scale in SCALES, fix)

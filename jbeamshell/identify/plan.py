@@ -99,7 +99,8 @@ class Source:
     set: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if isinstance(self.data, str) or not self.data:
+        files = isinstance(self.data, list | tuple) and all(isinstance(f, str) for f in self.data)
+        if not (files and self.data):
             raise InputError(f"specimen {self.label!r}: data = {self.data!r}: list its files")
         words = {"kind": KINDS, "cycles": CYCLES, "drift": DRIFTS, "driver": (None, *CONTROLS)}
         for name, known in words.items():
@@ -263,6 +264,10 @@ def _source(table: Mapping[str, Any], label: Any) -> Source:
         raise InputError(f"specimen {label!r}: data: list its files")
     for name in ("columns", "units", "set"):
         _check_table(f"specimen {label!r}: {name}", table.get(name, {}))
+    for name in ("columns", "units"):
+        for quantity, word in table.get(name, {}).items():
+            if not isinstance(word, str):
+                raise InputError(f"specimen {label!r}: {name}.{quantity} = {word!r}: give a word")
     return Source(**{**table, "label": str(label)})
 
 
