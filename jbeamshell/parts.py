@@ -24,12 +24,13 @@ from jbeamshell.friction import CappedTrial, ElasticSlip, FrictionLaw, SharpSlip
 from jbeamshell.grid import END_SIZE, ORDER
 from jbeamshell.kinematics import FIELDS, KINEMATICS
 from jbeamshell.laminate import Laminate, check_layers
-from jbeamshell.sections import LARGEST_ORDER
+from jbeamshell.rungs import LARGEST_ORDER, name_of
 
 FAR_ENDS = ("held", "pinned", "free")
 CONTROLS = ("force", "displacement")
 NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
+SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form")
 MODELS = (
     ("v",),
     ("v", "beta"),
@@ -383,6 +384,9 @@ class Model(eqx.Module):
     squeeze : "field" (psi has its own balance) or "assumed" (psi = -(F_N + R)/(2E), the earlier
         theory of Brink 2015, section 4.2, without Poisson's effect)
     order : 0 is the beamshell; p from 1 up is a section of order p, see `jbeamshell.sections`
+    solution : "stepwise" (Newton's method at every load level), "masing" (the loop is the mean
+        backbone of a pull and a push, doubled), "masing-pull" (of a pull alone), or "closed-form"
+        (Goodman's bar)
     end_size : size of the smallest elements, at the loaded end and at steps of the pressure, over
         H, before the node count scales all sizes
     """
@@ -394,6 +398,7 @@ class Model(eqx.Module):
     constants: str = _static("consistent")
     squeeze: str = _static("field")
     order: int = _static(0)
+    solution: str = _static("stepwise")
     end_size: float = _static(END_SIZE)
 
     def __check_init__(self) -> None:
@@ -415,6 +420,9 @@ class Model(eqx.Module):
         straight = {"beta", "psi"} <= set(self.fields) and self.squeeze == "field"
         fix = "needs beta and psi in model.fields, and the squeeze strain as a field"
         require("model.order", self.order, self.order == 0 or straight, fix)
+        require_choice("model.solution", self.solution, SOLUTIONS)
+        bar = self.solution != "closed-form" or self.fields == ("v",)
+        require("model.solution", self.solution, bar, "is the bar's: take ['v'] as model.fields")
         number = isinstance(self.end_size, int | float) and not isinstance(self.end_size, bool)
         require("model.end_size", self.end_size, number, POSITIVE + " (of H)")
         require_number("model.end_size", self.end_size, POSITIVE + " (of H)")
@@ -430,6 +438,11 @@ class Model(eqx.Module):
     def active(self) -> tuple[int, ...]:
         """Positions of the active fields among (v, w, beta, psi, and a section's further ones)."""
         return (*(FIELDS.index(f) for f in self.fields), *range(len(FIELDS), self.width))
+
+    @property
+    def rung(self) -> str:
+        """Name of the model on the ladder; see `jbeamshell.rungs`."""
+        return name_of(self.fields, self.order, self.solution)
 
     @property
     def width(self) -> int:

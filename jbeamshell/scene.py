@@ -42,6 +42,7 @@ from jbeamshell.parts import (
     require,
     require_number,
 )
+from jbeamshell.rungs import spelled_out
 from jbeamshell.sections import Hierarchic
 
 SECTIONS = {"strip": Strip, "contact": Contact, "load": Load, "model": Model}
@@ -90,6 +91,8 @@ WORDS = (
     "model.grid",
     "model.constants",
     "model.squeeze",
+    "model.solution",
+    "model.rung",
 )
 KEYS = NUMBERS + SETTINGS + WORDS
 OPTIONAL = ("strip.layers", "strip.curvature")  # may be None
@@ -179,6 +182,14 @@ class Scene(eqx.Module):
         plain = self.energy is None and strip.layers is None and strip.curvature is None
         fix = "is for a straight homogeneous strip without an energy of its own; take 0"
         require("model.order", self.model.order, self.model.order == 0 or plain, fix)
+        uniform = contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0
+        bar = plain and uniform and contact.normal == "rigid"
+        fix = "is the bar's, homogeneous, straight, under one pressure: take another model.rung"
+        closed = self.model.solution == "closed-form"
+        require("model.solution", self.model.solution, bar or not closed, fix)
+        cycling = self.model.solution == "stepwise" or self.load.cycles > 0
+        fix = "doubles a backbone for load.cycles, of which there are none: take 'stepwise'"
+        require("model.solution", self.model.solution, cycling, fix)
         layered = self.model.squeeze == "assumed" and strip.layers is not None
         require("model.squeeze", "assumed", not layered, "is for a homogeneous strip")
         if contact.normal == "none":
@@ -223,6 +234,7 @@ class Scene(eqx.Module):
             _check_word(key, value)
             if DERIVED.get(key) in values:
                 raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")
+        values = spelled_out(dict(values), self.model.fields)
         parts: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
         for key, value in values.items():
             if key not in DERIVED:
@@ -336,6 +348,8 @@ def scene_from_values(values: Mapping[str, Any]) -> Scene:
 def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Dotted keys with others on top; half_height replaces height_ratio and the like."""
     same = DERIVED | {primary: derived for derived, primary in DERIVED.items()}
+    values = spelled_out(dict(values))
+    overrides = spelled_out(dict(overrides), values.get("model.fields", ()))
     displaced = {same[key] for key in overrides if key in same}
     return {k: v for k, v in values.items() if k not in displaced} | dict(overrides)
 
@@ -374,7 +388,7 @@ def scene_to_toml(scene: Scene) -> str:
         )
     tables: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
     for key in KEYS:
-        if key in DERIVED:
+        if key in DERIVED or key == "model.rung":
             continue
         section, name = key.split(".")
         value = scene.get(key)

@@ -30,8 +30,6 @@ from numpy.polynomial import legendre
 from jbeamshell.energy import plane_stiffness, shear_modulus
 from jbeamshell.kinematics import FIELDS, KINEMATICS, Section, Strains
 
-LARGEST_ORDER = 12
-
 
 class Hierarchic(eqx.Module):
     """A homogeneous section of order p; its fields are v, w, beta, psi, a_2, b_2, ..., a_p, b_p.
