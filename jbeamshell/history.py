@@ -371,14 +371,14 @@ def _contact_ends(x: Array, tributary: Array, touching: Array, reaction: Array) 
 
     def end(touching: Array, reaction: Array) -> Array:
         j = last - jnp.argmax(touching[::-1])
-        before, outer = jnp.maximum(j - 1, 1), jnp.minimum(j + 1, last)
+        before = jnp.maximum(j - 1, 1)
         slope = (reaction[before] - reaction[before - 1]) / (x[before] - x[before - 1])
         force, begin = reaction[j] * tributary[j], share_begins[j]
         width = tributary[j]
         for _ in range(3):
             level = reaction[before] + slope * (begin + 0.5 * width - x[before])
             width = jnp.where(level > 0.0, force / jnp.where(level > 0.0, level, 1.0), width)
-            width = jnp.clip(width, 0.0, x[outer] - begin)
+            width = jnp.clip(width, 0.0, tributary[j])  # beyond its share the next node would touch
         found = jnp.where(j == last, x[last], begin + width)
         return jnp.where(jnp.any(touching), found, 0.0)
 
