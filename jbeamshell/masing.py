@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array, lax
@@ -24,7 +23,7 @@ from jbeamshell.equilibrium import Level, System, V
 from jbeamshell.history import Status
 from jbeamshell.newton import Newton
 from jbeamshell.scene import Scene
-from jbeamshell.stepping import Path, State, Steps, at_rest, walk
+from jbeamshell.stepping import Path, State, Steps, at_rest, march, walk
 
 
 class Backbone(NamedTuple):
@@ -52,29 +51,42 @@ class Backbone(NamedTuple):
     status: Array
 
 
-def masing(scene: Scene, start: State, path: Path, solver: Newton) -> Steps:
-    """The scene's own cycles from the backbones of a pull and of a push, or of a pull alone."""
-    backbone = _walked(scene, start, path, 1.0, solver)
-    if scene.model.solution == "masing":
-        backbone = _mean(backbone, _walked(scene, start, path, -1.0, solver))
-    return _doubled(scene, path, backbone)
+def masing(
+    scene: Scene, start: State, path: Path, solver: Newton, recovering: bool = False
+) -> Steps:
+    """The scene's own cycles from the backbones of a pull and of a push, or of a pull alone.
+
+    Parameters
+    ----------
+    scene, start, path, solver : as of `jbeamshell.stepping.march`
+    recovering : whether failed steps are walked in pieces, which cannot be traced
+    """
+    go = walk if recovering else march
+
+    def backbone(sign: float) -> Backbone:
+        return _since_pressed(scene, go(scene, start, _backbone_path(scene, path, sign), solver))
+
+    both = scene.model.solution == "masing"
+    found = _mean(backbone(1.0), backbone(-1.0)) if both else backbone(1.0)
+    return _doubled(scene, path, found)
 
 
-@eqx.filter_jit
 def bar(scene: Scene, path: Path) -> Steps:
     """The scene's own cycles of Goodman's bar, in closed form."""
     return _doubled(scene, path, _bar_backbone(scene, path))
 
 
-def _walked(scene: Scene, start: State, path: Path, sign: float, solver: Newton) -> Backbone:
-    """The backbone of a pull, or of a push, by Newton's method."""
+def _backbone_path(scene: Scene, path: Path, sign: float) -> Path:
+    """The pressing, then a pull (or a push) to the amplitude."""
     pressing, half = scene.load.pressure_steps, scene.load.steps_per_half_cycle
     levels = sign * scene.load.amplitude * jnp.arange(1, half + 1) / half
     ones = jnp.ones_like(levels)
-    whole = [
-        jnp.append(p[:pressing], more) for p, more in zip(path, (levels, ones, ones), strict=True)
-    ]
-    steps = walk(scene, start, Path(*whole), solver)
+    after = Path(levels, ones, ones)
+    return jax.tree.map(lambda a, b: jnp.append(a[:pressing], b), path, after)
+
+
+def _since_pressed(scene: Scene, steps: Steps) -> Backbone:
+    pressing = scene.load.pressure_steps
 
     def since(values: Array) -> Array:
         return values[pressing - 1 :] - values[pressing - 1]
@@ -173,7 +185,6 @@ def _pressed_bar(scene: Scene, system: System, path: Path) -> Steps:
     )
 
 
-@eqx.filter_jit
 def _doubled(scene: Scene, path: Path, backbone: Backbone) -> Steps:
     """The scene's own cycles from a backbone, by Masing's rule."""
     pressed, cycles = backbone.pressed, scene.load.cycles

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -20,7 +21,11 @@ from jbeamshell.masing import bar, masing
 from jbeamshell.newton import Newton
 from jbeamshell.parts import require
 from jbeamshell.scene import Scene
-from jbeamshell.stepping import ROUNDING, Path, State, Steps, at_rest, is_traced, walk
+from jbeamshell.stepping import ROUNDING, Path, Steps, at_rest, is_traced, march, recover
+
+ADVICE = (
+    "take more load.steps_per_half_cycle, a lower contact.stick_stiffness, or fewer model.nodes"
+)
 
 
 def solve(
@@ -57,10 +62,22 @@ def solve(
     """
     solver = solver or Newton()
     whole, cycles = check(scene, path)
-    steps = _walked(scene, at_rest(scene, contact), whole, solver)
-    if throw:
-        steps = _raise_if_failed(steps, whole, is_traced(scene, whole))
-    return _history(scene, steps, whole.pressure, cycles)
+    touching = None if contact is None else _check_contact(scene, contact)
+    steps, history = _solve(scene, touching, whole, solver, cycles, np.asarray(True))
+    if is_traced(scene, whole):
+        sound = steps.state.sound[-1]
+        message = f"a load step found no equilibrium: {ADVICE}"
+        return eqx.error_if(history, ~sound, message) if throw else history
+    if not bool(steps.state.sound[-1]):
+        start = at_rest(scene, touching)
+        if scene.model.solution == "stepwise":
+            steps = recover(scene, steps, whole, solver, start)
+        else:
+            steps = masing(scene, start, whole, solver, recovering=True)
+        if throw:
+            _raise_if_failed(steps, whole)
+        history = _history(scene, steps, whole.pressure, cycles)
+    return history
 
 
 def check(
@@ -79,57 +96,71 @@ def compile_for(
 ) -> None:
     """Compile what `solve` needs, without solving anything."""
     whole, cycles = _whole_path(scene, path)
-    start = at_rest(scene)._replace(sound=jnp.asarray(False))
-    steps = _walked(scene, start, whole, solver or Newton())
-    jax.block_until_ready(_history(scene, steps, whole.pressure, cycles))
+    jax.block_until_ready(_solve(scene, None, whole, solver or Newton(), cycles, np.asarray(False)))
 
 
-def _walked(scene: Scene, start: State, path: Path, solver: Newton) -> Steps:
+@eqx.filter_jit
+def _solve(
+    scene: Scene,
+    touching: np.ndarray | None,
+    path: Path,
+    solver: Newton,
+    cycles: Sequence[tuple[int, int, int]],
+    enabled: ArrayLike,
+) -> tuple[Steps, History]:
+    start = at_rest(scene, touching)._replace(sound=jnp.asarray(enabled))
     if scene.model.solution == "closed-form":
-        return bar(scene, path)
-    if scene.model.solution == "stepwise":
-        return walk(scene, start, path, solver)
-    return masing(scene, start, path, solver)
+        steps = bar(scene, path)
+    elif scene.model.solution == "stepwise":
+        steps = march(scene, start, path, solver)
+    else:
+        steps = masing(scene, start, path, solver)
+    return steps, _history(scene, steps, path.pressure, cycles)
 
 
 def _whole_path(
     scene: Scene, path: ArrayLike | None
 ) -> tuple[Path, tuple[tuple[int, int, int], ...]]:
     """The pressing, then the given loads or the scene's own; and the closed cycles among them."""
-    dtype, pressing = scene.load.amplitude.dtype, scene.load.pressure_steps
-    known: np.ndarray | None = scene.load.unit_path()
-    own = path is None or scene.model.solution == "stepwise"
-    fix = (
-        "has Masing's rule for the scene's own cycles only: leave the path out, or take 'stepwise'"
-    )
-    require("model.solution", scene.model.solution, own, fix)
+    pressing, known = scene.load.pressure_steps, scene.load.unit_path()
+    solution = scene.model.solution
+    fix = "knows the scene's own cycles only: leave the path out, or take 'stepwise'"
+    require("model.solution", solution, path is None or solution == "stepwise", fix)
+    numbers: Any = jnp if is_traced(scene.load.amplitude, path) else np  # the faster, where it can
+    amplitude = numbers.asarray(scene.load.amplitude)
     if path is None:
-        targets = scene.load.amplitude * jnp.asarray(known, dtype)
-        pressures = jnp.ones_like(targets)
+        targets = amplitude * known.astype(amplitude.dtype)
+        pressures = numbers.ones_like(targets)
     else:
-        loads = jnp.asarray(path, dtype)
+        loads = numbers.asarray(path, amplitude.dtype)
         shaped = loads.size > 0 and (loads.ndim == 1 or (loads.ndim == 2 and loads.shape[1] == 2))
         require("path", np.shape(path), shaped, "give (steps,) loads, or (steps, 2) with pressures")
-        targets, pressures = (loads, jnp.ones_like(loads)) if loads.ndim == 1 else loads.T
-        known = None if isinstance(loads, jax.core.Tracer) else np.asarray(targets)
-        if known is not None:
-            values = np.asarray(loads)
-            finite = np.isfinite(values)
-            require("path", values[~finite], bool(np.all(finite)), "must hold finite loads only")
-            pulling = np.asarray(pressures) < 0.0
+        targets, pressures = (loads, numbers.ones_like(loads)) if loads.ndim == 1 else loads.T
+        if not is_traced(loads):
+            known, finite = np.asarray(targets), np.isfinite(loads)
+            require("path", loads[~finite], bool(np.all(finite)), "must hold finite loads only")
+            pulling = pressures < 0.0
             fix = "the part of the pressures that acts must not be negative"
             require("path", np.asarray(pressures)[pulling], not np.any(pulling), fix)
-    before = jnp.arange(1, pressing + 1, dtype=dtype) / pressing
+        else:
+            known = np.zeros(0)
+    before = (np.arange(1, pressing + 1) / pressing).astype(amplitude.dtype)
     whole = Path(
-        jnp.append(jnp.zeros_like(before), targets),
-        jnp.append(before, pressures),
-        jnp.append(jnp.zeros_like(before), jnp.ones_like(targets)),
+        numbers.append(np.zeros_like(before), targets),
+        numbers.append(before, pressures),
+        numbers.append(np.zeros_like(before), numbers.ones_like(targets)),
     )
-    if known is None or known.size == 0:
-        return whole, ()
     last = pressing - 1
-    cycles = closed_cycles(np.append(0.0, known))
+    cycles = closed_cycles(np.append(0.0, known)) if known.size else ()
     return whole, tuple((a + last, b + last, c + last) for a, b, c in cycles)
+
+
+def _check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:
+    touching, nodes = np.asarray(contact, dtype=bool), scene.model.nodes
+    fits = touching.shape == (nodes,) and "w" in scene.model.fields
+    fix = f"give one truth for each of the {nodes} nodes, and w in model.fields"
+    require("contact", touching.shape, fits, fix)
+    return touching
 
 
 def _check_gross_slip(scene: Scene, path: Path) -> None:
@@ -164,16 +195,10 @@ def _gross_slip(scene: Scene) -> Array:
     return gross_slip_force(scene.contact.friction, mean, length)
 
 
-def _raise_if_failed(steps: Steps, path: Path, traced: bool) -> Steps:
-    advice = (
-        "take more load.steps_per_half_cycle, a lower contact.stick_stiffness, or fewer model.nodes"
-    )
-    if traced:
-        message = f"a load step found no equilibrium: {advice}"
-        return eqx.error_if(steps, ~steps.state.sound[-1], message)
+def _raise_if_failed(steps: Steps, path: Path) -> None:
     sound = np.asarray(steps.state.sound)
     if sound.all():
-        return steps
+        return
     first = int(np.argmin(sound))
     where = f"load step {first} of {sound.size - 1} (load {float(path.target[first]):.6g})"
     if not path.rough[first]:
@@ -181,7 +206,7 @@ def _raise_if_failed(steps: Steps, path: Path, traced: bool) -> Steps:
     reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
     error = float(steps.error[first])
     raise UnconvergedError(
-        f"{where} found no equilibrium ({reason}, out of balance {error:.2g} of mu F_N L): {advice}"
+        f"{where} found no equilibrium ({reason}, out of balance {error:.2g} of mu F_N L): {ADVICE}"
     )
 
 

@@ -16,7 +16,6 @@ from jbeamshell.friction import plastic_slip
 from jbeamshell.grid import ORDER
 from jbeamshell.history import Status
 from jbeamshell.newton import Newton
-from jbeamshell.parts import require
 from jbeamshell.scene import Scene
 
 SLIPS = 0.5  # a node slips in a step when more than this part of its motion is inelastic
@@ -98,11 +97,9 @@ _march = eqx.filter_jit(march)
 
 
 def walk(scene: Scene, start: State, path: Path, solver: Newton) -> Steps:
-    """Walk a load path; a step that fails is walked again in pieces, unless it is traced."""
+    """Walk a load path; a step that fails is walked again in pieces."""
     steps = _march(scene, start, path, solver)
-    if is_traced(scene, path) or bool(steps.state.sound[-1]) or not bool(start.sound):
-        return steps
-    return _recover(scene, steps, path, solver, start)
+    return steps if bool(steps.state.sound[-1]) else recover(scene, steps, path, solver, start)
 
 
 def is_traced(*trees: object) -> bool:
@@ -173,8 +170,14 @@ def _guess(system: System, state: State, stride: Array) -> Array:
     return lax.stop_gradient(jnp.where(ratio < 0.0, nudge, ratio) * state.change)
 
 
-def at_rest(scene: Scene, contact: ArrayLike | None = None) -> State:
-    """The strip before anything acts on it, and the contact from which its search starts."""
+def at_rest(scene: Scene, touching: ArrayLike | None = None) -> State:
+    """The strip before anything acts on it.
+
+    Parameters
+    ----------
+    scene : of which
+    touching : (n,) nodes from which the search for the contact starts; None is all of them
+    """
     model, dtype = scene.model, scene.strip.length.dtype
     nodes = jnp.zeros(model.nodes, dtype)
     level = Level(jnp.zeros((nodes.size, model.width), dtype), nodes, nodes, nodes, nodes[0])
@@ -183,12 +186,8 @@ def at_rest(scene: Scene, contact: ArrayLike | None = None) -> State:
     blocks = (model.nodes + order - 1) // order
     change = jnp.zeros((blocks * order, width), dtype)
     stride = jnp.zeros(2, dtype)
-    if contact is not None:
-        touching = np.asarray(contact, dtype=bool)
-        fits = touching.shape == nodes.shape and "w" in model.fields
-        fix = f"give one truth for each of the {nodes.size} nodes, and w in model.fields"
-        require("contact", touching.shape, fits, fix)
-        raised = jnp.where(touching, 0.0, scene.strip.half_height)
+    if touching is not None:
+        raised = jnp.where(jnp.asarray(touching), 0.0, scene.strip.half_height)
         change = change.at[-nodes.size :, model.fields.index("w")].set(raised)
         stride = stride.at[1].set(1.0 / scene.load.pressure_steps)  # so that it is gone on with
     change = change.reshape(blocks, order * width)
@@ -196,8 +195,8 @@ def at_rest(scene: Scene, contact: ArrayLike | None = None) -> State:
     return State(level, zero, zero, zero, stride, change, jnp.asarray(True))
 
 
-def _recover(scene: Scene, steps: Steps, path: Path, solver: Newton, start: State) -> Steps:
-    """Walk every failed step in pieces and go on from there."""
+def recover(scene: Scene, steps: Steps, path: Path, solver: Newton, start: State) -> Steps:
+    """Walk every failed step of a march in pieces and go on from there."""
     count = path.target.size
     while not bool(steps.state.sound[-1]):
         first = int(np.argmin(np.asarray(steps.state.sound)))

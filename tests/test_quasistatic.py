@@ -152,6 +152,6 @@ def test_beyond_gross_slip_force_control_is_refused():
 def test_compiling_alone_solves_nothing():
     scene = jb.Scene().replace(SMALL)
     quasistatic.compile_for(scene)
-    size = quasistatic._march._cached._cache_size()
+    size = quasistatic._solve._cached._cache_size()
     jb.solve(scene)
-    assert quasistatic._march._cached._cache_size() == size
+    assert quasistatic._solve._cached._cache_size() == size
