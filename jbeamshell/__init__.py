@@ -1,5 +1,6 @@
 """jbeamshell: differentiable beamshells on a rough foundation."""
 
+from jbeamshell.advice import Advice, advise
 from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.history import History, Status
 from jbeamshell.newton import Newton
@@ -10,6 +11,7 @@ from jbeamshell.scene import Scene, read_scene, scene_to_toml, write_scene
 __version__ = "0.1.0"
 
 __all__ = [
+    "Advice",
     "Contact",
     "History",
     "InputError",
@@ -20,6 +22,7 @@ __all__ = [
     "Status",
     "Strip",
     "UnconvergedError",
+    "advise",
     "read_scene",
     "scene_to_toml",
     "solve",

@@ -11,6 +11,7 @@ import jax
 
 from jbeamshell import __version__, fit_command
 from jbeamshell.errors import InputError, UnconvergedError
+from jbeamshell.scene import Scene, overridden, scene_from_values
 from jbeamshell.terminal import assignments, put, say, say_written, warn
 
 BAD_INPUT, UNCONVERGED, INTERRUPTED = 2, 3, 130
@@ -58,24 +59,39 @@ def _parser() -> argparse.ArgumentParser:
     listing = commands.add_parser("scenes", help="list the scenes that ship")
     listing.set_defaults(run=_scenes)
 
+    run.add_argument("--tol", type=float, metavar="PART", help="take the model that `advise` names")
+
+    advice = commands.add_parser("advise", help="name the cheapest model that is accurate enough")
+    advice.add_argument("scene", nargs="?", metavar="NAME|SCENE.toml", help="as of run")
+    advice.add_argument(
+        "--tol", type=float, default=0.05, metavar="PART", help="relative error (default .05)"
+    )
+    advice.add_argument(
+        "--quantity", default="dissipation", metavar="FIGURE", help="of which (dissipation)"
+    )
+    advice.set_defaults(run=_advise)
+
     fit = fit_command.add_to(commands)
-    for command in (run, fit):
+    for command in (run, advice, fit):
         command.add_argument(
             "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key"
         )
+    for command in (run, fit):
         command.add_argument("--out", metavar="DIR", help="write tables and pictures there")
-    for command in (run, listing, fit):
+    for command in (run, listing, advice, fit):
         command.add_argument("--json", action="store_true", help="print the result as JSON")
     return parser
 
 
 def _run(options: argparse.Namespace) -> int:
-    from jbeamshell import output, quasistatic, scenes
-    from jbeamshell.scene import overridden, scene_from_values
+    from jbeamshell import advice, output, quasistatic
 
-    given = scenes.values_from(options.scene) if options.scene else {}
-    scene = scene_from_values(overridden(given, assignments(options.set)))
+    scene = _scene(options)
     quasistatic.check(scene)
+    if options.tol is not None:
+        advised = advice.advise(scene, options.tol, tell=_tell)
+        say(str(advised))
+        scene = advised.applied(scene)
     folder = output.check_folder(options.out) if options.out else None
     say("compiling ...")
     begin = time.perf_counter()
@@ -99,6 +115,26 @@ def _run(options: argparse.Namespace) -> int:
     if folder is not None:
         say_written(output.write_run(folder, history, figures))
     return 0
+
+
+def _advise(options: argparse.Namespace) -> int:
+    from jbeamshell import advice, output
+
+    advised = advice.advise(_scene(options), options.tol, quantity=options.quantity, tell=_tell)
+    put(output.as_json(advised.figures()) if options.json else f"{advised}\n")
+    return 0
+
+
+def _tell(text: str) -> None:
+    say(f"solving on {text} ...")
+
+
+def _scene(options: argparse.Namespace) -> Scene:
+    """The scene of a name or a file, and what is set on top."""
+    from jbeamshell import scenes
+
+    given = scenes.values_from(options.scene) if options.scene else {}
+    return scene_from_values(overridden(given, assignments(options.set)))
 
 
 def _scenes(options: argparse.Namespace) -> int:

@@ -61,14 +61,18 @@ def masing(
     scene, start, path, solver : as of `jbeamshell.stepping.march`
     recovering : whether failed steps are walked in pieces, which cannot be traced
     """
-    go = walk if recovering else march
+    signs = (1.0, -1.0) if scene.model.solution == "masing" else (1.0,)
+    if recovering:
+        ways = [walk(scene, start, _backbone_path(scene, path, s), solver) for s in signs]
+    else:
 
-    def backbone(sign: float) -> Backbone:
-        return _since_pressed(scene, go(scene, start, _backbone_path(scene, path, sign), solver))
+        def way(sign: Array) -> Steps:
+            return march(scene, start, _backbone_path(scene, path, sign), solver)
 
-    both = scene.model.solution == "masing"
-    found = _mean(backbone(1.0), backbone(-1.0)) if both else backbone(1.0)
-    return _doubled(scene, path, found)
+        both = lax.map(way, jnp.asarray(signs))  # compiled once
+        ways = [jax.tree.map(lambda a, i=i: a[i], both) for i in range(len(signs))]
+    found = [_since_pressed(scene, steps) for steps in ways]
+    return _doubled(scene, path, _mean(*found) if len(found) == 2 else found[0])
 
 
 def bar(scene: Scene, path: Path) -> Steps:
@@ -76,7 +80,7 @@ def bar(scene: Scene, path: Path) -> Steps:
     return _doubled(scene, path, _bar_backbone(scene, path))
 
 
-def _backbone_path(scene: Scene, path: Path, sign: float) -> Path:
+def _backbone_path(scene: Scene, path: Path, sign: float | Array) -> Path:
     """The pressing, then a pull (or a push) to the amplitude."""
     pressing, half = scene.load.pressure_steps, scene.load.steps_per_half_cycle
     levels = sign * scene.load.amplitude * jnp.arange(1, half + 1) / half

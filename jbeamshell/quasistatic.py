@@ -35,6 +35,7 @@ def solve(
     contact: ArrayLike | None = None,
     solver: Newton | None = None,
     throw: bool = True,
+    tolerance: float | None = None,
 ) -> History:
     """Press the strip down, walk a load path, and report what happened.
 
@@ -47,6 +48,8 @@ def solve(
     contact : (n,) nodes from which the search for the contact starts; None is all of them
     solver : settings of Newton's method
     throw : whether a step without equilibrium raises; if not, read ``history.status``
+    tolerance : relative error of the dissipation that will do; the scene's model gives way to the
+        cheapest that is estimated to keep it, see `jbeamshell.advise`
 
     Returns
     -------
@@ -56,11 +59,17 @@ def solve(
     Raises
     ------
     InputError
-        if the path makes no sense or exceeds gross slip under force control
+        if the path makes no sense or exceeds gross slip under force control, or if no model keeps
+        the tolerance
     UnconvergedError
         if a step has no equilibrium, even when it is walked in smaller steps
     """
     solver = solver or Newton()
+    if tolerance is not None:
+        from jbeamshell.advice import advise
+
+        require("path", "given", path is None, "a tolerance is for the scene's own cycles")
+        scene = advise(scene, tolerance).applied(scene)
     whole, cycles = check(scene, path)
     touching = None if contact is None else _check_contact(scene, contact)
     steps, history = _solve(scene, touching, whole, solver, cycles, np.asarray(True))

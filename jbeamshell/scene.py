@@ -121,6 +121,7 @@ class Scene(eqx.Module):
     energy: Energy | None = None
 
     def __check_init__(self) -> None:
+        self._check_rung()
         self._check_contact()
         if self.energy is None:
             return
@@ -172,6 +173,24 @@ class Scene(eqx.Module):
             plane=strip.plane,
         )
 
+    def _check_rung(self) -> None:
+        """What the model cannot represent."""
+        strip, contact, model = self.strip, self.contact, self.model
+        plain = self.energy is None and strip.layers is None and strip.curvature is None
+        fix = "is for a straight homogeneous strip without an energy of its own; take 0"
+        require("model.order", model.order, model.order == 0 or plain, fix)
+        uniform = contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0
+        bar = plain and uniform and contact.normal == "rigid"
+        closed = model.solution == "closed-form"
+        fix = "is the bar's, homogeneous, straight, under one pressure: take another model.rung"
+        require("model.solution", model.solution, bar or not closed, fix)
+        cycling = model.solution == "stepwise" or self.load.cycles > 0
+        fix = "doubles a backbone for load.cycles, of which there are none: take 'stepwise'"
+        require("model.solution", model.solution, cycling, fix)
+        if not isinstance(contact.friction, jax.core.Tracer):
+            rubs = not closed or float(contact.friction) > 0.0
+            require("contact.friction", contact.friction, rubs, "the bar needs friction")
+
     def _check_contact(self) -> None:
         """What the parts cannot see alone: a strip that nothing holds, a load off the strip."""
         strip, contact, fields = self.strip, self.contact, self.model.fields
@@ -179,17 +198,6 @@ class Scene(eqx.Module):
         needs = "needs w in model.fields"
         require("contact.normal", contact.normal, lift or contact.normal == "rigid", needs)
         require("strip.curvature", strip.curvature, lift or strip.curvature is None, needs)
-        plain = self.energy is None and strip.layers is None and strip.curvature is None
-        fix = "is for a straight homogeneous strip without an energy of its own; take 0"
-        require("model.order", self.model.order, self.model.order == 0 or plain, fix)
-        uniform = contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0
-        bar = plain and uniform and contact.normal == "rigid"
-        fix = "is the bar's, homogeneous, straight, under one pressure: take another model.rung"
-        closed = self.model.solution == "closed-form"
-        require("model.solution", self.model.solution, bar or not closed, fix)
-        cycling = self.model.solution == "stepwise" or self.load.cycles > 0
-        fix = "doubles a backbone for load.cycles, of which there are none: take 'stepwise'"
-        require("model.solution", self.model.solution, cycling, fix)
         layered = self.model.squeeze == "assumed" and strip.layers is not None
         require("model.squeeze", "assumed", not layered, "is for a homogeneous strip")
         if contact.normal == "none":

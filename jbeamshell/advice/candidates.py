@@ -25,30 +25,41 @@ class Candidate(NamedTuple):
         return f"{self.rung}@{self.nodes}x{self.steps}"
 
     @property
-    def settings(self) -> dict[str, Any]:
-        """Dotted values that make a scene's model this one, all but the kinematics."""
+    def section(self) -> str:
+        """The rung whose section it has: "squeeze" for "masing", "p3" for "masing-p3"."""
+        last = self.rung.rpartition("-")[2]
+        return "squeeze" if last in ("masing", "pull") else last
+
+    @property
+    def resolution(self) -> dict[str, Any]:
+        """Dotted values of its grid and its load path."""
         # Coarse grids spend their nodes at the loaded end; the beamshell's point reaction there
         # goes into tension on finer elements than this.
-        fine = self.nodes <= 41 or self.rung.rpartition("-")[2].startswith("p")
+        fine = self.nodes <= 41 or self.section.startswith("p")
         return {
-            "model.rung": self.rung,
             "model.nodes": self.nodes,
             "model.end_size": 1.0 / 12.0 if fine else 1.0 / 6.0,
             "load.steps_per_half_cycle": self.steps,
         }
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Dotted values that make a scene's model this one, all but the kinematics."""
+        return {"model.rung": self.rung} | self.resolution
 
+
+_COARSE, _MIDDLE = [(41, 4), (41, 10)], [(81, 10)]
 _RESOLUTIONS = {
     "bar": [(41, 4)],
-    "masing": [(41, 4), (41, 10), (81, 10)],
-    "masing-p2": [(41, 4), (41, 10), (81, 10)],
-    "masing-p3": [(41, 4), (41, 10), (81, 10)],
-    "shell": [(41, 4), (41, 10), (81, 10)],
-    "squeeze": [(41, 4), (41, 10), (81, 10), (161, 20)],
-    "p2": [(41, 4), (41, 10), (81, 10)],
-    "p3": [(41, 4), (41, 10), (81, 10)],
-    "p4": [(41, 4), (41, 10), (81, 10)],
-    "p6": [(41, 4), (41, 10), (81, 10), (161, 10)],
+    "masing": _COARSE + _MIDDLE,
+    "masing-p2": _COARSE + _MIDDLE,
+    "masing-p3": _COARSE + _MIDDLE,
+    "shell": _COARSE + _MIDDLE,
+    "squeeze": [*_COARSE, *_MIDDLE, (161, 20)],
+    "p2": _COARSE + _MIDDLE,
+    "p3": _COARSE + _MIDDLE,
+    "p4": _COARSE + _MIDDLE,
+    "p6": [*_COARSE, *_MIDDLE, (161, 10)],
 }
 CANDIDATES = {
     candidate.name: candidate

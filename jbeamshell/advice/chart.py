@@ -91,7 +91,7 @@ def place(scene: Scene) -> np.ndarray | str:
         if holds:
             return reason
     half = 0.5 * float(strip.length)
-    mu, nu = float(contact.friction), float(strip.poisson_ratio)
+    mu, nu = float(contact.friction), float(np.asarray(strip.poisson_ratio))
     if strip.plane == "stress":  # as plane strain with the ratio that has the same E'/G
         nu = nu / (1.0 + nu)
     amplitude = float(load.amplitude) / max(mu * float(contact.pressure) * half, 1e-300)

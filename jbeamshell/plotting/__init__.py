@@ -1,4 +1,4 @@
-"""Pictures of a history: the loop, the profiles along X, the contact, and a fit over its data.
+"""Pictures of a history: the loop, the profiles along X, the contact; of a fit; of the ladder.
 
 The only package that imports matplotlib.  Every function draws into the axes it is given or into
 new ones, returns them, and neither shows them nor changes matplotlib's settings.  `style` dresses
@@ -10,6 +10,10 @@ from jbeamshell.plotting.contacts import contact_map as contact_map
 from jbeamshell.plotting.fits import likelihoods as likelihoods
 from jbeamshell.plotting.fits import overlay as overlay
 from jbeamshell.plotting.fits import residuals as residuals
+from jbeamshell.plotting.ladder import RUNG_LOOKS as RUNG_LOOKS
+from jbeamshell.plotting.ladder import advice_map as advice_map
+from jbeamshell.plotting.ladder import error_map as error_map
+from jbeamshell.plotting.ladder import work_precision as work_precision
 from jbeamshell.plotting.paths import loop as loop
 from jbeamshell.plotting.paths import profiles as profiles
 from jbeamshell.plotting.style import DATA as DATA
