@@ -73,7 +73,7 @@ def solve(
     whole, cycles = check(scene, path)
     touching = None if contact is None else _check_contact(scene, contact)
     steps, history = _solve(scene, touching, whole, solver, cycles, np.asarray(True))
-    if is_traced(scene, whole):
+    if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         sound = steps.state.sound[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
         return eqx.error_if(history, ~sound, message) if throw else history
@@ -175,7 +175,8 @@ def _check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:
 def _check_gross_slip(scene: Scene, path: Path) -> None:
     if scene.load.control != "force" or float(scene.contact.friction) == 0.0:
         return
-    limit = float(_gross_slip(scene))
+    with jax.ensure_compile_time_eval():
+        limit = float(_gross_slip(scene))
     targets, limits = np.abs(path.target), limit * np.asarray(path.pressure)
     beyond = (targets > 0.0) & (targets >= (1.0 - ROUNDING) * limits)
     require(
@@ -190,8 +191,10 @@ def _check_gross_slip(scene: Scene, path: Path) -> None:
 def _check_bar(scene: Scene) -> None:
     if scene.model.solution != "closed-form" or scene.load.control == "force":
         return
-    strip, rubs = scene.strip, scene.contact.friction * scene.contact.pressure
-    limit = float(bar_backbone(rubs * strip.length, strip.stretching_stiffness, rubs))
+    strip = scene.strip
+    with jax.ensure_compile_time_eval():
+        rubs = scene.contact.friction * scene.contact.pressure
+        limit = float(bar_backbone(rubs * strip.length, strip.stretching_stiffness, rubs))
     amplitude = float(scene.load.amplitude)
     fix = f"must stay below the bar's gross slip, {limit:.6g}; take model.fields = ['v'] beyond"
     require("load.amplitude", amplitude, amplitude < limit, fix)

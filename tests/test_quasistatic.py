@@ -155,3 +155,11 @@ def test_compiling_alone_solves_nothing():
     size = quasistatic._solve._cached._cache_size()
     jb.solve(scene)
     assert quasistatic._solve._cached._cache_size() == size
+
+
+def test_plain_numbers_inside_a_callers_jit():
+    scene = jb.Scene().replace(SMALL)
+    inside = jax.jit(lambda: jb.solve(scene).dissipation)()
+    assert float(inside) == pytest.approx(float(jb.solve(scene).dissipation), rel=1e-12)
+    with pytest.raises(jb.InputError, match="gross slip"):
+        jax.jit(lambda: jb.solve(scene, [1.0, 2.0]).displacement)()

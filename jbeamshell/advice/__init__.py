@@ -135,17 +135,17 @@ def _from_map(
     scene: Scene, here: np.ndarray, tolerance: float, quantity: str
 ) -> tuple[list[Option], str]:
     known, errors = chart.chart(), chart.estimates(here, quantity)
-    rotated = linear_error(scene)
-    linear = rotated <= KINEMATIC_SHARE * tolerance
-    times = known.linear_ms if linear else known.exact_ms
-    kinematics = "linear" if linear else "exact"
+    turned = {rung: linear_error(scene.replace({"model.rung": rung})) for rung in ("squeeze", "p2")}
     options = []
     for name, error in errors.items():
         candidate = CANDIDATES[name]
-        # The bar and its rule have nothing that turns.
+        rotated = turned["p2" if candidate.section.startswith("p") else "squeeze"]
+        linear = rotated <= KINEMATIC_SHARE * tolerance
+        # The bar has nothing that turns.
         if not chart.suits(candidate, scene) or (candidate.rung == "bar" and not linear):
             continue
-        settings = candidate.settings | {"model.kinematics": kinematics}
+        settings = candidate.settings | {"model.kinematics": "linear" if linear else "exact"}
         total = error + (rotated if linear else 0.0)
-        options.append(Option(candidate.rung, settings, total, times[name]))
+        ms = (known.linear_ms if linear else known.exact_ms)[name]
+        options.append(Option(candidate.rung, settings, total, ms))
     return options, f"map of {len(known.strips)} strips"

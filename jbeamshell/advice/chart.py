@@ -126,7 +126,7 @@ def estimates(here: np.ndarray, quantity: str) -> dict[str, float]:
 
 def suits(candidate: Candidate, scene: Scene) -> bool:
     """Whether the map's figures of a candidate hold for a scene's constants."""
-    if candidate.rung.rpartition("-")[2] not in ("squeeze", "masing"):
+    if candidate.section != "squeeze":
         return True
     return KAPPA_S[0] <= float(scene.strip.kappa_s) <= KAPPA_S[1]
 
