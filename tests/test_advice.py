@@ -51,7 +51,8 @@ def name_of(advice):
 
 def test_every_candidate_is_on_the_map():
     known = chart.chart()
-    assert set(CANDIDATES) == set(known.ratios) == set(known.linear_ms) == set(known.exact_ms)
+    assert set(CANDIDATES) == set(known.ratios) == set(known.linear_ms)
+    assert {c.rung for c in CANDIDATES.values()} == set(known.exact_over_linear)
     for name, candidate in CANDIDATES.items():
         assert candidate.name == name
         assert STRIP.replace(candidate.settings).model.rung == candidate.rung
@@ -77,7 +78,7 @@ def test_the_error_is_within_the_tolerance(others, tolerance):
         f"refused, of which {np.mean(np.array(refused) <= tolerance):.2f} needlessly"
     )
     assert within >= 0.95
-    assert len(errors) >= 0.7 * len(strips)
+    assert len(errors) >= 0.6 * len(strips)  # thick strips under small forces are refused
     if tolerance == 0.05:
         assert np.median(costs) >= 20.0
 
@@ -188,7 +189,8 @@ def test_a_laminate_climbs_what_it_has():
 
 def test_a_figure_that_the_scene_lacks():
     scene = STRIP.replace({"model.nodes": 21, "load.steps_per_half_cycle": 4, "load.cycles": 1})
-    with pytest.raises(jb.InputError, match="quantity = 'damping': figures of this scene are closure, diss"):
+    told = "quantity = 'damping': figures of this scene are closure, dissipation"
+    with pytest.raises(jb.InputError, match=told):
         jb.advise(scene, 0.1, quantity="damping")
 
 

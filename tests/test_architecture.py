@@ -25,7 +25,7 @@ INSIDE = {
         "observations", "parameters", "experiment", "problem", "search", "uncertainty", "results",
         "likelihood", "fitting", "plan", "__init__",
     ],
-    "plotting": ["style", "steps", "paths", "contacts", "fits", "__init__"],
+    "plotting": ["style", "steps", "paths", "contacts", "fits", "ladder", "__init__"],
 }
 # fmt: on
 ONLY = {

@@ -75,6 +75,13 @@ def values_of_all_keys(draw):
     squeeze = draw(st.sampled_from(["field", "assumed"] if assumed else ["field"]))
     plain = squeeze == "field" and not layered and not curvature
     order = draw(st.integers(0, 12)) if plain and {"beta", "psi"} <= set(fields) else 0
+    cycles = draw(st.integers(0, 1000))
+    friction = draw(positive if far_end == "free" else positive | st.just(0.0))
+    pressure = draw(positive | tables(length))
+    solutions = ["stepwise", *(["masing", "masing-pull"] if cycles else [])]
+    one_number = not isinstance(pressure, list) and normal == "rigid"
+    if cycles and friction and fields == ("v",) and plain and one_number:
+        solutions.append("closed-form")
     return (
         material
         | curvature
@@ -85,8 +92,8 @@ def values_of_all_keys(draw):
             "strip.far_end": far_end,
             "strip.deviation": draw(st.floats(-1e90, 1e90)),
             "strip.plane": draw(st.sampled_from(["strain", "stress"])),
-            "contact.friction": draw(positive if far_end == "free" else positive | st.just(0.0)),
-            "contact.pressure": draw(positive | tables(length)),
+            "contact.friction": friction,
+            "contact.pressure": pressure,
             "contact.bottom_pressure": draw(presses_up),
             "contact.stick_stiffness": draw(positive),
             "contact.smoothing": draw(smoothing | st.just("sharp")),
@@ -95,7 +102,7 @@ def values_of_all_keys(draw):
             "contact.normal_stiffness": draw(positive),
             "load.control": draw(st.sampled_from(["force", "displacement"])),
             "load.amplitude": draw(positive),
-            "load.cycles": draw(st.integers(0, 1000)),
+            "load.cycles": cycles,
             "load.steps_per_half_cycle": 2 * draw(st.integers(1, 1000)),
             "load.pressure_steps": draw(st.integers(1, 1000)),
             "model.fields": fields,
@@ -106,6 +113,7 @@ def values_of_all_keys(draw):
             "model.constants": draw(st.sampled_from(["consistent", "printed"])),
             "model.squeeze": squeeze,
             "model.order": order,
+            "model.solution": draw(st.sampled_from(solutions)),
         }
     )
 
@@ -125,7 +133,7 @@ def path(tmp_path_factory):
 
 @given(values=values_of_all_keys())
 def test_toml_keeps_every_bit(path, values):
-    assert set(values) | OPTIONAL == set(KEYS) - set(DERIVED)
+    assert set(values) | OPTIONAL == set(KEYS) - set(DERIVED) - {"model.rung"}
     scene = Scene().replace(values)
     write_scene(scene, path)
     again = read_scene(path)

@@ -146,6 +146,6 @@ def _from_map(
             continue
         settings = candidate.settings | {"model.kinematics": "linear" if linear else "exact"}
         total = error + (rotated if linear else 0.0)
-        ms = (known.linear_ms if linear else known.exact_ms)[name]
-        options.append(Option(candidate.rung, settings, total, ms))
+        longer = 1.0 if linear else known.exact_over_linear[candidate.rung]
+        options.append(Option(candidate.rung, settings, total, longer * known.linear_ms[name]))
     return options, f"map of {len(known.strips)} strips"

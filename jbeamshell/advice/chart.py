@@ -3,7 +3,7 @@
 `measured.json` holds strips drawn at random over eta, A/(mu F_N a), mu and nu, with the ratio of
 every candidate's answer to that of plane-strain finite elements (`calibration/map_ladder.py`).  The
 error at another strip is read off its nearest neighbours: a local plane through the logarithms of
-their ratios, and twice what they scatter about it.
+their ratios, and what they scatter about it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import json
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,9 @@ from jbeamshell.friction import ElasticSlip, SharpSlip
 from jbeamshell.scene import Scene
 
 # Distances over which errors change alike: of log(A/eta), A, log(mu) and nu.
-SCALES = np.array([0.15, 0.7, 0.7, 0.3])
-NEIGHBOURS = 16
+SCALES = np.array([0.15, 0.5, 0.7, 0.3])
+NEIGHBOURS = 14
+CAUTION = 2.5  # how many times their scatter is taken for granted
 RANGES = {
     "eta": (0.008, 0.45),
     "A/(mu F_N a)": (0.08, 1.95),
@@ -44,13 +45,14 @@ class Chart(NamedTuple):
     ----------
     strips : (n, 4) their eta, A/(mu F_N a), mu and nu
     ratios : (n,) to finite elements, by candidate and quantity
-    linear_ms, exact_ms : time of a warm run with linear and exact kinematics, by candidate
+    linear_ms : time of a warm run with linear kinematics, by candidate
+    exact_over_linear : how much longer it takes with exact ones, by rung
     """
 
     strips: np.ndarray
     ratios: dict[str, dict[str, np.ndarray]]
     linear_ms: dict[str, float]
-    exact_ms: dict[str, float]
+    exact_over_linear: dict[str, float]
 
 
 @functools.cache
@@ -62,7 +64,7 @@ def chart() -> Chart:
         name: {quantity: np.array(values) for quantity, values in own.items()}
         for name, own in record["ratios"].items()
     }
-    return Chart(strips, ratios, record["linear_ms"], record["exact_ms"])
+    return Chart(strips, ratios, record["linear_ms"], record["exact_over_linear"])
 
 
 def place(scene: Scene) -> np.ndarray | str:
@@ -120,7 +122,7 @@ def estimates(here: np.ndarray, quantity: str) -> dict[str, float]:
     left = logs - design @ planes
     freedom = NEIGHBOURS / (NEIGHBOURS - design.shape[1])
     scatter = np.sqrt(freedom * np.sum(weight[:, None] * left**2, axis=0) / np.sum(weight))
-    errors = np.abs(np.expm1(planes[0])) + 2.0 * scatter
+    errors = np.abs(np.expm1(planes[0])) + CAUTION * scatter
     return dict(zip(known.ratios, map(float, errors), strict=True))
 
 
@@ -135,9 +137,3 @@ def _coordinates(strips: np.ndarray) -> np.ndarray:
     eta, amplitude, mu, nu = strips.T
     ratio = np.log(amplitude / eta)
     return np.stack([ratio, amplitude, np.log(mu), nu], axis=1) / SCALES
-
-
-def provenance() -> dict[str, Any]:
-    """How and on what the map was measured."""
-    record = json.loads(Path(__file__).with_name("measured.json").read_text(encoding="utf-8"))
-    return record["provenance"]

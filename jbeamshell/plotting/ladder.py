@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from jbeamshell.errors import InputError
@@ -29,6 +30,7 @@ RUNG_LOOKS: dict[str, tuple[str, str]] = {
     "masing-p3": ("#5C3F00", "d"),
     "shell": ("#D55E00", "v"),
     "squeeze": ("#CC79A7", "o"),
+    "p1": ("#882255", "<"),
     "p2": ("#56B4E9", "^"),
     "p3": ("#0072B2", "P"),
     "p4": ("#009E73", "X"),
@@ -37,6 +39,7 @@ RUNG_LOOKS: dict[str, tuple[str, str]] = {
 OTHER = (FAINT, "o")
 FINITE_ELEMENTS = {"CalculiX": "H", "condensed": ">"}
 CONTOURS = (1.0, 5.0, 20.0)  # per cent
+SMALLEST = 1e-3  # per cent, of errors drawn
 SHADES = (0.1, 100.0)  # per cent, of the lightest and the darkest colour
 CELL = "$\\eta = H/(L/2)$  [1]", "$A\\,/\\,(\\mu F_N L/2)$  [1]"
 
@@ -87,7 +90,8 @@ def work_precision(
     -------
     matplotlib.axes.Axes
         the axes drawn into: a dot for every grid and load path, hollow where the answer is too
-        small, and dashed what is left on the finest grid
+        small, and dashed what is left on the finest grid; bars from condensed finite elements lead
+        to the time without building them
 
     Raises
     ------
@@ -97,6 +101,10 @@ def work_precision(
     if error not in ERRORS:
         raise InputError(f"error = {error!r}: choose one of {', '.join(ERRORS)}")
     column, right, label = ERRORS[error]
+    floor = SMALLEST
+    if error == "dissipation":  # less than the truth's own error means nothing
+        (reference,) = _of_strip(record["work"]["reference"], strip)
+        floor = max(floor, 100.0 * reference["error"])
     runs = _of_strip(record["work"]["runs"], strip)
     limits = {row["rung"]: row for row in _of_strip(record["work"]["limits"], strip)}
     with style():
@@ -106,13 +114,16 @@ def work_precision(
             colour, marker = RUNG_LOOKS.get(rung, OTHER)
             ms = np.array([row["ms_per_cycle"] for row in own])
             off = 100.0 * np.array([row[column] - right for row in own])
-            axes.plot(ms, abs(off), color=colour, linewidth=1.1, alpha=0.75)
-            for place, value in zip(ms, off, strict=True):
-                face = colour if value > 0.0 else "white"
-                dot = {"marker": marker, "markersize": 5.5, "markerfacecolor": face}
-                axes.plot(place, abs(value), color=colour, **dot)
+            size = np.maximum(abs(off), floor)
+            if error == "own limit" and size.max() == floor:  # in closed form
+                continue
+            axes.plot(ms, size, color=colour, linewidth=1.1, alpha=0.75)
+            for place, value, sign in zip(ms, size, off, strict=True):
+                face = colour if sign > 0.0 else "white"
+                dot: dict[str, Any] = {"markersize": 5.5, "markerfacecolor": face}
+                axes.plot(place, value, color=colour, marker=marker, **dot)
             if error != "own limit":
-                left = 100.0 * abs(limits[rung][column] - right)
+                left = max(100.0 * abs(limits[rung][column] - right), floor)
                 axes.plot(
                     [ms.min(), ms.max()], [left, left], color=colour, linestyle="--", linewidth=0.8
                 )
@@ -122,7 +133,7 @@ def work_precision(
             if rung in limits
         ]
         if error == "dissipation":
-            keys += _finite_elements(record, strip, axes)
+            keys += _finite_elements(record, strip, axes, floor)
         if error != "own limit":
             keys.append(
                 Line2D([], [], color=DATA, linestyle="--", linewidth=0.8, label="rung's own limit")
@@ -171,6 +182,7 @@ def error_map(
         lines = axes.contour(
             eta, amplitude, np.log10(off), np.log10(CONTOURS), colors="0.1", linewidths=1.0
         )
+        lines.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
         names = {np.log10(level): f"{level:g} %" for level in CONTOURS}
         for text in axes.clabel(lines, fmt=names, fontsize=8):
             text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8})
@@ -252,15 +264,16 @@ def _of_strip(rows: list[dict[str, Any]], strip: tuple[float, float]) -> list[di
     return own
 
 
-def _finite_elements(record: Record, strip: tuple[float, float], axes: Axes) -> list[Line2D]:
+def _finite_elements(
+    record: Record, strip: tuple[float, float], axes: Axes, floor: float
+) -> list[Line2D]:
     """Draw the finite elements' own work and precision; returns what the legend says of it."""
-    (reference,) = _of_strip(record["work"]["reference"], strip)
     rows = [row for row in record["finite_elements"] if (row["eta"], row["A"]) == strip]
     for row in rows:
         off, marker = 100.0 * (row["ratio"] - 1.0), FINITE_ELEMENTS[row["what"]]
         face = DATA if off > 0.0 else "white"
-        dot = {"color": DATA, "marker": marker, "markersize": 8.0, "markerfacecolor": face}
-        axes.plot(row["ms_per_cycle"], abs(off), **dot)
+        dot: dict[str, Any] = {"markersize": 8.0, "markerfacecolor": face}
+        axes.plot(row["ms_per_cycle"], abs(off), color=DATA, marker=marker, **dot)
         if "ms_per_cycle_once_built" in row:
             ms = [row["ms_per_cycle_once_built"], row["ms_per_cycle"]]
             axes.plot(ms, [abs(off)] * 2, color=DATA, linewidth=0.8, marker="|", markersize=4.0)
@@ -269,12 +282,9 @@ def _finite_elements(record: Record, strip: tuple[float, float], axes: Axes) -> 
         for what, marker in FINITE_ELEMENTS.items()
         if any(row["what"] == what for row in rows)
     ]
-    if reference["error"] > 0.0:
-        axes.axhline(100.0 * reference["error"], color=FAINT, linestyle=":", linewidth=1.2)
-        keys.append(
-            Line2D([], [], color=FAINT, linestyle=":", linewidth=1.2, label="reference's own error")
-        )
-    return keys
+    dotted: Any = {"color": FAINT, "linestyle": ":", "linewidth": 1.2}
+    axes.axhline(floor, **dotted)
+    return [*keys, Line2D([], [], label="reference's own error", **dotted)]
 
 
 def _grid(rows: list[dict[str, Any]], column: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
