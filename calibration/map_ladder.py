@@ -39,6 +39,7 @@ TINY = 1e-12  # a strip so thick that nothing slips in the finite elements
 WIDEST = (1e-3, 1e3)  # of a ratio; beyond, it is wrong and that is that
 LANES = 16  # solved at once
 COARSEST = (41, 4)
+REPEATS = 15
 STANDARD = (
     (0.0511, 1.0),
     (0.1126, 0.7855),
@@ -92,16 +93,18 @@ def answers(candidate: Candidate, points: np.ndarray) -> np.ndarray:
 
 
 def milliseconds(candidate: Candidate, kinematics: str) -> float:
-    """Median time of a warm run that leaves a whole History."""
+    """Median over strips of the fastest of some warm runs that leave a whole History."""
     times = []
     for eta, amplitude in STANDARD:
         scene = scene_of(candidate, eta, amplitude, 0.1, 0.3)
         scene = scene.replace({"model.kinematics": kinematics})
         jax.block_until_ready(jb.solve(scene))
-        for _ in range(7):
+        own = []
+        for _ in range(REPEATS):
             begin = time.perf_counter()
             jax.block_until_ready(jb.solve(scene))
-            times.append(time.perf_counter() - begin)
+            own.append(time.perf_counter() - begin)
+        times.append(min(own))  # what others do on the machine only ever adds
     return round(1e3 * float(np.median(times)), 3)
 
 
