@@ -347,7 +347,8 @@ def main() -> None:
     parser.add_argument("--draw", action="store_true", help="draw the record that is there")
     options = parser.parse_args()
     # First calls are to be compiled, whatever an earlier process has left.
-    jax.config.update("jax_enable_compilation_cache", options.quick)
+    timing = not options.quick and options.only in (None, "work")
+    jax.config.update("jax_enable_compilation_cache", not timing)
     record: dict[str, Any] = {}
     if RECORD.exists():
         record = json.loads(RECORD.read_text(encoding="utf-8"))
