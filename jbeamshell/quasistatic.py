@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
 from typing import Any
 
 import equinox as eqx
@@ -72,11 +72,12 @@ def solve(
         scene = advise(scene, tolerance).applied(scene)
     whole, cycles = check(scene, path)
     touching = None if contact is None else _check_contact(scene, contact)
-    steps, history = _solve(scene, touching, whole, solver, cycles, np.asarray(True))
+    steps, history = _solve(scene, touching, whole, solver, np.asarray(True))
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         sound = steps.state.sound[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
-        return eqx.error_if(history, ~sound, message) if throw else history
+        history = eqx.error_if(history, ~sound, message) if throw else history
+        return dataclasses.replace(history, cycles=cycles)
     if not bool(steps.state.sound[-1]):
         start = at_rest(scene, touching)
         if scene.model.solution == "stepwise":
@@ -85,8 +86,8 @@ def solve(
             steps = masing(scene, start, whole, solver, recovering=True)
         if throw:
             _raise_if_failed(steps, whole)
-        history = _history(scene, steps, whole.pressure, cycles)
-    return history
+        history = _history(scene, steps, whole.pressure)
+    return dataclasses.replace(history, cycles=cycles)
 
 
 def check(
@@ -104,8 +105,8 @@ def compile_for(
     scene: Scene, path: ArrayLike | None = None, *, solver: Newton | None = None
 ) -> None:
     """Compile what `solve` needs, without solving anything."""
-    whole, cycles = _whole_path(scene, path)
-    jax.block_until_ready(_solve(scene, None, whole, solver or Newton(), cycles, np.asarray(False)))
+    whole, _ = _whole_path(scene, path)
+    jax.block_until_ready(_solve(scene, None, whole, solver or Newton(), np.asarray(False)))
 
 
 @eqx.filter_jit
@@ -114,7 +115,6 @@ def _solve(
     touching: np.ndarray | None,
     path: Path,
     solver: Newton,
-    cycles: Sequence[tuple[int, int, int]],
     enabled: ArrayLike,
 ) -> tuple[Steps, History]:
     start = at_rest(scene, touching)._replace(sound=jnp.asarray(enabled))
@@ -124,7 +124,7 @@ def _solve(
         steps = march(scene, start, path, solver)
     else:
         steps = masing(scene, start, path, solver)
-    return steps, _history(scene, steps, path.pressure, cycles)
+    return steps, _history(scene, steps, path.pressure)
 
 
 def _whole_path(
@@ -223,9 +223,8 @@ def _raise_if_failed(steps: Steps, path: Path) -> None:
 
 
 @eqx.filter_jit
-def _history(
-    scene: Scene, steps: Steps, pressure: Array, cycles: Sequence[tuple[int, int, int]]
-) -> History:
+def _history(scene: Scene, steps: Steps, pressure: Array) -> History:
+    """What happened, but for the cycles in it: with them every path would compile anew."""
     system = System(scene)
     sound, level = steps.state.sound, steps.state.level
 
@@ -253,5 +252,5 @@ def _history(
         iterations=steps.iterations,
         error=steps.error,
         status=steps.status,
-        cycles=tuple(cycles),
+        cycles=(),
     )

@@ -172,16 +172,17 @@ def test_traced_scenes_get_no_advice():
         jax.jit(lambda mu: jb.solve(STRIP.replace({"contact.friction": mu}), tolerance=0.1))(0.1)
 
 
-def test_a_laminate_climbs_what_it_has():
+def test_a_laminate_climbs_what_it_has(monkeypatch):
     """Two equal layers are a homogeneous strip, whose rungs' errors the map knows."""
     own = {"model.nodes": 41, "load.steps_per_half_cycle": 8, "load.cycles": 1}
     height = 0.1126
     modulus = 3.4e4 / (2.0 * height) * (1.0 - 0.3**2)
     layers = {"strip.layers": [[height, modulus, 0.3], [height, modulus, 0.3]]}
     told = []
+    monkeypatch.setattr("jbeamshell.advice.climb.CHEAP", ("shell",))  # each of them compiles
     advice = jb.advise(STRIP.replace(own | layers), 0.2, tell=told.append)
     assert "off the map for layers; solved on squeeze; the scene has no rung above" in advice.basis
-    assert {option.rung for option in advice.considered} == {"masing", "shell", "squeeze"}
+    assert {option.rung for option in advice.considered} == {"shell", "squeeze"}
     shell = min(o.error for o in advice.considered if o.rung == "shell")
     assert 0.08 < shell < 0.14  # as by the map
     assert told[0] == "squeeze on 21 nodes"

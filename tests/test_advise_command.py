@@ -20,7 +20,8 @@ def test_the_answer_as_json(cli):
     code, out, err = cli("advise", "--tol", "0.05", "--json")
     told = json.loads(out)
     assert (code, err) == (0, "")
-    assert told["rung"] == told["settings"]["model.rung"] == "squeeze"
+    assert told["rung"] == told["settings"]["model.rung"]
+    assert told["rung"] in ("squeeze", "masing")  # by which was the quicker when it was measured
     assert 0.0 < told["estimated_error"] <= 0.05
     assert told["estimated_ms"] > 0.0
     assert (told["quantity"], told["tolerance"]) == ("dissipation", 0.05)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell import __main__, identify, quasistatic, scenes, terminal
+from jbeamshell import __main__, identify, quasistatic, scenes, stepping, terminal
 from jbeamshell.measured.loops import read_loops
 
 # One shape for nearly everything, so that it compiles once.
@@ -692,7 +692,7 @@ def test_commands_that_do_not_exist(cli, capsys, words):
 def test_a_step_without_equilibrium(refused, monkeypatch):
     # One Newton iteration per step: enough for the pressure and for sticking, not for slip.
     monkeypatch.setattr(quasistatic, "Newton", functools.partial(jb.Newton, max_iterations=1))
-    monkeypatch.setattr(quasistatic, "PIECES", ())
+    monkeypatch.setattr(stepping, "PIECES", ())
     line = refused("run", *BASE, "--json", code=3)
     pattern = r"load step \d+ of 20 \(load \S+\) found no equilibrium \(max iterations, .*\): take"
     assert re.match(pattern, line)

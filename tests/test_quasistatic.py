@@ -7,6 +7,7 @@ import jbeamshell as jb
 from jbeamshell import closed_form, quasistatic
 
 SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
+LINEAR = SMALL | {"model.kinematics": "linear"}  # compiles in half the time
 
 
 def test_bar_limit_gives_backbone_and_cubic_law():
@@ -24,7 +25,7 @@ def test_steps_do_not_matter():
     base = jb.Scene().replace({"model.nodes": 81, "model.kinematics": "linear", "load.cycles": 1})
     dissipation = [
         float(jb.solve(base.replace({"load.steps_per_half_cycle": n})).dissipation)
-        for n in (20, 40, 80, 160)
+        for n in (20, 40, 160)
     ]
     error = np.abs(np.array(dissipation) / dissipation[-1] - 1.0)
     assert error[0] < 5e-3
@@ -112,7 +113,7 @@ def test_inside_a_transformation_the_failure_is_loud_too():
 
 def test_a_failed_step_is_walked_in_pieces(monkeypatch):
     """The recovered path ends where a path with small steps ends."""
-    scene = jb.Scene().replace(SMALL | {"contact.smoothing": 16.0})
+    scene = jb.Scene().replace(LINEAR | {"contact.smoothing": 16.0})
     path = np.array([0.9, -0.9, 0.9])
     eager = jb.Newton(max_iterations=100)
     fine = jb.solve(

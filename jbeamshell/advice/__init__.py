@@ -72,7 +72,7 @@ class Advice:
         error = f"{100.0 * self.estimated_error:.2g} %"
         if self.rung == "none":
             return f"{NONE}; the best is estimated to be {error} off in {of}"
-        settings = ", ".join(f"{key} = {value}" for key, value in self.settings.items())
+        settings = ", ".join(f"{key} = {_shown(value)}" for key, value in self.settings.items())
         cost = f"{self.estimated_ms:.2g} ms"
         return f"{self.rung}: estimated to be {error} off in {of}, in {cost}; {settings}"
 
@@ -129,6 +129,10 @@ def advise(
         return Advice("none", best.error, best.ms, {}, *asked)
     chosen = enough[0]
     return Advice(chosen.rung, chosen.error, chosen.ms, chosen.settings, *asked)
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _from_map(
