@@ -11,6 +11,11 @@ import jbeamshell
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
+LONG = ("03_", "04_")  # more than a minute each
+RUNS = [
+    pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * path.stem.startswith(LONG))
+    for path in NOTEBOOKS
+]
 
 
 def code_cells(notebook):
@@ -21,23 +26,25 @@ def test_there_are_notebooks():
     assert NOTEBOOKS
 
 
+@pytest.mark.parametrize("path", RUNS)
+def test_a_notebook_runs(path, monkeypatch):
+    places = [str(Path(jbeamshell.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, places)))
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # the notebook's own, as users see it
+    notebook = nbformat.read(path, as_version=4)
+    for cell in code_cells(notebook):
+        cell.outputs, cell.execution_count = [], None
+    NotebookClient(
+        notebook,
+        timeout=120,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(FOLDER)}},
+    ).execute()
+    assert pictures(notebook) == pictures(nbformat.read(path, as_version=4)) > 0
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 class TestNotebook:
-    def test_runs(self, path, monkeypatch):
-        places = [str(Path(jbeamshell.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
-        monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, places)))
-        monkeypatch.delenv("MPLBACKEND", raising=False)  # the notebook's own, as users see it
-        notebook = nbformat.read(path, as_version=4)
-        for cell in code_cells(notebook):
-            cell.outputs, cell.execution_count = [], None
-        NotebookClient(
-            notebook,
-            timeout=120,
-            kernel_name="python3",
-            resources={"metadata": {"path": str(FOLDER)}},
-        ).execute()
-        assert pictures(notebook) == pictures(nbformat.read(path, as_version=4)) > 0
-
     def test_is_committed_with_its_outputs(self, path):
         cells = code_cells(nbformat.read(path, as_version=4))
         counts = [cell.execution_count for cell in cells]
