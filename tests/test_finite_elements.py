@@ -37,7 +37,7 @@ def reference() -> dict[tuple[float, float], float]:
 
 def sweep(fields, cells):
     """Ratio to the cubic law, ratio by loop area, smallest reaction, and status of many strips."""
-    base = jb.Scene().replace({"model.fields": fields})
+    base = jb.Scene().replace({"model.fields": fields, "model.kinematics": "linear"})
 
     def one(cell):
         scene = base.replace({"strip.height_ratio": cell[0], "load.amplitude": cell[1]})

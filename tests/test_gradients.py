@@ -52,7 +52,7 @@ def test_gradient_reaches_every_number_of_a_scene():
     scene = jb.Scene(
         contact=jb.Contact(pressure=table, law=ElasticSlip(16.0)),
         load=jb.Load(steps_per_half_cycle=20, cycles=1),
-        model=jb.Model(nodes=41),
+        model=jb.Model(nodes=41, kinematics="linear"),
     )
     gradient = jax.jit(jax.grad(lambda s: jb.solve(s, throw=False).dissipation))(scene)
     leaves, names = jax.tree.leaves(gradient), jax.tree_util.tree_flatten_with_path(scene)[0]
