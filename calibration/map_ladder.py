@@ -37,14 +37,12 @@ NUMBERS = ("eta", "A", "mu", "nu")
 QUANTITIES = ("dissipation", "secant_stiffness")
 TINY = 1e-12  # a strip so thick that nothing slips in the finite elements
 WIDEST = (1e-3, 1e3)  # of a ratio; beyond, it is wrong and that is that
+STIFFNESS = 1e4  # E' 2H, by which the table has D and u multiplied; any will do where all is linear
 LANES = 16  # solved at once
 COARSEST = (41, 4)
 REPEATS = 15
-STANDARD = (
-    (0.0511, 1.0),
-    (0.1126, 0.7855),
-    (0.2358, 1.0),
-)  # eta and A of the strips that are timed
+# eta and A of the strips that are timed
+STANDARD = ((0.0511, 1.0), (0.1126, 0.7855), (0.2358, 1.0))
 
 
 def strips() -> dict[str, np.ndarray]:
@@ -57,10 +55,10 @@ def strips() -> dict[str, np.ndarray]:
 
 
 def scene_of(candidate: Candidate, eta, amplitude, mu, nu) -> jb.Scene:
-    """A strip with mu F_N = 1 and E' 2H = 1, so that D and u are those of the table."""
+    """A strip with mu F_N = 1, as those of the table."""
     return jb.Scene().replace(
         {
-            "strip.axial_stiffness": 1e4,
+            "strip.axial_stiffness": STIFFNESS,
             "strip.height_ratio": eta,
             "strip.poisson_ratio": nu,
             "contact.friction": mu,
@@ -79,7 +77,9 @@ def answers(candidate: Candidate, points: np.ndarray) -> np.ndarray:
     def many(points):
         def one(point):
             history = jb.solve(scene_of(candidate, *point), throw=False)
-            return jnp.stack([history.dissipation * 1e4, history.secant_stiffness / 1e4])
+            return jnp.stack(
+                [history.dissipation * STIFFNESS, history.secant_stiffness / STIFFNESS]
+            )
 
         return jax.vmap(one)(points)
 
@@ -88,7 +88,7 @@ def answers(candidate: Candidate, points: np.ndarray) -> np.ndarray:
     found = found[: len(points)]
     for lane in np.flatnonzero(~np.isfinite(found).all(axis=1)):  # alone, a failed step is mended
         history = jb.solve(scene_of(candidate, *points[lane]))
-        found[lane] = float(history.dissipation) * 1e4, float(history.secant_stiffness) / 1e4
+        found[lane] = history.dissipation * STIFFNESS, history.secant_stiffness / STIFFNESS
     return found
 
 

@@ -85,10 +85,16 @@ def test_the_error_is_within_the_tolerance(others, tolerance):
 
 
 def test_masing_is_not_advised_where_it_fails(others):
+    """It is wrong by more than 20 % on some of these strips, and by 5 % on many."""
+    picked, all_of_them = [], []
     for row, ratios in others[0]:
         advice = jb.advise(scene_of(row), 0.05)
+        all_of_them.append(abs(ratios["masing@41x4"] - 1.0))
         if advice.rung.startswith("masing"):
-            assert abs(ratios[name_of(advice)] - 1.0) < 0.07
+            picked.append(abs(ratios[name_of(advice)] - 1.0))
+    assert np.mean(np.array(all_of_them) > 0.05) > 0.3
+    assert np.mean(np.array(picked) <= 0.05) >= 0.95
+    assert max(picked) < 0.1
 
 
 def test_a_coarser_tolerance_is_never_dearer():
