@@ -79,7 +79,8 @@ def test_the_error_is_within_the_tolerance(others, tolerance):
         f"refused, of which {np.mean(np.array(refused) <= tolerance):.2f} needlessly"
     )
     assert within >= 0.95
-    assert len(errors) >= 0.6 * len(strips)  # thick strips under small forces are refused
+    # Refusing all would be within any tolerance: few may be refused that a candidate would solve.
+    assert np.sum(np.array(refused) <= tolerance) < 0.2 * len(strips)
     if tolerance == 0.05:
         assert np.median(costs) >= 20.0
 
@@ -201,6 +202,13 @@ def test_a_figure_that_the_scene_lacks():
     told = "quantity = 'damping': figures of this scene are closure, dissipation"
     with pytest.raises(jb.InputError, match=told):
         jb.advise(scene, 0.1, quantity="damping")
+
+
+def test_a_climb_without_any_equilibrium_is_loud(monkeypatch):
+    module = import_module("jbeamshell.advice.climb")
+    monkeypatch.setattr(module, "_solved", lambda scene: ({}, np.inf))
+    with pytest.raises(jb.UnconvergedError, match="no rung's error can be told"):
+        jb.advise(STRIP.replace({"strip.far_end": "pinned"}), 0.1)
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from jbeamshell.advice import chart
 from jbeamshell.advice.candidates import CANDIDATES
 from jbeamshell.advice.climb import Option, climb
 from jbeamshell.advice.rotations import linear_error
-from jbeamshell.errors import InputError
+from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.parts import require
 from jbeamshell.quasistatic import check
 from jbeamshell.scene import Scene
@@ -108,6 +108,8 @@ def advise(
     ------
     InputError
         if the tolerance makes no sense, or the scene has no such figure
+    UnconvergedError
+        if so few rungs find an equilibrium that nothing can be said of their errors
     """
     require("scene", "traced", not is_traced(scene), "give plain numbers; advice has no derivative")
     number = isinstance(tolerance, int | float | np.number) and not isinstance(tolerance, bool)
@@ -126,6 +128,11 @@ def advise(
     asked = (quantity, float(tolerance), basis, tuple(options))
     if not enough:
         best = min(options, key=lambda option: option.error)
+        if not np.isfinite(best.error):
+            raise UnconvergedError(
+                f"no rung's error can be told ({basis}): some found no equilibrium; take more "
+                "load.steps_per_half_cycle, a lower contact.stick_stiffness, or finite elements"
+            )
         return Advice("none", best.error, best.ms, {}, *asked)
     chosen = enough[0]
     return Advice(chosen.rung, chosen.error, chosen.ms, chosen.settings, *asked)
