@@ -1,0 +1,67 @@
+"""Figures of a scene's last cycle as a compiled function of some of its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jbeamshell.history import History
+from jbeamshell.newton import Newton
+from jbeamshell.parts import require, require_choice
+from jbeamshell.quasistatic import solve
+from jbeamshell.scene import NUMBERS, Scene, check_key
+
+RESPONSES = tuple(name for name, value in vars(History).items() if isinstance(value, property)) + (
+    "force",
+    "displacement",
+)
+
+
+def response(
+    scene: Scene,
+    over: Sequence[str],
+    figures: Sequence[str] = ("dissipation",),
+    *,
+    solver: Newton | None = None,
+) -> Callable[..., dict[str, Array]]:
+    """A pure function of some of a scene's numbers, for `jax.jit`, `jax.vmap` and `jax.grad`.
+
+    Only what the figures need is computed, so that it costs less than `jbeamshell.solve`.
+
+    Parameters
+    ----------
+    scene : what is not varied
+    over : dotted keys of the numbers that are, in the order of the function's arguments
+    figures : names of `jbeamshell.History`, such as "dissipation" or "secant_stiffness"
+    solver : settings of Newton's method
+
+    Returns
+    -------
+    Callable
+        from the numbers to a dictionary of the figures and ``status``, the worst code of
+        `jbeamshell.Status` on the way: a figure with another one than zero is NaN or not to be
+        trusted.  Numbers are not checked: the domain is the caller's.
+
+    Raises
+    ------
+    InputError
+        if a key or a figure is unknown
+    """
+    for key in over:
+        check_key(key)
+        require("over", key, key in NUMBERS, "is no number of the scene: give it to the scene")
+    for name in figures:
+        require_choice("figures", name, RESPONSES)
+
+    @jax.jit
+    def answer(*values: Array) -> dict[str, Array]:
+        history = solve(
+            scene.replace(dict(zip(over, values, strict=True))), throw=False, solver=solver
+        )
+        found = {name: getattr(history, name) for name in figures}
+        return found | {"status": jnp.max(history.status)}
+
+    return answer
