@@ -14,9 +14,10 @@ from jbeamshell.parts import require, require_choice
 from jbeamshell.quasistatic import solve
 from jbeamshell.scene import NUMBERS, Scene, check_key
 
-RESPONSES = tuple(name for name, value in vars(History).items() if isinstance(value, property)) + (
+RESPONSES = (
     "force",
     "displacement",
+    *(name for name, value in vars(History).items() if isinstance(value, property)),
 )
 
 

@@ -12,9 +12,9 @@ PACKAGE = Path(jbeamshell.__file__).parent
 UPWARDS = [
     "errors", "files", "kinematics", "rungs", "closed_form", "elasticity", "energy", "sections",
     "laminate", "friction", "contact", "grid", "parts", "scene", "scenes", "block_tridiagonal",
-    "newton", "equilibrium", "cycles", "history", "stepping", "masing", "quasistatic", "response", "advice",
-    "measured", "example", "identify", "plotting", "output", "terminal", "fit_command", "__init__",
-    "__main__",
+    "newton", "equilibrium", "cycles", "history", "stepping", "masing", "quasistatic", "response",
+    "advice", "measured", "example", "identify", "plotting", "output", "terminal", "fit_command",
+    "__init__", "__main__",
 ]
 INSIDE = {
     "measured": [
