@@ -8,6 +8,7 @@ from jbeamshell.parts import Contact, Load, Model, Strip
 from jbeamshell.quasistatic import solve
 from jbeamshell.response import response
 from jbeamshell.scene import Scene, read_scene, scene_to_toml, write_scene
+from jbeamshell.sweeping import Sweep, sweep
 
 __version__ = "0.1.0"
 
@@ -22,11 +23,13 @@ __all__ = [
     "Scene",
     "Status",
     "Strip",
+    "Sweep",
     "UnconvergedError",
     "advise",
     "read_scene",
     "response",
     "scene_to_toml",
     "solve",
+    "sweep",
     "write_scene",
 ]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import jax
 
-from jbeamshell import __version__, fit_command
+from jbeamshell import __version__, fit_command, sweep_command
 from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.scene import Scene, overridden, scene_from_values
 from jbeamshell.terminal import assignments, put, say, say_written, warn
@@ -72,13 +72,14 @@ def _parser() -> argparse.ArgumentParser:
     advice.set_defaults(run=_advise)
 
     fit = fit_command.add_to(commands)
-    for command in (run, advice, fit):
+    sweep = sweep_command.add_to(commands)
+    for command in (run, advice, fit, sweep):
         command.add_argument(
             "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key"
         )
     for command in (run, fit):
         command.add_argument("--out", metavar="DIR", help="write tables and pictures there")
-    for command in (run, listing, advice, fit):
+    for command in (run, listing, advice, fit, sweep):
         command.add_argument("--json", action="store_true", help="print the result as JSON")
     return parser
 

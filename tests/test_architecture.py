@@ -13,8 +13,8 @@ UPWARDS = [
     "errors", "files", "kinematics", "rungs", "closed_form", "elasticity", "energy", "sections",
     "laminate", "friction", "contact", "grid", "parts", "scene", "scenes", "block_tridiagonal",
     "newton", "equilibrium", "cycles", "history", "stepping", "masing", "quasistatic", "response",
-    "advice", "measured", "example", "identify", "plotting", "output", "terminal", "fit_command",
-    "__init__", "__main__",
+    "sweeping", "advice", "measured", "example", "identify", "plotting", "output", "terminal",
+    "fit_command", "sweep_command", "__init__", "__main__",
 ]
 INSIDE = {
     "measured": [
@@ -25,7 +25,8 @@ INSIDE = {
         "observations", "parameters", "experiment", "problem", "search", "uncertainty", "results",
         "likelihood", "fitting", "plan", "__init__",
     ],
-    "plotting": ["style", "steps", "paths", "contacts", "fits", "ladder", "__init__"],
+    "sweeping": ["lanes", "runner", "store", "job", "results", "processes", "worker", "__init__"],
+    "plotting": ["style", "steps", "paths", "contacts", "fits", "ladder", "sweeps", "__init__"],
 }
 # fmt: on
 ONLY = {

@@ -1,4 +1,4 @@
-"""Pictures of a history: the loop, the profiles along X, the contact; of a fit; of the ladder.
+"""Pictures of a history (its loop, profiles along X, contact), of fits, sweeps and the ladder.
 
 The only package that imports matplotlib.  Every function draws into the axes it is given or into
 new ones, returns them, and neither shows them nor changes matplotlib's settings.  `style` dresses
@@ -29,3 +29,6 @@ from jbeamshell.plotting.style import close as close
 from jbeamshell.plotting.style import colours as colours
 from jbeamshell.plotting.style import save as save
 from jbeamshell.plotting.style import style as style
+from jbeamshell.plotting.sweeps import master_curve as master_curve
+from jbeamshell.plotting.sweeps import sweep as sweep
+from jbeamshell.plotting.sweeps import sweep_sheet as sweep_sheet

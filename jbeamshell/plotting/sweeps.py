@@ -1,0 +1,252 @@
+"""Pictures of a sweep: a figure along one key for values of another, and the master curve."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator
+
+from jbeamshell.closed_form import cubic_law
+from jbeamshell.errors import InputError
+from jbeamshell.plotting.style import DATA, PALETTE, colours, single, style
+from jbeamshell.sweeping import Sweep
+
+SYMBOLS = {
+    "load.amplitude": "$A$",
+    "strip.height_ratio": r"$\eta$",
+    "strip.half_height": "$H$",
+    "strip.length": "$L$",
+    "strip.poisson_ratio": r"$\nu$",
+    "strip.kappa_s": r"$\kappa_s$",
+    "strip.axial_stiffness": "$E' 2H$",
+    "strip.youngs_modulus": "$E$",
+    "contact.friction": r"$\mu$",
+    "contact.pressure": "$F_N$",
+    "contact.stick_stiffness": r"$\alpha$",
+}
+UNITS = {
+    "load.amplitude": "force per width",
+    "strip.half_height": "length",
+    "strip.length": "length",
+    "strip.axial_stiffness": "force per width",
+    "strip.youngs_modulus": "stress",
+    "contact.pressure": "stress",
+    "strip.height_ratio": "1",
+    "strip.poisson_ratio": "1",
+    "strip.kappa_s": "1",
+    "contact.friction": "1",
+    "contact.stick_stiffness": "1",
+}
+FIGURES = {
+    "dissipation": "$D$  [force]",
+    "dissipation_ratio": "$D\\,/\\,D_{bar}$  [1]",
+    "secant_stiffness": "secant stiffness  [force per width / length]",
+    "loss_factor": "loss factor  [1]",
+}
+WIDE = 20.0  # last value over first from which on an axis is logarithmic
+FLOOR = 1e-6  # of the largest value: what a logarithmic axis still shows
+
+
+def sweep(
+    result: Sweep,
+    axes: Axes | None = None,
+    *,
+    figure: str = "dissipation",
+    along: str | None = None,
+    per: str | None = None,
+) -> Axes:
+    """Draw a figure along one key, a curve for each value of another.
+
+    Parameters
+    ----------
+    result : of `jbeamshell.sweep`
+    axes : where to draw; new ones when not given
+    figure : one of the result's
+    along : key along the axis; the amplitude, or else the first
+    per : key of which every value has its curve; the first of the others.  Further keys stay at
+        their middle value; of a paired sweep all lanes are drawn, as dots
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        the axes drawn into; dashed is the bar's cubic law, where one holds for all curves
+
+    Raises
+    ------
+    InputError
+        if the result has no such figure or key
+    """
+    along, per = _keys(result, along, per)
+    values = result[figure]
+    with style():
+        axes = single(axes)
+        x = result.axes[along]
+        if result.paired:
+            hue = np.full(x.size, 0.0) if per is None else result.axes[per]
+            _dots(axes, x, values, hue, per and _label(per, result))
+        else:
+            table, rest = _plane(result, values, along, per)
+            order = np.argsort(x)
+            names: list[Any] = [None] if per is None else result.axes[per].tolist()
+            for row, value, colour in zip(table, names, colours(len(names)), strict=True):
+                label = None if value is None else f"{_symbol(per)} = {value:.3g}"
+                axes.plot(x[order], row[order], color=colour, label=label, marker=".", markersize=4)
+            axes.set_title(rest)
+        _cubic_law(result, axes, figure, along)
+        axes.set(xlabel=_label(along, result), ylabel=FIGURES.get(figure, figure.replace("_", " ")))
+        _scales(axes, x, values)
+        if axes.get_legend_handles_labels()[1]:
+            axes.legend(fontsize=8, ncols=1 + (len(axes.lines) > 8))
+    return axes
+
+
+def master_curve(
+    result: Sweep, axes: Axes | None = None, *, figure: str = "dissipation_ratio"
+) -> Axes:
+    """Draw the dissipation over the bar's against A/eta: strips of all heights on one curve.
+
+    Parameters
+    ----------
+    result : of `jbeamshell.sweep`, under force control
+    axes : where to draw; new ones when not given
+    figure : one of the result's that is a pure number
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        the axes drawn into: a dot for each lane that converged, in the colour of its eta
+
+    Raises
+    ------
+    InputError
+        if the result has no such figure, or no lane with friction and a known force
+    """
+    y, x = result[figure], result.lanes.amplitude_over_height
+    eta = np.broadcast_to(result.lanes.height_ratio, result.shape)
+    good = np.isfinite(x) & np.isfinite(y)
+    if not np.any(good):
+        raise InputError("sweep: has no lane with a force, friction and an answer to draw")
+    with style():
+        axes = single(axes)
+        key = "strip.height_ratio" if np.ptp(eta) > 0.0 else None
+        _dots(axes, x[good], y[good], eta[good], key and _label(key, result))
+        axes.axhline(1.0, color=DATA, linestyle="--", linewidth=0.8)
+        axes.set(
+            xlabel=r"$A\,/\,(\mu F_N L/2)\,/\,\eta$  [1]",
+            ylabel=FIGURES.get(figure, figure.replace("_", " ")),
+            xscale="log",
+        )
+    return axes
+
+
+def sweep_sheet(result: Sweep) -> Figure:
+    """A new sheet of a sweep: its first figure and, where there is one, the master curve.
+
+    Parameters
+    ----------
+    result : of `jbeamshell.sweep`
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        the figure, to be saved and closed
+    """
+    ratio, scaled = "dissipation_ratio", result.lanes.amplitude_over_height
+    both = ratio in result.values and bool(np.any(np.isfinite(scaled + result.values[ratio])))
+    with style():
+        sheet, panels = plt.subplots(
+            1, 1 + both, figsize=(5.6 * (1 + both), 4.0), squeeze=False, layout="constrained"
+        )
+        sweep(result, panels[0, 0], figure=next(iter(result.values)))
+        if both:
+            master_curve(result, panels[0, 1])
+    return sheet
+
+
+def _keys(result: Sweep, along: str | None, per: str | None) -> tuple[str, str | None]:
+    keys = list(result.axes)
+    for name, key in (("along", along), ("per", per)):
+        if key is not None and key not in keys:
+            raise InputError(f"{name} = {key!r}: the sweep is over {', '.join(keys)}")
+    if along is None:
+        first = [key for key in ("load.amplitude", *keys) if key in keys and key != per]
+        along = first[0] if first else keys[0]
+    if along == per:
+        raise InputError(f"per = {per!r}: is along the axis already")
+    others = [key for key in keys if key != along]
+    return along, others[0] if per is None and others else per
+
+
+def _plane(
+    result: Sweep, values: np.ndarray, along: str, per: str | None
+) -> tuple[np.ndarray, str]:
+    """Rows of ``per`` along ``along``, the other keys at their middle value; and what that is."""
+    kept, rest = [], []
+    for key, numbers in result.axes.items():
+        if key in (along, per):
+            kept.append(key)
+            continue
+        middle = numbers.size // 2
+        values = np.take(values, middle, axis=len(kept))
+        rest.append(f"{_symbol(key)} = {numbers[middle]:.4g}")
+    table = values if kept[-1] == along else values.T
+    return np.atleast_2d(table), ", ".join(rest)
+
+
+def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, hue: np.ndarray, name: str | None) -> None:
+    """Dots in colours of a third number, explained by a bar."""
+    if name is None:
+        axes.plot(x, y, linestyle="", marker="o", markersize=3, color=PALETTE[0])
+        return
+    low, high = float(np.min(hue)), float(np.max(hue))
+    norm = LogNorm(low, high) if low > 0.0 and high > 5.0 * low else Normalize(low, high)
+    size = 12.0 if x.size < 500 else 4.0
+    dots: dict[str, Any] = {"c": hue, "norm": norm, "cmap": "viridis", "linewidths": 0.0}
+    axes.scatter(x, y, size, rasterized=x.size > 5000, **dots)
+    plain = FuncFormatter(lambda value, _: f"{value:g}")
+    few = LogLocator(subs=(1.0, 2.0, 5.0)) if isinstance(norm, LogNorm) else None
+    bar = axes.figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, label=name)
+    if few is not None:
+        bar.set_ticks(few, minor=False)
+    bar.ax.yaxis.set_major_formatter(plain)
+    bar.ax.minorticks_off()
+
+
+def _cubic_law(result: Sweep, axes: Axes, figure: str, along: str) -> None:
+    lanes = result.lanes
+    friction = lanes.gross_slip / lanes.value("strip.length")
+    alike = all(np.ndim(number) == 0 for number in (lanes.stiffness, friction))
+    pulled = result.scene.load.control == "force" and along == "load.amplitude"
+    if figure != "dissipation" or not alike or not pulled or float(friction) <= 0.0:
+        return
+    inside = np.sort(result.axes[along])
+    inside = inside[(inside > 0.0) & (inside < float(lanes.gross_slip))]
+    law = np.asarray(cubic_law(inside, float(lanes.stiffness), float(friction)))
+    axes.plot(inside, law, color=DATA, linestyle="--", linewidth=0.9, label="bar", zorder=1.5)
+
+
+def _scales(axes: Axes, x: np.ndarray, values: np.ndarray) -> None:
+    if x.min() > 0.0 and x.max() > WIDE * x.min():
+        axes.set_xscale("log")
+    known = values[np.isfinite(values)]
+    if known.size and known.min() >= 0.0 and known.max() > WIDE * known.min():
+        axes.set_yscale("log")
+        smallest = np.min(known[known > 0.0], initial=known.max())
+        axes.set_ylim(bottom=max(0.7 * smallest, FLOOR * known.max()))
+
+
+def _symbol(key: str | None) -> str:
+    return SYMBOLS.get(key or "", (key or "").partition(".")[2].replace("_", " "))
+
+
+def _label(key: str, result: Sweep) -> str:
+    unit = UNITS.get(key)
+    if key == "load.amplitude" and result.scene.load.control == "displacement":
+        unit = "length"
+    return _symbol(key) + (f"  [{unit}]" if unit else "")

@@ -1,0 +1,163 @@
+"""A sweep as work: which lanes make which block, who runs it, and what became of all lanes."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from jbeamshell.errors import InputError
+from jbeamshell.newton import Newton
+from jbeamshell.scene import scene_from_values, scene_to_toml
+from jbeamshell.sweeping.lanes import Lanes, Outcome
+from jbeamshell.sweeping.runner import BLOCK, Block, Runner, width_of_chunks
+from jbeamshell.sweeping.store import Store
+
+BLOCKS = 32  # at least, of a sweep with chunks enough, so that all hands get alike shares
+
+Tell = Callable[[int], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Job:
+    """A sweep to be done.
+
+    Attributes
+    ----------
+    lanes : what varies
+    figures : names of `jbeamshell.History`
+    solver : settings of Newton's method
+    """
+
+    lanes: Lanes
+    figures: tuple[str, ...]
+    solver: Newton | None = None
+
+    @property
+    def dtype(self) -> np.dtype:
+        return np.dtype(self.lanes.scene.strip.length.dtype)
+
+    @functools.cached_property
+    def scene(self) -> str | None:
+        """TOML of what is not varied; None where a function of the user's own is part of it."""
+        try:
+            return scene_to_toml(self.lanes.scene)
+        except InputError:
+            return None
+
+    @functools.cached_property
+    def outside(self) -> np.ndarray:
+        """Which lanes lie outside the model's domain, an array of the lanes' shape."""
+        return self.lanes.outside()
+
+    @functools.cached_property
+    def blocks(self) -> list[np.ndarray]:
+        """Flat numbers of the lanes of every block, those outside the domain left out.
+
+        Lanes are sorted by difficulty and cut into chunks; every block gets chunks of all
+        difficulties, so that all blocks cost alike.
+        """
+        inside = np.flatnonzero(~self.outside)
+        hardness = self.lanes.difficulty.ravel()[inside]
+        order = inside[np.argsort(hardness, kind="stable")]
+        width = width_of_chunks(self.dtype)
+        chunks = -(-order.size // width)
+        largest = min(max(-(-chunks // BLOCKS), 1), BLOCK // width)
+        count = -(-chunks // largest)
+        rows = np.arange(width)
+        numbers = (
+            (np.arange(b, chunks, count)[:, None] * width + rows).ravel() for b in range(count)
+        )
+        return [order[n[n < order.size]] for n in numbers]
+
+    def runner(self, devices: Sequence[Any] | None = None) -> Runner:
+        """The compiled model."""
+        lanes = self.lanes
+        return Runner(lanes.scene, tuple(lanes.axes), self.figures, self.solver, devices)
+
+    def size(self, share: Sequence[int]) -> int:
+        """How many lanes these blocks have."""
+        return sum(self.blocks[number].size for number in share)
+
+    def run(
+        self,
+        share: Sequence[int],
+        runner: Runner,
+        store: Store | None,
+        tell: Tell,
+        known: Mapping[int, Block],
+    ) -> dict[int, Block]:
+        """Answers of blocks, the known ones as they are; tells of the others how many lanes each.
+
+        Blocks are stored as they finish.
+        """
+        found = dict(known)
+        missing = [number for number in share if number not in found]
+        abreast = len(runner.devices)
+        for first in range(0, len(missing), abreast):
+            numbers = missing[first : first + abreast]
+            batches = [self.lanes.columns(self.blocks[number]) for number in numbers]
+            for number, block in zip(numbers, runner(batches), strict=True):
+                if store is not None:
+                    store.save(number, block)
+                found[number] = block
+                tell(block.status.size)
+        return found
+
+    def stored(self, share: Sequence[int], store: Store) -> dict[int, Block]:
+        """Those of the blocks that are in the store."""
+        done = store.done()
+        loaded = {n: store.load(n, self.blocks[n].size) for n in share if n in done}
+        return {number: block for number, block in loaded.items() if block is not None}
+
+    def collected(self, blocks: Mapping[int, Block]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """Figures and codes of `Outcome` of all lanes, arrays of the lanes' shape."""
+        values = np.full((len(self.figures), self.lanes.size), np.nan, self.dtype)
+        status = np.full(self.lanes.size, Outcome.OUTSIDE, np.int8)
+        for number, block in blocks.items():
+            lanes = self.blocks[number]
+            values[:, lanes], status[lanes] = block
+        shape = self.lanes.shape
+        named = dict(zip(self.figures, values.reshape(-1, *shape), strict=True))
+        return named, status.reshape(shape)
+
+    # --- on paper -------------------------------------------------------------------------------
+
+    def description(self) -> str:
+        """Everything but the axes' values as text, the same for the same sweep only."""
+        from jbeamshell import __version__
+
+        if self.scene is None:
+            raise InputError(
+                "out, processes: a scene with a function of your own cannot be put on disk: "
+                "sweep it without them and write the table with to_csv"
+            )
+        about = {
+            "version": __version__,
+            "scene": self.scene,
+            "keys": list(self.lanes.axes),
+            "paired": self.lanes.paired,
+            "figures": list(self.figures),
+            "dtype": self.dtype.name,
+            "solver": None if self.solver is None else dataclasses.asdict(self.solver),
+            "layout": [BLOCKS, BLOCK, width_of_chunks(self.dtype)],
+        }
+        return json.dumps(about)
+
+
+def read_job(store: Store) -> Job:
+    """The sweep that a store was opened for."""
+    text, axes = store.read()
+    about = json.loads(text)
+    tables = tomllib.loads(about["scene"])
+    flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
+    scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
+    solver = None if about["solver"] is None else Newton(**about["solver"])
+    lanes = Lanes(scene, dict(zip(about["keys"], axes, strict=True)), about["paired"])
+    return Job(lanes, tuple(about["figures"]), solver)

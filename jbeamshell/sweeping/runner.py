@@ -1,0 +1,219 @@
+"""Blocks of lanes on the devices: one compiled shape, small chunks, failures retried alone."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
+
+from jbeamshell.errors import InputError
+from jbeamshell.history import History
+from jbeamshell.newton import Newton
+from jbeamshell.parts import require
+from jbeamshell.quasistatic import solve
+from jbeamshell.response import response
+from jbeamshell.scene import Scene, scene_to_toml
+from jbeamshell.sweeping.lanes import Outcome
+
+BLOCK = 1024  # lanes of the largest block, which is the compiled shape
+CACHE_LINE = 64  # bytes: the widest chunks for which the working set stays in a core's cache
+KEPT = 4  # compiled models of other scenes
+
+Answers = Callable[..., dict[str, Array]]
+_known: dict[str, Answers] = {}
+
+
+class Block(NamedTuple):
+    """Answers of some lanes.
+
+    Attributes
+    ----------
+    values : (figures, lanes) NaN where there is none
+    status : (lanes,) codes of `Outcome`
+    """
+
+    values: np.ndarray
+    status: np.ndarray
+
+
+def width_of_chunks(dtype: np.dtype) -> int:
+    """Lanes that advance together: wide ones wait for their slowest and spill out of the cache."""
+    on_cores = jax.default_backend() == "cpu"
+    return CACHE_LINE // dtype.itemsize if on_cores else BLOCK
+
+
+def check_figures(
+    scene: Scene, keys: Sequence[str], figures: Sequence[str], solver: Newton | None
+) -> None:
+    """Refuse figures that are no numbers; raises `InputError` where the scene takes no such key."""
+    require("figures", list(figures), len(figures) > 0, "name at least one")
+    require("figures", list(figures), len(set(figures)) == len(figures), "names one twice")
+    number = jax.ShapeDtypeStruct((), scene.strip.length.dtype)
+    ask = _ask(scene, tuple(keys), tuple(figures), solver)
+    try:
+        shapes = jax.eval_shape(ask, *[number] * len(keys))
+    except (jax.errors.ConcretizationTypeError, TypeError) as error:
+        name = ", ".join(figures)
+        raise InputError(f"figures = {name!r}: give numbers of a cycle ({error})") from None
+    for name in figures:
+        shape = getattr(shapes[name], "shape", None)
+        number_like = shape is not None and len(shape) <= 1
+        fix = "is no number, nor one of every step: give one such as 'dissipation'"
+        require(
+            "figures", name, number_like and jnp.issubdtype(shapes[name].dtype, jnp.floating), fix
+        )
+
+
+class Runner:
+    """The compiled model: lanes in, figures out.
+
+    Attributes
+    ----------
+    devices : on which blocks run side by side
+    width : lanes of a chunk
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        keys: Sequence[str],
+        figures: Sequence[str],
+        solver: Newton | None = None,
+        devices: Sequence[Any] | None = None,
+    ) -> None:
+        self.scene, self.keys, self.figures = scene, tuple(keys), tuple(figures)
+        self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
+        self.devices = list(devices or jax.local_devices())
+        self.width = width_of_chunks(self.dtype)
+        self._mesh = Mesh(np.array(self.devices), "lanes")
+        ask = _ask(scene, self.keys, self.figures, solver)
+        self._about = ask, self.figures, self._shape, self.dtype, self._mesh
+
+    def lower(self) -> None:
+        """Trace the model, which is the part of compiling that no cache saves."""
+        _lowered(*self._about)
+
+    def compile(self) -> None:
+        """Compile without running a lane."""
+        _compiled(*self._about)
+
+    def __call__(self, batches: Sequence[np.ndarray]) -> Iterator[Block]:
+        """Answers of one batch of lanes, (keys, lanes) each, for every device at the most."""
+        found = jax.device_get(self._answers(batches))
+        for device, columns in enumerate(batches):
+            lanes = columns.shape[1]
+            values, status = (f[device].reshape(*f.shape[1:-2], -1)[..., :lanes] for f in found)
+            block = Block(np.array(values), status.astype(np.int8))
+            self._mend(columns, block)
+            yield block
+
+    @property
+    def _shape(self) -> tuple[int, int, int, int]:
+        return len(self.devices), len(self.keys), BLOCK // self.width, self.width
+
+    def _answers(self, batches: Sequence[np.ndarray]) -> tuple[Array, Array]:
+        # What no lane fills is never computed, but for the rest of a chunk: its last lane again.
+        filled, counts = np.ones(self._shape, self.dtype), np.zeros(len(self.devices), np.int32)
+        for device, columns in enumerate(batches):
+            counts[device] = -(-columns.shape[1] // self.width)
+            padding = counts[device] * self.width - columns.shape[1]
+            padded = np.pad(columns, ((0, 0), (0, padding)), mode="edge")
+            filled[device, :, : counts[device]] = padded.reshape(len(self.keys), -1, self.width)
+        return _compiled(*self._about)(*jax.device_put((filled, counts), _spread(self._mesh)))
+
+    def _mend(self, columns: np.ndarray, block: Block) -> None:
+        """Solve alone what failed, which walks its steps in pieces; mark what still fails."""
+        values, status = block
+        unclear = (status != Outcome.CONVERGED) | ~np.all(np.isfinite(values), axis=0)
+        for lane in np.flatnonzero(unclear):
+            values[:, lane], status[lane] = self._alone(columns[:, lane])
+
+    def _alone(self, numbers: np.ndarray) -> tuple[np.ndarray, int]:
+        given = (jnp.asarray(number, self.dtype) for number in numbers)
+        try:
+            scene = self.scene.replace(dict(zip(self.keys, given, strict=True)))
+            history = solve(scene, throw=False, solver=self.solver)
+        except InputError:
+            return np.full(len(self.figures), np.nan), Outcome.OUTSIDE
+        status = Outcome(int(np.max(np.asarray(history.status))))
+        values = np.asarray(_figures(history, self.figures))
+        if status != Outcome.CONVERGED:
+            return np.full_like(values, np.nan), status
+        values = np.where(np.isfinite(values), values, np.nan)
+        return values, Outcome.UNDEFINED if np.any(np.isnan(values)) else status
+
+
+def _ask(
+    scene: Scene, keys: tuple[str, ...], figures: tuple[str, ...], solver: Newton | None
+) -> Answers:
+    """The scene's response: the same function for the same scene, so that it compiles once."""
+    try:
+        name = f"{scene_to_toml(scene)} {scene.strip.length.dtype} {keys} {figures} {solver}"
+    except InputError:  # a user's own energy has no text
+        return response(scene, keys, figures, solver=solver)
+    if name not in _known:
+        while len(_known) >= KEPT:
+            del _known[next(iter(_known))]
+        _known[name] = response(scene, keys, figures, solver=solver)
+    return _known[name]
+
+
+def _spread(mesh: Mesh) -> NamedSharding:
+    return NamedSharding(mesh, PartitionSpec("lanes"))
+
+
+@functools.lru_cache(KEPT)
+def _compiled(*about: Any) -> Any:
+    """What `_lowered` makes, compiled."""
+    return _lowered(*about).compile()
+
+
+@functools.lru_cache(KEPT)
+def _lowered(
+    ask: Answers, figures: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype, mesh: Mesh
+) -> Any:
+    """Runs one block on every device: (devices, keys, chunks, width) and how many chunks of each.
+
+    Chunks run one after the other, as many as there are, so that one compiled shape does for
+    sweeps of all sizes.
+    """
+
+    def chunk(lanes: Array) -> tuple[Array, Array]:
+        answer = jax.vmap(ask)(*lanes)
+        last = [answer[name].reshape(lanes.shape[-1], -1)[:, -1] for name in figures]
+        return jnp.stack(last), answer["status"].astype(jnp.int32)
+
+    def block(lanes: Array, count: Array) -> tuple[Array, Array]:
+        _, chunks, width = lanes.shape
+
+        def step(i: Array, found: tuple[Array, Array]) -> tuple[Array, Array]:
+            values, status = chunk(lanes[:, i])
+            return found[0].at[:, i].set(values), found[1].at[i].set(status)
+
+        nothing = jnp.full((len(figures), chunks, width), jnp.nan, lanes.dtype)
+        return lax.fori_loop(0, count, step, (nothing, jnp.zeros((chunks, width), jnp.int32)))
+
+    def each(lanes: Array, counts: Array) -> tuple[Array, Array]:
+        values, status = block(lanes[0], counts[0])
+        return values[None], status[None]
+
+    spread = PartitionSpec("lanes")
+    run: Callable[..., Any] = each
+    if mesh.size > 1:
+        run = jax.shard_map(each, mesh=mesh, in_specs=spread, out_specs=spread, check_vma=False)
+    kinds = ((shape, dtype), (shape[:1], np.int32))
+    given = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
+    return jax.jit(run).lower(*given)
+
+
+@eqx.filter_jit
+def _figures(history: History, figures: tuple[str, ...]) -> Array:
+    """Figures of the last cycle or, where there is one for every step, of the last step."""
+    return jnp.stack([jnp.ravel(getattr(history, name))[-1] for name in figures])
