@@ -7,6 +7,7 @@ from jbeamshell.newton import Newton
 from jbeamshell.parts import Contact, Load, Model, Strip
 from jbeamshell.quasistatic import solve
 from jbeamshell.response import response
+from jbeamshell.runtime import configure
 from jbeamshell.scene import Scene, read_scene, scene_to_toml, write_scene
 
 __version__ = "0.1.0"
@@ -24,6 +25,7 @@ __all__ = [
     "Strip",
     "UnconvergedError",
     "advise",
+    "configure",
     "read_scene",
     "response",
     "scene_to_toml",

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import jax
 
-from jbeamshell import __version__, fit_command
+from jbeamshell import __version__, fit_command, runtime
 from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.scene import Scene, overridden, scene_from_values
 from jbeamshell.terminal import assignments, put, say, say_written, warn
@@ -23,6 +23,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     options = _parser().parse_args(arguments)
     jax.config.update("jax_enable_x64", True)
+    if not runtime.started():
+        kept = jax.config.jax_compilation_cache_dir
+        runtime.configure(cache=None if kept else runtime.default_cache())
     try:
         return options.run(options)
     except InputError as error:
