@@ -7,6 +7,7 @@ from jbeamshell.newton import Newton
 from jbeamshell.parts import Contact, Load, Model, Strip
 from jbeamshell.quasistatic import solve
 from jbeamshell.response import response
+from jbeamshell.runtime import configure
 from jbeamshell.scene import Scene, read_scene, scene_to_toml, write_scene
 from jbeamshell.sweeping import Sweep, sweep
 
@@ -26,6 +27,7 @@ __all__ = [
     "Sweep",
     "UnconvergedError",
     "advise",
+    "configure",
     "read_scene",
     "response",
     "scene_to_toml",

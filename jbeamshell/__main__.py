@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import jax
 
-from jbeamshell import __version__, fit_command, sweep_command
+from jbeamshell import __version__, fit_command, runtime, sweep_command
 from jbeamshell.errors import InputError, UnconvergedError
 from jbeamshell.scene import Scene, overridden, scene_from_values
 from jbeamshell.terminal import assignments, put, say, say_written, warn
@@ -23,6 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     options = _parser().parse_args(arguments)
     jax.config.update("jax_enable_x64", True)
+    runtime.start_of_a_command()
     try:
         return options.run(options)
     except InputError as error:

@@ -70,6 +70,24 @@ class Drive(NamedTuple):
     rough: Array
 
 
+Seen = tuple[Array, Array, Array]  # what the foundation sees: forces along w, and v and w
+
+
+class Touch(NamedTuple):
+    """What the foundation answers, (n,) each.
+
+    Attributes
+    ----------
+    traction : of friction
+    contact : residual of the normal contact, a pressure
+    reaction : R
+    """
+
+    traction: Array
+    contact: Array
+    reaction: Array
+
+
 class System(eqx.Module):
     """A scene on its grid.
 
@@ -86,6 +104,7 @@ class System(eqx.Module):
     youngs_modulus : E, None where there are layers
     friction : mu
     slip_stiffness : k_t, traction per slip
+    known : whether the energy is ours, a quadratic form of the strains
     stiffness_scale, force_scale : make support rows forces, and residuals dimensionless
     """
 
@@ -108,6 +127,7 @@ class System(eqx.Module):
     model: Model = eqx.field(static=True)
     far_end: str = eqx.field(static=True)
     control: str = eqx.field(static=True)
+    known: bool = eqx.field(static=True)
 
     def __init__(self, scene: Scene) -> None:
         strip, contact, self.model = scene.strip, scene.contact, scene.model
@@ -139,10 +159,27 @@ class System(eqx.Module):
             stiffness = contact.normal_stiffness * stiffness
             self.normal = Compliance(stiffness, ROUNDING * pressing / strip.length / stiffness)
         self.far_end, self.control = strip.far_end, scene.load.control
+        self.known = scene.energy is None
 
     @property
     def _rule(self) -> grid.Rule:
         return grid.element_rule(self.model.grid)
+
+    @property
+    def linear(self) -> bool:
+        """Whether all but the foundation's answer is linear in the fields."""
+        return self.model.kinematics == "linear" and self.known
+
+    def feels(self, name: str) -> bool:
+        """Whether that part of a `Touch` has an effect."""
+        fields = {"traction": "v", "contact": "w", "reaction": "psi"}
+        felt = name != "reaction" or self.model.squeeze == "assumed"
+        return felt and fields[name] in self.model.fields
+
+    @property
+    def follows_friction(self) -> bool:
+        """Whether the ends are held otherwise before there is friction."""
+        return self.control == "displacement" or self.far_end == "free"
 
     @property
     def _kinematics(self) -> Kinematics:
@@ -156,7 +193,9 @@ class System(eqx.Module):
 
     def gap(self, q: Array) -> Array:
         """Height of the bottom face above the foundation, (n,)."""
-        lift = q[:, W]
+        return self._gap(q[:, W])
+
+    def _gap(self, lift: Array) -> Array:
         if self.curvature is None:
             return lift
         half = 0.5 * self._angle(self.x)
@@ -272,7 +311,7 @@ class System(eqx.Module):
         return jnp.stack(columns, axis=1)
 
     @eqx.filter_jit  # traced once for its several uses in a solver
-    def advance(self, change: Array, before: Level, drive: Drive) -> tuple[Level, Array]:
+    def advance(self, change: Array, before: Level, drive: Drive) -> tuple[Level, Array, Seen]:
         """The level after a change of the active fields, and the out-of-balance forces there.
 
         Parameters
@@ -285,24 +324,53 @@ class System(eqx.Module):
         -------
         level : the level after the change
         residual : (n, m) out-of-balance forces over mu F_N L; zero in equilibrium
+        seen : what the foundation sees, the first arguments of `touch`
         """
-        increment = self.embed(change)
-        q = before.q + increment
-        forces = jax.grad(self.potential)(q, drive.pressure)
-        pressed, gap = forces[:, W] / self.tributary, self.gap(q)
+        q = before.q + self.embed(change)
+        forces = self.elastic(q, drive.pressure)
+        seen = (forces[:, W], q[:, V], q[:, W])
+        touch = self.touch(*seen, before, drive)
+        force, residual = self.balance(forces, q, touch, drive)
+        cap = self._cap(touch.reaction)
+        return Level(q, touch.traction, cap, touch.reaction, force), residual, seen
+
+    def elastic(self, q: Array, pressure: ArrayLike) -> Array:
+        """Forces of the potential, (n, m)."""
+        return jax.grad(self.potential)(q, pressure)
+
+    def touch(self, balance: Array, v: Array, w: Array, before: Level, drive: Drive) -> Touch:
+        """What the foundation answers at the nodes, which do not see each other.
+
+        Parameters
+        ----------
+        balance : (n,) forces of the potential along w
+        v, w : (n,) fields
+        before, drive : as of `advance`
+        """
+        pressed, gap = balance / self.tributary, self._gap(w)
         reaction = jax.vmap(self.normal.reaction)(pressed, gap)
-        cap = jnp.maximum(self.friction * reaction, self.cap_floor)
+        cap = self._cap(reaction)
         slip = jax.vmap(self.law.traction, in_axes=(0, 0, 0, None))
         rough = jnp.where(self.friction > 0.0, drive.rough, 0.0)
         # No reaction, no traction; not even the floor, whose sign would flip for ever.
         closed = jnp.clip(cap / self.cap_floor - 1.0, 0.0, 1.0)
-        traction = slip(increment[:, V], before.traction, cap, self.slip_stiffness)
-        traction = rough * closed * traction
-        forces = forces.at[:, V].add(self.tributary * traction)
+        traction = slip(v - before.q[:, V], before.traction, cap, self.slip_stiffness)
         contact = jax.vmap(self.normal.residual)(pressed, gap)
-        forces = forces.at[:, W].set(self.tributary * contact)
+        return Touch(rough * closed * traction, contact, reaction)
+
+    def balance(self, forces: Array, q: Array, touch: Touch, drive: Drive) -> tuple[Array, Array]:
+        """F at the loaded end, and the residual; but for F's direction linear in the first three.
+
+        Parameters
+        ----------
+        forces, q : (n, m) elastic forces and fields
+        touch : what the foundation answers
+        drive : what the step prescribes
+        """
+        forces = forces.at[:, V].add(self.tributary * touch.traction)
+        forces = forces.at[:, W].set(self.tributary * touch.contact)
         if self.model.squeeze == "assumed":
-            mean = 0.5 * (drive.pressure * self.load / self.tributary + reaction)
+            mean = 0.5 * (drive.pressure * self.load / self.tributary + touch.reaction)
             assumed = jnp.asarray(self.youngs_modulus) * q[:, PSI] + mean
             forces = forces.at[:, PSI].set(2.0 * self.half_height * self.tributary * assumed)
 
@@ -319,7 +387,10 @@ class System(eqx.Module):
             jnp.ones(self.model.width).at[jnp.array([BETA, PSI])].set(1.0 / self.half_height)
         )
         residual = (forces * per_force / self.force_scale)[:, list(self.model.active)]
-        return Level(q, traction, cap, reaction, force), residual
+        return force, residual
+
+    def _cap(self, reaction: Array) -> Array:
+        return jnp.maximum(self.friction * reaction, self.cap_floor)
 
     def _support(self, forces: Array, q: Array, rough: Array) -> Array:
         """Replace the balance of held fields at X = 0 by their support condition."""

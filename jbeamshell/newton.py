@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array, lax
+from jax.typing import ArrayLike
 
 from jbeamshell import block_tridiagonal
+from jbeamshell.block_tridiagonal import BlockTridiagonal
 from jbeamshell.parts import require
+
+Seen = TypeVar("Seen")
+Stiffness = TypeVar("Stiffness")
+PATIENCE = 20  # iterations without which a root is mostly found
+CHORDS = 12  # iterations between refreshes of what hardly changes
 
 
 class Newton(eqx.Module):
@@ -50,19 +58,26 @@ class Newton(eqx.Module):
 
     def solve(
         self,
-        residual: Callable[[Array], Array],
+        evaluate: Callable[[Array], tuple[Array, Seen]],
         limit: Callable[[Array, Array], Array],
         guess: Array,
         enabled: Array,
+        tangent: Callable[[Seen, Stiffness], BlockTridiagonal],
+        stiffness: Stiffness,
+        refresh: Callable[[Array], Stiffness] | None = None,
     ) -> tuple[Array, tuple[Array, Array]]:
         """Find a root of a residual whose rows couple to neighbouring rows only.
 
         Parameters
         ----------
-        residual : (n, m) to (n, m), in units of the friction force mu F_N L
+        evaluate : from (n, m) unknowns to the residual (n, m), in units of the friction force
+            mu F_N L, and to what the tangent sees of it
         limit : from an iterate and the next one to the one to go on with
         guess : (n, m)
         enabled : false skips the iteration
+        tangent : the residual's matrix from what it sees and from the part that hardly changes
+        stiffness : that part
+        refresh : that part at some unknowns; None where it is the same everywhere
 
         Returns
         -------
@@ -71,44 +86,69 @@ class Newton(eqx.Module):
         """
         tolerance = self.tolerance_for(guess.dtype)
 
-        def unfinished(state: tuple[Array, Array, Array]) -> Array:
-            _, r, count = state
-            return enabled & (jnp.max(jnp.abs(r)) > tolerance) & (count < self.max_iterations)
+        def unfinished(at: Iterate) -> Array:
+            left = jnp.max(jnp.abs(at.residual)) > tolerance
+            return enabled & left & (at.tried < self.max_iterations)
 
-        def iterate(function: Callable[[Array], Array], start: Array) -> tuple[Array, tuple]:
-            def improve(state: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-                x, r, count = state
-                _, linear = jax.linearize(function, x)
-                step = block_tridiagonal.solve(block_tridiagonal.jacobian(linear, x), -r)
-                x, r = self._search(function, lambda s: limit(x, x + s * step), r)
-                return x, r, count + 1
+        def improve(at: Iterate, stiffness: Stiffness) -> Iterate:
+            step = block_tridiagonal.solve(tangent(at.seen, stiffness), -at.residual)
+            x = limit(at.x, at.x + at.scale * step)
+            residual, seen = evaluate(x)
+            # Friction's kinks raise the residual, but by no more than the friction force itself;
+            # a search that goes round in circles must lower it.
+            rise = jnp.where(at.tried < PATIENCE, 1.0, 0.0)
+            most = jnp.linalg.norm(at.residual) + rise
+            good = (jnp.linalg.norm(residual) <= most) | (at.scale <= 0.5**self.max_halvings)
+            new = Iterate(x, residual, seen, jnp.ones_like(at.scale), at.tried)
+            old = at._replace(scale=0.5 * at.scale)
+            kept: Iterate = jax.tree.map(lambda a, b: jnp.where(good, a, b), new, old)
+            return kept._replace(tried=at.tried + 1)
 
-            x, r, count = lax.while_loop(
-                unfinished, improve, (start, function(start), jnp.asarray(0))
+        def search(at: Iterate, stiffness: Stiffness, until: ArrayLike) -> Iterate:
+            return lax.while_loop(
+                lambda at: unfinished(at) & (at.tried < until),
+                lambda at: improve(at, stiffness),
+                at,
             )
+
+        def refreshing(start: Iterate, anew: Callable[[Array], Stiffness]) -> Iterate:
+            def chords(state: tuple[Iterate, Stiffness]) -> tuple[Iterate, Stiffness]:
+                at = search(*state, state[0].tried + CHORDS)
+                return at, lax.cond(unfinished(at), anew, lambda _: state[1], at.x)
+
+            return lax.while_loop(lambda s: unfinished(s[0]), chords, (start, stiffness))[0]
+
+        def iterate(_: Callable[[Array], Array], start: Array) -> tuple[Array, tuple]:
+            at = Iterate(start, *evaluate(start), jnp.ones((), start.dtype), jnp.asarray(0))
+            if refresh is None:
+                at = search(at, stiffness, self.max_iterations)
+            else:
+                at = refreshing(at, refresh)
             # As a float: custom_root has no tangent for integers.
-            return x, (count.astype(x.dtype), jnp.max(jnp.abs(r)))
+            return at.x, (at.tried.astype(at.x.dtype), jnp.max(jnp.abs(at.residual)))
 
         root, (count, error) = lax.custom_root(
-            residual, guess, iterate, block_tridiagonal.linear_solve, has_aux=True
+            lambda x: evaluate(x)[0],
+            guess,
+            iterate,
+            block_tridiagonal.linear_solve,
+            has_aux=True,
         )
         return root, (count.astype(int), error)
 
-    def _search(
-        self, function: Callable[[Array], Array], along: Callable[[Array], Array], r: Array
-    ) -> tuple[Array, Array]:
-        """Halve the step until the residual grows by no more than the friction force."""
-        bound = jnp.linalg.norm(r) + 1.0
 
-        def too_long(trial: tuple[Array, Array, Array]) -> Array:
-            _, r_new, scale = trial
-            return ~(jnp.linalg.norm(r_new) <= bound) & (scale > 0.5**self.max_halvings)
+class Iterate(NamedTuple):
+    """Where a search stands.
 
-        def halve(trial: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-            scale = 0.5 * trial[2]
-            x = along(scale)
-            return x, function(x), scale
+    Attributes
+    ----------
+    x, residual, seen : unknowns, their residual and what the tangent sees of it
+    scale : part of the next step that is taken
+    tried : steps tried so far
+    """
 
-        one = jnp.ones((), r.dtype)
-        x, r, _ = lax.while_loop(too_long, halve, (along(one), function(along(one)), one))
-        return x, r
+    x: Array
+    residual: Array
+    seen: Any
+    scale: Array
+    tried: Array

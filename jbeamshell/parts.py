@@ -310,7 +310,7 @@ class Load(eqx.Module):
     control : "force" (F, force per unit width) or "displacement" (u(L), mid-height face average)
     amplitude : A, of the controlled quantity; no default under displacement control
     cycles : full cycles A, -A, A after the first loading 0 to A; 0 is the pressure alone
-    steps_per_half_cycle : equal load steps from -A to A
+    steps_per_half_cycle : equal load steps from -A to A, an even number, or 1
     pressure_steps : equal steps in which the pressure is applied, without friction
     """
 
@@ -347,13 +347,10 @@ class Load(eqx.Module):
         require_number("load.amplitude", self.amplitude)
         _require_count("load.cycles", self.cycles, 0)
         _require_count("load.pressure_steps", self.pressure_steps, 1)
-        _require_count("load.steps_per_half_cycle", self.steps_per_half_cycle, 2)
-        require(
-            "load.steps_per_half_cycle",
-            self.steps_per_half_cycle,
-            self.steps_per_half_cycle % 2 == 0,
-            "must be even, so that the path passes through zero",
-        )
+        half = self.steps_per_half_cycle
+        _require_count("load.steps_per_half_cycle", half, 1)
+        fix = "must be 1, or even, so that the path passes through zero"
+        require("load.steps_per_half_cycle", half, half == 1 or half % 2 == 0, fix)
 
     def unit_path(self) -> np.ndarray:
         """Load levels after zero for unit amplitude: 0 to 1, then ``cycles`` times 1, -1, 1."""
@@ -361,7 +358,8 @@ class Load(eqx.Module):
         if self.cycles == 0:
             return np.zeros(0)
         down = 1.0 - 2.0 * np.arange(1, half + 1) / half
-        first = np.arange(1, half // 2 + 1) / (half // 2)
+        quarter = max(half // 2, 1)
+        first = np.arange(1, quarter + 1) / quarter
         return np.concatenate([first, *[down, -down] * self.cycles])
 
 

@@ -187,6 +187,10 @@ class Scene(eqx.Module):
         cycling = model.solution == "stepwise" or self.load.cycles > 0
         fix = "doubles a backbone for load.cycles, of which there are none: take 'stepwise'"
         require("model.solution", model.solution, cycling, fix)
+        half = self.load.steps_per_half_cycle
+        fix = "a backbone that is doubled needs an even number"
+        enough = model.solution == "stepwise" or half % 2 == 0
+        require("load.steps_per_half_cycle", half, enough, fix)
         if not isinstance(contact.friction, jax.core.Tracer):
             rubs = not closed or float(contact.friction) > 0.0
             require("contact.friction", contact.friction, rubs, "the bar needs friction")

@@ -11,17 +11,42 @@ import numpy as np
 from jax import Array, lax
 from jax.typing import ArrayLike
 
-from jbeamshell.equilibrium import Drive, Level, System, V
+from jbeamshell.block_tridiagonal import BlockTridiagonal
+from jbeamshell.equilibrium import Drive, Level, Seen, System, V
 from jbeamshell.friction import plastic_slip
-from jbeamshell.grid import ORDER
 from jbeamshell.history import Status
 from jbeamshell.newton import Newton
 from jbeamshell.scene import Scene
+from jbeamshell.stiffness import (
+    Stiffness,
+    in_blocks,
+    matrix,
+    nodal,
+    stiffness_at,
+    stiffness_at_rest,
+    unknowns_at_rest,
+)
 
 SLIPS = 0.5  # a node slips in a step when more than this part of its motion is inelastic
-NUDGE = 1e-6  # of the cap: elastic traction with which a reversed step starts
+NUDGE = 1e-6  # of the friction that is left: elastic traction with which a node sets out to stick
+CORNER = 1.6  # H by which a strip slips less deep than a bar
 ROUNDING = 1e-9  # of the cap, or of gross slip: less than this is no difference
 PIECES = (8, 64)  # a load step that fails is walked in so many pieces, or so many
+
+
+class Turn(NamedTuple):
+    """A reversal of the load.
+
+    Attributes
+    ----------
+    target : the controlled load there
+    depth : (n,) force since then that takes the slip to a node
+    left : friction left at the loaded end, up to the cap of the other sign
+    """
+
+    target: Array
+    depth: Array
+    left: Array
 
 
 class State(NamedTuple):
@@ -32,7 +57,7 @@ class State(NamedTuple):
     level : the level reached
     rest : u(L) after the pressure
     target, pressure : the controlled load and the part of the pressures reached
-    stride : their last increments
+    turn : the last reversal
     change : (blocks, size) the last increment of the unknowns
     sound : whether all steps so far found equilibrium
     """
@@ -41,7 +66,7 @@ class State(NamedTuple):
     rest: Array
     target: Array
     pressure: Array
-    stride: Array
+    turn: Turn
     change: Array
     sound: Array
 
@@ -86,9 +111,16 @@ def march(scene: Scene, start: State, path: Path, solver: Newton) -> Steps:
     solver : of one step
     """
     system = System(scene)
+    rough = stiffness_at_rest(system, 1.0)
+    if system.follows_friction:
+        smooth = stiffness_at_rest(system, 0.0)
 
     def step(state: State, to: Path) -> tuple[State, Steps]:
-        return _step(system, state, Drive(to.target, to.pressure, state.rest, to.rough), solver)
+        drive = Drive(to.target, to.pressure, state.rest, to.rough)
+        stiffness = rough
+        if system.follows_friction:
+            stiffness = jax.tree.map(lambda a, b: jnp.where(to.rough > 0.0, a, b), rough, smooth)
+        return _step(system, state, drive, solver, stiffness)
 
     return lax.scan(step, start, path)[1]
 
@@ -107,32 +139,44 @@ def is_traced(*trees: object) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(trees))
 
 
-def _step(system: System, state: State, drive: Drive, solver: Newton) -> tuple[State, Steps]:
-    before, active = state.level, len(system.model.active)
-    padding = state.change.size - system.x.size * active
+def _step(
+    system: System, state: State, drive: Drive, solver: Newton, stiffness: Stiffness
+) -> tuple[State, Steps]:
+    before = state.level
 
-    def nodal(unknown: Array) -> Array:
-        return unknown.ravel()[padding:].reshape(-1, active)
+    def evaluate(unknown: Array) -> tuple[Array, Seen]:
+        _, residual, seen = system.advance(nodal(system, unknown), before, drive)
+        filling = unknown.ravel()[: unknown.size - residual.size]
+        return jnp.append(filling, residual.ravel()).reshape(unknown.shape), seen
 
-    def residual(unknown: Array) -> Array:
-        balance = system.advance(nodal(unknown), before, drive)[1]
-        return jnp.append(unknown.ravel()[:padding], balance.ravel()).reshape(unknown.shape)
+    def tangent(seen: Seen, stiffness: Stiffness) -> BlockTridiagonal:
+        return matrix(system, stiffness, seen, before, drive)
+
+    def refresh(unknown: Array) -> Stiffness:
+        level, _, seen = system.advance(nodal(system, unknown), before, drive)
+        return stiffness_at(system, level.q, system.touch(*seen, before, drive), drive)
 
     def limit(old: Array, new: Array) -> Array:
-        slip, was = nodal(new)[:, V], nodal(old)[:, V]
+        slip, was = nodal(system, new)[:, V], nodal(system, old)[:, V]
         limited = jax.vmap(system.law.limit, in_axes=(0, 0, 0, 0, None))(
             was, slip, before.traction, before.cap, system.slip_stiffness
         )
         # A point without reaction slides freely.
         rubs = (drive.rough > 0.0) & (before.cap > 2.0 * system.cap_floor)
-        fields = nodal(new).at[:, V].set(jnp.where(rubs, limited, slip))
-        return jnp.append(new.ravel()[:padding], fields.ravel()).reshape(new.shape)
+        fields = nodal(system, new).at[:, V].set(jnp.where(rubs, limited, slip))
+        return in_blocks(fields, new)
 
-    stride = jnp.stack([drive.target - state.target, drive.pressure - state.pressure])
+    turn = _turned(system, state, drive)
     change, (iterations, error) = solver.solve(
-        residual, limit, _guess(system, state, stride), state.sound
+        evaluate,
+        limit,
+        _guess(system, state, drive, turn),
+        state.sound,
+        tangent,
+        stiffness,
+        None if system.linear else refresh,
     )
-    after, _ = system.advance(nodal(change), before, drive)
+    after, *_ = system.advance(nodal(system, change), before, drive)
     sound = state.sound & (error <= solver.tolerance_for(system.x.dtype))
     end = system.end_displacement(after.q)
     rest = jnp.where(drive.rough > 0.0, state.rest, end)
@@ -143,7 +187,7 @@ def _step(system: System, state: State, drive: Drive, solver: Newton) -> tuple[S
     noticeable = system.slip_stiffness * jnp.abs(inelastic) > ROUNDING * after.cap
     rubbing = (drive.rough > 0.0) & (after.cap > 2.0 * system.cap_floor)
     kept = jax.tree.map(lambda new, old: jnp.where(sound, new, old), after, before)
-    new = State(kept, rest, drive.target, drive.pressure, stride, change, sound)
+    new = State(kept, rest, drive.target, drive.pressure, turn, change, sound)
     return new, Steps(
         state=new,
         displacement=end - rest,
@@ -157,17 +201,39 @@ def _step(system: System, state: State, drive: Drive, solver: Newton) -> tuple[S
     )
 
 
-def _guess(system: System, state: State, stride: Array) -> Array:
-    """Continue the last increment; after a reversal only its direction, so that every node sticks.
+def _turned(system: System, state: State, drive: Drive) -> Turn:
+    """The last reversal of the load, which may be now."""
+    stride, rough = drive.target - state.target, drive.rough > 0.0
+    along = jnp.where(stride >= 0.0, 1.0, -1.0)
+    before = state.level
+    # What the end load has changed of the cap changes sign with it.
+    mean = system.friction * drive.pressure * (system.load - system.bottom_load) / system.tributary
+    left = jnp.maximum(2.0 * mean - before.cap - along * before.traction, 0.0)
+    share = left * system.tributary
+    used = jnp.cumsum(share[::-1])[::-1] - 0.5 * share
+    now = Turn(state.target, used + CORNER * system.half_height * left, left[-1])
+    back = rough & (stride * (state.target - state.turn.target) <= 0.0)
+    return jax.tree.map(lambda new, old: jnp.where(back, new, old), now, state.turn)
 
-    The direction matters: at the Coulomb cap, going on slips and going back sticks.  The increment
-    of an earlier kind of load, pressure or end load, says nothing and is dropped.
+
+def _guess(system: System, state: State, drive: Drive, turn: Turn) -> Array:
+    """Increments of v that let those nodes slip which would if the strip were a bar.
+
+    A bar slips from the loaded end to where the friction left at the last reversal is used up by
+    the load since.
     """
-    moving = jnp.sum(state.stride**2)
-    ratio = jnp.sum(stride * state.stride) / jnp.where(moving > 0.0, moving, 1.0)
-    traction = system.slip_stiffness * jnp.max(jnp.abs(state.change))
-    nudge = -NUDGE * jnp.mean(state.level.cap) / jnp.where(traction > 0.0, traction, 1.0)
-    return lax.stop_gradient(jnp.where(ratio < 0.0, nudge, ratio) * state.change)
+    rise = drive.target - turn.target
+    along, load = jnp.where(rise >= 0.0, 1.0, -1.0), jnp.abs(rise)
+    if system.control == "displacement":
+        stretch = system.stiffness_scale * jnp.sum(system.tributary)
+        load = jnp.sqrt(2.0 * stretch * turn.left * load)
+    level, stiffness = state.level, system.slip_stiffness
+    slips = turn.depth < load
+    beyond = (2.0 * level.cap - along * level.traction) / stiffness
+    slip = along * jnp.where(slips, jnp.maximum(beyond, 0.0), 0.0)
+    fields = jnp.zeros_like(level.q).at[:, V].set(slip)[:, list(system.model.active)]
+    bar = in_blocks(fields, state.change)
+    return lax.stop_gradient(jnp.where(drive.rough > 0.0, bar, state.change))
 
 
 def at_rest(scene: Scene, touching: ArrayLike | None = None) -> State:
@@ -178,21 +244,14 @@ def at_rest(scene: Scene, touching: ArrayLike | None = None) -> State:
     scene : of which
     touching : (n,) nodes from which the search for the contact starts; None is all of them
     """
-    model, dtype = scene.model, scene.strip.length.dtype
-    nodes = jnp.zeros(model.nodes, dtype)
-    level = Level(jnp.zeros((nodes.size, model.width), dtype), nodes, nodes, nodes, nodes[0])
-    # An element's later nodes share a block, so that blocks couple to their neighbours only.
-    order, width = ORDER[model.grid], len(model.active)
-    blocks = (model.nodes + order - 1) // order
-    change = jnp.zeros((blocks * order, width), dtype)
-    stride = jnp.zeros(2, dtype)
+    system, fields = System(scene), scene.model.fields
+    change, zero = unknowns_at_rest(system), jnp.zeros_like(system.x)
     if touching is not None:
         raised = jnp.where(jnp.asarray(touching), 0.0, scene.strip.half_height)
-        change = change.at[-nodes.size :, model.fields.index("w")].set(raised)
-        stride = stride.at[1].set(1.0 / scene.load.pressure_steps)  # so that it is gone on with
-    change = change.reshape(blocks, order * width)
-    zero = nodes[0]
-    return State(level, zero, zero, zero, stride, change, jnp.asarray(True))
+        lifted = jnp.zeros((zero.size, len(system.model.active)), zero.dtype)
+        change = in_blocks(lifted.at[:, fields.index("w")].set(raised), change)
+    turn = Turn(zero[0], zero, zero[0])
+    return State(system.rest(), zero[0], zero[0], zero[0], turn, change, jnp.asarray(True))
 
 
 def recover(scene: Scene, steps: Steps, path: Path, solver: Newton, start: State) -> Steps:

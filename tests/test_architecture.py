@@ -10,11 +10,11 @@ import jbeamshell
 PACKAGE = Path(jbeamshell.__file__).parent
 # fmt: off
 UPWARDS = [
-    "errors", "files", "kinematics", "rungs", "closed_form", "elasticity", "energy", "sections",
-    "laminate", "friction", "contact", "grid", "parts", "scene", "scenes", "block_tridiagonal",
-    "newton", "equilibrium", "cycles", "history", "stepping", "masing", "quasistatic", "response",
-    "sweeping", "advice", "measured", "example", "identify", "plotting", "output", "terminal",
-    "fit_command", "sweep_command", "__init__", "__main__",
+    "errors", "runtime", "files", "kinematics", "rungs", "closed_form", "elasticity", "energy",
+    "sections", "laminate", "friction", "contact", "grid", "parts", "scene", "scenes",
+    "block_tridiagonal", "newton", "equilibrium", "stiffness", "cycles", "history", "stepping",
+    "masing", "quasistatic", "response", "sweeping", "advice", "measured", "example", "identify",
+    "plotting", "output", "terminal", "fit_command", "sweep_command", "__init__", "__main__",
 ]
 INSIDE = {
     "measured": [

@@ -7,34 +7,35 @@ import pytest
 
 from jbeamshell.block_tridiagonal import BlockTridiagonal, jacobian, linear_solve, solve
 
-SHAPES = [(9, 1), (7, 3), (8, 4), (5, 6)]
+SHAPES = [(9, 1), (6, 2), (7, 3), (8, 4), (5, 6)]
 shapes = pytest.mark.parametrize(("n", "m"), SHAPES)
 
 
 def matrix_of(n, m, seed=0):
     """A random matrix, diagonally dominant and not symmetric."""
-    lower, diagonal, upper = np.random.default_rng(seed).normal(size=(3, n, m, m))
-    lower[0] = upper[-1] = 0
-    return BlockTridiagonal(*map(jnp.asarray, (lower, diagonal + 4 * m * np.eye(m), upper)))
+    lower, diagonal, upper = np.random.default_rng(seed).normal(size=(3, m, m, n))
+    lower[..., 0] = upper[..., -1] = 0
+    dominant = diagonal + 4 * m * np.eye(m)[..., None]
+    return BlockTridiagonal(*map(jnp.asarray, (lower, dominant, upper)))
 
 
 def dense(matrix):
     lower, diagonal, upper = map(np.asarray, matrix)
-    n, m, _ = diagonal.shape
+    m, _, n = diagonal.shape
     full = np.zeros((n, m, n, m))
     for i in range(n):
-        full[i, :, i] = diagonal[i]
+        full[i, :, i] = diagonal[..., i]
         if i > 0:
-            full[i, :, i - 1] = lower[i]
+            full[i, :, i - 1] = lower[..., i]
         if i < n - 1:
-            full[i, :, i + 1] = upper[i]
+            full[i, :, i + 1] = upper[..., i]
     return full.reshape(n * m, n * m)
 
 
 def apply(matrix, x):
     above, below = jnp.roll(x, 1, axis=0), jnp.roll(x, -1, axis=0)
     parts = zip(matrix, (above, x, below), strict=True)
-    return sum(jnp.einsum("nij,nj->ni", blocks, y) for blocks, y in parts)
+    return sum(jnp.einsum("ijn,nj->ni", blocks, y) for blocks, y in parts)
 
 
 def vector(n, m, seed=1):
@@ -54,8 +55,8 @@ def test_jacobian_recovers_a_matrix_from_its_action(n, m):
 def test_transpose(n, m):
     matrix = matrix_of(n, m)
     np.testing.assert_array_equal(dense(matrix.transpose), dense(matrix).T)
-    assert not jnp.any(matrix.transpose.lower[0])
-    assert not jnp.any(matrix.transpose.upper[-1])
+    assert not jnp.any(matrix.transpose.lower[..., 0])
+    assert not jnp.any(matrix.transpose.upper[..., -1])
 
 
 @shapes

@@ -1,0 +1,48 @@
+"""Options of the process: each in a process of its own, because they come before JAX starts."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from jbeamshell import runtime
+from jbeamshell.errors import InputError
+
+FAST = f"{runtime.EXTRA}{runtime.FAST_LOOPS}"
+
+
+def flags_after(flags, call="jbeamshell.configure()"):
+    """XLA_FLAGS after a call in a process that was started with some."""
+    code = f"import os, jbeamshell; {call}; print(os.environ.get('XLA_FLAGS', ''))"
+    given = {k: v for k, v in os.environ.items() if k != "XLA_FLAGS"} | flags
+    done = subprocess.run([sys.executable, "-c", code], env=given, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ({}, FAST),
+        ({"XLA_FLAGS": "--xla_dump_to=there"}, f"--xla_dump_to=there {FAST}"),
+        ({"XLA_FLAGS": f"{runtime.EXTRA}a=b"}, f"{FAST},a=b"),
+        ({"XLA_FLAGS": FAST}, FAST),
+    ],
+)
+def test_flags_are_added_to_what_is_there(before, after):
+    assert flags_after(before) == after
+
+
+def test_nothing_is_chosen_by_import():
+    assert flags_after({}, "pass") == ""
+    assert flags_after({}, "jbeamshell.configure(fast_loops=False)") == ""
+
+
+def test_too_late_is_said(monkeypatch):
+    monkeypatch.setenv("XLA_FLAGS", "")
+    monkeypatch.setattr(runtime, "started", lambda: True)
+    with pytest.raises(InputError, match=r"fast_loops = True.*already started.*before anything"):
+        runtime.configure()
+    monkeypatch.setenv("XLA_FLAGS", FAST)
+    runtime.configure()  # already so
