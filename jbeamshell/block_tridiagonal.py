@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
+from jax.typing import ArrayLike
 
 SMALL = 4  # largest blocks that are solved entry by entry: compiling grows with their cube
 
@@ -38,21 +39,21 @@ def jacobian(linear: Callable[[Array], Array], like: Array) -> BlockTridiagonal:
 
     Every third row is probed at once, so it costs 3 m applications whatever n is.
     """
-    response = jax.vmap(jax.vmap(linear))(seeds(like))
+    response = jax.vmap(jax.vmap(linear))(jnp.asarray(seeds(like)))
     columns = by_neighbour(response, np.arange(like.shape[0]))
     lower, diagonal, upper = jnp.moveaxis(columns, (1, 2), (2, 3))
     return BlockTridiagonal(lower.at[..., 0].set(0.0), diagonal, upper.at[..., -1].set(0.0))
 
 
-def seeds(like: Array) -> Array:
+def seeds(like: Array) -> np.ndarray:
     """Probes of an (n, m) array, (3, m, n, m): a unit in every third row, for each column."""
     n, m = like.shape
     colour = np.arange(n) % 3
     units = (colour[None, :, None, None] == np.arange(3)[:, None, None, None]) * np.eye(m)
-    return jnp.asarray(np.moveaxis(units, 3, 1), like.dtype)
+    return np.moveaxis(units, 3, 1).astype(like.dtype)
 
 
-def by_neighbour(response: Array, rows: np.ndarray) -> Array:
+def by_neighbour(response: ArrayLike, rows: np.ndarray) -> Array:
     """Responses to the probes sorted by where the unit is: in the row before, here, in the next.
 
     Parameters
@@ -64,7 +65,8 @@ def by_neighbour(response: Array, rows: np.ndarray) -> Array:
     -------
     (3, m, k, ...)
     """
-    colour = jnp.asarray(rows % 3).reshape(1, -1, *[1] * (response.ndim - 3))
+    response = jnp.asarray(response)
+    colour = (rows % 3).reshape(1, -1, *[1] * (response.ndim - 3))
 
     def shifted(by: int) -> Array:  # selected, not gathered: the compiler does whole vectors of it
         first, second, third = (response[(c + by) % 3] for c in range(3))

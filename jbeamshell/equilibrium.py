@@ -383,9 +383,8 @@ class System(eqx.Module):
             jnp.where(prescribed, self.stiffness_scale * gap, forces[-1, V])
         )
         forces = self._support(forces, q, drive.rough)
-        per_force = (
-            jnp.ones(self.model.width).at[jnp.array([BETA, PSI])].set(1.0 / self.half_height)
-        )
+        moments = np.isin(np.arange(self.model.width), (BETA, PSI))
+        per_force = jnp.where(moments, 1.0 / self.half_height, 1.0)
         residual = (forces * per_force / self.force_scale)[:, list(self.model.active)]
         return force, residual
 

@@ -77,16 +77,15 @@ def stiffness_at(system: System, q: Array, touch: Touch, drive: Drive) -> Stiffn
         rows = jnp.pad(active, padding).reshape(*active.shape[:-2], *like.shape)
         return jnp.swapaxes(rows, -1, -2)
 
-    probes = jax.vmap(jax.vmap(lambda unit: system.embed(nodal(system, unit))))(
-        block_tridiagonal.seeds(like)
-    )
+    probes = _probes(system, like)
     forces, elastic = jax.linearize(lambda q: system.elastic(q, drive.pressure), q)
-    responses = (jax.vmap(jax.vmap(elastic))(probes), probes)
-    changes = [block_tridiagonal.by_neighbour(each, block) for each in responses]
+    along = block_tridiagonal.by_neighbour(jax.vmap(jax.vmap(elastic))(jnp.asarray(probes)), block)
+    with jax.ensure_compile_time_eval():  # the compiler would do it anew in every run
+        fields = block_tridiagonal.by_neighbour(probes, block)
 
     _, ends = jax.linearize(lambda f, q, t: system.balance(f, q, t, drive)[1], forces, q, touch)
     still, silent = jnp.zeros_like(q), jax.tree.map(jnp.zeros_like, touch)
-    columns = jax.vmap(jax.vmap(lambda f, q: ends(f, q, silent)))(*changes)
+    columns = jax.vmap(jax.vmap(lambda f, q: ends(f, q, silent)))(along, fields)
     entries = jnp.moveaxis(blocked(columns), 1, 2)
     filling = np.arange(like.size - system.x.size * len(system.model.active))
     if filling.size:
@@ -103,7 +102,6 @@ def stiffness_at(system: System, q: Array, touch: Touch, drive: Drive) -> Stiffn
     def inside(part: Array, first: Any = first, last: Any = last) -> Array:
         return part.at[0, ..., first].set(0.0).at[2, ..., last].set(0.0)
 
-    along, fields = changes
     return Stiffness(
         inside(entries, 0, -1),
         inside(along[..., W]),
@@ -111,6 +109,16 @@ def stiffness_at(system: System, q: Array, touch: Touch, drive: Drive) -> Stiffn
         inside(fields[..., W]),
         answer,
     )
+
+
+def _probes(system: System, like: Array) -> np.ndarray:
+    """Fields (3, size, n, m) of unit unknowns in every third block."""
+    units = block_tridiagonal.seeds(like)
+    active = list(system.model.active)
+    nodes = units.reshape(*units.shape[:2], -1)[..., like.size - system.x.size * len(active) :]
+    fields = np.zeros((*units.shape[:2], system.x.size, system.model.width), units.dtype)
+    fields[..., active] = nodes.reshape(*units.shape[:2], -1, len(active))
+    return fields
 
 
 def stiffness_at_rest(system: System, rough: float) -> Stiffness:
