@@ -50,6 +50,7 @@ FIGURES = {
     "loss_factor": "loss factor  [1]",
 }
 WIDE = 20.0  # last value over first from which on an axis is logarithmic
+NAMED = 10  # curves at the most that the legend names
 FLOOR = 1e-6  # of the largest value: what a logarithmic axis still shows
 
 
@@ -94,15 +95,18 @@ def sweep(
             table, rest = _plane(result, values, along, per)
             order = np.argsort(x)
             names: list[Any] = [None] if per is None else result.axes[per].tolist()
-            for row, value, colour in zip(table, names, colours(len(names)), strict=True):
-                label = None if value is None else f"{_symbol(per)} = {value:.3g}"
+            every = -(-len(names) // NAMED)
+            curves = zip(table, names, colours(len(names)), strict=True)
+            for number, (row, value, colour) in enumerate(curves):
+                named = value is not None and number % every == 0
+                label = f"{_symbol(per)} = {value:.3g}" if named else None
                 axes.plot(x[order], row[order], color=colour, label=label, marker=".", markersize=4)
             axes.set_title(rest)
         _cubic_law(result, axes, figure, along)
         axes.set(xlabel=_label(along, result), ylabel=FIGURES.get(figure, figure.replace("_", " ")))
         _scales(axes, x, values)
         if axes.get_legend_handles_labels()[1]:
-            axes.legend(fontsize=8, ncols=1 + (len(axes.lines) > 8))
+            axes.legend(fontsize=8)
     return axes
 
 

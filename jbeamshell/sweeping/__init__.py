@@ -50,9 +50,9 @@ def sweep(
 ) -> Sweep:
     """Figures of the last cycle of many scenes that differ in some numbers.
 
-    Lanes are sorted by difficulty and run in small chunks, for which a core's cache suffices.  One
-    that fails is solved again alone, its load steps walked in pieces; one outside the model's
-    domain is marked and not run.  Neither disturbs the others.
+    Lanes are sorted by difficulty and dealt into blocks of equal cost; on a core they run one after
+    the other, in one compiled loop.  One that fails is solved again alone, its load steps walked in
+    pieces; one outside the model's domain is marked and not run.  Neither disturbs the others.
 
     Where `jax.distributed` is initialised, every process makes this same call, takes its part of
     the lanes, and gets the whole result.

@@ -66,7 +66,7 @@ class Job:
         inside = np.flatnonzero(~self.outside)
         hardness = self.lanes.difficulty.ravel()[inside]
         order = inside[np.argsort(hardness, kind="stable")]
-        width = width_of_chunks(self.dtype)
+        width = width_of_chunks()
         chunks = -(-order.size // width)
         largest = min(max(-(-chunks // BLOCKS), 1), BLOCK // width)
         count = -(-chunks // largest)
@@ -146,7 +146,7 @@ class Job:
             "figures": list(self.figures),
             "dtype": self.dtype.name,
             "solver": None if self.solver is None else dataclasses.asdict(self.solver),
-            "layout": [BLOCKS, BLOCK, width_of_chunks(self.dtype)],
+            "layout": [BLOCKS, BLOCK, width_of_chunks()],
         }
         return json.dumps(about)
 

@@ -1,4 +1,4 @@
-"""Blocks of lanes on the devices: one compiled shape, small chunks, failures retried alone."""
+"""Blocks of lanes on the devices: one compiled shape, chunks, failures retried alone."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from jbeamshell.scene import Scene, scene_to_toml
 from jbeamshell.sweeping.lanes import Outcome
 
 BLOCK = 1024  # lanes of the largest block, which is the compiled shape
-CACHE_LINE = 64  # bytes: the widest chunks for which the working set stays in a core's cache
 KEPT = 4  # compiled models of other scenes
 
 Answers = Callable[..., dict[str, Array]]
@@ -43,10 +42,12 @@ class Block(NamedTuple):
     status: np.ndarray
 
 
-def width_of_chunks(dtype: np.dtype) -> int:
-    """Lanes that advance together: wide ones wait for their slowest and spill out of the cache."""
-    on_cores = jax.default_backend() == "cpu"
-    return CACHE_LINE // dtype.itemsize if on_cores else BLOCK
+def width_of_chunks() -> int:
+    """Lanes that advance together: on a core each alone, because wide ones wait for their slowest.
+
+    A core's vectors run along the nodes of one strip; a GPU wants all the lanes it can get.
+    """
+    return 1 if jax.default_backend() == "cpu" else BLOCK
 
 
 def check_figures(
@@ -91,7 +92,7 @@ class Runner:
         self.scene, self.keys, self.figures = scene, tuple(keys), tuple(figures)
         self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
         self.devices = list(devices or jax.local_devices())
-        self.width = width_of_chunks(self.dtype)
+        self.width = width_of_chunks()
         self._mesh = Mesh(np.array(self.devices), "lanes")
         ask = _ask(scene, self.keys, self.figures, solver)
         self._about = ask, self.figures, self._shape, self.dtype, self._mesh
@@ -186,7 +187,7 @@ def _lowered(
     """
 
     def chunk(lanes: Array) -> tuple[Array, Array]:
-        answer = jax.vmap(ask)(*lanes)
+        answer = jax.vmap(ask)(*lanes) if lanes.shape[-1] > 1 else ask(*lanes[:, 0])
         last = [answer[name].reshape(lanes.shape[-1], -1)[:, -1] for name in figures]
         return jnp.stack(last), answer["status"].astype(jnp.int32)
 
