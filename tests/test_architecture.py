@@ -26,7 +26,9 @@ INSIDE = {
         "likelihood", "fitting", "plan", "__init__",
     ],
     "sweeping": ["lanes", "runner", "store", "job", "results", "processes", "worker", "__init__"],
-    "plotting": ["style", "steps", "paths", "contacts", "fits", "ladder", "sweeps", "__init__"],
+    "plotting": [
+        "style", "steps", "paths", "contacts", "fits", "ladder", "speed", "sweeps", "__init__",
+    ],
 }
 # fmt: on
 ONLY = {

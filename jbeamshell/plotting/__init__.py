@@ -1,4 +1,4 @@
-"""Pictures of a history (its loop, profiles along X, contact), of fits, sweeps and the ladder.
+"""Pictures of a history (its loop, profiles along X, contact), fits, sweeps and benchmarks.
 
 The only package that imports matplotlib.  Every function draws into the axes it is given or into
 new ones, returns them, and neither shows them nor changes matplotlib's settings.  `style` dresses
@@ -16,6 +16,13 @@ from jbeamshell.plotting.ladder import error_map as error_map
 from jbeamshell.plotting.ladder import work_precision as work_precision
 from jbeamshell.plotting.paths import loop as loop
 from jbeamshell.plotting.paths import profiles as profiles
+from jbeamshell.plotting.speed import speed_batches as speed_batches
+from jbeamshell.plotting.speed import speed_derivative as speed_derivative
+from jbeamshell.plotting.speed import speed_errors as speed_errors
+from jbeamshell.plotting.speed import speed_gradients as speed_gradients
+from jbeamshell.plotting.speed import speed_nodes as speed_nodes
+from jbeamshell.plotting.speed import speed_processes as speed_processes
+from jbeamshell.plotting.speed import speed_sheet as speed_sheet
 from jbeamshell.plotting.style import DATA as DATA
 from jbeamshell.plotting.style import DISPLACEMENT as DISPLACEMENT
 from jbeamshell.plotting.style import DOTS as DOTS

@@ -1,0 +1,179 @@
+"""The strip that is timed, its truth, and how it is timed."""
+
+import csv
+import statistics
+import time
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from tqdm import tqdm
+
+import jbeamshell as jb
+from jbeamshell.example import data_folder
+
+ETA, AMPLITUDE = 0.1126, 0.7855
+OVER = ("strip.height_ratio", "load.amplitude")
+STANDARD = {
+    "strip.height_ratio": ETA,
+    "load.amplitude": AMPLITUDE,
+    "load.cycles": 1,
+    "load.steps_per_half_cycle": 1,
+    "model.kinematics": "linear",
+    "model.nodes": 41,
+    "model.end_size": 1.0 / 36.0,
+}
+FINE = {"model.nodes": 321, "model.end_size": 1.0 / 3.0, "load.steps_per_half_cycle": 40}
+RANGE = {"strip.height_ratio": (0.03, 0.4), "load.amplitude": (0.3, 1.6)}
+MOST = 200  # calls in a spell
+
+Call = Callable[[], Any]
+
+
+class Plan(NamedTuple):
+    """How much is measured.
+
+    Attributes
+    ----------
+    rounds : in each of which every variant is timed
+    spell : seconds for which it is called again and again there
+    lanes, sample : of a sweep, and of those how many are solved on the fine grid
+    sizes : of batches
+    nodes : of grids
+    studied : nodes of the study of derivatives, the finest last
+    unsettled, unsettled_sample : lanes in which steps may not settle, and those solved finely
+    starts : of a command that finds its programs compiled
+    calculix : whether CalculiX is run where it is found
+    peer : script of condensed finite elements, timed if given
+    """
+
+    rounds: int = 7
+    spell: float = 0.1
+    lanes: int = 16384
+    sample: int = 256
+    sizes: tuple[int, ...] = (16, 64, 256, 1024, 4096, 16384)
+    nodes: tuple[int, ...] = (33, 65, 129, 257, 513, 1025)
+    studied: tuple[int, ...] = (41, 81, 161, 321)
+    unsettled: int = 65536
+    unsettled_sample: int = 200
+    starts: int = 5
+    calculix: bool = True
+    peer: str | None = None
+
+
+QUICK = Plan(
+    rounds=2,
+    spell=0.02,
+    lanes=256,
+    sample=8,
+    sizes=(16, 64, 256),
+    nodes=(33, 65, 129),
+    studied=(41, 81),
+    unsettled=512,
+    unsettled_sample=8,
+    starts=1,
+    calculix=False,
+)
+
+
+# --- the strip and its truth ----------------------------------------------------------------------
+
+
+def scene(values: Mapping[str, Any] | None = None) -> jb.Scene:
+    """The standard strip on the grid that is timed, with what differs."""
+    return jb.Scene().replace(STANDARD | dict(values or {}))
+
+
+@cache
+def truth() -> float:
+    """Dissipation of the standard strip by fine finite elements."""
+    with (data_folder() / "energy.csv").open(encoding="utf-8") as table:
+        (row,) = (
+            row
+            for row in csv.DictReader(table)
+            if (float(row["eta"]), float(row["A"])) == (ETA, AMPLITUDE)
+        )
+    return float(row["D"])
+
+
+def lanes(count: int, ranges: Mapping[str, tuple[float, float]] = RANGE) -> dict[str, np.ndarray]:
+    """Values that are uniform in their logarithms, paired; the same in every run."""
+    random = np.random.default_rng(1)
+    return {key: np.exp(random.uniform(*np.log(pair), count)) for key, pair in ranges.items()}
+
+
+def swept(values: Mapping[str, np.ndarray], change: Mapping[str, Any], **options: Any) -> Any:
+    """A sweep for the dissipation."""
+    return jb.sweep(scene(change), values, ("dissipation",), paired=True, **options)
+
+
+def errors(
+    values: Mapping[str, np.ndarray], found: np.ndarray, sample: int, change: Mapping[str, Any]
+) -> dict[str, Any]:
+    """How wrong the lanes are, by some of them on the fine grid."""
+    chosen = np.random.default_rng(2).choice(found.size, min(sample, found.size), replace=False)
+    some = {key: column[chosen] for key, column in values.items()}
+    right = swept(some, dict(change) | FINE)
+    off = np.abs(found[chosen] / right.values["dissipation"] - 1.0)
+    known = np.isfinite(off)
+    worst = int(np.nanargmax(off))
+    return {
+        "sample": int(known.sum()),
+        "without_answer": int((~known).sum()),
+        "error_median": float(np.median(off[known])),
+        "error_p90": float(np.quantile(off[known], 0.9)),
+        "error_worst": float(off[worst]),
+        "worst_at": {key: float(column[worst]) for key, column in some.items()},
+    }
+
+
+# --- timing ---------------------------------------------------------------------------------------
+
+
+def seconds_of(call: Call) -> float:
+    """Of one call, to the end of its work."""
+    begin = time.perf_counter()
+    jax.block_until_ready(call())
+    return time.perf_counter() - begin
+
+
+def spell(call: Call, seconds: float) -> list[float]:
+    """Seconds of every call, called again and again for so long, at least once."""
+    found: list[float] = []
+    end = time.perf_counter() + seconds
+    while not found or (time.perf_counter() < end and len(found) < MOST):
+        found.append(seconds_of(call))
+    return found
+
+
+def interleaved(calls: Mapping[str, Call], plan: Plan, name: str) -> dict[str, list[float]]:
+    """Seconds of the calls, all of them in every round."""
+    found: dict[str, list[float]] = {key: [] for key in calls}
+    for _ in tqdm(range(plan.rounds), disable=None, unit="round", desc=name):
+        for key, call in calls.items():
+            found[key] += spell(call, plan.spell)
+    return found
+
+
+def summary(seconds: list[float]) -> dict[str, Any]:
+    """Of repeated calls."""
+    return {
+        "median_us": 1e6 * statistics.median(seconds),
+        "best_us": 1e6 * min(seconds),
+        "calls": len(seconds),
+    }
+
+
+def compiled(function: Callable, *given: Any) -> tuple[Any, float]:
+    """A function compiled for arguments like these, and the seconds that took."""
+    begin = time.perf_counter()
+    program = jax.jit(function).lower(*given).compile()
+    return program, time.perf_counter() - begin
+
+
+def numbers(values: jb.Scene, keys: tuple[str, ...] = OVER) -> tuple[jax.Array, ...]:
+    """A scene's numbers behind keys, on the device."""
+    return tuple(jnp.asarray(values.get(key)) for key in keys)

@@ -1,0 +1,97 @@
+"""What gradients cost beside a run, and how derivatives depend on the grid."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from tqdm import tqdm
+
+import jbeamshell as jb
+
+from .common import FINE, OVER, Plan, compiled, interleaved, numbers, scene, seconds_of, summary
+
+KEYS = ("contact.friction", "strip.height_ratio", "strip.kappa_s", "strip.axial_stiffness")
+STEPS = "load.steps_per_half_cycle"
+OFF = 1.05  # times the parameters, with which the loop to be met is made
+END_SIZES = {"1/36": 1.0 / 36.0, "1/3": 1.0 / 3.0}
+
+
+def gradient(plan: Plan) -> dict[str, Any]:
+    """Gradients of a loop's misfit in four parameters; dD/d(eta) over nodes."""
+    start = jnp.ones(len(KEYS))
+    ways = {"run": lambda f: f, "forward": jax.jacfwd, "reverse": jax.grad}
+    built = {
+        (name, steps): compiled(way(misfit(steps)), start)
+        for steps in (4, 40)
+        for name, way in ways.items()
+    }
+    calls = {name: lambda f=built[name, 4][0]: f(start) for name in ways}
+    for call in calls.values():
+        seconds_of(call)
+    seconds = interleaved(calls, plan, "gradient")
+    found = {name: summary(own) for name, own in seconds.items()}
+    rows = [
+        {"what": name, "compile_s": built[name, 4][1]}
+        | found[name]
+        | {
+            f"{key}_runs": found[name][f"{key}_us"] / found["run"][f"{key}_us"]
+            for key in ("median", "best")
+        }
+        for name in ways
+    ]
+    forward, reverse = (calls[name]() for name in ("forward", "reverse"))
+    memory = [
+        {
+            "what": name,
+            "steps": steps,
+            "temporary_kb": 1e-3 * program.memory_analysis().temp_size_in_bytes,
+        }
+        for (name, steps), (program, _) in built.items()
+    ]
+    return {
+        "parameters": list(KEYS),
+        "steps": 4,
+        "nodes": scene().model.nodes,
+        "rows": rows,
+        "forward_to_reverse": float(jnp.max(jnp.abs(forward / reverse - 1.0))),
+        "memory": memory,
+        "study": study(plan),
+    }
+
+
+def misfit(steps: int) -> Any:
+    """Mean square of a loop's distance from another, over its size; of factors (4,)."""
+    here = scene({STEPS: steps})
+    loop = jb.response(here, KEYS, ("displacement",))
+    nominal = jnp.stack(numbers(here, KEYS))
+    target = loop(*(OFF * nominal))["displacement"]
+    size = jnp.mean(target**2)
+
+    def function(factors: jax.Array) -> jax.Array:
+        return jnp.mean((loop(*(factors * nominal))["displacement"] - target) ** 2) / size
+
+    return function
+
+
+def study(plan: Plan) -> dict[str, Any]:
+    """Derivative of the dissipation along eta, the grid moving with it."""
+    rows = []
+    cases = [(name, count) for name in END_SIZES for count in plan.studied]
+    for name, count in tqdm(cases, disable=None, unit="grid", desc="derivative"):
+        change = {STEPS: 4, "model.nodes": count, "model.end_size": END_SIZES[name]}
+        here = scene(change)
+        rows.append({"end_size": name, "nodes": count} | _derivative(here))
+    best = _derivative(scene(FINE | {STEPS: 4}))
+    for row in rows:
+        row["D_error"] = row["D"] / best["D"] - 1.0
+        row["error"] = row["dD_deta"] / best["dD_deta"] - 1.0
+    return {"steps": 4, "against": {"nodes": FINE["model.nodes"], "end_size": "1/3"}, "rows": rows}
+
+
+def _derivative(here: jb.Scene) -> dict[str, float]:
+    eta, amplitude = numbers(here)
+    figure = jb.response(here, OVER)
+    value, slope = jax.jvp(
+        lambda e: figure(e, amplitude)["dissipation"], (eta,), (jnp.ones_like(eta),)
+    )
+    return {"D": float(value), "dD_deta": float(slope)}

@@ -1,0 +1,295 @@
+"""One run: every variant and rival side by side, and over nodes."""
+
+import contextlib
+import functools
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from rivals import condensed_elements, cubic_law, iwan, patterns_numpy
+from tqdm import tqdm
+
+import jbeamshell as jb
+
+from . import machine
+from .common import (
+    AMPLITUDE,
+    ETA,
+    FINE,
+    OVER,
+    Call,
+    Plan,
+    interleaved,
+    numbers,
+    scene,
+    seconds_of,
+    spell,
+    summary,
+    truth,
+)
+
+STEPS = "load.steps_per_half_cycle"
+EXACT = {"model.kinematics": "exact"}
+LIFT = {"model.fields": ["v", "w", "beta", "psi"]}
+SMOOTH = {"contact.smoothing": 16.0}
+LOOP = ("force", "displacement", "dissipation")
+CALCULIX = machine.ROOT / "calibration" / "finite_elements" / "checked.json"
+SLOW_ROUNDS = 2  # of what takes seconds
+BACKBONE = np.linspace(0.0, 1.9, 41)  # forces of Iwan's network
+
+
+class Variant(NamedTuple):
+    """One way to a cycle's dissipation.
+
+    Attributes
+    ----------
+    row : what the record says of it
+    spell : from the seconds to spend to those of every call
+    dissipation, limit : found, and where the same model ends on fine grids
+    rounds : in how many it is timed, at the most
+    """
+
+    row: dict[str, Any]
+    spell: Callable[[float], list[float]]
+    dissipation: float
+    limit: float
+    rounds: int = 1000
+
+
+def dissipation_call(
+    change: Mapping[str, Any], figures: tuple[str, ...] = ("dissipation",)
+) -> Callable[[], dict[str, jax.Array]]:
+    """A warm call's worth of `jbeamshell.response` on the standard strip."""
+    here = scene(change)
+    return functools.partial(jb.response(here, OVER, figures), *numbers(here))
+
+
+def of_call(row: dict[str, Any], call: Call, dissipation: Callable, limit: float) -> Variant:
+    """A variant that is called here, whose first call is what compiles it."""
+    first = seconds_of(call)
+    own = {"first_s": first} if row["by"] == "jbeamshell" else {}
+    spelled = functools.partial(spell, call)
+    return Variant(row | own, spelled, float(dissipation(call())), limit)
+
+
+@functools.cache
+def fine(*change: tuple[str, Any]) -> float:
+    """Dissipation on the fine grid, of the standard strip with what differs."""
+    own = {key: list(v) if isinstance(v, tuple) else v for key, v in change}
+    return float(jb.solve(scene(own | FINE)).dissipation)
+
+
+def own_variants() -> list[Variant]:
+    """Jbeamshell's."""
+    cases: list[tuple[str, dict[str, Any], int, tuple[str, ...]]] = [
+        ("dissipation, 1 step", {}, 1, ("dissipation",)),
+        ("dissipation, 4 steps", {}, 4, ("dissipation",)),
+        ("loop, 20 steps", {}, 20, LOOP),
+        ("exact kinematics, 1 step", EXACT, 1, ("dissipation",)),
+        ("exact kinematics, 4 steps", EXACT, 4, ("dissipation",)),
+        ("with lift, 4 steps", LIFT, 4, ("dissipation",)),
+        ("m = 16, 4 steps", SMOOTH, 4, ("dissipation",)),
+    ]
+    found = []
+    for name, change, steps, figures in tqdm(cases, disable=None, desc="compile"):
+        limit = fine(*((k, tuple(v) if isinstance(v, list) else v) for k, v in change.items()))
+        call = dissipation_call(change | {STEPS: steps}, figures)
+        row = {"what": name, "by": "jbeamshell", "steps": steps, "returns": ", ".join(figures)}
+        found.append(of_call(row, call, lambda answer: answer["dissipation"], limit))
+    for steps in (1, 20):
+        here = scene({STEPS: steps})
+        name = f"History, {steps} step" + "s" * (steps > 1)
+        row = {"what": name, "by": "jbeamshell", "steps": steps, "returns": "History"}
+        call = functools.partial(jb.solve, here)
+        found.append(of_call(row, call, lambda history: history.dissipation, fine()))
+    return found
+
+
+def rival_variants(plan: Plan) -> list[Variant]:
+    """Everything else."""
+    found = []
+    for size, steps in (((40, 4), 1), ((40, 4), 4), ((60, 6), 1)):
+        name = "condensed elements {} x {}, {} step".format(*size, steps) + "s" * (steps > 1)
+        row = {"what": name, "by": "condensed elements", "steps": steps}
+        row["returns"] = "dissipation; building and cycle"
+        call = functools.partial(_condensed, size, steps)
+        found.append(of_call(row, call, lambda answer: answer["dissipation"], truth()))
+    for steps in (1, 4):
+        name = f"patterns in NumPy, {steps} step" + "s" * (steps > 1)
+        row = {"what": name, "by": "NumPy", "steps": steps}
+        row["returns"] = "dissipation; building without the grid, and cycle; default end_size"
+        strip = patterns_numpy.Strip(ETA, 41)
+        call = functools.partial(patterns_numpy.cycle, strip, AMPLITUDE, steps)
+        variant = of_call(row, call, lambda answer: answer["dissipation"], fine())
+        found.append(variant._replace(spell=functools.partial(_patterns, steps)))
+    network = iwan.network(*_backbone())
+    row = {"what": "Iwan's network, 20 steps", "by": "Iwan", "steps": 20}
+    row["returns"] = "loop; the cycle alone, of a network fitted to jbeamshell's backbone before"
+    call = functools.partial(iwan.cycle, network, AMPLITUDE, 20)
+    found.append(of_call(row, call, lambda answer: answer["dissipation"], fine()))
+    if plan.peer:
+        found += [_peer(plan.peer, steps) for steps in (2, 4)]
+    if plan.calculix and shutil.which("ccx"):
+        found += [_calculix(steps) for steps in (4, 20)]
+    else:
+        found.append(_calculix_recorded())
+    return found
+
+
+def _condensed(size: tuple[int, int], steps: int) -> dict[str, float]:
+    return condensed_elements.cycle(condensed_elements.Strip(ETA, *size), AMPLITUDE, steps)
+
+
+def _patterns(steps: int, seconds: float) -> list[float]:
+    """The strip's own seconds, which leave out the grid, and the cycle's."""
+    strip = patterns_numpy.Strip(ETA, 41)
+    cycles = spell(functools.partial(patterns_numpy.cycle, strip, AMPLITUDE, steps), seconds)
+    return [strip.seconds + cycle for cycle in cycles]
+
+
+def _backbone() -> tuple[np.ndarray, np.ndarray]:
+    """Mean of a pull's and a push's backbone of the strip on the timed grid."""
+    runs = [jb.solve(scene(), sign * BACKBONE[1:]) for sign in (1.0, -1.0)]
+    pull, push = (np.abs(np.asarray(run.displacement)) for run in runs)
+    return 0.5 * (pull + push), BACKBONE
+
+
+def _peer(script: str, steps: int) -> Variant:
+    """The peer's two cycles and a quarter, as one cycle and a quarter."""
+
+    def run() -> dict[str, float]:
+        words = [str(word) for word in (ETA, AMPLITUDE, 40, 4, steps // 2)]
+        command = [sys.executable, script, *words]
+        answer = subprocess.run(command, capture_output=True, text=True, check=True)
+        return json.loads(answer.stdout.splitlines()[-1])
+
+    def timed(_: float) -> list[float]:
+        said = run()
+        return [said["build_s"] + said["run_s_2_cycles"] * 1.25 / 2.25]
+
+    row = {"what": f"peer 40 x 4, {steps} steps", "by": "peer", "steps": steps}
+    row["returns"] = "dissipation; building and cycle, 1.25/2.25 of its two cycles' time"
+    return Variant(row, timed, run()["ratio"] * cubic_law(AMPLITUDE), truth())
+
+
+def _calculix(steps: int) -> Variant:
+    sys.path.append(str(machine.ROOT))  # calibration is no part of the package
+    from calibration.finite_elements import solve
+
+    here = scene({STEPS: steps})
+    call = functools.partial(solve, here)
+    row = {"what": f"CalculiX, {steps} steps", "by": "CalculiX", "steps": steps}
+    row["returns"] = "History; quadratic elements, meshing and reading included"
+    found = float(call().dissipation)
+    return Variant(row, lambda _: [seconds_of(call)], found, truth(), SLOW_ROUNDS)
+
+
+def _calculix_recorded() -> Variant:
+    record = json.loads(CALCULIX.read_text(encoding="utf-8"))
+    loop = next(
+        loop
+        for loop in record["loops"]
+        if (loop["eta"], loop["A"], loop["elements"]) == (ETA, AMPLITUDE, "quadratic")
+    )
+    row = {"what": "CalculiX, 20 steps", "by": "CalculiX", "steps": record["steps"][STEPS]}
+    row["returns"] = "History; recorded by calibration/finite_elements/check.py, not run here"
+    return Variant(row, lambda _: [loop["wall_s"]], loop["D"], truth(), 1)
+
+
+def one(plan: Plan) -> dict[str, Any]:
+    """All variants of one run, interleaved."""
+    variants = own_variants() + rival_variants(plan)
+    with contextlib.ExitStack() as stack:
+        for steps in (1, 4):
+            like = next(v for v in variants if v.row["what"].startswith(f"dissipation, {steps}"))
+            process = stack.enter_context(machine.child("unflagged", steps))
+            row = {"what": f"{like.row['what']}, no flag", "by": "jbeamshell without the flag"}
+            row |= {"steps": steps, "returns": "dissipation; in a process of its own"}
+            row["first_s"] = machine.ask(process, 0.0)[0]
+            timed = functools.partial(machine.ask, process)
+            variants.append(like._replace(row=row, spell=timed))
+        seconds: list[list[float]] = [[] for _ in variants]
+        for number in tqdm(range(plan.rounds), disable=None, unit="round", desc="one"):
+            for own, variant in zip(seconds, variants, strict=True):
+                if number < variant.rounds:
+                    own += variant.spell(plan.spell)
+    rows = [
+        variant.row
+        | summary(own)
+        | {
+            "error": variant.dissipation / variant.limit - 1.0,
+            "error_to_elements": variant.dissipation / truth() - 1.0,
+        }
+        for variant, own in zip(variants, seconds, strict=True)
+    ]
+    return {"eta": ETA, "A": AMPLITUDE, "nodes": 41, "rows": rows, "ratios": ratios(rows)}
+
+
+def ratios(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rivals' medians over that of our fastest answer without a larger error, and the flag's gain.
+
+    By either error; None where none of ours is as right.
+    """
+    by_name = {row["what"]: row for row in rows}
+    ours = [row for row in rows if row["by"] == "jbeamshell"]
+    found = []
+    for rival in rows:
+        if rival["by"] not in ("condensed elements", "peer", "CalculiX"):
+            continue
+        for error in ("error", "error_to_elements"):
+            fair = [row for row in ours if abs(row[error]) <= abs(rival[error])]
+            best = min(fair, key=lambda row: row["median_us"], default=None)
+            found.append(
+                {
+                    "of": rival["what"],
+                    "over": best["what"] if best else None,
+                    "no_worse_in": error,
+                    "times": rival["median_us"] / best["median_us"] if best else None,
+                }
+            )
+    for steps in ("1 step", "4 steps"):
+        name = f"dissipation, {steps}"
+        times = by_name[f"{name}, no flag"]["median_us"] / by_name[name]["median_us"]
+        found.append({"of": f"{name}, no flag", "over": name, "no_worse_in": None, "times": times})
+    calculix = [row for row in rows if row["by"] == "CalculiX"]
+    for rival in calculix:
+        name = "dissipation, 1 step"
+        times = rival["median_us"] / by_name[name]["median_us"]
+        found.append({"of": rival["what"], "over": name, "no_worse_in": None, "times": times})
+    return found
+
+
+def unflagged(steps: int) -> None:
+    """Answer lines of seconds with those of every call; of a process without the flag."""
+    call = dissipation_call({STEPS: steps})
+    first = True
+    for line in sys.stdin:
+        found = [seconds_of(call)] if first else spell(call, json.loads(line))
+        first = False
+        print(json.dumps(found), flush=True)
+
+
+def nodes(plan: Plan) -> dict[str, Any]:
+    """The dissipation in 1 step per half cycle over nodes."""
+    calls = {str(count): dissipation_call({"model.nodes": count}) for count in plan.nodes}
+    first = {name: seconds_of(call) for name, call in calls.items()}
+    seconds = interleaved(calls, plan, "nodes")
+    rows = [
+        {"nodes": int(name), "first_s": first[name]}
+        | summary(own)
+        | {"error": float(calls[name]()["dissipation"]) / fine() - 1.0}
+        for name, own in seconds.items()
+    ]
+    count, us = (np.log([row[key] for row in rows]) for key in ("nodes", "median_us"))
+    half = len(rows) // 2
+    return {
+        "steps": 1,
+        "rows": rows,
+        "slope": float(np.polyfit(count, us, 1)[0]),
+        "slope_of_the_finer_half": float(np.polyfit(count[half:], us[half:], 1)[0]),
+    }

@@ -1,0 +1,118 @@
+"""Charts of the speed record: drawn from a small made-up one."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import plotting
+
+
+def timed(what, by, us, error, to_elements):
+    return {
+        "what": what,
+        "by": by,
+        "median_us": us,
+        "error": error,
+        "error_to_elements": to_elements,
+    }
+
+
+@pytest.fixture
+def record():
+    grid = {"nodes": 41, "steps": 1, "end_size": 1.0 / 36.0}
+    off = {"error_median": 0.002, "error_p90": 0.004, "error_worst": 0.02}
+    study = [
+        {"end_size": size, "nodes": n, "D_error": 1.0 / n**2, "error": 0.0 if n == 81 else 1.0 / n}
+        for size in ("1/36", "1/3")
+        for n in (21, 41, 81)
+    ]
+    return {
+        "one": {
+            "eta": 0.1126,
+            "A": 0.7855,
+            "rows": [
+                timed("dissipation, 1 step", "jbeamshell", 80.0, -0.002, 0.008),
+                timed("History, 1 step", "jbeamshell", 900.0, -0.002, 0.008),
+                timed("CalculiX, 20 steps", "CalculiX", 2.5e7, 0.0007, 0.0007),
+            ],
+        },
+        "nodes": {
+            "steps": 1,
+            "slope": 1.0,
+            "rows": [{"nodes": n, "median_us": 2.0 * n, "best_us": 1.5 * n} for n in (33, 65, 129)],
+        },
+        "batch": {
+            "rows": [grid | off],
+            "sizes": [grid | {"lanes": n, "lanes_per_s": 1e4} for n in (16, 64)],
+        },
+        "gradient": {
+            "parameters": ["contact.friction", "strip.kappa_s"],
+            "rows": [
+                {"what": "run", "median_runs": 1.0, "best_runs": 1.0},
+                {"what": "reverse", "median_runs": 4.0, "best_runs": 3.5},
+            ],
+            "study": {
+                "steps": 4,
+                "against": {"nodes": 81, "end_size": "1/3"},
+                "rows": study,
+            },
+        },
+        "processes": {
+            "about": {"machine": "two cores"},
+            "lanes": 64,
+            "rows": [
+                {"what": "1 process", "lanes_per_s": 1e4},
+                {"what": "2 processes", "lanes_per_s": 1.9e4},
+            ],
+        },
+    }
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    yield
+    plt.close("all")
+
+
+def points(axes, marker):
+    """Places of the single marks that are drawn with it."""
+    lines = [line for line in axes.lines if line.get_marker() == marker]
+    return [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in lines]
+
+
+def test_every_time_stands_at_both_its_errors(record):
+    axes = plotting.speed_errors(record)
+    np.testing.assert_allclose(sorted(points(axes, "s")), [(900.0, 0.2), (900.0, 0.8)])
+    assert len(points(axes, "o")) == 4  # the first of either family
+    assert "[µs]" in axes.get_xlabel()
+    assert "[%]" in axes.get_ylabel()
+    told = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert told == [row["what"] for row in record["one"]["rows"]]
+
+
+def test_slopes_and_ratios_are_those_of_the_record(record):
+    told = [text.get_text() for text in plotting.speed_nodes(record).get_legend().get_texts()]
+    assert "slope 1.00" in told
+    shown = [text.get_text() for text in plotting.speed_gradients(record).texts]
+    assert shown == ["1.00", "4.00"]
+    shown = [text.get_text() for text in plotting.speed_processes(record).texts]
+    assert shown == ["1.00", "1.90"]
+    (label,) = (t.get_text() for t in plotting.speed_batches(record).get_legend().get_texts())
+    assert "worst 2 %" in label
+
+
+def test_the_reference_itself_is_left_out(record):
+    axes = plotting.speed_derivative(record)
+    for line in axes.lines:
+        np.testing.assert_allclose(line.get_xdata(), [21, 41])
+
+
+def test_a_sheet_holds_what_the_record_has(record):
+    assert sum(axes.axison for axes in plotting.speed_sheet(record).axes) == 6
+    del record["one"]
+    assert len(plotting.speed_sheet({"nodes": record["nodes"]}).axes) == 1
+    with pytest.raises(jb.InputError, match="no section 'one'"):
+        plotting.speed_errors(record)
+    with pytest.raises(jb.InputError, match="nothing to draw"):
+        plotting.speed_sheet({})
