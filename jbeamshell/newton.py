@@ -17,7 +17,7 @@ from jbeamshell.parts import require
 
 Seen = TypeVar("Seen")
 Stiffness = TypeVar("Stiffness")
-PATIENCE = 20  # iterations without which a root is mostly found
+PATIENCE = 100  # iterations; contact that recedes node by node needs many
 CHORDS = 12  # iterations between refreshes of what hardly changes
 
 
@@ -86,9 +86,13 @@ class Newton(eqx.Module):
         """
         tolerance = self.tolerance_for(guess.dtype)
 
+        def close(at: Iterate) -> Array:
+            return jnp.max(jnp.abs(at.residual)) <= tolerance
+
         def unfinished(at: Iterate) -> Array:
-            left = jnp.max(jnp.abs(at.residual)) > tolerance
-            return enabled & left & (at.tried < self.max_iterations)
+            # What approaches the root a little at a time goes on for once when it is close.
+            done = close(at) if refresh is None else close(at) & at.was_close
+            return enabled & ~done & (at.tried < self.max_iterations)
 
         def improve(at: Iterate, stiffness: Stiffness) -> Iterate:
             step = block_tridiagonal.solve(tangent(at.seen, stiffness), -at.residual)
@@ -99,7 +103,7 @@ class Newton(eqx.Module):
             rise = jnp.where(at.tried < PATIENCE, 1.0, 0.0)
             most = jnp.linalg.norm(at.residual) + rise
             good = (jnp.linalg.norm(residual) <= most) | (at.scale <= 0.5**self.max_halvings)
-            new = Iterate(x, residual, seen, jnp.ones_like(at.scale), at.tried)
+            new = Iterate(x, residual, seen, jnp.ones_like(at.scale), close(at), at.tried)
             old = at._replace(scale=0.5 * at.scale)
             kept: Iterate = jax.tree.map(lambda a, b: jnp.where(good, a, b), new, old)
             return kept._replace(tried=at.tried + 1)
@@ -119,7 +123,8 @@ class Newton(eqx.Module):
             return lax.while_loop(lambda s: unfinished(s[0]), chords, (start, stiffness))[0]
 
         def iterate(_: Callable[[Array], Array], start: Array) -> tuple[Array, tuple]:
-            at = Iterate(start, *evaluate(start), jnp.ones((), start.dtype), jnp.asarray(0))
+            one, none = jnp.ones((), start.dtype), jnp.asarray(0)
+            at = Iterate(start, *evaluate(start), one, jnp.asarray(False), none)
             if refresh is None:
                 at = search(at, stiffness, self.max_iterations)
             else:
@@ -144,6 +149,7 @@ class Iterate(NamedTuple):
     ----------
     x, residual, seen : unknowns, their residual and what the tangent sees of it
     scale : part of the next step that is taken
+    was_close : whether the iterate before was within the tolerance
     tried : steps tried so far
     """
 
@@ -151,4 +157,5 @@ class Iterate(NamedTuple):
     residual: Array
     seen: Any
     scale: Array
+    was_close: Array
     tried: Array
