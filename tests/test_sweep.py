@@ -105,9 +105,9 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
     batched, alone = runner.Runner._answers, []
 
     def failing(self, batches):
-        """As if the first lane of every chunk had failed in the batch."""
+        """As if the first lane of every block had failed in the batch."""
         values, status = map(np.array, batched(self, batches))
-        values[..., 0], status[..., 0] = np.nan, Outcome.MAX_ITERATIONS
+        values[..., 0, 0], status[..., 0, 0] = np.nan, Outcome.MAX_ITERATIONS
         return values, status
 
     def solve(scene, **settings):

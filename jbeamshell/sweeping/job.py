@@ -19,7 +19,8 @@ from jbeamshell.sweeping.lanes import Lanes, Outcome
 from jbeamshell.sweeping.runner import BLOCK, Block, Runner, width_of_chunks
 from jbeamshell.sweeping.store import Store
 
-BLOCKS = 32  # at least, of a sweep with chunks enough, so that all hands get alike shares
+BLOCKS = 32  # at least, of a sweep with lanes enough, so that all hands get alike shares
+LEAST = 8  # lanes of a block: less is not worth a file
 
 Tell = Callable[[int], None]
 
@@ -68,7 +69,8 @@ class Job:
         order = inside[np.argsort(hardness, kind="stable")]
         width = width_of_chunks()
         chunks = -(-order.size // width)
-        largest = min(max(-(-chunks // BLOCKS), 1), BLOCK // width)
+        least = -(-LEAST // width)
+        largest = min(max(-(-chunks // BLOCKS), least), BLOCK // width)
         count = -(-chunks // largest)
         rows = np.arange(width)
         numbers = (
@@ -146,7 +148,7 @@ class Job:
             "figures": list(self.figures),
             "dtype": self.dtype.name,
             "solver": None if self.solver is None else dataclasses.asdict(self.solver),
-            "layout": [BLOCKS, BLOCK, width_of_chunks()],
+            "layout": [BLOCKS, BLOCK, LEAST, width_of_chunks()],
         }
         return json.dumps(about)
 
