@@ -61,8 +61,13 @@ def start_of_a_command() -> None:
     """What the command line chooses: fast loops, and a cache unless the user has one."""
     if started():
         return
-    own = os.environ.get("JAX_COMPILATION_CACHE_DIR")
-    configure(cache=None if own else default_cache())
+    cache = None if os.environ.get("JAX_COMPILATION_CACHE_DIR") else default_cache()
+    if cache is not None:
+        try:
+            cache.mkdir(parents=True, exist_ok=True)
+        except OSError:  # a home that cannot be written to: everything works without
+            cache = None
+    configure(cache=cache)
 
 
 def default_cache() -> Path:

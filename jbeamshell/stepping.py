@@ -28,7 +28,6 @@ from jbeamshell.stiffness import (
 )
 
 SLIPS = 0.5  # a node slips in a step when more than this part of its motion is inelastic
-NUDGE = 1e-6  # of the friction that is left: elastic traction with which a node sets out to stick
 CORNER = 1.6  # H by which a strip slips less deep than a bar
 ROUNDING = 1e-9  # of the cap, or of gross slip: less than this is no difference
 PIECES = (8, 64)  # a load step that fails is walked in so many pieces, or so many

@@ -113,6 +113,7 @@ def test_inside_a_transformation_the_failure_is_loud_too():
 
 def test_a_failed_step_is_walked_in_pieces(monkeypatch):
     """The recovered path ends where a path with small steps ends."""
+    # So smooth that large steps take more iterations than small ones.
     scene = jb.Scene().replace(LINEAR | {"contact.smoothing": 4.0})
     path = np.array([0.9, -0.9, 0.9])
     eager = jb.Newton(max_iterations=100)
