@@ -9,20 +9,21 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jbeamshell import plotting
 from jbeamshell.errors import InputError
 from jbeamshell.files import write_text
 from jbeamshell.history import History
-from jbeamshell.identify.likelihood import Profile
-from jbeamshell.identify.results import Fit
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene import scene_to_toml
+
+if TYPE_CHECKING:  # a run that draws and fits nothing need not wait for them
+    from jbeamshell.identify.likelihood import Profile
+    from jbeamshell.identify.results import Fit
 
 # Table of a fit: types of its measurements, columns of the data, columns of the model.
 TABLES: dict[str, tuple[tuple[type, ...], tuple[str, ...], tuple[str, ...]]] = {
@@ -74,7 +75,7 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
         if float(scene.contact.friction) > 0.0:
             drawn["profiles.png"] = history.plot_profiles()
     if {"w", "psi"} & set(scene.model.fields):
-        drawn["contact.png"] = plotting.contact(history)
+        drawn["contact.png"] = history.plot_contact()
     pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
     return _write(folder, texts, pictures)
 
@@ -88,6 +89,8 @@ def write_fit(
     the other curves, as far as there are any; scene.toml, or scene_1.toml and so on of several
     specimens; result.json, overlay.png and residuals.png; profiles.csv and profiles.png if asked.
     """
+    from jbeamshell import plotting
+
     texts: dict[str, str] = {}
     for name, (types, given, answered) in TABLES.items():
         pairs = [p for p in zip(result.data, result.model, strict=True) if isinstance(p[0], types)]
@@ -126,6 +129,8 @@ def write_fit(
 
 def _write(folder: Path, texts: Mapping[str, str], pictures: Mapping[str, Any]) -> list[Path]:
     """Write what is complete by now; so what cannot be put into words leaves no file behind."""
+    from jbeamshell import plotting
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.typing import ArrayLike
 
 from jbeamshell.energy import CONSTANTS, PLANES, shear_modulus
 from jbeamshell.errors import InputError
@@ -42,6 +43,9 @@ STANDARD_AMPLITUDE = 0.7855
 STANDARD = {"axial_stiffness": 3.4e4, "poisson_ratio": 0.3}
 TINY = np.finfo(float).tiny
 
+LONGEST = 300  # characters of a value in a message
+MOST_LEVELS = 10**7  # of a load path
+
 NUMBER = "must be a number"
 POSITIVE = "must be a positive number"
 SMOOTHING = "must be a number above 1, or 'sharp'"
@@ -52,7 +56,7 @@ PRESSURE = "give a number or a table of [X, pressure] rows"
 
 def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
     """A floating-point leaf from numbers or nested lists of them; arrays keep their precision."""
-    if isinstance(value, jax.Array) and jnp.issubdtype(value.dtype, jnp.floating):
+    if isinstance(value, jax.Array) and value.dtype in (jnp.float32, jnp.float64):
         return value
     require(key, value, _numeric(value), fix)
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value))
@@ -70,7 +74,7 @@ def _numeric(value: Any) -> bool:
     if isinstance(value, list | tuple):
         return all(map(_numeric, value))
     if isinstance(value, np.ndarray | np.generic | jax.Array):
-        return value.dtype.kind in "fiu"
+        return value.dtype.kind in "fiu" or jnp.issubdtype(value.dtype, jnp.floating)
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -80,7 +84,14 @@ def _leaf(key: str, default: float, fix: str = NUMBER) -> Any:
 
 
 def _static(default: Any) -> Any:
-    return eqx.field(static=True, default=default)
+    return eqx.field(static=True, default=default, converter=_plain)
+
+
+def _plain(value: Any) -> Any:
+    """A word or a number as Python has it; an array is none, and shown by the check to come."""
+    if isinstance(value, np.generic):
+        return value.item()
+    return _shown(value) if eqx.is_array(value) else value
 
 
 def require(key: str, value: Any, holds: bool, fix: str) -> None:
@@ -93,8 +104,16 @@ def _shown(value: Any) -> str:
     if isinstance(value, jax.core.Tracer):
         return "a traced value"
     if isinstance(value, jax.Array | np.ndarray):
+        if value.size > LONGEST:
+            return f"an array of shape {value.shape}"
         value = np.asarray(value).tolist()
-    return repr(value)
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # Python shows no whole number of thousands of digits
+        return f"a {type(value).__name__} too large to show"
+    if len(text) <= LONGEST:
+        return text
+    return f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 
 def require_number(
@@ -110,7 +129,8 @@ def require_number(
 
 def require_choice(key: str, value: Any, choices: Sequence[Any]) -> None:
     """Raise `InputError` with the choices unless the value is one of them."""
-    require(key, value, value in choices, "choose " + " or ".join(map(repr, choices)))
+    known = not eqx.is_array(value) and value in choices
+    require(key, value, known, "choose " + " or ".join(map(repr, choices)))
 
 
 class Strip(eqx.Module):
@@ -280,10 +300,33 @@ class Contact(eqx.Module):
         """The exponent m of the friction law; infinity for the sharp slider."""
         return getattr(self.law, "smoothing", jnp.asarray(np.inf))
 
+    def resultant(self, length: ArrayLike) -> tuple[float, float]:
+        """Force of the pressures on a strip of that length, down, and its moment about X = 0."""
+        down, turning = resultant(self.pressure, length, table=self.pressure.ndim == 2)
+        up, lifting = resultant(self.bottom_pressure, length, table=self.bottom_pressure.ndim == 2)
+        return float(down - up), float(turning - lifting)
+
     @property
     def largest_pressure(self) -> Array:
         """Largest F_N on the top face."""
         return jnp.max(self.pressure[:, 1]) if self.pressure.ndim else self.pressure
+
+
+def resultant(
+    pressure: ArrayLike, length: ArrayLike, *, table: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Force of a pressure, a table or numbers, on strips; and its moment about X = 0."""
+    load, length = np.asarray(pressure, float), np.asarray(length, float)
+    if not table:
+        return load * length, 0.5 * load * length**2
+    end = length[..., None]
+    x, p = (np.broadcast_to(column, (*length.shape, column.size)) for column in load.T)
+    x = np.concatenate([np.zeros_like(end), x, end], axis=-1)
+    p = np.concatenate([p[..., :1], p, p[..., -1:]], axis=-1)
+    run, begin, stop = np.diff(x), p[..., :-1], p[..., 1:]
+    force, middle = 0.5 * run * (begin + stop), 0.5 * (x[..., 1:] + x[..., :-1])
+    moment = force * middle + run**2 * (stop - begin) / 12.0
+    return np.sum(force, axis=-1), np.sum(moment, axis=-1)
 
 
 def _values(pressure: np.ndarray) -> np.ndarray:

@@ -41,6 +41,7 @@ from jbeamshell.parts import (
     as_leaf,
     require,
     require_number,
+    resultant,
 )
 from jbeamshell.rungs import spelled_out
 from jbeamshell.sections import Hierarchic
@@ -215,10 +216,11 @@ class Scene(eqx.Module):
         fix = "nothing holds the strip along X without friction (rigid-body motion): give "
         require("contact.friction", 0.0, rough, fix + "strip.far_end or friction")
         length = float(strip.length)
-        down, moment = _resultant("contact.pressure", contact.pressure, length)
-        require("contact.pressure", contact.pressure, down > 0.0, "must press somewhere")
-        up, lifting = _resultant("contact.bottom_pressure", contact.bottom_pressure, length)
-        total, moment = down - up, moment - lifting
+        _check_on_strip("contact.pressure", contact.pressure, length)
+        _check_on_strip("contact.bottom_pressure", contact.bottom_pressure, length)
+        down, _ = resultant(contact.pressure, length, table=contact.pressure.ndim == 2)
+        require("contact.pressure", contact.pressure, bool(down > 0.0), "must press somewhere")
+        total, moment = contact.resultant(length)
         if contact.normal != "none":
             fix = "nothing holds the strip down (rigid-body motion): press more on top"
             require("contact.bottom_pressure", contact.bottom_pressure, total > 0.0, fix)
@@ -278,20 +280,13 @@ class Scene(eqx.Module):
         return scene
 
 
-def _resultant(key: str, pressure: Any, length: float) -> tuple[float, float]:
-    """Force of a pressure on the strip and its moment about X = 0."""
+def _check_on_strip(key: str, pressure: Any, length: float) -> None:
     table = np.asarray(pressure, dtype=float)
-    if table.ndim == 0:
-        return float(table) * length, 0.5 * float(table) * length**2
-    x, p = table.T
-    off = (x < 0.0) | (x > length * (1.0 + 1e-12))
-    fix = f"lies off the strip, whose X runs from 0 to {length:.6g}"
-    require(key, x[off], not np.any(off), fix)
-    x, p = np.concatenate([[0.0], x, [length]]), np.pad(p, 1, mode="edge")
-    run, begin, end = np.diff(x), p[:-1], p[1:]
-    middle = 0.5 * (x[1:] + x[:-1])
-    force = 0.5 * run * (begin + end)
-    return float(np.sum(force)), float(np.sum(force * middle + run**2 * (end - begin) / 12.0))
+    if table.ndim == 2:
+        x = table[:, 0]
+        off = (x < 0.0) | (x > length * (1.0 + 1e-12))
+        fix = f"lies off the strip, whose X runs from 0 to {length:.6g}"
+        require(key, x[off], not np.any(off), fix)
 
 
 def check_key(key: str) -> None:

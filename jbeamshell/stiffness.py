@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -63,6 +64,7 @@ def in_blocks(active: Array, like: Array) -> Array:
     return jnp.pad(active.ravel(), (like.size - active.size, 0)).reshape(like.shape)
 
 
+@eqx.filter_jit  # traced once for its several uses in a solver
 def stiffness_at(system: System, q: Array, touch: Touch, drive: Drive) -> Stiffness:
     """The stiffness at fields q (n, m), where the foundation answers so."""
     like = unknowns_at_rest(system)

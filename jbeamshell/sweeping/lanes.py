@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from jbeamshell.closed_form import bar_backbone
 from jbeamshell.errors import InputError
-from jbeamshell.parts import as_leaf, require
+from jbeamshell.parts import as_leaf, require, resultant
 from jbeamshell.scene import DERIVED, NUMBERS, Scene, check_key
 from jbeamshell.stepping import ROUNDING
 
@@ -115,9 +115,9 @@ class Lanes:
     def resultant(self) -> tuple[np.ndarray, np.ndarray]:
         """Force of the pressures on the strip, down, and its moment about X = 0."""
         length = self.value("strip.length")
-        down, turning = _resultant(self.value("contact.pressure"), self._table("pressure"), length)
-        up, lifting = _resultant(
-            self.value("contact.bottom_pressure"), self._table("bottom_pressure"), length
+        (down, turning), (up, lifting) = (
+            resultant(self.value(f"contact.{name}"), length, table=self._table(name))
+            for name in ("pressure", "bottom_pressure")
         )
         return down - up, turning - lifting
 
@@ -237,19 +237,3 @@ def _bytes(count: int) -> str:
     while size >= 1000.0 and unit != "PB":
         size, unit = size / 1000.0, next(units)
     return f"{size:.3g} {unit}"
-
-
-def _resultant(
-    pressure: np.ndarray, table: bool, length: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Force of a pressure on strips of these lengths, and its moment about X = 0."""
-    if not table:
-        return pressure * length, 0.5 * pressure * length**2
-    end = length[..., None]
-    x, p = (np.broadcast_to(column, (*length.shape, column.size)) for column in pressure.T)
-    x = np.concatenate([np.zeros_like(end), x, end], axis=-1)
-    p = np.concatenate([p[..., :1], p, p[..., -1:]], axis=-1)
-    run, begin, stop = np.diff(x), p[..., :-1], p[..., 1:]
-    force, middle = 0.5 * run * (begin + stop), 0.5 * (x[..., 1:] + x[..., :-1])
-    moment = force * middle + run**2 * (stop - begin) / 12.0
-    return np.sum(force, axis=-1), np.sum(moment, axis=-1)
