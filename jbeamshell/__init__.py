@@ -1,7 +1,8 @@
 """jbeamshell: differentiable beamshells on a rough foundation."""
 
 from jbeamshell.advice import Advice, advise
-from jbeamshell.errors import InputError, UnconvergedError
+from jbeamshell.errors import DoubtfulWarning, InputError, UnconvergedError
+from jbeamshell.histories import read_history
 from jbeamshell.history import History, Status
 from jbeamshell.newton import Newton
 from jbeamshell.parts import Contact, Load, Model, Strip
@@ -16,6 +17,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Advice",
     "Contact",
+    "DoubtfulWarning",
     "History",
     "InputError",
     "Load",
@@ -28,6 +30,7 @@ __all__ = [
     "UnconvergedError",
     "advise",
     "configure",
+    "read_history",
     "read_scene",
     "response",
     "scene_to_toml",

@@ -25,7 +25,7 @@ from jbeamshell.contact import Absent, Compliance, NormalLaw, Rigid
 from jbeamshell.energy import Energy, forces
 from jbeamshell.friction import FrictionLaw
 from jbeamshell.kinematics import FIELDS, KINEMATICS, Kinematics, Strains, turned
-from jbeamshell.parts import Contact, Model
+from jbeamshell.parts import ARC_LENGTH, Contact, Model
 from jbeamshell.scene import Scene
 from jbeamshell.sections import Hierarchic
 
@@ -58,16 +58,18 @@ class Drive(NamedTuple):
 
     Attributes
     ----------
-    target : F, or u(L) from the unloaded end's rest, whichever is controlled
+    target : F, or u(L) from the unloaded end's rest, or what `along` says, whichever is controlled
     pressure : part of the pressures that acts
     rest : u(L) after the pressure, from which displacements are counted
     rough : 1 with friction, 0 in the pressure step before it (which ends at F = 0)
+    along : (2,) what is controlled but a force: this much of u(L) and this much of F L/(E' 2H)
     """
 
     target: Array
     pressure: Array
     rest: Array
     rough: Array
+    along: Array | tuple[float, float] = (1.0, 0.0)
 
 
 Seen = tuple[Array, Array, Array]  # what the foundation sees: forces along w, and v and w
@@ -179,7 +181,7 @@ class System(eqx.Module):
     @property
     def follows_friction(self) -> bool:
         """Whether the ends are held otherwise before there is friction."""
-        return self.control == "displacement" or self.far_end == "free"
+        return self.control != "force" or self.far_end == "free"
 
     @property
     def _kinematics(self) -> Kinematics:
@@ -375,10 +377,13 @@ class System(eqx.Module):
             forces = forces.at[:, PSI].set(2.0 * self.half_height * self.tributary * assumed)
 
         conjugate = jax.grad(self.end_displacement)(q)[-1]
-        prescribed = jnp.asarray(self.control == "displacement") & (drive.rough > 0.0)
+        prescribed = jnp.asarray(self.control != "force") & (drive.rough > 0.0)
         force = jnp.where(prescribed, forces[-1, V], drive.target)
         forces = forces.at[-1].add(-force * conjugate)
-        gap = self.end_displacement(q) - drive.rest - drive.target
+        gap = self.end_displacement(q) - drive.rest
+        if self.control == ARC_LENGTH:
+            gap = drive.along[0] * gap + drive.along[1] * force / self.stiffness_scale
+        gap = gap - drive.target
         forces = forces.at[-1, V].set(
             jnp.where(prescribed, self.stiffness_scale * gap, forces[-1, V])
         )

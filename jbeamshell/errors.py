@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+LONGEST = 800  # characters of a message
+
 
 class InputError(ValueError):
-    """Input that makes no model; the message names the field, the value and the fix."""
+    """Input that makes no model; the message names the field, the value and the fix.
+
+    It is one line; of a very long one, the middle is left out.
+    """
+
+    def __init__(self, message: object = "") -> None:
+        line = " ".join(str(message).splitlines())
+        if len(line) > LONGEST:
+            line = f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
+        super().__init__(line)
 
 
 class UnconvergedError(RuntimeError):
     """A load step without equilibrium; the message names the step and what to try."""
+
+
+class DoubtfulWarning(UserWarning):
+    """A result that converged and may be wrong all the same; see `jbeamshell.History.doubts`."""

@@ -5,17 +5,29 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from jbeamshell.errors import InputError
+
+LARGEST_TOML = 10_000_000  # bytes: a pressure table of 100,000 rows is a quarter of it
+
+
+def as_path(path: Any) -> Path:
+    """The path of a file's name; `InputError` for what is none."""
+    if isinstance(path, str | os.PathLike):
+        name = os.fspath(path)
+        if isinstance(name, str) and "\0" not in name:
+            return Path(name)
+    raise InputError(f"{path!r}: is no file name: give text without NUL, or a pathlib.Path")
 
 
 @contextlib.contextmanager
 def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A draft to write to, renamed to ``path`` when the block ends well, else removed."""
-    target = Path(path)
-    draft = None
+    target, draft = as_path(path), None
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
         os.close(handle)
@@ -25,6 +37,8 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         draft.replace(target)
     except OSError as error:  # no folder, no permission, a full disk
         raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
+    except UnicodeEncodeError as error:  # of a file's name that is not text itself
+        raise InputError(f"{target}: cannot be written ({error})") from None
     finally:
         if draft is not None:
             draft.unlink(missing_ok=True)
@@ -34,6 +48,30 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write a text file whole or not at all."""
     with written_whole(path) as draft:
         draft.write_text(text, encoding="utf-8")
+
+
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The tables of a TOML file; `InputError` for what is none, or too large to be one of ours."""
+    try:
+        with as_path(path).open("rb") as file:
+            data = file.read(LARGEST_TOML + 1)
+    except (OSError, UnicodeEncodeError) as error:  # the latter for a name that is no text
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read ({reason})") from None
+    if len(data) > LARGEST_TOML:
+        raise InputError(f"{path}: is no scene or plan: holds more than {LARGEST_TOML:,} bytes")
+    try:
+        return parsed_toml(data.decode("utf-8"))
+    except ValueError as error:
+        raise InputError(f"{path}: is not a TOML file ({error})") from None
+
+
+def parsed_toml(text: str) -> dict[str, Any]:
+    """The tables of TOML text; `ValueError` for any other."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("its lists are nested too deeply") from None
 
 
 def _umask() -> int:

@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
             raise InputError(f"--profile {key}: is not among the free keys {free}")
     for note in plan.notes:
         say(note)
-    folder = output.check_folder(options.out) if options.out else None
+    folder = None if options.out is None else output.check_folder(options.out)
     begin = time.perf_counter()
     with tqdm(disable=None, file=sys.stderr, unit="step") as bar:
 
@@ -120,7 +120,7 @@ def _plan(options: argparse.Namespace) -> Any:
     if any(name.endswith(".toml") for name in options.data):
         return _plan_of_file(options)
     values = {name: getattr(options, name) for name in plan.OPTIONS if _given(options, name)}
-    if options.scene:
+    if options.scene is not None:
         values["scene"] = options.scene
     values["set"] = assignments(options.set)
     values["free"] = _free(options)
@@ -159,7 +159,7 @@ def _example(values: dict[str, Any]) -> Any:
 
     start = {key: value for key, value in EXAMPLE_START.items() if key in values["free"]}
     scene = values.pop("scene", None)
-    below = overridden(start, scenes.values_from(scene) if scene else {})
+    below = overridden(start, {} if scene is None else scenes.values_from(scene))
     return plan.plan_for(values | {"set": overridden(below, values["set"])}, example_loops())
 
 

@@ -179,7 +179,7 @@ def nodes(rule: Rule, ends: Array) -> Array:
 
 def tributary_lengths(rule: Rule, ends: Array) -> Array:
     """Length l_i of contact that belongs to each node; they add up to L."""
-    return scatter(jnp.diff(ends)[:, None] * rule.node_weights)
+    return scatter(jnp.diff(ends)[:, None] * rule.node_weights.astype(ends.dtype))
 
 
 def gather(nodal: Array, order: int) -> Array:

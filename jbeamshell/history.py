@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell import closed_form
+from jbeamshell import closed_form, trust
 from jbeamshell.cycles import branch_work
 from jbeamshell.errors import InputError
 from jbeamshell.kinematics import Strains
@@ -58,6 +58,9 @@ class History(eqx.Module):
     error : (steps+1,) largest out-of-balance force over mu F_N L
     status : (steps+1,) codes of `Status`
     cycles : for each closed cycle the steps at its start, its turn and its end
+    target : (steps+1,) the controlled load that was prescribed
+    end : state of the strip after the last step, for `continued`; None unless it was solved
+        step by step
     """
 
     scene: Scene
@@ -81,6 +84,8 @@ class History(eqx.Module):
     error: Array
     status: Array
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
+    target: Array | None = None
+    end: Any = None
 
     @property
     def pressed(self) -> int:
@@ -255,6 +260,31 @@ class History(eqx.Module):
         return jnp.max(self.slipping[start + 1 : stop + 1] @ self.tributary)
 
     @property
+    def dissipation_error(self) -> Array:
+        """Estimate of the dissipation's relative error by the grid at the loaded end.
+
+        Rather too large than too small; infinite where nothing slips.  See `doubts`.
+        """
+        return jnp.maximum(*trust.errors(self.rubbing))
+
+    @property
+    def rubbing(self) -> trust.Rubbing:
+        """The last cycle at the contact."""
+        start, _, stop = self._last
+        cycle = slice(start, stop + 1)
+        strip, contact = self.scene.strip, self.scene.contact
+        return trust.Rubbing(
+            x=self.x,
+            tributary=self.tributary,
+            v=self.v[cycle],
+            traction=self.traction[cycle],
+            reaction=self.reaction[cycle],
+            friction=contact.friction,
+            slip_stiffness=contact.stick_stiffness * strip.shear_modulus / strip.half_height,
+            half_height=strip.half_height,
+        )
+
+    @property
     def reaction_min(self) -> Array:
         """Smallest normal reaction after the pressure; negative is tension (w frozen)."""
         return jnp.min(self.reaction)
@@ -277,13 +307,23 @@ class History(eqx.Module):
         """Whether every step found its equilibrium."""
         return bool(np.all(np.asarray(self.status) == Status.CONVERGED))
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is doubtful about this run, by how much, and what to change; a sentence each."""
+        return trust.told(self)
+
     def figures(self) -> dict[str, Any]:
-        """The figures of the last cycle and of the contact at the last step, as plain numbers."""
+        """The figures of the last cycle and of the contact at the last step, as plain numbers.
+
+        None is what means nothing here, such as nought over nought.
+        """
         worst = Status(int(np.max(np.asarray(self.status))))
         names = (*(FIGURES if self.cycles else ()), *self._contact_figures)
-        figures: dict[str, Any] = {k: float(v) for k, v in _last_values(self, names).items()}
+        values = {name: float(value) for name, value in _last_values(self, names).items()}
+        figures: dict[str, Any] = {k: v if np.isfinite(v) else None for k, v in values.items()}
         figures["newton_iterations"] = int(np.sum(np.asarray(self.iterations)))
         figures["status"] = worst.name.lower()
+        figures["doubts"] = list(self.doubts)
         return figures
 
     @property
@@ -309,14 +349,29 @@ class History(eqx.Module):
         lines += [
             f"  {name.replace('_', ' '):20s} {value:.6g}"
             if isinstance(value, float)
-            else f"  {name.replace('_', ' '):20s} {value}"
+            else f"  {name.replace('_', ' '):20s} {'undefined' if value is None else value}"
             for name, value in self.figures().items()
+            if name != "doubts"
         ]
-        return "\n".join(lines)
+        return "\n".join(lines + [f"  doubtful: {doubt}" for doubt in self.doubts])
 
     @property
     def _driver(self) -> Array:
         return self.force if self.scene.load.control == "force" else self.displacement
+
+    # --- further -------------------------------------------------------------------------------
+
+    def continued(self, path: Any = None, **options: Any) -> History:
+        """The history with further load steps; see `jbeamshell.histories.continued`."""
+        from jbeamshell import histories
+
+        return histories.continued(self, path, **options)
+
+    def save(self, path: Any) -> None:
+        """Write it to an .npz file, for `jbeamshell.read_history`."""
+        from jbeamshell import histories
+
+        histories.write_history(self, path)
 
     def plot(self, axes: Any = None) -> Any:
         """Draw the loop; returns the axes."""

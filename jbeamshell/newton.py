@@ -13,7 +13,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell import block_tridiagonal
 from jbeamshell.block_tridiagonal import BlockTridiagonal
-from jbeamshell.parts import require
+from jbeamshell.parts import require, require_count
 
 Seen = TypeVar("Seen")
 Stiffness = TypeVar("Stiffness")
@@ -31,7 +31,7 @@ class Newton(eqx.Module):
     Attributes
     ----------
     tolerance : largest out-of-balance force at a node over mu F_N L; None is 1e-10 in double and
-        2e-5 in single precision
+        1e-4 in single precision
     max_iterations : Newton iterations per load step
     max_halvings : of one Newton step
     """
@@ -41,17 +41,20 @@ class Newton(eqx.Module):
     max_halvings: int = eqx.field(static=True, default=8)
 
     def __check_init__(self) -> None:
-        good = self.tolerance is None or self.tolerance > 0.0
+        number = isinstance(self.tolerance, int | float) and not isinstance(self.tolerance, bool)
+        good = self.tolerance is None or (number and self.tolerance > 0.0)
         require("solver.tolerance", self.tolerance, good, "must be a positive number or None")
+        require_count("solver.max_iterations", self.max_iterations, 1)
+        require_count("solver.max_halvings", self.max_halvings, 0)
 
     def tolerance_for(self, dtype: jnp.dtype) -> float:
         """The tolerance in force at a precision."""
         double = dtype == jnp.float64
-        tolerance = self.tolerance or (1e-10 if double else 2e-5)
+        tolerance = self.tolerance or (1e-10 if double else 1e-4)
         require(
             "solver.tolerance",
             tolerance,
-            double or tolerance >= 1e-6,
+            double or tolerance >= 1e-5,
             "is beyond single precision; write jax.config.update('jax_enable_x64', True) first",
         )
         return tolerance

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from jbeamshell.errors import InputError
-from jbeamshell.files import write_text
+from jbeamshell.files import as_path, write_text
 from jbeamshell.history import History
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
@@ -41,11 +41,14 @@ def as_json(figures: Mapping[str, Any]) -> str:
 
 def check_folder(path: str | os.PathLike[str]) -> Path:
     """The folder, if it is there or can be made; nothing is made yet."""
-    folder = Path(path)
-    try:
-        ground = next(p for p in (folder, *folder.parents) if p.exists())
-    except OSError as error:
-        raise InputError(f"--out {path}: cannot be made ({error.strerror})") from None
+    folder = as_path(path)
+    if not os.fspath(path):
+        raise InputError("--out '': is empty: name a folder")
+    try:  # a link to nothing is there, too
+        ground = next(p for p in (folder, *folder.parents) if p.is_symlink() or p.exists())
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"--out {path}: cannot be made ({reason})") from None
     if not ground.is_dir():
         raise InputError(f"--out {path}: {ground} is a file: name a folder")
     if not os.access(ground, os.W_OK | os.X_OK):

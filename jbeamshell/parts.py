@@ -29,6 +29,7 @@ from jbeamshell.rungs import LARGEST_ORDER, name_of
 
 FAR_ENDS = ("held", "pinned", "free")
 CONTROLS = ("force", "displacement")
+ARC_LENGTH = "arc-length"
 NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
 SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form")
@@ -43,7 +44,7 @@ STANDARD_AMPLITUDE = 0.7855
 STANDARD = {"axial_stiffness": 3.4e4, "poisson_ratio": 0.3}
 TINY = np.finfo(float).tiny
 
-LONGEST = 300  # characters of a value in a message
+MOST_SHOWN = 100  # numbers of an array in a message
 MOST_LEVELS = 10**7  # of a load path
 
 NUMBER = "must be a number"
@@ -66,13 +67,15 @@ def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
         with concrete:
             return jnp.asarray(value, dtype=jnp.result_type(float))
     except (ValueError, OverflowError):  # rows of different length; whole numbers beyond any float
-        raise InputError(f"{key} = {_shown(value)}: {fix}") from None
+        raise InputError(f"{key} = {shown(value)}: {fix}") from None
 
 
 def _numeric(value: Any) -> bool:
     """Whether there are only numbers in a value, words and truths being none."""
     if isinstance(value, list | tuple):
         return all(map(_numeric, value))
+    if np.ma.is_masked(value):
+        return False
     if isinstance(value, np.ndarray | np.generic | jax.Array):
         return value.dtype.kind in "fiu" or jnp.issubdtype(value.dtype, jnp.floating)
     return isinstance(value, int | float) and not isinstance(value, bool)
@@ -87,33 +90,36 @@ def _static(default: Any) -> Any:
     return eqx.field(static=True, default=default, converter=_plain)
 
 
+def _words(value: Any) -> Any:
+    """A list of words as a tuple."""
+    return tuple(map(_plain, value)) if isinstance(value, list | tuple) else _plain(value)
+
+
 def _plain(value: Any) -> Any:
-    """A word or a number as Python has it; an array is none, and shown by the check to come."""
+    """A word or a number as Python has it; with arrays it is neither, as the check will find."""
     if isinstance(value, np.generic):
         return value.item()
-    return _shown(value) if eqx.is_array(value) else value
+    return shown(value) if any(map(eqx.is_array, jax.tree.leaves(value))) else value
 
 
 def require(key: str, value: Any, holds: bool, fix: str) -> None:
     """Raise `InputError` naming the key, the value and the fix unless the condition holds."""
     if not holds:
-        raise InputError(f"{key} = {_shown(value)}: {fix}")
+        raise InputError(f"{key} = {shown(value)}: {fix}")
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A value as messages have it."""
     if isinstance(value, jax.core.Tracer):
         return "a traced value"
     if isinstance(value, jax.Array | np.ndarray):
-        if value.size > LONGEST:
+        if value.size > MOST_SHOWN:
             return f"an array of shape {value.shape}"
         value = np.asarray(value).tolist()
     try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # Python shows no whole number of thousands of digits
-        return f"a {type(value).__name__} too large to show"
-    if len(text) <= LONGEST:
-        return text
-    return f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
+        return repr(value)
+    except (ValueError, RecursionError):  # Python writes no whole number of thousands of digits
+        return f"a {type(value).__name__} too long to show"
 
 
 def require_number(
@@ -127,9 +133,15 @@ def require_number(
     require(key, value, bool(np.isfinite(number) and low < number < high), fix)
 
 
+def check_words(key: str, words: Any) -> None:
+    """Raise `InputError` unless it is a list of words."""
+    several = isinstance(words, list | tuple) and all(isinstance(word, str) for word in words)
+    require(key, words, several, "give a list of words")
+
+
 def require_choice(key: str, value: Any, choices: Sequence[Any]) -> None:
     """Raise `InputError` with the choices unless the value is one of them."""
-    known = not eqx.is_array(value) and value in choices
+    known = not isinstance(value, jax.Array | np.ndarray) and value in choices
     require(key, value, known, "choose " + " or ".join(map(repr, choices)))
 
 
@@ -189,12 +201,13 @@ class Strip(eqx.Module):
         self.axial_stiffness = material["axial_stiffness"]
         self.poisson_ratio = material["poisson_ratio"]
         self.kappa_s = as_leaf(kappa_s, "strip.kappa_s")
-        self.far_end = far_end
+        self.far_end = _plain(far_end)
         self.layers = None if layers is None else as_leaf(layers, "strip.layers", LAYERS)
         self.deviation = as_leaf(deviation, "strip.deviation")
-        self.plane = plane
+        self.plane = _plain(plane)
         bend = None if curvature is None else as_leaf(curvature, "strip.curvature")
-        straight = bend is None or (not isinstance(bend, jax.core.Tracer) and not np.any(bend))
+        known = bend is not None and bend.ndim == 0 and not isinstance(bend, jax.core.Tracer)
+        straight = bend is None or (known and not np.any(bend))
         self.curvature = None if straight else bend
 
     def __check_init__(self) -> None:
@@ -285,6 +298,8 @@ class Contact(eqx.Module):
         require_number("contact.stick_stiffness", self.stick_stiffness)
         if isinstance(self.law, ElasticSlip | CappedTrial):
             require_number("contact.smoothing", self.law.smoothing, SMOOTHING, low=1.0)
+        law = isinstance(self.law, FrictionLaw)
+        require("contact.law", self.law, law, "give a jbeamshell.friction.FrictionLaw")
         require_choice("contact.normal", self.normal, NORMALS)
         require_number("contact.normal_stiffness", self.normal_stiffness)
         for key in ("pressure", "bottom_pressure"):
@@ -312,6 +327,7 @@ class Contact(eqx.Module):
         return jnp.max(self.pressure[:, 1]) if self.pressure.ndim else self.pressure
 
 
+@np.errstate(over="ignore", invalid="ignore")  # infinite forces are told by those who ask
 def resultant(
     pressure: ArrayLike, length: ArrayLike, *, table: bool
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -350,7 +366,9 @@ class Load(eqx.Module):
 
     Attributes
     ----------
-    control : "force" (F, force per unit width) or "displacement" (u(L), mid-height face average)
+    control : "force" (F, force per unit width), "displacement" (u(L), mid-height face average) or
+        "arc-length": the way along the path of u and F L/(E' 2H), a length, which goes on where
+        either turns back by itself (Riks 1979, with a plane for the arc)
     amplitude : A, of the controlled quantity; no default under displacement control
     cycles : full cycles A, -A, A after the first loading 0 to A; 0 is the pressure alone
     steps_per_half_cycle : equal load steps from -A to A, an even number, or 1
@@ -371,29 +389,32 @@ class Load(eqx.Module):
         steps_per_half_cycle: int = 40,
         pressure_steps: int = 1,
     ) -> None:
-        require_choice("load.control", control, CONTROLS)
+        require_choice("load.control", control, (*CONTROLS, ARC_LENGTH))
         if amplitude is None:
             require(
                 "load.amplitude",
                 None,
                 control == "force" or cycles == 0,
-                "give the end displacement's amplitude under displacement control",
+                f"give the amplitude under {control} control",
             )
             amplitude = STANDARD_AMPLITUDE
         self.control = control
         self.amplitude = as_leaf(amplitude, "load.amplitude")
-        self.cycles = cycles
-        self.steps_per_half_cycle = steps_per_half_cycle
-        self.pressure_steps = pressure_steps
+        self.cycles = _plain(cycles)
+        self.steps_per_half_cycle = _plain(steps_per_half_cycle)
+        self.pressure_steps = _plain(pressure_steps)
 
     def __check_init__(self) -> None:
         require_number("load.amplitude", self.amplitude)
-        _require_count("load.cycles", self.cycles, 0)
-        _require_count("load.pressure_steps", self.pressure_steps, 1)
+        require_count("load.cycles", self.cycles, 0)
+        require_count("load.pressure_steps", self.pressure_steps, 1)
         half = self.steps_per_half_cycle
-        _require_count("load.steps_per_half_cycle", half, 1)
+        require_count("load.steps_per_half_cycle", half, 1)
         fix = "must be 1, or even, so that the path passes through zero"
         require("load.steps_per_half_cycle", half, half == 1 or half % 2 == 0, fix)
+        few = 2 * self.cycles * half <= MOST_LEVELS
+        fix = f"with {half} steps per half cycle are more than {MOST_LEVELS} load steps: take fewer"
+        require("load.cycles", self.cycles, few, fix)
 
     def unit_path(self) -> np.ndarray:
         """Load levels after zero for unit amplitude: 0 to 1, then ``cycles`` times 1, -1, 1."""
@@ -406,7 +427,8 @@ class Load(eqx.Module):
         return np.concatenate([first, *[down, -down] * self.cycles])
 
 
-def _require_count(key: str, value: Any, low: int, high: int = 10**6) -> None:
+def require_count(key: str, value: Any, low: int, high: int = 10**6) -> None:
+    """Raise `InputError` unless it is a whole number from low to high."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     require(key, value, whole and low <= value <= high, f"must be a whole number, {low} to {high}")
 
@@ -432,7 +454,7 @@ class Model(eqx.Module):
         H, before the node count scales all sizes
     """
 
-    fields: tuple[str, ...] = eqx.field(static=True, default=("v", "beta", "psi"), converter=tuple)
+    fields: tuple[str, ...] = eqx.field(static=True, default=("v", "beta", "psi"), converter=_words)
     kinematics: str = _static("exact")
     grid: str = _static("finite-difference")
     nodes: int = _static(161)
@@ -443,6 +465,7 @@ class Model(eqx.Module):
     end_size: float = _static(END_SIZE)
 
     def __check_init__(self) -> None:
+        require("model.fields", self.fields, isinstance(self.fields, tuple), "give a list of words")
         unknown = [f for f in self.fields if f not in FIELDS]
         require("model.fields", list(self.fields), not unknown, f"fields are {', '.join(FIELDS)}")
         require(
@@ -457,17 +480,16 @@ class Model(eqx.Module):
         require_choice("model.squeeze", self.squeeze, SQUEEZES)
         both = self.squeeze == "field" or {"w", "psi"} <= set(self.fields)
         require("model.squeeze", self.squeeze, both, "needs w and psi in model.fields")
-        _require_count("model.order", self.order, 0, LARGEST_ORDER)
+        require_count("model.order", self.order, 0, LARGEST_ORDER)
         straight = {"beta", "psi"} <= set(self.fields) and self.squeeze == "field"
         fix = "needs beta and psi in model.fields, and the squeeze strain as a field"
         require("model.order", self.order, self.order == 0 or straight, fix)
         require_choice("model.solution", self.solution, SOLUTIONS)
         bar = self.solution != "closed-form" or self.fields == ("v",)
         require("model.solution", self.solution, bar, "is the bar's: take ['v'] as model.fields")
-        number = isinstance(self.end_size, int | float) and not isinstance(self.end_size, bool)
-        require("model.end_size", self.end_size, number, POSITIVE + " (of H)")
-        require_number("model.end_size", self.end_size, POSITIVE + " (of H)")
-        _require_count("model.nodes", self.nodes, 3)
+        size = as_leaf(self.end_size, "model.end_size", POSITIVE + " (of H)")
+        require_number("model.end_size", size, POSITIVE + " (of H)")
+        require_count("model.nodes", self.nodes, 3)
         require(
             "model.nodes",
             self.nodes,

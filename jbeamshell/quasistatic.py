@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from typing import Any
 
 import equinox as eqx
@@ -15,17 +16,21 @@ from jax.typing import ArrayLike
 from jbeamshell.closed_form import bar_backbone
 from jbeamshell.cycles import closed_cycles
 from jbeamshell.equilibrium import System
-from jbeamshell.errors import UnconvergedError
+from jbeamshell.errors import DoubtfulWarning, UnconvergedError
 from jbeamshell.history import History, Status
 from jbeamshell.masing import bar, masing
 from jbeamshell.newton import Newton
-from jbeamshell.parts import require
+from jbeamshell.parts import as_leaf, require
+from jbeamshell.runtime import memory
 from jbeamshell.scene import Scene
 from jbeamshell.stepping import ROUNDING, Path, Steps, at_rest, is_traced, march, recover
 
 ADVICE = (
     "take more load.steps_per_half_cycle, a lower contact.stick_stiffness, or fewer model.nodes"
 )
+
+LEFT = 13  # numbers that a load step leaves at a node, besides twice its fields
+LOADS = "give (steps,) loads, or (steps, 2) with pressures"
 
 
 def solve(
@@ -42,12 +47,13 @@ def solve(
     Parameters
     ----------
     scene : what is loaded; may hold traced leaves, so `jax.grad` and `jax.vmap` go through
-    path : loads after the pressing, (steps,): F or u(L) by ``scene.load.control``; or (steps, 2)
-        with the part of the pressures that acts in the second column; None is the scene's own
-        cycles
+    path : loads after the pressing, (steps,): F, u(L) or the way gone, by ``scene.load.control``;
+        or (steps, 2) with the part of the pressures that acts in the second column; None is the
+        scene's own cycles
     contact : (n,) nodes from which the search for the contact starts; None is all of them
     solver : settings of Newton's method
-    throw : whether a step without equilibrium raises; if not, read ``history.status``
+    throw : whether a step without equilibrium raises, and what is doubtful warns; if not, read
+        ``history.status`` and ``history.doubts``
     tolerance : relative error of the dissipation that will do; the scene's model gives way to the
         cheapest that is estimated to keep it, see `jbeamshell.advise`
 
@@ -63,7 +69,14 @@ def solve(
         the tolerance
     UnconvergedError
         if a step has no equilibrium, even when it is walked in smaller steps
+
+    Warns
+    -----
+    DoubtfulWarning
+        if what converged may be wrong all the same, see `jbeamshell.History.doubts`; never in a
+        traced run, whose estimate is `jbeamshell.History.dissipation_error`
     """
+    check_solver(solver)
     solver = solver or Newton()
     if tolerance is not None:
         from jbeamshell.advice import advise
@@ -85,9 +98,13 @@ def solve(
         else:
             steps = masing(scene, start, whole, solver, recovering=True)
         if throw:
-            _raise_if_failed(steps, whole)
-        history = _history(scene, steps, whole.pressure)
-    return dataclasses.replace(history, cycles=cycles)
+            raise_if_failed(steps, whole)
+        history = history_of(scene, steps, whole.pressure)
+    history = dataclasses.replace(history, cycles=cycles)
+    if throw:
+        for doubt in history.doubts:
+            warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=2)
+    return history
 
 
 def check(
@@ -96,9 +113,16 @@ def check(
     """The whole path and its closed cycles; raises `InputError` where `solve` would."""
     whole, cycles = _whole_path(scene, path)
     if not is_traced(scene, whole):
+        _check_size(scene, whole)
         _check_gross_slip(scene, whole)
         _check_bar(scene)
     return whole, cycles
+
+
+def check_solver(solver: Newton | None) -> None:
+    """Raise `InputError` for settings that are none."""
+    fix = "give a jbeamshell.Newton"
+    require("solver", solver, solver is None or isinstance(solver, Newton), fix)
 
 
 def compile_for(
@@ -124,13 +148,14 @@ def _solve(
         steps = march(scene, start, path, solver)
     else:
         steps = masing(scene, start, path, solver)
-    return steps, _history(scene, steps, path.pressure)
+    return steps, history_of(scene, steps, path.pressure)
 
 
 def _whole_path(
     scene: Scene, path: ArrayLike | None
 ) -> tuple[Path, tuple[tuple[int, int, int], ...]]:
     """The pressing, then the given loads or the scene's own; and the closed cycles among them."""
+    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     pressing, known = scene.load.pressure_steps, scene.load.unit_path()
     solution = scene.model.solution
     fix = "knows the scene's own cycles only: leave the path out, or take 'stepwise'"
@@ -141,9 +166,9 @@ def _whole_path(
         targets = amplitude * known.astype(amplitude.dtype)
         pressures = numbers.ones_like(targets)
     else:
-        loads = numbers.asarray(path, amplitude.dtype)
+        loads = numbers.asarray(as_leaf(path, "path", LOADS), amplitude.dtype)
         shaped = loads.size > 0 and (loads.ndim == 1 or (loads.ndim == 2 and loads.shape[1] == 2))
-        require("path", np.shape(path), shaped, "give (steps,) loads, or (steps, 2) with pressures")
+        require("path", np.shape(path), shaped, LOADS)
         targets, pressures = (loads, numbers.ones_like(loads)) if loads.ndim == 1 else loads.T
         if not is_traced(loads):
             known, finite = np.asarray(targets), np.isfinite(loads)
@@ -165,11 +190,22 @@ def _whole_path(
 
 
 def _check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:
-    touching, nodes = np.asarray(contact, dtype=bool), scene.model.nodes
+    try:
+        touching, nodes = np.asarray(contact, dtype=bool), scene.model.nodes
+    except (TypeError, ValueError):
+        require("contact", contact, False, "give one truth for each of the nodes")
     fits = touching.shape == (nodes,) and "w" in scene.model.fields
     fix = f"give one truth for each of the {nodes} nodes, and w in model.fields"
     require("contact", touching.shape, fits, fix)
     return touching
+
+
+def _check_size(scene: Scene, path: Path) -> None:
+    """Refuse what would fill this machine's memory."""
+    levels, nodes = path.target.size, scene.model.nodes
+    need, most = 8.0 * levels * nodes * (2 * scene.model.width + LEFT), memory()
+    fix = f"and {levels} load steps take {need:.2g} bytes of memory, this machine has {most:.2g}"
+    require("model.nodes", nodes, need < most, f"{fix}: take fewer")
 
 
 def _check_gross_slip(scene: Scene, path: Path) -> None:
@@ -184,7 +220,7 @@ def _check_gross_slip(scene: Scene, path: Path) -> None:
         float(targets[beyond].max(initial=0.0)),
         not np.any(beyond),
         f"must stay below gross slip, mu F_N L = {limit:.6g}; "
-        "set load.control to 'displacement' to go beyond",
+        "set load.control to 'displacement' or 'arc-length' to go beyond",
     )
 
 
@@ -200,12 +236,14 @@ def _check_bar(scene: Scene) -> None:
     require("load.amplitude", amplitude, amplitude < limit, fix)
 
 
-def _raise_if_failed(steps: Steps, path: Path) -> None:
+def raise_if_failed(steps: Steps, path: Path, before: int = 0) -> None:
+    """Raise `UnconvergedError` with the first step that failed, after so many of another path."""
     sound = np.asarray(steps.state.sound)
     if sound.all():
         return
     first = int(np.argmin(sound))
-    where = f"load step {first} of {sound.size - 1} (load {float(path.target[first]):.6g})"
+    number, last = before + first, before + sound.size - 1
+    where = f"load step {number} of {last} (load {float(path.target[first]):.6g})"
     if not path.rough[first]:
         where = f"pressing down (to {100.0 * float(path.pressure[first]):.3g} % of the pressure)"
     reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
@@ -216,9 +254,9 @@ def _raise_if_failed(steps: Steps, path: Path) -> None:
 
 
 @eqx.filter_jit
-def _history(scene: Scene, steps: Steps, pressure: Array) -> History:
+def history_of(scene: Scene, steps: Steps, pressure: Array) -> History:
     """What happened, but for the cycles in it: with them every path would compile anew."""
-    system = System(scene)
+    system, stepwise = System(scene), scene.model.solution == "stepwise"
     sound, level = steps.state.sound, steps.state.level
 
     def masked(values: Array) -> Array:
@@ -246,4 +284,6 @@ def _history(scene: Scene, steps: Steps, pressure: Array) -> History:
         error=steps.error,
         status=steps.status,
         cycles=(),
+        target=steps.state.target,
+        end=jax.tree.map(lambda a: a[-1], steps.state) if stepwise else None,
     )

@@ -10,7 +10,7 @@ from jax import Array
 
 from jbeamshell.history import History
 from jbeamshell.newton import Newton
-from jbeamshell.parts import require, require_choice
+from jbeamshell.parts import check_words, require, require_choice
 from jbeamshell.quasistatic import solve
 from jbeamshell.scene import NUMBERS, Scene, check_key
 
@@ -51,6 +51,9 @@ def response(
     InputError
         if a key or a figure is unknown
     """
+    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+    check_words("over", over)
+    check_words("figures", figures)
     for key in over:
         check_key(key)
         require("over", key, key in NUMBERS, "is no number of the scene: give it to the scene")

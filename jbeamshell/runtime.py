@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
@@ -57,15 +58,24 @@ def started() -> bool:
     return xla_bridge.backends_are_initialized()
 
 
+def memory() -> float:
+    """Bytes of memory that this machine has; infinite where it does not say."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return math.inf
+
+
 def start_of_a_command() -> None:
     """What the command line chooses: fast loops, and a cache unless the user has one."""
     if started():
         return
-    cache = None if os.environ.get("JAX_COMPILATION_CACHE_DIR") else default_cache()
-    if cache is not None:
+    cache = None
+    if not os.environ.get("JAX_COMPILATION_CACHE_DIR"):
         try:
+            cache = default_cache()
             cache.mkdir(parents=True, exist_ok=True)
-        except OSError:  # a home that cannot be written to: everything works without
+        except (OSError, RuntimeError):  # no home, or none to write to: everything works without
             cache = None
     configure(cache=cache)
 

@@ -10,9 +10,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import os
-import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -23,7 +21,7 @@ import tomli_w
 
 from jbeamshell.energy import Energy, Homogeneous
 from jbeamshell.errors import InputError
-from jbeamshell.files import write_text
+from jbeamshell.files import read_toml, write_text
 from jbeamshell.friction import (
     LAWS,
     CappedTrial,
@@ -33,6 +31,8 @@ from jbeamshell.friction import (
     TanhIncrement,
 )
 from jbeamshell.parts import (
+    ARC_LENGTH,
+    CONTROLS,
     SMOOTHING,
     Contact,
     Load,
@@ -46,6 +46,7 @@ from jbeamshell.parts import (
 from jbeamshell.rungs import spelled_out
 from jbeamshell.sections import Hierarchic
 
+LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
 SECTIONS = {"strip": Strip, "contact": Contact, "load": Load, "model": Model}
 
 # Keys that set a leaf through others, in the order in which they apply.
@@ -122,17 +123,20 @@ class Scene(eqx.Module):
     energy: Energy | None = None
 
     def __check_init__(self) -> None:
+        for name, kind in SECTIONS.items():
+            part = getattr(self, name)
+            require(name, part, isinstance(part, kind), f"give a jbeamshell.{kind.__name__}")
         self._check_rung()
         self._check_contact()
         if self.energy is None:
             return
+        fix = "must be a function of (e, g, k, psi, psi')"
+        require("energy", self.energy, callable(self.energy), fix)
         probe = [jax.ShapeDtypeStruct((), self.strip.length.dtype)] * 5
         try:
             shape = jax.eval_shape(self.energy, *probe)
         except TypeError as error:
-            raise InputError(
-                f"energy: must be a function of (e, g, k, psi, psi'); {error}"
-            ) from None
+            raise InputError(f"energy: {fix}; {error}") from None
         require(
             "energy",
             self.energy,
@@ -185,6 +189,8 @@ class Scene(eqx.Module):
         closed = model.solution == "closed-form"
         fix = "is the bar's, homogeneous, straight, under one pressure: take another model.rung"
         require("model.solution", model.solution, bar or not closed, fix)
+        either = model.solution == "stepwise" or self.load.control in CONTROLS
+        require("model.solution", model.solution, either, "knows no arc length: take 'stepwise'")
         cycling = model.solution == "stepwise" or self.load.cycles > 0
         fix = "doubles a backbone for load.cycles, of which there are none: take 'stepwise'"
         require("model.solution", model.solution, cycling, fix)
@@ -221,6 +227,8 @@ class Scene(eqx.Module):
         down, _ = resultant(contact.pressure, length, table=contact.pressure.ndim == 2)
         require("contact.pressure", contact.pressure, bool(down > 0.0), "must press somewhere")
         total, moment = contact.resultant(length)
+        fix = "overflows together with contact.pressure: take other units"
+        require("strip.length", length, bool(np.isfinite(moment)), fix)
         if contact.normal != "none":
             fix = "nothing holds the strip down (rigid-body motion): press more on top"
             require("contact.bottom_pressure", contact.bottom_pressure, total > 0.0, fix)
@@ -243,6 +251,8 @@ class Scene(eqx.Module):
         Keys are those of the TOML file and the command line; values may be traced, so gradients and
         batches reach every number through it.
         """
+        known = isinstance(values, Mapping)
+        require("values", values, known, "give a dictionary, such as {'contact.friction': 0.2}")
         for key, value in values.items():
             check_key(key)
             _check_word(key, value)
@@ -291,6 +301,8 @@ def _check_on_strip(key: str, pressure: Any, length: float) -> None:
 
 def check_key(key: str) -> None:
     """Raise `InputError` for a key that does not exist, with the nearest one that does."""
+    if not isinstance(key, str):
+        raise InputError(f"{key!r}: is no key; keys are {', '.join(KEYS)}")
     if key not in KEYS:
         near = difflib.get_close_matches(key, KEYS, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"keys are {', '.join(KEYS)}"
@@ -313,7 +325,8 @@ def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:
     smoothing = getattr(current, "smoothing", "sharp") if given is None else given
     m = np.inf if isinstance(smoothing, str) else smoothing
     exponent = as_leaf(m, "contact.smoothing", SMOOTHING)
-    sharp = not isinstance(exponent, jax.core.Tracer) and bool(np.isposinf(exponent).all())
+    sharp = not isinstance(exponent, jax.core.Tracer) and bool(np.all(np.isposinf(exponent)))
+    require("contact.smoothing", m, exponent.ndim == 0, SMOOTHING)
     if name == "elastic-slip":
         return SharpSlip() if sharp else ElasticSlip(exponent)
     if name == "smooth-cap":
@@ -332,7 +345,7 @@ def _law_name(law: FrictionLaw) -> Any:
 def _check_word(key: str, value: Any) -> None:
     """Types of the static values; numbers check theirs when they become leaves."""
     if key == "contact.law":
-        known = isinstance(value, FrictionLaw) or value in LAWS
+        known = isinstance(value, FrictionLaw) or (isinstance(value, str) and value in LAWS)
         require(key, value, known, f"choose {' or '.join(map(repr, LAWS))}")
     elif key == "contact.smoothing" and isinstance(value, str):
         require(key, value, value == "sharp", SMOOTHING)
@@ -347,14 +360,17 @@ def _check_word(key: str, value: Any) -> None:
 
 def scene_from_values(values: Mapping[str, Any]) -> Scene:
     """A scene from dotted keys on top of the standard strip."""
-    if values.get("load.control") == "displacement" and "load.amplitude" not in values:
-        return Scene(load=Load("displacement"))  # says what is missing
+    if values.get("load.control") in LENGTHS and "load.amplitude" not in values:
+        return Scene(load=Load(values["load.control"]))  # says what is missing
     return Scene().replace(values)
 
 
 def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Dotted keys with others on top; half_height replaces height_ratio and the like."""
     same = DERIVED | {primary: derived for derived, primary in DERIVED.items()}
+    for given in (values, overrides):
+        if "model.rung" in given:
+            _check_word("model.rung", given["model.rung"])
     values = spelled_out(dict(values))
     overrides = spelled_out(dict(overrides), values.get("model.fields", ()))
     displaced = {same[key] for key in overrides if key in same}
@@ -363,15 +379,8 @@ def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[
 
 def read_values(path: str | os.PathLike[str]) -> dict[str, Any]:
     """The dotted keys of a TOML file, flat."""
-    try:
-        text = Path(path).read_bytes().decode("utf-8")
-        tables = tomllib.loads(text)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is not a TOML file ({error})") from None
     values: dict[str, Any] = {}
-    for section, table in tables.items():
+    for section, table in read_toml(path).items():
         if section not in SECTIONS:
             raise InputError(
                 f"{path}: unknown section {section!r}; sections are {', '.join(SECTIONS)}"
@@ -389,6 +398,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 def scene_to_toml(scene: Scene) -> str:
     """TOML text that `read_scene` turns into the same scene, to the last bit."""
+    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     if scene.energy is not None or not isinstance(_law_name(scene.contact.law), str):
         raise InputError(
             "energy, law: a user's own function cannot be written to TOML; keep it in code"

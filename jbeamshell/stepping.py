@@ -16,6 +16,7 @@ from jbeamshell.equilibrium import Drive, Level, Seen, System, V
 from jbeamshell.friction import plastic_slip
 from jbeamshell.history import Status
 from jbeamshell.newton import Newton
+from jbeamshell.parts import ARC_LENGTH
 from jbeamshell.scene import Scene
 from jbeamshell.stiffness import (
     Stiffness,
@@ -28,7 +29,8 @@ from jbeamshell.stiffness import (
 )
 
 SLIPS = 0.5  # a node slips in a step when more than this part of its motion is inelastic
-CORNER = 1.6  # H by which a strip slips less deep than a bar
+CORNER, REACH = 1.7, 0.4  # H by which a strip slips less deep than a bar, and over which it grows
+EVENLY = 0.5**0.5  # of a direction that is as much displacement as force
 ROUNDING = 1e-9  # of the cap, or of gross slip: less than this is no difference
 PIECES = (8, 64)  # a load step that fails is walked in so many pieces, or so many
 
@@ -58,6 +60,7 @@ class State(NamedTuple):
     target, pressure : the controlled load and the part of the pressures reached
     turn : the last reversal
     change : (blocks, size) the last increment of the unknowns
+    along : (2,) direction in which the path goes on, of u(L) and F L/(E' 2H); for the arc length
     sound : whether all steps so far found equilibrium
     """
 
@@ -67,6 +70,7 @@ class State(NamedTuple):
     pressure: Array
     turn: Turn
     change: Array
+    along: Array
     sound: Array
 
 
@@ -141,7 +145,12 @@ def is_traced(*trees: object) -> bool:
 def _step(
     system: System, state: State, drive: Drive, solver: Newton, stiffness: Stiffness
 ) -> tuple[State, Steps]:
-    before = state.level
+    before, turn = state.level, _turned(system, state, drive)
+    guess = _guess(system, state, drive, turn)
+    target = drive.target
+    if system.control == ARC_LENGTH:
+        drive = _onwards(system, state, drive, turn)
+        stiffness = stiffness_at_rest(system, drive.rough, drive.along)
 
     def evaluate(unknown: Array) -> tuple[Array, Seen]:
         _, residual, seen = system.advance(nodal(system, unknown), before, drive)
@@ -165,11 +174,10 @@ def _step(
         fields = nodal(system, new).at[:, V].set(jnp.where(rubs, limited, slip))
         return in_blocks(fields, new)
 
-    turn = _turned(system, state, drive)
     change, (iterations, error) = solver.solve(
         evaluate,
         limit,
-        _guess(system, state, drive, turn),
+        guess,
         state.sound,
         tangent,
         stiffness,
@@ -186,7 +194,10 @@ def _step(
     noticeable = system.slip_stiffness * jnp.abs(inelastic) > ROUNDING * after.cap
     rubbing = (drive.rough > 0.0) & (after.cap > 2.0 * system.cap_floor)
     kept = jax.tree.map(lambda new, old: jnp.where(sound, new, old), after, before)
-    new = State(kept, rest, drive.target, drive.pressure, turn, change, sound)
+    path = _place(system, after, rest) - _place(system, before, rest)
+    gone = jnp.linalg.norm(path)
+    along = jnp.where(gone > 0.0, path / jnp.where(gone > 0.0, gone, 1.0), state.along)
+    new = State(kept, rest, target, drive.pressure, turn, change, along, sound)
     return new, Steps(
         state=new,
         displacement=end - rest,
@@ -200,6 +211,21 @@ def _step(
     )
 
 
+def _onwards(system: System, state: State, drive: Drive, turn: Turn) -> Drive:
+    """So far along the direction of the last step; on the middle way after a reversal."""
+    stride = drive.target - state.target
+    middle = jnp.where(stride >= 0.0, EVENLY, -EVENLY)
+    along = jnp.where(turn.target == state.target, middle, state.along)
+    ahead = jnp.sum(along * _place(system, state.level, state.rest)) + jnp.abs(stride)
+    return drive._replace(target=jnp.where(drive.rough > 0.0, ahead, 0.0), along=along)
+
+
+def _place(system: System, level: Level, rest: Array) -> Array:
+    """Where a level is on the path: u(L) and F L/(E' 2H), (2,)."""
+    u = system.end_displacement(level.q) - rest
+    return jnp.stack([u, level.force / system.stiffness_scale])
+
+
 def _turned(system: System, state: State, drive: Drive) -> Turn:
     """The last reversal of the load, which may be now."""
     stride, rough = drive.target - state.target, drive.rough > 0.0
@@ -210,7 +236,9 @@ def _turned(system: System, state: State, drive: Drive) -> Turn:
     left = jnp.maximum(2.0 * mean - before.cap - along * before.traction, 0.0)
     share = left * system.tributary
     used = jnp.cumsum(share[::-1])[::-1] - 0.5 * share
-    now = Turn(state.target, used + CORNER * system.half_height * left, left[-1])
+    away = (system.x[-1] - system.x) / (REACH * system.half_height)
+    corner = CORNER * system.half_height * (1.0 - jnp.exp(-away))
+    now = Turn(state.target, used + corner * left, left[-1])
     back = rough & (stride * (state.target - state.turn.target) <= 0.0)
     return jax.tree.map(lambda new, old: jnp.where(back, new, old), now, state.turn)
 
@@ -223,9 +251,14 @@ def _guess(system: System, state: State, drive: Drive, turn: Turn) -> Array:
     """
     rise = drive.target - turn.target
     along, load = jnp.where(rise >= 0.0, 1.0, -1.0), jnp.abs(rise)
-    if system.control == "displacement":
+    if system.control != "force":  # by the bar's u = F^2/(2 E' 2H q)
         stretch = system.stiffness_scale * jnp.sum(system.tributary)
-        load = jnp.sqrt(2.0 * stretch * turn.left * load)
+        square = 2.0 * stretch * turn.left
+        load = square * load
+        if system.control == ARC_LENGTH:  # the way is about the chord of u and F L/(E' 2H)
+            soft = (square / system.stiffness_scale) ** 2 / 2.0
+            load = load**2 / (soft + jnp.hypot(soft, load) + jnp.finfo(load.dtype).tiny)
+        load = jnp.sqrt(load)
     level, stiffness = state.level, system.slip_stiffness
     slips = turn.depth < load
     beyond = (2.0 * level.cap - along * level.traction) / stiffness
@@ -250,7 +283,16 @@ def at_rest(scene: Scene, touching: ArrayLike | None = None) -> State:
         lifted = jnp.zeros((zero.size, len(system.model.active)), zero.dtype)
         change = in_blocks(lifted.at[:, fields.index("w")].set(raised), change)
     turn = Turn(zero[0], zero, zero[0])
-    return State(system.rest(), zero[0], zero[0], zero[0], turn, change, jnp.asarray(True))
+    return State(
+        level=system.rest(),
+        rest=zero[0],
+        target=zero[0],
+        pressure=zero[0],
+        turn=turn,
+        change=change,
+        along=jnp.full(2, EVENLY, zero.dtype),
+        sound=jnp.asarray(True),
+    )
 
 
 def recover(scene: Scene, steps: Steps, path: Path, solver: Newton, start: State) -> Steps:

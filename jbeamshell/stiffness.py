@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.typing import ArrayLike
 
 from jbeamshell import block_tridiagonal
 from jbeamshell.block_tridiagonal import BlockTridiagonal
@@ -123,10 +124,12 @@ def _probes(system: System, like: Array) -> np.ndarray:
     return fields
 
 
-def stiffness_at_rest(system: System, rough: float) -> Stiffness:
+def stiffness_at_rest(
+    system: System, rough: ArrayLike, along: Array | tuple[float, float] = (1.0, 0.0)
+) -> Stiffness:
     """The stiffness of the strip before anything acts on it, with or without friction."""
     zero = jnp.zeros_like(system.x)
-    drive = Drive(zero[0], zero[0] + 1.0, zero[0], zero[0] + rough)
+    drive = Drive(zero[0], zero[0] + 1.0, zero[0], zero[0] + rough, along)
     return stiffness_at(system, system.rest().q, Touch(zero, zero, zero), drive)
 
 

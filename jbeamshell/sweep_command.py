@@ -15,6 +15,7 @@ import jax
 import numpy as np
 
 from jbeamshell.errors import InputError
+from jbeamshell.files import as_path
 from jbeamshell.terminal import assignments, put, say, say_written, warn
 
 UNCONVERGED = 3
@@ -70,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     over = values_of(options.over)
     figures = FIGURES if options.figures is None else words_of(options.figures)
     first = _joined(options)  # before anything else asks JAX for its devices
-    given = scenes.values_from(options.scene) if options.scene else {}
+    given = {} if options.scene is None else scenes.values_from(options.scene)
     scene = scene_from_values(overridden(given, assignments(options.set)))
     count = (max if options.paired else math.prod)([v.size for v in over.values()]) * len(figures)
     if options.json and count > MOST:
@@ -78,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
             f"--json: {count:,} numbers are too many for one text, {MOST:,} the most: leave it out "
             "and give --out FILE.csv"
         )
-    if options.plot:
+    if options.plot is not None:
         _check_picture(options.plot)
     say("compiling ...")
     with tqdm(disable=None if first else True, file=sys.stderr, unit="lane") as bar:
@@ -188,8 +189,8 @@ def _number(text: str, word: str) -> float:
 
 def _check_picture(path: str) -> None:
     """Refuse before the work what could not be written after it."""
-    folder = Path(path).parent
-    if not folder.is_dir():
+    folder = as_path(path).parent
+    if not os.path.isdir(folder):
         raise InputError(f"--plot {path}: there is no folder {folder}")
     if Path(path).suffix.lower() not in (".png", ".pdf", ".svg"):
         raise InputError(f"--plot {path}: end the name in .png, .pdf or .svg")

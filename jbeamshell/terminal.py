@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import ast
+import contextlib
+import math
 import os
 import sys
-import tomllib
 from collections.abc import Sequence
 from typing import Any
 
 from jbeamshell.errors import InputError
+from jbeamshell.files import parsed_toml
 
 
 def assignments(texts: Sequence[str]) -> dict[str, Any]:
@@ -33,13 +35,16 @@ def pairs(texts: Sequence[str], example: str) -> dict[str, str]:
 
 def _value(text: str) -> Any:
     """A TOML value; else a number such as .5, a list of them, a word, or words between commas."""
+    with contextlib.suppress(ValueError):
+        tables = parsed_toml(f"value = {text}")
+        if len(tables) == 1:  # else further lines of it
+            return tables["value"]
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        pass
-    try:
-        return ast.literal_eval(text) if text.startswith("[") else float(text)
-    except (ValueError, SyntaxError):
+        if text.startswith("["):
+            return ast.literal_eval(text)
+        number = float(text)
+        return text if math.isinf(number) and "inf" not in text.lower() else number
+    except (ValueError, SyntaxError, RecursionError, MemoryError):  # brackets by the thousand
         return [word.strip() for word in text.split(",")] if "," in text else text
 
 
@@ -47,8 +52,18 @@ def put(text: str) -> None:
     """Print a result."""
     try:
         print(text, end="", flush=True)
+    except UnicodeEncodeError as error:  # a label in letters that the terminal has not
+        print(text.encode(error.encoding, "backslashreplace").decode(error.encoding), end="")
     except BrokenPipeError:  # a reader such as head has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence(sys.stdout)
+    except OSError as error:
+        _silence(sys.stdout)
+        raise InputError(f"standard output: cannot be written ({error.strerror})") from None
+
+
+def _silence(stream: Any) -> None:
+    """Send what is still in its buffer nowhere, or Python would complain at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def say(text: str) -> None:

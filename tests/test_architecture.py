@@ -12,9 +12,10 @@ PACKAGE = Path(jbeamshell.__file__).parent
 UPWARDS = [
     "errors", "runtime", "files", "kinematics", "rungs", "closed_form", "elasticity", "energy",
     "sections", "laminate", "friction", "contact", "grid", "parts", "scene", "scenes",
-    "block_tridiagonal", "newton", "equilibrium", "stiffness", "cycles", "history", "stepping",
-    "masing", "quasistatic", "response", "sweeping", "advice", "measured", "example", "identify",
-    "plotting", "output", "terminal", "fit_command", "sweep_command", "__init__", "__main__",
+    "block_tridiagonal", "newton", "equilibrium", "stiffness", "cycles", "trust", "history",
+    "stepping", "masing", "quasistatic", "histories", "response", "sweeping", "advice", "measured",
+    "example", "identify", "dynamics", "plotting", "output", "terminal", "fit_command",
+    "sweep_command", "ringdown_command", "__init__", "__main__",
 ]
 INSIDE = {
     "measured": [
@@ -26,12 +27,21 @@ INSIDE = {
         "likelihood", "fitting", "plan", "__init__",
     ],
     "sweeping": ["lanes", "runner", "store", "job", "results", "processes", "worker", "__init__"],
+    "dynamics": [
+        "sliding", "excitation", "riders", "inertia", "equations", "modes", "motion", "banded",
+        "stride", "midpoint", "stepsize", "transient", "ringdown", "joint", "structure", "modal",
+        "shaking", "study", "__init__",
+    ],
     "plotting": [
-        "style", "steps", "paths", "contacts", "fits", "ladder", "speed", "sweeps", "__init__",
+        "style", "steps", "failures", "motions", "paths", "contacts", "fits", "ladder", "speed",
+        "discretisations", "methods", "sweeps", "__init__",
     ],
 }
 # fmt: on
 ONLY = {
+    "diffrax": "dynamics",
+    "lineax": "dynamics",
+    "optimistix": "dynamics",
     "matplotlib": "plotting",
     "jaxopt": "identify/search.py",
     "optax": "identify/search.py",

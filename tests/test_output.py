@@ -38,7 +38,7 @@ def pressed(history, steps, **values):
     """The start of a history, as if nothing but pressing had been asked for."""
     scene = history.scene.replace({"load.cycles": 0, "load.pressure_steps": steps} | values)
     kept = {"x", "middles", "tributary", "load"}
-    path = {k: v for k, v in vars(history).items() if k not in kept | {"scene", "cycles"}}
+    path = {k: v for k, v in vars(history).items() if k not in kept | {"scene", "cycles", "end"}}
     path = jax.tree.map(lambda a: a[:steps], path)
     return jb.History(**vars(history) | path | {"scene": scene, "cycles": ()})
 

@@ -405,7 +405,7 @@ def test_bad_values_are_refused(key, value, fix):
         (lambda: Contact(pressure="high"), "contact.pressure = 'high': give a number or a table"),
         (lambda: Contact(law=CappedTrial(0.5)), "contact.smoothing = 0.5: must be a number above"),
         (lambda: Load(amplitude=True), "load.amplitude = True: must be a number"),
-        (lambda: Load("displacement"), "load.amplitude = None: give the end displacement's"),
+        (lambda: Load("displacement"), "load.amplitude = None: give the amplitude"),
         (lambda: Model(fields=("v", "psi")), r"model.fields = \['v', 'psi'\]: make no model"),
     ],
 )
@@ -426,7 +426,7 @@ def test_parts_check_themselves(make, told):
             "strip.youngs_modulus and strip.axial_stiffness say the same thing",
         ),
         ({"model.grid": "collocation", "model.nodes": 40}, "model.nodes = 40: must be odd"),
-        ({"load.control": "displacement"}, "load.amplitude = None: give the end displacement's"),
+        ({"load.control": "displacement"}, "load.amplitude = None: give the amplitude"),
         (
             {"contact.law": "tanh-increment", "contact.smoothing": 8.0},
             "contact.smoothing = 8.0: contact.law 'tanh-increment' has none",

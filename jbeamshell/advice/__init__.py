@@ -112,6 +112,7 @@ def advise(
         if so few rungs find an equilibrium that nothing can be said of their errors
     """
     require("scene", "traced", not is_traced(scene), "give plain numbers; advice has no derivative")
+    require("quantity", quantity, isinstance(quantity, str), "give the name of a figure")
     number = isinstance(tolerance, int | float | np.number) and not isinstance(tolerance, bool)
     fix = f"must be a number from {SMALLEST} to 1; no rung is known finer: use finite elements"
     require("tolerance", tolerance, number and SMALLEST <= tolerance <= 1.0, fix)

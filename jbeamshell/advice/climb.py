@@ -8,13 +8,14 @@ the scene does not have: a laminate has no section of order p.
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 
-from jbeamshell.errors import InputError, UnconvergedError
+from jbeamshell.errors import DoubtfulWarning, InputError, UnconvergedError
 from jbeamshell.grid import ORDER
 from jbeamshell.parts import require
 from jbeamshell.quasistatic import check, compile_for, solve
@@ -68,7 +69,8 @@ def climb(
             tell(f"{rung} on {(fine if finely else coarse)['model.nodes']} nodes")
             settings = {"model.rung": rung} | (fine if finely else coarse)
             runs[rung, finely] = _solved(scene.replace(settings))
-        return runs[rung, finely][0].get(quantity, np.nan)
+        value = runs[rung, finely][0].get(quantity)
+        return np.nan if value is None else value
 
     climbed: list[str] = []
     change = np.inf
@@ -126,7 +128,9 @@ def _solved(scene: Scene) -> tuple[dict[str, Any], float]:
     compile_for(scene)
     begin = time.perf_counter()
     try:
-        history = jax.block_until_ready(solve(scene))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DoubtfulWarning)  # the climb finds out by itself
+            history = jax.block_until_ready(solve(scene))
     except UnconvergedError:
         return {}, np.inf  # no rung to choose, and no reason to give up the others
     return history.figures(), 1e3 * (time.perf_counter() - begin)

@@ -23,7 +23,9 @@ from jbeamshell.errors import InputError
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.measured.curves import Measurement, noise_of, response_of, weight_of
 from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.recordings import as_column
 from jbeamshell.newton import Newton
+from jbeamshell.parts import CONTROLS, require
 from jbeamshell.scene import Scene
 
 
@@ -113,6 +115,8 @@ class Experiment:
         weights = [_checked_weights(specimen) for specimen in specimens]
         for owner, specimen in enumerate(specimens):
             driver = specimen.scene.load.control
+            fix = "does not drive a measurement: take " + " or ".join(map(repr, CONTROLS))
+            require("load.control", driver, driver in CONTROLS, fix)
             if not specimen.measurements:
                 where = f" of specimen {specimen.label!r}" if specimen.label else ""
                 raise InputError(f"data{where}: no measurement given; read loops with read_loops")
@@ -282,10 +286,14 @@ def _with_column(measurement: Any, column: str, values: NDArray[np.float64]) -> 
 def _checked_weights(specimen: Specimen) -> NDArray[np.float64]:
     """One factor for each of the measurements."""
     count, where = len(specimen.measurements), f" of {specimen.label!r}" if specimen.label else ""
-    weights = np.ones(count) if len(specimen.weights) == 0 else np.asarray(specimen.weights, float)
+    fix = "give one positive number for each of the measurements"
+    several = isinstance(specimen.weights, list | tuple | np.ndarray)
+    require(f"weights{where}", specimen.weights, several, fix)
+    given = as_column(specimen.weights, f"weights{where}", "data")
+    weights = given if given.size else np.ones(count)
     if weights.shape != (count,) or not np.all(np.isfinite(weights) & (weights > 0.0)):
         raise InputError(
-            f"weights{where} = {list(specimen.weights)}: give one positive number for each of the "
+            f"weights{where} = {given.tolist()}: give one positive number for each of the "
             f"{count} measurements"
         )
     return weights

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -19,11 +20,13 @@ from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, Limits
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.loops import FEWEST_POINTS, Loop
 from jbeamshell.newton import Newton
+from jbeamshell.parts import require, shown
 from jbeamshell.scene import Scene
 
 POINTS = 96  # of a loop that the model is run through
 MAX_ITERATIONS = 40
 METHODS = tuple(SEARCHES)
+MOST = 10**6  # of anything that is counted
 STARTS = 3  # of searches between bounds
 ADAM_STARTS = 8
 SCREENED = 4  # points tried for each start beside the given one
@@ -115,7 +118,7 @@ def fit(
     KeyboardInterrupt
         when interrupted, with a message that says what was saved
     """
-    if method not in METHODS:
+    if not (isinstance(method, str) and method in METHODS):
         raise InputError(f"method = {method!r}: choose {' or '.join(map(repr, METHODS))}")
     _check_counts(
         starts=(1 if starts is None else starts, 1),
@@ -126,6 +129,8 @@ def fit(
         noise=(1.0 if noise is None else noise, "a positive part of the range, such as 0.01"),
         tolerance=(tolerance, "a positive number, such as 1e-7"),
     )
+    fix = "give a jbeamshell.Newton"
+    require("solver", solver, solver is None or isinstance(solver, Newton), fix)
     parameters = as_parameters(free)
     specimens = _specimens(data, scene, weights)
     labels = [specimen.label for specimen in specimens]
@@ -201,16 +206,17 @@ def _check_counts(**given: Any) -> None:
     """Options that are whole numbers; each with the least it may be."""
     for name, (value, least) in given.items():
         whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-        if not (whole and value >= least):
-            raise InputError(f"{name} = {value!r}: give a whole number, {least} or more")
+        if not (whole and least <= value <= MOST):
+            fix = f"{least} or more" if not whole or value < least else f"{MOST} at the most"
+            raise InputError(f"{name} = {shown(value)}: give a whole number, {fix}")
 
 
 def _check_sizes(**given: Any) -> None:
     """Options that are positive numbers; each with what to give."""
     for name, (value, fix) in given.items():
         number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if not (number and np.isfinite(value) and value > 0.0):
-            raise InputError(f"{name} = {value!r}: give {fix}")
+        if not (number and 0.0 < value <= sys.float_info.max):
+            raise InputError(f"{name} = {shown(value)}: give {fix}")
 
 
 def _specimens(data: Any, scene: Scene | None, weights: Sequence[float]) -> list[Specimen]:
@@ -222,6 +228,7 @@ def _specimens(data: Any, scene: Scene | None, weights: Sequence[float]) -> list
             raise InputError(
                 "scene: give one, or a Specimen (a scene with its data) in place of data"
             )
+        require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
         return [Specimen(scene, data, weights=weights)]
     if not all(isinstance(item, Specimen) for item in given):
         raise InputError("data: mixes specimens with measurements: make each a Specimen")

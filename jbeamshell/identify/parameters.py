@@ -7,6 +7,7 @@ the slopes of these bijections.
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import expit, logit
 
 from jbeamshell.errors import InputError
+from jbeamshell.parts import shown
 from jbeamshell.scene import NUMBERS, Scene, check_key
 
 # Open intervals in which parameters live; all others are positive.
@@ -69,7 +71,8 @@ class Parameter:
         self._require("each", self.each, isinstance(self.each, bool), "give true or false")
         self._check_prior()
         fix = "choose 'log' or 'linear'"
-        self._require("scale", self.scale, self.scale is None or self.scale in SCALES, fix)
+        known = isinstance(self.scale, str) and self.scale in SCALES
+        self._require("scale", self.scale, self.scale is None or known, fix)
         low, high = self.bounds
         least, most = LIMITS.get(self.key, (0.0, np.inf))
         fix = f"the parameter lives between {least:g} and {most:g}: give a bound in there"
@@ -109,7 +112,7 @@ class Parameter:
 
     def _require(self, name: str, value: Any, holds: bool, fix: str) -> None:
         if not holds:
-            raise InputError(f"free {self.key!r}: {name} = {value!r}: {fix}")
+            raise InputError(f"free {self.key!r}: {name} = {shown(value)}: {fix}")
 
 
 class Bijection(NamedTuple):
@@ -249,8 +252,8 @@ class Space(NamedTuple):
 
 def as_parameters(free: Sequence[str | Parameter]) -> tuple[Parameter, ...]:
     """Parameters from keys or parameters; raises `InputError` for none or one named twice."""
-    given = [free] if isinstance(free, str | Parameter) else list(free)
-    if not given:
+    given = [free] if isinstance(free, str | Parameter) else free
+    if not (isinstance(given, list | tuple) and given):
         raise InputError("free: name at least one key, such as contact.friction")
     parameters = []
     for item in given:
@@ -318,4 +321,4 @@ def _start(scene: Scene, key: str) -> float:
 
 def _is_number(value: Any) -> bool:
     number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    return number and bool(np.isfinite(value))
+    return number and bool(abs(value) <= sys.float_info.max)  # a whole number may be beyond

@@ -24,7 +24,7 @@ The command line makes one of its options; anything larger is a TOML file:
 from __future__ import annotations
 
 import dataclasses
-import tomllib
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -33,6 +33,7 @@ import numpy as np
 
 from jbeamshell import scenes
 from jbeamshell.errors import InputError
+from jbeamshell.files import as_path, read_toml
 from jbeamshell.identify.experiment import Specimen
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.measured.curve_files import read_curves
@@ -41,7 +42,7 @@ from jbeamshell.measured.loops import Loop, driver_of
 from jbeamshell.measured.recordings import Recording, read_recordings
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import DRIFTS, steady_loops
-from jbeamshell.parts import CONTROLS
+from jbeamshell.parts import CONTROLS, shown
 from jbeamshell.scene import overridden, scene_from_values
 
 KINDS = ("loop", "backbone", "dissipation", "stiffness", "squeeze")
@@ -105,14 +106,14 @@ class Source:
         words = {"kind": KINDS, "cycles": CYCLES, "drift": DRIFTS, "driver": (None, *CONTROLS)}
         for name, known in words.items():
             value = getattr(self, name)
-            if value not in known:
+            if not (value is None or isinstance(value, str)) or value not in known:
                 names = ", ".join(repr(word) for word in known if word)
-                raise InputError(f"{name} = {value!r}: choose among {names}")
+                raise InputError(f"{name} = {shown(value)}: choose among {names}")
         if not isinstance(self.centre, bool):
             raise InputError(f"centre = {self.centre!r}: give true or false")
         number = isinstance(self.width, int | float) and not isinstance(self.width, bool)
-        if not (number and np.isfinite(self.width) and self.width > 0.0):
-            raise InputError(f"width = {self.width!r}: give a positive number")
+        if not (number and 0.0 < self.width <= sys.float_info.max):
+            raise InputError(f"width = {shown(self.width)}: give a positive number")
 
     def measurements(self, folder: Path) -> Iterator[tuple[Measurement, Sequence[str]]]:
         """What is in the files, each with a note or two on what was done to it."""
@@ -165,14 +166,9 @@ def read_plan(path: str | Path) -> Plan:
     InputError
         naming the file, the entry and the fix
     """
+    values = read_toml(path)
     try:
-        values = tomllib.loads(Path(path).read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: is not a TOML file ({error})") from None
-    try:
-        return plan_from_values(values, Path(path).parent)
+        return plan_from_values(values, as_path(path).parent)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -190,6 +186,7 @@ def plan_from_values(values: Mapping[str, Any], folder: Path) -> Plan:
     InputError
         for an entry that is unknown or of the wrong kind, and for files that cannot be read
     """
+    _check_table("plan", values)
     given = values.get("specimen", [])
     if not (isinstance(given, list) and given and all(isinstance(s, dict) for s in given)):
         raise InputError("specimen: write a table [[specimen]] with data for each")
@@ -283,7 +280,7 @@ def _parameter(key: str, table: Any) -> dict[str, Any]:
 
 def _check_table(name: str, table: Any) -> None:
     if not isinstance(table, Mapping):
-        raise InputError(f"{name} = {table!r}: must be a table")
+        raise InputError(f"{name} = {shown(table)}: must be a table")
 
 
 def _check_names(where: str, table: Mapping[str, Any], known: Sequence[str]) -> None:

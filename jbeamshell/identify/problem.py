@@ -22,12 +22,13 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from jbeamshell.errors import InputError
-from jbeamshell.files import write_text
+from jbeamshell.files import as_path, write_text
 from jbeamshell.identify.experiment import Answer, Experiment
 from jbeamshell.identify.parameters import Space
 from jbeamshell.newton import Newton
 
 FORMAT = "jbeamshell fit 1"
+LONGEST_HEADER = 1000  # characters
 
 
 class Point(NamedTuple):
@@ -79,12 +80,12 @@ class Problem:
                 "unknown noise; give noise, such as 0.01 of the range"
             )
         self._known: dict[bytes, Answer] = {}
-        self._path = None if save is None else Path(save)
+        self._path = None if save is None else as_path(save)
         if self._path is not None:
             mark = _fingerprint(experiment, space.keys, solver)
             self._header = json.dumps({"format": FORMAT, "fingerprint": mark})
-            if self._path.exists():
-                self._restore()
+            if os.path.exists(self._path):  # or false, where there can be no such name
+                self._restore(space)
             else:
                 write_text(self._path, self._header + "\n")
 
@@ -141,19 +142,23 @@ class Problem:
             reason = error.strerror or error
             raise InputError(f"save {self._path}: cannot be written ({reason})") from None
 
-    def _restore(self) -> None:
+    def _restore(self, space: Space) -> None:
         path, fix = Path(str(self._path)), "delete it, or save elsewhere"
+        sizes = self.experiment.weight.size, len(space.keys), len(space.names)
         try:
-            # What follows the last newline was being written when the power went.
-            header, *lines = path.read_text(encoding="utf-8").split("\n")[:-1]
-            state = json.loads(header)
-            if state["format"] != FORMAT:
-                raise ValueError
-            runs = [_run(line, self.experiment.weight.size) for line in lines]
+            with path.open(encoding="utf-8") as file:
+                # No more than a header of what may be gigabytes of anything.
+                header = file.readline(LONGEST_HEADER).rstrip("\n")
+                fit = json.loads(header)["format"] == FORMAT
+                # What follows the last newline was being written when the power went.
+                lines = file.read().split("\n")[:-1] if header == self._header else []
+            runs = [_run(line, *sizes) for line in lines]
         except OSError as error:
             raise InputError(f"save {path}: cannot be read ({error.strerror})") from None
-        except (ValueError, KeyError, TypeError):
-            raise InputError(f"save {path}: is no state of a fit: {fix}") from None
+        except (ValueError, KeyError, TypeError, RecursionError):
+            fit = False
+        if not fit:
+            raise InputError(f"save {path}: is no state of a fit: {fix}")
         if header != self._header:
             raise InputError(f"save {path}: is the state of another fit: {fix}")
         self._known = {values.tobytes(): answer for values, answer in runs}
@@ -166,13 +171,15 @@ def _line(values: NDArray[np.float64], answer: Answer) -> str:
     return json.dumps(packed | {"sound": answer.sound}) + "\n"
 
 
-def _run(line: str, rows: int) -> tuple[NDArray[np.float64], Answer]:
+def _run(line: str, rows: int, keys: int, entries: int) -> tuple[NDArray[np.float64], Answer]:
     run = json.loads(line)
     residual, prediction = (
         _unpacked(run[name]).reshape(rows) for name in ("residual", "prediction")
     )
-    jacobian = _unpacked(run["jacobian"]).reshape(rows, -1)
-    return _unpacked(run["values"]), Answer(residual, jacobian, prediction, bool(run["sound"]))
+    jacobian = _unpacked(run["jacobian"]).reshape(rows, keys)
+    return _unpacked(run["values"]).reshape(entries), Answer(
+        residual, jacobian, prediction, bool(run["sound"])
+    )
 
 
 def _packed(array: NDArray[np.float64]) -> str:

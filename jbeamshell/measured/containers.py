@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
@@ -100,8 +101,10 @@ def read_table(
 
 
 def _matlab(data: bytes) -> Iterator[tuple[str, Any]]:
-    from scipy.io import loadmat  # only files of MATLAB's pay for it
+    from scipy.io import loadmat, whosmat  # only files of MATLAB's pay for it
 
+    if sum(8 * math.prod(shape) for _, shape, _ in whosmat(io.BytesIO(data))) > LARGEST:
+        raise ValueError(f"more than {LARGEST // 10**6} MB when unpacked")
     for name, value in loadmat(io.BytesIO(data)).items():
         if name.startswith("__"):
             continue

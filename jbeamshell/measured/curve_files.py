@@ -11,7 +11,7 @@ from jbeamshell.errors import InputError
 from jbeamshell.measured.columns import bare, factor_of, unit_of
 from jbeamshell.measured.containers import read_table
 from jbeamshell.measured.curves import Curve, DissipationCurve, SqueezeCurve, StiffnessCurve
-from jbeamshell.measured.recordings import FilePath, labels_of
+from jbeamshell.measured.recordings import FilePath, check_words_of, labels_of
 
 # What the columns of a kind of curve are measured in, all per unit width.
 QUANTITIES: dict[str, dict[str, tuple[str, ...]]] = {
@@ -57,14 +57,15 @@ def read_curves(
     InputError
         naming the file, the line or column, and the fix
     """
-    if kind not in QUANTITIES:
+    check_words_of(columns=columns, units=units)
+    if not (isinstance(kind, str) and kind in QUANTITIES):
         raise InputError(f"kind = {kind!r}: choose among {', '.join(map(repr, QUANTITIES))}")
     known = (*QUANTITIES[kind], "noise")
     for name, given in (("columns", columns or {}), ("units", units or {})):
         for quantity in given:
             if quantity not in known:
                 raise InputError(f"{name}: {quantity!r} is unknown: choose among {known}")
-    files = list(paths) if isinstance(paths, Sequence) and not isinstance(paths, str) else [paths]
+    files: list[Any] = list(paths) if isinstance(paths, list | tuple) else [paths]
     return [
         _read(path, label, kind, columns or {}, units or {}, decimal)
         for path, label in zip(files, labels_of(files), strict=True)

@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.errors import InputError
 from jbeamshell.measured.loops import FEWEST_POINTS, Loop
+from jbeamshell.measured.recordings import HUGE, as_column
+from jbeamshell.parts import shown
 from jbeamshell.scene import Scene
 
 FEWEST_OF_BACKBONE = 3
@@ -45,7 +47,7 @@ class Curve(eqx.Module):
             if column.ndim != 1 or column.size < fewest:
                 fix = f"give {fewest} point{'s' * (fewest > 1)} or more"
                 raise InputError(f"{self.label}: {name} has shape {column.shape}: {fix}")
-            bad = np.flatnonzero(~np.isfinite(column))
+            bad = np.flatnonzero(~(np.abs(column) <= HUGE))
             if bad.size:
                 raise InputError(
                     f"{self.label}: {name} is {column[bad[0]]} at point {bad[0] + 1}: remove or "
@@ -84,9 +86,9 @@ class SqueezeCurve(Curve):
         noise: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        self.x, self.stress = np.asarray(x, dtype=float), np.asarray(stress, dtype=float)
-        self.label, self.weight = label, weight
-        self.noise = _noise(noise, self.x)
+        self.x, self.stress = as_column(x, "x", label), as_column(stress, "stress", label)
+        self.label, self.weight = label, _weight(weight, label)
+        self.noise = _noise(noise, self.x, label)
 
     def __check_init__(self) -> None:
         self._check(FEWEST_POINTS, x=self.x, stress=self.stress)
@@ -144,10 +146,10 @@ class Backbone(Curve):
         noise: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        self.force = np.asarray(force, dtype=float)
-        self.displacement = np.asarray(displacement, dtype=float)
-        self.label, self.weight = label, weight
-        self.noise = _noise(noise, self.force)
+        self.force = as_column(force, "force", label)
+        self.displacement = as_column(displacement, "displacement", label)
+        self.label, self.weight = label, _weight(weight, label)
+        self.noise = _noise(noise, self.force, label)
 
     def __check_init__(self) -> None:
         columns = {"force": self.force, "displacement": self.displacement}
@@ -201,10 +203,10 @@ class DissipationCurve(AmplitudeCurve):
         noise: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        self.amplitude = np.asarray(amplitude, dtype=float)
-        self.dissipation = np.asarray(dissipation, dtype=float)
-        self.label, self.weight = label, weight
-        self.noise = _noise(noise, self.amplitude)
+        self.amplitude = as_column(amplitude, "amplitude", label)
+        self.dissipation = as_column(dissipation, "dissipation", label)
+        self.label, self.weight = label, _weight(weight, label)
+        self.noise = _noise(noise, self.amplitude, label)
 
     def __check_init__(self) -> None:
         self._check_positive(amplitude=self.amplitude, dissipation=self.dissipation)
@@ -238,10 +240,10 @@ class StiffnessCurve(AmplitudeCurve):
         noise: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        self.amplitude = np.asarray(amplitude, dtype=float)
-        self.stiffness = np.asarray(stiffness, dtype=float)
-        self.label, self.weight = label, weight
-        self.noise = _noise(noise, self.amplitude)
+        self.amplitude = as_column(amplitude, "amplitude", label)
+        self.stiffness = as_column(stiffness, "stiffness", label)
+        self.label, self.weight = label, _weight(weight, label)
+        self.noise = _noise(noise, self.amplitude, label)
 
     def __check_init__(self) -> None:
         self._check_positive(amplitude=self.amplitude, stiffness=self.stiffness)
@@ -296,8 +298,17 @@ def check_noise(label: str, noise: NDArray[np.float64] | None, points: int) -> N
         )
 
 
-def _noise(noise: Any, column: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def _weight(weight: Any, label: str) -> float:
+    number = isinstance(weight, int | float | np.floating | np.integer)
+    if number and not isinstance(weight, bool) and abs(weight) <= HUGE:
+        return float(weight)
+    raise InputError(f"{label}: weight = {shown(weight)}: must be a positive number")
+
+
+def _noise(
+    noise: Any, column: NDArray[np.float64], label: str = "noise"
+) -> NDArray[np.float64] | None:
     if noise is None:
         return None
-    values = np.asarray(noise, dtype=float)
+    values = as_column(noise, "noise", label)
     return np.full(column.shape, float(values)) if values.ndim == 0 else values

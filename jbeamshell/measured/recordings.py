@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.errors import InputError
+from jbeamshell.files import as_path
 from jbeamshell.measured.columns import FURTHER, QUANTITIES, find_columns, is_header, unit_factors
 from jbeamshell.measured.containers import read_table
 
@@ -70,10 +70,7 @@ def recording_from_arrays(
     given |= {"normal_force": normal_force} if normal_force is not None else {}
     columns = {}
     for name, values in given.items():
-        try:
-            columns[name] = np.asarray(values, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{label}: {name} is no array of numbers: give one") from None
+        columns[name] = as_column(values, name, label)
         if columns[name].ndim != 1 or columns[name].size < FEWEST_POINTS:
             raise InputError(
                 f"{label}: {name} has shape {columns[name].shape}: give {FEWEST_POINTS} points or "
@@ -116,6 +113,19 @@ def recording_from_arrays(
     )
 
 
+def as_column(values: ArrayLike, name: str, label: str) -> NDArray[np.float64]:
+    """Numbers as an array, NaN for masked ones and None; words, truths, complex ones are none."""
+    try:
+        if isinstance(values, np.ma.MaskedArray):
+            values = np.ma.filled(values.astype(float), np.nan)
+        given = np.asarray(values)
+        if given.dtype.kind in "iufO":
+            return given.astype(float)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InputError(f"{label}: {name} is no array of numbers: give one")
+
+
 def read_recordings(
     paths: FilePath | Sequence[FilePath],
     *,
@@ -149,14 +159,15 @@ def read_recordings(
     InputError
         naming the file, the line or column, and the fix
     """
-    if decimal not in (None, ",", "."):
+    check_words_of(columns=columns, units=units)
+    if not (decimal is None or (isinstance(decimal, str) and decimal in (",", "."))):
         raise InputError(f"decimal = {decimal!r}: give ',' or '.'")
     for quantity in units or {}:
         if quantity not in (*QUANTITIES, *FURTHER):
             raise InputError(f"units: {quantity!r} is no quantity: give force and displacement")
     if isinstance(paths, str | os.PathLike):
         return _read(paths, None, columns or {}, units or {}, decimal)
-    if not paths:
+    if not (isinstance(paths, list | tuple) and paths):
         raise InputError("no file given: name at least one")
     found = []
     for path, label in zip(paths, labels_of(paths), strict=True):
@@ -164,9 +175,19 @@ def read_recordings(
     return found
 
 
+def check_words_of(**given: Any) -> None:
+    """Raise `InputError` for options that are no dictionary of words."""
+    for name, words in given.items():
+        if words is not None and not (
+            isinstance(words, Mapping)
+            and all(isinstance(w, str) for w in (*words, *words.values()))
+        ):
+            raise InputError(f"{name} = {words!r}: give a dictionary of words")
+
+
 def labels_of(paths: Sequence[FilePath]) -> list[str]:
     """The files' names, with as much of their folders as tells them apart."""
-    whole = [Path(path).absolute() for path in paths]
+    whole = [as_path(path).absolute() for path in paths]
     for i, path in enumerate(whole):
         if path in whole[:i]:
             raise InputError(f"{paths[i]}: is given twice: it would count double")

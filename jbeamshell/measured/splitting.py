@@ -121,7 +121,10 @@ def split_cycles(
     InputError
         if there is no reversal, or no whole cycle
     """
-    if driver not in (None, "force", "displacement"):
+    if not isinstance(recording, Recording | Loop):
+        kind = type(recording).__name__
+        raise InputError(f"recording: a {kind} is none: give a Recording or a Loop")
+    if not (driver is None or (isinstance(driver, str) and driver in ("force", "displacement"))):
         raise InputError(f"driver = {driver!r}: give 'force' or 'displacement'")
     if not 0.0 < smallest < 1.0:
         raise InputError(f"smallest = {smallest}: give a share of the range between 0 and 1")

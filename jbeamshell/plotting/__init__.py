@@ -7,6 +7,16 @@ figures of your own alike.
 
 from jbeamshell.plotting.contacts import contact as contact
 from jbeamshell.plotting.contacts import contact_map as contact_map
+from jbeamshell.plotting.discretisations import methods_contacts as methods_contacts
+from jbeamshell.plotting.discretisations import methods_grids as methods_grids
+from jbeamshell.plotting.discretisations import methods_locking as methods_locking
+from jbeamshell.plotting.discretisations import methods_oscillation as methods_oscillation
+from jbeamshell.plotting.discretisations import methods_shooting as methods_shooting
+from jbeamshell.plotting.failures import OUTCOMES as OUTCOMES
+from jbeamshell.plotting.failures import failure_map as failure_map
+from jbeamshell.plotting.failures import failure_scatter as failure_scatter
+from jbeamshell.plotting.failures import failure_sheets as failure_sheets
+from jbeamshell.plotting.failures import outcome as outcome
 from jbeamshell.plotting.fits import likelihoods as likelihoods
 from jbeamshell.plotting.fits import overlay as overlay
 from jbeamshell.plotting.fits import residuals as residuals
@@ -14,6 +24,17 @@ from jbeamshell.plotting.ladder import RUNG_LOOKS as RUNG_LOOKS
 from jbeamshell.plotting.ladder import advice_map as advice_map
 from jbeamshell.plotting.ladder import error_map as error_map
 from jbeamshell.plotting.ladder import work_precision as work_precision
+from jbeamshell.plotting.methods import methods_controls as methods_controls
+from jbeamshell.plotting.methods import methods_laws as methods_laws
+from jbeamshell.plotting.methods import methods_sheet as methods_sheet
+from jbeamshell.plotting.methods import methods_solvers as methods_solvers
+from jbeamshell.plotting.methods import methods_steps as methods_steps
+from jbeamshell.plotting.motions import energies as energies
+from jbeamshell.plotting.motions import modal_curve as modal_curve
+from jbeamshell.plotting.motions import ring_down as ring_down
+from jbeamshell.plotting.motions import ring_down_sheet as ring_down_sheet
+from jbeamshell.plotting.motions import spectrogram as spectrogram
+from jbeamshell.plotting.motions import vibration as vibration
 from jbeamshell.plotting.paths import loop as loop
 from jbeamshell.plotting.paths import profiles as profiles
 from jbeamshell.plotting.speed import speed_batches as speed_batches

@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from jbeamshell.errors import InputError
+from jbeamshell.files import as_path
+from jbeamshell.parts import require
 from jbeamshell.scene import Scene, read_scene, read_values
 
 
@@ -148,7 +150,7 @@ def values_of(name: str) -> dict[str, Any]:
 
 def values_from(word: str, folder: Path = Path()) -> dict[str, Any]:
     """Dotted values of a scene of a name, or of a file in a folder."""
-    path = Path(word)
+    path = as_path(word)
     is_file = path.suffix == ".toml" or path.name != word or os.path.isfile(folder / path)
     return read_values(folder / path) if is_file else values_of(word)
 
@@ -160,6 +162,7 @@ def summary(name: str) -> str:
 
 
 def _file(name: str) -> Path:
+    require("scene", name, isinstance(name, str), "give a name")
     if name not in NAMES:
         near = difflib.get_close_matches(name, NAMES, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"scenes are {', '.join(NAMES)}"

@@ -17,8 +17,9 @@ import jax
 from numpy.typing import ArrayLike
 
 from jbeamshell.errors import UnconvergedError
+from jbeamshell.files import as_path
 from jbeamshell.newton import Newton
-from jbeamshell.parts import require
+from jbeamshell.parts import check_words, require
 from jbeamshell.scene import Scene
 from jbeamshell.sweeping.job import Job
 from jbeamshell.sweeping.lanes import Lanes as Lanes
@@ -30,6 +31,7 @@ from jbeamshell.sweeping.runner import Block, check_figures
 from jbeamshell.sweeping.store import Store
 
 FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "loss_factor")
+MOST_PROCESSES = 10_000
 PARTS = ".parts"  # what a sweep to FILE.csv keeps its finished blocks in, beside the file
 LOST = "a process was lost: its lanes that were not on disk were run by the others"
 
@@ -97,7 +99,7 @@ def sweep(
                 f"{said}; {store.folder} keeps what is done, and the same sweep goes on from there"
             ) from None
         if jax.process_index() == 0:
-            result.to_csv(table)
+            store.publish(result, table)
         if jax.process_count() > 1 and LOST not in result.notes:
             wait_for_all()
         if jax.process_index() == 0 or LOST not in result.notes:
@@ -116,29 +118,39 @@ def _job(
     paired: bool,
     solver: Newton | None,
 ) -> Job:
-    names = (figures,) if isinstance(figures, str) else tuple(figures)
+    names = [figures] if isinstance(figures, str) else figures
+    check_words("figures", names)
+    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+    fix = "give a jbeamshell.Newton"
+    require("solver", solver, solver is None or isinstance(solver, Newton), fix)
     lanes = lanes_of(scene, over, paired)
     check_size(lanes.size, len(names))
-    check_figures(scene, tuple(lanes.axes), names, solver)
-    return Job(lanes, names, solver)
+    check_figures(scene, tuple(lanes.axes), tuple(names), solver)
+    return Job(lanes, tuple(names), solver)
 
 
 def _check_processes(processes: int, devices: Sequence[Any] | None) -> None:
-    whole = isinstance(processes, int) and not isinstance(processes, bool) and processes >= 1
-    require("processes", processes, whole, "must be a whole number, 1 or more")
+    whole = isinstance(processes, int) and not isinstance(processes, bool)
+    fix = "must be a whole number, 1 or more"
+    require("processes", processes, whole and 1 <= processes <= MOST_PROCESSES, fix)
     if processes > 1:
         on_cores = jax.default_backend() == "cpu"
         require("processes", processes, on_cores, "are for cores: other devices work side by side")
         fix = "is not for the processes of jax.distributed: leave it out"
         require("processes", processes, jax.process_count() == 1, fix)
         require("devices", devices, devices is None, "are chosen by the processes: leave it out")
+    if devices is not None:
+        known = isinstance(devices, list | tuple) and all(
+            isinstance(d, jax.Device) for d in devices
+        )
+        require("devices", devices, known and len(devices) > 0, "give a list such as jax.devices()")
 
 
 def _check_out(out: str | os.PathLike[str]) -> Path:
-    table = Path(out)
+    table = as_path(out)
     require("out", str(out), table.suffix.lower() == ".csv", "end the name in .csv")
-    require("out", str(out), not table.is_dir(), "is a folder: name a file")
-    require("out", str(out), table.parent.is_dir(), f"there is no folder {table.parent}")
+    require("out", str(out), not os.path.isdir(table), "is a folder: name a file")
+    require("out", str(out), os.path.isdir(table.parent), f"there is no folder {table.parent}")
     fix = f"the folder {table.parent} cannot be written to: name another"
     require("out", str(out), os.access(table.parent, os.W_OK | os.X_OK), fix)
     return table

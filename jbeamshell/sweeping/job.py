@@ -115,7 +115,8 @@ class Job:
     def stored(self, share: Sequence[int], store: Store) -> dict[int, Block]:
         """Those of the blocks that are in the store."""
         done = store.done()
-        loaded = {n: store.load(n, self.blocks[n].size) for n in share if n in done}
+        figures = len(self.figures)
+        loaded = {n: store.load(n, figures, self.blocks[n].size) for n in share if n in done}
         return {number: block for number, block in loaded.items() if block is not None}
 
     def collected(self, blocks: Mapping[int, Block]) -> tuple[dict[str, np.ndarray], np.ndarray]:

@@ -196,7 +196,8 @@ class Lanes:
 
 def lanes_of(scene: Scene, over: Mapping[str, ArrayLike], paired: bool = False) -> Lanes:
     """Lanes of axes that are checked; raises `InputError` with the fix where they make none."""
-    require("over", dict(over), bool(over), "name at least one key and its values")
+    some = isinstance(over, Mapping) and len(over) > 0
+    require("over", over, some, "name at least one key and its values, in a dictionary")
     for key in over:
         check_key(key)
         number = key in NUMBERS and key != "strip.layers"

@@ -70,7 +70,7 @@ class Crew:
             return subprocess.Popen(
                 [sys.executable, *words, str(self.count)],
                 env=self._environment,
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE,  # whose end tells a worker that its parent is gone
                 stdout=log,
                 stderr=log,
             )
@@ -84,6 +84,7 @@ class Crew:
                 f"worker process {number + 1} of {self.count} died {TRIES} times without "
                 f"finishing a block ({self._cause(number)}); what is done is kept"
             )
+        _close(self._processes[number])
         self._processes[number] = self._start(number)
 
     def _cause(self, number: int) -> str:
@@ -112,6 +113,13 @@ class Crew:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+            _close(process)
+
+
+def _close(process: subprocess.Popen[bytes]) -> None:
+    """Close our end of its standard input."""
+    if process.stdin is not None:
+        process.stdin.close()
 
 
 def mark(store: Store, number: int) -> Path:

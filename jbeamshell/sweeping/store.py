@@ -6,10 +6,9 @@ import contextlib
 import os
 import re
 import shutil
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,10 +16,12 @@ from jbeamshell.errors import InputError
 from jbeamshell.files import written_whole
 from jbeamshell.sweeping.runner import Block
 
+if TYPE_CHECKING:
+    from jbeamshell.sweeping.results import Sweep
+
 DESCRIPTION = "sweep.npz"
 FINISHED = re.compile(r"block-(\d+)\.npz$")
-OURS = re.compile(r"sweep\.npz$|block-\d+\.npz$|worker-\d+\.|\.")  # and drafts, of any of them
-UNREADABLE = (OSError, TypeError, ValueError, KeyError, EOFError, zipfile.BadZipFile)
+OURS = re.compile(r"(sweep|block-\d+)\.npz$|table\.csv$|worker-\d+\.|\.")  # and their drafts
 
 
 class Store:
@@ -66,7 +67,7 @@ class Store:
             held = _arrays(self.folder / DESCRIPTION)
             axes = [held[f"axis_{i}"] for i in range(len(held) - 1)]
             return str(held["description"]), axes
-        except UNREADABLE:
+        except Exception:  # whatever a parser stumbles over in a broken file
             raise InputError(
                 f"{self.folder}: holds no sweep that can be read: delete the folder"
             ) from None
@@ -82,22 +83,34 @@ class Store:
         with written_whole(self._place(number)) as draft:
             np.savez(draft, values=block.values, status=block.status)
 
-    def load(self, number: int, lanes: int) -> Block | None:
-        """A block of so many lanes; None, and no file any more, if it is damaged."""
-        with contextlib.suppress(*UNREADABLE):
+    def load(self, number: int, figures: int, lanes: int) -> Block | None:
+        """A block of so many figures and lanes; None, and no file any more, if it is damaged."""
+        with contextlib.suppress(Exception):  # whatever a parser stumbles over in a broken file
             block = Block(**_arrays(self._place(number)))
-            if block.values.shape[-1] == block.status.size == lanes:
+            sizes = block.values.shape, block.status.shape
+            kinds = block.values.dtype.kind, block.status.dtype
+            if sizes == ((figures, lanes), (lanes,)) and kinds == ("f", np.int8):
                 return block
         self._place(number).unlink(missing_ok=True)
         return None
+
+    def publish(self, result: Sweep, table: Path) -> None:
+        """Write the table, so that what a kill leaves behind is in the folder."""
+        draft = self.folder / "table.csv"
+        result.to_csv(draft)
+        try:
+            draft.replace(table)
+        except OSError as error:
+            raise InputError(f"{table}: cannot be written ({error.strerror})") from None
 
     def remove(self) -> None:
         """Remove what a sweep leaves in the folder, and the folder if nothing else is in there."""
         shutil.rmtree(self.cache, ignore_errors=True)
         with contextlib.suppress(OSError):
-            for path in self.folder.iterdir():
-                if OURS.match(path.name) and path.is_file():
-                    path.unlink(missing_ok=True)
+            ours = [p for p in self.folder.iterdir() if OURS.match(p.name) and p.is_file()]
+            # The description last: without it, what is left after a kill could not be read.
+            for path in sorted(ours, key=lambda path: path.name == DESCRIPTION):
+                path.unlink(missing_ok=True)
             self.folder.rmdir()
 
     def _place(self, number: int) -> Path:

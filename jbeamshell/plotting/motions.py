@@ -1,0 +1,166 @@
+"""Motions: displacement, energies, frequency and damping over amplitude, spectrogram."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import scipy.signal
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
+
+from jbeamshell.plotting.style import DATA, DISPLACEMENT, PALETTE, single, style
+
+if TYPE_CHECKING:  # they bring diffrax, which pictures of other things need not wait for
+    from jbeamshell.dynamics.modal import ModalCurve
+    from jbeamshell.dynamics.motion import Motion
+    from jbeamshell.dynamics.ringdown import RingDown
+    from jbeamshell.dynamics.study import RingDownStudy
+
+TIME, AMPLITUDE = "$t$  [time]", "amplitude of $u(L)$  [length]"
+LEDGER = {"kinetic": "kinetic", "stored": "stored", "rubbed": "friction", "damped": "damping"}
+WINDOWS = 12  # of a spectrogram, side by side
+FLOOR = -70.0  # dB
+HARMONICS = 8.5  # of the main frequency, shown in a spectrogram
+
+
+def vibration(motion: Motion, axes: Axes | None = None) -> Axes:
+    """Draw u(L) over time."""
+    with style():
+        axes = single(axes)
+        axes.plot(motion.time, motion.displacement, color=PALETTE[0], linewidth=1.0)
+        axes.set(xlabel=TIME, ylabel=DISPLACEMENT)
+    return axes
+
+
+def energies(motion: Motion, axes: Axes | None = None) -> Axes:
+    """Draw the energy ledger over time, stacked: what moves, what is stored, what is lost.
+
+    Notes
+    -----
+    Stored energy is counted from its least value.  The dashed line is what there was at the start
+    and what has been given since.
+    """
+    with style():
+        axes = single(axes)
+        least = float(np.nanmin(np.asarray(motion.stored)))
+        parts = {name: np.asarray(getattr(motion, name)) for name in LEDGER}
+        parts["stored"] = parts["stored"] - least
+        if not np.any(parts["damped"] > 0.0):
+            del parts["damped"]
+        time = np.asarray(motion.time)
+        axes.stackplot(
+            time,
+            list(parts.values()),
+            labels=[LEDGER[name] for name in parts],
+            colors=[PALETTE[0], PALETTE[5], PALETTE[1], PALETTE[4]],
+            linewidth=0.0,
+        )
+        whole = parts["kinetic"][0] + parts["stored"][0] + np.asarray(motion.given)
+        axes.plot(time, whole, color=DATA, linestyle="--", linewidth=1.0, label="given")
+        axes.set(xlabel=TIME, ylabel="energy per width")
+        axes.legend(loc="center right", frameon=True, framealpha=0.9)
+    return axes
+
+
+def ring_down(
+    found: RingDown, *, label: str = "ring-down", axes: Sequence[Axes] | None = None
+) -> Any:
+    """Draw frequency and damping over amplitude, two axes.
+
+    Parameters
+    ----------
+    found : what `jbeamshell.dynamics.ring_down` gives
+    label : for the legend
+    axes : two axes; a new figure when not given
+    """
+    return _pair((found.amplitude, found.frequency, found.damping), axes, label, "o", DATA)
+
+
+def modal_curve(
+    curve: ModalCurve,
+    *,
+    mass: float = 1.0,
+    label: str = "quasi-static",
+    axes: Sequence[Axes] | None = None,
+) -> Any:
+    """Draw frequency and damping over amplitude, two axes.
+
+    Parameters
+    ----------
+    curve : what `jbeamshell.dynamics.modal_curve` or `harmonic_balance` gives
+    mass : whose root turns modal displacements into those drawn
+    label : for the legend
+    axes : two axes; a new figure when not given
+    """
+    amplitude = np.asarray(curve.amplitude) / np.sqrt(mass)
+    frequency = np.asarray(curve.frequency) / (2.0 * np.pi)
+    return _pair((amplitude, frequency, curve.damping), axes, label, "", PALETTE[1])
+
+
+def spectrogram(motion: Motion, axes: Axes | None = None) -> Axes:
+    """Draw the velocity's spectrum over time, in dB of its largest value."""
+    time, velocity = np.asarray(motion.time), np.asarray(motion.velocity)
+    length = max(16, 2 * time.size // WINDOWS)
+    frequency, at, power = scipy.signal.spectrogram(
+        velocity,
+        1.0 / (time[1] - time[0]),
+        nperseg=length,
+        noverlap=(7 * length) // 8,
+        window="hann",
+    )
+    level = 10.0 * np.log10(np.maximum(power / power.max(), 1e-30))
+    with style():
+        axes = single(axes)
+        shown = axes.pcolormesh(
+            at, frequency, level, vmin=FLOOR, vmax=0.0, cmap="magma", shading="auto"
+        )
+        axes.figure.colorbar(shown, ax=axes, label="dB")
+        axes.grid(False)
+        main = frequency[np.argmax(power.sum(axis=1))]
+        axes.set(xlabel=TIME, ylabel="frequency  [1/time]")
+        axes.set_ylim(0.0, min(HARMONICS * main, frequency[-1]))
+    return axes
+
+
+def ring_down_sheet(study: RingDownStudy) -> Figure:
+    """Draw a ring-down beside its prediction: motion, energies, frequency and damping."""
+    with style():
+        figure, axes = plt.subplots(2, 2, figsize=(10.0, 7.0))
+        vibration(study.motion, axes[0, 0])
+        energies(study.motion, axes[0, 1])
+        ring_down(study.found, axes=axes[1])
+        modal_curve(study.predicted, mass=study.payload, axes=axes[1])
+        reach = np.asarray(study.found.amplitude)
+        for below, values in zip(
+            axes[1], (study.found.frequency, study.found.damping), strict=True
+        ):
+            known = values[values > 0.0]
+            room = (known.max() / known.min()) ** 0.1
+            below.set_xlim(0.9 * reach.min(), 1.1 * reach.max())
+            below.set_ylim(known.min() / room, known.max() * room)
+    return figure
+
+
+def _pair(
+    columns: tuple[Any, Any, Any], axes: Sequence[Axes] | None, label: str, marker: str, colour: str
+) -> Any:
+    amplitude, frequency, damping = map(np.asarray, columns)
+    line: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 3.0, "label": label}
+    line["linestyle"] = "" if marker else "-"
+    with style():
+        pair = plt.subplots(1, 2, figsize=(10.0, 3.6))[1] if axes is None else axes
+        pair[0].plot(amplitude, frequency, **line)
+        shown = damping > 0.0
+        pair[1].plot(amplitude[shown], damping[shown], **line)
+        pair[0].set(xlabel=AMPLITUDE, ylabel="frequency  [1/time]", xscale="log")
+        pair[1].set(xlabel=AMPLITUDE, ylabel=r"damping ratio $\zeta$", xscale="log", yscale="log")
+        pair[1].legend(loc="upper left")
+        for below in pair:  # less than a decade, often: 1, 2 and 5 of each
+            below.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            below.xaxis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(99, 99)))
+            below.xaxis.set_minor_formatter(NullFormatter())
+    return pair
