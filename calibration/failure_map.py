@@ -1,0 +1,359 @@
+"""Where every method works, is slow, wrong or fails, and whether it says so.
+
+Runs the standard strip with one or two of its numbers over their whole range, on every method, and
+2,000 strips drawn at random from the stated domain with the defaults; compares each dissipation
+with that of the same model on a fine grid whose end may lift, and writes failure_map.json beside
+this file, map by map, so that an interrupted run goes on from there.  An hour on a core:
+
+    python calibration/failure_map.py [--only NAME ...] [--quick] [--draw]
+
+--only computes these maps anew, --quick takes few values of each, --draw only draws the record.
+"""
+
+import argparse
+import functools
+import json
+import multiprocessing
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from provenance import provenance
+from tqdm import tqdm
+
+import jbeamshell as jb
+from jbeamshell import plotting, trust
+from jbeamshell.files import write_text
+from jbeamshell.friction import ElasticSlip
+
+HERE = Path(__file__).parent
+RECORD = HERE / "failure_map.json"
+FIGURES = ("ratio", "grid", "corner", "closure", "iterations", "status")
+
+# The standard strip; load is the amplitude over gross slip.
+STANDARD = {
+    "eta": 0.1126,
+    "mu": 0.1,
+    "load": 0.39,
+    "nu": 0.3,
+    "kappa_s": 0.44,
+    "alpha": 1e3,
+    "stiffness": 3.4e4,
+    "k_n": 50.0,
+    "m": 16.0,
+}
+PRESSURE, LENGTH = 10.0, 2.0
+LIFT = {"model.fields": ["v", "w", "beta", "psi"]}
+FINE = {"model.nodes": 321, "model.end_size": 1.0 / 200.0}
+EXACT = LIFT | FINE
+COARSER = {"model.nodes": 161, "model.end_size": 1.0 / 48.0}  # where that finds no equilibrium
+SMOOTH = {"contact.smoothing": 16.0}
+LINEAR = {"model.kinematics": "linear"}
+PRINTED = {"model.constants": "printed"}
+COMPLIANT = LIFT | {"contact.normal": "compliant"}
+SECOND = {"model.rung": "p2"}
+PULLED = {"load.control": "displacement", "load.amplitude": 1.0}
+# Of every method its settings, and those of its reference.
+SOLVERS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "default": ({}, EXACT),
+    "lift-off": (LIFT, EXACT),
+    "linear": (LINEAR, EXACT),
+    "collocation": ({"model.grid": "collocation"}, EXACT),
+    "smooth, m = 16": (SMOOTH, EXACT),
+    "single precision": ({"single": True}, EXACT),
+    "one step": ({"load.steps_per_half_cycle": 1}, EXACT),
+    "masing": ({"model.rung": "masing"}, EXACT),
+}
+MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "compliant": (COMPLIANT, COMPLIANT | FINE),
+    "displacement": (PULLED, PULLED | EXACT),
+    "shell": ({"model.rung": "shell"}, {"model.fields": ["v", "w", "beta"]} | FINE),
+    "p2": (SECOND, SECOND | FINE),
+    "printed": (PRINTED, PRINTED | EXACT),
+}
+
+
+def spread(low: float, high: float, count: int) -> list[float]:
+    """Values from low to high, evenly on a logarithmic scale."""
+    return [float(f"{value:.4g}") for value in np.geomspace(low, high, count)]
+
+
+LOADS = [0.005, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 0.999]
+KNOBS: dict[str, list[float]] = {
+    "eta": spread(1e-4, 2.0, 10),
+    "mu": spread(0.01, 2.0, 8),
+    "load": [*LOADS, 1.0, 1.1],
+    "nu": [0.0, 0.15, 0.3, 0.4, 0.45, 0.49, 0.499, 0.4999],
+    "kappa_s": spread(1e-6, 100.0, 9),
+    "alpha": spread(1.0, 1e8, 9),
+    "stiffness": spread(10.0, 1e16, 11),
+}
+NODES = [5, 9, 17, 33, 65, 161, 513, 1025]
+END_SIZES = [2.0, 0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 96.0]
+STEPS = [1, 2, 4, 10, 40, 160, 640]
+EXPONENTS = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0]
+TOLERANCES = [1e-3, 1e-4, 2e-5, 1e-5, 3e-6, 1e-6]
+SCENES, BLOCK = 2000, 100
+DOMAIN = ("eta", "mu", "load", "nu", "kappa_s", "alpha")  # of the random scenes
+
+# Of a row its label, the settings of the method and of its reference, and what is set.
+Row = tuple[Any, dict[str, Any], dict[str, Any], dict[str, float]]
+
+
+@functools.cache
+def runner(settings: tuple[tuple[str, Any], ...]) -> Callable[[jax.Array], jax.Array]:
+    """From the numbers of `STANDARD` to the figures, for some settings."""
+    given = {key: list(v) if isinstance(v, tuple) else v for key, v in settings}
+    given.pop("single", None)
+    tolerance = given.pop("tolerance", None)
+    base = jb.Scene().replace(given)
+
+    @jax.jit
+    def run(numbers: jax.Array) -> jax.Array:
+        history = jb.solve(scene_of(base, numbers), throw=False, solver=jb.Newton(tolerance))
+        grid, corner = trust.errors(history.rubbing)
+        effort = jnp.sum(history.iterations) / history.force.size
+        found = (history.dissipation_ratio, grid, corner, history.closure, effort)
+        return jnp.stack([*found, jnp.max(history.status)]).astype(float)
+
+    return run
+
+
+def scene_of(base: jb.Scene, numbers: jax.Array) -> jb.Scene:
+    """A scene with the numbers of `STANDARD`."""
+    n = dict(zip(STANDARD, numbers, strict=True))
+    amplitude = n["load"] * n["mu"] * PRESSURE * LENGTH
+    if base.load.control == "displacement":  # the bar's
+        amplitude = amplitude**2 / (2.0 * n["stiffness"] * n["mu"] * PRESSURE)
+    values = {
+        "strip.height_ratio": n["eta"],
+        "contact.friction": n["mu"],
+        "load.amplitude": amplitude,
+        "strip.poisson_ratio": n["nu"],
+        "strip.kappa_s": n["kappa_s"],
+        "contact.stick_stiffness": n["alpha"],
+        "strip.axial_stiffness": n["stiffness"],
+        "contact.normal_stiffness": n["k_n"],
+    }
+    if isinstance(base.contact.law, ElasticSlip):
+        values["contact.smoothing"] = n["m"]
+    return base.replace(values)
+
+
+@functools.cache
+def figures(settings: tuple[tuple[str, Any], ...], numbers: tuple[float, ...]) -> list[Any]:
+    """The `FIGURES` of a run; None is what is not finite."""
+    found = np.asarray(runner(settings)(np.asarray(numbers)))
+    return [float(f"{value:.6g}") if np.isfinite(value) else None for value in found]
+
+
+def cell(
+    settings: Mapping[str, Any], reference: Mapping[str, Any], point: Mapping[str, float]
+) -> list[Any]:
+    """Figures of a run, the dissipation ratio of its reference, and doubts without running."""
+    refused = point.get("load", 0.0) >= 1.0 and "load.control" not in settings
+    if refused:  # by `solve`, where nothing is traced
+        return [None] * (len(FIGURES) - 1) + [-1, None, 0]
+    own, against = (_figures(s, point) for s in (settings, reference))
+    if against[-1] != 0:
+        against = _figures(reference | COARSER, point)
+    reached = against[0] if against[-1] == 0 else None
+    return [*own, reached, doubts_beforehand(settings, point)]
+
+
+def doubts_beforehand(settings: Mapping[str, Any], point: Mapping[str, float]) -> int:
+    """How many doubts the scene alone raises."""
+    base = jb.Scene().replace({key: v for key, v in settings.items() if "." in key})
+    return len(trust.foretold(scene_of(base, list((STANDARD | point).values()))))
+
+
+def _figures(settings: Mapping[str, Any], point: Mapping[str, float]) -> list[Any]:
+    fixed = tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in settings.items())
+    given = fixed, tuple((STANDARD | point).values())
+    return (
+        single_precision().submit(figures, *given).result()
+        if "single" in settings
+        else figures(*given)
+    )
+
+
+@functools.cache
+def single_precision() -> ProcessPoolExecutor:
+    """A process that does not switch double precision on."""
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
+
+
+# --- maps -----------------------------------------------------------------------------------------
+
+
+def methods(kind: dict[str, tuple[dict[str, Any], dict[str, Any]]]) -> list[Row]:
+    """A row for every method."""
+    return [(name, *both, {}) for name, both in kind.items()]
+
+
+def settings(key: str, values: list[Any], **common: Any) -> list[Row]:
+    """A row for every value of a setting."""
+    law = {k: v for k, v in common.items() if k.startswith("contact")}
+    return [(v, LINEAR | common | {key: v}, EXACT | law, {}) for v in values]
+
+
+def numbers(key: str, values: list[float], name: str = "default") -> list[Row]:
+    """A row for every value of a number."""
+    return [(value, *(SOLVERS | MODELS)[name], {key: value}) for value in values]
+
+
+def exponents(key: str, values: list[Any]) -> list[Row]:
+    """A row for every value of a setting, with the smooth law."""
+    return [(v, LINEAR | SMOOTH | {key: v}, EXACT | SMOOTH, {}) for v in values]
+
+
+# What is along X, and the rows.
+MAPS: dict[str, tuple[str, list[float], str, list[Row]]] = {
+    **{f"methods over {x}": (x, v, "method", methods(SOLVERS)) for x, v in KNOBS.items()},
+    **{f"models over {x}": (x, v, "method", methods(MODELS)) for x, v in KNOBS.items()},
+    "height and load": ("load", LOADS, "eta", numbers("eta", spread(1e-3, 1.0, 10))),
+    "height and kappa_s": (
+        "kappa_s",
+        KNOBS["kappa_s"],
+        "eta",
+        numbers("eta", spread(1e-3, 1.0, 7)),
+    ),
+    "friction and load": ("load", LOADS, "mu", numbers("mu", KNOBS["mu"])),
+    "alpha and height": ("alpha", KNOBS["alpha"], "eta", numbers("eta", spread(1e-3, 1.0, 7))),
+    "compliance and alpha": (
+        "k_n",
+        spread(1.0, 1e6, 7),
+        "alpha",
+        numbers("alpha", KNOBS["alpha"], "compliant"),
+    ),
+    "smoothing and alpha": (
+        "m",
+        EXPONENTS,
+        "alpha",
+        numbers("alpha", KNOBS["alpha"], "smooth, m = 16"),
+    ),
+    "smoothing and steps": (
+        "m",
+        EXPONENTS,
+        "steps per half cycle",
+        exponents("load.steps_per_half_cycle", STEPS),
+    ),
+    "nodes and load": ("load", LOADS, "nodes", settings("model.nodes", NODES)),
+    "nodes and alpha": ("alpha", KNOBS["alpha"], "nodes", settings("model.nodes", NODES)),
+    "end size and load": ("load", LOADS, "end size over H", settings("model.end_size", END_SIZES)),
+    "end size and load, lift-off": (
+        "load",
+        LOADS,
+        "end size over H",
+        settings("model.end_size", END_SIZES, **LIFT),
+    ),
+    "steps and load": (
+        "load",
+        LOADS,
+        "steps per half cycle",
+        settings("load.steps_per_half_cycle", STEPS),
+    ),
+    "precision and alpha": (
+        "alpha",
+        KNOBS["alpha"],
+        "tolerance",
+        settings("tolerance", TOLERANCES, single=True),
+    ),
+    "precision and stiffness": (
+        "stiffness",
+        KNOBS["stiffness"],
+        "tolerance",
+        settings("tolerance", TOLERANCES, single=True),
+    ),
+}
+
+
+def chart(name: str, part: int = 1) -> dict[str, Any]:
+    """A map, or every so-manieth row and column of it."""
+    x, values, y, rows = MAPS[name]
+    values, rows = values[::part], rows[::part]
+    cells = []
+    with tqdm(total=len(rows) * len(values), desc=name, disable=None) as bar:
+        for _, own, reference, point in rows:
+            cells.append([])
+            for value in values:
+                cells[-1].append(cell(own, reference, point | {x: value}))
+                bar.update()
+    return {"x": x, "y": y, "columns": values, "rows": [row[0] for row in rows], "cells": cells}
+
+
+# --- random scenes --------------------------------------------------------------------------------
+
+
+def random_points(count: int = SCENES) -> np.ndarray:
+    """Strips all over the stated domain, (count, 6) in the order of `DOMAIN`."""
+    part = np.random.default_rng(7).uniform(size=(count, len(DOMAIN)))
+    low = np.array([0.005, 0.02, 0.02, 0.0, 0.05, 2.0])
+    high = np.array([0.5, 1.0, 0.98, 0.49, 3.0, 1e4])
+    even = np.array([False, False, True, True, False, False])
+    ratio = np.where(even, 1.0, high / np.where(even, 1.0, low))
+    return np.where(even, low + part * (high - low), low * ratio**part)
+
+
+def walked_in_pieces(point: Mapping[str, float]) -> bool:
+    """Whether a run that failed finds its way in smaller steps."""
+    history = jb.solve(scene_of(jb.Scene(), list((STANDARD | point).values())), throw=False)
+    return history.converged
+
+
+def block(points: np.ndarray) -> list[list[Any]]:
+    """Cells of some random strips, each with whether it needed smaller steps to succeed."""
+    found = []
+    for values in points:
+        point = dict(zip(DOMAIN, map(float, values), strict=True))
+        one = cell({}, EXACT, point)
+        found.append([*one, walked_in_pieces(point) if one[5] > 0 else None])
+    return found
+
+
+def scattered(record: dict[str, Any], count: int, save: Callable[[], None]) -> None:
+    """The random strips, block by block."""
+    done = record.setdefault("scenes", [])
+    points = random_points()[:count]
+    for begin in tqdm(range(len(done), count, BLOCK), desc="random scenes", disable=None):
+        done += block(points[begin : begin + BLOCK])
+        save()
+
+
+def main() -> None:
+    """Compute what is missing, write it map by map, and draw it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", nargs="+", metavar="NAME", help=", ".join(["scenes", *MAPS]))
+    parser.add_argument("--quick", action="store_true", help="every fourth value, 100 scenes")
+    parser.add_argument("--draw", action="store_true", help="draw the record that is there")
+    options = parser.parse_args()
+    jb.configure()
+    jax.config.update("jax_enable_x64", True)
+    record = json.loads(RECORD.read_text()) if RECORD.exists() else {"maps": {}}
+    record |= {
+        "provenance": provenance(),
+        "figures": [*FIGURES, "reference", "foretold"],
+        "standard": STANDARD,
+    }
+
+    def save() -> None:
+        write_text(RECORD, json.dumps(record) + "\n")
+
+    if not options.draw:
+        wanted = options.only or [name for name in MAPS if name not in record["maps"]]
+        for name in wanted:
+            if name != "scenes":
+                record["maps"][name] = chart(name, 4 if options.quick else 1)
+                save()
+        if not options.only or "scenes" in options.only:
+            scattered(record, BLOCK if options.quick else SCENES, save)
+    for name, figure in plotting.failure_sheets(record).items():
+        plotting.save(figure, HERE / f"failures_{name}.png")
+
+
+if __name__ == "__main__":
+    main()
