@@ -74,6 +74,7 @@ def methods_oscillation(record: Record, axes: Axes | None = None) -> Axes:
         axes.set(
             xscale="log", xlabel="elements per $H$  [1]", ylabel="overshoot over the load  [1]"
         )
+        _ticks_at(axes, section["elements_per_height"])
         axes.set_title("oscillation of the squeeze")
         axes.legend(fontsize=7)
     return axes
@@ -106,9 +107,16 @@ def methods_grids(record: Record, axes: Axes | None = None) -> Axes:
             nodes = section["nodes"]
             axes.loglog(nodes, sizes(row["dissipation_off"]), color=colour, marker="o", label=label)
             axes.loglog(nodes, sizes(row["stiffness_off"]), "--", color=colour, alpha=0.6)
+        _ticks_at(axes, section["nodes"])
         axes.set(xlabel="nodes  [1]", ylabel=f"{OFF}\n(dashed: of the secant stiffness)")
         axes.legend(fontsize=7)
     return axes
+
+
+def _ticks_at(axes: Axes, values: Sequence[float]) -> None:
+    """Mark these values of a logarithmic scale, and no others."""
+    axes.set_xticks(values, [f"{value:g}" for value in values])
+    axes.minorticks_off()
 
 
 def methods_shooting(record: Record, axes: Axes | None = None) -> Axes:
