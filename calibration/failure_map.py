@@ -97,7 +97,9 @@ END_SIZES = [2.0, 0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 96.0]
 STEPS = [1, 2, 4, 10, 40, 160, 640]
 EXPONENTS = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0]
 TOLERANCES = [1e-3, 1e-4, 2e-5, 1e-5, 3e-6, 1e-6]
-SCENES, BLOCK = 2000, 100
+# Random scenes, by seed and how many: the estimate was made on the first, the others test it.
+SCENES = {"scenes": (7, 2000), "fresh scenes": (8, 400)}
+BLOCK = 100
 DOMAIN = ("eta", "mu", "load", "nu", "kappa_s", "alpha")  # of the random scenes
 
 # Of a row its label, the settings of the method and of its reference, and what is set.
@@ -289,9 +291,9 @@ def chart(name: str, part: int = 1) -> dict[str, Any]:
 # --- random scenes --------------------------------------------------------------------------------
 
 
-def random_points(count: int = SCENES) -> np.ndarray:
+def random_points(seed: int, count: int) -> np.ndarray:
     """Strips all over the stated domain, (count, 6) in the order of `DOMAIN`."""
-    part = np.random.default_rng(7).uniform(size=(count, len(DOMAIN)))
+    part = np.random.default_rng(seed).uniform(size=(count, len(DOMAIN)))
     low = np.array([0.005, 0.02, 0.02, 0.0, 0.05, 2.0])
     high = np.array([0.5, 1.0, 0.98, 0.49, 3.0, 1e4])
     even = np.array([False, False, True, True, False, False])
@@ -315,11 +317,12 @@ def block(points: np.ndarray) -> list[list[Any]]:
     return found
 
 
-def scattered(record: dict[str, Any], count: int, save: Callable[[], None]) -> None:
-    """The random strips, block by block."""
-    done = record.setdefault("scenes", [])
-    points = random_points()[:count]
-    for begin in tqdm(range(len(done), count, BLOCK), desc="random scenes", disable=None):
+def scattered(record: dict[str, Any], name: str, quick: bool, save: Callable[[], None]) -> None:
+    """Random strips, block by block."""
+    done = record.setdefault(name, [])
+    points = random_points(*SCENES[name])
+    count = BLOCK if quick else len(points)
+    for begin in tqdm(range(len(done), count, BLOCK), desc=name, disable=None):
         done += block(points[begin : begin + BLOCK])
         save()
 
@@ -327,7 +330,7 @@ def scattered(record: dict[str, Any], count: int, save: Callable[[], None]) -> N
 def main() -> None:
     """Compute what is missing, write it map by map, and draw it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", nargs="+", metavar="NAME", help=", ".join(["scenes", *MAPS]))
+    parser.add_argument("--only", nargs="+", metavar="NAME", help=", ".join([*SCENES, *MAPS]))
     parser.add_argument("--quick", action="store_true", help="every fourth value, 100 scenes")
     parser.add_argument("--draw", action="store_true", help="draw the record that is there")
     options = parser.parse_args()
@@ -344,13 +347,13 @@ def main() -> None:
         write_text(RECORD, json.dumps(record) + "\n")
 
     if not options.draw:
-        wanted = options.only or [name for name in MAPS if name not in record["maps"]]
-        for name in wanted:
-            if name != "scenes":
+        missing = [name for name in MAPS if name not in record["maps"]]
+        for name in options.only or [*missing, *SCENES]:
+            if name in SCENES:
+                scattered(record, name, options.quick, save)
+            else:
                 record["maps"][name] = chart(name, 4 if options.quick else 1)
                 save()
-        if not options.only or "scenes" in options.only:
-            scattered(record, BLOCK if options.quick else SCENES, save)
     for name, figure in plotting.failure_sheets(record).items():
         plotting.save(figure, HERE / f"failures_{name}.png")
 

@@ -180,6 +180,7 @@ def test_traced_scenes_get_no_advice():
         jax.jit(lambda mu: jb.solve(STRIP.replace({"contact.friction": mu}), tolerance=0.1))(0.1)
 
 
+@pytest.mark.slow
 def test_a_laminate_climbs_what_it_has(monkeypatch):
     """Two equal layers are a homogeneous strip, whose rungs' errors the map knows."""
     own = {"model.nodes": 41, "load.steps_per_half_cycle": 8, "load.cycles": 1}

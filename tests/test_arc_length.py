@@ -34,6 +34,7 @@ def test_steps_are_as_long_as_asked():
     np.testing.assert_allclose(gone[-1], 3e-5, rtol=1e-6)  # and is met where it is straight
 
 
+@pytest.mark.slow
 def test_below_gross_slip_it_is_the_path_of_the_force():
     values = {"load.control": "arc-length", "load.amplitude": 8e-5, "model.kinematics": "linear"}
     history = jb.solve(scene(values))

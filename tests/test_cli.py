@@ -357,6 +357,7 @@ def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
     assert line.startswith("the fit has not settled after 1 iterations, at contact.friction = ")
 
 
+@pytest.mark.slow
 def test_fit_driven_by_the_displacement(cli, closed, tmp_path):
     drive = options({"load.control": "displacement", "load.amplitude": 2e-5})
     code, out, _ = cli("fit", closed, *FIT, *drive, "--json", "--out", tmp_path)

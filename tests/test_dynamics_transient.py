@@ -80,6 +80,7 @@ class TestRingDown:
         plotting.close(sheet)
 
 
+@pytest.mark.slow
 def test_a_slow_load_walks_the_quasi_static_loop():
     strip = scene()
     slow, riders = 100.0 * period(strip), dynamics.Riders(heavy(strip))

@@ -56,6 +56,7 @@ def test_what_becomes_of_a_run(changes, name):
     assert plotting.outcome([changes.get(i, value) for i, value in enumerate(RIGHT)]) == name
 
 
+@pytest.mark.slow
 def test_a_cell_of_the_map(script):
     fine = COARSE | {"model.nodes": 41}
     cell = script.cell(COARSE, fine, {"load": 0.39})

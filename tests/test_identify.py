@@ -341,6 +341,7 @@ def test_loops_of_like_length_share_what_is_compiled(planted):
         np.testing.assert_array_equal(waiting, 0.0)
 
 
+@pytest.mark.slow
 def test_a_mixture_of_everything(tmp_path):
     """Of one strip, clamped harder at its far part, measured under prescribed displacements."""
     clamped = [[0.0, 10.0], [1.4, 10.0], [1.4, 6.0], [2.0, 6.0]]

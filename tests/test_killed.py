@@ -130,6 +130,7 @@ def fit_survives(tmp_path, kills):
     killed_again_and_again(words, folder, kills, 0, whole_run, check)
 
 
+@pytest.mark.slow
 def test_a_sweep_of_two_processes_survives_a_kill(tmp_path):
     sweep_survives(tmp_path, 20, kills=1, processes=2)
 

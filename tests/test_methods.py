@@ -35,6 +35,7 @@ def cycled(law, steps):
 # --- friction laws --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_only_the_trap_moves_while_the_load_rests():
     moved, off = {}, {}
     for law in ("sharp", "elastic slip, m = 16", "smooth cap, m = 16"):

@@ -37,7 +37,7 @@ def check(history, steady=1e-6):
     assert abs(float(history.closure)) < steady
 
 
-@pytest.mark.parametrize("smoothing", ["sharp", 16.0])
+@pytest.mark.parametrize("smoothing", ["sharp", pytest.param(16.0, marks=pytest.mark.slow)])
 def test_random_strips_converge_and_obey_friction(smoothing):
     random = np.random.default_rng(11)
     base = jb.Scene().replace(SMALL | {"contact.smoothing": smoothing})

@@ -51,6 +51,7 @@ def test_the_active_set_does_not_depend_on_where_it_starts(receding, start):
     np.testing.assert_allclose(again.w, receding.w, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_search_that_does_not_end_says_so():
     with pytest.raises(jb.UnconvergedError, match="pressing down"):
         jb.solve(scenes.receding(), solver=jb.Newton(max_iterations=3))
@@ -70,6 +71,7 @@ def test_the_contact_does_not_know_how_hard_it_is_pressed(receding):
     assert float(gentle.contact_end[0]) == pytest.approx(float(receding.contact_end[0]), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_the_error_of_a_compliant_contact_falls_with_its_compliance():
     scene = scenes.receding().replace(LINEAR | {"model.nodes": 201})
     rigid = jb.solve(scene)

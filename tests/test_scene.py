@@ -555,7 +555,7 @@ def test_an_amplitude_does_not_outlive_its_control():
         (b"[strip]\nlenght = 2.0", "unknown key 'strip.lenght': did you mean 'strip.length'"),
         (b"[strip]\nlength = 'two'", "strip.length = 'two': must be a number"),
         (b"[strip]\nlength = 2024-01-01", "strip.length = .*: must be a number"),
-        (b"[load]\ncontrol = 'displacement'", "load.amplitude = None: give the end displacement"),
+        (b"[load]\ncontrol = 'displacement'", "load.amplitude = None: give the amplitude"),
     ],
 )
 def test_bad_files(path, text, told):

@@ -60,6 +60,7 @@ def test_the_squeeze_against_finite_elements(squeezed):
     assert np.max(squeezed.squeeze_stress) < 1e-9
 
 
+@pytest.mark.slow
 def test_nodal_quadrature_does_not_oscillate_and_converges():
     short = scenes.squeezed().replace(
         {
