@@ -66,7 +66,7 @@ def test_a_cell_of_the_map(script):
     assert max(cell[1:3]) == pytest.approx(float(strip.dissipation_error), rel=1e-5)
     assert 0.0 < abs(cell[0] / cell[6] - 1.0) < 0.1
     assert plotting.outcome(script.cell(COARSE, fine, {"load": 1.0})) == "fails, and says so"
-    points = script.random_points()
+    points = script.random_points(*script.SCENES["scenes"])
     assert points.shape == (2000, 6)
     assert points.min(axis=0) == pytest.approx(
         [0.005, 0.02, 0.02, 0.0, 0.05, 2.0], rel=0.02, abs=1e-3
