@@ -131,6 +131,7 @@ def compile_for(
     """Compile what `solve` needs, without solving anything."""
     whole, _ = _whole_path(scene, path)
     jax.block_until_ready(_solve(scene, None, whole, solver or Newton(), np.asarray(False)))
+    jax.block_until_ready(scene.strip.shear_modulus)  # JAX compiles every operation of its own
 
 
 @eqx.filter_jit
