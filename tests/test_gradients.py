@@ -23,7 +23,10 @@ SHARP = jax.jit(jax.value_and_grad(dissipation))
 SMOOTH = jax.jit(jax.value_and_grad(lambda p: dissipation(p, **{"contact.smoothing": 16.0})))
 
 
-@pytest.mark.parametrize("both", [SHARP, SMOOTH], ids=["sharp", "16.0"])
+@pytest.mark.parametrize(
+    "both",
+    [pytest.param(SHARP, marks=pytest.mark.slow, id="sharp"), pytest.param(SMOOTH, id="16.0")],
+)
 def test_gradients_have_taylor_slope_two(both):
     value, gradient = both(AT)
     for i in range(len(KEYS)):
@@ -38,6 +41,7 @@ def test_gradients_have_taylor_slope_two(both):
         assert slope == pytest.approx(2.0, abs=0.1), KEYS[i]
 
 
+@pytest.mark.slow
 def test_forward_and_reverse_agree_and_batches_equal_loops():
     reverse, forward = SHARP(AT)[1], jax.jit(jax.jacfwd(dissipation))(AT)
     np.testing.assert_allclose(forward, reverse, rtol=1e-8)

@@ -56,6 +56,7 @@ def test_a_path_without_a_cycle_has_no_dissipation_per_cycle():
     assert float(jnp.sum(history.slip_work)) > 0.0
 
 
+@pytest.mark.slow
 def test_energy_balances_at_every_step():
     """External work is stored or dissipated, up to the second order of the load step."""
     worst = []

@@ -388,6 +388,7 @@ def test_a_mixture_of_everything(tmp_path):
     plt.close("all")
 
 
+@pytest.mark.slow
 def test_finite_element_loops_are_recovered_with_small_bias():
     """True values mu = 0.1, eta = 0.1126; what remains is the model's error, not noise."""
     start = jb.Scene().replace(

@@ -21,6 +21,7 @@ def test_bar_limit_gives_backbone_and_cubic_law():
     )
 
 
+@pytest.mark.slow
 def test_steps_do_not_matter():
     base = jb.Scene().replace({"model.nodes": 81, "model.kinematics": "linear", "load.cycles": 1})
     dissipation = [

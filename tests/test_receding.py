@@ -87,6 +87,7 @@ def test_the_error_of_a_compliant_contact_falls_with_its_compliance():
     assert order == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_gradients_pass_through_a_compliant_contact():
     scene = scenes.receding().replace(LINEAR | {"model.nodes": 201, "contact.normal": "compliant"})
 
@@ -111,6 +112,7 @@ def test_gradients_pass_through_a_compliant_contact():
             assert np.polyfit(np.log(sizes), np.log(rest), 1)[0] == pytest.approx(2.0, abs=0.15)
 
 
+@pytest.mark.slow
 def test_the_block_stays_and_the_curved_strip_advances():
     block = jb.solve(scenes.block())
     assert bool(jnp.all(block.touching))
@@ -130,6 +132,7 @@ def test_a_point_load_lifts_the_strip_beyond_three_quarters_of_its_height():
     assert float(history.contact_end[0]) / 2.0 == pytest.approx(0.735, abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_assumed_squeeze_strain_is_what_it_says():
     history = jb.solve(scenes.receding_421())
     pressed = np.interp(history.x, [0, 2.405, 2.5], [1000, 1000, 0])

@@ -104,6 +104,7 @@ def test_the_standard_strip_is_beyond_doubt():
     assert 1e-3 < float(history.dissipation_error) < TOLERANCE
 
 
+@pytest.mark.slow
 def test_the_estimate_falls_with_the_elements():
     scene = jb.Scene().replace({"load.amplitude": 0.3} | COARSE)
     sizes = (1.0 / 6.0, 1.0 / 24.0, 1.0 / 96.0)
