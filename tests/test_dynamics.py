@@ -98,7 +98,8 @@ def test_a_cantilever_vibrates_as_timoshenkos():
 
 @pytest.mark.slow
 def test_sections_of_higher_order_vibrate_ever_slower_and_the_shell_is_near():
-    shell, *orders = (dynamics.modes(scene(model__order=p)).frequency[0] for p in (0, 1, 2, 3))
+    strips = (scene(model__order=order, model__nodes=41) for order in range(4))
+    shell, *orders = (dynamics.modes(strip).frequency[0] for strip in strips)
     assert np.all(np.diff(orders) < 0.0)
     assert shell == pytest.approx(orders[-1], rel=0.02)
 
