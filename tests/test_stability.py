@@ -73,11 +73,12 @@ def test_no_scene_of_two_thousand_is_wrong_silently():
     check_random_scenes(2000, {}, 0.2)
 
 
-def test_the_recorded_scenes_hold_no_silent_failure():
-    ends = [outcome(cell) for cell in RECORD["scenes"]]
-    assert len(ends) == 2000
+@pytest.mark.parametrize(("name", "least"), [("scenes", 2000), ("fresh scenes", 200)])
+def test_the_recorded_scenes_hold_no_silent_failure(name, least):
+    ends = [outcome(cell) for cell in RECORD[name]]
+    assert len(ends) >= least
     assert "wrong, silently" not in ends
-    mended = sum(cell[8] is True for cell in RECORD["scenes"])
+    mended = sum(cell[8] is True for cell in RECORD[name])
     assert ends.count("fails, and says so") - mended <= 0.005 * len(ends)
 
 

@@ -26,7 +26,6 @@ STRIPS: dict[str, dict[str, Any]] = {
     "near gross slip": {"load.amplitude": 1.98},
 }
 CLAMP = "receding clamp"
-NAMES = (*STRIPS, CLAMP)
 SHARP = "sharp"
 FORGETFUL = 1e-3  # of its width: a loop that ends further off is not closed
 
