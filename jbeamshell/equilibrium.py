@@ -149,7 +149,7 @@ class System(eqx.Module):
         self.bottom_load = grid.nodal_loads(self._rule, ends, contact.bottom_pressure)
         self.half_height, self.friction = strip.half_height, contact.friction
         self.curvature, self.youngs_modulus = strip.curvature, strip.youngs_modulus
-        self.slip_stiffness = contact.stick_stiffness * strip.shear_modulus / strip.half_height
+        self.slip_stiffness = scene.slip_stiffness
         self.stiffness_scale = strip.stretching_stiffness / strip.length
         pressing = jnp.sum(self.load)
         self.force_scale = pressing * jnp.where(self.friction > 0.0, self.friction, 1.0)

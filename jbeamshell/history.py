@@ -280,7 +280,7 @@ class History(eqx.Module):
             traction=self.traction[cycle],
             reaction=self.reaction[cycle],
             friction=contact.friction,
-            slip_stiffness=contact.stick_stiffness * strip.shear_modulus / strip.half_height,
+            slip_stiffness=self.scene.slip_stiffness,
             half_height=strip.half_height,
         )
 

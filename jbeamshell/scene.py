@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import tomli_w
+from jax import Array
 
 from jbeamshell.energy import Energy, Homogeneous
 from jbeamshell.errors import InputError
@@ -236,6 +237,12 @@ class Scene(eqx.Module):
             inside = upright or 0.0 <= moment <= total * length
             fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
             require("contact.bottom_pressure", contact.bottom_pressure, inside, fix)
+
+    @property
+    def slip_stiffness(self) -> Array:
+        """Elastic stiffness k_t = alpha G/H of the sliders, traction per slip."""
+        strip = self.strip
+        return self.contact.stick_stiffness * strip.shear_modulus / strip.half_height
 
     def get(self, key: str) -> Any:
         """The value behind a dotted key, e.g. ``scene.get("strip.height_ratio")``."""
