@@ -80,15 +80,27 @@ def solve(matrix: BlockTridiagonal, rhs: Array) -> Array:
 
     The residuals of this package have diagonal blocks that dominate or are positive definite.
     """
-    return (_solve_entries if rhs.shape[1] <= SMALL else _solve_blocks)(matrix, rhs)
-
-
-def _solve_entries(matrix: BlockTridiagonal, rhs: Array) -> Array:
-    """Every entry a scalar: twice as fast where the compiler makes the loop one function."""
     m = rhs.shape[1]
+    if m > SMALL:
+        return _solve_blocks(matrix, rhs)
+    entries = [[[blocks[i, j] for j in range(m)] for i in range(m)] for blocks in matrix]
+    return jnp.stack(solve_entries(entries, [rhs[:, i] for i in range(m)]), axis=1)
 
-    def nested(blocks: Array) -> list[list[Array]]:
-        return [[blocks[i, j] for j in range(m)] for i in range(m)]
+
+def solve_entries(matrix: Sequence, rhs: Sequence[Array]) -> list[Array]:
+    """Every entry a scalar: twice as fast where the compiler makes the loop one function.
+
+    Parameters
+    ----------
+    matrix : lower, diagonal and upper blocks, m x m entries (n, ...) each; further axes than the
+        rows are systems that are solved together
+    rhs : m entries (n, ...)
+
+    Returns
+    -------
+    m entries (n, ...)
+    """
+    m = len(rhs)
 
     def eliminate(above: list, row: tuple) -> tuple[list, list]:
         lower, diagonal, upper, right = row
@@ -104,17 +116,15 @@ def _solve_entries(matrix: BlockTridiagonal, rhs: Array) -> Array:
         x = [each[m] - _dot(each[:m], below) for each in row]
         return x, x
 
-    zero = jnp.zeros((), rhs.dtype)
-    entries = (*map(nested, matrix), [rhs[:, i] for i in range(m)])
-    _, rows = lax.scan(eliminate, [[zero] * (m + 1)] * m, entries)
-    _, x = lax.scan(substitute, [zero] * m, rows, reverse=True)
-    return jnp.stack(x, axis=1)
+    zero = jnp.zeros_like(rhs[0][0])
+    _, rows = lax.scan(eliminate, [[zero] * (m + 1)] * m, (*matrix, list(rhs)))
+    return list(lax.scan(substitute, [zero] * m, rows, reverse=True)[1])
 
 
 def _divided(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Array]]:
     """The inverse of a small block times some columns, entry by entry."""
     m = len(pivot)
-    if m == 3:  # by cofactors: a short way from every entry to every other, so that lanes share it
+    if m == 3 and not pivot[0][0].ndim:  # by cofactors: a short way from every entry to every other
         turn = [(1, 2), (2, 0), (0, 1)]
         cofactors = [
             [pivot[i][k] * pivot[j][n] - pivot[i][n] * pivot[j][k] for k, n in turn]
@@ -124,13 +134,15 @@ def _divided(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Ar
         inverse = [[c * scale for c in column] for column in zip(*cofactors, strict=True)]
         columns = list(zip(*known, strict=True))
         return [[_dot(row, column) for column in columns] for row in inverse]
+    # By quotients: the compiler keeps them, and computes all else anew for each of its uses.
     rows = [[*p, *k] for p, k in zip(pivot, known, strict=True)]
     for k in range(m):
-        scale = 1.0 / rows[k][k]
-        rows[k] = [a * scale for a in rows[k]]
-        for i in set(range(m)) - {k}:
-            factor = rows[i][k]
-            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k], strict=True)]
+        for i in range(k):
+            rows[k] = [a - rows[k][i] * b if j > i else a for j, (a, b) in enumerate(zip(rows[k], rows[i], strict=True))]
+        rows[k] = [a / rows[k][k] if j > k else a for j, a in enumerate(rows[k])]
+    for k in reversed(range(m)):
+        for i in range(k + 1, m):
+            rows[k] = [a - rows[k][i] * b if j >= m else a for j, (a, b) in enumerate(zip(rows[k], rows[i], strict=True))]
     return [row[m:] for row in rows]
 
 

@@ -143,10 +143,10 @@ class System(eqx.Module):
         )
         self.energy, self.law = scene.strain_energy(), contact.law
         self.section = scene.hierarchic_section()
-        self.x, self.lengths = grid.nodes(self._rule, ends), jnp.diff(ends)
-        self.tributary = grid.tributary_lengths(self._rule, ends)
-        self.load = grid.nodal_loads(self._rule, ends, contact.pressure)
-        self.bottom_load = grid.nodal_loads(self._rule, ends, contact.bottom_pressure)
+        self.x, self.lengths = grid.nodes(self.rule, ends), jnp.diff(ends)
+        self.tributary = grid.tributary_lengths(self.rule, ends)
+        self.load = grid.nodal_loads(self.rule, ends, contact.pressure)
+        self.bottom_load = grid.nodal_loads(self.rule, ends, contact.bottom_pressure)
         self.half_height, self.friction = strip.half_height, contact.friction
         self.curvature, self.youngs_modulus = strip.curvature, strip.youngs_modulus
         self.slip_stiffness = scene.slip_stiffness
@@ -164,7 +164,8 @@ class System(eqx.Module):
         self.known = scene.energy is None
 
     @property
-    def _rule(self) -> grid.Rule:
+    def rule(self) -> grid.Rule:
+        """Of an element."""
         return grid.element_rule(self.model.grid)
 
     @property
@@ -234,7 +235,7 @@ class System(eqx.Module):
             density = jax.vmap(jax.vmap(self.energy))(*self._strains(q))
         else:
             density = jax.vmap(jax.vmap(self.section.energy))(*self._sections(q))
-        return jnp.sum(self._rule.weights[:, None] * self.lengths * density)
+        return jnp.sum(self.rule.weights[:, None] * self.lengths * density)
 
     def section_forces(self, q: Array) -> Strains:
         """Mean N, Q, M, chi and xi of every element, (elements,) each."""
@@ -246,7 +247,7 @@ class System(eqx.Module):
         if self.model.squeeze == "assumed":
             stretch = 2.0 * self.half_height * jnp.asarray(self.youngs_modulus)
             each = each._replace(psi=stretch * strains.psi)
-        return jax.tree.map(lambda f: jnp.sum(self._rule.weights[:, None] * f, axis=0), each)
+        return jax.tree.map(lambda f: jnp.sum(self.rule.weights[:, None] * f, axis=0), each)
 
     @property
     def middles(self) -> Array:
@@ -264,19 +265,34 @@ class System(eqx.Module):
             # Elements last, and no matrix product: the compiler works on whole vectors of them.
             return jnp.asarray(sum(s[:, None] * v for s, v in zip(shape.T, values.T, strict=True)))
 
-        rule, order = self._rule, grid.ORDER[self.model.grid]
+        rule, order = self.rule, grid.ORDER[self.model.grid]
         nodal = [grid.gather(column, order) for column in q.T]
-        # The beamshell's squeeze strain is integrated at the nodes, lest it oscillate.
-        shapes = [rule.values] * len(nodal)
-        if self.section is None:
-            shapes[PSI] = rule.squeeze
-        section = [at(shape, values) for shape, values in zip(shapes, nodal, strict=True)]
+        section = [at(self.shapes(field), values) for field, values in enumerate(nodal)]
         slope = [at(rule.slopes, values) / self.lengths for values in nodal]
         if self.curvature is not None:
             inside = rule.values @ rule.nodes
             angle = self._angle(self._starts + inside[:, None] * self.lengths)
             slope[V], slope[W] = turned(slope[V], slope[W], angle)
         return section, slope
+
+    def shapes(self, field: int) -> np.ndarray:
+        """Interpolation (points, p+1) of a field from an element's nodes to its strain points."""
+        # The beamshell's squeeze strain is integrated at the nodes, lest it oscillate.
+        nodal = field == PSI and self.section is None
+        return self.rule.squeeze if nodal else self.rule.values
+
+    def section_stiffness(self) -> Array:
+        """Hessian (2, m, 2, m) of a section's strain energy at rest, in its fields and slopes."""
+
+        def energy(both: Array) -> Array:
+            section, slope = both
+            if self.section is not None:
+                return self.section.energy(section, slope)
+            return self.energy(
+                *self._kinematics.strains(section, slope, self.half_height, self.curvature)
+            )
+
+        return jax.hessian(energy)(jnp.zeros((2, self.model.width), self.x.dtype))
 
     def _strains(self, q: Array) -> Strains:
         """The beamshell's strains at all points of all elements, (points, elements) each."""
@@ -297,7 +313,7 @@ class System(eqx.Module):
     @property
     def cap_floor(self) -> Array:
         """Cap of a point without reaction."""
-        return CAP_FLOOR * self.force_scale / jnp.sum(self.tributary)
+        return CAP_FLOOR * self.force_scale / jnp.sum(self.tributary, axis=0)
 
     def rest(self) -> Level:
         """The strip before anything acts on it."""
@@ -388,26 +404,46 @@ class System(eqx.Module):
             jnp.where(prescribed, self.stiffness_scale * gap, forces[-1, V])
         )
         forces = self._support(forces, q, drive.rough)
-        moments = np.isin(np.arange(self.model.width), (BETA, PSI))
-        per_force = jnp.where(moments, 1.0 / self.half_height, 1.0)
-        residual = (forces * per_force / self.force_scale)[:, list(self.model.active)]
+        scale = jnp.stack([self.residual_scale(field) for field in range(self.model.width)])
+        residual = (forces * scale)[:, list(self.model.active)]
         return force, residual
+
+    def residual_scale(self, field: int) -> Array:
+        """Residual per force, or per moment, of a field's balance."""
+        per_force = 1.0 / self.half_height if field in (BETA, PSI) else 1.0
+        return per_force / self.force_scale
 
     def _cap(self, reaction: Array) -> Array:
         return jnp.maximum(self.friction * reaction, self.cap_floor)
 
+    def supports(self, rough: bool) -> dict[int, Array]:
+        """Fields that are held at X = 0, with what makes their support condition a force."""
+        held = {}
+        if isinstance(self.normal, Absent):
+            held[W] = self.stiffness_scale
+        if self.far_end == "free":  # held by friction alone, so only once there is friction
+            return held if rough else held | {V: self.stiffness_scale}
+        held[V] = self.stiffness_scale
+        if self.far_end == "held":
+            held[BETA] = self.stiffness_scale * self.half_height**2
+            # Of a hierarchic section: its displacements along X.
+            further = range(len(FIELDS), self.model.width, 2)
+            held |= dict.fromkeys(further, self.stiffness_scale)
+        return held
+
     def _support(self, forces: Array, q: Array, rough: Array) -> Array:
         """Replace the balance of held fields at X = 0 by their support condition."""
-        if isinstance(self.normal, Absent):
-            forces = forces.at[0, W].set(self.stiffness_scale * q[0, W])
-        held_v = forces.at[0, V].set(self.stiffness_scale * q[0, V])
-        if self.far_end == "free":  # held by friction alone, so only once there is friction
-            return jnp.where(rough > 0.0, forces, held_v)
-        if self.far_end == "pinned":
-            return held_v
-        along = slice(len(FIELDS), None, 2)  # of a hierarchic section: its displacements along X
-        held = held_v.at[0, along].set(self.stiffness_scale * q[0, along])
-        return held.at[0, BETA].set(self.stiffness_scale * self.half_height**2 * q[0, BETA])
+
+        def held(supports: dict[int, Array]) -> Array:
+            found = forces
+            for field, scale in supports.items():
+                found = found.at[0, field].set(scale * q[0, field])
+            return found
+
+        with_friction, without = self.supports(True), self.supports(False)
+        if with_friction.keys() == without.keys():
+            return held(with_friction)
+        return jnp.where(rough > 0.0, held(with_friction), held(without))
 
     # --- energies of a step -----------------------------------------------------------------------
 

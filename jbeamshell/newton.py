@@ -66,7 +66,7 @@ class Newton(eqx.Module):
         guess: Array,
         enabled: Array,
         tangent: Callable[[Seen, Stiffness], BlockTridiagonal],
-        stiffness: Stiffness,
+        stiffness: Stiffness | None,
         refresh: Callable[[Array], Stiffness] | None = None,
     ) -> tuple[Array, tuple[Array, Array]]:
         """Find a root of a residual whose rows couple to neighbouring rows only.
@@ -79,7 +79,8 @@ class Newton(eqx.Module):
         guess : (n, m)
         enabled : false skips the iteration
         tangent : the residual's matrix from what it sees and from the part that hardly changes
-        stiffness : that part
+        stiffness : that part; None where the guess is likely to be a root, so that it is found only
+            when it is needed
         refresh : that part at some unknowns; None where it is the same everywhere
 
         Returns
@@ -88,13 +89,14 @@ class Newton(eqx.Module):
         iterations, error : count, and the largest residual left
         """
         tolerance = self.tolerance_for(guess.dtype)
+        creeping = refresh is not None and stiffness is not None
 
         def close(at: Iterate) -> Array:
             return jnp.max(jnp.abs(at.residual)) <= tolerance
 
         def unfinished(at: Iterate) -> Array:
             # What approaches the root a little at a time goes on for once when it is close.
-            done = close(at) if refresh is None else close(at) & at.was_close
+            done = close(at) & at.was_close if creeping else close(at)
             return enabled & ~done & (at.tried < self.max_iterations)
 
         def improve(at: Iterate, stiffness: Stiffness) -> Iterate:
@@ -128,7 +130,11 @@ class Newton(eqx.Module):
         def iterate(_: Callable[[Array], Array], start: Array) -> tuple[Array, tuple]:
             one, none = jnp.ones((), start.dtype), jnp.asarray(0)
             at = Iterate(start, *evaluate(start), one, jnp.asarray(False), none)
-            if refresh is None:
+            if stiffness is None and refresh is not None:
+                at = lax.while_loop(
+                    unfinished, lambda at: search(at, refresh(at.x), self.max_iterations), at
+                )
+            elif refresh is None:
                 at = search(at, stiffness, self.max_iterations)
             else:
                 at = refreshing(at, refresh)

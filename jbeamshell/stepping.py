@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import equinox as eqx
@@ -12,11 +13,13 @@ from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jbeamshell.block_tridiagonal import BlockTridiagonal
-from jbeamshell.equilibrium import Drive, Level, Seen, System, V
+from jbeamshell.equilibrium import Drive, Level, Seen, System, Touch, V
 from jbeamshell.friction import plastic_slip
 from jbeamshell.history import Status
 from jbeamshell.newton import Newton
+from jbeamshell import patterns
 from jbeamshell.parts import ARC_LENGTH
+from jbeamshell.patterns import Foreseen, Memory
 from jbeamshell.scene import Scene
 from jbeamshell.stiffness import (
     Stiffness,
@@ -27,27 +30,11 @@ from jbeamshell.stiffness import (
     stiffness_at_rest,
     unknowns_at_rest,
 )
+from jbeamshell.turning import ROUNDING, Here, Turn, first_to_slip, turned
 
 SLIPS = 0.5  # a node slips in a step when more than this part of its motion is inelastic
-CORNER, REACH = 1.7, 0.4  # H by which a strip slips less deep than a bar, and over which it grows
 EVENLY = 0.5**0.5  # of a direction that is as much displacement as force
-ROUNDING = 1e-9  # of the cap, or of gross slip: less than this is no difference
 PIECES = (8, 64)  # a load step that fails is walked in so many pieces, or so many
-
-
-class Turn(NamedTuple):
-    """A reversal of the load.
-
-    Attributes
-    ----------
-    target : the controlled load there
-    depth : (n,) force since then that takes the slip to a node
-    left : friction left at the loaded end, up to the cap of the other sign
-    """
-
-    target: Array
-    depth: Array
-    left: Array
 
 
 class State(NamedTuple):
@@ -114,18 +101,25 @@ def march(scene: Scene, start: State, path: Path, solver: Newton) -> Steps:
     solver : of one step
     """
     system = System(scene)
-    rough = stiffness_at_rest(system, 1.0)
-    if system.follows_friction:
-        smooth = stiffness_at_rest(system, 0.0)
+    foreseen = patterns.foresee(system, start, path) if patterns.applies(scene) else None
+    if foreseen is not None and isinstance(solver, patterns.Foresight):
+        return _as_foreseen(system, start, path, solver, foreseen)
+    if foreseen is None:
+        rough = stiffness_at_rest(system, 1.0)
+        if system.follows_friction:
+            smooth = stiffness_at_rest(system, 0.0)
 
-    def step(state: State, to: Path) -> tuple[State, Steps]:
+    def step(state: State, along: tuple[Path, Foreseen | None]) -> tuple[State, Steps]:
+        to, known = along
         drive = Drive(to.target, to.pressure, state.rest, to.rough)
+        if foreseen is not None:
+            return _step(system, state, drive, solver, None, known)
         stiffness = rough
         if system.follows_friction:
             stiffness = jax.tree.map(lambda a, b: jnp.where(to.rough > 0.0, a, b), rough, smooth)
-        return _step(system, state, drive, solver, stiffness)
+        return _step(system, state, drive, solver, stiffness, None)
 
-    return lax.scan(step, start, path)[1]
+    return lax.scan(step, start, (path, foreseen))[1]
 
 
 _march = eqx.filter_jit(march)
@@ -143,10 +137,17 @@ def is_traced(*trees: object) -> bool:
 
 
 def _step(
-    system: System, state: State, drive: Drive, solver: Newton, stiffness: Stiffness
+    system: System,
+    state: State,
+    drive: Drive,
+    solver: Newton,
+    stiffness: Stiffness | None,
+    foreseen: Foreseen | None,
 ) -> tuple[State, Steps]:
-    before, turn = state.level, _turned(system, state, drive)
-    guess = _guess(system, state, drive, turn)
+    before = state.level
+    here = Here(before.traction, before.cap, state.target, state.turn)
+    turn = turned(system, here, drive)
+    guess = _guess(system, state, drive, turn) if foreseen is None else foreseen.change.T
     target = drive.target
     if system.control == ARC_LENGTH:
         drive = _onwards(system, state, drive, turn)
@@ -161,8 +162,10 @@ def _step(
         return matrix(system, stiffness, seen, before, drive)
 
     def refresh(unknown: Array) -> Stiffness:
-        level, _, seen = system.advance(nodal(system, unknown), before, drive)
-        return stiffness_at(system, level.q, system.touch(*seen, before, drive), drive)
+        # Tied to the unknowns, lest the compiler finds it before it is needed.
+        strip, unknown = lax.optimization_barrier((system, unknown))
+        level, _, seen = strip.advance(nodal(strip, unknown), before, drive)
+        return stiffness_at(strip, level.q, strip.touch(*seen, before, drive), drive)
 
     def limit(old: Array, new: Array) -> Array:
         slip, was = nodal(system, new)[:, V], nodal(system, old)[:, V]
@@ -181,18 +184,12 @@ def _step(
         state.sound,
         tangent,
         stiffness,
-        None if system.linear else refresh,
+        refresh if stiffness is None or not system.linear else None,
     )
     after, *_ = system.advance(nodal(system, change), before, drive)
     sound = state.sound & (error <= solver.tolerance_for(system.x.dtype))
     end = system.end_displacement(after.q)
     rest = jnp.where(drive.rough > 0.0, state.rest, end)
-    failure = jnp.where(jnp.isfinite(error), Status.MAX_ITERATIONS, Status.NOT_FINITE)
-    status = jnp.where(state.sound, failure, Status.NOT_REACHED)
-    motion = after.q[:, V] - before.q[:, V]
-    inelastic = plastic_slip(motion, before.traction, after.traction, system.slip_stiffness)
-    noticeable = system.slip_stiffness * jnp.abs(inelastic) > ROUNDING * after.cap
-    rubbing = (drive.rough > 0.0) & (after.cap > 2.0 * system.cap_floor)
     kept = jax.tree.map(lambda new, old: jnp.where(sound, new, old), after, before)
     path = _place(system, after, rest) - _place(system, before, rest)
     gone = jnp.linalg.norm(path)
@@ -201,14 +198,78 @@ def _step(
     return new, Steps(
         state=new,
         displacement=end - rest,
-        slipping=rubbing & noticeable & (jnp.abs(inelastic) > SLIPS * jnp.abs(motion)),
+        slipping=_slipping(system, before, after, drive.rough),
         slip_work=drive.rough * system.slip_work(before, after),
         stored_energy=system.stored_energy(after, drive.pressure),
         sinking=system.sinking(after.q),
-        iterations=iterations,
+        iterations=iterations if foreseen is None else iterations + foreseen.solves,
         error=error,
-        status=jnp.where(sound, Status.CONVERGED, status),
+        status=_status(sound, state.sound, error),
     )
+
+
+def _as_foreseen(
+    system: System, start: State, path: Path, solver: Newton, foreseen: Foreseen
+) -> Steps:
+    """The steps that were foreseen, with no other check than that they settled."""
+    memory = foreseen.memory
+    change = jnp.swapaxes(foreseen.change, 1, 2)
+    q = start.level.q + jnp.cumsum(jax.vmap(system.embed)(change), axis=0)
+    end = jax.vmap(system.end_displacement)(q)
+
+    def pressed(rest: Array, here: tuple[Array, Array]) -> tuple[Array, Array]:
+        rest = jnp.where(here[0] > 0.0, rest, here[1])
+        return rest, rest
+
+    rest = lax.scan(pressed, start.rest, (path.rough, end))[1]
+
+    def reached(q: Array, to: Path, rest: Array, memory: Memory) -> Level:
+        drive, none = Drive(to.target, to.pressure, rest, to.rough), jnp.zeros_like(system.x)
+        touch = Touch(memory.traction, none, memory.reaction)
+        force, _ = system.balance(system.elastic(q, to.pressure), q, touch, drive)
+        return Level(q, memory.traction, memory.cap, memory.reaction, force)
+
+    level = jax.vmap(reached)(q, path, rest, memory)
+    before = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b[:-1]]), start.level, level)
+    good = foreseen.settled & (foreseen.error <= solver.tolerance_for(system.x.dtype))
+    sound = start.sound & (jnp.cumsum(~good) == 0)
+    reached_before = jnp.append(start.sound, sound[:-1])
+    count = path.target.size
+    return Steps(
+        state=State(
+            level=level,
+            rest=rest,
+            target=path.target,
+            pressure=path.pressure,
+            turn=memory.turn,
+            change=jax.vmap(lambda c: in_blocks(c, start.change))(change),
+            along=jnp.broadcast_to(start.along, (count, *start.along.shape)),
+            sound=sound,
+        ),
+        displacement=end - rest,
+        slipping=jax.vmap(functools.partial(_slipping, system))(before, level, path.rough),
+        slip_work=foreseen.slip_work,
+        stored_energy=jax.vmap(system.stored_energy)(level, path.pressure),
+        sinking=jax.vmap(system.sinking)(q),
+        iterations=foreseen.solves,
+        error=foreseen.error,
+        status=_status(sound, reached_before, foreseen.error),
+    )
+
+
+def _slipping(system: System, before: Level, after: Level, rough: Array) -> Array:
+    """Whether the nodes slip in a step, (n,)."""
+    motion = after.q[:, V] - before.q[:, V]
+    inelastic = plastic_slip(motion, before.traction, after.traction, system.slip_stiffness)
+    noticeable = system.slip_stiffness * jnp.abs(inelastic) > ROUNDING * after.cap
+    rubbing = (rough > 0.0) & (after.cap > 2.0 * system.cap_floor)
+    return rubbing & noticeable & (jnp.abs(inelastic) > SLIPS * jnp.abs(motion))
+
+
+def _status(sound: Array, sound_before: Array, error: Array) -> Array:
+    failure = jnp.where(jnp.isfinite(error), Status.MAX_ITERATIONS, Status.NOT_FINITE)
+    failed = jnp.where(sound_before, failure, Status.NOT_REACHED)
+    return jnp.where(sound, Status.CONVERGED, failed)
 
 
 def _onwards(system: System, state: State, drive: Drive, turn: Turn) -> Drive:
@@ -226,43 +287,11 @@ def _place(system: System, level: Level, rest: Array) -> Array:
     return jnp.stack([u, level.force / system.stiffness_scale])
 
 
-def _turned(system: System, state: State, drive: Drive) -> Turn:
-    """The last reversal of the load, which may be now."""
-    stride, rough = drive.target - state.target, drive.rough > 0.0
-    along = jnp.where(stride >= 0.0, 1.0, -1.0)
-    before = state.level
-    # What the end load has changed of the cap changes sign with it.
-    mean = system.friction * drive.pressure * (system.load - system.bottom_load) / system.tributary
-    left = jnp.maximum(2.0 * mean - before.cap - along * before.traction, 0.0)
-    share = left * system.tributary
-    used = jnp.cumsum(share[::-1])[::-1] - 0.5 * share
-    away = (system.x[-1] - system.x) / (REACH * system.half_height)
-    corner = CORNER * system.half_height * (1.0 - jnp.exp(-away))
-    now = Turn(state.target, used + corner * left, left[-1])
-    back = rough & (stride * (state.target - state.turn.target) <= 0.0)
-    return jax.tree.map(lambda new, old: jnp.where(back, new, old), now, state.turn)
-
-
 def _guess(system: System, state: State, drive: Drive, turn: Turn) -> Array:
-    """Increments of v that let those nodes slip which would if the strip were a bar.
-
-    A bar slips from the loaded end to where the friction left at the last reversal is used up by
-    the load since.
-    """
-    rise = drive.target - turn.target
-    along, load = jnp.where(rise >= 0.0, 1.0, -1.0), jnp.abs(rise)
-    if system.control != "force":  # by the bar's u = F^2/(2 E' 2H q)
-        stretch = system.stiffness_scale * jnp.sum(system.tributary)
-        square = 2.0 * stretch * turn.left
-        load = square * load
-        if system.control == ARC_LENGTH:  # the way is about the chord of u and F L/(E' 2H)
-            soft = (square / system.stiffness_scale) ** 2 / 2.0
-            load = load**2 / (soft + jnp.hypot(soft, load) + jnp.finfo(load.dtype).tiny)
-        load = jnp.sqrt(load)
-    level, stiffness = state.level, system.slip_stiffness
-    slips = turn.depth < load
-    beyond = (2.0 * level.cap - along * level.traction) / stiffness
-    slip = along * jnp.where(slips, jnp.maximum(beyond, 0.0), 0.0)
+    """Increments of v that take those nodes to their caps which would slip if the strip were a bar."""
+    level, slips = state.level, first_to_slip(system, turn, drive.target)
+    beyond = (2.0 * level.cap - slips * level.traction) / system.slip_stiffness
+    slip = slips * jnp.maximum(beyond, 0.0)
     fields = jnp.zeros_like(level.q).at[:, V].set(slip)[:, list(system.model.active)]
     bar = in_blocks(fields, state.change)
     return lax.stop_gradient(jnp.where(drive.rough > 0.0, bar, state.change))

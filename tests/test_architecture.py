@@ -12,10 +12,10 @@ PACKAGE = Path(jbeamshell.__file__).parent
 UPWARDS = [
     "errors", "runtime", "files", "kinematics", "rungs", "closed_form", "elasticity", "energy",
     "sections", "laminate", "friction", "contact", "grid", "parts", "scene", "scenes",
-    "block_tridiagonal", "newton", "equilibrium", "stiffness", "cycles", "trust", "history",
-    "stepping", "masing", "quasistatic", "histories", "response", "sweeping", "advice", "measured",
-    "example", "identify", "dynamics", "plotting", "output", "terminal", "fit_command",
-    "sweep_command", "ringdown_command", "__init__", "__main__",
+    "block_tridiagonal", "newton", "equilibrium", "stiffness", "bands", "turning", "patterns",
+    "cycles", "trust", "history", "stepping", "masing", "quasistatic", "histories", "response",
+    "sweeping", "advice", "measured", "example", "identify", "dynamics", "plotting", "output",
+    "terminal", "fit_command", "sweep_command", "ringdown_command", "__init__", "__main__",
 ]
 INSIDE = {
     "measured": [

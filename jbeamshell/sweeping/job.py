@@ -67,7 +67,7 @@ class Job:
         inside = np.flatnonzero(~self.outside)
         hardness = self.lanes.difficulty.ravel()[inside]
         order = inside[np.argsort(hardness, kind="stable")]
-        width = width_of_chunks()
+        width = width_of_chunks(self.lanes.scene)
         chunks = -(-order.size // width)
         least = -(-LEAST // width)
         largest = min(max(-(-chunks // BLOCKS), least), BLOCK // width)
@@ -149,7 +149,7 @@ class Job:
             "figures": list(self.figures),
             "dtype": self.dtype.name,
             "solver": None if self.solver is None else dataclasses.asdict(self.solver),
-            "layout": [BLOCKS, BLOCK, LEAST, width_of_chunks()],
+            "layout": [BLOCKS, BLOCK, LEAST, width_of_chunks(self.lanes.scene)],
         }
         return json.dumps(about)
 

@@ -13,6 +13,7 @@ import numpy as np
 from jax import Array, lax
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
+from jbeamshell import patterns
 from jbeamshell.errors import InputError
 from jbeamshell.history import History
 from jbeamshell.newton import Newton
@@ -22,6 +23,7 @@ from jbeamshell.response import response
 from jbeamshell.scene import Scene, scene_to_toml
 from jbeamshell.sweeping.lanes import Outcome
 
+ABREAST = 32  # strips of which a core finds the patterns side by side
 BLOCK = 1024  # lanes of the largest block, which is the compiled shape
 KEPT = 4  # compiled models of other scenes
 
@@ -42,12 +44,15 @@ class Block(NamedTuple):
     status: np.ndarray
 
 
-def width_of_chunks() -> int:
-    """Lanes that advance together: on a core each alone, because wide ones wait for their slowest.
+def width_of_chunks(scene: Scene) -> int:
+    """Lanes that advance together: a GPU wants all that it can get.
 
-    A core's vectors run along the nodes of one strip; a GPU wants all the lanes it can get.
+    On a core those of which only patterns are to be found, for its vectors then run along them;
+    else each alone, because wide ones wait for their slowest, and vectors run along the nodes.
     """
-    return 1 if jax.default_backend() == "cpu" else BLOCK
+    if jax.default_backend() != "cpu":
+        return BLOCK
+    return ABREAST if patterns.applies(scene) else 1
 
 
 def check_figures(
@@ -92,9 +97,9 @@ class Runner:
         self.scene, self.keys, self.figures = scene, tuple(keys), tuple(figures)
         self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
         self.devices = list(devices or jax.local_devices())
-        self.width = width_of_chunks()
+        self.width = width_of_chunks(scene)
         self._mesh = Mesh(np.array(self.devices), "lanes")
-        ask = _ask(scene, self.keys, self.figures, solver)
+        ask = _ask(scene, self.keys, self.figures, patterns.Foresight.of(solver))
         self._about = ask, self.figures, self._shape, self.dtype, self._mesh
 
     def lower(self) -> None:

@@ -1,0 +1,300 @@
+r"""Load steps of sharp sliders under linear strains: who sticks, who slips, one linear solve.
+
+With a guess of every node's status the equilibrium of a step is linear, because a node that sticks
+has t = t_n + k_t dv and one that slips has t = +-mu R, and its solution says what every node does:
+again, until nothing changes.  That is Newton's method without a residual, a line search, or
+anything evaluated twice.
+
+Arrays have their nodes (and what else is said) first; any further axes are lanes that are solved
+together.  Under `jax.vmap` the lanes come last here, where a core's vectors run along them.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array, lax
+from jax.custom_batching import custom_vmap
+
+from jbeamshell import block_tridiagonal
+from jbeamshell.bands import Band, band, node, times, unheld
+from jbeamshell.equilibrium import System, V
+from jbeamshell.friction import SharpSlip
+from jbeamshell.newton import Newton
+from jbeamshell.parts import CONTROLS
+from jbeamshell.scene import Scene
+from jbeamshell.turning import ROUNDING, Turn, first_to_slip, turned
+
+MOST = 40  # guesses of one step
+TIES = 64.0  # machine precisions of a displacement: less than this decides nothing
+
+
+class Memory(NamedTuple):
+    """What a step leaves to the next one; see `jbeamshell.stepping.State`."""
+
+    traction: Array
+    cap: Array
+    reaction: Array
+    target: Array
+    pressure: Array
+    turn: Turn
+
+
+class Pattern(NamedTuple):
+    """A guess and its answer.
+
+    Attributes
+    ----------
+    slips : (n,) 1 and -1 for nodes that slip along and against v, 0 for those that stick
+    closed : (n,) whether there is a reaction to rub
+    change : (m, n) increments of the unknowns
+    error : largest residual of the answer; of the last one only
+    solves : guesses so far
+    settled : whether the answer is what was guessed
+    """
+
+    slips: Array
+    closed: Array
+    change: Array
+    error: Array
+    solves: Array
+    settled: Array
+
+
+class Foreseen(NamedTuple):
+    """Steps of a path, stacked along the first axis.
+
+    Attributes
+    ----------
+    change : (m, n) increments of the unknowns
+    memory : what the step leaves
+    slip_work : work of friction
+    error : largest out-of-balance force over mu F_N L, by the assembled stiffness
+    solves : guesses it took
+    settled : whether the last one was right
+    """
+
+    change: Array
+    memory: Memory
+    slip_work: Array
+    error: Array
+    solves: Array
+    settled: Array
+
+
+class Strip(NamedTuple):
+    """A system with what is constant in it.
+
+    Attributes
+    ----------
+    system : its arrays may have lanes behind their nodes
+    section : (2, m, 2, m) stiffness of the section
+    pull : (m,) fields' part in the displacement of the loaded end
+    press : (n, m) forces of the whole pressure
+    """
+
+    system: System
+    section: Array
+    pull: Array
+    press: Array
+
+
+class Foresight(Newton):
+    """Takes what is foreseen for the answer where it can be, and does without a second look.
+
+    For batches, whose failures are solved again.  Derivatives do not pass.
+    """
+
+    @classmethod
+    def of(cls, solver: Newton | None) -> Foresight:
+        """With the settings of a solver."""
+        return cls(**vars(solver)) if solver is not None else cls()
+
+
+def applies(scene: Scene) -> bool:
+    """Whether only the statuses of sharp sliders make a scene's steps nonlinear."""
+    model = scene.model
+    return (
+        model.kinematics == "linear"
+        and scene.energy is None
+        and type(scene.contact.law) is SharpSlip
+        and "w" not in model.fields
+        and model.grid == "finite-difference"
+        and model.squeeze == "field"
+        and scene.load.control in CONTROLS
+        and len(model.active) <= block_tridiagonal.SMALL
+    )
+
+
+def foresee(system: System, start: Any, path: Any) -> Foreseen:
+    """Walk a load path.  Derivatives do not pass: they are those of the residual at the root.
+
+    Parameters
+    ----------
+    system : of a scene to which this `applies`
+    start, path : `jbeamshell.stepping.State` and `jbeamshell.stepping.Path`
+    """
+    level, rest = start.level, system.rest().q
+    memory = Memory(
+        level.traction, level.cap, level.reaction, start.target, start.pressure, start.turn
+    )
+    strip = Strip(
+        system,
+        system.section_stiffness(),
+        jax.grad(system.end_displacement)(rest)[-1],
+        jax.grad(system.sinking)(rest),
+    )
+    follow = custom_vmap(_follow)
+
+    @follow.def_vmap
+    def _(size: int, batched: Any, *given: Any) -> tuple[Any, Any]:
+        def last(along: bool, a: Array) -> Array:
+            if along:
+                return jnp.moveaxis(a, 0, -1)
+            return jnp.broadcast_to(a[..., None], (*a.shape, size))
+
+        found = _follow(*jax.tree.map(last, tuple(batched), given))
+        first = jax.tree.map(lambda a: jnp.moveaxis(a, -1, 0), found)
+        return first, jax.tree.map(lambda _: True, first)
+
+    found: Foreseen = follow(*lax.stop_gradient((strip, memory, path)))
+    return found
+
+
+def _follow(strip: Strip, start: Memory, path: Any) -> Foreseen:
+    system = strip.system
+    rough = smooth = band(system, strip.section, True)
+    if system.follows_friction:
+        smooth = band(system, strip.section, False)
+    net = (system.load - system.bottom_load) / system.tributary
+    weight = [system.residual_scale(i) * strip.press[:, i] for i in system.model.active]
+    pressed = jnp.stack(_solve(smooth, [-each for each in unheld(system, smooth, weight)]))
+
+    def step(memory: Memory, to: Any) -> tuple[Memory, Foreseen]:
+        rubs, turn = to.rough > 0.0, turned(system, memory, to)
+        further = to.pressure - memory.pressure
+        given = memory.reaction + further * net
+        load = [-further * each for each in unheld(system, rough, weight)]
+        slips = first_to_slip(system, turn, to.target)
+        drawn = to.target - memory.target
+        found = _settle(strip, rough, memory.traction, given, drawn, load, slips, rubs)
+        change = jnp.where(rubs, found.change, further * pressed)
+        reaction = given + times(rough.normal, change)
+        cap = jnp.maximum(system.friction * reaction, system.cap_floor)
+        trial = jnp.clip(memory.traction + system.slip_stiffness * change[V], -cap, cap)
+        traction = jnp.where(found.closed & rubs, trial, 0.0)
+        after = Memory(traction, cap, reaction, to.target, to.pressure, turn)
+        work = system.law.slip_work(
+            change[V], memory.traction, traction, memory.cap, cap, system.slip_stiffness
+        )
+        return after, Foreseen(
+            change,
+            after,
+            jnp.where(rubs, jnp.sum(system.tributary * work, axis=0), 0.0),
+            found.error,
+            found.solves,
+            found.settled,
+        )
+
+    found: Foreseen = lax.scan(step, start, path)[1]
+    return found
+
+
+def _settle(
+    strip: Strip,
+    band: Band,
+    traction: Array,
+    given: Array,
+    drawn: Array,
+    load: list[Array],
+    slips: Array,
+    rough: Array,
+) -> Pattern:
+    """Find who sticks and who slips in a step.
+
+    Parameters
+    ----------
+    strip, band : what is loaded, with friction
+    traction, given : (n,) friction before the step, and R but for what the step adds
+    drawn : the step of the controlled load
+    load : m entries (n,) of the step's other forces, as residuals
+    slips : (n,) a first guess
+    rough : whether there is friction; if not, nothing is done
+    """
+    system = strip.system
+    slider, friction = system.slip_stiffness, system.friction
+
+    def equations(slips: Array, closed: Array) -> tuple[Band, list[Array]]:
+        sticks = closed & (slips == 0.0)
+        rubbing = jnp.where(closed, friction * band.rubbing * slips, 0.0)
+        lower, diagonal, upper = (
+            [[a + rubbing * b for a, b in zip(blocks[V], normal, strict=True)], *blocks[1:]]
+            for blocks, normal in zip(band[:3], band.normal, strict=True)
+        )
+        diagonal[V][V] = diagonal[V][V] + jnp.where(sticks, band.rubbing * slider, 0.0)
+        slid = jnp.where(sticks, 0.0, rubbing * given - band.rubbing * traction)
+        rows = band._replace(lower=lower, diagonal=diagonal, upper=upper)
+        return _drawn(strip, rows, [load[V] - slid, *load[1:]], drawn)
+
+    def again(at: Pattern) -> Pattern:
+        change = _solve(*equations(at.slips, at.closed))
+        cap = friction * (given + times(band.normal, change))
+        trial = traction + slider * change[V]
+        largest = jnp.max(jnp.abs(change[V]), axis=0)
+        little = ROUNDING * cap + TIES * jnp.finfo(cap.dtype).eps * slider * largest
+        beyond = jnp.where(jnp.abs(trial) > cap + little, jnp.sign(trial), 0.0)
+        # A node that slips may stick next, but not slip back: else the search goes in circles.
+        on = jnp.where(at.slips * trial >= cap - little, at.slips, 0.0)
+        closed = cap > 2.0 * system.cap_floor
+        slips = jnp.where(closed, jnp.where(at.slips == 0.0, beyond, on), 0.0)
+        same = jnp.all((slips == at.slips) & (closed == at.closed), axis=0)
+        return Pattern(slips, closed, jnp.stack(change), at.error, at.solves + ~at.settled, same)
+
+    closed = friction * given > 2.0 * system.cap_floor
+    nothing, zero = jnp.zeros((len(load), *traction.shape), traction.dtype), jnp.zeros_like(drawn)
+    none = jnp.zeros(rough.shape, int)
+    first = Pattern(jnp.where(closed, slips, 0.0), closed, nothing, zero, none, ~rough)
+    found = lax.while_loop(lambda at: jnp.any(~at.settled & (at.solves < MOST)), again, first)
+    rows, right = equations(found.slips, found.closed)
+    left = [
+        r - times(near, list(found.change))
+        for r, near in zip(right, zip(*rows[:3], strict=True), strict=True)
+    ]
+    error = jnp.max(functools.reduce(jnp.maximum, map(jnp.abs, left)), axis=0)
+    return found._replace(error=jnp.where(rough, error, 0.0))
+
+
+def _drawn(
+    strip: Strip, rows: Band, right: list[Array], drawn: Array
+) -> tuple[Band, list[Array]]:
+    """The equations with the step of the controlled load at the loaded end."""
+    system = strip.system
+    active, last = system.model.active, node(system.x, -1)
+    pull = [system.residual_scale(i) * strip.pull[i] for i in active]
+    if system.control == "force":
+        return rows, [
+            r + jnp.where(last, weight * drawn, 0.0) for r, weight in zip(right, pull, strict=True)
+        ]
+    # The balance along v says what the force is, for the other rows; its own says u(L).
+    shares = [weight / pull[V] for weight in pull]
+    scale = system.stiffness_scale * system.residual_scale(V)
+
+    def without_force(blocks: list[list[Array]], own: bool) -> list[list[Array]]:
+        end = [jnp.where(last, scale * strip.pull[j] if own else 0.0, a) for j, a in zip(active, blocks[V], strict=True)]
+        return [end] + [
+            [a - jnp.where(last, share * b, 0.0) for a, b in zip(row, blocks[V], strict=True)]
+            for row, share in zip(blocks[1:], shares[1:], strict=True)
+        ]
+
+    rows = rows._replace(
+        lower=without_force(rows.lower, False), diagonal=without_force(rows.diagonal, True)
+    )
+    others = [r - jnp.where(last, share * right[V], 0.0) for r, share in zip(right[1:], shares[1:], strict=True)]
+    return rows, [jnp.where(last, scale * drawn, right[V]), *others]
+
+
+def _solve(rows: Band, right: list[Array]) -> list[Array]:
+    return block_tridiagonal.solve_entries(rows[:3], right)
