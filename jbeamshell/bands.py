@@ -54,7 +54,10 @@ def band(system: System, section: Array, rough: bool) -> Band:
     h, supports = system.lengths, system.supports(rough)
     none, one = jnp.zeros_like(h[:1]), jnp.ones_like(h)
     powers = [h, one, 1.0 / h]
-    before, after = ([jnp.append(*pair, 0) for pair in zip(a, b, strict=True)] for a, b in (([none] * 3, powers), (powers, [none] * 3)))
+    before, after = (
+        [jnp.append(*pair, 0) for pair in zip(a, b, strict=True)]
+        for a, b in (([none] * 3, powers), (powers, [none] * 3))
+    )
 
     def rows(near: tuple[list[Array], list[Array], Array]) -> tuple[Blocks, ...]:
         return _rows(system, section, supports, *near)
@@ -146,5 +149,9 @@ def times(normal: Blocks, change: list[Array]) -> Array:
         change,
         [jnp.append(each[1:], none, 0) for each in change],
     )
-    parts = [a * x for row, columns in zip(normal, near, strict=True) for a, x in zip(row, columns, strict=True)]
+    parts = [
+        a * x
+        for row, columns in zip(normal, near, strict=True)
+        for a, x in zip(row, columns, strict=True)
+    ]
     return sum(parts[1:], parts[0])

@@ -138,11 +138,17 @@ def _divided(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Ar
     rows = [[*p, *k] for p, k in zip(pivot, known, strict=True)]
     for k in range(m):
         for i in range(k):
-            rows[k] = [a - rows[k][i] * b if j > i else a for j, (a, b) in enumerate(zip(rows[k], rows[i], strict=True))]
+            rows[k] = [
+                a - rows[k][i] * b if j > i else a
+                for j, (a, b) in enumerate(zip(rows[k], rows[i], strict=True))
+            ]
         rows[k] = [a / rows[k][k] if j > k else a for j, a in enumerate(rows[k])]
     for k in reversed(range(m)):
         for i in range(k + 1, m):
-            rows[k] = [a - rows[k][i] * b if j >= m else a for j, (a, b) in enumerate(zip(rows[k], rows[i], strict=True))]
+            rows[k] = [
+                a - rows[k][i] * b if j >= m else a
+                for j, (a, b) in enumerate(zip(rows[k], rows[i], strict=True))
+            ]
     return [row[m:] for row in rows]
 
 

@@ -20,7 +20,7 @@ from jax import Array, lax
 from jax.custom_batching import custom_vmap
 
 from jbeamshell import block_tridiagonal
-from jbeamshell.bands import Band, band, node, times, unheld
+from jbeamshell.bands import Band, Blocks, band, node, times, unheld
 from jbeamshell.equilibrium import System, V
 from jbeamshell.friction import SharpSlip
 from jbeamshell.newton import Newton
@@ -91,15 +91,17 @@ class Strip(NamedTuple):
     Attributes
     ----------
     system : its arrays may have lanes behind their nodes
-    section : (2, m, 2, m) stiffness of the section
-    pull : (m,) fields' part in the displacement of the loaded end
-    press : (n, m) forces of the whole pressure
+    band : its stiffness with friction
+    pull : m fields' parts in the displacement of the loaded end
+    press : m entries (n,) of the whole pressure, as residuals
+    pressed : (m, n) change of the unknowns by the whole pressure without friction
     """
 
     system: System
-    section: Array
-    pull: Array
-    press: Array
+    band: Band
+    pull: list[Array]
+    press: list[Array]
+    pressed: Array
 
 
 class Foresight(Newton):
@@ -130,23 +132,13 @@ def applies(scene: Scene) -> bool:
 
 
 def foresee(system: System, start: Any, path: Any) -> Foreseen:
-    """Walk a load path.  Derivatives do not pass: they are those of the residual at the root.
+    """Walk a load path.  Derivatives do not pass.
 
     Parameters
     ----------
     system : of a scene to which this `applies`
     start, path : `jbeamshell.stepping.State` and `jbeamshell.stepping.Path`
     """
-    level, rest = start.level, system.rest().q
-    memory = Memory(
-        level.traction, level.cap, level.reaction, start.target, start.pressure, start.turn
-    )
-    strip = Strip(
-        system,
-        system.section_stiffness(),
-        jax.grad(system.end_displacement)(rest)[-1],
-        jax.grad(system.sinking)(rest),
-    )
     follow = custom_vmap(_follow)
 
     @follow.def_vmap
@@ -160,52 +152,94 @@ def foresee(system: System, start: Any, path: Any) -> Foreseen:
         first = jax.tree.map(lambda a: jnp.moveaxis(a, -1, 0), found)
         return first, jax.tree.map(lambda _: True, first)
 
-    found: Foreseen = follow(*lax.stop_gradient((strip, memory, path)))
+    given = (system, *_parts(system), memory_of(start), path)
+    found: Foreseen = follow(*lax.stop_gradient(given))
     return found
 
 
-def _follow(strip: Strip, start: Memory, path: Any) -> Foreseen:
-    system = strip.system
-    rough = smooth = band(system, strip.section, True)
+def known(system: System) -> Strip:
+    """What is constant in a system.  Derivatives do not pass."""
+    return _known(*lax.stop_gradient((system, *_parts(system))))
+
+
+def memory_of(state: Any) -> Memory:
+    """What the next step sees of a `jbeamshell.stepping.State`.  Derivatives do not pass."""
+    level = state.level
+    memory = Memory(
+        level.traction, level.cap, level.reaction, state.target, state.pressure, state.turn
+    )
+    return lax.stop_gradient(memory)
+
+
+def _parts(system: System) -> tuple[Array, Array, Array]:
+    """Stiffness of the section, fields' part in the end's displacement, forces of the pressure."""
+    rest = system.rest().q
+    pull = jax.grad(system.end_displacement)(rest)[-1]
+    return system.section_stiffness(), pull, jax.grad(system.sinking)(rest)
+
+
+def _known(system: System, section: Array, pull: Array, press: Array) -> Strip:
+    rough = smooth = band(system, section, True)
     if system.follows_friction:
-        smooth = band(system, strip.section, False)
-    net = (system.load - system.bottom_load) / system.tributary
-    weight = [system.residual_scale(i) * strip.press[:, i] for i in system.model.active]
-    pressed = jnp.stack(_solve(smooth, [-each for each in unheld(system, smooth, weight)]))
+        smooth = band(system, section, False)
+    active = system.model.active
+    forces = [system.residual_scale(i) * press[:, i] for i in active]
+    pressed = jnp.stack(_solve(smooth, [-each for each in unheld(system, smooth, forces)]))
+    return Strip(system, rough, [pull[i] for i in active], unheld(system, rough, forces), pressed)
 
-    def step(memory: Memory, to: Any) -> tuple[Memory, Foreseen]:
-        rubs, turn = to.rough > 0.0, turned(system, memory, to)
-        further = to.pressure - memory.pressure
-        given = memory.reaction + further * net
-        load = [-further * each for each in unheld(system, rough, weight)]
-        slips = first_to_slip(system, turn, to.target)
-        drawn = to.target - memory.target
-        found = _settle(strip, rough, memory.traction, given, drawn, load, slips, rubs)
-        change = jnp.where(rubs, found.change, further * pressed)
-        reaction = given + times(rough.normal, change)
-        cap = jnp.maximum(system.friction * reaction, system.cap_floor)
-        trial = jnp.clip(memory.traction + system.slip_stiffness * change[V], -cap, cap)
-        traction = jnp.where(found.closed & rubs, trial, 0.0)
-        after = Memory(traction, cap, reaction, to.target, to.pressure, turn)
-        work = system.law.slip_work(
-            change[V], memory.traction, traction, memory.cap, cap, system.slip_stiffness
-        )
-        return after, Foreseen(
-            change,
-            after,
-            jnp.where(rubs, jnp.sum(system.tributary * work, axis=0), 0.0),
-            found.error,
-            found.solves,
-            found.settled,
-        )
 
-    found: Foreseen = lax.scan(step, start, path)[1]
+def _follow(
+    system: System, section: Array, pull: Array, press: Array, start: Memory, path: Any
+) -> Foreseen:
+    strip = _known(system, section, pull, press)
+
+    def go(memory: Memory, to: Any) -> tuple[Memory, Foreseen]:
+        found = step(strip, memory, to)
+        return found.memory, found
+
+    found: Foreseen = lax.scan(go, start, path)[1]
     return found
+
+
+def step(strip: Strip, memory: Memory, to: Any) -> Foreseen:
+    """One load step.
+
+    Parameters
+    ----------
+    strip : what is loaded
+    memory : of the step before
+    to : has the target, the pressure and the roughness of this one
+    """
+    system = strip.system
+    rubs, turn = to.rough > 0.0, turned(system, memory, to)
+    further = to.pressure - memory.pressure
+    net = (system.load - system.bottom_load) / system.tributary
+    given = memory.reaction + further * net
+    load = [-further * each for each in strip.press]
+    slips = first_to_slip(system, turn, to.target)
+    drawn = to.target - memory.target
+    found = _settle(strip, memory.traction, given, drawn, load, slips, rubs)
+    change = jnp.where(rubs, found.change, further * strip.pressed)
+    reaction = given + times(strip.band.normal, change)
+    cap = jnp.maximum(system.friction * reaction, system.cap_floor)
+    trial = jnp.clip(memory.traction + system.slip_stiffness * change[V], -cap, cap)
+    traction = jnp.where(found.closed & rubs, trial, 0.0)
+    work = system.tributary * system.law.slip_work(
+        change[V], memory.traction, traction, memory.cap, cap, system.slip_stiffness
+    )
+    pressed = jnp.maximum(memory.cap, cap) > 2.0 * system.cap_floor
+    return Foreseen(
+        change,
+        Memory(traction, cap, reaction, to.target, to.pressure, turn),
+        jnp.where(rubs, jnp.sum(jnp.where(pressed, work, 0.0), axis=0), 0.0),
+        found.error,
+        found.solves,
+        found.settled,
+    )
 
 
 def _settle(
     strip: Strip,
-    band: Band,
     traction: Array,
     given: Array,
     drawn: Array,
@@ -217,14 +251,14 @@ def _settle(
 
     Parameters
     ----------
-    strip, band : what is loaded, with friction
+    strip : what is loaded
     traction, given : (n,) friction before the step, and R but for what the step adds
     drawn : the step of the controlled load
     load : m entries (n,) of the step's other forces, as residuals
     slips : (n,) a first guess
     rough : whether there is friction; if not, nothing is done
     """
-    system = strip.system
+    system, band = strip.system, strip.band
     slider, friction = system.slip_stiffness, system.friction
 
     def equations(slips: Array, closed: Array) -> tuple[Band, list[Array]]:
@@ -267,33 +301,34 @@ def _settle(
     return found._replace(error=jnp.where(rough, error, 0.0))
 
 
-def _drawn(
-    strip: Strip, rows: Band, right: list[Array], drawn: Array
-) -> tuple[Band, list[Array]]:
+def _drawn(strip: Strip, rows: Band, right: list[Array], drawn: Array) -> tuple[Band, list[Array]]:
     """The equations with the step of the controlled load at the loaded end."""
-    system = strip.system
-    active, last = system.model.active, node(system.x, -1)
-    pull = [system.residual_scale(i) * strip.pull[i] for i in active]
+    system, last = strip.system, node(strip.system.x, -1)
+    scales = [system.residual_scale(i) for i in system.model.active]
+    forces = [scale * pull for scale, pull in zip(scales, strip.pull, strict=True)]
     if system.control == "force":
-        return rows, [
-            r + jnp.where(last, weight * drawn, 0.0) for r, weight in zip(right, pull, strict=True)
-        ]
+        ends = [jnp.where(last, force * drawn, 0.0) for force in forces]
+        return rows, [r + end for r, end in zip(right, ends, strict=True)]
     # The balance along v says what the force is, for the other rows; its own says u(L).
-    shares = [weight / pull[V] for weight in pull]
-    scale = system.stiffness_scale * system.residual_scale(V)
+    shares = [jnp.where(last, force / forces[V], 0.0) for force in forces[1:]]
+    stiffness = system.stiffness_scale * scales[V]
 
-    def without_force(blocks: list[list[Array]], own: bool) -> list[list[Array]]:
-        end = [jnp.where(last, scale * strip.pull[j] if own else 0.0, a) for j, a in zip(active, blocks[V], strict=True)]
-        return [end] + [
-            [a - jnp.where(last, share * b, 0.0) for a, b in zip(row, blocks[V], strict=True)]
-            for row, share in zip(blocks[1:], shares[1:], strict=True)
+    def without_force(blocks: Blocks, own: list[Array] | list[float]) -> Blocks:
+        along = blocks[V]
+        end = [jnp.where(last, a, b) for a, b in zip(own, along, strict=True)]
+        others = [
+            [a - share * b for a, b in zip(row, along, strict=True)]
+            for row, share in zip(blocks[1:], shares, strict=True)
         ]
+        return [end, *others]
 
+    ends = [stiffness * pull for pull in strip.pull]
     rows = rows._replace(
-        lower=without_force(rows.lower, False), diagonal=without_force(rows.diagonal, True)
+        lower=without_force(rows.lower, [0.0] * len(right)),
+        diagonal=without_force(rows.diagonal, ends),
     )
-    others = [r - jnp.where(last, share * right[V], 0.0) for r, share in zip(right[1:], shares[1:], strict=True)]
-    return rows, [jnp.where(last, scale * drawn, right[V]), *others]
+    others = [r - share * right[V] for r, share in zip(right[1:], shares, strict=True)]
+    return rows, [jnp.where(last, stiffness * drawn, right[V]), *others]
 
 
 def _solve(rows: Band, right: list[Array]) -> list[Array]:

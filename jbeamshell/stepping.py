@@ -12,12 +12,12 @@ import numpy as np
 from jax import Array, lax
 from jax.typing import ArrayLike
 
+from jbeamshell import patterns
 from jbeamshell.block_tridiagonal import BlockTridiagonal
 from jbeamshell.equilibrium import Drive, Level, Seen, System, Touch, V
 from jbeamshell.friction import plastic_slip
 from jbeamshell.history import Status
 from jbeamshell.newton import Newton
-from jbeamshell import patterns
 from jbeamshell.parts import ARC_LENGTH
 from jbeamshell.patterns import Foreseen, Memory
 from jbeamshell.scene import Scene
@@ -101,25 +101,27 @@ def march(scene: Scene, start: State, path: Path, solver: Newton) -> Steps:
     solver : of one step
     """
     system = System(scene)
-    foreseen = patterns.foresee(system, start, path) if patterns.applies(scene) else None
-    if foreseen is not None and isinstance(solver, patterns.Foresight):
-        return _as_foreseen(system, start, path, solver, foreseen)
-    if foreseen is None:
+    foresees = patterns.applies(scene)
+    if foresees and isinstance(solver, patterns.Foresight):
+        return _as_foreseen(system, start, path, solver)
+    if foresees:
+        known = patterns.known(system)
+    else:
         rough = stiffness_at_rest(system, 1.0)
         if system.follows_friction:
             smooth = stiffness_at_rest(system, 0.0)
 
-    def step(state: State, along: tuple[Path, Foreseen | None]) -> tuple[State, Steps]:
-        to, known = along
+    def step(state: State, to: Path) -> tuple[State, Steps]:
         drive = Drive(to.target, to.pressure, state.rest, to.rough)
-        if foreseen is not None:
-            return _step(system, state, drive, solver, None, known)
+        if foresees:
+            foreseen = patterns.step(known, patterns.memory_of(state), lax.stop_gradient(to))
+            return _step(system, state, drive, solver, None, foreseen)
         stiffness = rough
         if system.follows_friction:
             stiffness = jax.tree.map(lambda a, b: jnp.where(to.rough > 0.0, a, b), rough, smooth)
         return _step(system, state, drive, solver, stiffness, None)
 
-    return lax.scan(step, start, (path, foreseen))[1]
+    return lax.scan(step, start, path)[1]
 
 
 _march = eqx.filter_jit(march)
@@ -145,9 +147,11 @@ def _step(
     foreseen: Foreseen | None,
 ) -> tuple[State, Steps]:
     before = state.level
-    here = Here(before.traction, before.cap, state.target, state.turn)
-    turn = turned(system, here, drive)
-    guess = _guess(system, state, drive, turn) if foreseen is None else foreseen.change.T
+    if foreseen is None:
+        turn = turned(system, Here(before.traction, before.cap, state.target, state.turn), drive)
+        guess = _guess(system, state, drive, turn)
+    else:
+        turn, guess = foreseen.memory.turn, foreseen.change.T
     target = drive.target
     if system.control == ARC_LENGTH:
         drive = _onwards(system, state, drive, turn)
@@ -208,10 +212,9 @@ def _step(
     )
 
 
-def _as_foreseen(
-    system: System, start: State, path: Path, solver: Newton, foreseen: Foreseen
-) -> Steps:
-    """The steps that were foreseen, with no other check than that they settled."""
+def _as_foreseen(system: System, start: State, path: Path, solver: Newton) -> Steps:
+    """The steps that are foreseen, with no other check than that they settle."""
+    foreseen = patterns.foresee(system, start, path)
     memory = foreseen.memory
     change = jnp.swapaxes(foreseen.change, 1, 2)
     q = start.level.q + jnp.cumsum(jax.vmap(system.embed)(change), axis=0)
@@ -288,7 +291,7 @@ def _place(system: System, level: Level, rest: Array) -> Array:
 
 
 def _guess(system: System, state: State, drive: Drive, turn: Turn) -> Array:
-    """Increments of v that take those nodes to their caps which would slip if the strip were a bar."""
+    """Increments of v that take those nodes to their caps which would slip in a bar."""
     level, slips = state.level, first_to_slip(system, turn, drive.target)
     beyond = (2.0 * level.cap - slips * level.traction) / system.slip_stiffness
     slip = slips * jnp.maximum(beyond, 0.0)

@@ -110,7 +110,7 @@ def test_what_cannot_go_on_says_why(begun):
 
 def test_a_path_that_goes_on_to_where_nothing_converges_is_loud(begun, monkeypatch):
     monkeypatch.setattr("jbeamshell.stepping.PIECES", ())
-    hasty = jb.Newton(max_iterations=1)
+    hasty = jb.Newton(max_iterations=1, tolerance=1e-18)
     with pytest.raises(jb.UnconvergedError, match=r"load step [6-9] of 9 \(load \S+\) found"):
         begun.continued(MORE, solver=hasty)
     quiet = begun.continued(MORE, solver=hasty, throw=False)

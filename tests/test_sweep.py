@@ -93,7 +93,7 @@ def test_many_blocks_answer_as_one():
     inside = int(np.sum(amplitudes < 2.0)) * 30
     assert told[0] == (0, inside)
     assert told[-1] == (inside, inside)
-    assert len(told) > 25
+    assert len(told) > 15
     assert many.computed == inside
 
 
@@ -121,7 +121,7 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
 
     monkeypatch.setattr(runner.Runner, "_answers", failing)
     monkeypatch.setattr(runner, "solve", solve)
-    over = {"load.amplitude": [0.3, 1.9, 1.1, 0.7], "strip.height_ratio": [0.05] * 7 + [0.4]}
+    over = {"load.amplitude": [0.3, 1.9, 1.1, 0.7], "strip.height_ratio": [0.05] * 31 + [0.4]}
     hurt = jb.sweep(SCENE, over, FIGURES)
     assert len(alone) == 4
     assert set(alone) <= {0.3, 1.9, 1.1, 0.7}
@@ -129,7 +129,7 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
     assert hurt.outside == alone.count(0.7)
     known = hurt.status == Outcome.CONVERGED
     for name in FIGURES:
-        right = result[name][[0, 1, 2, 4]][:, [0] * 7 + [1]]
+        right = result[name][[0, 1, 2, 4]][:, [0] * 31 + [1]]
         np.testing.assert_allclose(hurt[name][known], right[known], rtol=1e-9, atol=1e-13)
         assert np.all(np.isnan(hurt[name][~known]))
 
@@ -328,7 +328,7 @@ def test_a_sweep_that_was_cut_off_goes_on(tmp_path):
         jb.sweep(SCENE, over, FIGURES, out=out, progress=cut)
     assert not out.exists()
     blocks = sorted(parts.glob("block-*"))
-    assert len(blocks) == 5
+    assert len(blocks) == 2
     blocks[0].write_bytes(blocks[0].read_bytes()[:100])  # a disk that ran full
     (parts / ".draft.npz").touch()
 
@@ -337,7 +337,7 @@ def test_a_sweep_that_was_cut_off_goes_on(tmp_path):
     with pytest.raises(InputError, match="holds another sweep"):
         jb.sweep(SCENE.replace({"contact.friction": 0.11}), over, FIGURES, out=out)
     rest = jb.sweep(SCENE, over, FIGURES, out=out)
-    assert rest.computed == 96 - 4 * 8
+    assert rest.computed == 96 - 32
     assert rest.notes == ("32 lanes were done before",)
     same(whole, rest)
     assert [path.name for path in tmp_path.iterdir()] == ["sweep.csv"]
