@@ -11,11 +11,13 @@ further axes are lanes, strips that are treated together.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
+from jax.typing import ArrayLike
 
 from jbeamshell.equilibrium import System, V, W
 
@@ -109,10 +111,10 @@ def _rows(
         entries = [tuple(scale * entry for entry in near(i, j)) for j in active]
         if i not in supports:
             return entries
-        held = (0.0, scale * supports[i], 0.0)
+        held: tuple[ArrayLike, ...] = (0.0, scale * supports[i], 0.0)
         return [
             tuple(
-                jnp.where(first, own if j == i else 0.0, entry)
+                jnp.where(first, jnp.asarray(own) if j == i else 0.0, entry)
                 for own, entry in zip(held, entry_of_j, strict=True)
             )
             for j, entry_of_j in zip(active, entries, strict=True)
@@ -125,7 +127,7 @@ def _rows(
     return lower, diagonal, upper, normal
 
 
-def node(x: Array, node: int) -> Array:
+def node(x: Array, node: int) -> np.ndarray:
     """Which entry of an array over the nodes belongs to one of them."""
     here = np.zeros(x.shape[0], bool)
     here[node] = True
@@ -141,7 +143,7 @@ def unheld(system: System, band: Band, load: list[Array]) -> list[Array]:
     ]
 
 
-def times(normal: Blocks, change: list[Array]) -> Array:
+def times(rows: Sequence[Sequence[Array]], change: Sequence[Array]) -> Array:
     """Rows of a band times the unknowns: m arrays (n, ...) to (n, ...)."""
     none = jnp.zeros_like(change[0][:1])
     near = (
@@ -151,7 +153,7 @@ def times(normal: Blocks, change: list[Array]) -> Array:
     )
     parts = [
         a * x
-        for row, columns in zip(normal, near, strict=True)
+        for row, columns in zip(rows, near, strict=True)
         for a, x in zip(row, columns, strict=True)
     ]
     return sum(parts[1:], parts[0])

@@ -124,7 +124,9 @@ def solve_entries(matrix: Sequence, rhs: Sequence[Array]) -> list[Array]:
 def _divided(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Array]]:
     """The inverse of a small block times some columns, entry by entry."""
     m = len(pivot)
-    if m == 3 and not pivot[0][0].ndim:  # by cofactors: a short way from every entry to every other
+    if pivot[0][0].ndim:
+        return _by_quotients(pivot, known)
+    if m == 3:  # by cofactors: a short way from every entry to every other
         turn = [(1, 2), (2, 0), (0, 1)]
         cofactors = [
             [pivot[i][k] * pivot[j][n] - pivot[i][n] * pivot[j][k] for k, n in turn]
@@ -134,21 +136,32 @@ def _divided(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Ar
         inverse = [[c * scale for c in column] for column in zip(*cofactors, strict=True)]
         columns = list(zip(*known, strict=True))
         return [[_dot(row, column) for column in columns] for row in inverse]
-    # By quotients: the compiler keeps them, and computes all else anew for each of its uses.
     rows = [[*p, *k] for p, k in zip(pivot, known, strict=True)]
     for k in range(m):
+        scale = 1.0 / rows[k][k]
+        rows[k] = [a * scale for a in rows[k]]
+        for i in set(range(m)) - {k}:
+            factor = rows[i][k]
+            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k], strict=True)]
+    return [row[m:] for row in rows]
+
+
+def _by_quotients(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Array]]:
+    """For whole vectors: the compiler keeps quotients, but computes all else anew for each use."""
+    m = len(pivot)
+    rows = [[*p, *k] for p, k in zip(pivot, known, strict=True)]
+
+    def less(row: list[Array], factor: Array, other: list[Array], first: int) -> list[Array]:
+        pairs = zip(row[first:], other[first:], strict=True)
+        return [*row[:first], *(a - factor * b for a, b in pairs)]
+
+    for k in range(m):
         for i in range(k):
-            rows[k] = [
-                a - rows[k][i] * b if j > i else a
-                for j, (a, b) in enumerate(zip(rows[k], rows[i], strict=True))
-            ]
-        rows[k] = [a / rows[k][k] if j > k else a for j, a in enumerate(rows[k])]
+            rows[k] = less(rows[k], rows[k][i], rows[i], i + 1)
+        rows[k] = [*rows[k][: k + 1], *(a / rows[k][k] for a in rows[k][k + 1 :])]
     for k in reversed(range(m)):
         for i in range(k + 1, m):
-            rows[k] = [
-                a - rows[k][i] * b if j >= m else a
-                for j, (a, b) in enumerate(zip(rows[k], rows[i], strict=True))
-            ]
+            rows[k] = less(rows[k], rows[k][i], rows[i], m)
     return [row[m:] for row in rows]
 
 

@@ -404,14 +404,16 @@ class System(eqx.Module):
             jnp.where(prescribed, self.stiffness_scale * gap, forces[-1, V])
         )
         forces = self._support(forces, q, drive.rough)
-        scale = jnp.stack([self.residual_scale(field) for field in range(self.model.width)])
-        residual = (forces * scale)[:, list(self.model.active)]
+        per_force = jnp.stack([self._per_force(field) for field in range(self.model.width)])
+        residual = (forces * per_force / self.force_scale)[:, list(self.model.active)]
         return force, residual
 
     def residual_scale(self, field: int) -> Array:
         """Residual per force, or per moment, of a field's balance."""
-        per_force = 1.0 / self.half_height if field in (BETA, PSI) else 1.0
-        return per_force / self.force_scale
+        return self._per_force(field) / self.force_scale
+
+    def _per_force(self, field: int) -> Array:
+        return 1.0 / self.half_height if field in (BETA, PSI) else jnp.ones_like(self.half_height)
 
     def _cap(self, reaction: Array) -> Array:
         return jnp.maximum(self.friction * reaction, self.cap_floor)

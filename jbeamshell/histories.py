@@ -27,6 +27,7 @@ from jbeamshell.history import History
 from jbeamshell.kinematics import Strains
 from jbeamshell.newton import Newton
 from jbeamshell.parts import require
+from jbeamshell.patterns import Foresight
 from jbeamshell.quasistatic import check, check_solver, history_of, raise_if_failed
 from jbeamshell.scene import Scene, scene_from_values, scene_to_toml
 from jbeamshell.stepping import Path, State, Steps, at_rest, march, recover
@@ -83,7 +84,7 @@ def continued(
     # A single step would be compiled without its loop, and rounded otherwise.
     count, least = further.target.size, max(further.target.size, 2)
     walked: Path = jax.tree.map(lambda a: np.pad(a, (0, least - count), mode="edge"), further)
-    steps = _march(scene, history.end, walked, solver)
+    steps = _march(scene, history.end, walked, Foresight.of(solver, checked=True))
     if not np.asarray(steps.state.sound)[count - 1]:
         steps = recover(scene, steps, walked, solver, history.end)
         if throw:

@@ -81,7 +81,7 @@ class Newton(eqx.Module):
         tangent : the residual's matrix from what it sees and from the part that hardly changes
         stiffness : that part; None where the guess is likely to be a root, so that it is found only
             when it is needed
-        refresh : that part at some unknowns; None where it is the same everywhere
+        refresh : that part at some unknowns; None where it is the same everywhere and known
 
         Returns
         -------
@@ -120,7 +120,9 @@ class Newton(eqx.Module):
                 at,
             )
 
-        def refreshing(start: Iterate, anew: Callable[[Array], Stiffness]) -> Iterate:
+        def refreshing(
+            start: Iterate, stiffness: Stiffness, anew: Callable[[Array], Stiffness]
+        ) -> Iterate:
             def chords(state: tuple[Iterate, Stiffness]) -> tuple[Iterate, Stiffness]:
                 at = search(*state, state[0].tried + CHORDS)
                 return at, lax.cond(unfinished(at), anew, lambda _: state[1], at.x)
@@ -130,14 +132,14 @@ class Newton(eqx.Module):
         def iterate(_: Callable[[Array], Array], start: Array) -> tuple[Array, tuple]:
             one, none = jnp.ones((), start.dtype), jnp.asarray(0)
             at = Iterate(start, *evaluate(start), one, jnp.asarray(False), none)
-            if stiffness is None and refresh is not None:
+            if stiffness is not None and refresh is not None:
+                at = refreshing(at, stiffness, refresh)
+            elif stiffness is not None:
+                at = search(at, stiffness, self.max_iterations)
+            elif refresh is not None:
                 at = lax.while_loop(
                     unfinished, lambda at: search(at, refresh(at.x), self.max_iterations), at
                 )
-            elif refresh is None:
-                at = search(at, stiffness, self.max_iterations)
-            else:
-                at = refreshing(at, refresh)
             # As a float: custom_root has no tangent for integers.
             return at.x, (at.tried.astype(at.x.dtype), jnp.max(jnp.abs(at.residual)))
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import functools
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import equinox as eqx
 import jax
@@ -243,7 +243,7 @@ class Strip(eqx.Module):
         """E' 2H, or its sum over the layers, force per unit width."""
         if self.section is not None:
             return self.section.stretching_stiffness
-        return jnp.asarray(self.axial_stiffness)
+        return cast(Array, self.axial_stiffness)  # as it is: NumPy's stays NumPy's
 
     @property
     def plane_modulus(self) -> Array:
@@ -264,7 +264,7 @@ class Strip(eqx.Module):
         """G (the mean over the height where there are layers), stress."""
         if self.section is not None:
             return self.section.mean_shear_modulus
-        return shear_modulus(self.plane_modulus, jnp.asarray(self.poisson_ratio), self.plane)
+        return shear_modulus(self.plane_modulus, cast(Array, self.poisson_ratio), self.plane)
 
 
 class Contact(eqx.Module):

@@ -14,6 +14,7 @@ from __future__ import annotations
 import functools
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array, lax
@@ -105,15 +106,23 @@ class Strip(NamedTuple):
 
 
 class Foresight(Newton):
-    """Takes what is foreseen for the answer where it can be, and does without a second look.
+    """Takes what is foreseen for the answer where it can be; derivatives do not pass.
 
-    For batches, whose failures are solved again.  Derivatives do not pass.
+    It is for runs whose failures are walked again with Newton's method, which is only compiled
+    then.
+
+    Attributes
+    ----------
+    checked : whether the answer's residual is evaluated like any other; else by the assembled
+        stiffness
     """
 
+    checked: bool = eqx.field(static=True, default=True)
+
     @classmethod
-    def of(cls, solver: Newton | None) -> Foresight:
+    def of(cls, solver: Newton | None, *, checked: bool) -> Foresight:
         """With the settings of a solver."""
-        return cls(**vars(solver)) if solver is not None else cls()
+        return cls(**(vars(solver or Newton()) | {"checked": checked}))
 
 
 def applies(scene: Scene) -> bool:
@@ -220,7 +229,7 @@ def step(strip: Strip, memory: Memory, to: Any) -> Foreseen:
     drawn = to.target - memory.target
     found = _settle(strip, memory.traction, given, drawn, load, slips, rubs)
     change = jnp.where(rubs, found.change, further * strip.pressed)
-    reaction = given + times(strip.band.normal, change)
+    reaction = given + times(strip.band.normal, [*change])
     cap = jnp.maximum(system.friction * reaction, system.cap_floor)
     trial = jnp.clip(memory.traction + system.slip_stiffness * change[V], -cap, cap)
     traction = jnp.where(found.closed & rubs, trial, 0.0)
@@ -313,7 +322,7 @@ def _drawn(strip: Strip, rows: Band, right: list[Array], drawn: Array) -> tuple[
     shares = [jnp.where(last, force / forces[V], 0.0) for force in forces[1:]]
     stiffness = system.stiffness_scale * scales[V]
 
-    def without_force(blocks: Blocks, own: list[Array] | list[float]) -> Blocks:
+    def without_force(blocks: Blocks, own: list[Array]) -> Blocks:
         along = blocks[V]
         end = [jnp.where(last, a, b) for a, b in zip(own, along, strict=True)]
         others = [
@@ -324,7 +333,7 @@ def _drawn(strip: Strip, rows: Band, right: list[Array], drawn: Array) -> tuple[
 
     ends = [stiffness * pull for pull in strip.pull]
     rows = rows._replace(
-        lower=without_force(rows.lower, [0.0] * len(right)),
+        lower=without_force(rows.lower, [jnp.zeros_like(drawn)] * len(right)),
         diagonal=without_force(rows.diagonal, ends),
     )
     others = [r - share * right[V] for r, share in zip(right[1:], shares, strict=True)]

@@ -21,6 +21,7 @@ from jbeamshell.history import History, Status
 from jbeamshell.masing import bar, masing
 from jbeamshell.newton import Newton
 from jbeamshell.parts import as_leaf, require
+from jbeamshell.patterns import Foresight
 from jbeamshell.runtime import memory
 from jbeamshell.scene import Scene
 from jbeamshell.stepping import ROUNDING, Path, Steps, at_rest, is_traced, march, recover
@@ -85,7 +86,7 @@ def solve(
         scene = advise(scene, tolerance).applied(scene)
     whole, cycles = check(scene, path)
     touching = None if contact is None else _check_contact(scene, contact)
-    steps, history = _solve(scene, touching, whole, solver, np.asarray(True))
+    steps, history = _solve(scene, touching, whole, _first(scene, whole, solver), np.asarray(True))
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         sound = steps.state.sound[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
@@ -130,8 +131,14 @@ def compile_for(
 ) -> None:
     """Compile what `solve` needs, without solving anything."""
     whole, _ = _whole_path(scene, path)
-    jax.block_until_ready(_solve(scene, None, whole, solver or Newton(), np.asarray(False)))
-    jax.block_until_ready(scene.strip.shear_modulus)  # JAX compiles every operation of its own
+    first = _first(scene, whole, solver or Newton())
+    jax.block_until_ready(_solve(scene, None, whole, first, np.asarray(False)))
+
+
+def _first(scene: Scene, path: Path, solver: Newton) -> Newton:
+    """The solver of a first attempt: foresight, unless derivatives may be taken of it."""
+    staged = is_traced(scene, path, jnp.zeros(()))  # the last by a caller's jit
+    return solver if staged else Foresight.of(solver, checked=True)
 
 
 @eqx.filter_jit

@@ -19,7 +19,7 @@ from jbeamshell.friction import plastic_slip
 from jbeamshell.history import Status
 from jbeamshell.newton import Newton
 from jbeamshell.parts import ARC_LENGTH
-from jbeamshell.patterns import Foreseen, Memory
+from jbeamshell.patterns import Foreseen, Foresight, Memory
 from jbeamshell.scene import Scene
 from jbeamshell.stiffness import (
     Stiffness,
@@ -102,7 +102,7 @@ def march(scene: Scene, start: State, path: Path, solver: Newton) -> Steps:
     """
     system = System(scene)
     foresees = patterns.applies(scene)
-    if foresees and isinstance(solver, patterns.Foresight):
+    if foresees and isinstance(solver, Foresight):
         return _as_foreseen(system, start, path, solver)
     if foresees:
         known = patterns.known(system)
@@ -129,7 +129,7 @@ _march = eqx.filter_jit(march)
 
 def walk(scene: Scene, start: State, path: Path, solver: Newton) -> Steps:
     """Walk a load path; a step that fails is walked again in pieces."""
-    steps = _march(scene, start, path, solver)
+    steps = _march(scene, start, path, Foresight.of(solver, checked=True))
     return steps if bool(steps.state.sound[-1]) else recover(scene, steps, path, solver, start)
 
 
@@ -212,32 +212,35 @@ def _step(
     )
 
 
-def _as_foreseen(system: System, start: State, path: Path, solver: Newton) -> Steps:
-    """The steps that are foreseen, with no other check than that they settle."""
+def _as_foreseen(system: System, start: State, path: Path, solver: Foresight) -> Steps:
+    """The steps that are foreseen; not sound from the first on that is none."""
     foreseen = patterns.foresee(system, start, path)
     memory = foreseen.memory
     change = jnp.swapaxes(foreseen.change, 1, 2)
-    q = start.level.q + jnp.cumsum(jax.vmap(system.embed)(change), axis=0)
-    end = jax.vmap(system.end_displacement)(q)
 
-    def pressed(rest: Array, here: tuple[Array, Array]) -> tuple[Array, Array]:
-        rest = jnp.where(here[0] > 0.0, rest, here[1])
-        return rest, rest
+    def go(at: tuple[Array, Array], to: tuple[Path, Array]) -> tuple[tuple[Array, Array], tuple]:
+        rough, q = to[0].rough > 0.0, at[0] + system.embed(to[1])
+        end = system.end_displacement(q)
+        rest = jnp.where(rough, at[1], end)
+        return (q, rest), (q, rest, end)
 
-    rest = lax.scan(pressed, start.rest, (path.rough, end))[1]
+    q, rest, end = lax.scan(go, (start.level.q, start.rest), (path, change))[1]
+    along = jnp.tile(start.along, (q.shape[0], 1))
+    drive = Drive(path.target, path.pressure, rest, path.rough, along)
 
-    def reached(q: Array, to: Path, rest: Array, memory: Memory) -> Level:
-        drive, none = Drive(to.target, to.pressure, rest, to.rough), jnp.zeros_like(system.x)
-        touch = Touch(memory.traction, none, memory.reaction)
-        force, _ = system.balance(system.elastic(q, to.pressure), q, touch, drive)
+    def reached(q: Array, memory: Memory, drive: Drive) -> Level:
+        touch = Touch(memory.traction, jnp.zeros_like(system.x), memory.reaction)
+        force, _ = system.balance(system.elastic(q, drive.pressure), q, touch, drive)
         return Level(q, memory.traction, memory.cap, memory.reaction, force)
 
-    level = jax.vmap(reached)(q, path, rest, memory)
+    level = jax.vmap(reached)(q, memory, drive)
     before = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b[:-1]]), start.level, level)
-    good = foreseen.settled & (foreseen.error <= solver.tolerance_for(system.x.dtype))
+    error = foreseen.error
+    if solver.checked:
+        left = jax.vmap(system.advance)(change, before, drive)[1]
+        error = jnp.max(jnp.abs(left), axis=(1, 2))
+    good = foreseen.settled & (error <= solver.tolerance_for(system.x.dtype))
     sound = start.sound & (jnp.cumsum(~good) == 0)
-    reached_before = jnp.append(start.sound, sound[:-1])
-    count = path.target.size
     return Steps(
         state=State(
             level=level,
@@ -246,7 +249,7 @@ def _as_foreseen(system: System, start: State, path: Path, solver: Newton) -> St
             pressure=path.pressure,
             turn=memory.turn,
             change=jax.vmap(lambda c: in_blocks(c, start.change))(change),
-            along=jnp.broadcast_to(start.along, (count, *start.along.shape)),
+            along=along,
             sound=sound,
         ),
         displacement=end - rest,
@@ -255,8 +258,8 @@ def _as_foreseen(system: System, start: State, path: Path, solver: Newton) -> St
         stored_energy=jax.vmap(system.stored_energy)(level, path.pressure),
         sinking=jax.vmap(system.sinking)(q),
         iterations=foreseen.solves,
-        error=foreseen.error,
-        status=_status(sound, reached_before, foreseen.error),
+        error=error,
+        status=_status(sound, jnp.append(start.sound, sound[:-1]), error),
     )
 
 

@@ -322,11 +322,11 @@ BLOCKS = [b"", b"noise", b"\0" * 1000, b"PK\3\4" + bytes(range(256))]
 
 
 def test_broken_blocks_of_a_sweep_are_computed_again(folder):
-    over = {"load.amplitude": np.linspace(0.2, 1.9, 30)}
+    over = {"load.amplitude": np.linspace(0.2, 1.9, 120)}
     whole = jb.sweep(SCENE, over, ["dissipation"])
 
     def cut(done, total):
-        if done >= 24:
+        if done >= 96:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -352,7 +352,7 @@ def test_broken_blocks_of_a_sweep_are_computed_again(folder):
     for path, content in zip(blocks * 2, BLOCKS, strict=False):
         path.write_bytes(content)
     rest = jb.sweep(SCENE, over, ["dissipation"], out="sweep.csv")
-    assert 0 < rest.computed <= 30
+    assert 0 < rest.computed <= 120
     np.testing.assert_array_equal(rest["dissipation"], whole["dissipation"])
     assert not (folder / "evil").exists()
     for content in BLOCKS:
@@ -407,7 +407,7 @@ def test_a_full_disk_leaves_what_was_there(folder, capsys, monkeypatch, at):
 
 
 def test_a_disk_that_fills_during_a_sweep_loses_nothing(folder, fault, capsys, monkeypatch):
-    words = ["sweep", *BASE, "--over", "load.amplitude=.2:1.9:30", "--out", "sweep.csv"]
+    words = ["sweep", *BASE, "--over", "load.amplitude=.2:1.9:200", "--out", "sweep.csv"]
     write, saved = np.savez, []
 
     def filling(*arguments, **arrays):
@@ -429,7 +429,7 @@ def test_a_disk_that_fills_during_a_sweep_loses_nothing(folder, fault, capsys, m
     assert json.loads(capsys.readouterr().out)["computed"] == 0
     left = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
     assert left == ["good.csv", "sweep.csv"]
-    assert (folder / "sweep.csv").read_text().count("\n") == 31
+    assert (folder / "sweep.csv").read_text().count("\n") == 201
 
 
 # --- as a program ---------------------------------------------------------------------------------

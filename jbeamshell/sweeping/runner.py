@@ -99,7 +99,7 @@ class Runner:
         self.devices = list(devices or jax.local_devices())
         self.width = width_of_chunks(scene)
         self._mesh = Mesh(np.array(self.devices), "lanes")
-        ask = _ask(scene, self.keys, self.figures, patterns.Foresight.of(solver))
+        ask = _ask(scene, self.keys, self.figures, patterns.Foresight.of(solver, checked=False))
         self._about = ask, self.figures, self._shape, self.dtype, self._mesh
 
     def lower(self) -> None:
