@@ -20,7 +20,7 @@ from jbeamshell.sweeping.job import Job, Tell
 from jbeamshell.sweeping.runner import Block
 from jbeamshell.sweeping.store import Store
 
-POLL = 0.05  # seconds between looks at what the workers have done
+POLL = 0.01  # seconds between looks at what the workers have done
 TRIES = 3  # deaths in a row, without a block in between, after which a worker is given up
 
 

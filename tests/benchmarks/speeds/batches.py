@@ -18,7 +18,7 @@ from .common import OVER, RANGE, Plan, errors, lanes, scene, seconds_of, swept
 
 GRIDS: tuple[dict[str, Any], ...] = (
     {},
-    {"model.nodes": 61, "load.steps_per_half_cycle": 4, "model.end_size": 1.0 / 24.0},
+    {"model.nodes": 61, "load.steps_per_half_cycle": 2, "model.end_size": 1.0 / 24.0},
 )
 WIDE = {"strip.height_ratio": (0.01, 0.4), "load.amplitude": (0.05, 1.9)}
 CHUNK = 8  # lanes that advance together
@@ -74,11 +74,7 @@ def memory(size: int) -> None:
 def processes(plan: Plan) -> dict[str, Any]:
     """One process, two of them, and two devices of one."""
     values = lanes(plan.lanes)
-    swept(values, {})
-    alone, pair = [], []
-    for _ in tqdm(range(min(plan.rounds, STARTS)), disable=None, unit="round", desc="processes"):
-        alone.append(swept(values, {}))
-        pair.append(swept(values, {}, processes=2))
+    alone, pair = _alone_and_paired(values, GRIDS[0], plan)
     told = machine.told("devices", plan.lanes, plan.rounds, XLA_FLAGS=_two_devices())
     right = alone[0].values["dissipation"]
     one_s = _run_s(alone)
@@ -98,8 +94,26 @@ def processes(plan: Plan) -> dict[str, Any]:
         )
     rows[0]["whole_s"] = float(np.median([each.wall_s for each in alone]))
     rows[1]["whole_s"] = float(np.median([each.wall_s for each in pair]))
-    measured = "without starting and compiling"
-    return {"lanes": plan.lanes, "steps": 1, "run_s_is": measured, "rows": rows}
+    one, two = (plan.lanes / _run_s(sweeps) for sweeps in _alone_and_paired(values, GRIDS[1], plan))
+    return {
+        "lanes": plan.lanes,
+        "steps": 1,
+        "run_s_is": "without starting and compiling",
+        "rows": rows,
+        "finer_grid": {"lanes_per_s": one, "lanes_per_s_of_2_processes": two},
+    }
+
+
+def _alone_and_paired(
+    values: dict[str, np.ndarray], change: dict[str, Any], plan: Plan
+) -> tuple[list[jb.Sweep], list[jb.Sweep]]:
+    """Sweeps in one process and in two, by turns."""
+    swept(values, change)
+    alone, pair = [], []
+    for _ in tqdm(range(min(plan.rounds, STARTS)), disable=None, unit="round", desc="processes"):
+        alone.append(swept(values, change))
+        pair.append(swept(values, change, processes=2))
+    return alone, pair
 
 
 def _run_s(sweeps: list[jb.Sweep]) -> float:
