@@ -349,7 +349,7 @@ class System(eqx.Module):
         seen = (forces[:, W], q[:, V], q[:, W])
         touch = self.touch(*seen, before, drive)
         force, residual = self.balance(forces, q, touch, drive)
-        cap = self._cap(touch.reaction)
+        cap = self.cap(touch.reaction)
         return Level(q, touch.traction, cap, touch.reaction, force), residual, seen
 
     def elastic(self, q: Array, pressure: ArrayLike) -> Array:
@@ -367,7 +367,7 @@ class System(eqx.Module):
         """
         pressed, gap = balance / self.tributary, self._gap(w)
         reaction = jax.vmap(self.normal.reaction)(pressed, gap)
-        cap = self._cap(reaction)
+        cap = self.cap(reaction)
         slip = jax.vmap(self.law.traction, in_axes=(0, 0, 0, None))
         rough = jnp.where(self.friction > 0.0, drive.rough, 0.0)
         # No reaction, no traction; not even the floor, whose sign would flip for ever.
@@ -415,7 +415,8 @@ class System(eqx.Module):
     def _per_force(self, field: int) -> Array:
         return 1.0 / self.half_height if field in (BETA, PSI) else jnp.ones_like(self.half_height)
 
-    def _cap(self, reaction: Array) -> Array:
+    def cap(self, reaction: Array) -> Array:
+        """Coulomb cap mu R, never less than its floor."""
         return jnp.maximum(self.friction * reaction, self.cap_floor)
 
     def supports(self, rough: bool) -> dict[int, Array]:

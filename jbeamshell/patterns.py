@@ -230,9 +230,9 @@ def step(strip: Strip, memory: Memory, to: Any) -> Foreseen:
     found = _settle(strip, memory.traction, given, drawn, load, slips, rubs)
     change = jnp.where(rubs, found.change, further * strip.pressed)
     reaction = given + times(strip.band.normal, [*change])
-    cap = jnp.maximum(system.friction * reaction, system.cap_floor)
-    trial = jnp.clip(memory.traction + system.slip_stiffness * change[V], -cap, cap)
-    traction = jnp.where(found.closed & rubs, trial, 0.0)
+    cap = system.cap(reaction)
+    slid = system.law.traction(change[V], memory.traction, cap, system.slip_stiffness)
+    traction = jnp.where(found.closed & rubs, slid, 0.0)
     work = system.tributary * system.law.slip_work(
         change[V], memory.traction, traction, memory.cap, cap, system.slip_stiffness
     )
