@@ -6,14 +6,21 @@ from collections.abc import Callable, Sequence
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
-from jbeamshell.history import History
+from jbeamshell import patterns
+from jbeamshell.history import History, Status
+from jbeamshell.native import Native
 from jbeamshell.newton import Newton
 from jbeamshell.parts import check_words, require, require_choice
 from jbeamshell.quasistatic import solve
 from jbeamshell.scene import NUMBERS, Scene, check_key
+from jbeamshell.stepping import is_traced
 
+Answer = Callable[..., dict[str, Array]]
+
+FEW = 200  # nodes: with more the arithmetic takes longer than calling it
 RESPONSES = (
     "force",
     "displacement",
@@ -27,7 +34,7 @@ def response(
     figures: Sequence[str] = ("dissipation",),
     *,
     solver: Newton | None = None,
-) -> Callable[..., dict[str, Array]]:
+) -> Answer:
     """A pure function of some of a scene's numbers, for `jax.jit`, `jax.vmap` and `jax.grad`.
 
     Only what the figures need is computed, so that it costs less than `jbeamshell.solve`.
@@ -60,12 +67,26 @@ def response(
     for name in figures:
         require_choice("figures", name, RESPONSES)
 
-    @jax.jit
-    def answer(*values: Array) -> dict[str, Array]:
-        history = solve(
-            scene.replace(dict(zip(over, values, strict=True))), throw=False, solver=solver
-        )
-        found = {name: getattr(history, name) for name in figures}
-        return found | {"status": jnp.max(history.status)}
+    def asked(solver: Newton | None) -> Answer:
+        def answer(*values: Array) -> dict[str, Array]:
+            history = solve(
+                scene.replace(dict(zip(over, values, strict=True))), throw=False, solver=solver
+            )
+            found = {name: getattr(history, name) for name in figures}
+            return found | {"status": jnp.max(history.status)}
 
-    return answer
+        return answer
+
+    compiled = jax.jit(asked(solver))
+    if scene.model.nodes > FEW or is_traced(scene):
+        return compiled
+    foresees = patterns.applies(scene)
+    first = Native(asked(patterns.Foresight.of(solver, checked=True) if foresees else solver))
+
+    def ask(*values: Array) -> dict[str, Array]:
+        found: dict[str, Array] | None = first.now(*values)
+        if found is None or (foresees and np.asarray(found["status"]).item() != Status.CONVERGED):
+            return compiled(*values)
+        return found
+
+    return ask

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
+from typing import Any
 
 import jax
 
@@ -12,24 +13,32 @@ from jbeamshell.errors import InputError
 
 EXTRA = "--xla_backend_extra_options="
 FAST_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
+ASYNCHRONOUS = "jax_cpu_enable_async_dispatch"
 WORTH_KEEPING = 0.2  # seconds of compiling
 
 
-def configure(*, fast_loops: bool = True, cache: str | os.PathLike[str] | None = None) -> None:
-    """Choose how JAX compiles, for this process and those it starts.
+def configure(
+    *,
+    fast_loops: bool = True,
+    asynchronous: bool = False,
+    cache: str | os.PathLike[str] | None = None,
+) -> None:
+    """Choose how JAX compiles and calls, for this process and, but for calls, those it starts.
 
     Parameters
     ----------
     fast_loops : whether every loop on a CPU becomes one native function, instead of a call for each
         of its operations: load paths run several times faster, and compile a little slower.  It is
         the compiler's own option and holds for all that the process compiles.
+    asynchronous : whether a call on a CPU computes in another thread, as JAX's do unless told
+        otherwise; handing over takes as long as a small strip's cycle
     cache : folder in which compiled programs are kept, so that the next process need not compile
         them again; None leaves that as it is
 
     Raises
     ------
     InputError
-        if JAX has already started, so that ``fast_loops`` would come too late
+        if JAX has already started, so that these would come too late
 
     Notes
     -----
@@ -38,17 +47,30 @@ def configure(*, fast_loops: bool = True, cache: str | os.PathLike[str] | None =
     if cache is not None:
         jax.config.update("jax_compilation_cache_dir", str(cache))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", WORTH_KEEPING)
+    if is_asynchronous() != asynchronous:
+        _check_not_started(f"asynchronous = {asynchronous}")
+        jax.config.update(ASYNCHRONOUS, asynchronous)
     flags = os.environ.get("XLA_FLAGS", "")
     if not fast_loops or FAST_LOOPS in flags:
         return
-    if started():
-        fix = "call jbeamshell.configure() before anything else that computes"
-        raise InputError(f"fast_loops = True: JAX has already started in this process: {fix}")
+    _check_not_started("fast_loops = True")
     if EXTRA in flags:  # given once only, with commas
         flags = flags.replace(EXTRA, f"{EXTRA}{FAST_LOOPS},", 1)
     else:
         flags = f"{flags} {EXTRA}{FAST_LOOPS}".strip()
     os.environ["XLA_FLAGS"] = flags
+
+
+def _check_not_started(asked: str) -> None:
+    if started():
+        fix = "call jbeamshell.configure() before anything else that computes"
+        raise InputError(f"{asked}: JAX has already started in this process: {fix}")
+
+
+def is_asynchronous() -> bool:
+    """Whether JAX is set to compute in other threads than calls come from."""
+    config: Any = jax.config
+    return bool(config.values[ASYNCHRONOUS])
 
 
 def started() -> bool:

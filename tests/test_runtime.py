@@ -39,10 +39,20 @@ def test_nothing_is_chosen_by_import():
     assert flags_after({}, "jbeamshell.configure(fast_loops=False)") == ""
 
 
+def test_calls_wait_unless_told_otherwise():
+    look = f"print(jax.config.values[{runtime.ASYNCHRONOUS!r}])"
+    assert flags_after({}, f"import jax; {look}") == "True"
+    assert flags_after({}, f"import jax; jbeamshell.configure(fast_loops=False); {look}") == "False"
+
+
 def test_too_late_is_said(monkeypatch):
+    monkeypatch.setattr(runtime, "is_asynchronous", lambda: False)
     monkeypatch.setenv("XLA_FLAGS", "")
     monkeypatch.setattr(runtime, "started", lambda: True)
     with pytest.raises(InputError, match=r"fast_loops = True.*already started.*before anything"):
         runtime.configure()
     monkeypatch.setenv("XLA_FLAGS", FAST)
     runtime.configure()  # already so
+    monkeypatch.setattr(runtime, "is_asynchronous", lambda: True)
+    with pytest.raises(InputError, match=r"asynchronous = False.*already started"):
+        runtime.configure()
