@@ -107,7 +107,6 @@ def report(record: dict[str, Any]) -> str:
 def main() -> None:
     """Measure, write the record, say what it holds, draw it."""
     options = parsed()
-    jax.config.update("jax_cpu_enable_async_dispatch", machine.ASYNC_DISPATCH)
     # First calls are to be compiled, whatever an earlier process has left.
     jax.config.update("jax_enable_compilation_cache", options.quick)
     if options.child:

@@ -17,10 +17,11 @@ import jax
 import jaxlib
 import numpy as np
 
+from jbeamshell.runtime import is_asynchronous
+
 ROOT = Path(__file__).parents[3]
 SCRIPT = Path(__file__).parents[1] / "speed.py"
 GIVEN_FLAGS = os.environ.get("XLA_FLAGS", "")  # before this process adds its own
-ASYNC_DISPATCH = False  # calls as short as these would wait for the thread that does them
 PEAK_SIZE, PEAK_TRIES = 1024, 7
 
 
@@ -39,7 +40,7 @@ def about() -> dict[str, Any]:
         "numpy": np.__version__,
         "dtype": "float64",
         "flags": os.environ.get("XLA_FLAGS", ""),
-        "async_dispatch": ASYNC_DISPATCH,
+        "async_dispatch": is_asynchronous(),
         "omp_threads": int(os.environ["OMP_NUM_THREADS"]),
         "commit": _git("rev-parse", "--short", "HEAD"),
         "changed_since": bool(_git("status", "--porcelain", "jbeamshell")),
