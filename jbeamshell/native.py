@@ -14,43 +14,45 @@ REFUSED = ("custom_call", "stablehlo.sort", "stablehlo.fft")  # they need the ru
 
 
 class Native:
-    """A function of arrays that a CPU runs as one native function.
+    """A function of numbers that runs as one native function on a CPU, where that can be had.
 
     Otherwise each of its operations is a call of its own, and they take turns on several threads,
     which takes longer than the arithmetic of a strip of some dozen nodes.
 
     Attributes
     ----------
-    compiled : the function; not for transformations
-    fits : whether it is one that can be had in this form; None is not tried yet
+    ordinary : the compiled function
+    whole : another form of it: one call, which is marked
+    fits : whether that can be had; None is not tried yet
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._inside = jax.jit(function)
-        self.compiled = jax.jit(self._marked)
-        self.fits: bool | None = None
+    def __init__(self, function: Callable[..., Any], *, worth: bool = True) -> None:
+        self.ordinary = jax.jit(function)
+        self.whole = jax.jit(self._marked)
+        self.fits = None if worth else False
 
     def _marked(self, *given: Any) -> Any:
-        leaves, tree = jax.tree.flatten(self._inside(*given))
+        leaves, tree = jax.tree.flatten(self.ordinary(*given))
         leaves[0] = set_xla_metadata(leaves[0], **MARK)  # the call that makes it
         return jax.tree.unflatten(tree, leaves)
 
     def now(self, *given: Any) -> Any | None:
-        """The function's value, or None where it is not to be had: the caller has another way."""
-        if self.fits is False or any(isinstance(each, jax.core.Tracer) for each in given):
+        """The function's value, or None if it is asked by a transformation: it is for numbers."""
+        if any(isinstance(each, jax.core.Tracer) for each in given):
             return None
-        try:
-            with jax.ensure_compile_time_eval():  # now, even while another function is traced
-                if self.fits is None:
-                    self.fits = _may_fit(self.compiled, given)
-                return self.compiled(*given) if self.fits else None
-        except jax.errors.JaxRuntimeError:  # the compiler found something that it cannot take in
-            self.fits = False
-            return None
+        with jax.ensure_compile_time_eval():  # now, even while another function is traced
+            if self.fits is None:
+                self.fits = _may_fit(self.whole, given)
+            if self.fits:
+                try:
+                    return self.whole(*given)
+                except jax.errors.JaxRuntimeError:  # the compiler cannot take something in
+                    self.fits = False
+            return self.ordinary(*given)
 
 
-def _may_fit(compiled: Any, given: tuple[Any, ...]) -> bool:
+def _may_fit(whole: Any, given: tuple[Any, ...]) -> bool:
     if jax.default_backend() != "cpu":
         return False
-    text = compiled.lower(*given).as_text()
+    text = whole.lower(*given).as_text()
     return not any(word in text for word in REFUSED)

@@ -20,7 +20,7 @@ from jbeamshell.stepping import is_traced
 
 Answer = Callable[..., dict[str, Array]]
 
-FEW = 200  # nodes: with more the arithmetic takes longer than calling it
+FEW = 200  # nodes: beyond, the arithmetic takes longer than calling it
 RESPONSES = (
     "force",
     "displacement",
@@ -37,7 +37,9 @@ def response(
 ) -> Answer:
     """A pure function of some of a scene's numbers, for `jax.jit`, `jax.vmap` and `jax.grad`.
 
-    Only what the figures need is computed, so that it costs less than `jbeamshell.solve`.
+    Only what the figures need is computed, so that it costs less than `jbeamshell.solve`.  Called
+    with numbers, and not in a transformation, it is one native function on a CPU where the compiler
+    allows that: a strip of some dozen nodes takes less time than handing its parts to threads.
 
     Parameters
     ----------
@@ -78,10 +80,11 @@ def response(
         return answer
 
     compiled = jax.jit(asked(solver))
-    if scene.model.nodes > FEW or is_traced(scene):
+    if is_traced(scene):
         return compiled
     foresees = patterns.applies(scene)
-    first = Native(asked(patterns.Foresight.of(solver, checked=True) if foresees else solver))
+    quick = asked(patterns.Foresight.of(solver, checked=True) if foresees else solver)
+    first = Native(quick, worth=scene.model.nodes <= FEW)
 
     def ask(*values: Array) -> dict[str, Array]:
         found: dict[str, Array] | None = first.now(*values)

@@ -46,16 +46,13 @@ def called_back(x, y):
         (called_back, False),
     ],
 )
-def test_values_are_the_function_s_or_none(function, fits):
+def test_values_are_the_function_s(function, fits):
     native, given = Native(function), (jnp.asarray(0.3), jnp.asarray(0.4))
     for _ in range(2):  # the second time what was found is known
-        found = native.now(*given)
-        assert (found is not None) is native.fits
-        assert fits is None or native.fits is fits
-        if found is not None:
-            expected = jax.jit(function)(*given)
-            for name, value in found.items():
-                np.testing.assert_allclose(value, expected[name], rtol=1e-14)
+        found, expected = native.now(*given), jax.jit(function)(*given)
+        assert native.fits is not None if fits is None else native.fits is fits
+        for name, value in found.items():
+            np.testing.assert_allclose(value, expected[name], rtol=1e-14)
 
 
 def test_it_is_for_numbers_only():
@@ -68,13 +65,19 @@ def test_it_is_for_numbers_only():
     assert native.fits is True
 
 
+def test_what_is_not_worth_it_is_not_tried():
+    native = Native(looped, worth=False)
+    np.testing.assert_allclose(native.now(0.3, 0.4)["y"], np.cos(0.4))
+    assert native.fits is False
+
+
 def test_a_response_is_native_and_falls_back(monkeypatch):
     numbers = {"model.nodes": 11, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
     scene = jb.Scene().replace(numbers | {"load.cycles": 1})
     amplitude, made = float(scene.load.amplitude), []
 
-    def native(function):
-        made.append(Native(function))
+    def native(*given, **more):
+        made.append(Native(*given, **more))
         return made[-1]
 
     monkeypatch.setattr(sys.modules["jbeamshell.response"], "Native", native)
