@@ -82,7 +82,7 @@ def response(
     compiled = jax.jit(asked(solver))
     if is_traced(scene):
         return compiled
-    foresees = patterns.applies(scene)
+    foresees = patterns.applies(scene) and not isinstance(solver, patterns.Foresight)
     quick = asked(patterns.Foresight.of(solver, checked=True) if foresees else solver)
     first = Native(quick, worth=scene.model.nodes <= FEW)
 

@@ -105,7 +105,7 @@ def test_one_backbone_is_worse_than_two():
     assert 3.0 * two < one < 0.05
 
 
-@pytest.mark.parametrize("rung", ["bar", "masing"])
+@pytest.mark.parametrize("rung", ["bar", pytest.param("masing", marks=pytest.mark.slow)])
 def test_gradients_pass_through(rung):
     def dissipation(mu):
         return jb.solve(STRIP.replace({"model.rung": rung, "contact.friction": mu})).dissipation

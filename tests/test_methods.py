@@ -134,6 +134,7 @@ def test_the_bounded_solution_is_that_of_elements():
 # --- iterations -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_plain_newton_fails_where_the_limit_does_not():
     strips = solvers.random_strips(16)
     runs = {}

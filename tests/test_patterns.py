@@ -32,6 +32,7 @@ CASES = {
     "thick": {"strip.height_ratio": 0.4, "load.amplitude": 1.9, "model.end_size": 1.0 / 60.0},
     "gravel": {"contact.friction": 0.9, "load.amplitude": 5.0, "load.pressure_steps": 2},
 }
+RARER = {"bar", "free", "thick"}
 
 
 def same(one, other, rtol):
@@ -45,7 +46,11 @@ def same(one, other, rtol):
     assert np.array_equal(one.slipping, other.slipping)
 
 
-@pytest.mark.parametrize("case", CASES)
+def marked(case):
+    return pytest.param(case, marks=pytest.mark.slow) if case in RARER else case
+
+
+@pytest.mark.parametrize("case", [marked(case) for case in CASES])
 def test_what_is_foreseen_is_what_newton_finds(case, monkeypatch):
     scene = SCENE.replace(CASES[case])
     assert patterns.applies(scene)
