@@ -136,6 +136,18 @@ def _divided(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Ar
         inverse = [[c * scale for c in column] for column in zip(*cofactors, strict=True)]
         columns = list(zip(*known, strict=True))
         return [[_dot(row, column) for column in columns] for row in inverse]
+    return divided(pivot, known)
+
+
+def divided(pivot: Sequence[Sequence[Array]], known: Sequence[Sequence[Array]]) -> list:
+    """The inverse of a block times some columns, entry by entry, by Gauss and Jordan, no pivoting.
+
+    Parameters
+    ----------
+    pivot : m x m entries, arrays of any one shape
+    known : m rows of any number of columns
+    """
+    m = len(pivot)
     rows = [[*p, *k] for p, k in zip(pivot, known, strict=True)]
     for k in range(m):
         scale = 1.0 / rows[k][k]

@@ -10,10 +10,11 @@ import jbeamshell
 PACKAGE = Path(jbeamshell.__file__).parent
 # fmt: off
 UPWARDS = [
-    "errors", "runtime", "files", "kinematics", "rungs", "closed_form", "elasticity", "energy",
+    "errors", "runtime", "native", "files", "kinematics", "rungs", "closed_form", "elasticity",
+    "energy",
     "sections", "laminate", "friction", "contact", "grid", "parts", "scene", "scenes",
     "block_tridiagonal", "newton", "equilibrium", "stiffness", "bands", "turning", "patterns",
-    "cycles", "trust", "history", "stepping", "masing", "quasistatic", "histories", "native",
+    "cycles", "trust", "history", "stepping", "masing", "quasistatic", "histories",
     "response", "sweeping", "advice", "measured", "example", "identify", "dynamics", "plotting",
     "output", "terminal", "fit_command", "sweep_command", "ringdown_command", "__init__",
     "__main__",

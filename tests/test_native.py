@@ -93,11 +93,13 @@ def test_a_response_is_native_and_falls_back(monkeypatch):
 
 
 def test_a_response_of_a_traced_scene():
-    scene = jb.Scene().replace({"model.rung": "bar", "load.cycles": 1})
+    small = {"model.nodes": 11, "model.fields": ["v"], "model.kinematics": "linear"}
+    scene = jb.Scene().replace(small | {"load.cycles": 1, "load.steps_per_half_cycle": 2})
+    assert patterns.applies(scene)
 
     def of_height(ratio):
         ask = jb.response(scene.replace({"strip.height_ratio": ratio}), ("load.amplitude",))
         return ask(scene.load.amplitude)["dissipation"]
 
     found = jax.jit(of_height)(scene.strip.height_ratio)
-    np.testing.assert_allclose(found, jb.solve(scene).dissipation, rtol=1e-12)
+    np.testing.assert_allclose(found, jb.solve(scene, throw=False).dissipation, rtol=1e-9)

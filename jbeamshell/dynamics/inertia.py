@@ -25,7 +25,7 @@ from jax import Array
 from jax.typing import ArrayLike
 from numpy.polynomial import legendre
 
-from jbeamshell import grid
+from jbeamshell import block_tridiagonal, grid
 from jbeamshell.equilibrium import PSI, System
 from jbeamshell.kinematics import FIELDS, KINEMATICS
 from jbeamshell.parts import NOT_NEGATIVE, POSITIVE, TINY, as_leaf, require, require_choice
@@ -233,14 +233,9 @@ def free(system: System) -> np.ndarray:
 def solved(blocks: Array, rhs: Array) -> Array:
     """Solve symmetric positive definite blocks (n, m, m) x = rhs (n, m), all nodes at once."""
     m = rhs.shape[1]
-    rows = [[blocks[:, i, j] for j in range(m)] + [rhs[:, i]] for i in range(m)]
-    for k in range(m):
-        scale = 1.0 / rows[k][k]
-        rows[k] = [scale * entry for entry in rows[k]]
-        for i in set(range(m)) - {k}:
-            factor = rows[i][k]
-            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k], strict=True)]
-    return jnp.stack([row[m] for row in rows], axis=1)
+    entries = [[blocks[:, i, j] for j in range(m)] for i in range(m)]
+    rows = block_tridiagonal.divided(entries, [[rhs[:, i]] for i in range(m)])
+    return jnp.stack([row[0] for row in rows], axis=1)
 
 
 def _exact_rule(name: str) -> tuple[np.ndarray, np.ndarray]:
