@@ -26,9 +26,10 @@ from provenance import provenance
 from tqdm import tqdm
 
 import jbeamshell as jb
-from jbeamshell import plotting, trust
-from jbeamshell.files import write_text
-from jbeamshell.friction import ElasticSlip
+from jbeamshell import plotting
+from jbeamshell.common.files import write_text
+from jbeamshell.history import reliability
+from jbeamshell.mechanics.friction import ElasticSlip
 
 HERE = Path(__file__).parent
 RECORD = HERE / "failure_map.json"
@@ -117,7 +118,7 @@ def runner(settings: tuple[tuple[str, Any], ...]) -> Callable[[jax.Array], jax.A
     @jax.jit
     def run(numbers: jax.Array) -> jax.Array:
         history = jb.solve(scene_of(base, numbers), throw=False, solver=jb.Newton(tolerance))
-        grid, corner = trust.errors(history.rubbing)
+        grid, corner = reliability.dissipation_errors(history.rubbing)
         effort = jnp.sum(history.iterations) / history.force.size
         found = (history.dissipation_ratio, grid, corner, history.closure, effort)
         return jnp.stack([*found, jnp.max(history.status)]).astype(float)
@@ -170,7 +171,7 @@ def cell(
 def doubts_beforehand(settings: Mapping[str, Any], point: Mapping[str, float]) -> int:
     """How many doubts the scene alone raises."""
     base = jb.Scene().replace({key: v for key, v in settings.items() if "." in key})
-    return len(trust.foretold(scene_of(base, list((STANDARD | point).values()))))
+    return len(reliability.doubts_before(scene_of(base, list((STANDARD | point).values()))))
 
 
 def _figures(settings: Mapping[str, Any], point: Mapping[str, float]) -> list[Any]:

@@ -20,8 +20,8 @@ from provenance import provenance  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify, plotting  # noqa: E402
-from jbeamshell.example import HEIGHT_RATIOS, example_loops  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.measured.example import HEIGHT_RATIOS, example_loops  # noqa: E402
 
 HERE = Path(__file__).parent
 FREE = {

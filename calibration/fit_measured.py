@@ -28,15 +28,12 @@ import numpy as np  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify, plotting  # noqa: E402
-from jbeamshell.errors import InputError, UnconvergedError  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
-from jbeamshell.measured import (  # noqa: E402
-    Loop,
-    Recording,
-    read_recordings,
-    split_cycles,
-    steady_loops,
-)
+from jbeamshell.common.errors import InputError, UnconvergedError  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.measured.loops import Loop  # noqa: E402
+from jbeamshell.measured.recordings import Recording, read_recordings  # noqa: E402
+from jbeamshell.measured.splitting import split_cycles  # noqa: E402
+from jbeamshell.measured.steady import steady_loops  # noqa: E402
 
 MU, STRIP, SLIDER, SHOULDER = (
     "contact.friction",

@@ -23,11 +23,13 @@ from provenance import provenance  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
-from jbeamshell import identify, plotting, scenes  # noqa: E402
-from jbeamshell.elasticity import best_kappa_s, squeeze_decay_length  # noqa: E402
-from jbeamshell.example import data_folder, example_loops  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
-from jbeamshell.measured import Loop, SqueezeCurve, make_loop  # noqa: E402
+from jbeamshell import identify, plotting  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.measured.curves import SqueezeCurve  # noqa: E402
+from jbeamshell.measured.example import data_folder, example_loops  # noqa: E402
+from jbeamshell.measured.loops import Loop, make_loop  # noqa: E402
+from jbeamshell.reference.elasticity import best_kappa_s, squeeze_decay_length  # noqa: E402
+from jbeamshell.scene import library  # noqa: E402
 
 HERE = Path(__file__).parent
 EDGE = 50.0  # mm, where the pressure ends
@@ -55,7 +57,7 @@ def squeezed_curve() -> SqueezeCurve:
 def fit_squeeze(half_window: float, nodes: int, constants: str) -> tuple[identify.Fit, dict]:
     """Fit kappa_s in a window about the load's edge."""
     start = {"strip.kappa_s": START[constants], "model.constants": constants, "model.nodes": nodes}
-    scene = scenes.squeezed().replace(start)
+    scene = library.squeezed().replace(start)
     curve = squeezed_curve().between(EDGE - half_window, EDGE + half_window)
     fit = identify.fit_kappa_s(curve, scene)
     kappa_s, strip = fit.values["strip.kappa_s"], scene.strip

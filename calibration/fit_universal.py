@@ -25,9 +25,9 @@ from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify, plotting  # noqa: E402
-from jbeamshell.example import HEIGHT_RATIOS, data_folder  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
-from jbeamshell.measured import DissipationCurve  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.measured.curves import DissipationCurve  # noqa: E402
+from jbeamshell.measured.example import HEIGHT_RATIOS, data_folder  # noqa: E402
 
 HERE = Path(__file__).parent
 FREE = ("strip.kappa_s", "contact.stick_stiffness")

@@ -32,11 +32,12 @@ from provenance import provenance  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
-from jbeamshell import plotting, scenes  # noqa: E402
-from jbeamshell.closed_form import shear_coefficient  # noqa: E402
-from jbeamshell.elasticity import filon_average_step, reaction_jump  # noqa: E402
-from jbeamshell.example import data_folder  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
+from jbeamshell import plotting  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.measured.example import data_folder  # noqa: E402
+from jbeamshell.mechanics.homogeneous import shear_coefficient  # noqa: E402
+from jbeamshell.reference.elasticity import filon_average_step, reaction_jump  # noqa: E402
+from jbeamshell.scene import library  # noqa: E402
 
 HERE = Path(__file__).parent
 RECORD = HERE / "ladder_squeeze.json"
@@ -134,7 +135,7 @@ def closed_step(order: int) -> float:
     """Step of R at the edge of the load."""
     if order:
         return -PRESSURE * (-1) ** order / (order + 1)
-    strip = scenes.receding().strip
+    strip = library.receding().strip
     return float(reaction_jump(-PRESSURE, strip.kappa_s, shear_coefficient(strip.poisson_ratio)))
 
 
@@ -149,8 +150,8 @@ def profile(x: Any, values: Any) -> list[list[float]]:
 def climb(order: int, nodes: int, kinematics: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Both problems on one grid: their figures, and their profiles."""
     change = {"model.order": order, "model.nodes": nodes, "model.kinematics": kinematics}
-    squeezed, squeeze_time = timed(scenes.squeezed().replace(change))
-    receding, contact_time = timed(scenes.receding().replace(change))
+    squeezed, squeeze_time = timed(library.squeezed().replace(change))
+    receding, contact_time = timed(library.receding().replace(change))
     jax.clear_caches()  # every case compiles programs of its own
     figures = {
         "order": order,

@@ -21,7 +21,7 @@ from provenance import provenance  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
 
 HERE = Path(__file__).parent
 HEIGHTS, AMPLITUDES = (0.0511, 0.1126, 0.2358, 0.4), (0.3247, 0.5851, 1.0, 1.6)

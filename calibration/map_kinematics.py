@@ -14,7 +14,7 @@ equilibrium in the plain load steps (a batch does not retry in smaller ones), or
 pressed through itself, psi <= -1.
 
 Writes map_kinematics.json beside this file, draws map_kinematics.png from it, and fits the
-constants of `jbeamshell.advice.rotations`; a quarter of an hour on one core:
+constants of `jbeamshell.history.linearisation`; a quarter of an hour on one core:
 
     python calibration/map_kinematics.py           # --draw: only the picture, from the record
 """
@@ -41,8 +41,8 @@ from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import plotting  # noqa: E402
-from jbeamshell.advice.rotations import BEAMSHELL, SECTIONS, bound  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.history.linearisation import BEAMSHELL, SECTIONS, bound  # noqa: E402
 
 HERE = Path(__file__).parent
 RECORD = HERE / "map_kinematics.json"

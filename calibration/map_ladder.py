@@ -27,8 +27,8 @@ from provenance import provenance  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
-from jbeamshell.advice.candidates import CANDIDATES, Candidate  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.ladder.candidates import CANDIDATES, Candidate  # noqa: E402
 
 HERE = Path(__file__).parent
 RECORD = HERE / "ladder_map.json"

@@ -31,8 +31,8 @@ from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify, plotting  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
-from jbeamshell.measured import Loop, make_loop  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.measured.loops import Loop, make_loop  # noqa: E402
 
 HERE = Path(__file__).parent
 TRUTH = {

@@ -18,11 +18,17 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell import __main__, identify, scenes, stepping, sweeping, terminal
-from jbeamshell.errors import LONGEST
+from jbeamshell import identify
+from jbeamshell.cli import main, terminal
+from jbeamshell.common.errors import LONGEST
 from jbeamshell.identify import plan
-from jbeamshell.measured import containers, curve_files, curves, loops, read_recordings, steady
-from jbeamshell.scene import KEYS, NUMBERS, overridden, scene_from_values
+from jbeamshell.measured import containers, curve_files, curves, loops, steady
+from jbeamshell.measured.recordings import read_recordings
+from jbeamshell.quasistatic import stepping
+from jbeamshell.scene import library
+from jbeamshell.scene.keys import KEYS, NUMBERS
+from jbeamshell.scene.toml import overridden, scene_from_values
+from jbeamshell.sweeping import store
 
 TINY = {
     "model.nodes": 9,
@@ -52,7 +58,7 @@ def fault(capsys):
     def fault(*words, code=2):
         before = {place.name for place in pathlib.Path().iterdir()}
         try:
-            got = __main__.main([*map(str, words)])
+            got = main.main([*map(str, words)])
         except BaseException as error:  # a traceback
             return f"{words} -> {error!r}"[:500]
         out, err = capsys.readouterr()
@@ -158,8 +164,8 @@ ENTRIES = {
     "write_scene": lambda x: jb.write_scene(SCENE, x),
     "scene_to_toml": lambda x: jb.scene_to_toml(x),
     "read_history": lambda x: jb.read_history(x),
-    "named": lambda x: scenes.named(x),
-    "values_from": lambda x: scenes.values_from(x),
+    "named": lambda x: library.named(x),
+    "values_from": lambda x: library.values_from(x),
     "sweep": lambda x: jb.sweep(x, {"load.amplitude": [0.5]}),
     "over": lambda x: jb.sweep(SCENE, x),
     "values": lambda x: jb.sweep(SCENE, {"load.amplitude": x}),
@@ -246,7 +252,7 @@ def test_numbers_at_the_ends_of_what_there_is_give_figures_or_one_line(capsys, m
     monkeypatch.setattr(stepping, "PIECES", ())
     for key in (key for key in NUMBERS if key != "strip.layers"):
         for value in ("5e-324", "1.7e308"):
-            code = __main__.main(["run", *BASE, "--json", "--set", f"{key}={value}"])
+            code = main.main(["run", *BASE, "--json", "--set", f"{key}={value}"])
             out, err = capsys.readouterr()
             if code == 0:
                 figures = json.loads(out, parse_constant=pytest.fail)
@@ -346,8 +352,8 @@ def test_broken_blocks_of_a_sweep_are_computed_again(folder):
     ]
     for path, arrays in zip(blocks * 3, wrong, strict=False):
         np.savez(path, **arrays)
-        store = sweeping.Store(folder / "sweep.csv.parts")
-        assert store.load(int(path.stem[-6:]), 1, lanes) is None
+        kept = store.Store(folder / "sweep.csv.parts")
+        assert kept.load(int(path.stem[-6:]), 1, lanes) is None
         assert not path.exists()
     for path, content in zip(blocks * 2, BLOCKS, strict=False):
         path.write_bytes(content)
@@ -396,7 +402,7 @@ def test_a_full_disk_leaves_what_was_there(folder, capsys, monkeypatch, at):
     out.mkdir()
     (out / "loop.csv").write_text("old")
     monkeypatch.setattr(at if at != "os.fdopen" else "tempfile.mkstemp", full)
-    assert __main__.main(["run", *BASE, "--json", "--out", str(out)]) == 2
+    assert main.main(["run", *BASE, "--json", "--out", str(out)]) == 2
     told = capsys.readouterr()
     assert json.loads(told.out)["status"] == "converged"  # what was computed is not lost
     assert told.err.endswith("loop.csv: cannot be written (No space left on device)\n")
@@ -420,12 +426,12 @@ def test_a_disk_that_fills_during_a_sweep_loses_nothing(folder, fault, capsys, m
     monkeypatch.undo()
     monkeypatch.chdir(folder)
     monkeypatch.setattr("csv.writer", full)  # of the table
-    assert __main__.main(words) == 2
+    assert main.main(words) == 2
     assert "table.csv: cannot be written (No space left on device)" in capsys.readouterr().err
     assert not (folder / "sweep.csv").exists()
     monkeypatch.undo()
     monkeypatch.chdir(folder)
-    assert __main__.main([*words, "--json"]) == 0
+    assert main.main([*words, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["computed"] == 0
     left = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
     assert left == ["good.csv", "sweep.csv"]

@@ -16,11 +16,13 @@ import jbeamshell as jb
 from calibration.finite_elements import solve
 from calibration.finite_elements.mesh import ORDERS
 from calibration.finite_elements.solving import check_reach
-from jbeamshell import scenes
-from jbeamshell.__main__ import BAD_INPUT, INTERRUPTED, UNCONVERGED
-from jbeamshell.output import as_json, check_folder, turning_steps, write_run
-from jbeamshell.scene import overridden, scene_from_values
-from jbeamshell.terminal import assignments, put, say_written
+from jbeamshell.cli.main import BAD_INPUT, INTERRUPTED, UNCONVERGED
+from jbeamshell.cli.terminal import assignments, put, say_written
+from jbeamshell.common.files import as_json
+from jbeamshell.history.report import turning_steps, write_run
+from jbeamshell.plotting.folder import check_folder
+from jbeamshell.scene import library
+from jbeamshell.scene.toml import overridden, scene_from_values
 
 COUNTS = ("newton_iterations", "wall_s")  # of which a difference says nothing
 PICTURE = "finite_elements.png"
@@ -67,7 +69,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(options: argparse.Namespace) -> int:
-    given = scenes.values_from(options.scene) if options.scene else {}
+    given = library.values_from(options.scene) if options.scene else {}
     scene = scene_from_values(overridden(given, assignments(options.set)))
     folder = check_folder(options.out) if options.out else None
     check_reach(scene)

@@ -22,9 +22,9 @@ jax.config.update("jax_enable_x64", True)
 import jbeamshell as jb  # noqa: E402
 from calibration.finite_elements import program, solve  # noqa: E402
 from calibration.provenance import provenance  # noqa: E402
-from jbeamshell import scenes  # noqa: E402
-from jbeamshell.example import data_folder  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.measured.example import data_folder  # noqa: E402
+from jbeamshell.scene import library  # noqa: E402
 
 HERE = Path(__file__).parent
 CASES = ((0.1126, 0.7855), (0.1126, 1.6), (0.2358, 1.0))  # height ratio, amplitude
@@ -73,7 +73,7 @@ def loop(height_ratio: float, amplitude: float, elements: str) -> dict[str, Any]
 
 def receding() -> dict[str, Any]:
     """The frictionless strip that lifts off beyond its load, against the data of theory."""
-    history, took = timed(scenes.receding())
+    history, took = timed(library.receding())
     found = {name: float(getattr(history, name)[-1]) for name in RECEDING}
     return {"found": found, "reference": RECEDING, "elements": "quadratic", **took}
 

@@ -24,8 +24,8 @@ import numpy as np
 
 from calibration.finite_elements.cards import card, equation, node_set, normal_behaviour
 from calibration.finite_elements.mesh import Mesh, nodal_loads
-from jbeamshell.scene import Scene
-from jbeamshell.stepping import Path
+from jbeamshell.quasistatic.load_path import LoadPath
+from jbeamshell.scene.scene import Scene
 
 NORMAL_STIFFNESS = 1000.0  # of the contact, in units of E'/H
 SOFTER = (1e-3, 1e-2, 1e-1)  # of it, in the steps before the first level
@@ -68,7 +68,7 @@ class Step(NamedTuple):
     softer: float = 1.0
 
 
-def penalty(scene: Scene, path: Path) -> Penalty:
+def penalty(scene: Scene, path: LoadPath) -> Penalty:
     """Contact stiffnesses that are nearly rigid, in any units.
 
     The stick slope allows an elastic slip of a thousandth of the slip at the loaded end, which is
@@ -88,7 +88,7 @@ def penalty(scene: Scene, path: Path) -> Penalty:
     return Penalty(normal, cap / (ELASTIC_SLIP * slip))
 
 
-def write_deck(scene: Scene, path: Path, mesh: Mesh) -> str:
+def write_deck(scene: Scene, path: LoadPath, mesh: Mesh) -> str:
     """The whole input deck.
 
     Parameters

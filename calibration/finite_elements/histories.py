@@ -17,10 +17,11 @@ from calibration.finite_elements.deck import Penalty, penalty, steps_before
 from calibration.finite_elements.mesh import Mesh, nodal_loads
 from calibration.finite_elements.results import Printed
 from calibration.finite_elements.sections import fitted, section_forces
-from jbeamshell.history import History, Status
-from jbeamshell.kinematics import Strains
-from jbeamshell.scene import Scene
-from jbeamshell.stepping import Path
+from jbeamshell.common.errors import Status
+from jbeamshell.history.history import History
+from jbeamshell.mechanics.kinematics import Strains
+from jbeamshell.quasistatic.load_path import LoadPath
+from jbeamshell.scene.scene import Scene
 
 SLIDES = 0.99  # of the cap: a node with more traction slips
 TENSION = 1e-3  # of the largest nodal force: less is none
@@ -47,7 +48,7 @@ class Contact(NamedTuple):
 
 def make_history(
     scene: Scene,
-    path: Path,
+    path: LoadPath,
     cycles: tuple[tuple[int, int, int], ...],
     mesh: Mesh,
     printed: dict[tuple[str, str], Printed],

@@ -15,9 +15,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell import grid
-from jbeamshell.parts import POSITIVE, require, require_choice, require_number
-from jbeamshell.scene import Scene
+from jbeamshell.common.checks import POSITIVE, require, require_choice, require_number
+from jbeamshell.mechanics import elements
+from jbeamshell.scene.scene import Scene
 
 ORDERS = {"linear": 1, "quadratic": 2}
 RULES = {1: "finite-difference", 2: "collocation"}
@@ -135,8 +135,8 @@ def nodal_loads(ends: np.ndarray, order: int, pressure: Array) -> np.ndarray:
     """Work-equivalent nodal forces of a pressure (a number or a table), however its steps fall."""
     if pressure.ndim == 0:
         return float(pressure) * weights(ends, order)
-    rule = grid.element_rule(RULES[order])
-    loads = jax.jit(lambda ends, table: grid.nodal_loads(rule, ends, table))
+    rule = elements.element_rule(RULES[order])
+    loads = jax.jit(lambda ends, table: elements.nodal_loads(rule, ends, table))
     return np.asarray(loads(jnp.asarray(ends), pressure))
 
 

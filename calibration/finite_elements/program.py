@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 
 JOB = "strip"
 INSTALL = "install it (Debian, Ubuntu: apt-get install calculix-ccx), or say where it is: CCX=PATH"

@@ -16,8 +16,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from calibration.finite_elements.mesh import Mesh, weights
-from jbeamshell.energy import plane_stiffness, shear_modulus
-from jbeamshell.scene import Scene
+from jbeamshell.mechanics.homogeneous import plane_stiffness, shear_modulus
+from jbeamshell.scene.scene import Scene
 
 
 def fitted(mesh: Mesh, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,11 +14,11 @@ from calibration.finite_elements.histories import make_history
 from calibration.finite_elements.mesh import make_mesh
 from calibration.finite_elements.program import find_program, run
 from calibration.finite_elements.results import read
-from jbeamshell import quasistatic
-from jbeamshell.errors import UnconvergedError
-from jbeamshell.history import History, Status
-from jbeamshell.parts import require
-from jbeamshell.scene import Scene
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import Status, UnconvergedError
+from jbeamshell.history.history import History
+from jbeamshell.quasistatic import load_path
+from jbeamshell.scene.scene import Scene
 
 
 def solve(
@@ -57,7 +57,7 @@ def solve(
         if CalculiX stops early; the message holds its own and names its files
     """
     check_reach(scene)
-    whole, cycles = quasistatic.check(scene, path)
+    whole, cycles = load_path.check(scene, path)
     command = find_program(program)
     mesh = make_mesh(scene, elements, refinement)
     levels = whole.target.size

@@ -29,7 +29,7 @@ from calibration.methods import (  # noqa: E402
 )
 from calibration.provenance import provenance  # noqa: E402
 from jbeamshell import plotting  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
 
 HERE = Path(__file__).parent.parent
 RECORD, PICTURE = HERE / "methods.json", HERE / "methods.png"

@@ -8,7 +8,7 @@ import numpy as np
 
 import jbeamshell as jb
 from calibration.methods.strips import CLAMP, number, scene_of
-from jbeamshell import scenes
+from jbeamshell.scene import library
 
 
 def figures(stiffness: float | None, nodes: int = 401) -> dict[str, Any]:
@@ -19,7 +19,7 @@ def figures(stiffness: float | None, nodes: int = 401) -> dict[str, Any]:
     contact_end over H from the end of the load, reaction_max over the pressure, the angle of the
     lifted end, Newton iterations, the deepest penetration over H
     """
-    history = jb.solve(_with(scenes.receding().replace({"model.nodes": nodes}), stiffness))
+    history = jb.solve(_with(library.receding().replace({"model.nodes": nodes}), stiffness))
     strip_, top = history.scene.strip, float(history.scene.contact.largest_pressure)
     half_height = float(strip_.half_height)
     return {

@@ -11,7 +11,8 @@ import numpy as np
 
 import jbeamshell as jb
 from calibration.methods.strips import number, scene_of
-from jbeamshell.stepping import Path, at_rest, march
+from jbeamshell.quasistatic.load_path import LoadPath
+from jbeamshell.quasistatic.stepping import at_rest, march
 
 LARGE = 1.0  # an amplitude for paths of their own, for which it means nothing
 
@@ -59,7 +60,7 @@ def to_gross_slip(
         target = part * pull * whole[control]
         one = jnp.ones_like(pull)
         zero = jnp.zeros(1)
-        path = Path(jnp.append(zero, target), jnp.append(1.0, one), jnp.append(zero, one))
+        path = LoadPath(jnp.append(zero, target), jnp.append(1.0, one), jnp.append(zero, one))
         found = march(scene, at_rest(scene), path, jb.Newton())  # `solve` refuses gross slip
         sound = found.state.sound
         return found.state.level.force, found.iterations, found.error, sound

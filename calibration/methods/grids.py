@@ -16,7 +16,7 @@ import numpy as np
 
 import jbeamshell as jb
 from calibration.methods.strips import stiffness_of_section
-from jbeamshell.kinematics import FIELDS, linear_strains
+from jbeamshell.mechanics.kinematics import FIELDS, linear_strains
 
 GAUSS = 0.5 + 0.5 / np.sqrt(3.0) * np.array([-1.0, 1.0])
 

@@ -22,7 +22,7 @@ from scipy.linalg import expm
 
 import jbeamshell as jb
 from calibration.methods.strips import stiffness_of_section
-from jbeamshell.kinematics import linear_strains
+from jbeamshell.mechanics.kinematics import linear_strains
 
 DIGITS = -np.log10(np.finfo(float).eps)
 CORRECTIONS = 5

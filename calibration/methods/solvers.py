@@ -18,10 +18,10 @@ import numpy as np
 from jax import Array, lax
 
 import jbeamshell as jb
-from jbeamshell import block_tridiagonal
-from jbeamshell.closed_form import cubic_law
-from jbeamshell.equilibrium import Drive, Level, System, V
-from jbeamshell.stiffness import Stiffness, matrix, stiffness_at_rest
+from jbeamshell.mechanics.bar import cubic_law
+from jbeamshell.numerics import block_tridiagonal
+from jbeamshell.quasistatic.system import Drive, Level, System, V
+from jbeamshell.quasistatic.tangent import Stiffness, matrix, stiffness_at_rest
 
 TOLERANCE = 1e-10  # of mu F_N L, as the library's
 TRIES, HALVINGS = 100, 8

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jbeamshell as jb
-from jbeamshell import scenes
+from jbeamshell.scene import library
 
 LINEAR = {"model.kinematics": "linear"}
 # What is changed of the standard strip, on whose nodes they all are.
@@ -34,7 +34,7 @@ def scene_of(name: str, nodes: int = 81, **load: int) -> jb.Scene:
     """One of the scenes, with linear kinematics; ``load`` sets counts of its load path."""
     counts = {f"load.{key}": value for key, value in load.items()}
     if name == CLAMP:
-        return scenes.receding_rough().replace(LINEAR | {"model.nodes": 2 * nodes} | counts)
+        return library.receding_rough().replace(LINEAR | {"model.nodes": 2 * nodes} | counts)
     return jb.Scene().replace(STRIPS[name] | LINEAR | {"model.nodes": nodes} | counts)
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike, NDArray
 
+from jbeamshell.common.checks import require, require_choice
 from jbeamshell.measured.curves import DissipationCurve, StiffnessCurve
-from jbeamshell.parts import require, require_choice
 
 METHODS = ("turning-points", "hilbert")
 SIGNAL = "give as many evenly spaced times as finite values, at least {} of both"

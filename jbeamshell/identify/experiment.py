@@ -19,14 +19,15 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import InputError
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.measured.curves import Measurement, noise_of, response_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.recordings import as_column
-from jbeamshell.newton import Newton
-from jbeamshell.parts import CONTROLS, require
-from jbeamshell.scene import Scene
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.parts import CONTROLS
+from jbeamshell.scene.scene import Scene
 
 
 class Specimen(NamedTuple):
@@ -53,7 +54,7 @@ class Specimen(NamedTuple):
         return [self.data] if one else list(self.data)  # type: ignore[list-item, arg-type]
 
 
-class Answer(NamedTuple):
+class Prediction(NamedTuple):
     """What the model says to all measurements, their compared points one after the other.
 
     Attributes
@@ -156,7 +157,9 @@ class Experiment:
         self._firsts = [shapes.index(shape) for shape in dict.fromkeys(shapes)]
         self._compiled: set[Any] = set()
 
-    def __call__(self, keys: tuple[str, ...], table: NDArray[np.float64], solver: Newton) -> Answer:
+    def __call__(
+        self, keys: tuple[str, ...], table: NDArray[np.float64], solver: Newton
+    ) -> Prediction:
         """The model's answer to all measurements.
 
         Parameters
@@ -169,7 +172,7 @@ class Experiment:
 
     def together(
         self, keys: tuple[str, ...], tables: NDArray[np.float64], solver: Newton
-    ) -> list[Answer]:
+    ) -> list[Prediction]:
         """The same for several tables, (tables, specimens, k), each measurement's as one batch."""
         answers = self._walked(_answers, np.swapaxes(tables, 0, 1), keys, solver)
         return [
@@ -203,7 +206,7 @@ class Experiment:
             pool.shutdown(cancel_futures=True)
         return [done[place] for place in range(len(self._runs))]
 
-    def _joined(self, answers: Sequence[tuple[NDArray[Any], ...]]) -> Answer:
+    def _joined(self, answers: Sequence[tuple[NDArray[Any], ...]]) -> Prediction:
         """One answer from those of the runs."""
         sound = all(bool(answer[-1]) for answer in answers)
         columns = [
@@ -211,7 +214,7 @@ class Experiment:
             for answer, compared in zip(answers, self._compared, strict=True)
         ]
         residual, jacobian, prediction = map(np.concatenate, zip(*columns, strict=True))
-        return Answer(residual, jacobian, prediction, sound)
+        return Prediction(residual, jacobian, prediction, sound)
 
     def answered(self, prediction: NDArray[np.float64]) -> list[Any]:
         """Measurements (the model's) from compared points (rows,)."""

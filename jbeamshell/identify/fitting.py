@@ -11,17 +11,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.errors import InputError, UnconvergedError
+from jbeamshell.common.checks import require, shown
+from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.identify.experiment import Experiment, Specimen
 from jbeamshell.identify.parameters import Parameter, Space, as_parameters, search_space
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit, fit_at
 from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, Limits
 from jbeamshell.measured.curves import Measurement
-from jbeamshell.measured.loops import FEWEST_POINTS, Loop
-from jbeamshell.newton import Newton
-from jbeamshell.parts import require, shown
-from jbeamshell.scene import Scene
+from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.recordings import FEWEST_POINTS
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.scene import Scene
 
 POINTS = 96  # of a loop that the model is run through
 MAX_ITERATIONS = 40

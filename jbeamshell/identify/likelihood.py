@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 from jbeamshell.identify.parameters import FARTHEST
 from jbeamshell.identify.problem import Point
 from jbeamshell.identify.results import Fit

@@ -18,7 +18,7 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 from jbeamshell.measured.curves import (
     Backbone,
     DissipationCurve,
@@ -28,14 +28,15 @@ from jbeamshell.measured.curves import (
     response_of,
 )
 from jbeamshell.measured.loops import Loop
-from jbeamshell.newton import Newton
-from jbeamshell.quasistatic import check, solve
-from jbeamshell.scene import Scene
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic.load_path import check
+from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.scene import Scene
 
 LENGTH_STEP = 32  # where points to fill up cost next to nothing
 APPROACH = 8  # load steps from zero to the first point of a loop
 RUN_IN = 32  # and about so many through a closed loop, before it is compared
-ROUNDING = 1e-6  # of L: so far tables may round a position off the strip
+POSITION_ROUNDING = 1e-6  # of L: so far tables may round a position off the strip
 HOPELESS = 10.0  # residual, in ranges, of a trial without equilibrium: never accepted
 NOTHING = 1e-6  # of what was measured: a model that dissipates less has a logarithm all the same
 
@@ -89,7 +90,7 @@ class Observation(eqx.Module):
         return jnp.where(sound, difference, hopeless), prediction, sound
 
 
-class LoadPath(Observation):
+class LoopObservation(Observation):
     """One column of a loop as the answer to the other, which ``scene.load.control`` names.
 
     A closed loop is run through twice, in larger steps at first, so that its second pass is steady;
@@ -107,14 +108,14 @@ class LoadPath(Observation):
     length_step: ClassVar[int] = LENGTH_STEP
 
     @classmethod
-    def of(cls, loop: Loop, scene: Scene) -> LoadPath:
+    def of(cls, loop: Loop, scene: Scene) -> LoopObservation:
         """The path of a loop; raises `InputError` for forces beyond gross slip."""
         control = scene.load.control
         run_in = getattr(loop.thinned(RUN_IN, control), control) if loop.closed else np.zeros(0)
         return cls._through(loop, scene, run_in)
 
     @classmethod
-    def of_backbone(cls, backbone: Backbone, scene: Scene) -> LoadPath:
+    def of_backbone(cls, backbone: Backbone, scene: Scene) -> LoopObservation:
         """The path of a first loading; raises `InputError` for one that turns back as well."""
         drive = getattr(backbone, scene.load.control)
         steps = np.diff(drive, prepend=0.0) * np.sign(drive[-1])
@@ -130,7 +131,7 @@ class LoadPath(Observation):
     @classmethod
     def _through(
         cls, measurement: Loop | Backbone, scene: Scene, run_in: NDArray[np.float64]
-    ) -> LoadPath:
+    ) -> LoopObservation:
         drive = getattr(measurement, scene.load.control)
         response = getattr(measurement, response_of(measurement, scene))
         approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
@@ -170,7 +171,7 @@ class LoadPath(Observation):
         return answer, jnp.all(history.status == 0)
 
 
-class Squeezed(Observation):
+class SqueezeObservation(Observation):
     """The squeeze stress at given positions under the scene's whole pressure.
 
     A point counts with the length it stands for, so that the misfit is that of the curve and does
@@ -185,7 +186,7 @@ class Squeezed(Observation):
     length_step: ClassVar[int] = LENGTH_STEP
 
     @classmethod
-    def of(cls, curve: SqueezeCurve, scene: Scene) -> Squeezed:
+    def of(cls, curve: SqueezeCurve, scene: Scene) -> SqueezeObservation:
         """The run for a curve; raises `InputError` if it has none."""
         if "psi" not in scene.model.fields:
             raise InputError(
@@ -193,7 +194,7 @@ class Squeezed(Observation):
                 "add psi"
             )
         length = float(scene.strip.length)
-        slack = ROUNDING * length
+        slack = POSITION_ROUNDING * length
         off = curve.x[(curve.x < -slack) | (curve.x > length + slack)]
         if off.size:
             raise InputError(
@@ -212,7 +213,7 @@ class Squeezed(Observation):
         return stress, jnp.all(history.status == 0)
 
 
-class Sweep(Observation):
+class AmplitudeObservation(Observation):
     """Logarithm of a figure of the steady cycle at several amplitudes.
 
     Attributes
@@ -235,7 +236,7 @@ class Sweep(Observation):
         return np.exp(prediction)
 
     @classmethod
-    def of(cls, curve: DissipationCurve | StiffnessCurve, scene: Scene) -> Sweep:
+    def of(cls, curve: DissipationCurve | StiffnessCurve, scene: Scene) -> AmplitudeObservation:
         """The runs for a curve; raises `InputError` for forces beyond gross slip."""
         figure = getattr(curve, response_of(curve, scene))
         check(scene, np.sort(curve.amplitude))
@@ -280,8 +281,8 @@ def observe(measurement: Any, scene: Scene) -> Observation:
     )
 
 
-observe.register(Loop, LoadPath.of)
-observe.register(Backbone, LoadPath.of_backbone)
-observe.register(SqueezeCurve, Squeezed.of)
-observe.register(DissipationCurve, Sweep.of)
-observe.register(StiffnessCurve, Sweep.of)
+observe.register(Loop, LoopObservation.of)
+observe.register(Backbone, LoopObservation.of_backbone)
+observe.register(SqueezeCurve, SqueezeObservation.of)
+observe.register(DissipationCurve, AmplitudeObservation.of)
+observe.register(StiffnessCurve, AmplitudeObservation.of)

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import expit, logit
 
-from jbeamshell.errors import InputError
-from jbeamshell.parts import shown
-from jbeamshell.scene import NUMBERS, Scene, check_key
+from jbeamshell.common.checks import shown
+from jbeamshell.common.errors import InputError
+from jbeamshell.scene.keys import NUMBERS, check_key
+from jbeamshell.scene.scene import Scene
 
 # Open intervals in which parameters live; all others are positive.
 LIMITS = {

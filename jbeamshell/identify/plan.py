@@ -31,9 +31,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jbeamshell import scenes
-from jbeamshell.errors import InputError
-from jbeamshell.files import as_path, read_toml
+from jbeamshell.common.checks import shown
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import as_path, read_toml
 from jbeamshell.identify.experiment import Specimen
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.measured.curve_files import read_curves
@@ -42,8 +42,9 @@ from jbeamshell.measured.loops import Loop, driver_of
 from jbeamshell.measured.recordings import Recording, read_recordings
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import DRIFTS, steady_loops
-from jbeamshell.parts import CONTROLS, shown
-from jbeamshell.scene import overridden, scene_from_values
+from jbeamshell.scene import library
+from jbeamshell.scene.parts import CONTROLS
+from jbeamshell.scene.toml import overridden, scene_from_values
 
 KINDS = ("loop", "backbone", "dissipation", "stiffness", "squeeze")
 CYCLES = ("auto", "steady", "recorded")
@@ -251,7 +252,7 @@ def _base(scene: Any, folder: Path) -> dict[str, Any]:
         return {}
     if not isinstance(scene, str):
         raise InputError(f"scene = {scene!r}: give the name of one that ships, or a file")
-    return scenes.values_from(scene, folder)
+    return library.values_from(scene, folder)
 
 
 def _source(table: Mapping[str, Any], label: Any) -> Source:

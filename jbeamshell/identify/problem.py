@@ -21,11 +21,11 @@ import numpy as np
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-from jbeamshell.errors import InputError
-from jbeamshell.files import as_path, write_text
-from jbeamshell.identify.experiment import Answer, Experiment
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import as_path, write_text
+from jbeamshell.identify.experiment import Experiment, Prediction
 from jbeamshell.identify.parameters import Space
-from jbeamshell.newton import Newton
+from jbeamshell.numerics.newton import Newton
 
 FORMAT = "jbeamshell fit 1"
 LONGEST_HEADER = 1000  # characters
@@ -79,7 +79,7 @@ class Problem:
                 f"free {name!r}: prior = {(mean, deviation)}: is worth nothing beside data of "
                 "unknown noise; give noise, such as 0.01 of the range"
             )
-        self._known: dict[bytes, Answer] = {}
+        self._known: dict[bytes, Prediction] = {}
         self._path = None if save is None else as_path(save)
         if self._path is not None:
             mark = _fingerprint(experiment, space.keys, solver)
@@ -130,7 +130,7 @@ class Problem:
         residual = np.append(answer.residual * experiment.emphasis, beliefs)
         return Point(residual, jacobian * space.slopes(point), answer.prediction, answer.sound)
 
-    def _learn(self, runs: Sequence[tuple[NDArray[np.float64], Answer]]) -> None:
+    def _learn(self, runs: Sequence[tuple[NDArray[np.float64], Prediction]]) -> None:
         self._known |= {values.tobytes(): answer for values, answer in runs}
         if self._path is None:
             return
@@ -165,19 +165,19 @@ class Problem:
         write_text(path, "\n".join([header, *lines, ""]))
 
 
-def _line(values: NDArray[np.float64], answer: Answer) -> str:
-    arrays = {"values": values} | {name: getattr(answer, name) for name in Answer._fields[:3]}
+def _line(values: NDArray[np.float64], answer: Prediction) -> str:
+    arrays = {"values": values} | {name: getattr(answer, name) for name in Prediction._fields[:3]}
     packed: dict[str, Any] = {name: _packed(array) for name, array in arrays.items()}
     return json.dumps(packed | {"sound": answer.sound}) + "\n"
 
 
-def _run(line: str, rows: int, keys: int, entries: int) -> tuple[NDArray[np.float64], Answer]:
+def _run(line: str, rows: int, keys: int, entries: int) -> tuple[NDArray[np.float64], Prediction]:
     run = json.loads(line)
     residual, prediction = (
         _unpacked(run[name]).reshape(rows) for name in ("residual", "prediction")
     )
     jacobian = _unpacked(run["jacobian"]).reshape(rows, keys)
-    return _unpacked(run["values"]).reshape(entries), Answer(
+    return _unpacked(run["values"]).reshape(entries), Prediction(
         residual, jacobian, prediction, bool(run["sound"])
     )
 

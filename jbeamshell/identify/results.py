@@ -14,7 +14,7 @@ from jbeamshell.identify.parameters import Space
 from jbeamshell.identify.problem import Point, Problem
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
 from jbeamshell.measured.curves import AmplitudeCurve, response_of
-from jbeamshell.scene import Scene
+from jbeamshell.scene.scene import Scene
 
 TOO_WRONG = 2.0  # misfit over noise beyond which the model, not the noise, is what is left
 
@@ -158,9 +158,9 @@ class Fit(NamedTuple):
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write tables, pictures, scenes and figures into a folder; returns the files' paths."""
-        from jbeamshell import output
+        from jbeamshell.identify import report
 
-        return output.write_fit(Path(folder), self, self.figures())
+        return report.write_fit(Path(folder), self, self.figures())
 
     @property
     def _uncertainty(self) -> Uncertainty:

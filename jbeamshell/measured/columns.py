@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 
 # What they are measured in; a force per width is as good, as the model is of unit width.
 QUANTITIES = {"force": ("N", "N/m"), "displacement": ("m",)}

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 from jbeamshell.measured.tables import LARGEST, Table, TextTable, read_bytes
 
 HDF5 = b"\x89HDF\r\n\x1a\n"

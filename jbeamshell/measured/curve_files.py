@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 from jbeamshell.measured.columns import bare, factor_of, unit_of
 from jbeamshell.measured.containers import read_table
 from jbeamshell.measured.curves import Curve, DissipationCurve, SqueezeCurve, StiffnessCurve

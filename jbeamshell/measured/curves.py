@@ -13,11 +13,11 @@ import equinox as eqx
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.errors import InputError
-from jbeamshell.measured.loops import FEWEST_POINTS, Loop
-from jbeamshell.measured.recordings import HUGE, as_column
-from jbeamshell.parts import shown
-from jbeamshell.scene import Scene
+from jbeamshell.common.checks import shown
+from jbeamshell.common.errors import InputError
+from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.recordings import FEWEST_POINTS, HUGE, as_column
+from jbeamshell.scene.scene import Scene
 
 FEWEST_OF_BACKBONE = 3
 

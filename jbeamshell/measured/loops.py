@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
 from jbeamshell.measured.recordings import FilePath, read_recordings, recording_from_arrays
 from jbeamshell.measured.reversals import find_driver, find_turns

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.errors import InputError
-from jbeamshell.files import as_path
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import as_path
 from jbeamshell.measured.columns import FURTHER, QUANTITIES, find_columns, is_header, unit_factors
 from jbeamshell.measured.containers import read_table
 

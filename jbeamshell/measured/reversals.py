@@ -16,7 +16,7 @@ CALM = 0.001  # to and fro, over the way from turn to turn, of a column without 
 Floats = NDArray[np.float64]
 
 
-class Path(NamedTuple):
+class SmoothPath(NamedTuple):
     """A load path without its noise.
 
     Attributes
@@ -37,7 +37,7 @@ def noise_of(column: Floats) -> float:
     return float(np.median(third) / (0.6745 * np.sqrt(20.0))) if third.size else 0.0
 
 
-def smoothed_path(drive: Floats, smallest: float = SMALLEST) -> Path:
+def smoothed_path(drive: Floats, smallest: float = SMALLEST) -> SmoothPath:
     """A load path (points,) smoothed as much as its noise asks for and its turns allow.
 
     Local parabolas over w points cut a sharp turn by 3/32 of w steps and leave 3/2 of the noise
@@ -54,10 +54,10 @@ def smoothed_path(drive: Floats, smallest: float = SMALLEST) -> Path:
     branch = float(np.median(np.diff(ends)))  # points from turn to turn
     width = int(min((16.0 * noise / scale * branch) ** (2.0 / 3.0), branch / 5.0)) // 2 * 2 + 1
     if width < 5:
-        return Path(drive, noise, band)
+        return SmoothPath(drive, noise, band)
     left = 1.5 * noise / np.sqrt(width)
     band = max(smallest * scale, _extremes(drive.size / width) * left)
-    return Path(_local_parabolas(drive, width), left, band)
+    return SmoothPath(_local_parabolas(drive, width), left, band)
 
 
 def find_turns(drive: Floats, smallest: float = SMALLEST) -> list[int]:

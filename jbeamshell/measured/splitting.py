@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 from jbeamshell.measured.loops import CLOSED, Loop
 from jbeamshell.measured.recordings import Recording, recording_from_arrays
 from jbeamshell.measured.reversals import (
     SMALLEST,
     Floats,
-    Path,
+    SmoothPath,
     extremes,
     find_driver,
     noise_of,
@@ -235,7 +235,7 @@ def _rolled(recording: Recording, start: int) -> Recording:
     )
 
 
-def _no_cycle(label: str, driver: str, path: Path, inner: list[int]) -> str:
+def _no_cycle(label: str, driver: str, path: SmoothPath, inner: list[int]) -> str:
     """What was found instead of a cycle, and what to do."""
     ends = f"{label}: {driver} runs from {path.smooth[0]:.4g} to {path.smooth[-1]:.4g}"
     if not inner:

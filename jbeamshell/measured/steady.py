@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.recordings import Recording
 from jbeamshell.measured.reversals import SMALLEST, Floats, noise_of

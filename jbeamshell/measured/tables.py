@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
 
 LARGEST = 200_000_000  # bytes
 DELIMITERS = "\t;,"  # in the order of trust: the comma has other duties

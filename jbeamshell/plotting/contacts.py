@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
-from jbeamshell.cycles import turning_points
-from jbeamshell.errors import InputError
-from jbeamshell.history import History
+from jbeamshell.common.errors import InputError
+from jbeamshell.history.history import History
+from jbeamshell.numerics.cycles import turning_points
 from jbeamshell.plotting.steps import checked_steps, default_contact_steps, load_label
 from jbeamshell.plotting.style import (
     DATA,

@@ -15,10 +15,10 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 from jbeamshell.plotting.style import DATA, DISPLACEMENT, PALETTE, single, style
 
 if TYPE_CHECKING:  # they bring diffrax, which pictures of other things need not wait for
-    from jbeamshell.dynamics.modal import ModalCurve
-    from jbeamshell.dynamics.motion import Motion
+    from jbeamshell.dynamics.let_go import RingDownStudy
     from jbeamshell.dynamics.ringdown import RingDown
-    from jbeamshell.dynamics.study import RingDownStudy
+    from jbeamshell.dynamics.strip.motion import Motion
+    from jbeamshell.dynamics.structure.modal import ModalCurve
 
 TIME, AMPLITUDE = "$t$  [time]", "amplitude of $u(L)$  [length]"
 LEDGER = {"kinetic": "kinetic", "stored": "stored", "rubbed": "friction", "damped": "damping"}

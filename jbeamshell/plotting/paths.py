@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
-from jbeamshell.errors import InputError
-from jbeamshell.history import History
+from jbeamshell.common.errors import InputError
+from jbeamshell.history.history import History
 from jbeamshell.plotting.steps import checked_steps, default_steps, load_label
 from jbeamshell.plotting.style import (
     DATA,

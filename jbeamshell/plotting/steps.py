@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jbeamshell.cycles import turning_points
-from jbeamshell.errors import InputError
-from jbeamshell.history import History
+from jbeamshell.common.errors import InputError
+from jbeamshell.history.history import History
+from jbeamshell.numerics.cycles import turning_points
 
 
 def checked_steps(history: History, steps: Sequence[int]) -> list[int]:

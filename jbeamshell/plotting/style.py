@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from jbeamshell.errors import InputError
-from jbeamshell.files import written_whole
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import written_whole
 
 STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,

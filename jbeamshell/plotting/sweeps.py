@@ -12,10 +12,10 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from jbeamshell.closed_form import cubic_law
-from jbeamshell.errors import InputError
+from jbeamshell.common.errors import InputError
+from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.plotting.style import DATA, PALETTE, colours, single, style
-from jbeamshell.sweeping import Sweep
+from jbeamshell.sweeping.results import Sweep
 
 SYMBOLS = {
     "load.amplitude": "$A$",

@@ -7,14 +7,15 @@ import functools
 import json
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from typing import Any
 
 import jax
 import numpy as np
 
-from jbeamshell.errors import InputError
-from jbeamshell.newton import Newton
-from jbeamshell.scene import scene_from_values, scene_to_toml
+from jbeamshell.common.errors import InputError
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.toml import scene_from_values, scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 from jbeamshell.sweeping.runner import BLOCK, Block, Runner, width_of_chunks
 from jbeamshell.sweeping.store import Store
@@ -134,15 +135,13 @@ class Job:
 
     def description(self) -> str:
         """Everything but the axes' values as text, the same for the same sweep only."""
-        from jbeamshell import __version__
-
         if self.scene is None:
             raise InputError(
                 "out, processes: a scene with a function of your own cannot be put on disk: "
                 "sweep it without them and write the table with to_csv"
             )
         about = {
-            "version": __version__,
+            "version": version("jbeamshell"),
             "scene": self.scene,
             "keys": list(self.lanes.axes),
             "paired": self.lanes.paired,

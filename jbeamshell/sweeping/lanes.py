@@ -10,11 +10,13 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from jbeamshell.closed_form import bar_backbone
-from jbeamshell.errors import InputError
-from jbeamshell.parts import as_leaf, require, resultant
-from jbeamshell.scene import DERIVED, NUMBERS, Scene, check_key
-from jbeamshell.stepping import ROUNDING
+from jbeamshell.common.checks import as_leaf, require
+from jbeamshell.common.errors import InputError
+from jbeamshell.mechanics.bar import bar_backbone
+from jbeamshell.quasistatic.prediction import SMALLEST_SHARE
+from jbeamshell.scene.keys import DERIVED, NUMBERS, check_key
+from jbeamshell.scene.pressure import resultant
+from jbeamshell.scene.scene import Scene
 
 LARGEST = 400_000_000  # bytes of a sweep's arrays: with what compiling takes less than 1 GB
 # Where a number must lie, both ends excluded; as the scene's parts have it.
@@ -184,7 +186,7 @@ class Lanes:
                 yield (moment < 0.0) | (moment > total * length)
         amplitude = self.value("load.amplitude")
         if self.scene.load.control == "force":
-            slides = amplitude >= (1.0 - ROUNDING) * friction * total
+            slides = amplitude >= (1.0 - SMALLEST_SHARE) * friction * total
             yield slides & (friction > 0.0) & bool(self.scene.load.cycles)
         elif model.solution == "closed-form":
             limit = bar_backbone(friction * total, self.stiffness, friction * total / length)

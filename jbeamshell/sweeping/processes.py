@@ -15,7 +15,7 @@ from typing import Any, cast
 import jax
 import numpy as np
 
-from jbeamshell.errors import InputError, UnconvergedError
+from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.sweeping.job import Job, Tell
 from jbeamshell.sweeping.runner import Block
 from jbeamshell.sweeping.store import Store

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from jbeamshell.errors import InputError
-from jbeamshell.files import written_whole
-from jbeamshell.parts import require_choice
-from jbeamshell.quasistatic import check
-from jbeamshell.scene import Scene
+from jbeamshell.common.checks import require_choice
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import written_whole
+from jbeamshell.quasistatic.load_path import check
+from jbeamshell.scene.scene import Scene
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 
 ROWS = 4096  # of a table that are put into words at a time

@@ -13,14 +13,15 @@ import numpy as np
 from jax import Array, lax
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
-from jbeamshell import patterns
-from jbeamshell.errors import InputError
-from jbeamshell.history import History
-from jbeamshell.newton import Newton
-from jbeamshell.parts import require
-from jbeamshell.quasistatic import solve
-from jbeamshell.response import response
-from jbeamshell.scene import Scene, scene_to_toml
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import InputError
+from jbeamshell.history.history import History
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic import slip_patterns
+from jbeamshell.quasistatic.response import response
+from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.toml import scene_to_toml
 from jbeamshell.sweeping.lanes import Outcome
 
 ABREAST = 32  # strips of which a core finds the patterns side by side
@@ -52,7 +53,7 @@ def width_of_chunks(scene: Scene) -> int:
     """
     if jax.default_backend() != "cpu":
         return BLOCK
-    return ABREAST if patterns.applies(scene) else 1
+    return ABREAST if slip_patterns.applies(scene) else 1
 
 
 def check_figures(
@@ -99,7 +100,9 @@ class Runner:
         self.devices = list(devices or jax.local_devices())
         self.width = width_of_chunks(scene)
         self._mesh = Mesh(np.array(self.devices), "lanes")
-        ask = _ask(scene, self.keys, self.figures, patterns.Foresight.of(solver, checked=False))
+        ask = _ask(
+            scene, self.keys, self.figures, slip_patterns.Foresight.of(solver, checked=False)
+        )
         self._about = ask, self.figures, self._shape, self.dtype, self._mesh
 
     def lower(self) -> None:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jbeamshell.errors import InputError
-from jbeamshell.files import written_whole
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import written_whole
 from jbeamshell.sweeping.runner import Block
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ import jbeamshell as jb  # noqa: E402
 jb.configure()
 
 from jbeamshell import dynamics, plotting  # noqa: E402
-from jbeamshell.dynamics.study import HEAVY, let_go  # noqa: E402
+from jbeamshell.dynamics.let_go import HEAVY, let_go  # noqa: E402
 
 HERE = Path(__file__).parent
 STRIP = {"model.kinematics": "linear", "model.nodes": 41, "model.end_size": 0.0278}

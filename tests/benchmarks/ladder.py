@@ -40,9 +40,9 @@ from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import plotting  # noqa: E402
-from jbeamshell.advice.candidates import Candidate  # noqa: E402
-from jbeamshell.example import data_folder, example_loops  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.ladder.candidates import Candidate  # noqa: E402
+from jbeamshell.measured.example import data_folder, example_loops  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
 RECORD = Path(__file__).with_suffix(".json")

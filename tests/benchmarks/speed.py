@@ -44,7 +44,7 @@ from speeds.common import QUICK, Plan  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import plotting  # noqa: E402
-from jbeamshell.files import write_text  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
 
 RECORD = Path(__file__).with_suffix(".json")
 SECTIONS = {

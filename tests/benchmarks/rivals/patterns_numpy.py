@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import lapack
 
-from jbeamshell import grid
+from jbeamshell.mechanics import elements
 
 from . import FRICTION, LENGTH, POISSON, PRESSURE, STIFFNESS, first_guess, load_path
 
@@ -51,7 +51,7 @@ class Strip:
 
     def __init__(self, eta: float, nodes: int = 41) -> None:
         half_height = 0.5 * eta * LENGTH
-        self.x = np.asarray(grid.vertices(nodes - 1, LENGTH, half_height))
+        self.x = np.asarray(elements.vertices(nodes - 1, LENGTH, half_height))
         begin = time.perf_counter()
         self.eta, lengths = eta, np.diff(self.x)
         tributary = 0.5 * (np.append(0.0, lengths) + np.append(lengths, 0.0))

@@ -11,7 +11,7 @@ from jax import lax
 from tqdm import tqdm
 
 import jbeamshell as jb
-from jbeamshell.sweeping import Outcome
+from jbeamshell.sweeping.lanes import Outcome
 
 from . import machine
 from .common import OVER, RANGE, Plan, errors, lanes, scene, seconds_of, swept

@@ -13,7 +13,7 @@ import numpy as np
 from tqdm import tqdm
 
 import jbeamshell as jb
-from jbeamshell.example import data_folder
+from jbeamshell.measured.example import data_folder
 
 ETA, AMPLITUDE = 0.1126, 0.7855
 OVER = ("strip.height_ratio", "load.amplitude")

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 import jbeamshell as jb
-from jbeamshell.equilibrium import Drive, System
-from jbeamshell.stiffness import unknowns_at_rest
+from jbeamshell.quasistatic.system import Drive, System
+from jbeamshell.quasistatic.tangent import unknowns_at_rest
 
 from . import machine
 from .common import (

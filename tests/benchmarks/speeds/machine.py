@@ -17,7 +17,7 @@ import jax
 import jaxlib
 import numpy as np
 
-from jbeamshell.runtime import is_asynchronous
+from jbeamshell.common.jax_options import is_asynchronous
 
 ROOT = Path(__file__).parents[3]
 SCRIPT = Path(__file__).parents[1] / "speed.py"

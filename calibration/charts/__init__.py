@@ -1,0 +1,1 @@
+"""Charts of the recorded benchmarks and studies."""

@@ -1,0 +1,205 @@
+"""`jbeamshell fit`: from files of measured or computed curves to parameters with uncertainty."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from jbeamshell.cli.terminal import assignments, pairs, put, say, say_written
+from jbeamshell.common.errors import InputError
+
+EXAMPLE_START = {"contact.friction": 0.15, "strip.height_ratio": 0.2}
+EXAMPLE_FREE = "contact.friction,strip.height_ratio"
+
+
+def add_to(commands: Any) -> argparse.ArgumentParser:
+    """Add the command's options to a parser."""
+    fit = commands.add_parser(
+        "fit",
+        help="fit a strip's parameters to loops and other curves",
+        description="Least squares of a strip's parameters on measured or computed curves, with "
+        "their uncertainty and a plain word on what the data cannot tell.",
+    )
+    fit.add_argument(
+        "data",
+        nargs="*",
+        metavar="DATA|PLAN.toml",
+        help="files of one specimen (.csv, .mat, .npz), or a plan of several specimens; "
+        "default: the finite-element loops that ship",
+    )
+    fit.add_argument(
+        "--scene", metavar="NAME|SCENE.toml", help="what stays fixed; default standard"
+    )
+    fit.add_argument("--free", metavar="KEY,KEY,...", help=f"default {EXAMPLE_FREE}")
+    several = {
+        "start": ("KEY=VALUE", "where a free parameter starts"),
+        "bounds": ("KEY=LOW:HIGH", "bounds of a free parameter; either may be left out"),
+        "prior": ("KEY=MEAN:DEVIATION", "what is known of a free parameter beforehand"),
+        "profile": ("KEY", "profile likelihood of a free parameter"),
+        "column": ("QUANTITY=NAME", "column of the force, the displacement, ..."),
+        "unit": ("QUANTITY=UNIT", "unit of the force, the displacement, ..."),
+    }
+    for name, (metavar, text) in several.items():
+        fit.add_argument(f"--{name}", action="append", default=[], metavar=metavar, help=text)
+    words = {
+        "kind": "of the data: loop (default), backbone, dissipation, stiffness or squeeze",
+        "cycles": "steady: average the steady ones; recorded: take all as it stands; default auto",
+        "drift": "keep (default), linear or cycle: what to remove from a recording",
+        "method": "levenberg-marquardt (default), l-bfgs-b or adam",
+        "decimal": "decimal sign, where the numbers alone do not tell",
+    }
+    for name, text in words.items():
+        fit.add_argument(f"--{name}", metavar="WORD", help=text)
+    numbers = {
+        "noise": (float, "standard deviation of the data, as a part of their range"),
+        "width": (float, "of the specimen, by which forces are divided"),
+        "starts": (int, "searches from different starts"),
+    }
+    for name, (kind, text) in numbers.items():
+        fit.add_argument(f"--{name}", type=kind, metavar="NUMBER", help=text)
+    fit.add_argument(
+        "--centre",
+        action="store_true",
+        default=None,
+        help="take the zeros of the sensors from closed loops",
+    )
+    fit.add_argument(
+        "--save", metavar="FILE", help="keep every model run there, and go on from what it holds"
+    )
+    fit.set_defaults(run=run)
+    return fit
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fit, report and write; returns the exit code."""
+    from tqdm import tqdm
+
+    from jbeamshell import identify
+    from jbeamshell.common import files
+    from jbeamshell.identify import report
+    from jbeamshell.plotting.folder import check_folder
+
+    plan = _plan(options)
+    for key in options.profile:
+        if key not in [p.key for p in plan.free]:
+            free = ", ".join(p.key for p in plan.free)
+            raise InputError(f"--profile {key}: is not among the free keys {free}")
+    for note in plan.notes:
+        say(note)
+    folder = None if options.out is None else check_folder(options.out)
+    begin = time.perf_counter()
+    with tqdm(disable=None, file=sys.stderr, unit="step") as bar:
+
+        def progress(now: object) -> None:
+            bar.set_postfix_str(str(now))
+            bar.update()
+
+        result = identify.fit(
+            plan.specimens, free=plan.free, save=options.save, progress=progress, **plan.options
+        )
+    names = [name for name in result.values if name.partition("[")[0] in options.profile]
+    profiles = [
+        identify.profile(result, name)
+        for name in tqdm(names, desc="profiles", disable=None if names else True)
+    ]
+    wall = time.perf_counter() - begin
+    figures = result.figures() | {"notes": plan.notes, "wall_s": wall}
+    if profiles:
+        figures["profiles"] = {profile.name: profile.figures() for profile in profiles}
+    parts = (result, *profiles)
+    put(files.as_json(figures) if options.json else "".join(f"{part}\n" for part in parts))
+    if folder is not None:
+        say_written(report.write_fit(folder, result, figures, profiles))
+    return 0
+
+
+def _plan(options: argparse.Namespace) -> Any:
+    """The plan of a file, or of the options."""
+    from jbeamshell.identify import plan
+
+    if any(name.endswith(".toml") for name in options.data):
+        return _plan_of_file(options)
+    values = {name: getattr(options, name) for name in plan.OPTIONS if _given(options, name)}
+    if options.scene is not None:
+        values["scene"] = options.scene
+    values["set"] = assignments(options.set)
+    values["free"] = _free(options)
+    if not options.data:
+        return _example(values)
+    specimen: dict[str, Any] = {"data": options.data}
+    for name in ("kind", "cycles", "drift", "centre", "width", "decimal"):
+        if _given(options, name):
+            specimen[name] = getattr(options, name)
+    specimen["columns"] = pairs(options.column, "force=FT")
+    specimen["units"] = pairs(options.unit, "force=kN")
+    return plan.plan_from_values(values | {"specimen": [specimen]}, Path())
+
+
+def _plan_of_file(options: argparse.Namespace) -> Any:
+    """The plan of a file; options may change how it is solved, not what it says."""
+    from jbeamshell.identify import plan
+
+    if len(options.data) > 1:
+        raise InputError(f"{' '.join(options.data)}: give one plan, or files of data")
+    ours = ("data", "json", "out", "save", "profile", "run", *plan.OPTIONS)
+    for name in sorted(set(vars(options)) - set(ours)):
+        if _given(options, name):
+            raise InputError(f"--{name}: {options.data[0]} is a plan; say so in there")
+    read = plan.read_plan(options.data[0])
+    changed = {name: getattr(options, name) for name in plan.OPTIONS if _given(options, name)}
+    return read._replace(options=read.options | changed)
+
+
+def _example(values: dict[str, Any]) -> Any:
+    """The finite-element loops that ship."""
+    from jbeamshell.identify import plan
+    from jbeamshell.measured.example import example_loops
+    from jbeamshell.scene import library
+    from jbeamshell.scene.toml import overridden
+
+    start = {key: value for key, value in EXAMPLE_START.items() if key in values["free"]}
+    scene = values.pop("scene", None)
+    below = overridden(start, {} if scene is None else library.values_from(scene))
+    return plan.plan_for(values | {"set": overridden(below, values["set"])}, example_loops())
+
+
+def _given(options: argparse.Namespace, name: str) -> bool:
+    return getattr(options, name, None) not in (None, [])
+
+
+def _free(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
+    """Tables of the free parameters."""
+    words = EXAMPLE_FREE if options.free is None else options.free
+    keys = [key.strip() for key in words.split(",") if key.strip()]
+    if len(set(keys)) < len(keys):
+        raise InputError(f"--free {words}: names a key twice")
+    free: dict[str, dict[str, Any]] = {key: {} for key in keys}
+
+    def table(option: str, key: str) -> dict[str, Any]:
+        if key not in free:
+            raise InputError(f"--{option} {key}: is not among the free keys {', '.join(free)}")
+        return free[key]
+
+    for key, value in assignments(options.start).items():
+        table("start", key)["start"] = value
+    for key, text in pairs(options.bounds, "contact.friction=0.05:0.5").items():
+        low, high = _two(f"--bounds {key}={text}", text)
+        table("bounds", key).update({"low": low, "high": high})
+    for key, text in pairs(options.prior, "contact.friction=0.1:0.02").items():
+        table("prior", key)["prior"] = _two(f"--prior {key}={text}", text)
+    return free
+
+
+def _two(option: str, text: str) -> tuple[float | None, float | None]:
+    """Two numbers between a colon."""
+    parts = text.split(":")
+    try:
+        first, second = (float(part) if part.strip() else None for part in parts)
+    except ValueError:
+        raise InputError(
+            f"{option}: write two numbers and a colon between, such as 0.05:0.5"
+        ) from None
+    return first, second

@@ -1,0 +1,1 @@
+"""Tools without physics: errors, checks of input, files, options of JAX."""

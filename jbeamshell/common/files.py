@@ -1,0 +1,105 @@
+"""Files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jbeamshell.common.errors import InputError
+
+if TYPE_CHECKING:  # a run that draws and fits nothing need not wait for them
+    pass
+
+import tempfile
+import tomllib
+
+LARGEST_TOML = 10_000_000  # bytes: a pressure table of 100,000 rows is a quarter of it
+
+
+def as_path(path: Any) -> Path:
+    """The path of a file's name; `InputError` for what is none."""
+    if isinstance(path, str | os.PathLike):
+        name = os.fspath(path)
+        if isinstance(name, str) and "\0" not in name:
+            return Path(name)
+    raise InputError(f"{path!r}: is no file name: give text without NUL, or a pathlib.Path")
+
+
+@contextlib.contextmanager
+def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A draft to write to, renamed to ``path`` when the block ends well, else removed."""
+    target, draft = as_path(path), None
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
+        os.close(handle)
+        draft = Path(name)
+        yield draft
+        draft.chmod(0o666 & ~_umask())
+        draft.replace(target)
+    except OSError as error:  # no folder, no permission, a full disk
+        raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
+    except UnicodeEncodeError as error:  # of a file's name that is not text itself
+        raise InputError(f"{target}: cannot be written ({error})") from None
+    finally:
+        if draft is not None:
+            draft.unlink(missing_ok=True)
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text file whole or not at all."""
+    with written_whole(path) as draft:
+        draft.write_text(text, encoding="utf-8")
+
+
+def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The tables of a TOML file; `InputError` for what is none, or too large to be one of ours."""
+    try:
+        with as_path(path).open("rb") as file:
+            data = file.read(LARGEST_TOML + 1)
+    except (OSError, UnicodeEncodeError) as error:  # the latter for a name that is no text
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read ({reason})") from None
+    if len(data) > LARGEST_TOML:
+        raise InputError(f"{path}: is no scene or plan: holds more than {LARGEST_TOML:,} bytes")
+    try:
+        return parsed_toml(data.decode("utf-8"))
+    except ValueError as error:
+        raise InputError(f"{path}: is not a TOML file ({error})") from None
+
+
+def parsed_toml(text: str) -> dict[str, Any]:
+    """The tables of TOML text; `ValueError` for any other."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("its lists are nested too deeply") from None
+
+
+def _umask() -> int:
+    current = os.umask(0)
+    os.umask(current)
+    return current
+
+
+if TYPE_CHECKING:  # a run that draws and fits nothing need not wait for them
+    pass
+
+
+def as_json(figures: Mapping[str, Any]) -> str:
+    """JSON text; a number that is not finite is refused rather than written as NaN."""
+    return json.dumps(figures, indent=2, allow_nan=False) + "\n"
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """CSV text of a header and rows."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue()

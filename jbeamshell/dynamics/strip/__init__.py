@@ -1,0 +1,1 @@
+"""The strip in motion: inertia, excitation, time integration, natural modes."""

@@ -1,0 +1,1 @@
+"""The ladder of models: which one is accurate enough for a scene, and at what cost."""

@@ -1,0 +1,71 @@
+"""What `advise` chooses from: rungs, each on grids and load paths that suit it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+
+class Candidate(NamedTuple):
+    """A rung with its resolution.
+
+    Attributes
+    ----------
+    rung : its name, see `jbeamshell.scene.rungs`
+    nodes : along X
+    steps : load steps per half cycle
+    """
+
+    rung: str
+    nodes: int
+    steps: int
+
+    @property
+    def name(self) -> str:
+        """Such as "p3@81x10"."""
+        return f"{self.rung}@{self.nodes}x{self.steps}"
+
+    @property
+    def section(self) -> str:
+        """The rung whose section it has: "squeeze" for "masing", "p3" for "masing-p3"."""
+        last = self.rung.rpartition("-")[2]
+        return "squeeze" if last in ("masing", "pull") else last
+
+    @property
+    def resolution(self) -> dict[str, Any]:
+        """Dotted values of its grid and its load path."""
+        # Coarse grids spend their nodes at the loaded end; the beamshell's point reaction there
+        # goes into tension on finer elements than this.
+        fine = self.nodes <= 41 or self.section.startswith("p")
+        return {
+            "model.nodes": self.nodes,
+            "model.end_size": 1.0 / 12.0 if fine else 1.0 / 6.0,
+            "load.steps_per_half_cycle": self.steps,
+        }
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Dotted values that make a scene's model this one, all but the kinematics."""
+        return {"model.rung": self.rung} | self.resolution
+
+
+_COARSE, _MIDDLE = [(41, 4), (41, 10)], [(81, 10)]
+_RESOLUTIONS = {
+    "bar": [(41, 4)],
+    "masing": _COARSE + _MIDDLE,
+    "masing-p2": _COARSE + _MIDDLE,
+    "masing-p3": _COARSE + _MIDDLE,
+    "shell": _COARSE + _MIDDLE,
+    "squeeze": [*_COARSE, *_MIDDLE, (161, 20)],
+    "p2": _COARSE + _MIDDLE,
+    "p3": _COARSE + _MIDDLE,
+    "p4": _COARSE + _MIDDLE,
+    "p6": [*_COARSE, *_MIDDLE, (161, 10)],
+}
+CANDIDATES = {
+    candidate.name: candidate
+    for candidate in (
+        Candidate(rung, *resolution)
+        for rung, resolutions in _RESOLUTIONS.items()
+        for resolution in resolutions
+    )
+}

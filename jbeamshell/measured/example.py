@@ -1,0 +1,46 @@
+"""The finite-element loops that ship with the library."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+from jbeamshell.common.errors import InputError
+from jbeamshell.measured.loops import Loop, read_loops
+
+EXAMPLE_AMPLITUDES = (0.3247, 0.5851, 1.0, 1.6)
+HEIGHT_RATIOS = (0.0305, 0.0511, 0.1126, 0.2358, 0.4)
+
+
+def data_folder() -> Path:
+    """Where the finite-element data lie: in the installed package, or in the source tree."""
+    installed = Path(str(resources.files("jbeamshell"))) / "finite_elements"
+    source = Path(__file__).resolve().parents[2] / "calibration" / "data"
+    for folder in (installed, source):
+        if folder.is_dir():
+            return folder
+    raise InputError(f"{source}: the finite-element data are missing; reinstall jbeamshell")
+
+
+def example_loops(
+    height_ratio: float = 0.1126, amplitudes: tuple[float, ...] | None = EXAMPLE_AMPLITUDES
+) -> list[Loop]:
+    """Steady loops of the standard strip by plane-strain finite elements (mu = 0.1, F_N = 10).
+
+    Parameters
+    ----------
+    height_ratio : eta, one of 0.0305, 0.0511, 0.1126, 0.2358, 0.4
+    amplitudes : of the force, among 0.1, 0.2, 0.3247, 0.4359, 0.5851, 0.7855, 1, 1.3, 1.6, 1.9;
+        None for all
+    """
+    if height_ratio not in HEIGHT_RATIOS:
+        raise InputError(f"height_ratio = {height_ratio}: choose one of {HEIGHT_RATIOS}")
+    loops = read_loops(data_folder() / f"loops_eta{height_ratio:.4f}.csv")
+    if amplitudes is None:
+        return loops
+    by_label = {loop.label: loop for loop in loops}
+    wanted = [f"A = {amplitude:g}" for amplitude in amplitudes]
+    for label in wanted:
+        if label not in by_label:
+            raise InputError(f"amplitudes: there is no {label}; there are {', '.join(by_label)}")
+    return [by_label[label] for label in wanted]

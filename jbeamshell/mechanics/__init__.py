@@ -1,0 +1,1 @@
+"""Laws of one point, one section or one element, each written once as a scalar function."""

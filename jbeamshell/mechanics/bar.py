@@ -1,0 +1,116 @@
+"""mechanics.bar."""
+
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+
+def bar_backbone(
+    force: ArrayLike, axial_stiffness: ArrayLike, friction_per_length: ArrayLike
+) -> Array:
+    """End displacement of the first loading of a bar, ``u = F |F| / (2 EA q)``.
+
+    Parameters
+    ----------
+    force : array_like, shape (...)
+        End force F [force], below gross slip: ``|F| <= q length``.
+    axial_stiffness : array_like, shape (...)
+        EA [force]; ``2 H E'`` for a strip in plane strain.
+    friction_per_length : array_like, shape (...)
+        q [force / length]; friction coefficient times pressure.
+
+    Returns
+    -------
+    Array, shape (...)
+        u(length) [length].
+
+    Notes
+    -----
+    Goodman 1959; Brink 2015, eq. 3.11 with the slip length of eq. 3.12.
+    """
+    return jnp.abs(force) * force / axial_stiffness / friction_per_length / 2
+
+
+def bar_slip_length(force: ArrayLike, friction_per_length: ArrayLike) -> Array:
+    """Length of the slip zone at the loaded end of a bar, ``s = |F| / q``.
+
+    Parameters
+    ----------
+    force : array_like, shape (...)
+        End force F of a first loading [force].
+    friction_per_length : array_like, shape (...)
+        q [force / length].
+
+    Returns
+    -------
+    Array, shape (...)
+        s [length].
+
+    Notes
+    -----
+    Goodman 1959; Brink 2015, eq. 3.12.
+    """
+    return jnp.abs(force) / friction_per_length
+
+
+def bar_slip_profile(
+    x: ArrayLike,
+    force: ArrayLike,
+    length: ArrayLike,
+    axial_stiffness: ArrayLike,
+    friction_per_length: ArrayLike,
+) -> Array:
+    """Displacement of a bar, ``v(X) = sign(F) q max(X - (length - s), 0)^2 / (2 EA)``.
+
+    Parameters
+    ----------
+    x : array_like, shape (...)
+        Positions X in [0, length] [length].
+    force : array_like, shape (...)
+        End force F of a first loading [force], below gross slip: ``|F| <= q length``.
+    length : array_like, shape (...)
+        Length of the bar [length].
+    axial_stiffness : array_like, shape (...)
+        EA [force].
+    friction_per_length : array_like, shape (...)
+        q [force / length].
+
+    Returns
+    -------
+    Array, shape (...)
+        v(X) [length], zero outside the slip zone of length ``s = |F| / q``.
+
+    Notes
+    -----
+    The solution of ``EA v'' = sign(F) q`` in the slip zone, with ``v = v' = 0`` at its inner end.
+    Goodman 1959; Brink 2015, eq. 3.11 with the slip length of eq. 3.12.
+    """
+    slip_length = bar_slip_length(force, friction_per_length)
+    slipped = jnp.maximum(jnp.asarray(x) - length + slip_length, 0)
+    return jnp.sign(force) * friction_per_length * slipped**2 / axial_stiffness / 2
+
+
+def cubic_law(
+    amplitude: ArrayLike, axial_stiffness: ArrayLike, friction_per_length: ArrayLike
+) -> Array:
+    """Energy a bar dissipates per full cycle, ``D = (2/3) A^3 / (EA q)``.
+
+    Parameters
+    ----------
+    amplitude : array_like, shape (...)
+        Largest end force ``A >= 0`` [force], below gross slip: ``A <= q length``.
+    axial_stiffness : array_like, shape (...)
+        EA [force].
+    friction_per_length : array_like, shape (...)
+        q [force / length].
+
+    Returns
+    -------
+    Array, shape (...)
+        D [force length].
+
+    Notes
+    -----
+    Goodman 1959.
+    """
+    return 2 / 3 * jnp.power(amplitude, 3) / axial_stiffness / friction_per_length

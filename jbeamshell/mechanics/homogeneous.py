@@ -1,0 +1,136 @@
+r"""Strain energy per unit length, Phi(e, g, k, psi, psi'), and the forces conjugate to the strains.
+
+A strain energy is any JAX function of five scalars that returns a scalar; `forces` and the
+solver's tangent come from it by automatic differentiation.  The homogeneous section (Brink 2015,
+eqs. 4.59-4.68, with the bending and squeeze-shear constants made consistent):
+
+    Phi = H C11 (e + nu' psi)^2 + H E' psi^2 + kappa G H g^2 + D k^2/2 + S psi'^2/2
+    D = (2/3) E' H^3,   S = (2/3) kappa_s G H^3,   kappa = 10(1+nu)/(12+11nu)   (Cowper 1966)
+
+with C11 = E'/(1-nu'^2), and E' = E/(1-nu^2), nu' = nu/(1-nu) in plane strain; E and nu in plane
+stress.
+
+Without a squeeze field sigma_y = 0 is condensed instead (chapter III):
+
+    Phi = H E' e^2 + kappa G H g^2 + D k^2/2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from jbeamshell.mechanics.kinematics import Strains
+
+Energy = Callable[[Array, Array, Array, Array, Array], Array]
+
+CONSTANTS = ("consistent", "printed")
+PLANES = ("strain", "stress")
+
+
+class Homogeneous(eqx.Module):
+    """Strain energy of a homogeneous section.
+
+    Attributes
+    ----------
+    half_height : H, length
+    plane_modulus : E', stress: E/(1-nu^2) in plane strain, E in plane stress
+    poisson_ratio : nu
+    kappa_s : squeeze-shear factor
+    squeeze : whether psi is a field; if not, sigma_y = 0 is condensed
+    constants : "consistent", or "printed" for the dissertation's own bending stiffness
+        (eq. 3.45, 1/16 of the consistent one) and squeeze-shear stiffness (eq. 4.73, 24 times)
+    plane : "strain" or "stress"
+    """
+
+    half_height: Array = eqx.field(converter=jnp.asarray)
+    plane_modulus: Array = eqx.field(converter=jnp.asarray)
+    poisson_ratio: Array = eqx.field(converter=jnp.asarray)
+    kappa_s: Array = eqx.field(converter=jnp.asarray)
+    squeeze: bool = eqx.field(static=True, default=True)
+    constants: str = eqx.field(static=True, default="consistent")
+    plane: str = eqx.field(static=True, default="strain")
+
+    @property
+    def shear_modulus(self) -> Array:
+        """G = E/(2(1+nu)), stress."""
+        return shear_modulus(self.plane_modulus, self.poisson_ratio, self.plane)
+
+    @property
+    def bending_stiffness(self) -> Array:
+        """D, force times length (per unit width)."""
+        factor = 2.0 / 3.0 if self.constants == "consistent" else 1.0 / 24.0
+        return factor * self.plane_modulus * self.half_height**3
+
+    @property
+    def squeeze_stiffness(self) -> Array:
+        """S, force times length (per unit width)."""
+        factor = 2.0 / 3.0 if self.constants == "consistent" else 16.0
+        return factor * self.kappa_s * self.shear_modulus * self.half_height**3
+
+    def __call__(self, e: Array, g: Array, k: Array, psi: Array, dpsi: Array) -> Array:
+        """Phi at one section, energy per unit length and width."""
+        h, nu, plane = self.half_height, self.poisson_ratio, self.plane_modulus
+        shear = shear_coefficient(nu) * self.shear_modulus * h * g**2
+        bending = 0.5 * self.bending_stiffness * k**2
+        if not self.squeeze:
+            return h * plane * e**2 + shear + bending
+        coupling, c11 = plane_stiffness(plane, nu, self.plane)
+        squeeze = h * plane * psi**2 + 0.5 * self.squeeze_stiffness * dpsi**2
+        return h * c11 * (e + coupling * psi) ** 2 + squeeze + shear + bending
+
+
+def shear_modulus(plane_modulus: Array, poisson_ratio: Array, plane: str) -> Array:
+    """G from E' and nu, stress."""
+    if plane == "strain":
+        return 0.5 * (1.0 - poisson_ratio) * plane_modulus
+    return 0.5 * plane_modulus / (1.0 + poisson_ratio)
+
+
+def plane_stiffness(plane_modulus: Array, poisson_ratio: Array, plane: str) -> tuple[Array, Array]:
+    """Nu' and C11 = E'/(1-nu'^2), stress: sigma_x = C11 (eps_x + nu' eps_y)."""
+    nu = poisson_ratio
+    coupling = nu / (1.0 - nu) if plane == "strain" else nu
+    return coupling, plane_modulus / (1.0 - coupling**2)
+
+
+def forces(energy: Energy, strains: Strains) -> Strains:
+    """Forces conjugate to the strains of one section: N, Q, M, chi and xi.
+
+    Parameters
+    ----------
+    energy : Phi(e, g, k, psi, psi')
+    strains : one section's strains, scalars
+
+    Returns
+    -------
+    Strains
+        (N, Q, M, chi, xi) in the places of (e, g, k, psi, psi').
+    """
+    return Strains(*jax.grad(lambda s: energy(*s))(strains))
+
+
+def shear_coefficient(nu: ArrayLike) -> Array:
+    """Shear coefficient of a rectangular section, ``kappa = 10 (1 + nu) / (12 + 11 nu)``.
+
+    Parameters
+    ----------
+    nu : array_like, shape (...)
+        Poisson's ratio [1].
+
+    Returns
+    -------
+    Array, shape (...)
+        kappa [1], 0.85 at ``nu = 0.3``.
+
+    Notes
+    -----
+    Cowper 1966; Brink 2015, eq. 3.53.
+    """
+    nu = jnp.asarray(nu)
+    return 10 * (1 + nu) / (12 + 11 * nu)

@@ -1,0 +1,268 @@
+r"""Strain energy per unit length, Phi(e, g, k, psi, psi'), of a section of layers.
+
+Layers that press on each other share the stress sigma_y, not the squeeze strain psi.  With
+sigma_y = q uniform over the height h and psi the mean of eps_y, eliminating q leaves
+
+    Phi = A e^2/2 - B e k + D k^2/2 + (h psi + P0 e - P1 k)^2/(2 F) + shear,
+    A, B, D = int Eb (1, s, s^2) ds,   P0, P1 = int nb (1, s) ds,   F = int (1 - nb^2)/Eb ds,
+    q = (h psi + P0 e - P1 k)/F,   chi = h q,
+    shear = int G (sqrt(kappa) (g + d psi') + sqrt(kappa_s) (s - d) psi')^2/2 ds,
+
+with eps_x = e - s k, gamma = g + s psi', s from -h/2 at the bottom to h/2 at the top, and per layer
+Eb = E, nb = nu in plane stress, Eb = E/(1-nu^2), nb = nu/(1-nu) in plane strain.  d is the height
+at which the shear is split into its mean and its squeeze part; nothing else depends on it.  The
+shear is an integral of squares, hence never negative; its coupling factor is
+kappa_c = sqrt(kappa kappa_s).
+
+One psi shared by all layers (Brink 2015, eqs. 4.79-4.86) puts all of eps_y = psi into every layer
+instead:
+
+    Phi = int C11 (eps_x^2 + 2 nb eps_x psi + psi^2)/2 ds + shear,   C11 = Eb/(1 - nb^2).
+
+Under a uniform squeeze it leaves a laminate of equal nu straight whatever its moduli, for the
+free layers would all lengthen by the same -nb psi.
+
+References
+----------
+Brink, A. R. (2015). Modeling complex contact phenomena with nonlinear beamshells. Dissertation,
+    The University of Akron. Section 4.7.1, eqs. 4.74-4.95.
+Cowper, G. R. (1966). The shear coefficient in Timoshenko's beam theory. J. Appl. Mech. 33,
+    335-340.
+Reuss, A. (1929). Berechnung der Fließgrenze von Mischkristallen auf Grund der
+    Plastizitätsbedingung für Einkristalle. Z. Angew. Math. Mech. 9, 49-58. (Uniform stress.)
+Timoshenko, S. (1925). Analysis of bi-metal thermostats. J. Opt. Soc. Am. 11, 233-255.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+
+from jbeamshell.common.errors import InputError
+from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES, shear_coefficient
+from jbeamshell.mechanics.kinematics import Strains
+
+
+class Laminate(eqx.Module):
+    """Strain energy of a laminated section.
+
+    The strains are those of the mid-height curve; the deviation enters the shear only.
+
+    Attributes
+    ----------
+    layers : (n, 3) rows from the bottom to the top: thickness (length), E (stress), nu
+    kappa_s : squeeze-shear factor, positive
+    deviation : d, height above mid-height at which the shear is split, length
+    plane : "strain", or "stress"
+    squeeze : whether psi is a field; if not, sigma_y = 0 is condensed: q = 0, without psi'
+    constants : "consistent", or "printed" for one psi shared by all layers (Brink 2015, eqs.
+        4.79-4.86), no coupling of g and psi' (eq. 4.80) and a squeeze-shear stiffness 24 times
+        larger; without squeeze both are the same
+
+    Raises
+    ------
+    InputError
+        If `plane` or `constants` is not one of the choices; `check_layers` looks at the layers.
+    """
+
+    layers: Array = eqx.field(converter=jnp.asarray)
+    kappa_s: Array = eqx.field(converter=jnp.asarray)
+    deviation: Array = eqx.field(converter=jnp.asarray, default=0.0)
+    plane: str = eqx.field(static=True, default="strain")
+    squeeze: bool = eqx.field(static=True, default=True)
+    constants: str = eqx.field(static=True, default="consistent")
+
+    def __check_init__(self) -> None:
+        for name, choices in (("plane", PLANES), ("constants", CONSTANTS)):
+            value = getattr(self, name)
+            if value not in choices:
+                fix = " or ".join(map(repr, choices))
+                raise InputError(f"{name} = {value!r}: choose {fix}")
+
+    @property
+    def height(self) -> Array:
+        """h, sum of the thicknesses, length."""
+        return self.layers[:, 0].sum()
+
+    @property
+    def stretching_stiffness(self) -> Array:
+        """A = int Eb ds, force per unit width: 2 H E' of one layer in plane strain."""
+        return (self.layers[:, 0] * self._in_plane[0]).sum()
+
+    @property
+    def mean_shear_modulus(self) -> Array:
+        """Mean of G = E/(2(1+nu)) over the height, stress."""
+        return (self.layers[:, 0] * self._shear_moduli).sum() / self.height
+
+    @property
+    def shear_coefficient(self) -> Array:
+        """Cowper's kappa at the mean of nu, each layer weighing in by its shear stiffness."""
+        weights = self.layers[:, 0] * self._shear_moduli
+        return shear_coefficient((weights * self.layers[:, 2]).sum() / weights.sum())
+
+    def __call__(self, e: Array, g: Array, k: Array, psi: Array, dpsi: Array) -> Array:
+        """Phi at one section, energy per unit length and width."""
+        modulus, contraction = self._in_plane
+        if not self.squeeze:
+            mean = 0.5 * self.shear_coefficient * self.mean_shear_modulus * self.height * g**2
+            return self._bending(modulus, e, k) + mean
+        if self.constants == "printed":
+            c11 = modulus / (1.0 - contraction**2)
+            p0, p1, _ = self._integrals(c11 * contraction)
+            uncoupled = self._bending(c11, e, k) + 0.5 * self._integrals(c11)[0] * psi**2
+            return uncoupled + (p0 * e - p1 * k) * psi + self._shear(g, dpsi)
+        p0, p1, _ = self._integrals(contraction)
+        closing = self.height * psi + p0 * e - p1 * k
+        squeezed = 0.5 * closing**2 / self._compliance
+        return self._bending(modulus, e, k) + squeezed + self._shear(g, dpsi)
+
+    def uniform_squeeze(self, pressure: ArrayLike) -> Strains:
+        """Strains under equal and opposite pressures on both faces, no force and no moment.
+
+        The solution of [A, -B; -B, D] (e, k) = p (P0, -P1), with psi from q = -p.
+
+        Parameters
+        ----------
+        pressure : array_like, scalar
+            p, stress, positive pressing.
+
+        Returns
+        -------
+        Strains
+            Of the mid-height curve; k > 0 bends the end at X = L up when the top is the stiffer.
+
+        Notes
+        -----
+        The solution of the consistent section with psi, whatever `constants` and `squeeze` say.
+        For two layers of equal thickness and n = E_top/E_bottom it is Timoshenko's (1925) bi-metal
+        strip, k = 24 (eps_b - eps_t)/(h (14 + n + 1/n)), with the free strains eps = nb p/Eb in
+        place of the thermal ones.
+        """
+        modulus, contraction = self._in_plane
+        neutral = self._neutral(modulus)
+        stretching, _, bending = self._integrals(modulus, neutral)
+        p0, p1, _ = self._integrals(contraction)
+        k = -jnp.asarray(pressure) * (p1 - neutral * p0) / bending
+        e = neutral * k + pressure * p0 / stretching
+        psi = (p1 * k - p0 * e - pressure * self._compliance) / self.height
+        zero = jnp.zeros_like(k)
+        return Strains(e=e, g=zero, k=k, psi=psi, dpsi=zero)
+
+    @property
+    def _in_plane(self) -> tuple[Array, Array]:
+        """Eb and nb of every layer: sigma_x = Eb eps_x and eps_y = -nb eps_x when sigma_y = 0."""
+        modulus, nu = self.layers[:, 1], self.layers[:, 2]
+        if self.plane == "stress":
+            return modulus, nu
+        return modulus / (1.0 - nu**2), nu / (1.0 - nu)
+
+    @property
+    def _shear_moduli(self) -> Array:
+        return 0.5 * self.layers[:, 1] / (1.0 + self.layers[:, 2])
+
+    @property
+    def _compliance(self) -> Array:
+        """F = int ds/C11, length/stress."""
+        modulus, contraction = self._in_plane
+        return (self.layers[:, 0] * (1.0 - contraction**2) / modulus).sum()
+
+    def _integrals(self, values: Array, about: ArrayLike = 0.0) -> Array:
+        """Integrals of a value per layer times (1, s - about, (s - about)^2) over the height."""
+        thickness = self.layers[:, 0]
+        middle = jnp.cumsum(thickness) - 0.5 * thickness - 0.5 * self.height - about
+        powers = jnp.stack([jnp.ones_like(middle), middle, middle**2 + thickness**2 / 12.0])
+        return (powers * thickness * values).sum(axis=-1)
+
+    def _neutral(self, modulus: Array) -> Array:
+        """Height of the line that pure bending leaves unstretched."""
+        stretching, coupling, _ = self._integrals(modulus)
+        return coupling / stretching
+
+    def _bending(self, modulus: Array, e: Array, k: Array) -> Array:
+        """Energy int modulus eps_x^2/2 ds, about the neutral line, where it is a sum of squares."""
+        neutral = self._neutral(modulus)
+        stretching, _, bending = self._integrals(modulus, neutral)
+        return 0.5 * stretching * (e - neutral * k) ** 2 + 0.5 * bending * k**2
+
+    def _shear(self, g: Array, dpsi: Array) -> Array:
+        """Shear energy of a section with psi, split at the deviation."""
+        mean = jnp.sqrt(self.shear_coefficient) * (g + self.deviation * dpsi)
+        squeeze = jnp.sqrt(self.kappa_s) * dpsi
+        zeroth, first, second = self._integrals(self._shear_moduli, self.deviation)
+        if self.constants == "printed":
+            first, second = 0.0, 24.0 * second
+        return 0.5 * zeroth * mean**2 + first * mean * squeeze + 0.5 * second * squeeze**2
+
+
+def check_layers(layers: Any, height: ArrayLike, plane: str) -> None:
+    """Refuse layers that make no section of the height 2H; traced values are left unchecked.
+
+    Parameters
+    ----------
+    layers : array_like, (n, 3)
+        Rows from the bottom to the top: thickness (length), E (stress), nu.
+    height : array_like, scalar
+        2H, length.
+    plane : str
+        "strain" or "stress".
+
+    Raises
+    ------
+    InputError
+        If the layers are no table of such rows, if a thickness or an E is not a positive number,
+        if a nu is out of its range (-1 < nu < 0.5 in plane strain, -1 < nu <= 0.5 in plane
+        stress), or if the thicknesses miss the height by more than 1e-6 of it.
+    """
+    if _traced(layers):
+        return
+    table = _table(layers)
+    for place, row in enumerate(table.tolist(), start=1):
+        fix = _fault(row, plane)
+        if fix:
+            raise InputError(f"strip.layers = {row} (row {place} from the bottom): {fix}")
+    if _traced(height):
+        return
+    total, whole = float(table[:, 0].sum()), float(np.asarray(height))
+    if not abs(total - whole) <= 1e-6 * whole:
+        raise InputError(
+            f"strip.layers = {table.tolist()}: the thicknesses add up to {total:.9g}, but the "
+            f"height 2H is {whole:.9g}; make them equal"
+        )
+
+
+def _traced(value: Any) -> bool:
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value))
+
+
+def _table(layers: Any) -> np.ndarray:
+    """The layers in double precision, refused unless they are rows of three numbers."""
+    try:
+        table = np.asarray(layers)
+    except (ValueError, OverflowError):  # rows of different length
+        table = np.empty(0)
+    shaped = table.ndim == 2 and table.shape[0] > 0 and table.shape[1] == 3
+    if not shaped or table.dtype.kind not in "fiu":
+        shown = layers.tolist() if isinstance(layers, jax.Array | np.ndarray) else layers
+        raise InputError(
+            f"strip.layers = {shown!r}: give rows [thickness, E, nu] from the bottom to the top"
+        )
+    return table.astype(np.float64)
+
+
+def _fault(row: list[float], plane: str) -> str:
+    """What is wrong with a layer, in words; nothing if it can be used."""
+    thickness, modulus, nu = row
+    for name, value in (("thickness", thickness), ("E", modulus)):
+        if not 0.0 < value < np.inf:
+            return f"the {name} must be a positive number, not {value!r}"
+    if plane == "strain" and nu == 0.5:
+        return "nu = 0.5 is incompressible: C11 is infinite; give 0.499 or choose plane stress"
+    if not -1.0 < nu <= 0.5:
+        return f"nu must lie between -1 and 0.5, not {nu!r}"
+    return ""

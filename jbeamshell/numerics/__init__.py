@@ -1,0 +1,1 @@
+"""Numerics without physics: block-tridiagonal elimination, Newton's method, closed cycles."""

@@ -1,0 +1,128 @@
+"""Load paths that go on from where one ended."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import InputError
+from jbeamshell.history.history import History
+from jbeamshell.numerics.cycles import closed_cycles
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic.load_path import LoadPath, check
+from jbeamshell.quasistatic.outcome import (
+    check_solver,
+    history_of,
+    raise_if_failed,
+    warn_of_doubts,
+)
+from jbeamshell.quasistatic.slip_patterns import Foresight
+from jbeamshell.quasistatic.stepping import PathState, Steps, march, recover
+from jbeamshell.scene.scene import Scene
+
+
+class PathEnd(eqx.Module):
+    """End of a load path that was walked step by step, from which another one can go on.
+
+    Attributes
+    ----------
+    state : the strip after the last step
+    """
+
+    state: PathState
+
+    def continued(
+        self,
+        history: History,
+        path: ArrayLike | None = None,
+        *,
+        solver: Newton | None = None,
+        throw: bool = True,
+    ) -> History:
+        """History with further load steps, as `jbeamshell.solve` gives it of both paths in one.
+
+        It is the same to the last bit where both paths have two load steps or more, else to
+        round-off.
+
+        Parameters
+        ----------
+        history : the history that ends here
+        path : loads to go on with, as of `jbeamshell.solve`; None is the scene's own cycles once
+            more, where the last load is its amplitude
+        solver, throw : as of `jbeamshell.solve`
+
+        Raises
+        ------
+        InputError
+            if the last step found no equilibrium, or the path makes no sense
+        UnconvergedError
+            if a step has no equilibrium, even when it is walked in smaller steps
+        """
+        check_solver(solver)
+        if not bool(self.state.sound):
+            raise InputError("history: its last step found no equilibrium: go on from one that did")
+        scene, solver = history.scene, solver or Newton()
+        whole, _ = check(scene, path)
+        pressing, half = scene.load.pressure_steps, scene.load.steps_per_half_cycle
+        begun = pressing
+        if path is None:
+            last, amplitude = float(self.state.target), float(scene.load.amplitude)
+            require("path", None, scene.load.cycles > 0, "the scene has no cycles: give the loads")
+            fix = (
+                f"the last load is {last:.6g}, not load.amplitude = {amplitude:.6g}: give the loads"
+            )
+            require("path", None, last == amplitude, fix)
+            begun += max(half // 2, 1)
+        further: LoadPath = jax.tree.map(lambda column: np.asarray(column)[begun:], whole)
+        # A single step would be compiled without its loop, and rounded otherwise.
+        count, least = further.target.size, max(further.target.size, 2)
+        walked: LoadPath = jax.tree.map(
+            lambda a: np.pad(a, (0, least - count), mode="edge"), further
+        )
+        steps = _march(scene, self.state, walked, Foresight.of(solver, checked=True))
+        if not np.asarray(steps.state.sound)[count - 1]:
+            steps = recover(scene, steps, walked, solver, self.state)
+            if throw:
+                part = jax.tree.map(lambda a: a[:count], steps)
+                raise_if_failed(part, further, history.force.size)
+        added = jax.tree.map(
+            lambda a: a[:count], _steps_of(history_of(scene, steps, walked.pressure))
+        )
+        joined = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), _steps_of(history), added)
+        end = jax.tree.map(lambda a: a[count - 1], steps.state)
+        known = np.append(0.0, np.asarray(joined["target"])[pressing:])
+        cycles = tuple(
+            (a + pressing - 1, b + pressing - 1, c + pressing - 1)
+            for a, b, c in closed_cycles(known)
+        )
+        result = dataclasses.replace(history, **joined, end=PathEnd(end), cycles=cycles)
+        if throw:
+            warn_of_doubts(result, stacklevel=3)
+        return result
+
+
+def with_end(history: History, steps: Steps) -> History:
+    """History with the end of its path, where it was walked step by step."""
+    if history.scene.model.solution != "stepwise":
+        return history
+    last = jax.tree.map(lambda a: a[-1], steps.state)
+    return dataclasses.replace(history, end=PathEnd(last))
+
+
+@eqx.filter_jit
+def _march(scene: Scene, start: PathState, path: LoadPath, solver: Newton) -> Steps:
+    return march(scene, start, path, solver)
+
+
+def _steps_of(history: History) -> dict[str, Any]:
+    """The fields that have an entry for every step."""
+    rest = {"scene", "cycles", "end", "middles", "x", "tributary", "load"}
+    names = [field.name for field in dataclasses.fields(history) if field.name not in rest]
+    return {name: getattr(history, name) for name in names}

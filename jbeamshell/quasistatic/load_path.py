@@ -1,0 +1,136 @@
+"""quasistatic.load_path."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+
+from jbeamshell.common.checks import as_leaf, is_traced, require
+from jbeamshell.common.jax_options import memory
+from jbeamshell.mechanics.bar import bar_backbone
+from jbeamshell.numerics.cycles import closed_cycles
+from jbeamshell.quasistatic.prediction import (
+    SMALLEST_SHARE,
+)
+from jbeamshell.scene.scene import Scene
+
+LEFT = 13  # numbers that a load step leaves at a node, besides twice its fields
+LOADS = "give (steps,) loads, or (steps, 2) with pressures"
+
+
+def check(
+    scene: Scene, path: ArrayLike | None = None
+) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
+    """The whole path and its closed cycles; raises `InputError` where `solve` would."""
+    whole, cycles = whole_path(scene, path)
+    if not is_traced(scene, whole):
+        _check_size(scene, whole)
+        _check_gross_slip(scene, whole)
+        _check_bar(scene)
+    return whole, cycles
+
+
+def whole_path(
+    scene: Scene, path: ArrayLike | None
+) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
+    """The pressing, then the given loads or the scene's own; and the closed cycles among them."""
+    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+    pressing, known = scene.load.pressure_steps, scene.load.unit_path()
+    solution = scene.model.solution
+    fix = "knows the scene's own cycles only: leave the path out, or take 'stepwise'"
+    require("model.solution", solution, path is None or solution == "stepwise", fix)
+    numbers: Any = jnp if is_traced(scene.load.amplitude, path) else np  # the faster, where it can
+    amplitude = numbers.asarray(scene.load.amplitude)
+    if path is None:
+        targets = amplitude * known.astype(amplitude.dtype)
+        pressures = numbers.ones_like(targets)
+    else:
+        loads = numbers.asarray(as_leaf(path, "path", LOADS), amplitude.dtype)
+        shaped = loads.size > 0 and (loads.ndim == 1 or (loads.ndim == 2 and loads.shape[1] == 2))
+        require("path", np.shape(path), shaped, LOADS)
+        targets, pressures = (loads, numbers.ones_like(loads)) if loads.ndim == 1 else loads.T
+        if not is_traced(loads):
+            known, finite = np.asarray(targets), np.isfinite(loads)
+            require("path", loads[~finite], bool(np.all(finite)), "must hold finite loads only")
+            pulling = pressures < 0.0
+            fix = "the part of the pressures that acts must not be negative"
+            require("path", np.asarray(pressures)[pulling], not np.any(pulling), fix)
+        else:
+            known = np.zeros(0)
+    before = (np.arange(1, pressing + 1) / pressing).astype(amplitude.dtype)
+    whole = LoadPath(
+        numbers.append(np.zeros_like(before), targets),
+        numbers.append(before, pressures),
+        numbers.append(np.zeros_like(before), numbers.ones_like(targets)),
+    )
+    last = pressing - 1
+    cycles = closed_cycles(np.append(0.0, known)) if known.size else ()
+    return whole, tuple((a + last, b + last, c + last) for a, b, c in cycles)
+
+
+def check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:
+    """Nodes in contact (n,) from which a search starts; raises `InputError` where they fit no scene."""
+    try:
+        touching, nodes = np.asarray(contact, dtype=bool), scene.model.nodes
+    except (TypeError, ValueError):
+        require("contact", contact, False, "give one truth for each of the nodes")
+    fits = touching.shape == (nodes,) and "w" in scene.model.fields
+    fix = f"give one truth for each of the {nodes} nodes, and w in model.fields"
+    require("contact", touching.shape, fits, fix)
+    return touching
+
+
+def _check_size(scene: Scene, path: LoadPath) -> None:
+    """Refuse what would fill this machine's memory."""
+    levels, nodes = path.target.size, scene.model.nodes
+    need, most = 8.0 * levels * nodes * (2 * scene.model.width + LEFT), memory()
+    fix = f"and {levels} load steps take {need:.2g} bytes of memory, this machine has {most:.2g}"
+    require("model.nodes", nodes, need < most, f"{fix}: take fewer")
+
+
+def _check_gross_slip(scene: Scene, path: LoadPath) -> None:
+    if scene.load.control != "force" or float(scene.contact.friction) == 0.0:
+        return
+    pressing, _ = scene.contact.resultant(scene.strip.length)
+    limit = float(scene.contact.friction) * pressing
+    targets, limits = np.abs(path.target), limit * np.asarray(path.pressure)
+    beyond = (targets > 0.0) & (targets >= (1.0 - SMALLEST_SHARE) * limits)
+    require(
+        "load.amplitude",
+        float(targets[beyond].max(initial=0.0)),
+        not np.any(beyond),
+        f"must stay below gross slip, mu F_N L = {limit:.6g}; "
+        "set load.control to 'displacement' or 'arc-length' to go beyond",
+    )
+
+
+def _check_bar(scene: Scene) -> None:
+    if scene.model.solution != "closed-form" or scene.load.control == "force":
+        return
+    strip = scene.strip
+    with jax.ensure_compile_time_eval():
+        rubs = scene.contact.friction * scene.contact.pressure
+        limit = float(bar_backbone(rubs * strip.length, strip.stretching_stiffness, rubs))
+    amplitude = float(scene.load.amplitude)
+    fix = f"must stay below the bar's gross slip, {limit:.6g}; take model.fields = ['v'] beyond"
+    require("load.amplitude", amplitude, amplitude < limit, fix)
+
+
+class LoadPath(NamedTuple):
+    """What a path prescribes, (steps,) each.
+
+    Attributes
+    ----------
+    target : the controlled load, F or u(L)
+    pressure : part of the pressures that acts
+    rough : 1 with friction, 0 while the strip is pressed down before it
+    """
+
+    target: Array
+    pressure: Array
+    rough: Array

@@ -1,0 +1,227 @@
+"""Load cycles from backbones alone, by Masing's rule; and the bar, whose backbone is closed form.
+
+The branches of a loop are the backbone, doubled (Masing 1926).  With the increments q(F) that a
+pull from the pressed strip makes,
+
+    q(F) = q(A) - 2 q((A - F)/2) on the way down,    q(F) = -q(A) + 2 q((A + F)/2) on the way up.
+
+A pull and a push differ where the strip has height, because the reaction does; the mean of the two
+takes that out of the loop at first order.  For the one-dimensional bar (Goodman 1959) pull and push
+are the same and the rule is exact.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array, lax
+
+from jbeamshell.common.errors import Status
+from jbeamshell.mechanics.bar import bar_backbone, bar_slip_length, bar_slip_profile
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic.load_path import LoadPath
+from jbeamshell.quasistatic.stepping import PathState, Steps, at_rest, march, walk
+from jbeamshell.quasistatic.system import Level, System, V
+from jbeamshell.scene.scene import Scene
+
+
+class BackboneSteps(NamedTuple):
+    """A pull from the pressed strip in equal steps to the amplitude.
+
+    Attributes
+    ----------
+    pressed : the steps in which the pressure is applied
+    level : increments since then, (half+1, ...) from zero to the amplitude
+    displacement, sinking : (half+1,) likewise
+    slip_work : (half,) of every step
+    slipping : (half, n) whether a node slips in a step
+    iterations, error, sound, status : (half,) of every step
+    """
+
+    pressed: Steps
+    level: Level
+    displacement: Array
+    sinking: Array
+    slip_work: Array
+    slipping: Array
+    iterations: Array
+    error: Array
+    sound: Array
+    status: Array
+
+
+def masing(
+    scene: Scene, start: PathState, path: LoadPath, solver: Newton, recovering: bool = False
+) -> Steps:
+    """The scene's own cycles from the backbones of a pull and of a push, or of a pull alone.
+
+    Parameters
+    ----------
+    scene, start, path, solver : as of `jbeamshell.quasistatic.stepping.march`
+    recovering : whether failed steps are walked in pieces, which cannot be traced
+    """
+    signs = (1.0, -1.0) if scene.model.solution == "masing" else (1.0,)
+    if recovering:
+        ways = [walk(scene, start, _backbone_path(scene, path, s), solver) for s in signs]
+    else:
+
+        def way(sign: Array) -> Steps:
+            return march(scene, start, _backbone_path(scene, path, sign), solver)
+
+        both = lax.map(way, jnp.asarray(signs))  # compiled once
+        ways = [jax.tree.map(lambda a, i=i: a[i], both) for i in range(len(signs))]
+    found = [_since_pressed(scene, steps) for steps in ways]
+    return _doubled(scene, path, _mean(*found) if len(found) == 2 else found[0])
+
+
+def bar_cycles(scene: Scene, path: LoadPath) -> Steps:
+    """The scene's own cycles of Goodman's bar, in closed form."""
+    return _doubled(scene, path, _bar_backbone(scene, path))
+
+
+def _backbone_path(scene: Scene, path: LoadPath, sign: float | Array) -> LoadPath:
+    """The pressing, then a pull (or a push) to the amplitude."""
+    pressing, half = scene.load.pressure_steps, scene.load.steps_per_half_cycle
+    levels = sign * scene.load.amplitude * jnp.arange(1, half + 1) / half
+    ones = jnp.ones_like(levels)
+    after = LoadPath(levels, ones, ones)
+    return jax.tree.map(lambda a, b: jnp.append(a[:pressing], b), path, after)
+
+
+def _since_pressed(scene: Scene, steps: Steps) -> BackboneSteps:
+    pressing = scene.load.pressure_steps
+
+    def since(values: Array) -> Array:
+        return values[pressing - 1 :] - values[pressing - 1]
+
+    return BackboneSteps(
+        pressed=jax.tree.map(lambda a: a[:pressing], steps),
+        level=jax.tree.map(since, steps.state.level),
+        displacement=since(steps.displacement),
+        sinking=since(steps.sinking),
+        slip_work=steps.slip_work[pressing:],
+        slipping=steps.slipping[pressing:],
+        iterations=steps.iterations[pressing:],
+        error=steps.error[pressing:],
+        sound=steps.state.sound[pressing:],
+        status=steps.status[pressing:],
+    )
+
+
+def _mean(pull: BackboneSteps, push: BackboneSteps) -> BackboneSteps:
+    """What a pull and a push have in common, as a pull."""
+
+    def odd(a: Array, b: Array) -> Array:
+        return 0.5 * (a - b)
+
+    return BackboneSteps(
+        pressed=pull.pressed,
+        level=jax.tree.map(odd, pull.level, push.level),
+        displacement=odd(pull.displacement, push.displacement),
+        sinking=odd(pull.sinking, push.sinking),
+        slip_work=0.5 * (pull.slip_work + push.slip_work),
+        slipping=pull.slipping | push.slipping,
+        iterations=pull.iterations + push.iterations,
+        error=jnp.maximum(pull.error, push.error),
+        sound=pull.sound & push.sound,
+        status=jnp.maximum(pull.status, push.status),
+    )
+
+
+def _bar_backbone(scene: Scene, path: LoadPath) -> BackboneSteps:
+    system, strip, load = System(scene), scene.strip, scene.load
+    half = load.steps_per_half_cycle
+    rubs = scene.contact.friction * scene.contact.pressure
+    part = jnp.arange(half + 1) / half
+    stiffness = strip.stretching_stiffness
+    if load.control == "force":
+        force = load.amplitude * part
+        displacement = bar_backbone(force, stiffness, rubs)
+    else:
+        displacement = load.amplitude * part
+        force = jnp.sqrt(2.0 * stiffness * rubs * load.amplitude) * jnp.sqrt(part)
+    reach = bar_slip_length(force, rubs)
+    slid = jax.vmap(lambda f: bar_slip_profile(system.x, f, strip.length, stiffness, rubs))(force)
+    nothing = jnp.zeros_like(slid)
+    level = Level(
+        q=jnp.zeros((*slid.shape, scene.model.width)).at[..., V].set(slid),
+        traction=rubs * (system.x > strip.length - reach[:, None]),
+        cap=nothing,
+        reaction=nothing,
+        force=force,
+    )
+    work = force**3 / (6.0 * stiffness * rubs)  # q times the integral of the slip
+    return BackboneSteps(
+        pressed=_pressed_bar(scene, system, path),
+        level=level,
+        displacement=displacement,
+        sinking=jnp.zeros_like(work),
+        slip_work=jnp.diff(work),
+        slipping=level.traction[1:] > 0.0,
+        iterations=jnp.zeros(half, int),
+        error=jnp.zeros(half),
+        sound=jnp.ones(half, bool),
+        status=jnp.full(half, Status.CONVERGED),
+    )
+
+
+def _pressed_bar(scene: Scene, system: System, path: LoadPath) -> Steps:
+    """The bar under pressure: it feels nothing but the reaction."""
+    count = scene.load.pressure_steps
+    start, none = at_rest(scene), jnp.zeros(count)
+    part = path.pressure[:count]
+    state: PathState = jax.tree.map(lambda a: jnp.broadcast_to(a, (count, *a.shape)), start)
+    reaction = part[:, None] * (system.load / system.tributary)
+    level = state.level._replace(reaction=reaction, cap=scene.contact.friction * reaction)
+    return Steps(
+        state=state._replace(level=level, pressure=part),
+        displacement=none,
+        slipping=jnp.zeros((count, system.x.size), bool),
+        slip_work=none,
+        stored_energy=none,
+        sinking=none,
+        iterations=none.astype(int),
+        error=none,
+        status=jnp.full(count, Status.CONVERGED),
+    )
+
+
+def _doubled(scene: Scene, path: LoadPath, backbone: BackboneSteps) -> Steps:
+    """The scene's own cycles from a backbone, by Masing's rule."""
+    pressed, cycles = backbone.pressed, scene.load.cycles
+
+    def joined(before: Array, first: Array, down: Array, up: Array) -> Array:
+        return jnp.concatenate([before, first, *[down, up] * cycles])
+
+    def doubled(before: Array, gone: Array) -> Array:
+        up = 2.0 * gone[1:] - gone[-1]
+        return joined(before, *(before[-1] + part for part in (gone[2::2], -up, up)))
+
+    def steps(before: Array, first: Array, branch: Array) -> Array:
+        return joined(before, first, branch, branch)
+
+    def reached(before: Array, each: Array) -> Array:
+        """Of a backbone that must be known to its end before a branch is."""
+        return steps(before, each[1::2], jnp.broadcast_to(each[-1], each.shape))
+
+    level = jax.tree.map(doubled, pressed.state.level, backbone.level)
+    level = level._replace(cap=scene.contact.friction * jnp.maximum(level.reaction, 0.0))
+    sound = reached(pressed.state.sound, backbone.sound)
+    count = sound.size
+    last: PathState = jax.tree.map(
+        lambda a: jnp.broadcast_to(a[-1], (count, *a.shape[1:])), pressed.state
+    )
+    work, slips, taken = backbone.slip_work, backbone.slipping, backbone.iterations
+    return Steps(
+        state=last._replace(level=level, target=path.target, pressure=path.pressure, sound=sound),
+        displacement=doubled(pressed.displacement, backbone.displacement),
+        slipping=steps(pressed.slipping, slips[::2] | slips[1::2], slips),
+        slip_work=steps(pressed.slip_work, work[::2] + work[1::2], 2.0 * work),
+        stored_energy=jax.vmap(System(scene).stored_energy)(level, path.pressure),
+        sinking=doubled(pressed.sinking, backbone.sinking),
+        iterations=steps(pressed.iterations, taken[::2] + taken[1::2], jnp.zeros_like(taken)),
+        error=reached(pressed.error, lax.cummax(backbone.error)),
+        status=reached(pressed.status, backbone.status),
+    )

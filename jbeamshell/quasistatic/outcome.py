@@ -1,0 +1,88 @@
+"""Outcome of a walked load path: its history, or the error that says which step failed."""
+
+from __future__ import annotations
+
+import warnings
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
+from jbeamshell.history.history import History
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic.load_path import LoadPath
+from jbeamshell.quasistatic.stepping import Steps
+from jbeamshell.quasistatic.system import System
+from jbeamshell.scene.scene import Scene
+
+ADVICE = (
+    "take more load.steps_per_half_cycle, a lower contact.stick_stiffness, or fewer model.nodes"
+)
+
+
+def check_solver(solver: Newton | None) -> None:
+    """Raise `InputError` for settings that are none."""
+    fix = "give a jbeamshell.Newton"
+    require("solver", solver, solver is None or isinstance(solver, Newton), fix)
+
+
+def raise_if_failed(steps: Steps, path: LoadPath, before: int = 0) -> None:
+    """Raise `UnconvergedError` with the first step that failed, after so many of another path."""
+    sound = np.asarray(steps.state.sound)
+    if sound.all():
+        return
+    first = int(np.argmin(sound))
+    number, last = before + first, before + sound.size - 1
+    where = f"load step {number} of {last} (load {float(path.target[first]):.6g})"
+    if not path.rough[first]:
+        where = f"pressing down (to {100.0 * float(path.pressure[first]):.3g} % of the pressure)"
+    reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
+    error = float(steps.error[first])
+    raise UnconvergedError(
+        f"{where} found no equilibrium ({reason}, out of balance {error:.2g} of mu F_N L): {ADVICE}"
+    )
+
+
+@eqx.filter_jit
+def history_of(scene: Scene, steps: Steps, pressure: Array) -> History:
+    """History of the steps, without its cycles (with them every path would compile anew) and end."""
+    system = System(scene)
+    sound, level = steps.state.sound, steps.state.level
+
+    def masked(values: Array) -> Array:
+        return jnp.where(sound.reshape(-1, *[1] * (values.ndim - 1)), values, jnp.nan)
+
+    return History(
+        scene=scene,
+        x=system.x,
+        middles=system.middles,
+        tributary=system.tributary,
+        load=system.load,
+        force=masked(level.force),
+        displacement=masked(steps.displacement),
+        fields=masked(level.q),
+        gap=masked(jax.vmap(system.gap)(level.q)),
+        sections=jax.tree.map(masked, jax.vmap(system.section_forces)(level.q)),
+        traction=masked(level.traction),
+        reaction=masked(level.reaction),
+        slipping=steps.slipping,
+        slip_work=masked(steps.slip_work),
+        stored_energy=masked(steps.stored_energy),
+        pressure=pressure,
+        sinking=masked(steps.sinking),
+        iterations=steps.iterations,
+        error=steps.error,
+        status=steps.status,
+        cycles=(),
+        target=steps.state.target,
+    )
+
+
+def warn_of_doubts(history: History, stacklevel: int) -> None:
+    """Warn of everything that is doubtful about a history, at a caller's line."""
+    for doubt in history.doubts:
+        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=stacklevel + 1)

@@ -1,0 +1,96 @@
+"""Histories read from the files that `History.save` writes."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import os
+import tomllib
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import as_path
+from jbeamshell.history.history import History
+from jbeamshell.history.saved import FORMAT, named_arrays, without_scene
+from jbeamshell.mechanics.kinematics import Strains
+from jbeamshell.quasistatic.continuation import PathEnd
+from jbeamshell.quasistatic.stepping import at_rest
+from jbeamshell.scene.toml import scene_from_values
+
+# Arrays of a history by what they run along.
+ALONG_X = ("x", "tributary", "load")
+ALONG_PATH = (
+    *("force", "displacement", "pressure", "target"),
+    *("slip_work", "stored_energy", "sinking", "error"),
+)
+ALONG_BOTH = ("gap", "traction", "reaction")
+COUNTS = ("iterations", "status")
+
+
+def read_history(path: str | os.PathLike[str]) -> History:
+    """The history in a file, to the last bit; nothing in the file is executed.
+
+    Raises
+    ------
+    InputError
+        for a file that cannot be read, is damaged or none of ours, and in single precision for one
+        that was written in double
+    """
+    try:
+        # A handle of our own: NumPy leaves its own open where the file is damaged.
+        with as_path(path).open("rb") as handle, np.load(handle, allow_pickle=False) as file:
+            about = json.loads(str(file["about"]))
+            if about["format"] != FORMAT:
+                raise ValueError("of another format")
+            arrays = {name: file[name] for name in file.files if name != "about"}
+        precise = about["dtype"] != "float64" or jax.config.read("jax_enable_x64")
+        blank = _blank(about, arrays) if precise else None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except Exception as error:  # whatever a parser stumbles over in a broken file
+        reason = f"{type(error).__name__}: {error}"[:200]
+        raise InputError(
+            f"{path}: is no history that can be read ({reason}): save it anew"
+        ) from None
+    if blank is None:
+        fix = "write jax.config.update('jax_enable_x64', True) first"
+        raise InputError(f"{path}: is in double precision: {fix}")
+    for name, wanted in named_arrays(blank):
+        held = arrays.get(name)
+        if held is None or (held.shape, held.dtype) != (wanted.shape, wanted.dtype):
+            raise InputError(f"{path}: {name} is missing or of another shape: save it anew")
+    leaves = [jnp.asarray(arrays[name]) for name, _ in named_arrays(blank)]
+    read: History = jax.tree.unflatten(jax.tree.structure(without_scene(blank)), leaves)
+    return dataclasses.replace(read, scene=blank.scene)
+
+
+def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
+    """A history of the scene in a file, with shapes for arrays, as many steps as its loads."""
+    tables = tomllib.loads(about["scene"])
+    flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
+    scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
+    number = functools.partial(jax.ShapeDtypeStruct, dtype=jnp.dtype(about["dtype"]))
+    count = functools.partial(jax.ShapeDtypeStruct, dtype=jnp.result_type(int))
+    steps, elements = len(arrays["force"]), len(arrays["middles"])
+    sections: list[Any] = [number((steps, elements))] * len(Strains._fields)
+    nodes, width = scene.model.nodes, scene.model.width
+    shapes: dict[str, Any] = {name: number((steps,)) for name in ALONG_PATH}
+    shapes |= {name: count((steps,)) for name in COUNTS}
+    shapes |= {name: number((nodes,)) for name in ALONG_X}
+    shapes |= {name: number((steps, nodes)) for name in ALONG_BOTH}
+    shapes |= {
+        "middles": number((elements,)),
+        "fields": number((steps, nodes, width)),
+        "sections": Strains(*sections),
+        "slipping": jax.ShapeDtypeStruct((steps, nodes), bool),
+    }
+    cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])
+    stepwise = scene.model.solution == "stepwise"
+    end = PathEnd(eqx.filter_eval_shape(at_rest, scene)) if stepwise else None
+    return History(scene=scene, cycles=cycles, end=end, **shapes)

@@ -1,0 +1,1 @@
+"""Exact solutions from the literature, each with its source."""

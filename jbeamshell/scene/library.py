@@ -1,0 +1,174 @@
+"""Scenes that ship: the standard strip and the contact problems of Brink (2015), ready to run.
+
+Every scene is a TOML file of its name and a function here.  ``named("receding")`` is
+``receding()``; ``values_of("receding")`` are its dotted values, to be changed before a scene is
+made of them.  On the command line: ``jbeamshell scenes`` and ``jbeamshell run receding``.
+
+References
+----------
+Brink, A. R. (2015). Modeling complex contact phenomena with nonlinear beamshells. Dissertation,
+    The University of Akron.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import os
+from pathlib import Path
+from typing import Any
+
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import as_path
+from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.toml import read_scene, read_values
+
+
+def standard() -> Scene:
+    """The standard strip: a thin bar on a rough base, pulled to and fro at its end.
+
+    What ``Scene()`` is: fields v, beta and psi, held at X = 0, two cycles of the end force (after
+    chapter III).  Units are any consistent ones; gross slip begins at F = 2.
+    """
+    return named("standard")
+
+
+def calibrated() -> Scene:
+    """The standard strip with constants fitted once to finite elements, for thick strips too.
+
+    One kappa_s, one alpha and m = 8 for all heights: the dissipation is then within 11 % (rms) of
+    finite elements for eta = .03 to .4 and A from .3 up, and within 2 % where it exceeds .3 of the
+    cubic law, nu being .3 (`calibration/fit_universal.py`).  Set the height as you like.
+    """
+    return named("calibrated")
+
+
+def bimaterial() -> Scene:
+    """Two layers, squeezed evenly on both faces: the strip bends towards the stiffer one.
+
+    Layers of 1 mm with E = 2090 and 209000 MPa in plane stress, no foundation (section 4.7.1).
+    Its ``curvature`` and ``tip_deflection`` have a closed form, `Laminate.uniform_squeeze`.
+    Millimetres, newtons, megapascals.
+    """
+    return named("bimaterial")
+
+
+def squeezed() -> Scene:
+    """A strip squeezed on both faces over its middle: the squeeze ends soon after the load.
+
+    Steel of 200 x 2 mm under 100 MPa over 100 mm, half of it modelled, no foundation (section
+    4.7.2); beyond the load the squeeze decays over about 0.23 H.  Millimetres, newtons,
+    megapascals.
+    """
+    return named("squeezed")
+
+
+def receding() -> Scene:
+    """A strip pressed onto a frictionless base over its middle: beyond the load it lifts off.
+
+    The strip of `squeezed` with a rigid base in place of the pressure from below (section 4.7.3).
+    However little it is pressed, ``contact_end`` is the same, just beyond X = 50.  Millimetres,
+    newtons, megapascals.
+    """
+    return named("receding")
+
+
+def receding_rough() -> Scene:
+    """The receding strip on a rough base, its free end pulled to and fro.
+
+    Clamped as if by a bolt over its middle half, it slips out from there, and what slips changes
+    where the contact ends.  Millimetres, newtons, megapascals.
+    """
+    return named("receding-rough")
+
+
+def receding_421() -> Scene:
+    """Receding contact by the earlier theory, whose squeeze strain is assumed.
+
+    psi = -(F_N + R)/(2E) in place of a balance of its own (section 4.2, example 4.2.1): a strip of
+    10 x 0.1 in, half of it modelled, its pressure falling to zero between X = 2.405 and 2.5 in.
+    Inches, pounds, pounds per square inch.
+    """
+    return named("receding-421")
+
+
+def point_load() -> Scene:
+    """A strip on a frictionless base under a point load: it lifts off within its height.
+
+    The load is a patch of 1/40 of the height h = 2 at the middle, X = 0; half of the strip is
+    modelled.  Elasticity ends the contact 0.855 h from the load.  Millimetres, newtons,
+    megapascals.
+    """
+    return named("point-load")
+
+
+def advancing() -> Scene:
+    """A curved strip, its ends up, flattened onto a frictionless base: the contact advances.
+
+    The pressure grows in 20 steps (figure 2.5a), and ``contact_end`` with it.  Millimetres,
+    newtons, megapascals.
+    """
+    return named("advancing")
+
+
+def block() -> Scene:
+    """A block as long as it is high, pressed over its whole top face: the contact stays.
+
+    On a frictionless base (figure 2.5b); R is the pressure, uniformly.  Millimetres, newtons,
+    megapascals.
+    """
+    return named("block")
+
+
+_FUNCTIONS = {
+    function.__name__.replace("_", "-"): function
+    for function in (
+        standard,
+        calibrated,
+        bimaterial,
+        squeezed,
+        receding,
+        receding_rough,
+        receding_421,
+        point_load,
+        advancing,
+        block,
+    )
+}
+NAMES = tuple(_FUNCTIONS)
+
+
+def named(name: str) -> Scene:
+    """The scene of a name; `InputError` with the nearest one if there is none."""
+    return read_scene(_file(name))
+
+
+def values_of(name: str) -> dict[str, Any]:
+    """Dotted values of the scene of a name; what they leave out is the standard strip's."""
+    return read_values(_file(name))
+
+
+def values_from(word: str, folder: Path = Path()) -> dict[str, Any]:
+    """Dotted values of a scene of a name, or of a file in a folder."""
+    path = as_path(word)
+    is_file = path.suffix == ".toml" or path.name != word or os.path.isfile(folder / path)
+    return read_values(folder / path) if is_file else values_of(word)
+
+
+def summary(name: str) -> str:
+    """One line on the scene of a name."""
+    _file(name)
+    return inspect.getdoc(_FUNCTIONS[name]).splitlines()[0]  # type: ignore[union-attr]
+
+
+def _file(name: str) -> Path:
+    require("scene", name, isinstance(name, str), "give a name")
+    if name not in NAMES:
+        near = difflib.get_close_matches(name, NAMES, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"scenes are {', '.join(NAMES)}"
+        raise InputError(
+            f"unknown scene {name!r}: {hint} (`jbeamshell scenes` lists them; a file of your own "
+            "ends in .toml)"
+        )
+    return Path(__file__).parent / "shipped" / f"{name}.toml"

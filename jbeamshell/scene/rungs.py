@@ -1,0 +1,91 @@
+"""The ladder's rungs by name, from a bar to plane elasticity.
+
+| name | what it is |
+|---|---|
+| ``bar`` | Goodman's one-dimensional bar, in closed form |
+| ``shell`` | fields v and beta |
+| ``squeeze`` | fields v, beta and psi |
+| ``p1``, ``p2``, ``p3``, ... | sections of order p through the height, see `jbeamshell.mechanics.hierarchic` |
+| ``masing`` | Masing's rule from a pull and a push of ``squeeze`` |
+| ``masing-shell``, ``masing-p2``, ... | the same of another section |
+| ``masing-pull``, ``masing-pull-p2``, ... | from a pull alone |
+| ``stepwise-bar`` | field v by Newton's method: the bar where the closed form does not reach |
+
+All but the bars take the lift w where the scene has it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from jbeamshell.common.errors import InputError
+
+LARGEST_ORDER = 12
+FIELDS_OF = {"bar": ("v",), "shell": ("v", "beta"), "squeeze": ("v", "beta", "psi")}
+SETS = ("model.fields", "model.order", "model.solution")  # what a rung's name stands for
+_NAME = re.compile(r"(?P<prefix>(masing-pull|masing|stepwise)-)?(?P<section>[a-z]+|p\d+)")
+
+
+def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
+    """Dotted values that make a model this rung.
+
+    Parameters
+    ----------
+    rung : its name
+    lift : whether the strip may lift off
+    """
+    text = rung if isinstance(rung, str) else repr(rung)
+    full = f"{text}-squeeze" if text in ("masing", "masing-pull") else text
+    match = _NAME.fullmatch(full)
+    prefix = (match["prefix"] or "").rstrip("-") if match else ""
+    section = match["section"] if match else ""
+    order = int(section[1:]) if re.fullmatch(r"p\d+", section) else 0
+    ordered = section not in FIELDS_OF and 1 <= order <= LARGEST_ORDER
+    stepwise = prefix == "stepwise" and section != "bar"  # that is what no prefix means
+    if not match or stepwise or not (ordered or section in FIELDS_OF):
+        raise InputError(
+            f"model.rung = {rung!r}: choose 'bar', 'shell', 'squeeze', 'p1' to 'p{LARGEST_ORDER}', "
+            "'masing' (of squeeze), or 'masing-' and one of these"
+        )
+    fields = FIELDS_OF.get(section, FIELDS_OF["squeeze"])
+    if lift and section != "bar":
+        fields = ("v", "w", *fields[1:])
+    closed = section == "bar" and not prefix
+    solution = "closed-form" if closed else prefix or "stepwise"
+    return dict(zip(SETS, (fields, order, solution), strict=True))
+
+
+def name_of(fields: Sequence[str], order: int, solution: str) -> str:
+    """Name of the rung that a model is."""
+    if order > 0:
+        section = f"p{order}"
+    else:
+        section = {1: "bar", 2: "shell", 3: "squeeze"}[len(set(fields) - {"w"})]
+    if solution == "closed-form":
+        return section
+    if solution == "stepwise":
+        return "stepwise-bar" if section == "bar" else section
+    return solution if section == "squeeze" else f"{solution}-{section}"
+
+
+def spelled_out(values: dict[str, Any], fields: Sequence[str] = ()) -> dict[str, Any]:
+    """Dotted values with a rung's name replaced by what it stands for.
+
+    Parameters
+    ----------
+    values : dotted values; where they give ``model.fields`` too, they must say the same
+    fields : of the model that is changed, for whether it may lift off
+    """
+    if "model.rung" not in values:
+        return values
+    rung, given = values["model.rung"], values.get("model.fields", fields)
+    lift = isinstance(given, list | tuple) and "w" in given
+    meant = values_of(rung, lift)
+    for key, value in meant.items():
+        other = values.get(key, value)
+        same = tuple(other) == value if isinstance(other, list | tuple) else other == value
+        if not same:
+            raise InputError(f"model.rung = {rung!r} and {key} = {other!r} disagree: give one")
+    return {key: value for key, value in values.items() if key != "model.rung"} | meant

@@ -1,0 +1,291 @@
+"""A Scene: everything that defines a run, as a frozen pytree whose physical parameters are leaves.
+
+``Scene()`` is the standard strip.  Units are the user's own, as long as they are consistent; forces
+are per unit width.  Dotted keys ("strip.height_ratio") name the same things in the TOML file, on
+the command line and among the free parameters of a fit.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jbeamshell.common.checks import as_leaf, require, require_number
+from jbeamshell.common.errors import InputError
+from jbeamshell.mechanics.friction import (
+    LAWS,
+    CappedTrial,
+    ElasticSlip,
+    FrictionLaw,
+    SharpSlip,
+    TanhIncrement,
+)
+from jbeamshell.mechanics.hierarchic import Hierarchic
+from jbeamshell.mechanics.homogeneous import Energy, Homogeneous
+from jbeamshell.scene.keys import DERIVED, NUMBERS, OPTIONAL, WORDS, check_key
+from jbeamshell.scene.parts import CONTROLS, SMOOTHING, Contact, Load, Model, Strip
+from jbeamshell.scene.pressure import resultant
+from jbeamshell.scene.rungs import spelled_out
+
+SECTIONS = {"strip": Strip, "contact": Contact, "load": Load, "model": Model}
+
+_LAWS: dict[str, type[FrictionLaw]] = {
+    "elastic-slip": ElasticSlip,
+    "smooth-cap": CappedTrial,
+    "tanh-increment": TanhIncrement,
+}
+
+
+class Scene(eqx.Module):
+    """A strip, its contact, its load and the model of it.
+
+    Attributes
+    ----------
+    strip, contact, load, model : the parts
+    energy : the user's own strain energy Phi(e, g, k, psi, psi') per unit length, any JAX function
+        of five scalars (an `equinox.Module` may carry parameters); None is the homogeneous section
+    """
+
+    strip: Strip = eqx.field(default_factory=Strip)
+    contact: Contact = eqx.field(default_factory=Contact)
+    load: Load = eqx.field(default_factory=Load)
+    model: Model = eqx.field(default_factory=Model)
+    energy: Energy | None = None
+
+    def __check_init__(self) -> None:
+        for name, kind in SECTIONS.items():
+            part = getattr(self, name)
+            require(name, part, isinstance(part, kind), f"give a jbeamshell.{kind.__name__}")
+        self._check_rung()
+        self._check_contact()
+        if self.energy is None:
+            return
+        fix = "must be a function of (e, g, k, psi, psi')"
+        require("energy", self.energy, callable(self.energy), fix)
+        probe = [jax.ShapeDtypeStruct((), self.strip.length.dtype)] * 5
+        try:
+            shape = jax.eval_shape(self.energy, *probe)
+        except TypeError as error:
+            raise InputError(f"energy: {fix}; {error}") from None
+        require(
+            "energy",
+            self.energy,
+            getattr(shape, "shape", None) == (),
+            f"must return one number, not {shape}",
+        )
+
+    def strain_energy(self) -> Energy:
+        """Phi(e, g, k, psi, psi') of this scene's section."""
+        if self.energy is not None:
+            return self.energy
+        strip = self.strip
+        squeeze = "psi" in self.model.fields and self.model.squeeze == "field"
+        if strip.section is not None:
+            return dataclasses.replace(
+                strip.section, squeeze=squeeze, constants=self.model.constants
+            )
+        return Homogeneous(
+            half_height=strip.half_height,
+            plane_modulus=strip.plane_modulus,
+            poisson_ratio=jnp.asarray(strip.poisson_ratio),
+            kappa_s=strip.kappa_s,
+            squeeze=squeeze,
+            constants=self.model.constants,
+            plane=strip.plane,
+        )
+
+    def hierarchic_section(self) -> Hierarchic | None:
+        """The section of order p; None where the beamshell's is meant."""
+        strip, model = self.strip, self.model
+        if model.order == 0:
+            return None
+        return Hierarchic(
+            half_height=strip.half_height,
+            plane_modulus=strip.plane_modulus,
+            poisson_ratio=jnp.asarray(strip.poisson_ratio),
+            order=model.order,
+            kinematics=model.kinematics,
+            plane=strip.plane,
+        )
+
+    def _check_rung(self) -> None:
+        """What the model cannot represent."""
+        strip, contact, model = self.strip, self.contact, self.model
+        plain = self.energy is None and strip.layers is None and strip.curvature is None
+        fix = "is for a straight homogeneous strip without an energy of its own; take 0"
+        require("model.order", model.order, model.order == 0 or plain, fix)
+        uniform = contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0
+        bar = plain and uniform and contact.normal == "rigid"
+        closed = model.solution == "closed-form"
+        fix = "is the bar's, homogeneous, straight, under one pressure: take another model.rung"
+        require("model.solution", model.solution, bar or not closed, fix)
+        either = model.solution == "stepwise" or self.load.control in CONTROLS
+        require("model.solution", model.solution, either, "knows no arc length: take 'stepwise'")
+        cycling = model.solution == "stepwise" or self.load.cycles > 0
+        fix = "doubles a backbone for load.cycles, of which there are none: take 'stepwise'"
+        require("model.solution", model.solution, cycling, fix)
+        half = self.load.steps_per_half_cycle
+        fix = "a backbone that is doubled needs an even number"
+        enough = model.solution == "stepwise" or half % 2 == 0
+        require("load.steps_per_half_cycle", half, enough, fix)
+        if not isinstance(contact.friction, jax.core.Tracer):
+            rubs = not closed or float(contact.friction) > 0.0
+            require("contact.friction", contact.friction, rubs, "the bar needs friction")
+
+    def _check_contact(self) -> None:
+        """What the parts cannot see alone: a strip that nothing holds, a load off the strip."""
+        strip, contact, fields = self.strip, self.contact, self.model.fields
+        lift = "w" in fields
+        needs = "needs w in model.fields"
+        require("contact.normal", contact.normal, lift or contact.normal == "rigid", needs)
+        require("strip.curvature", strip.curvature, lift or strip.curvature is None, needs)
+        layered = self.model.squeeze == "assumed" and strip.layers is not None
+        require("model.squeeze", "assumed", not layered, "is for a homogeneous strip")
+        if contact.normal == "none":
+            held = strip.far_end == "held"
+            fix = "is all that holds a strip without a foundation: take 'held' (rigid-body motion)"
+            require("strip.far_end", strip.far_end, held, fix)
+        leaves = (strip.length, contact.friction, contact.pressure, contact.bottom_pressure)
+        if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+            return
+        rough = float(contact.friction) > 0.0 or strip.far_end != "free"
+        fix = "nothing holds the strip along X without friction (rigid-body motion): give "
+        require("contact.friction", 0.0, rough, fix + "strip.far_end or friction")
+        length = float(strip.length)
+        _check_on_strip("contact.pressure", contact.pressure, length)
+        _check_on_strip("contact.bottom_pressure", contact.bottom_pressure, length)
+        down, _ = resultant(contact.pressure, length, table=contact.pressure.ndim == 2)
+        require("contact.pressure", contact.pressure, bool(down > 0.0), "must press somewhere")
+        total, moment = contact.resultant(length)
+        fix = "overflows together with contact.pressure: take other units"
+        require("strip.length", length, bool(np.isfinite(moment)), fix)
+        if contact.normal != "none":
+            fix = "nothing holds the strip down (rigid-body motion): press more on top"
+            require("contact.bottom_pressure", contact.bottom_pressure, total > 0.0, fix)
+            upright = strip.far_end == "held" or not lift
+            inside = upright or 0.0 <= moment <= total * length
+            fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
+            require("contact.bottom_pressure", contact.bottom_pressure, inside, fix)
+
+    @property
+    def slip_stiffness(self) -> Array:
+        """Elastic stiffness k_t = alpha G/H of the sliders, traction per slip."""
+        strip = self.strip
+        return self.contact.stick_stiffness * strip.shear_modulus / strip.half_height
+
+    def get(self, key: str) -> Any:
+        """The value behind a dotted key, e.g. ``scene.get("strip.height_ratio")``."""
+        check_key(key)
+        section, name = key.split(".")
+        if key == "contact.law":
+            return law_name(self.contact.law)
+        return getattr(getattr(self, section), name)
+
+    def replace(self, values: Mapping[str, Any]) -> Scene:
+        """A copy with other values, e.g. ``scene.replace({"contact.friction": 0.2})``.
+
+        Keys are those of the TOML file and the command line; values may be traced, so gradients and
+        batches reach every number through it.
+        """
+        known = isinstance(values, Mapping)
+        require("values", values, known, "give a dictionary, such as {'contact.friction': 0.2}")
+        for key, value in values.items():
+            check_key(key)
+            check_word(key, value)
+            if DERIVED.get(key) in values:
+                raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")
+        values = spelled_out(dict(values), self.model.fields)
+        parts: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
+        for key, value in values.items():
+            if key not in DERIVED:
+                section, name = key.split(".")
+                parts[section][name] = value
+        if "strip.half_height" in values:
+            height = as_leaf(values["strip.half_height"], "strip.half_height")
+            require_number("strip.half_height", height)
+            length = parts["strip"].get("length", self.strip.length)
+            parts["strip"]["height_ratio"] = 2.0 * height / as_leaf(length, "strip.length")
+        if parts["strip"].get("layers") is not None:
+            # The layers say what the stiffness and nu are; giving both is refused by the strip.
+            for name in ("axial_stiffness", "poisson_ratio"):
+                parts["strip"].setdefault(name, None)
+        contact = parts["contact"]
+        if "law" in contact or "smoothing" in contact:
+            contact["law"] = _make_law(self.contact.law, contact)
+        # A number keeps its meaning when the control changes only if it is given anew.
+        if parts["load"].get("control", self.load.control) != self.load.control:
+            parts["load"].setdefault("amplitude", None)
+        fresh = {
+            section: dataclasses.replace(getattr(self, section), **changes) if changes else None
+            for section, changes in parts.items()
+        }
+        scene = dataclasses.replace(self, **{k: v for k, v in fresh.items() if v is not None})
+        if "strip.youngs_modulus" in values:
+            strip = _with_youngs_modulus(scene.strip, values["strip.youngs_modulus"])
+            scene = dataclasses.replace(scene, strip=strip)
+        return scene
+
+
+def _check_on_strip(key: str, pressure: Any, length: float) -> None:
+    table = np.asarray(pressure, dtype=float)
+    if table.ndim == 2:
+        x = table[:, 0]
+        off = (x < 0.0) | (x > length * (1.0 + 1e-12))
+        fix = f"lies off the strip, whose X runs from 0 to {length:.6g}"
+        require(key, x[off], not np.any(off), fix)
+
+
+def _with_youngs_modulus(strip: Strip, value: Any) -> Strip:
+    key = "strip.youngs_modulus"
+    value = as_leaf(value, key)
+    require_number(key, value)
+    require(key, value, strip.layers is None, "strip.layers say it already; leave it out")
+    nu = jnp.asarray(strip.poisson_ratio)
+    plane = value if strip.plane == "stress" else value / (1.0 - nu**2)
+    return dataclasses.replace(strip, axial_stiffness=plane * 2.0 * strip.half_height)
+
+
+def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:
+    name = contact.pop("law", law_name(current))
+    given = contact.pop("smoothing", None)
+    smoothing = getattr(current, "smoothing", "sharp") if given is None else given
+    m = np.inf if isinstance(smoothing, str) else smoothing
+    exponent = as_leaf(m, "contact.smoothing", SMOOTHING)
+    sharp = not isinstance(exponent, jax.core.Tracer) and bool(np.all(np.isposinf(exponent)))
+    require("contact.smoothing", m, exponent.ndim == 0, SMOOTHING)
+    if name == "elastic-slip":
+        return SharpSlip() if sharp else ElasticSlip(exponent)
+    if name == "smooth-cap":
+        return CappedTrial() if sharp else CappedTrial(exponent)
+    unused = given is None or sharp
+    require("contact.smoothing", given, unused, f"contact.law {name!r} has none; leave it out")
+    return name if isinstance(name, FrictionLaw) else TanhIncrement()
+
+
+def law_name(law: FrictionLaw) -> Any:
+    if isinstance(law, SharpSlip):
+        return "elastic-slip"
+    return next((name for name, kind in _LAWS.items() if type(law) is kind), law)
+
+
+def check_word(key: str, value: Any) -> None:
+    """Raise `InputError` for a static value of the wrong type; numbers check theirs as leaves."""
+    if key == "contact.law":
+        known = isinstance(value, FrictionLaw) or (isinstance(value, str) and value in LAWS)
+        require(key, value, known, f"choose {' or '.join(map(repr, LAWS))}")
+    elif key == "contact.smoothing" and isinstance(value, str):
+        require(key, value, value == "sharp", SMOOTHING)
+    elif key == "model.fields":
+        words = isinstance(value, list | tuple) and all(isinstance(f, str) for f in value)
+        require(key, value, words, "give a list such as ['v', 'beta', 'psi']")
+    elif key in WORDS:
+        require(key, value, isinstance(value, str), "must be a word")
+    elif key in NUMBERS and key not in OPTIONAL:
+        require(key, value, value is not None, "must be a number")

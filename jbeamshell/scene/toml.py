@@ -1,0 +1,84 @@
+"""scene.toml."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import read_toml, write_text
+from jbeamshell.scene.keys import DERIVED, KEYS, LENGTHS, NUMBERS
+from jbeamshell.scene.parts import Load
+from jbeamshell.scene.rungs import spelled_out
+from jbeamshell.scene.scene import SECTIONS, Scene, check_word, law_name
+
+
+def scene_from_values(values: Mapping[str, Any]) -> Scene:
+    """A scene from dotted keys on top of the standard strip."""
+    if values.get("load.control") in LENGTHS and "load.amplitude" not in values:
+        return Scene(load=Load(values["load.control"]))  # says what is missing
+    return Scene().replace(values)
+
+
+def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Dotted keys with others on top; half_height replaces height_ratio and the like."""
+    same = DERIVED | {primary: derived for derived, primary in DERIVED.items()}
+    for given in (values, overrides):
+        if "model.rung" in given:
+            check_word("model.rung", given["model.rung"])
+    values = spelled_out(dict(values))
+    overrides = spelled_out(dict(overrides), values.get("model.fields", ()))
+    displaced = {same[key] for key in overrides if key in same}
+    return {k: v for k, v in values.items() if k not in displaced} | dict(overrides)
+
+
+def read_values(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The dotted keys of a TOML file, flat."""
+    values: dict[str, Any] = {}
+    for section, table in read_toml(path).items():
+        if section not in SECTIONS:
+            raise InputError(
+                f"{path}: unknown section {section!r}; sections are {', '.join(SECTIONS)}"
+            )
+        if not isinstance(table, dict):
+            raise InputError(f"{path}: {section} must be a table: write [{section}] above its keys")
+        values |= {f"{section}.{name}": value for name, value in table.items()}
+    return values
+
+
+def read_scene(path: str | os.PathLike[str]) -> Scene:
+    """The scene described by a TOML file; what it leaves out is the standard strip's."""
+    return scene_from_values(read_values(path))
+
+
+def scene_to_toml(scene: Scene) -> str:
+    """TOML text that `read_scene` turns into the same scene, to the last bit."""
+    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+    if scene.energy is not None or not isinstance(law_name(scene.contact.law), str):
+        raise InputError(
+            "energy, law: a user's own function cannot be written to TOML; keep it in code"
+        )
+    tables: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
+    for key in KEYS:
+        if key in DERIVED or key == "model.rung":
+            continue
+        section, name = key.split(".")
+        value = scene.get(key)
+        if value is None:  # no layers, no curvature
+            continue
+        if key in NUMBERS:
+            value = np.asarray(value, dtype=float).tolist()
+        if key == "contact.smoothing" and np.isinf(value):
+            value = "sharp"
+        tables[section][name] = list(value) if isinstance(value, tuple) else value
+    return tomli_w.dumps(tables)
+
+
+def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write the scene as TOML, whole or not at all."""
+    write_text(path, scene_to_toml(scene))

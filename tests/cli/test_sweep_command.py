@@ -1,0 +1,210 @@
+"""`jbeamshell sweep`: ranges in words, JSON and files out, one line of complaint."""
+
+import csv
+import dataclasses
+import json
+import re
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import sweeping
+from jbeamshell.cli import main
+from jbeamshell.cli.sweep import values_of
+from jbeamshell.common.errors import InputError
+from jbeamshell.sweeping import lanes, run
+from jbeamshell.sweeping.lanes import Outcome
+from jbeamshell.sweeping.results import Sweep
+
+FIGURES = "dissipation,dissipation_ratio,secant_stiffness,reaction_max"  # of test_sweep
+WORDS = [
+    *("--set", "model.nodes=9", "--set", "model.kinematics=linear"),
+    *("--set", "load.steps_per_half_cycle=2", "--set", "load.cycles=1", "--figures", FIGURES),
+]
+AMPLITUDES = ("--over", "load.amplitude=0.5:2.5:3")
+HEIGHTS = ("--over", "strip.height_ratio=0.05, .4")
+
+
+@pytest.fixture
+def cli(capsys):
+    def cli(*words):
+        code = main.main(["sweep", *map(str, words)])
+        return code, *capsys.readouterr()
+
+    return cli
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("load.amplitude=1:3:5", [1.0, 1.5, 2.0, 2.5, 3.0]),
+        ("load.amplitude=3:1:2", [3.0, 1.0]),
+        ("load.amplitude = 0.1 : 10 : 3 : log", [0.1, 1.0, 10.0]),
+        ("load.amplitude=.5", [0.5]),
+        ("load.amplitude=1,2e-1, 3", [1.0, 0.2, 3.0]),
+        ("load.amplitude=2:7:1", [2.0]),
+    ],
+)
+def test_ranges_are_what_they_say(text, values):
+    np.testing.assert_allclose(values_of([text])["load.amplitude"], values, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("texts", "says"),
+    [
+        ([], "at least one key"),
+        (["load.amplitude"], "write KEY=START:STOP:COUNT"),
+        (["load.amplitud=1:2:3"], "did you mean 'load.amplitude'"),
+        (["load.amplitude="], "is empty"),
+        (["load.amplitude=1:2:0"], "is empty: COUNT"),
+        (["load.amplitude=1:2:-3"], "is empty: COUNT"),
+        (["load.amplitude=1:2:2.5"], "COUNT must be a whole number"),
+        (["load.amplitude=1:2"], "write KEY"),
+        (["load.amplitude=1:2:3:cubic"], "write KEY"),
+        (["load.amplitude=0:2:3:log"], "must be positive for a log range"),
+        (["load.amplitude=1,,2"], "'' is no finite number"),
+        (["load.amplitude=1,two"], "'two' is no finite number"),
+        (["load.amplitude=0:inf:3"], "'inf' is no finite number"),
+        (["load.amplitude=0:1:99999999999"], "99,999,999,999 lanes .* take"),
+        (["load.amplitude=1", "load.amplitude=2"], "is given twice"),
+    ],
+)
+def test_ranges_that_are_none_are_refused_in_one_line(texts, says):
+    with pytest.raises(InputError, match=says) as caught:
+        values_of(texts)
+    assert "\n" not in str(caught.value)
+
+
+def test_json_is_strict_and_files_hold_the_same(cli, tmp_path):
+    table, picture = tmp_path / "sweep.csv", tmp_path / "sweep.png"
+    code, out, err = cli(*WORDS, *AMPLITUDES, *HEIGHTS, "--json", "--out", table, "--plot", picture)
+    assert code == 0
+    assert "2 lanes lie outside the model's domain: load.amplitude = 2.5: must stay below" in err
+    found = json.loads(out, parse_constant=pytest.fail)
+    assert (found["lanes"], found["outside"], found["failed"]) == (6, 2, 0)
+    assert found["axes"]["load.amplitude"] == [0.5, 1.5, 2.5]
+    assert found["status"] == [["converged"] * 2, ["converged"] * 2, ["outside"] * 2]
+    assert found["values"]["dissipation"][2] == [None, None]
+    with table.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    listed = [row["dissipation"] for row in rows]
+    flat = np.ravel(found["values"]["dissipation"]).tolist()
+    assert [float(word) if word else None for word in listed] == flat
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["sweep.csv", "sweep.png"]
+    assert f"wrote {table}, {picture}" in err
+
+
+def test_the_summary_counts_and_a_lane_that_fails_shows_in_the_exit_code(cli, monkeypatch):
+    answer = run.sweep
+
+    def failing(*words, **settings):
+        result = answer(*words, **settings)
+        status = result.status.copy()
+        status.flat[0] = Outcome.MAX_ITERATIONS
+        return dataclasses.replace(result, status=status)
+
+    code, out, err = cli(*WORDS, "--over", "load.amplitude=.5,1.5", *HEIGHTS)
+    assert (code, err) == (0, "")
+    assert out.startswith("4 lanes over load.amplitude (2), strip.height_ratio (2): 4 converged")
+    monkeypatch.setattr(sweeping, "sweep", failing)
+    code, out, err = cli(*WORDS, "--over", "load.amplitude=.5,1.5", *HEIGHTS)
+    assert code == 3
+    assert "1 failed" in out
+    assert "1 lanes found no equilibrium" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--over", "contact.law=1"], "no single number"),
+        ([*AMPLITUDES, "--paired", "--over", "contact.friction=0.1,0.2"], "equally many"),
+        ([*AMPLITUDES, "--figures", "nonsense"], "choose"),
+        (["--json", "--over", "load.amplitude=0:1:600000"], "2,400,000 numbers are too many"),
+        ([*AMPLITUDES, "--processes", "0"], "processes = 0: must be a whole number"),
+        ([*AMPLITUDES, "--out", "folder"], "end the name in .csv"),
+        ([*AMPLITUDES, "--plot", "nowhere/sweep.png"], "there is no folder nowhere"),
+        ([*AMPLITUDES, "--plot", "sweep.doc"], "end the name in .png"),
+        ([*AMPLITUDES, "--coordinator", "here:1"], "need all three"),
+        ([*AMPLITUDES, "--coordinator", "here", "--process", "0", "--of", "2"], "HOST:PORT"),
+        ([*AMPLITUDES, "--coordinator", "here:1", "--process", "2", "--of", "2"], "from 0 to 1"),
+        (["no-such-scene", *AMPLITUDES], "no-such-scene"),
+    ],
+)
+def test_bad_input_is_one_line(cli, words, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = cli(*words)
+    assert (code, out) == (2, "")
+    assert re.fullmatch(r"jbeamshell: [^\n]+\n", err), err
+    assert says in err
+    assert not list(tmp_path.iterdir())
+
+
+# --- pictures -------------------------------------------------------------------------------------
+
+
+def made_up(control="force", paired=False, **over):
+    """A sweep by a formula instead of a model."""
+    scene = jb.Scene().replace({"load.control": control, "load.amplitude": 1.0})
+    found = lanes.Lanes(scene, {k: np.array(v) for k, v in over.items()}, paired)
+    scaled = np.nan_to_num(np.broadcast_to(found.difficulty, found.shape))
+    values = {"dissipation": 1e-5 * scaled**3, "dissipation_ratio": scaled / (1.0 + scaled)}
+    status = np.zeros(found.shape, np.int8)
+    status.flat[0] = Outcome.NOT_FINITE
+    for figure in values.values():
+        figure.flat[0] = np.nan
+    return Sweep(scene, found.axes, paired, values, status, 1.0, 0.5, status.size)
+
+
+AXES = {"load.amplitude": np.linspace(0.1, 1.9, 7), "strip.height_ratio": [0.05, 0.1, 0.2]}
+
+
+@pytest.fixture
+def pyplot():
+    plt = pytest.importorskip("matplotlib.pyplot")
+    yield plt
+    plt.close("all")
+
+
+def test_a_curve_for_every_height_and_the_bar_for_all(pyplot):
+    result = made_up(**AXES, **{"contact.friction": [0.1, 0.2]})
+    axes = result.plot(per="strip.height_ratio")
+    curves = axes.lines
+    assert len(curves) == 3  # friction varies: no one bar for all
+    np.testing.assert_array_equal(curves[1].get_ydata(), result["dissipation"][:, 1, 1])
+    assert axes.get_title() == r"$\mu$ = 0.2"
+    assert "force per width" in axes.get_xlabel()
+    bar = made_up(**AXES).plot().lines[-1]
+    assert bar.get_label() == "bar"
+    assert np.all(np.diff(bar.get_ydata()) > 0.0)
+    assert len(made_up("displacement", **AXES).plot().lines) == 3
+    turned = result.plot(figure="dissipation_ratio", along="contact.friction", per="load.amplitude")
+    assert len(turned.lines) == 7
+    with pytest.raises(InputError, match="the sweep is over"):
+        result.plot(along="strip.length")
+    with pytest.raises(InputError, match="along the axis already"):
+        result.plot(along="contact.friction", per="contact.friction")
+    with pytest.raises(InputError, match="choose"):
+        result.plot(figure="loss_factor")
+
+
+def test_the_master_curve_has_a_dot_for_every_lane_that_converged(pyplot):
+    result = made_up(**AXES)
+    axes = result.plot_master()
+    (dots,) = axes.collections
+    x, y = np.asarray(dots.get_offsets()).T
+    assert x.size == result.status.size - 1
+    np.testing.assert_allclose(y, x / 2.0 / (1.0 + x / 2.0))
+    assert x.max() == pytest.approx(1.9 / 0.05)
+    with pytest.raises(InputError, match="no lane with a force"):
+        made_up("displacement", **AXES).plot_master()
+
+
+def test_pairs_are_dots(pyplot):
+    heights = np.geomspace(0.05, 0.4, 7)
+    result = made_up(paired=True, **AXES | {"strip.height_ratio": heights})
+    axes = result.plot()
+    assert len(axes.collections[0].get_offsets()) == 7
+    assert len(axes.figure.axes) == 2  # with a bar of colours
+    assert len(made_up(paired=True, **{"load.amplitude": [0.5, 1.0]}).plot().collections) == 0

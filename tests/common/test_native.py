@@ -1,0 +1,107 @@
+"""One native function: the same values, whatever is in it."""
+
+import sys
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.common.native import Native
+from jbeamshell.quasistatic import slip_patterns
+
+
+def looped(x, y):
+    """A loop, a gather, a scatter that is a slice, and a product."""
+    turned = jax.lax.fori_loop(0, 7, lambda i, at: at.at[i % 5].add(x * at[i % 3]), jnp.ones(5))
+    return {"turned": jnp.outer(turned, turned) @ turned, "y": jnp.cos(y)}
+
+
+def sorted_by_compiler(x, y):
+    return {"turned": jnp.sort(jnp.sin(jnp.arange(9.0) * x)), "y": y}
+
+
+def scattered(x, y):
+    index = (jnp.arange(40.0) * x * 97.0).astype(int) % 11
+    return {"turned": jnp.zeros(11).at[index].add(1.0 + jnp.arange(40.0)), "y": y}
+
+
+def factorised(x, y):
+    return {"turned": jnp.linalg.eigh(jnp.eye(3) + x)[0], "y": y}
+
+
+def called_back(x, y):
+    like = jax.ShapeDtypeStruct((), x.dtype)
+    return {"turned": jax.pure_callback(lambda a: np.asarray(a) * 2.0, like, x), "y": y}
+
+
+@pytest.mark.parametrize(
+    ("function", "fits"),
+    [
+        (looped, True),
+        (sorted_by_compiler, False),
+        (scattered, None),  # by the compiler's release and options
+        (factorised, False),
+        (called_back, False),
+    ],
+)
+def test_values_are_the_function_s(function, fits):
+    native, given = Native(function), (jnp.asarray(0.3), jnp.asarray(0.4))
+    for _ in range(2):  # the second time what was found is known
+        found, expected = native.now(*given), jax.jit(function)(*given)
+        assert native.fits is not None if fits is None else native.fits is fits
+        for name, value in found.items():
+            np.testing.assert_allclose(value, expected[name], rtol=1e-14)
+
+
+def test_it_is_for_numbers_only():
+    native = Native(looped)
+    assert jax.jit(native.now)(0.3, 0.4) is None
+    assert jax.vmap(native.now, (0, None))(jnp.linspace(0.1, 0.9, 4), 0.4) is None
+    assert native.fits is None  # not asked
+    inside = jax.jit(lambda x: x * native.now(0.3, 0.4)["y"])  # numbers that do not depend on x
+    np.testing.assert_allclose(inside(2.0), 2.0 * np.cos(0.4))
+    assert native.fits is True
+
+
+def test_what_is_not_worth_it_is_not_tried():
+    native = Native(looped, worth=False)
+    np.testing.assert_allclose(native.now(0.3, 0.4)["y"], np.cos(0.4))
+    assert native.fits is False
+
+
+def test_a_response_is_native_and_falls_back(monkeypatch):
+    numbers = {"model.nodes": 11, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
+    scene = jb.Scene().replace(numbers | {"load.cycles": 1})
+    amplitude, made = float(scene.load.amplitude), []
+
+    def native(*given, **more):
+        made.append(Native(*given, **more))
+        return made[-1]
+
+    monkeypatch.setattr(sys.modules["jbeamshell.quasistatic.response"], "Native", native)
+    foreseen = jb.response(scene, ("load.amplitude",))(amplitude)
+    assert made[0].fits is True
+    assert foreseen["status"] == 0
+
+    monkeypatch.setattr(
+        slip_patterns, "MOST", 0
+    )  # what is not foreseen is found by Newton's method
+    walked = jb.response(scene, ("load.amplitude",))(amplitude)
+    assert made[1].fits is True
+    assert walked["status"] == 0
+    np.testing.assert_allclose(walked["dissipation"], foreseen["dissipation"], rtol=1e-9)
+
+
+def test_a_response_of_a_traced_scene():
+    small = {"model.nodes": 11, "model.fields": ["v"], "model.kinematics": "linear"}
+    scene = jb.Scene().replace(small | {"load.cycles": 1, "load.steps_per_half_cycle": 2})
+    assert slip_patterns.applies(scene)
+
+    def of_height(ratio):
+        ask = jb.response(scene.replace({"strip.height_ratio": ratio}), ("load.amplitude",))
+        return ask(scene.load.amplitude)["dissipation"]
+
+    found = jax.jit(of_height)(scene.strip.height_ratio)
+    np.testing.assert_allclose(found, jb.solve(scene, throw=False).dissipation, rtol=1e-9)

@@ -1,0 +1,204 @@
+"""Inertia, vibrations and friction as a rate law, against closed forms."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.linalg
+import scipy.optimize
+
+import jbeamshell as jb
+from jbeamshell import dynamics
+from jbeamshell.dynamics.strip import rate_friction
+from jbeamshell.dynamics.strip.equations import Equations
+from jbeamshell.dynamics.strip.stepsize import EXPLICIT, stability_limits
+from jbeamshell.mechanics.friction import ElasticSlip
+from jbeamshell.mechanics.homogeneous import shear_coefficient
+from jbeamshell.quasistatic.system import V
+
+build = eqx.filter_jit(Equations)  # one program instead of hundreds
+jitted = eqx.filter_jit(lambda method, *arguments: method(*arguments))
+LINEAR = {"model.kinematics": "linear", "model.nodes": 21}
+RHO = 2.5
+
+
+def scene(**values):
+    return jb.Scene().replace(LINEAR | {k.replace("__", "."): v for k, v in values.items()})
+
+
+def stuck(scene, shear=True):
+    """Lowest frequency of a stuck strip: v and beta go like sin(pi X/2L) and rub elastically."""
+    strip = scene.strip
+    height, modulus = float(strip.half_height), float(strip.plane_modulus)
+    rubs = float(scene.contact.stick_stiffness * strip.shear_modulus / strip.half_height)
+    wave = 0.5 * np.pi / float(strip.length)
+    kappa = float(shear_coefficient(strip.poisson_ratio) * strip.shear_modulus)
+    turning = 8.0 / 3.0 * modulus * height**3 * wave**2 + 2.0 * kappa * height
+    coupling = -2.0 * modulus * height**2 * wave**2
+    stiffness = [[2.0 * height * modulus * wave**2 + rubs, coupling], [coupling, turning]]
+    mass = np.array([[2.0 * height, -2.0 * height**2], [-2.0 * height**2, 8.0 / 3.0 * height**3]])
+    return np.sqrt(scipy.linalg.eigh(stiffness, RHO * mass)[0])
+
+
+@pytest.mark.parametrize("mass", ["lumped", "consistent"])
+def test_a_stuck_strip_vibrates_as_in_closed_form(mass):
+    errors = []
+    for nodes in (11, 21):
+        strip = scene(model__fields=["v", "beta"], model__nodes=nodes)
+        found = dynamics.modes(strip, dynamics.Inertia(RHO, mass=mass)).frequency[0]
+        errors.append(abs(found / stuck(strip)[0] - 1.0))
+    assert errors[-1] < 5e-3
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
+
+
+def cantilever(strip):
+    """Lowest frequency of Timoshenko's cantilever (Huang 1961), by its own determinant."""
+    height, modulus, length = (float(a) for a in (strip.half_height, strip.plane_modulus, 2.0))
+    kappa = float(shear_coefficient(strip.poisson_ratio) * strip.shear_modulus)
+    area, inertia = 2.0 * height, 2.0 / 3.0 * height**3
+
+    def determinant(omega):
+        # Amplitudes (w, beta) e^(r X): kappa A (r^2 w - r beta) = -rho A omega^2 w, and so on.
+        mass, turning = RHO * area * omega**2, RHO * inertia * omega**2
+        stiff, bend = kappa * area, modulus * inertia
+        square = np.roots(
+            [bend * stiff, bend * mass + stiff * turning, mass * turning - mass * stiff]
+        ).astype(complex)
+        roots = np.concatenate([np.sqrt(square), -np.sqrt(square)])
+        tilt = (stiff * roots**2 + mass) / (stiff * roots)
+        grown = np.exp(roots * length)
+        rows = [np.ones(4), tilt, roots * tilt * grown, (roots - tilt) * grown]
+        return np.linalg.det(np.array(rows))
+
+    guesses = np.linspace(5.0, 30.0, 101)
+    values = np.array([determinant(g) for g in guesses])
+    values = (values / values[0]).real
+    first = np.flatnonzero(values[:-1] * values[1:] < 0.0)[0]
+    scale = determinant(guesses[0])
+    return scipy.optimize.brentq(
+        lambda g: (determinant(g) / scale).real, guesses[first], guesses[first + 1]
+    )
+
+
+def test_a_cantilever_vibrates_as_timoshenkos():
+    errors = []
+    for nodes in (21, 41):
+        strip = scene(
+            model__fields=["v", "w", "beta"],
+            model__nodes=nodes,
+            contact__normal="none",
+            contact__friction=0.0,
+        )
+        found = dynamics.modes(strip, dynamics.Inertia(RHO)).frequency[0]
+        errors.append(abs(found / cantilever(strip.strip) - 1.0))
+    assert errors[-1] < 5e-3
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.slow
+def test_sections_of_higher_order_vibrate_ever_slower_and_the_shell_is_near():
+    strips = (scene(model__order=order, model__nodes=41) for order in range(4))
+    shell, *orders = (dynamics.modes(strip).frequency[0] for strip in strips)
+    assert np.all(np.diff(orders) < 0.0)
+    assert shell == pytest.approx(orders[-1], rel=0.02)
+
+
+def test_the_first_thickness_stretch_is_ten_per_cent_off_unless_corrected():
+    strip = scene()
+    half, modulus = strip.strip.half_height, strip.strip.plane_modulus
+    c11 = modulus / (1.0 - (0.3 / 0.7) ** 2)
+    exact = 0.5 * np.pi * jnp.sqrt(c11 / RHO) / half
+    for factor, off in ((1.0, np.sqrt(12.0) / np.pi), (dynamics.THICKNESS_STRETCH, 1.0)):
+        inertia = dynamics.Inertia(RHO, squeeze_factor=factor)
+        masses = build(strip, inertia, dynamics.Riders(), dynamics.Excitation()).masses
+        rates = jnp.array([0.0, -half, 0.0, 1.0])  # about mid-height
+        found = jnp.sqrt(half * c11 / masses.section(jnp.zeros(4), rates))
+        assert found / exact == pytest.approx(off, rel=1e-12)
+
+
+def test_the_mass_of_layers_adds_up():
+    half = 0.5 * 0.1126 * 2.0
+    layers = [[0.5 * half, 1e5, 0.3], [1.5 * half, 2e5, 0.3]]
+    strip = scene(strip__layers=layers)
+    inertia = dynamics.Inertia([8.0, 2.0])
+    masses = build(strip, inertia, dynamics.Riders(), dynamics.Excitation()).masses
+    along = masses.section(jnp.zeros(4), jnp.array([1.0, 0.0, 0.0, 0.0]))
+    turned = masses.section(jnp.zeros(4), jnp.array([0.0, 0.0, 1.0, 0.0]))
+    assert along == pytest.approx(0.5 * (8.0 * 0.5 + 2.0 * 1.5) * half, rel=1e-12)
+    cube = (8.0 * 0.5**3 + 2.0 * (2.0**3 - 0.5**3)) * half**3 / 3.0
+    assert turned == pytest.approx(0.5 * cube, rel=1e-12)
+
+
+def test_exact_kinematics_keep_energy_and_momentum_of_a_turning_section():
+    strip = jb.Scene().replace({"model.nodes": 11})
+    masses = build(strip, dynamics.Inertia(RHO), dynamics.Riders(3.0), dynamics.Excitation()).masses
+    rng = np.random.default_rng(1)
+    q, p = 0.3 * rng.standard_normal((2, 11, 4))
+    blocks = jitted(masses.blocks, jnp.asarray(q))
+    energy = 0.5 * np.einsum("ni,nij,nj", p, blocks, p)
+    assert jitted(masses.kinetic, jnp.asarray(q), jnp.asarray(p)) == pytest.approx(
+        energy, rel=1e-12
+    )
+    # Work of the inertia forces of free motion is the change of the kinetic energy: none, where
+    # the accelerations balance them.
+    force = -jitted(masses.transport, jnp.asarray(q), jnp.asarray(p))
+    speed = np.linalg.solve(blocks, np.asarray(force)[..., None])[..., 0]
+    step = 1e-5
+    ahead, behind = (
+        jitted(masses.kinetic, jnp.asarray(q + s * step * p), jnp.asarray(p + s * step * speed))
+        for s in (1.0, -1.0)
+    )
+    assert abs(ahead - behind) / (2.0 * step) < 1e-6 * energy
+
+
+@pytest.mark.parametrize("m", [2.0, 16.0])
+def test_the_rate_law_walks_the_quasi_static_loop(m):
+    path = lambda s: 3.0 * np.sin(s) + 0.5 * np.sin(3.0 * s)  # noqa: E731
+    speed = lambda s: 3.0 * np.cos(s) + 1.5 * np.cos(3.0 * s)  # noqa: E731
+    law, steps = ElasticSlip(m), np.linspace(0.0, 4.0 * np.pi, 801)
+    walked, t = [], jnp.asarray(0.0)
+    for a, b in zip(path(steps[:-1]), path(steps[1:]), strict=True):
+        t = law.traction(jnp.asarray(b - a), t, jnp.asarray(1.0), jnp.asarray(1.0))
+        walked.append(float(t))
+
+    def rate(s, t):
+        slid = rate_friction.slid(
+            jnp.asarray(t[0]), jnp.asarray(speed(s)), jnp.asarray(1.0), 1.0, jnp.asarray(m), 1e-9
+        )
+        return [float(slid)]
+
+    coarse = steps[::8]
+    solved = scipy.integrate.solve_ivp(
+        rate, coarse[[0, -1]], [0.0], t_eval=coarse, rtol=1e-7, atol=1e-9, max_step=0.05
+    )
+    assert np.max(np.abs(solved.y[0, 1:] - walked[7::8])) < 2e-4  # the walk turns between its steps
+
+
+def test_a_falling_cap_takes_the_traction_along():
+    t, cap = jnp.asarray(0.9), jnp.asarray(0.5)
+    assert rate_friction.relaxing(t, cap, 0.1) == pytest.approx(-4.0)
+    assert rate_friction.relaxing(-t, cap, 0.1) == pytest.approx(4.0)
+    assert rate_friction.relaxing(0.4 * t, cap, 0.1) == 0.0
+    assert rate_friction.relaxing(t, -cap, 0.1) == pytest.approx(-9.0)
+
+
+def test_stability_limits_are_the_textbooks():
+    vibration, decay = stability_limits(EXPLICIT["bosh3"]().tableau)
+    assert vibration == pytest.approx(np.sqrt(3.0), abs=2e-3)  # of every third-order method
+    assert decay == pytest.approx(2.5127, abs=2e-3)
+
+
+def test_reaction_has_elasticity_and_inertia():
+    strip = scene(model__nodes=11)
+    shaker = dynamics.Shaker(3.0, 0.25, direction="across")
+    equations = build(strip, dynamics.Inertia(RHO), dynamics.Riders(), shaker)
+    history = jb.solve(strip, np.zeros(1))
+    state = jitted(equations.state, history.fields[-1], history.traction[-1], jnp.zeros(()))
+    still, shaken = (jitted(equations.answer, jnp.asarray(t), state).reaction for t in (0.0, 1.0))
+    assert np.allclose(still, 10.0, rtol=1e-9)
+    # The strip weighs more on a foundation that rises, but for what its squeezing gives way.
+    weight = 2.0 * float(strip.strip.half_height) * RHO * 3.0
+    assert np.all(shaken > still)
+    assert np.allclose((shaken - still) / weight, 0.25, atol=0.02)
+    assert V == 0

@@ -1,0 +1,348 @@
+"""Transients: energy, waves, the slow limit, other solvers, derivatives, bad input."""
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import dynamics, identify, plotting
+from jbeamshell.dynamics.let_go import let_go
+
+LINEAR = {"model.kinematics": "linear", "model.nodes": 21}
+HEAVY = 20.0
+
+
+def scene(**values):
+    return jb.Scene().replace(LINEAR | {k.replace("__", "."): v for k, v in values.items()})
+
+
+def heavy(strip):
+    return HEAVY * 2.0 * float(strip.strip.half_height * strip.strip.length)
+
+
+def period(strip):
+    riders = dynamics.Riders(heavy(strip))
+    return 2.0 * np.pi / float(dynamics.modes(strip, riders=riders).frequency[0])
+
+
+def left_over(motion):
+    return float(jnp.max(jnp.abs(motion.imbalance)))
+
+
+@pytest.fixture(scope="module")
+def study():
+    fine = {"model__nodes": 41, "model__end_size": 0.0278}
+    return let_go(scene(**fine), 1.0, cycles=20.0, per_cycle=400)
+
+
+class TestRingDown:
+    def test_energy_is_where_the_ledger_says(self, study):
+        motion = study.motion
+        assert motion.sound
+        assert motion.reached == pytest.approx(float(motion.time[-1]))
+        begin = float(motion.energy[0] - jnp.min(motion.energy))
+        assert left_over(motion) < 5e-4 * begin
+        assert np.all(np.diff(np.asarray(motion.rubbed)) > -1e-4 * begin)
+        assert motion.rubbed[-1] == pytest.approx(begin + float(motion.given[-1]), rel=0.02)
+
+    def test_damping_is_what_masing_predicts(self, study):
+        """But for the first cycles, in which the loops are far from closed."""
+        late = study.found.damping < 0.02
+        assert np.sum(late) > 20
+        assert np.median(np.abs(study.ratio[late] - 1.0)) < 0.05
+        at = study.found.amplitude * np.sqrt(study.payload)
+        predicted = np.interp(at, study.predicted.amplitude, study.predicted.frequency)
+        assert np.allclose(2.0 * np.pi * study.found.frequency[late], predicted[late], rtol=5e-3)
+
+    @pytest.mark.slow
+    def test_friction_is_found_again_from_damping_over_amplitude(self, study):
+        late = dynamics.RingDown(*(column[5:] for column in study.found))
+        curves = late.curves(study.payload)
+        start = study.motion.scene.replace({"contact.friction": 0.15, "load.cycles": 1})
+        fit = identify.fit(curves, start, ["contact.friction"])
+        assert fit.scene.contact.friction == pytest.approx(0.1, rel=0.05)
+
+    def test_its_curves_are_energy_and_stiffness(self, study):
+        loss, stiffness = study.found.curves(study.payload)
+        predicted = study.predicted
+        at = loss.amplitude / stiffness.stiffness * np.sqrt(study.payload)
+        mean = np.interp(at, predicted.amplitude, predicted.frequency) ** 2 * study.payload
+        assert np.allclose(stiffness.stiffness, mean, rtol=0.03)
+        energy = np.interp(at, predicted.amplitude, predicted.dissipation)
+        assert np.median(np.abs(loss.dissipation / energy - 1.0)) < 0.1
+
+    def test_its_picture_has_what_it_says(self, study):
+        sheet = plotting.ring_down_sheet(study)
+        assert len(sheet.axes) == 4
+        assert plotting.spectrogram(study.motion).get_ylabel().startswith("frequency")
+        plotting.close(sheet)
+
+
+@pytest.mark.slow
+def test_a_slow_load_walks_the_quasi_static_loop():
+    strip = scene()
+    slow, riders = 100.0 * period(strip), dynamics.Riders(heavy(strip))
+    motion = dynamics.simulate(
+        strip,
+        2.5 * slow,
+        dynamics.Harmonic(0.7855, 1.0 / slow, ramp=0.5),
+        riders=riders,
+        samples=501,
+        step=slow / 5000.0,
+    )
+    loss = motion.rubbed[-1] - motion.rubbed[-201]
+    assert loss == pytest.approx(float(jb.solve(strip).dissipation), rel=5e-3)
+    last = slice(-201, None)
+    work = jnp.trapezoid(motion.force[last], motion.displacement[last])
+    assert work == pytest.approx(float(loss), rel=0.01)
+
+
+def arrival(time, signal):
+    """Time at which a pulse is at its highest."""
+    top = int(np.argmax(signal))
+    before, here, after = signal[top - 1 : top + 2]
+    return time[top] + 0.5 * (before - after) / (before - 2 * here + after) * (time[1] - time[0])
+
+
+def speed_between(motion, signals, places):
+    times = [arrival(np.asarray(motion.time), signal) for signal in signals]
+    return (places[1] - places[0]) / (times[1] - times[0])
+
+
+@pytest.mark.parametrize("wave", ["axial", pytest.param("shear", marks=pytest.mark.slow)])
+def test_fronts_run_at_the_speeds_of_waves(wave):
+    axial = wave == "axial"
+    strip = jb.Scene().replace(
+        LINEAR
+        | {
+            "model.nodes": 401,
+            "model.end_size": 1.0,
+            "model.fields": ["v"] if axial else ["v", "w", "beta"],
+            "contact.friction": 0.0,
+            "contact.normal": "rigid" if axial else "none",
+            "strip.height_ratio": 0.2 if axial else 0.4,
+        }
+    )
+    modulus, shear = float(strip.strip.plane_modulus), float(strip.strip.shear_modulus)
+    kappa = 10.0 * 1.3 / (12.0 + 11.0 * 0.3)
+    speed = np.sqrt(modulus if axial else kappa * shear)
+    blow = 0.08 * 2.0 / speed
+    shape = np.sin(np.pi * np.linspace(0.0, 1.0, 41)) ** 2
+    times = np.append(np.linspace(0.0, blow, 41), 10.0)
+    excitation = dynamics.Recorded(times, np.append(shape, 0.0), "force" if axial else "across")
+    span = 1.7 / speed
+    motion = dynamics.simulate(strip, span, excitation, samples=851, step=span / 850)
+    field = 0 if axial else 1
+    x = np.asarray(motion.x)
+    places = (1.4, 0.7) if axial else (0.3, 0.9)
+    nodes = [int(np.argmin(np.abs(x - place))) for place in places]
+    rates = np.asarray(motion.rates)[:, nodes, field].T
+    if not axial:  # the shaken support sends its acceleration along the strip
+        rates = np.gradient(rates, axis=1) / float(motion.time[1])
+        rates = rates + np.asarray(jax.vmap(excitation.acceleration)(motion.time)[1])
+    assert abs(speed_between(motion, rates, x[nodes])) == pytest.approx(speed, rel=0.01)
+    assert left_over(motion) < 1e-2 * float(jnp.max(motion.energy - motion.energy[0]))
+
+
+class TestWhatRides:
+    def test_a_blow_gives_the_payload_its_velocity(self):
+        strip = scene(model__nodes=11)
+        riders = dynamics.Riders(heavy(strip), [1.0, 2.0], [500.0, 300.0], [0.0, 1.0])
+        for duration in (0.0, 2e-2 * period(strip)):
+            motion = dynamics.simulate(
+                strip,
+                0.2 * period(strip),
+                dynamics.Impact(0.01, duration),
+                riders=riders,
+                samples=201,
+            )
+            assert float(motion.velocity[30]) == pytest.approx(0.01 / heavy(strip), rel=0.05)
+            scale = float(jnp.max(motion.kinetic))
+            assert left_over(motion) < 0.02 * scale
+
+    @pytest.mark.slow
+    def test_the_chain_is_moved_and_damped_as_it_should(self):
+        """Against the chain's own equations under the motion found of the loaded end."""
+        strip = scene(model__nodes=11)
+        riders = dynamics.Riders(heavy(strip), [1.0, 2.0], [500.0, 300.0], [0.1, 1.0])
+        motion = dynamics.simulate(
+            strip, period(strip), released=0.5, riders=riders, samples=401, step=period(strip) / 400
+        )
+        z = np.asarray(motion.chain)
+        dt = float(motion.time[1])
+        end = np.asarray(motion.displacement) + z[0, 0] - float(motion.displacement[0])
+        every = np.column_stack([end, z])
+        rate = np.gradient(every, dt, axis=0)
+        bend = (every[2:] - 2 * every[1:-1] + every[:-2]) / dt**2
+        pulls = np.array([500.0, 300.0]) * np.diff(every) + np.array([0.1, 1.0]) * np.diff(rate)
+        forces = np.column_stack([pulls[:, 1] - pulls[:, 0], -pulls[:, 1]])[1:-1]
+        inertia = bend[:, 1:] * np.array([1.0, 2.0])
+        assert np.max(np.abs(inertia - forces)) < 0.03 * np.max(np.abs(forces))
+        assert float(motion.damped[-1]) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("method", "options"),
+    [
+        ("bosh3", {}),
+        ("kvaerno3", {"tolerance": 1e-6}),
+    ],
+)
+@pytest.mark.slow
+def test_other_solvers_find_the_same_motion(method, options):
+    strip = scene(model__nodes=11, contact__smoothing=16.0, contact__stick_stiffness=50.0)
+    riders, span = dynamics.Riders(heavy(strip)), 0.7 * period(strip)
+    excitation = dynamics.Recorded([0.0, 0.2 * span], [0.8, 0.0])
+    common = {"riders": riders, "released": 0.8, "samples": 101}
+    one = dynamics.simulate(strip, span, excitation, **common, step=span / 3000)
+    other = dynamics.simulate(strip, span, excitation, **common, method=method, **options)
+    scale = float(jnp.max(jnp.abs(one.displacement)))
+    assert float(jnp.max(jnp.abs(one.displacement - other.displacement))) < 5e-3 * scale
+    assert other.rubbed[-1] == pytest.approx(float(one.rubbed[-1]), rel=5e-3)
+    assert left_over(other) < 1e-3 * float(jnp.max(one.kinetic))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mass", ["lumped", "consistent"])
+def test_exact_kinematics_damping_and_other_masses_keep_the_ledger(mass):
+    kind = "exact" if mass == "lumped" else "linear"
+    strip = scene(model__nodes=11, model__kinematics=kind, model__grid="collocation")
+    inertia = dynamics.Inertia(1.0, mass=mass, damping_mass=1.0, damping_stiffness=1e-5)
+    motion = dynamics.simulate(
+        strip,
+        0.5 * period(strip),
+        dynamics.Shaker(200.0, 2.0 / period(strip), ramp=0.5),
+        inertia=inertia,
+        riders=dynamics.Riders(heavy(strip)),
+        samples=201,
+    )
+    scale = float(jnp.max(motion.kinetic))
+    assert float(motion.damped[-1]) > 1e-3 * scale
+    assert left_over(motion) < 0.01 * scale
+
+
+@pytest.mark.slow
+def test_a_shaken_strip_lifts_off_where_the_foundation_falls_away():
+    strip = scene(
+        model__nodes=11, model__fields=["v", "w", "beta", "psi"], contact__normal="compliant"
+    )
+    weight = 2.0 * float(strip.strip.half_height)  # of density 1, per length
+    for level, lifts in ((0.5, False), (1.6, True)):
+        shaker = dynamics.Shaker(level * 10.0 / weight, 20.0, ramp=0.5, direction="across")
+        motion = dynamics.simulate(strip, 0.1, shaker, samples=401, step=1e-5)
+        gap = np.asarray(motion.fields)[:, :, 1]
+        assert np.all(np.asarray(motion.reaction) >= 0.0)
+        assert (gap.max() > 10.0 * abs(gap.min())) == lifts
+        apart = gap > 0.1 * abs(gap.min())
+        assert np.all(np.asarray(motion.reaction)[apart] == 0.0)
+        assert left_over(motion) < (0.1 if lifts else 1e-3) * float(jnp.max(motion.kinetic))
+
+
+@pytest.mark.slow
+def test_a_misfit_has_derivatives_to_friction_and_height():
+    base = scene(model__nodes=11, contact__smoothing=4.0, contact__stick_stiffness=20.0)
+    span, riders = 0.6 * period(base), dynamics.Riders(heavy(base))
+    excitation = dynamics.Recorded([0.0, 0.1 * span], [0.8, 0.0])
+
+    @jax.jit
+    def misfit(values):
+        keys = ("contact.friction", "strip.height_ratio")
+        motion = dynamics.simulate(
+            base.replace(dict(zip(keys, values, strict=True))),
+            span,
+            excitation,
+            riders=riders,
+            released=0.8,
+            samples=41,
+            step=span / 200,
+            adjoint=diffrax.ForwardMode(),
+        )
+        return jnp.sum((1e5 * motion.displacement - 0.3) ** 2)
+
+    at, way = jnp.array([0.12, 0.1126]), jnp.array([0.03, 0.02])
+    value, slope = jax.jvp(misfit, (at,), (way,))
+    steps = 0.5 ** np.arange(2, 7)
+    rests = [abs(float(misfit(at + h * way) - value - h * slope)) for h in steps]
+    orders = np.diff(np.log(rests)) / np.diff(np.log(steps))
+    assert np.median(orders) == pytest.approx(2.0, abs=0.1)
+
+
+REFUSED = {
+    "density": (lambda: dynamics.Inertia(-1.0), r"inertia.density = -1.0"),
+    "factor": (lambda: dynamics.Inertia(squeeze_factor=0.0), "inertia.squeeze_factor"),
+    "payload": (lambda: dynamics.Riders(-1.0), "riders.payload = -1.0"),
+    "chain": (lambda: dynamics.Riders(0.0, [1.0], []), "riders.springs"),
+    "record": (lambda: dynamics.Recorded([0.0, 0.0], [1.0, 1.0]), "increasing times"),
+    "nothing": (lambda: dynamics.simulate(scene(), 1.0), "nothing happens"),
+    "silent record": (
+        lambda: dynamics.simulate(scene(), 1.0, dynamics.Recorded([2.0, 3.0], [0.0, 1.0])),
+        "nothing happens",
+    ),
+    "span": (lambda: dynamics.simulate(scene(), 0.0, released=1.0), "span = 0.0"),
+    "samples": (lambda: dynamics.simulate(scene(), 1.0, released=1.0, samples=1), "samples = 1"),
+    "method": (lambda: dynamics.simulate(scene(), 1.0, released=1.0, method="euler"), "choose"),
+    "step": (
+        lambda: dynamics.simulate(scene(), 1.0, released=1.0, method="tsit5", step=1.0),
+        r"step = 1.0: is above the largest stable one of tsit5, \d",
+    ),
+    "adaptive": (
+        lambda: dynamics.simulate(scene(), 1.0, released=1.0, method="kvaerno3", step=1.0),
+        "chooses its own",
+    ),
+    "rigid": (
+        lambda: dynamics.simulate(
+            scene(model__fields=["v", "w", "beta", "psi"]), 1.0, released=1.0
+        ),
+        "contact.normal = 'rigid'.*'compliant'",
+    ),
+    "control": (
+        lambda: dynamics.simulate(
+            scene(load__control="displacement", load__amplitude=1e-4), 1.0, released=1.0
+        ),
+        "load.control",
+    ),
+    "law": (
+        lambda: dynamics.simulate(scene(contact__law="tanh-increment"), 1.0, released=1.0),
+        "contact.law",
+    ),
+    "consistent": (
+        lambda: dynamics.simulate(
+            scene(model__kinematics="exact"),
+            1.0,
+            released=1.0,
+            inertia=dynamics.Inertia(mass="consistent"),
+        ),
+        "inertia.mass",
+    ),
+    "layers": (
+        lambda: dynamics.simulate(scene(), 1.0, released=1.0, inertia=dynamics.Inertia([1.0, 2.0])),
+        "inertia.density",
+    ),
+    "gross slip": (lambda: dynamics.simulate(scene(), 1.0, released=3.0), "gross slip"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_input_is_one_clear_line(name):
+    call, message = REFUSED[name]
+    with pytest.raises(jb.InputError, match=message) as refusal:
+        call()
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_motion_that_is_given_up_is_kept_as_far_as_it_came():
+    strip = scene(model__nodes=11)
+    common = {"released": 0.5, "samples": 101, "riders": dynamics.Riders(heavy(strip))}
+    span = period(strip)
+    with pytest.raises(dynamics.InterruptedMotionError, match=r"ends at t = .*too many") as cut:
+        dynamics.simulate(strip, span, **common, most_steps=120)
+    motion = cut.value.motion
+    assert 0.0 < motion.reached < span
+    known = np.asarray(motion.time) <= motion.reached
+    assert np.all(np.isfinite(np.asarray(motion.displacement)[known]))
+    assert np.all(np.isnan(np.asarray(motion.displacement)[~known]))
+    kept = dynamics.simulate(strip, span, **common, most_steps=120, throw=False)
+    assert kept.status == dynamics.Ending.TOO_MANY_STEPS
+    assert kept.figures()["status"] == "too_many_steps"

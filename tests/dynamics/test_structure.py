@@ -1,0 +1,180 @@
+"""A strip as the joint in a structure: Iwan's network, modes over amplitude, transients."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import scipy.sparse
+
+import jbeamshell as jb
+from jbeamshell import dynamics
+from jbeamshell.dynamics.structure.joint import Joint
+from jbeamshell.dynamics.structure.matrices import Attachment, Structure
+from jbeamshell.dynamics.structure.modal import harmonic_balance, modal_curve
+
+U = np.geomspace(0.02, 4.0, 40)
+JOINT = Joint(U, np.tanh(U))
+# The cubic law: F = sqrt(2 u), D = (2/3) F^3 for unit stiffness and friction.
+FINE = np.linspace(0.0, 1.0, 401)[1:] ** 2 / 2.0
+BAR = Joint(FINE, np.sqrt(2.0 * FINE))
+
+
+def chain(count=2, joint=JOINT, sparse=False):
+    """Equal masses on equal springs, the first held by the joint alone."""
+    stiffness = 3.0 * (2.0 * np.eye(count) - np.eye(count, k=1) - np.eye(count, k=-1))
+    stiffness[0, 0] = stiffness[-1, -1] = 3.0
+    mass = np.eye(count)
+    if sparse:
+        stiffness, mass = map(scipy.sparse.csr_array, (stiffness, mass))
+    return Structure(mass, stiffness, [Attachment(joint, 0)])
+
+
+class TestJoint:
+    def test_the_network_has_the_backbone_and_masings_loop(self):
+        up, down = np.linspace(0.0, 1.7, 120), np.linspace(1.7, -1.7, 240)
+        forces = JOINT.along(np.concatenate([up, down, -down]))
+        assert np.allclose(forces[:120], JOINT.backbone(up), rtol=0.0, atol=1e-14)
+        branch = float(JOINT.backbone(1.7)) - 2.0 * np.asarray(JOINT.backbone(0.5 * (1.7 - down)))
+        assert np.allclose(forces[120:360], branch, rtol=0.0, atol=1e-13)
+        loop, path = forces[119:], np.concatenate([up[-1:], down, -down])
+        area = np.trapezoid(loop, path)
+        assert area == pytest.approx(float(JOINT.dissipation(1.7)), rel=1e-3)
+
+    def test_a_bars_energy_per_cycle_is_goodmans(self):
+        u = jnp.array([0.05, 0.2, 0.45])
+        assert np.allclose(BAR.dissipation(u), 2.0 / 3.0 * (2.0 * u) ** 1.5, rtol=1e-3)
+        first = BAR.first_harmonic(u)
+        assert np.allclose(np.pi * first.imag * u**2, BAR.dissipation(u), rtol=1e-12)
+        assert np.all(np.diff(first.real) < 0.0)
+
+    def test_an_elastic_joint_has_its_stiffness_as_first_harmonic(self):
+        assert complex(JOINT.first_harmonic(jnp.asarray(0.01))) == pytest.approx(
+            float(JOINT.stiffness), rel=1e-6
+        )
+
+    @pytest.mark.slow
+    def test_a_strip_gives_its_mean_backbone(self):
+        strip = jb.Scene().replace({"model.kinematics": "linear", "model.nodes": 21})
+        joint = Joint.of(strip, 1.0, points=24, width=2.0)
+        loop = jb.solve(strip.replace({"load.amplitude": 1.0}))
+        u = float(loop.peak_displacement)
+        assert float(joint.force[-1]) == 2.0
+        assert float(joint.displacement[-1]) == pytest.approx(u, rel=0.02)
+        assert float(joint.dissipation(u)) == pytest.approx(2.0 * float(loop.dissipation), rel=0.03)
+
+
+class TestModes:
+    def test_one_mass_is_the_joint_itself(self):
+        structure = Structure([[2.0]], [[0.5]], [Attachment(BAR, 0)])
+        amplitude = np.array([0.05, 0.2, 0.4])
+        curve = modal_curve(structure, amplitude * np.sqrt(2.0))
+        force = 0.5 * amplitude + np.asarray(BAR.backbone(amplitude))
+        assert np.allclose(curve.frequency**2, force / amplitude / 2.0, rtol=1e-9)
+        loss = np.asarray(BAR.dissipation(amplitude))
+        assert np.allclose(curve.damping, loss / (2.0 * np.pi * force * amplitude), rtol=1e-9)
+        slope = np.diff(np.log(curve.dissipation)) / np.diff(np.log(np.sqrt(2.0 * amplitude)))
+        assert np.allclose(slope, 3.0, atol=0.01)  # Goodman's cubic law in the force
+
+    @pytest.mark.parametrize(("mode", "largest"), [(0, 1.0), (1, 0.2)])
+    def test_statics_and_one_harmonic_agree(self, mode, largest):
+        """A higher mode's static load moves the lower ones too, the more the further it slips."""
+        amplitude = np.geomspace(0.1, largest, 4)
+        static = modal_curve(chain(), amplitude, mode)
+        harmonic = harmonic_balance(chain(), amplitude, mode)
+        assert np.allclose(static.frequency, harmonic.frequency, rtol=0.01)
+        assert np.allclose(static.damping, harmonic.damping, rtol=0.03, atol=1e-5)
+
+    def test_sparse_and_dense_are_one_structure(self):
+        amplitude = np.geomspace(0.1, 2.0, 4)
+        one, other = (modal_curve(chain(500, sparse=s), amplitude) for s in (False, True))
+        assert np.allclose(one.frequency, other.frequency, rtol=1e-9)
+        assert np.allclose(one.damping, other.damping, rtol=1e-6)
+
+    def test_small_motion_is_undamped_and_stuck(self):
+        curve = modal_curve(chain(), [1e-4, 1e-3])
+        assert np.allclose(curve.frequency, chain().modes()[0][0], rtol=1e-9)
+        assert np.all(curve.damping < 1e-9)
+
+
+@pytest.fixture(scope="module")
+def shaken():
+    structure = chain()
+    frequency, shapes = structure.modes()
+    span = 25.0 * 2.0 * np.pi / frequency[0]
+    return structure, dynamics.shake(
+        structure, span, velocity=0.25 * shapes[:, 0], samples=2001, method="tsit5", tolerance=1e-8
+    )
+
+
+class TestTransient:
+    def test_energy_is_where_the_ledger_says(self, shaken):
+        _, motion = shaken
+        assert float(jnp.max(jnp.abs(motion.imbalance))) < 1e-4 * float(motion.kinetic[0])
+        assert float(motion.rubbed[-1]) > 0.1 * float(motion.kinetic[0])
+
+    def test_it_rings_down_as_statics_predict(self, shaken):
+        structure, motion = shaken
+        _, shapes = structure.modes()
+        modal = np.asarray(motion.displacement) @ structure.mass @ shapes[:, 0]
+        found = dynamics.ring_down(motion.time, modal)
+        curve = modal_curve(structure, np.geomspace(0.05, 1.0, 40))
+        predicted = np.interp(found.amplitude, curve.amplitude, curve.damping)
+        assert np.median(np.abs(found.damping / predicted - 1.0)) < 0.05
+        frequency = np.interp(found.amplitude, curve.amplitude, curve.frequency)
+        assert np.allclose(2.0 * np.pi * found.frequency, frequency, rtol=0.01)
+
+    def test_what_is_given_up_is_kept(self):
+        with pytest.raises(dynamics.InterruptedShakingError, match="ends at t") as cut:
+            dynamics.shake(
+                chain(), 50.0, velocity=[1.0, 0.0], samples=2001, method="tsit5", most_steps=200
+            )
+        assert 0.0 < cut.value.shaken.reached < 50.0
+
+
+class TestRingDown:
+    TIME = np.linspace(0.0, 30.0, 6001)
+
+    @pytest.mark.parametrize("method", ["turning-points", "hilbert"])
+    def test_a_linear_oscillator(self, method):
+        signal = np.exp(-2.0 * np.pi * 0.01 * self.TIME) * np.cos(2.0 * np.pi * self.TIME) + 0.3
+        found = dynamics.ring_down(self.TIME, signal, method=method)
+        inner = slice(found.time.size // 10, -found.time.size // 10)
+        assert np.allclose(found.frequency[inner], 1.0, rtol=2e-3)
+        assert np.allclose(found.damping[inner], 0.01, rtol=0.05)
+        envelope = np.exp(-2.0 * np.pi * 0.01 * found.time)
+        assert np.allclose(found.amplitude[inner], envelope[inner], rtol=0.02)
+
+    def test_damping_that_grows_with_amplitude(self):
+        """A mean decrease of c A^2 per time is an amplitude of 1/(1 + c t)."""
+        size = 1.0 / (1.0 + 0.1 * self.TIME)
+        found = dynamics.ring_down(self.TIME, size * np.sin(2.0 * np.pi * self.TIME))
+        expected = 0.1 * found.amplitude / (2.0 * np.pi)
+        assert np.allclose(found.damping, expected, rtol=0.02)
+
+
+REFUSED = {
+    "shape": (lambda: Structure(np.eye(2), np.ones((2, 3))), "stiffness"),
+    "sizes": (lambda: Structure(np.eye(2), np.eye(3)), "stiffness"),
+    "words": (lambda: Structure("mass", np.eye(2)), "mass"),
+    "skew": (lambda: Structure(np.eye(2), [[1.0, 0.5], [0.0, 1.0]]), "stiffness.*symmetric"),
+    "not finite": (lambda: Structure(np.eye(1), [[np.nan]]), "finite"),
+    "massless": (lambda: Structure(np.diag([1.0, 0.0]), np.eye(2)), "mass.*positive definite"),
+    "damping": (lambda: Structure(np.eye(2), np.eye(2), damping=[[1.0]]), "damping"),
+    "rigid": (lambda: Structure(np.eye(2), [[1.0, -1.0], [-1.0, 1.0]]), "rigid mode"),
+    "nowhere": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 1)]), "attachments"),
+    "to itself": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 0, 0)]), "attachm"),
+    "stiffening": (lambda: Joint([1.0, 2.0], [1.0, 3.0]), "softening"),
+    "falling": (lambda: Joint([2.0, 1.0], [1.0, 3.0]), "rising"),
+    "amplitudes": (lambda: modal_curve(chain(), [0.2, 0.1]), "amplitudes"),
+    "still": (lambda: dynamics.shake(chain(), 1.0), "nothing happens"),
+    "start": (lambda: dynamics.shake(chain(), 1.0, velocity=[1.0]), "velocity"),
+    "silence": (lambda: dynamics.ring_down(np.arange(9.0), np.zeros(9)), "turns fewer"),
+    "uneven": (lambda: dynamics.ring_down(np.arange(9.0) ** 2, np.ones(9)), "evenly"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_input_is_one_clear_line(name):
+    call, message = REFUSED[name]
+    with pytest.raises(jb.InputError, match=message) as refusal:
+        call()
+    assert "\n" not in str(refusal.value)

@@ -1,0 +1,202 @@
+"""What converged and is wrong all the same says so; what cannot be had is refused or raises."""
+
+import json
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from calibration.charts.failures import outcome
+from jbeamshell.cli import main
+from jbeamshell.history import reliability
+from jbeamshell.history.reliability import TOLERANCE
+
+RECORD = json.loads(
+    (Path(__file__).parents[2] / "calibration" / "failure_map.json").read_text(encoding="utf-8")
+)
+# Numbers of the random scenes; the draws are those of calibration/failure_map.py.
+LOW = np.array([0.005, 0.02, 0.02, 0.0, 0.05, 2.0])
+HIGH = np.array([0.5, 1.0, 0.98, 0.49, 3.0, 1e4])
+EVEN = np.array([False, False, True, True, False, False])
+KEYS = (
+    "strip.height_ratio",
+    "contact.friction",
+    "load.amplitude",
+    "strip.poisson_ratio",
+    "strip.kappa_s",
+    "contact.stick_stiffness",
+)
+COARSE = {"model.nodes": 41, "model.kinematics": "linear", "load.steps_per_half_cycle": 4}
+LITTLE = {"strip.height_ratio": 0.2, "load.amplitude": 0.3}  # its corner alone slips
+
+
+def random_values(count):
+    """Values of `KEYS`, (count, 6)."""
+    part = np.random.default_rng(7).uniform(size=(2000, len(KEYS)))[:count]
+    ratio = np.where(EVEN, 1.0, HIGH / np.where(EVEN, 1.0, LOW))
+    values = np.where(EVEN, LOW + part * (HIGH - LOW), LOW * ratio**part)
+    values[:, 2] *= values[:, 1] * 20.0  # of gross slip
+    return values
+
+
+def check_random_scenes(count, settings, in_vain):
+    """No scene is wrong by more than 2 % without a doubt; few fail, or are doubted in vain."""
+
+    @jax.jit
+    def run(values):
+        scene = jb.Scene().replace(settings | dict(zip(KEYS, values, strict=True)))
+        history = jb.solve(scene, throw=False)
+        found = (
+            history.dissipation_ratio,
+            *reliability.dissipation_errors(history.rubbing),
+            history.closure,
+        )
+        return jnp.stack([*found, jnp.max(history.iterations), jnp.max(history.status)])
+
+    ends = []
+    for values, recorded in zip(random_values(count), RECORD["scenes"][:count], strict=True):
+        found = [v if np.isfinite(v) else None for v in run(values).tolist()]
+        ends.append(outcome([*found, *recorded[6:8]]))
+    assert "wrong, silently" not in ends
+    assert ends.count("fails, and says so") <= 0.005 * count
+    assert ends.count("right, but doubted") < in_vain * count
+    assert ends.count("wrong, and says so") > 0.05 * count
+
+
+def test_no_random_scene_is_wrong_silently():
+    check_random_scenes(60, COARSE | {"model.nodes": 81}, 0.4)
+
+
+@pytest.mark.slow
+def test_no_scene_of_two_thousand_is_wrong_silently():
+    check_random_scenes(2000, {}, 0.2)
+
+
+@pytest.mark.parametrize(("name", "least"), [("scenes", 2000), ("fresh scenes", 200)])
+def test_the_recorded_scenes_hold_no_silent_failure(name, least):
+    ends = [outcome(cell) for cell in RECORD[name]]
+    assert len(ends) >= least
+    assert "wrong, silently" not in ends
+    mended = sum(cell[8] is True for cell in RECORD[name])
+    assert ends.count("fails, and says so") - mended <= 0.005 * len(ends)
+
+
+# --- doubts -------------------------------------------------------------------------------------
+
+
+def test_a_doubtful_run_warns_with_the_fix():
+    scene = jb.Scene().replace(LITTLE | COARSE)
+    with pytest.warns(jb.DoubtfulWarning, match=r"off by about \d+ %: few nodes do .*end_size"):
+        history = jb.solve(scene)
+    assert history.figures()["doubts"] == list(history.doubts)
+    assert f"doubtful: {history.doubts[0]}" in str(history)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        again = jb.solve(scene, throw=False)
+    assert again.doubts == history.doubts
+
+
+def test_the_standard_strip_is_beyond_doubt():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", jb.DoubtfulWarning)
+        history = jb.solve(jb.Scene())
+    assert history.doubts == ()
+    assert 1e-3 < float(history.dissipation_error) < TOLERANCE
+
+
+@pytest.mark.slow
+def test_the_estimate_falls_with_the_elements():
+    scene = jb.Scene().replace({"load.amplitude": 0.3} | COARSE)
+    sizes = (1.0 / 6.0, 1.0 / 24.0, 1.0 / 96.0)
+    runs = [jb.solve(scene.replace({"model.end_size": size})) for size in sizes]
+    grid = [float(reliability.dissipation_errors(run.rubbing)[0]) for run in runs]
+    assert grid[0] > 2.0 * grid[1] > 4.0 * grid[2]
+
+
+def test_where_nothing_slips_the_dissipation_is_doubted():
+    tiny = {"load.amplitude": 1e-4, "contact.stick_stiffness": 2.0}
+    history = jb.solve(jb.Scene().replace(tiny | COARSE))
+    assert np.isinf(history.dissipation_error)
+    assert "nothing slips" in history.doubts[0]
+    frictionless = jb.Scene().replace({"contact.friction": 0.0} | COARSE)
+    assert jb.solve(frictionless).doubts == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"strip.poisson_ratio": 0.499}, "take model.grid = collocation"),
+        ({"strip.axial_stiffness": 10.0}, "take model.kinematics = exact"),
+        ({"strip.poisson_ratio": 0.499, "model.grid": "collocation"}, None),
+        ({}, None),
+    ],
+)
+def test_what_a_scene_alone_makes_doubtful(changes, told):
+    doubts = reliability.doubts_before(jb.Scene().replace(COARSE | changes))
+    assert len(doubts) == (told is not None)
+    assert all(told in doubt for doubt in doubts)
+
+
+def test_an_open_loop_and_a_failed_run_are_doubted():
+    history = jb.solve(jb.Scene().replace(COARSE))
+    shifted = history.displacement.at[-1].add(0.01 * jnp.ptp(history.displacement))
+    opened = jb.History(**(vars(history) | {"displacement": shifted}))
+    assert any("does not close" in doubt for doubt in opened.doubts)
+    failed = jb.History(**(vars(history) | {"status": history.status.at[-1].set(1)}))
+    assert [doubt[:38] for doubt in failed.doubts] == ["a load step found no equilibrium: the "]
+
+
+def test_the_command_line_passes_doubts_on(capsys):
+    options = [f"--set={key}={value}" for key, value in (COARSE | LITTLE).items()]
+    assert main.main(["run", *options, "--json"]) == 0
+    out, err = capsys.readouterr()
+    doubts = json.loads(out)["doubts"]
+    assert doubts
+    assert err.splitlines() == [f"jbeamshell: warning: {doubt}" for doubt in doubts]
+
+
+# --- many cycles, few digits ----------------------------------------------------------------------
+
+
+def test_a_thousand_cycles_neither_drift_nor_lose_energy():
+    settings = {"model.nodes": 21, "load.cycles": 1000}
+    history = jb.solve(jb.Scene().replace(COARSE | settings))
+    ends = np.array([stop for _, _, stop in history.cycles])
+    closed = np.asarray(history.displacement)[ends[1:]]
+    assert np.max(np.abs(np.diff(closed))) < 1e-8 * np.ptp(np.asarray(history.displacement))
+    lost = np.diff(np.cumsum(np.asarray(history.slip_work))[ends[1:]])
+    assert np.ptp(lost) < 1e-8 * lost[0]
+    # What the trapezoid of four steps misses of the work is the same in every cycle.
+    missed = np.diff(np.asarray(history.energy_imbalance)[ends[1:]])
+    assert np.ptp(missed) < 1e-8 * lost[0]
+    assert float(history.dissipation_loop) == pytest.approx(float(history.dissipation), rel=0.02)
+
+
+def test_single_precision_holds_what_it_can_and_refuses_the_rest():
+    code = f"""
+import json, warnings
+import jbeamshell as jb
+warnings.simplefilter("ignore", jb.DoubtfulWarning)
+found, scene = {{}}, jb.Scene().replace({COARSE!r})
+for tolerance in (1e-3, 1e-4, 1e-5, 1e-7):
+    try:
+        history = jb.solve(scene, solver=jb.Newton(tolerance))
+        found[tolerance] = [str(history.force.dtype), float(history.dissipation)]
+    except (jb.InputError, jb.UnconvergedError) as error:
+        found[tolerance] = [type(error).__name__, str(error)]
+print(json.dumps(list(found.values())))
+"""
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loose, usual, tight, beyond = json.loads(run.stdout)
+    exact = float(jb.solve(jb.Scene().replace(COARSE)).dissipation)
+    assert loose == ["float32", pytest.approx(exact, rel=2e-3)]
+    assert usual == ["float32", pytest.approx(exact, rel=1e-3)]
+    assert tight[0] == "UnconvergedError" or tight[1] == pytest.approx(exact, rel=5e-3)
+    assert beyond[0] == "InputError"
+    assert "jax_enable_x64" in beyond[1]

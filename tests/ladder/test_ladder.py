@@ -1,0 +1,156 @@
+"""The rungs of the ladder: names, the closed-form bar, Masing's rule, one History for all."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.reference import beams
+from jbeamshell.scene import rungs
+from jbeamshell.scene.toml import overridden, scene_from_values
+
+SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 8, "model.kinematics": "linear"}
+STRIP = jb.Scene().replace(SMALL)
+
+
+def on(rung, **more):
+    return STRIP.replace({"model.rung": rung} | more)
+
+
+NAMES = ("bar", "stepwise-bar", "shell", "squeeze", "p1", "p6", "masing", "masing-shell")
+NAMES += ("masing-bar", "masing-pull", "masing-p3", "masing-pull-p2")
+
+
+@pytest.mark.parametrize("rung", NAMES)
+def test_names_come_back(rung, tmp_path):
+    scene = on(rung)
+    assert scene.model.rung == scene.get("model.rung") == rung
+    jb.write_scene(scene, tmp_path / "scene.toml")
+    again = jb.read_scene(tmp_path / "scene.toml")
+    assert again.model == scene.model
+    assert rungs.values_of(rung)["model.order"] == scene.model.order
+
+
+@pytest.mark.parametrize("rung", ["p0", "p13", "p99", "p-1", "p", "beam", "masing-", "Bar", ""])
+def test_unknown_names_are_refused(rung):
+    with pytest.raises(jb.InputError, match=r"model\.rung = .*choose 'bar', 'shell'"):
+        on(rung)
+
+
+def test_a_rung_keeps_the_lift():
+    lifting = STRIP.replace({"model.fields": ["v", "w", "beta", "psi"]})
+    assert lifting.replace({"model.rung": "p2"}).model.fields == ("v", "w", "beta", "psi")
+    assert lifting.replace({"model.rung": "shell"}).model.fields == ("v", "w", "beta")
+    assert lifting.replace({"model.rung": "bar"}).model.fields == ("v",)
+    given = {"model.fields": ["v", "w", "beta", "psi"], "model.nodes": 31}
+    merged = scene_from_values(overridden(given, {"model.rung": "p3"}))
+    assert merged.model.rung == "p3"
+    assert "w" in merged.model.fields
+
+
+def test_a_rung_and_what_it_stands_for_may_not_disagree():
+    with pytest.raises(jb.InputError, match="disagree: give one"):
+        STRIP.replace({"model.rung": "p3", "model.order": 2})
+    assert STRIP.replace({"model.rung": "p3", "model.order": 3}).model.order == 3
+    merged = overridden({"model.rung": "p3"}, {"model.order": 2})
+    assert scene_from_values(merged).model.rung == "p2"
+
+
+def test_the_bar_is_the_cubic_law():
+    history = jb.solve(on("bar"))
+    assert float(history.dissipation_ratio) == pytest.approx(1.0, rel=1e-12)
+    assert float(history.dissipation_loop / history.dissipation) == pytest.approx(1.0, rel=1e-12)
+    force, displacement = beams.bar_hysteresis(0.7855, 3.4e4, 1.0, 9)
+    np.testing.assert_allclose(history.loop[0], force, atol=1e-15)
+    np.testing.assert_allclose(history.loop[1], displacement, atol=1e-18)
+    assert history.converged
+    assert float(history.reaction_min) == 10.0
+
+
+@pytest.mark.parametrize("control", ["force", "displacement"])
+def test_the_closed_bar_is_the_limit_of_the_stepwise_one(control):
+    amplitude = {"force": 0.8, "displacement": 1e-5}[control]
+    load = {"load.control": control, "load.amplitude": amplitude, "load.cycles": 1}
+    closed, stepped = (jb.solve(on(rung, **load)) for rung in ("bar", "stepwise-bar"))
+    assert float(stepped.dissipation) == pytest.approx(float(closed.dissipation), rel=2e-3)
+    np.testing.assert_allclose(stepped.force, closed.force, atol=6e-3)
+    np.testing.assert_allclose(stepped.v[-1], closed.v[-1], atol=6e-3 * float(closed.v.max()))
+
+
+def test_masing_doubles_the_backbone():
+    """Its loop is the closed form's of the mean backbone, its dissipation near the full cycle's."""
+    history, full = jb.solve(on("masing")), jb.solve(on("squeeze"))
+    assert float(history.dissipation) == pytest.approx(float(full.dissipation), rel=5e-3)
+    assert float(history.secant_stiffness) == pytest.approx(float(full.secant_stiffness), rel=1e-3)
+    u = history.displacement
+    start, turn, stop = history.cycles[-1]
+    np.testing.assert_allclose(u[turn], -u[start], rtol=1e-12)
+    np.testing.assert_allclose(u[stop], u[start], rtol=1e-12)
+    # The first loading is the backbone at every other of the levels that a branch doubles.
+    first, (top, bottom, _) = u[: history.cycles[0][0] + 1], history.cycles[0]
+    np.testing.assert_allclose(
+        u[top : bottom + 1 : 2], u[top] - 2.0 * first, rtol=1e-12, atol=1e-18
+    )
+    profile = history.v[start] - history.v[history.pressed]
+    np.testing.assert_allclose(profile, full.v[start] - full.v[full.pressed], atol=4e-7)
+    assert int(jnp.sum(history.iterations)) < int(jnp.sum(full.iterations))
+
+
+def test_one_backbone_is_worse_than_two():
+    full = float(jb.solve(on("squeeze")).dissipation)
+    two, one = (
+        abs(float(jb.solve(on(rung)).dissipation) / full - 1.0)
+        for rung in ("masing", "masing-pull")
+    )
+    assert 3.0 * two < one < 0.05
+
+
+@pytest.mark.parametrize("rung", ["bar", pytest.param("masing", marks=pytest.mark.slow)])
+def test_gradients_pass_through(rung):
+    def dissipation(mu):
+        return jb.solve(STRIP.replace({"model.rung": rung, "contact.friction": mu})).dissipation
+
+    slope, step = jax.jacfwd(dissipation)(0.1), 1e-5
+    differences = (dissipation(0.1 + step) - dissipation(0.1 - step)) / (2.0 * step)
+    assert float(slope) == pytest.approx(float(differences), rel=1e-5)
+    if rung == "bar":
+        assert float(slope) == pytest.approx(-float(dissipation(0.1)) / 0.1, rel=1e-12)
+
+
+LAYERS = {"strip.layers": [[0.1, 1e5, 0.3], [0.1252, 2e5, 0.3]]}
+
+
+@pytest.mark.parametrize(
+    ("rung", "more", "message"),
+    [
+        ("bar", LAYERS, "closed-form.*is the bar's, homogeneous, straight"),
+        ("p2", LAYERS, r"model\.order = 2: is for a straight homogeneous strip"),
+        ("bar", {"contact.pressure": [[0.0, 10.0], [2.0, 5.0]]}, "under one pressure"),
+        ("bar", {"contact.friction": 0.0}, r"contact\.friction = 0\.0: the bar needs friction"),
+        ("masing", {"load.cycles": 0}, r"model\.solution = 'masing'.*load\.cycles"),
+        ("bar", {"load.control": "displacement", "load.amplitude": 1e-3}, "bar's gross slip"),
+    ],
+)
+def test_what_a_rung_cannot_represent(rung, more, message):
+    with pytest.raises(jb.InputError, match=message):
+        jb.solve(on(rung, **more))
+
+
+def test_masing_walks_the_scenes_own_cycles_only():
+    with pytest.raises(jb.InputError, match=r"model\.solution = 'masing'.*leave the path out"):
+        jb.solve(on("masing"), [0.1, 0.2])
+
+
+def test_a_backbone_without_equilibrium_is_told():
+    """A branch doubles all of the backbone, so it is known only where that is, to its end."""
+
+    @jax.jit  # traced, a step is not walked in pieces
+    def solved(amplitude):
+        scene = on("masing-shell").replace({"load.amplitude": amplitude})
+        return jb.solve(scene, solver=jb.Newton(tolerance=1e-30, max_iterations=2), throw=False)
+
+    history = solved(0.7855)
+    assert not history.converged
+    assert np.isnan(np.asarray(history.displacement[1:])).all()
+    assert set(np.asarray(history.status[1:]).tolist()) <= {jb.Status.MAX_ITERATIONS, 3}

@@ -1,0 +1,384 @@
+"""Pictures: what is drawn is what was solved, with its axes labelled, and files are whole."""
+
+import dataclasses
+
+import jax
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import plotting
+from jbeamshell.common.errors import InputError
+from jbeamshell.identify.likelihood import Profile
+
+COARSE = {
+    "model.nodes": 21,
+    "load.steps_per_half_cycle": 6,
+    "load.cycles": 2,
+    "contact.stick_stiffness": 100.0,
+}
+
+
+@pytest.fixture(scope="module")
+def history():
+    return jb.solve(jb.Scene().replace(COARSE))
+
+
+@pytest.fixture(scope="module")
+def pull(history):
+    # As many steps as the cycles, so that nothing compiles anew.
+    return jb.solve(history.scene, np.linspace(0.03, 0.81, history.force.size - 1))
+
+
+@pytest.fixture(scope="module")
+def clamped():
+    """A strip that is clamped over X < 5, lifts off beyond, and is pulled to and fro."""
+    patch = [[0.0, 100.0], [5.0, 100.0], [5.0, 0.0], [15.0, 0.0]]
+    values = {
+        "strip.length": 15.0,
+        "strip.half_height": 0.5,
+        "contact.pressure": patch,
+        "load.amplitude": 30.0,
+        "load.pressure_steps": 4,
+        "load.cycles": 1,
+        "model.fields": ["v", "w", "beta", "psi"],
+        "model.nodes": 61,
+    }
+    return jb.solve(jb.Scene().replace(COARSE | values))
+
+
+@pytest.fixture(scope="module")
+def pressing(clamped):
+    """The same under the growing pressure alone."""
+    steps = clamped.force.size
+    cut = jax.tree.map(lambda a: a[:4] if a.shape[:1] == (steps,) else a, clamped)
+    return dataclasses.replace(cut, cycles=())
+
+
+def with_scene(history, **values):
+    """The history as if of another scene."""
+    keys = {key.replace("_", ".", 1): value for key, value in values.items()}
+    return dataclasses.replace(history, scene=history.scene.replace(keys))
+
+
+@pytest.fixture(autouse=True)
+def _closed_figures():
+    yield
+    plt.close("all")
+
+
+def labels(axes):
+    return [text for panel in np.ravel(axes) for text in (panel.get_xlabel(), panel.get_ylabel())]
+
+
+def drawn(axes):
+    """Lines of the axes by label."""
+    return {line.get_label(): line for line in axes.get_lines()}
+
+
+class TestLoop:
+    def test_draws_the_path_and_the_last_cycle(self, history):
+        axes = plotting.loop(history)
+        lines = drawn(axes)
+        force, displacement = history.loop
+        np.testing.assert_array_equal(lines["last cycle"].get_ydata(), force)
+        np.testing.assert_array_equal(lines["last cycle"].get_xdata(), displacement)
+        np.testing.assert_array_equal(lines["path"].get_ydata(), history.force)
+        assert lines["last cycle"].get_linewidth() > lines["path"].get_linewidth()
+        assert all(labels(axes))
+
+    def test_draws_a_path_without_a_cycle(self, pull):
+        assert list(drawn(plotting.loop(pull))) == ["path"]
+
+    def test_draws_where_it_is_told(self, history):
+        _, axes = plt.subplots()
+        assert history.plot(axes) is axes
+
+
+class TestProfiles:
+    def test_labels_four_panels(self, history):
+        axes = history.plot_profiles()
+        assert axes.shape == (2, 2)
+        assert all(labels(axes))
+        assert all(panel.get_title() for panel in axes.ravel())
+
+    def test_takes_turns_and_zero_crossings_of_the_last_cycle(self, history):
+        traction = plotting.profiles(history).ravel()[2]
+        # The second cycle: steps 15 to 27, through zero at 18 and 24, turning at 21.
+        shown = [line.get_ydata() for line in traction.get_lines() if len(line.get_xdata()) == 21]
+        np.testing.assert_allclose(shown, history.traction[np.array([18, 21, 24, 27])])
+        legend = [text.get_text() for text in traction.get_legend().get_texts()]
+        assert legend[0] == "$F = 0$, falling"
+        assert legend[2] == "$F = 0$, rising"
+
+    def test_takes_four_steps_of_a_pull(self, pull):
+        slip = plotting.profiles(pull).ravel()[0]
+        shown = [line.get_ydata() for line in slip.get_lines()]
+        np.testing.assert_allclose(shown, pull.slip[np.array([7, 14, 20, 27])])
+
+    def test_marks_what_slips(self, pull):
+        traction = plotting.profiles(pull, [-1]).ravel()[2]
+        dots = next(line for line in traction.get_lines() if line.get_marker() == "o")
+        np.testing.assert_array_equal(dots.get_xdata(), pull.x[pull.slipping[-1]])
+        assert len(dots.get_xdata()) > 0
+
+    def test_shows_the_squeeze_strain_only_where_it_is_modelled(self, pull):
+        flat_scene = pull.scene.replace({"model.fields": ["v", "beta"]})
+        flat = dataclasses.replace(pull, scene=flat_scene)
+        with_squeeze, without = (plotting.profiles(h, [-1]).ravel()[1] for h in (pull, flat))
+        assert len(with_squeeze.get_lines()) == 2
+        assert len(without.get_lines()) == 1
+
+    def test_shows_the_traction_itself_without_friction(self, pull):
+        smooth = with_scene(pull, contact_friction=0.0)
+        traction = plotting.profiles(smooth, [-1]).ravel()[2]
+        np.testing.assert_array_equal(traction.get_lines()[0].get_ydata(), pull.traction[-1])
+        assert traction.get_ylabel() == "$t$  [stress]"
+
+    def test_counts_the_squeeze_strain_from_the_pressed_strip(self, clamped):
+        rotation = plotting.profiles(clamped, [-1]).ravel()[1]
+        change = clamped.psi[-1] - clamped.psi[3]
+        np.testing.assert_array_equal(rotation.get_lines()[1].get_ydata(), change)
+
+    def test_takes_steps_of_the_pressure_where_nothing_else_happens(self, pressing):
+        legend = plotting.profiles(pressing).ravel()[2].get_legend().get_texts()
+        shares = ["25 % of $F_N$", "50 % of $F_N$", "75 % of $F_N$", "100 % of $F_N$", "slips"]
+        assert [text.get_text() for text in legend] == shares
+
+    def test_refuses_steps_off_the_path(self, pull):
+        with pytest.raises(
+            InputError, match="steps: 28 is not on the path, whose steps are 0 to 27"
+        ):
+            plotting.profiles(pull, [28])
+
+    def test_refuses_other_than_four_axes(self, pull):
+        with pytest.raises(InputError, match="four"):
+            plotting.profiles(pull, axes=plt.subplots(1, 3)[1])
+
+
+class TestContact:
+    NAMES = ("reaction", "gap", "beta", "squeeze_stress", "psi", "squeeze_couple")
+
+    def test_draws_all_profiles_of_the_scene(self, clamped):
+        panels = clamped.plot_contact([-1])
+        assert panels.shape == (6,)
+        assert all(labels(panels))
+        for name, panel in zip(self.NAMES, panels, strict=True):
+            curve = next(line for line in panel.get_lines() if line.get_color() == "#0072B2")
+            values = getattr(clamped, name)[-1]
+            x = clamped.x if values.size == clamped.x.size else clamped.middles
+            np.testing.assert_array_equal(curve.get_xdata(), x)
+            np.testing.assert_array_equal(curve.get_ydata(), values)
+
+    def test_takes_the_pressed_strip_and_the_turns_of_the_last_cycle(self, clamped):
+        gap = plotting.contact(clamped, panels=["gap"])[0]
+        shown = [line.get_ydata() for line in gap.get_lines() if line.get_linestyle() == "-"]
+        np.testing.assert_array_equal(shown, clamped.gap[np.array([3, 12, 18])])
+        legend = [text.get_text() for text in gap.get_legend().get_texts()]
+        assert legend == ["$F = 0$", "$F = -30$", "$F = 30$", "contact ends"]
+
+    def test_takes_the_end_of_a_path_without_a_cycle(self, pull):
+        panel = plotting.contact(pull, panels=["beta"])[0]
+        np.testing.assert_array_equal(panel.get_lines()[0].get_ydata(), pull.beta[-1])
+        assert len(panel.get_lines()) == 1
+
+    def test_shows_the_corners_of_the_pressure_that_acts(self, pressing):
+        reaction = plotting.contact(pressing, [1, 2])[0]
+        x, pressure = reaction.get_lines()[0].get_data()
+        np.testing.assert_array_equal(x, [0, 0, 5, 5, 15, 15])
+        np.testing.assert_array_equal(pressure, [75, 75, 75, 0, 0, 0])
+
+    def test_marks_the_ends_of_contact(self, clamped):
+        steps = [3, 12, 18]
+        for panel in plotting.contact(clamped, steps):
+            marks = [line for line in panel.get_lines() if line.get_linestyle() == ":"]
+            ends = [line.get_xdata()[0] for line in marks]
+            np.testing.assert_array_equal(ends, clamped.contact_end[np.array(steps)])
+
+    def test_marks_no_end_of_a_contact_that_does_not_end(self, history):
+        legend = plotting.contact(history)[0].get_legend().get_texts()
+        assert "contact ends" not in [text.get_text() for text in legend]
+
+    def test_shows_where_something_happens(self, clamped, history):
+        low, high = plotting.contact(clamped)[0].get_xlim()
+        ends = clamped.contact_end[np.array([3, 12, 18])]
+        assert (low, high) == (2.5, float(ends.max()) + 2.5)
+        assert plotting.contact(history)[0].get_xlim() == (0.0, 2.0)
+        assert plotting.contact(clamped, xlim=(4.0, 6.0))[0].get_xlim() == (4.0, 6.0)
+
+    def test_is_as_high_as_what_is_shown(self, clamped):
+        gap = plotting.contact(clamped, [-1], panels=["gap"], xlim=(4.0, 8.0))[0]
+        seen = float(np.interp(8.0, clamped.x, clamped.gap[-1]))
+        assert seen < gap.get_ylim()[1] < 1.1 * seen < 0.6 * float(clamped.gap[-1].max())
+
+    def test_does_not_magnify_rounding_errors(self, history):
+        couple = plotting.contact(history, [0], panels=["squeeze_couple"])[0]
+        assert couple.get_ylim()[1] > 1e3 * float(np.abs(history.squeeze_couple[0]).max())
+
+    def test_puts_a_reference_beside_it(self, clamped):
+        reference = {"gap": ([4.0, 5.0, 6.0], [0.0, 0.1, 0.2])}
+        panels = plotting.contact(clamped, [-1], reference=reference, reference_label="test")
+        dots = [[line for line in p.get_lines() if line.get_marker() == "o"] for p in panels]
+        assert [len(d) for d in dots] == [0, 1, 0, 0, 0, 0]
+        np.testing.assert_array_equal(dots[1][0].get_xydata().T, reference["gap"])
+        assert panels[1].get_ylim()[1] > 0.2
+        assert "test" in [text.get_text() for text in panels[0].get_legend().get_texts()]
+
+    def test_draws_only_what_is_modelled(self, clamped, history):
+        assert len(plotting.contact(history)) == 5  # the lift is frozen
+        flat = with_scene(history, model_fields=["v", "beta"])
+        assert [p.get_title() for p in plotting.contact(flat)] == ["normal reaction", "rotation"]
+        assumed = with_scene(clamped, model_squeeze="assumed")
+        assert len(plotting.contact(assumed)) == 5  # no squeeze couple
+
+    def test_without_a_foundation_shows_the_rise_and_no_reaction(self, clamped):
+        free = with_scene(clamped, contact_normal="none")
+        panels = plotting.contact(free, [-1])
+        assert panels[0].get_title() == "rise of the bottom face"
+        assert [len(p.get_lines()) for p in panels] == [1, 1, 2, 1, 1]
+        stress = panels[2].get_lines()[0].get_ydata()
+        np.testing.assert_array_equal(stress, [-100, -100, -100, 0, 0, 0])
+
+    def test_draws_where_it_is_told(self, clamped):
+        axes = plt.subplots(1, 2)[1]
+        assert plotting.contact(clamped, axes=axes, panels=["psi", "gap"]) is not None
+        assert [panel.get_title() for panel in axes] == ["squeeze strain", "gap under the strip"]
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"panels": ["heat"]}, "panels: there is no 'heat' in reaction, gap"),
+            ({"reference": {"w": ([0.0], [0.0])}}, "reference: there is no 'w'"),
+            ({"steps": [19]}, "steps: 19 is not on the path"),
+            ({"axes": [], "panels": ["gap"]}, "axes: gap need 1, not 0"),
+        ],
+    )
+    def test_refuses_what_is_not_there(self, clamped, options, message):
+        with pytest.raises(InputError, match=message):
+            plotting.contact(clamped, **options)
+
+
+class TestContactMap:
+    @staticmethod
+    def cells(axes):
+        """States (steps, nodes), and the edges along the path and along X."""
+        mesh = axes.collections[0]
+        edges = mesh.get_coordinates()
+        return mesh.get_array().T, edges[0, :, 0], edges[:, 0, 1]
+
+    def test_tells_lifted_stuck_and_slipping_nodes_apart(self, clamped):
+        axes = clamped.plot_contact_map()
+        states, _, across = self.cells(axes)
+        touching, slipping = np.asarray(clamped.touching)[3:], np.asarray(clamped.slipping)[3:]
+        np.testing.assert_array_equal(states == 0, ~touching)
+        np.testing.assert_array_equal(states == 2, touching & slipping)
+        assert {0, 1, 2} == set(states.ravel().tolist())
+        np.testing.assert_allclose(np.diff(across), clamped.tributary)
+        legend = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert legend == ["lifted", "sticks", "slips", "contact ends"]
+        assert all(labels(axes))
+
+    def test_ticks_the_turns_of_the_load(self, clamped):
+        axes = plotting.contact_map(clamped)
+        assert list(axes.get_xticks()) == [0, 3, 9, 15]
+        ticks = [text.get_text() for text in axes.get_xticklabels()]
+        assert ticks == ["$0$", "$30$", "$-30$", "$30$"]
+
+    def test_draws_the_end_of_contact(self, clamped):
+        values, edges, _ = plotting.contact_map(clamped).patches[0].get_data()
+        np.testing.assert_array_equal(values, clamped.contact_end[3:])
+        np.testing.assert_array_equal(edges, np.arange(17) - 0.5)
+
+    def test_goes_by_the_pressure_where_only_that_grows(self, pressing):
+        axes = plotting.contact_map(pressing)
+        states, along, _ = self.cells(axes)
+        np.testing.assert_array_equal(along, [0.0, 0.25, 0.5, 0.75, 1.0])
+        np.testing.assert_array_equal(states, pressing.touching)
+        legend = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert legend == ["lifted", "touches", "contact ends"]
+
+    def test_a_smooth_base_is_touched_not_stuck_to(self, clamped):
+        axes = plotting.contact_map(with_scene(clamped, contact_friction=0.0))
+        assert axes.get_legend().get_texts()[1].get_text() == "touches"
+        np.testing.assert_array_equal(self.cells(axes)[0], clamped.touching[3:])
+
+    def test_leaves_steps_without_equilibrium_blank(self, clamped):
+        lost = {name: getattr(clamped, name).at[15:].set(np.nan) for name in ("force", "reaction")}
+        axes = plotting.contact_map(dataclasses.replace(clamped, **lost))
+        np.testing.assert_array_equal(self.cells(axes)[0].mask.all(axis=1), np.arange(16) >= 12)
+        ticks = [text.get_text() for text in axes.get_xticklabels()]
+        assert ticks == ["$0$", "$30$", "$-30$", "$-10$"]
+
+    def test_shows_a_part(self, clamped):
+        _, axes = plt.subplots()
+        assert plotting.contact_map(clamped, axes, xlim=(4.0, 6.0)) is axes
+        assert axes.get_ylim() == (4.0, 6.0)
+
+    def test_needs_a_foundation(self, clamped):
+        with pytest.raises(InputError, match="no contact to draw"):
+            plotting.contact_map(with_scene(clamped, contact_normal="none"))
+
+
+class TestLikelihoods:
+    PROFILES = (
+        Profile("mu", np.array([0.1, 0.2, 0.4]), np.array([4.0, 0.0, 5.0]), (0.11, 0.38), 0.95),
+        Profile("kappa_s", np.array([0.1, 0.2]), np.array([4.0, 0.0]), (0.11, np.inf), 0.68),
+    )
+
+    def test_draws_each_with_the_ends_of_its_interval(self):
+        mu, kappa_s = plotting.likelihoods(self.PROFILES)
+        np.testing.assert_array_equal(mu.get_lines()[1].get_ydata(), [4.0, 0.0, 5.0])
+        assert [line.get_xdata()[0] for line in mu.get_lines()[2:]] == [0.11, 0.38]
+        assert len(kappa_s.get_lines()) == 3  # the other end is at infinity
+        parabola = np.interp(0.3, *mu.get_lines()[0].get_data())
+        assert parabola == pytest.approx(5.0 * 0.5**2, rel=0.01)
+        assert kappa_s.get_title() == "68 %: 0.11 to inf"
+        assert all(labels(mu))
+
+    def test_needs_axes_for_each(self):
+        with pytest.raises(InputError, match="there are 2 to draw, not 1"):
+            plotting.likelihoods(self.PROFILES, plt.subplots()[1])
+
+
+class TestStyle:
+    def test_leaves_the_settings_alone(self, history):
+        before = dict(plt.rcParams)
+        plotting.loop(history)
+        plotting.profiles(history)
+        plotting.contact(history)
+        plotting.contact_map(history)
+        assert dict(plt.rcParams) == before
+
+    @pytest.mark.parametrize("count", [1, 6, 7, 20])
+    def test_colours_differ(self, count):
+        assert len({tuple(colour) for colour in plotting.colours(count)}) == count
+
+
+class TestSave:
+    @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+    def test_writes_the_format_of_the_suffix(self, history, tmp_path, suffix):
+        path = tmp_path / f"loop.{suffix}"
+        plotting.save(plotting.loop(history).figure, path)
+        start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix]
+        assert path.read_bytes().startswith(start)
+
+    def test_leaves_no_half_file(self, history, tmp_path, monkeypatch):
+        path = tmp_path / "loop.png"
+        path.write_text("old")
+        figure = plotting.loop(history).figure
+
+        def half(draft, **_):
+            draft.write_text("half")
+            raise OSError("disk full")
+
+        monkeypatch.setattr(figure, "savefig", half)
+        with pytest.raises(InputError, match="disk full"):
+            plotting.save(figure, path)
+        assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("loop.png", "old")]
+
+    @pytest.mark.parametrize("name", ["loop", "loop.xyz"])
+    def test_refuses_an_unknown_format(self, history, tmp_path, name):
+        with pytest.raises(InputError, match=r"end the name in .*\.png"):
+            plotting.save(plotting.loop(history).figure, tmp_path / name)
+        assert not list(tmp_path.iterdir())

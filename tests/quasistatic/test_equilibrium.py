@@ -1,0 +1,273 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.mechanics import homogeneous
+from jbeamshell.mechanics.friction import FrictionLaw
+from jbeamshell.quasistatic.system import Drive, System
+from jbeamshell.reference import beams
+
+SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
+
+
+@pytest.mark.parametrize("grid", ["finite-difference", "collocation"])
+def test_rigid_motion_stores_no_energy(grid):
+    system = System(jb.Scene().replace({"model.nodes": 41, "model.grid": grid}))
+    angle = 1.0
+    rigid = jnp.stack(
+        [
+            system.x * (jnp.cos(angle) - 1.0) + 0.3,
+            system.x * jnp.sin(angle) - 0.2,
+            jnp.full_like(system.x, angle),
+            jnp.zeros_like(system.x),
+        ],
+        axis=1,
+    )
+    bent = rigid.at[:, 2].multiply(1.0 + 0.1 * system.x)
+    assert abs(float(system.strain_energy(rigid))) < 1e-20 * float(system.strain_energy(bent))
+
+
+def curved(curvature, nodes=41, **values):
+    return System(
+        jb.Scene().replace(
+            {
+                "model.nodes": nodes,
+                "model.fields": ["v", "w", "beta", "psi"],
+                "strip.curvature": curvature,
+            }
+            | values
+        )
+    )
+
+
+def bottom(system):
+    """The bottom face of a strip whose mid-height is an arc, level at X = 0, as (x, y)."""
+    alpha, radius = system.curvature * system.x, 1.0 / system.curvature
+    outer = radius + system.half_height
+    return outer * jnp.sin(alpha), radius - outer * jnp.cos(alpha)
+
+
+def test_turning_a_curved_strip_stores_no_energy_in_the_limit_of_fine_grids():
+    strains = []
+    for nodes in (41, 81, 161):
+        system = curved(0.8, nodes)
+        x, y = bottom(system)
+        sin, cos = jnp.sin(1.0), jnp.cos(1.0)
+        turned = [
+            x * cos - y * sin - x + 0.3,
+            x * sin + y * cos - y - 0.2,
+            jnp.ones_like(x),
+            jnp.zeros_like(x),
+        ]
+        bent = jnp.zeros((nodes, 4)).at[:, 2].set(0.1 * system.x)
+        ratio = system.strain_energy(jnp.stack(turned, axis=1)) / system.strain_energy(bent)
+        strains.append(float(jnp.sqrt(ratio)))
+    assert strains[-1] < 1e-2
+    slopes = np.log2(np.array(strains[:-1]) / strains[1:])
+    np.testing.assert_allclose(slopes, 2.0, atol=0.1)
+
+
+def test_the_gap_under_a_curved_strip_is_that_of_its_bottom_face():
+    for curvature in (0.8, -0.3):
+        system = curved(curvature)
+        _, y = bottom(system)
+        lift = jnp.zeros((41, 4)).at[:, 1].set(0.1 * system.x)
+        np.testing.assert_allclose(system.gap(lift), y - y[0] + 0.1 * system.x, atol=1e-14)
+
+
+@pytest.mark.parametrize("kinematics", ["exact", "linear"])
+def test_a_curvature_that_vanishes_leaves_a_straight_strip(kinematics):
+    slight, straight = (curved(c, **{"model.kinematics": kinematics}) for c in (1e-12, 0.0))
+    assert straight.curvature is None
+    q = 0.1 * jax.random.normal(jax.random.key(3), (41, 4))
+    for name in ("strain_energy", "sinking", "end_displacement", "gap"):
+        one, other = (getattr(system, name)(q) for system in (slight, straight))
+        np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-11)
+
+
+def test_pressure_alone_squeezes_uniformly():
+    history = jb.solve(jb.Scene().replace(SMALL))
+    plane_modulus = history.scene.strip.plane_modulus
+    np.testing.assert_allclose(history.reaction[0], 10.0, rtol=1e-9)
+    np.testing.assert_allclose(history.psi[0], -10.0 / plane_modulus, rtol=1e-9)
+    np.testing.assert_allclose(history.traction[0], 0.0)
+    assert float(jnp.max(jnp.abs(history.beta[0]))) < 1e-15
+
+
+@pytest.mark.parametrize("pressure", [10.0, [[0.0, 4.0], [1.0, 12.0], [2.0, 9.0]]])
+def test_reactions_carry_the_pressure_at_every_load(pressure):
+    history = jb.solve(jb.Scene().replace(SMALL | {"contact.pressure": pressure}))
+    system = System(history.scene)
+    carried = history.reaction @ history.tributary
+    applied = jnp.sum(system.load)
+    np.testing.assert_allclose(carried, applied, rtol=1e-7)
+
+
+def test_tractions_balance_the_end_force_away_from_the_held_end():
+    history = jb.solve(jb.Scene().replace(SMALL))
+    inner = history.traction[:, 1:] @ history.tributary[1:]
+    # What the held node takes is small: the slip front is far from it.
+    assert float(jnp.max(jnp.abs(inner - history.force))) < 0.02 * 0.7855
+
+
+def test_pull_lowers_the_loaded_end_and_pull_and_push_differ():
+    history = jb.solve(jb.Scene().replace(SMALL))
+    start, turn, _ = history.cycles[-1]
+    assert float(history.beta[start, -1]) < 0.0 < float(history.beta[turn, -1])
+    assert float(-history.displacement[turn]) > 1.02 * float(history.displacement[start])
+
+
+def test_end_force_is_conjugate_to_the_mid_height():
+    """In a stuck strip the work of F is the energy stored: only with the right conjugate."""
+    stuck = SMALL | {"contact.friction": 100.0, "contact.stick_stiffness": 10.0}
+    # The tolerance is a part of mu F_N L, which is huge here.
+    history = jb.solve(jb.Scene().replace(stuck), [0.5, 1.0], solver=jb.Newton(tolerance=1e-14))
+    work = 0.5 * float(history.force[-1] * history.displacement[-1])
+    stored = float(history.stored_energy[-1] - history.stored_energy[0])
+    assert work == pytest.approx(stored, rel=1e-5)
+
+
+def test_stuck_strip_rotates_as_the_closed_form():
+    """{v, beta}, small strain: beta decays from the loaded end; second order in the grid."""
+    errors = []
+    for nodes in (81, 161):
+        scene = jb.Scene().replace(
+            {
+                "model.fields": ["v", "beta"],
+                "model.kinematics": "linear",
+                "model.nodes": nodes,
+                "contact.friction": 1e3,
+                "contact.stick_stiffness": 1e6,
+            }
+        )
+        history = jb.solve(scene, np.array([1.0]))
+        strip = scene.strip
+        exact = beams.stuck_rotation(
+            history.x,
+            1.0,
+            strip.length,
+            strip.half_height,
+            strip.plane_modulus,
+            strip.shear_modulus,
+            homogeneous.shear_coefficient(strip.poisson_ratio),
+        )
+        errors.append(float(jnp.max(jnp.abs(history.beta[1] - exact)) / jnp.max(jnp.abs(exact))))
+    assert errors[-1] < 1e-3
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [pytest.param(["v", "w", "beta"], marks=pytest.mark.slow), ["v", "w", "beta", "psi"]],
+)
+def test_unilateral_lift_cures_the_tension_at_the_loaded_end(fields):
+    """Finite elements stay in contact there; a frozen shell would pull, worse on finer grids."""
+    ratios = []
+    for nodes in (81, 161, 321):  # end elements of about H/8, H/16 and H/32
+        scene = jb.Scene().replace(
+            {
+                "model.fields": fields,
+                "model.nodes": nodes,
+                "load.amplitude": 0.3247,
+                "load.cycles": 1,
+                "load.steps_per_half_cycle": 20,
+                "model.kinematics": "linear",
+            }
+        )
+        history = jb.solve(scene)
+        ratios.append(float(history.dissipation_ratio))
+        assert float(history.reaction_min) > -1e-6
+        assert float(jnp.min(history.w)) > -1e-15
+        assert float(jnp.max(jnp.abs(history.w * history.reaction))) < 1e-10
+    assert ratios[2] == pytest.approx(ratios[1], rel=0.005)
+    assert ratios[1] == pytest.approx(ratios[0], rel=0.015)
+
+
+def test_frozen_lift_reports_tension_and_drifts_with_the_end_element():
+    ratios, reactions = [], []
+    for nodes in (81, 321):
+        scene = jb.Scene().replace(
+            {
+                "model.fields": ["v", "beta"],
+                "model.nodes": nodes,
+                "load.amplitude": 0.3247,
+                "load.cycles": 1,
+                "load.steps_per_half_cycle": 20,
+                "model.kinematics": "linear",
+            }
+        )
+        history = jb.solve(scene)
+        ratios.append(float(history.dissipation_ratio))
+        reactions.append(float(history.reaction_min))
+    assert reactions[1] < reactions[0] < 0.0
+    assert abs(ratios[1] / ratios[0] - 1.0) > 0.01
+
+
+def test_displacement_control_finds_the_force_of_force_control():
+    by_force = jb.solve(jb.Scene().replace(SMALL))
+    scene = by_force.scene.replace({"load.control": "displacement", "load.amplitude": 1.0})
+    by_displacement = jb.solve(scene, by_force.displacement[1:])
+    np.testing.assert_allclose(by_displacement.force, by_force.force, atol=1e-7)
+    np.testing.assert_allclose(by_displacement.slip, by_force.slip, atol=1e-12)
+
+
+def test_free_strip_slides_at_the_gross_slip_force():
+    scene = jb.Scene().replace(
+        SMALL
+        | {
+            "strip.far_end": "free",
+            "load.control": "displacement",
+            "load.amplitude": 5e-4,
+            "load.steps_per_half_cycle": 40,
+        }
+    )
+    history = jb.solve(scene)
+    assert float(jnp.max(history.force)) == pytest.approx(2.0, rel=2e-3)
+    assert float(jnp.min(history.force)) == pytest.approx(-2.0, rel=2e-3)
+    assert float(history.slip_length) == pytest.approx(2.0)
+
+
+def test_strip_held_at_the_contact_point_only_turns_there():
+    held, pinned = (
+        jb.solve(jb.Scene().replace(SMALL | {"strip.far_end": end, "load.amplitude": 1.9}))
+        for end in ("held", "pinned")
+    )
+    assert float(jnp.max(jnp.abs(held.beta[:, 0]))) < 1e-18
+    assert float(jnp.max(jnp.abs(pinned.beta[:, 0]))) > 1e-9
+    assert float(jnp.max(jnp.abs(pinned.slip[:, 0]))) < 1e-18
+
+
+def test_exact_and_linear_kinematics_agree_at_small_strain():
+    exact, linear = (
+        jb.solve(jb.Scene().replace(SMALL | {"model.kinematics": name})).dissipation
+        for name in ("exact", "linear")
+    )
+    assert float(exact) == pytest.approx(float(linear), rel=1e-3)
+    assert float(exact) != float(linear)
+
+
+def test_residual_couples_neighbours_only():
+    """What the block-tridiagonal tangent relies on, for friction, contact and both controls."""
+    scene = jb.Scene().replace({"model.nodes": 9, "model.fields": ["v", "w", "beta", "psi"]})
+    for control in ("force", "displacement"):
+        system = System(scene.replace({"load.control": control, "load.amplitude": 1e-6}))
+        drive = Drive(*map(jnp.asarray, (1e-6, 1.0, 0.0, 1.0)))
+        start = 1e-7 * jax.random.normal(jax.random.key(0), (9, 4))
+        before = system.rest()
+        dense = jax.jacfwd(lambda u: system.advance(u, before, drive)[1])(start)  # noqa: B023
+        rows, columns = np.nonzero(np.any(np.asarray(dense) != 0.0, axis=(1, 3)))
+        assert np.max(np.abs(rows - columns)) == 1
+
+
+def test_a_law_of_your_own_slides_in():
+    class Viscous(FrictionLaw):
+        coefficient: float = 1e5
+
+        def traction(self, dv, t_n, cap, k_t):
+            return self.coefficient * dv
+
+    scene = jb.Scene(contact=jb.Contact(law=Viscous()), model=jb.Model(nodes=41))
+    history = jb.solve(scene, np.array([0.2, 0.4]))
+    np.testing.assert_allclose(history.traction[1:], 1e5 * jnp.diff(history.v, axis=0))

@@ -1,0 +1,66 @@
+"""Derivatives of a whole load path: Taylor slopes, forward against reverse, batches."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.mechanics.friction import ElasticSlip
+
+SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
+KEYS = ("contact.friction", "strip.height_ratio", "strip.kappa_s", "contact.stick_stiffness")
+AT = jnp.array([0.1, 0.1126, 0.44, 1000.0])
+
+
+def dissipation(values, **more):
+    scene = jb.Scene().replace(SMALL | more | dict(zip(KEYS, values, strict=True)))
+    return jb.solve(scene, throw=False).dissipation
+
+
+# Compiled once for all that needs them.
+SHARP = jax.jit(jax.value_and_grad(dissipation))
+SMOOTH = jax.jit(jax.value_and_grad(lambda p: dissipation(p, **{"contact.smoothing": 16.0})))
+
+
+@pytest.mark.parametrize(
+    "both",
+    [pytest.param(SHARP, marks=pytest.mark.slow, id="sharp"), pytest.param(SMOOTH, id="16.0")],
+)
+def test_gradients_have_taylor_slope_two(both):
+    value, gradient = both(AT)
+    for i in range(len(KEYS)):
+        direction = jnp.zeros(4).at[i].set(AT[i])
+        # Small enough that no node changes between sticking and slipping on the way.
+        sizes = np.array([4e-4, 2e-4, 1e-4, 5e-5])
+        rest = [
+            abs(float(both(AT + h * direction)[0] - value - h * gradient @ direction))
+            for h in sizes
+        ]
+        slope = np.polyfit(np.log(sizes), np.log(rest), 1)[0]
+        assert slope == pytest.approx(2.0, abs=0.1), KEYS[i]
+
+
+@pytest.mark.slow
+def test_forward_and_reverse_agree_and_batches_equal_loops():
+    reverse, forward = SHARP(AT)[1], jax.jit(jax.jacfwd(dissipation))(AT)
+    np.testing.assert_allclose(forward, reverse, rtol=1e-8)
+    points = AT * jnp.array([[1.0], [1.1], [0.8]])
+    batch = jax.jit(jax.vmap(dissipation))(points)
+    single = jnp.stack([SHARP(p)[0] for p in points])
+    np.testing.assert_allclose(batch, single, rtol=1e-10)
+
+
+def test_gradient_reaches_every_number_of_a_scene():
+    table = jnp.array([[0.0, 10.0], [1.0, 9.0], [2.0, 10.0]])
+    scene = jb.Scene(
+        contact=jb.Contact(pressure=table, law=ElasticSlip(16.0)),
+        load=jb.Load(steps_per_half_cycle=20, cycles=1),
+        model=jb.Model(nodes=41, kinematics="linear"),
+    )
+    gradient = jax.jit(jax.grad(lambda s: jb.solve(s, throw=False).dissipation))(scene)
+    leaves, names = jax.tree.leaves(gradient), jax.tree_util.tree_flatten_with_path(scene)[0]
+    moved = {path[-1].name for (path, _), leaf in zip(names, leaves, strict=True) if leaf.any()}
+    assert all(bool(jnp.all(jnp.isfinite(leaf))) for leaf in leaves)
+    # A homogeneous strip on a rigid foundation has no use for these two.
+    assert {path[-1].name for path, _ in names} - moved == {"deviation", "normal_stiffness"}

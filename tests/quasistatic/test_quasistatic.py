@@ -1,0 +1,169 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.mechanics import bar
+from jbeamshell.quasistatic import solver
+
+SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
+LINEAR = SMALL | {"model.kinematics": "linear"}  # compiles in half the time
+
+
+def test_bar_limit_gives_backbone_and_cubic_law():
+    history = jb.solve(jb.Scene().replace({"strip.height_ratio": 0.001}))
+    start = history.cycles[0][0]
+    loading = history.force[1 : start + 1]
+    backbone = bar.bar_backbone(loading, 3.4e4, 1.0)
+    assert float(history.dissipation_ratio) == pytest.approx(1.0, abs=2e-3)
+    assert float(jnp.max(jnp.abs(history.displacement[1 : start + 1] - backbone))) < 2e-3 * float(
+        backbone[-1]
+    )
+
+
+@pytest.mark.slow
+def test_steps_do_not_matter():
+    base = jb.Scene().replace({"model.nodes": 81, "model.kinematics": "linear", "load.cycles": 1})
+    dissipation = [
+        float(jb.solve(base.replace({"load.steps_per_half_cycle": n})).dissipation)
+        for n in (20, 40, 160)
+    ]
+    error = np.abs(np.array(dissipation) / dissipation[-1] - 1.0)
+    assert error[0] < 5e-3
+    assert error[1] < 2e-3
+
+
+@pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-12), (16.0, 1e-4)])
+def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
+    scene = jb.Scene().replace({"model.nodes": 41, "contact.smoothing": smoothing})
+    history = jb.solve(scene.replace({"strip.height_ratio": 0.4}), [0.05, 0.1, *[-0.1, 0.1] * 100])
+    cap = history.scene.contact.friction * history.reaction
+    assert 0.5 < float(jnp.max(jnp.abs(history.traction / cap))) < 0.8
+    peaks = np.asarray(history.displacement[2::2])
+    assert np.ptp(peaks) < drift * peaks[0]
+    assert float(jnp.sum(jnp.abs(history.slip_work))) / 100 < drift * 0.1 * peaks[0]
+
+
+@pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-13), (16.0, 1e-4)])
+def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
+    scene = jb.Scene().replace({"model.nodes": 41, "contact.smoothing": smoothing})
+    history = jb.solve(scene, [*np.linspace(0.07, 0.7, 10), *[0.6, 0.7] * 100])
+    peaks = np.asarray(history.displacement[10::2])
+    creep = abs(peaks[-1] - peaks[0]) / peaks[0] / 100
+    assert creep < drift
+    assert (creep > 1e-6) == (smoothing != "sharp")
+    work = float(jnp.sum(jnp.abs(history.slip_work[11:]))) / 100
+    assert work < drift * 0.7 * peaks[0]
+
+
+@pytest.mark.parametrize("smoothing", ["sharp", 8.0, 32.0])
+def test_smoothing_does_not_change_the_dissipation(smoothing):
+    scene = jb.Scene().replace(SMALL | {"contact.smoothing": smoothing})
+    assert float(jb.solve(scene).dissipation_ratio) == pytest.approx(0.7695, abs=2e-3)
+
+
+@pytest.mark.parametrize(("grid", "order"), [("finite-difference", 2.0), ("collocation", 4.0)])
+def test_order_of_convergence_in_the_grid(grid, order):
+    """A stuck strip on its elastic foundation is smooth: no slip front spoils the order."""
+
+    def end(nodes):
+        scene = jb.Scene().replace(
+            {
+                "model.grid": grid,
+                "model.nodes": nodes,
+                "model.kinematics": "linear",
+                "contact.friction": 100.0,
+                "contact.stick_stiffness": 3.0,
+            }
+        )
+        return float(jb.solve(scene, np.array([1.0])).displacement[-1])
+
+    values = np.array([end(nodes) for nodes in (41, 81, 161)])
+    rate = np.log2(np.abs(np.diff(values)[:-1] / np.diff(values)[1:]))
+    assert rate[-1] == pytest.approx(order, abs=0.3)
+
+
+# --- failure --------------------------------------------------------------------------------------
+
+
+def test_an_unconverged_step_is_never_silent():
+    lame = jb.Newton(max_iterations=1, tolerance=1e-12)
+    scene = jb.Scene().replace(SMALL)
+    with pytest.raises(jb.UnconvergedError, match=r"load step \d+ of 50 .* found no equilibrium"):
+        jb.solve(scene, solver=lame)
+    history = jb.solve(scene, solver=lame, throw=False)
+    first = int(np.argmax(np.asarray(history.status) > 0))
+    assert not history.converged
+    assert history.status[first] == jb.Status.MAX_ITERATIONS
+    assert set(np.asarray(history.status[first + 1 :]).tolist()) == {jb.Status.NOT_REACHED}
+    assert bool(jnp.all(jnp.isnan(history.force[first:])))
+    assert bool(jnp.all(jnp.isfinite(history.force[:first])))
+    assert bool(jnp.isnan(history.dissipation))
+
+
+def test_inside_a_transformation_the_failure_is_loud_too():
+    lame = jb.Newton(max_iterations=1)
+    run = jax.jit(
+        lambda mu: (
+            jb.solve(jb.Scene().replace(SMALL | {"contact.friction": mu}), solver=lame).dissipation
+        )
+    )
+    with pytest.raises(Exception, match="a load step found no equilibrium"):
+        jax.block_until_ready(run(0.1))
+
+
+def test_a_failed_step_is_walked_in_pieces(monkeypatch):
+    """The recovered path ends where a path with small steps ends."""
+    # So smooth that large steps take more iterations than small ones.
+    scene = jb.Scene().replace(LINEAR | {"contact.smoothing": 4.0})
+    path = np.array([0.9, -0.9, 0.9])
+    eager = jb.Newton(max_iterations=100)
+    fine = jb.solve(
+        scene,
+        np.concatenate([np.linspace(a, b, 9)[1:] for a, b in ((0, 0.9), (0.9, -0.9), (-0.9, 0.9))]),
+        solver=eager,
+    )
+    needed = int(jnp.max(fine.iterations))
+    history = jb.solve(scene, path, solver=jb.Newton(max_iterations=needed))
+    plain = jb.solve(scene, path, solver=eager)
+    assert int(jnp.max(plain.iterations)) > needed  # the whole step takes more than is allowed
+    np.testing.assert_allclose(history.force[1:], path)
+    assert float(history.displacement[-1]) == pytest.approx(float(fine.displacement[-1]), rel=1e-6)
+    assert float(jnp.sum(history.slip_work)) == pytest.approx(
+        float(jnp.sum(fine.slip_work)), rel=1e-6
+    )
+
+
+def test_single_precision_says_what_it_cannot_do():
+    with pytest.raises(jb.InputError, match="single precision"):
+        jb.Newton(tolerance=1e-9).tolerance_for(jnp.dtype("float32"))
+
+
+@pytest.mark.parametrize("path", [[], [[0.1]], [0.1, np.nan], [0.1, np.inf]])
+def test_paths_that_are_none(path):
+    with pytest.raises(jb.InputError, match="path"):
+        jb.solve(jb.Scene(), path)
+
+
+def test_beyond_gross_slip_force_control_is_refused():
+    with pytest.raises(jb.InputError, match=r"load.amplitude = 2.5.*'displacement'"):
+        jb.solve(jb.Scene().replace({"load.amplitude": 2.5}))
+    with pytest.raises(jb.InputError, match="gross slip"):
+        jb.solve(jb.Scene(), [1.0, 2.0])
+
+
+def test_compiling_alone_solves_nothing():
+    scene = jb.Scene().replace(SMALL)
+    solver.compile_for(scene)
+    size = solver._solve._cached._cache_size()
+    jb.solve(scene)
+    assert solver._solve._cached._cache_size() == size
+
+
+def test_plain_numbers_inside_a_callers_jit():
+    scene = jb.Scene().replace(SMALL)
+    inside = jax.jit(lambda: jb.solve(scene).dissipation)()
+    assert float(inside) == pytest.approx(float(jb.solve(scene).dissipation), rel=1e-12)
+    with pytest.raises(jb.InputError, match="gross slip"):
+        jax.jit(lambda: jb.solve(scene, [1.0, 2.0]).displacement)()

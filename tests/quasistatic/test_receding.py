@@ -1,0 +1,181 @@
+"""Contact that recedes, advances or stays, without and with friction."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.scene import library
+
+LINEAR = {"model.kinematics": "linear"}
+
+
+@pytest.fixture(scope="module")
+def receding():
+    return jb.solve(library.receding())
+
+
+def test_receding_contact_against_the_prototype_and_finite_elements(receding):
+    """Prototype shell .62 mm, 103.1 MPa, 1.990e-4; finite elements .779, 103.12, 1.9858e-4."""
+    figures = receding.figures()
+    assert figures["contact_end"] - 50.0 == pytest.approx(0.62, rel=0.01)
+    assert figures["reaction_max"] == pytest.approx(103.1, rel=0.01)
+    assert figures["reaction_max_at"] == pytest.approx(47.5, rel=0.01)
+    assert figures["lift_slope"] == pytest.approx(1.990e-4, rel=0.01)
+    assert figures["lift_slope"] == pytest.approx(1.9858e-4, rel=0.01)
+    total = float(jnp.sum(receding.tributary * receding.reaction[0]))
+    assert total == pytest.approx(5000.0, rel=1e-9)
+
+
+def test_contact_conditions_hold_at_every_node(receding):
+    gap, reaction = receding.gap[0], receding.reaction[0]
+    assert float(jnp.min(gap)) > -1e-15
+    assert float(jnp.min(reaction)) > -1e-5
+    assert float(jnp.max(jnp.abs(jnp.where(receding.touching[0], gap, reaction)))) < 1e-5
+    touching = np.asarray(receding.touching[0])
+    assert np.all(np.diff(touching.astype(int)) <= 0)  # one patch, from the middle on
+
+
+@pytest.mark.parametrize("start", ["half", "few", "beyond", "random"])
+def test_the_active_set_does_not_depend_on_where_it_starts(receding, start):
+    x, rng = np.asarray(receding.x), np.random.default_rng(3)
+    contact = {
+        "half": x < 25.0,
+        "few": np.arange(x.size) < 5,
+        "beyond": x > 60.0,
+        "random": rng.random(x.size) < 0.5,
+    }[start]
+    again = jb.solve(library.receding(), contact=contact)
+    assert bool(jnp.all(again.touching == receding.touching))
+    np.testing.assert_allclose(again.w, receding.w, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_search_that_does_not_end_says_so():
+    with pytest.raises(jb.UnconvergedError, match="pressing down"):
+        jb.solve(library.receding(), solver=jb.Newton(max_iterations=3))
+
+
+def test_the_contact_does_not_know_how_hard_it_is_pressed(receding):
+    half = [[0, 50.0], [50, 50.0], [50, 0.0], [100, 0.0]]
+    gentle = jb.solve(library.receding().replace({"contact.pressure": half}))
+    assert bool(jnp.all(gentle.touching == receding.touching))
+    for name in ("w", "beta", "psi", "squeeze_stress"):
+        full, twice = getattr(receding, name), 2.0 * getattr(gentle, name)
+        assert float(jnp.max(jnp.abs(twice - full))) < 1e-3 * float(jnp.max(jnp.abs(full))), name
+    # The last node in contact carries what the geometry's nonlinearity moves the end by.
+    inner = receding.touching[0].at[jnp.sum(receding.touching[0]) - 1].set(False)
+    difference = jnp.where(inner, 2.0 * gentle.reaction[0] - receding.reaction[0], 0.0)
+    assert float(jnp.max(jnp.abs(difference))) < 1e-3 * 100.0
+    assert float(gentle.contact_end[0]) == pytest.approx(float(receding.contact_end[0]), abs=1e-3)
+
+
+@pytest.mark.slow
+def test_the_error_of_a_compliant_contact_falls_with_its_compliance():
+    scene = library.receding().replace(LINEAR | {"model.nodes": 201})
+    rigid = jb.solve(scene)
+    soft = scene.replace({"contact.normal": "compliant"})
+    stiffness = np.array([10.0, 40.0, 160.0, 640.0])
+    slopes = [
+        float(jb.solve(soft.replace({"contact.normal_stiffness": k})).lift_slope[0])
+        for k in stiffness
+    ]
+    error = np.array(slopes) / float(rigid.lift_slope[0]) - 1.0
+    assert error[0] == pytest.approx(0.08, abs=0.01)
+    order = -np.polyfit(np.log(stiffness), np.log(error), 1)[0]
+    assert order == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.slow
+def test_gradients_pass_through_a_compliant_contact():
+    scene = library.receding().replace(LINEAR | {"model.nodes": 201, "contact.normal": "compliant"})
+
+    def slope(kappa_s, mean):
+        table = jnp.array([[0.0, 1.0], [50.0, 1.0], [50.0, 0.0], [100.0, 0.0]]) * jnp.array(
+            [1.0, mean]
+        )
+        changed = scene.replace({"strip.kappa_s": kappa_s, "contact.pressure": table})
+        return 1e4 * jb.solve(changed, throw=False).lift_slope[0]
+
+    at = jnp.array([0.44, 100.0])
+    function = jax.jit(lambda p: slope(*p))
+    value, gradient = jax.jit(jax.value_and_grad(lambda p: slope(*p)))(at)
+    for direction in (jnp.array([0.44, 0.0]), jnp.array([0.0, 100.0])):
+        sizes = np.array([4e-3, 2e-3, 1e-3])
+        rest = [
+            abs(float(function(at + h * direction) - value - h * gradient @ direction))
+            for h in sizes
+        ]
+        # The response is proportional to the pressure: nothing but round-off is left of it.
+        if rest[0] > 1e-9:
+            assert np.polyfit(np.log(sizes), np.log(rest), 1)[0] == pytest.approx(2.0, abs=0.15)
+
+
+@pytest.mark.slow
+def test_the_block_stays_and_the_curved_strip_advances():
+    block = jb.solve(library.block())
+    assert bool(jnp.all(block.touching))
+    assert float(block.contact_end[0]) == 1.0
+    np.testing.assert_allclose(block.reaction[0], 100.0, rtol=1e-9)
+    advancing = jb.solve(library.advancing())
+    ends = np.asarray(advancing.contact_end)
+    assert np.all(np.diff(ends) > -1e-9)
+    assert ends[0] < 2.0
+    assert ends[-1] > 50.0
+    total = jnp.sum(advancing.tributary * advancing.reaction, axis=1)
+    np.testing.assert_allclose(total, 0.02 * 100.0 * advancing.pressure, rtol=1e-8)
+
+
+def test_a_point_load_lifts_the_strip_beyond_three_quarters_of_its_height():
+    history = jb.solve(library.point_load())
+    assert float(history.contact_end[0]) / 2.0 == pytest.approx(0.735, abs=0.01)
+
+
+@pytest.mark.slow
+def test_the_assumed_squeeze_strain_is_what_it_says():
+    history = jb.solve(library.receding_421())
+    pressed = np.interp(history.x, [0, 2.405, 2.5], [1000, 1000, 0])
+    inner = np.abs(np.asarray(history.x) - 2.45) > 0.1  # nodes whose pressure is not averaged
+    assumed = -(pressed + np.asarray(history.reaction[0])) / (2.0 * 3e7)
+    np.testing.assert_allclose(history.psi[0][inner], assumed[inner], atol=1e-9)
+    assert 2.5 < float(history.contact_end[0]) < 2.52
+    assert 1010.0 < float(history.reaction_max[0]) < 1040.0  # rises before the load falls
+
+
+@pytest.fixture(scope="module", params=[{}, {"contact.friction": 0.5, "load.amplitude": 1500.0}])
+def clamped(request):
+    return jb.solve(library.receding_rough().replace(request.param))
+
+
+def test_friction_and_lift_balance_their_energy(clamped):
+    assert float(clamped.dissipation_loop) == pytest.approx(float(clamped.dissipation), rel=1e-3)
+    assert abs(float(clamped.closure)) < 1e-6
+    assert float(jnp.min(clamped.slip_work)) > -1e-12
+    worst = float(jnp.max(jnp.abs(clamped.energy_imbalance)))
+    assert worst < 3e-3 * float(jnp.sum(clamped.slip_work))  # of the trapezoid of F du
+
+
+def test_an_open_contact_forgets_its_traction(clamped):
+    mu = clamped.scene.contact.friction
+    open_ = ~clamped.touching
+    assert bool(jnp.any(open_ & (clamped.x < 50.9)))
+    assert float(jnp.max(jnp.abs(jnp.where(open_, clamped.traction, 0.0)))) < 1e-3
+    cap = jnp.maximum(mu * clamped.reaction, 1e-3)
+    assert float(jnp.max(jnp.abs(clamped.traction) / cap)) < 1.0 + 1e-9
+    ends = np.asarray(clamped.contact_end[1:])
+    assert np.ptp(ends) > 0.1  # it recedes and advances along the cycle
+
+
+def test_a_unilateral_end_does_not_mind_how_fine_it_is():
+    """With the lift frozen the corner goes into tension, and D drifts with the end element."""
+    thick = {"model.fields": ["v", "w", "beta", "psi"], "load.amplitude": 0.3247}
+    sizes = {12: 68, 24: 75, 96: 91}  # H over the end element, and nodes with all others alike
+    dissipation = []
+    for parts, nodes in sizes.items():
+        change = LINEAR | thick | {"model.end_size": 1.0 / parts, "model.nodes": nodes}
+        history = jb.solve(jb.Scene().replace(change | {"load.cycles": 1}))
+        assert float(history.reaction_min) > -1e-6
+        dissipation.append(float(history.dissipation))
+    assert abs(dissipation[0] / dissipation[1] - 1.0) < 6e-3
+    assert abs(dissipation[1] / dissipation[2] - 1.0) < 5e-3

@@ -1,0 +1,92 @@
+"""The squeeze strain at work: laminates, Filon's layer, and a strip without a foundation."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.measured.example import data_folder
+from jbeamshell.reference import elasticity
+from jbeamshell.scene import library
+
+PRESSURE, SOFT = 0.209, 2090.0
+DECAY = elasticity.squeeze_decay_length(1.0, 0.44, 0.3)
+EVEN = 1.0 / 0.6  # of H: makes the end elements of a strip of 100 H as large as the others
+
+
+def reference(name):
+    return np.genfromtxt(data_folder() / "squeeze" / name, delimiter=",", names=True)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+def test_a_squeezed_laminate_bends_as_the_closed_form_and_the_finite_elements(plane):
+    history = jb.solve(library.bimaterial().replace({"strip.plane": plane}))
+    closed = elasticity.bimetal_curvature(PRESSURE, 2.0, SOFT, 100 * SOFT, 0.3, plane)
+    curvature = np.diff(history.beta[0]) / np.diff(history.x)
+    np.testing.assert_allclose(curvature, closed, rtol=1e-8)
+    tip = elasticity.tip_deflection(closed, 100.0)
+    assert float(history.tip_deflection[0]) == pytest.approx(float(tip), rel=1e-8)
+    measured = reference(f"b1_{plane}.csv")
+    at = np.arange(10.0, 91.0, 10.0)  # nodes of both
+    for name, field in (("deflection_fe", history.w), ("slope_fe", history.beta)):
+        finite_elements = np.interp(at, measured["x_mm"], measured[name]) * PRESSURE / SOFT
+        model = np.interp(at, history.x, field[0])
+        np.testing.assert_allclose(model, finite_elements, rtol=1e-4, err_msg=name)
+
+
+def test_one_squeeze_strain_shared_by_the_layers_cannot_bend():
+    history = jb.solve(library.bimaterial().replace({"model.constants": "printed"}))
+    consistent = elasticity.bimetal_curvature(PRESSURE, 2.0, SOFT, 100 * SOFT, 0.3, "stress")
+    assert abs(float(history.curvature[0])) < 1e-10 * float(consistent)
+
+
+@pytest.fixture(scope="module")
+def squeezed():
+    return jb.solve(library.squeezed())
+
+
+def test_the_squeeze_reaches_beyond_the_load_as_exponentials(squeezed):
+    distance = np.asarray(squeezed.middles) - 50.0
+    closed = -100.0 * elasticity.squeeze_step(distance, DECAY)
+    assert float(jnp.max(jnp.abs(squeezed.squeeze_stress[0] - closed))) < 0.1
+
+
+def test_the_squeeze_against_finite_elements(squeezed):
+    measured = reference("b2.csv")
+    x = np.linspace(45.0, 55.0, 1001)
+    model = np.interp(x, squeezed.middles, squeezed.squeeze_stress[0])
+    rms = np.sqrt(np.mean((model - np.interp(x, measured["x_mm"], measured["sy_avg"])) ** 2))
+    assert 0.6 < rms < 0.8
+    assert np.max(measured["sy_avg"]) > 1.3  # Filon's tension, which a single psi cannot have
+    assert np.max(squeezed.squeeze_stress) < 1e-9
+
+
+@pytest.mark.slow
+def test_nodal_quadrature_does_not_oscillate_and_converges():
+    short = library.squeezed().replace(
+        {
+            "strip.length": 20.0,
+            "strip.half_height": 1.0,
+            "contact.pressure": [[0, 100.0], [10, 100.0], [10, 0.0], [20, 0.0]],
+            "contact.bottom_pressure": [[0, 100.0], [10, 100.0], [10, 0.0], [20, 0.0]],
+            "model.kinematics": "linear",
+            "model.end_size": 20.0 / 60.0,
+        }
+    )
+    errors = []
+    for elements in (44, 88, 176, 352):  # h = 2 lam, lam, lam/2, lam/4
+        history = jb.solve(short.replace({"model.nodes": elements + 1}))
+        stress = np.asarray(history.squeeze_stress[0])
+        assert np.ptp(np.diff(history.x)) < 1e-9
+        assert np.all(np.diff(stress) > -1e-8)  # monotonic, so no oscillation
+        assert np.min(stress) > -100.0 - 1e-8
+        closed = -100.0 * elasticity.squeeze_step(np.asarray(history.middles) - 10.0, DECAY)
+        errors.append(np.sqrt(np.mean((stress - closed) ** 2)))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all(orders[1:] > 1.8), (errors, orders)
+
+
+def test_a_table_may_press_from_above_and_a_gas_from_below():
+    closed = jb.solve(library.block().replace({"contact.bottom_pressure": 30.0}))
+    np.testing.assert_allclose(closed.reaction[0], 70.0, rtol=1e-9)
+    np.testing.assert_allclose(closed.squeeze_stress[0], -100.0, rtol=1e-9)

@@ -1,0 +1,622 @@
+"""Scenes: TOML to the last bit, clear refusals, and gradients that reach every number."""
+
+import errno
+import pathlib
+import re
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from jbeamshell import Contact, InputError, Load, Model, Scene, Strip, read_scene, scene_to_toml
+from jbeamshell.common.files import written_whole
+from jbeamshell.mechanics.friction import (
+    CappedTrial,
+    ElasticSlip,
+    FrictionLaw,
+    SharpSlip,
+    TanhIncrement,
+)
+from jbeamshell.scene import library
+from jbeamshell.scene.keys import DERIVED, KEYS, NUMBERS
+from jbeamshell.scene.parts import FAR_ENDS, MODELS
+from jbeamshell.scene.toml import scene_from_values, write_scene
+
+TABLE = [[0.0, 3.0], [0.7, 0.0], [0.7, 5.0], [2.0, 12.5]]  # with a step
+LAYERS = [[0.1, 1e4, 0.3], [0.1252, 1e5, 0.2]]  # of the standard strip's height
+LIFTING = ["v", "w", "beta", "psi"]
+
+# --- files --------------------------------------------------------------------------------------
+
+positive = st.floats(1e-90, 1e90)
+OPTIONAL = {"strip.axial_stiffness", "strip.poisson_ratio", "strip.layers", "strip.curvature"}
+
+
+@st.composite
+def tables(draw, length):
+    parts = draw(st.lists(st.floats(0, 1), min_size=2, max_size=5, unique=True))
+    steps = draw(st.sets(st.sampled_from(parts)))
+    x = [length * part for part in sorted([*parts, *steps])]
+    return [[at, draw(st.floats(0.5, 1e3))] for at in x]
+
+
+@st.composite
+def sections(draw, height):
+    """A homogeneous section or layers, and whether they are layers."""
+    if draw(st.booleans()):
+        return {
+            "strip.axial_stiffness": draw(positive),
+            "strip.poisson_ratio": draw(st.floats(-0.99999, 0.49999)),
+        }, False
+    parts = draw(st.lists(st.floats(0.1, 1), min_size=1, max_size=3))
+    stiffness = [(draw(positive), draw(st.floats(-0.99, 0.49))) for _ in parts]
+    thickness = [height * part / sum(parts) for part in parts]
+    return {"strip.layers": [[t, *s] for t, s in zip(thickness, stiffness, strict=True)]}, True
+
+
+@st.composite
+def values_of_all_keys(draw):
+    length, ratio = draw(positive), draw(positive)
+    material, layered = draw(sections(length * ratio))
+    fields = draw(st.sampled_from(MODELS))
+    lifting, squeezing = "w" in fields, "psi" in fields
+    normal = draw(st.sampled_from(["rigid", "compliant", "none"] if lifting else ["rigid"]))
+    far_end = draw(st.sampled_from(["held"] if normal == "none" else FAR_ENDS))
+    law = draw(st.sampled_from(["elastic-slip", "smooth-cap", "tanh-increment"]))
+    smoothing = st.just("sharp") if law == "tanh-increment" else st.floats(1.01, 1e3)
+    presses_up = positive | tables(length) if normal == "none" else st.just(0.0)
+    curvature = {"strip.curvature": draw(positive)} if lifting and draw(st.booleans()) else {}
+    assumed = lifting and squeezing and not layered
+    squeeze = draw(st.sampled_from(["field", "assumed"] if assumed else ["field"]))
+    plain = squeeze == "field" and not layered and not curvature
+    order = draw(st.integers(0, 12)) if plain and {"beta", "psi"} <= set(fields) else 0
+    cycles = draw(st.integers(0, 1000))
+    friction = draw(positive if far_end == "free" else positive | st.just(0.0))
+    pressure = draw(positive | tables(length))
+    solutions = ["stepwise", *(["masing", "masing-pull"] if cycles else [])]
+    one_number = not isinstance(pressure, list) and normal == "rigid"
+    if cycles and friction and fields == ("v",) and plain and one_number:
+        solutions.append("closed-form")
+    return (
+        material
+        | curvature
+        | {
+            "strip.length": length,
+            "strip.height_ratio": ratio,
+            "strip.kappa_s": draw(positive),
+            "strip.far_end": far_end,
+            "strip.deviation": draw(st.floats(-1e90, 1e90)),
+            "strip.plane": draw(st.sampled_from(["strain", "stress"])),
+            "contact.friction": friction,
+            "contact.pressure": pressure,
+            "contact.bottom_pressure": draw(presses_up),
+            "contact.stick_stiffness": draw(positive),
+            "contact.smoothing": draw(smoothing | st.just("sharp")),
+            "contact.law": law,
+            "contact.normal": normal,
+            "contact.normal_stiffness": draw(positive),
+            "load.control": draw(st.sampled_from(["force", "displacement"])),
+            "load.amplitude": draw(positive),
+            "load.cycles": cycles,
+            "load.steps_per_half_cycle": 2 * draw(st.integers(1, 1000)),
+            "load.pressure_steps": draw(st.integers(1, 1000)),
+            "model.fields": fields,
+            "model.kinematics": draw(st.sampled_from(["exact", "linear"])),
+            "model.grid": draw(st.sampled_from(["finite-difference", "collocation"])),
+            "model.nodes": 2 * draw(st.integers(1, 1000)) + 1,
+            "model.end_size": draw(positive),
+            "model.constants": draw(st.sampled_from(["consistent", "printed"])),
+            "model.squeeze": squeeze,
+            "model.order": order,
+            "model.solution": draw(st.sampled_from(solutions)),
+        }
+    )
+
+
+def same(one, other):
+    """Equal structure, words and bits."""
+    return jax.tree.structure(one) == jax.tree.structure(other) and all(
+        a.dtype == b.dtype and np.array_equal(a, b)
+        for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True)
+    )
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return tmp_path_factory.mktemp("scenes") / "scene.toml"
+
+
+@given(values=values_of_all_keys())
+def test_toml_keeps_every_bit(path, values):
+    assert set(values) | OPTIONAL == set(KEYS) - set(DERIVED) - {"model.rung"}
+    scene = Scene().replace(values)
+    write_scene(scene, path)
+    again = read_scene(path)
+    assert same(again, scene)
+    for key, value in values.items():
+        if key != "contact.smoothing":  # the traps have no sharp end
+            got = again.get(key)
+            assert np.array_equal(got, value), key
+
+
+def test_an_empty_file_is_the_standard_strip(path):
+    path.write_text("")
+    assert same(read_scene(path), Scene())
+
+
+def test_a_readable_file(path):
+    path.write_text(
+        "[strip]\nhalf_height = 0.5\nlength = 4\n[contact]\nsmoothing = 8\n"
+        f"pressure = {TABLE}\n[model]\nfields = ['v', 'beta']\n"
+    )
+    scene = read_scene(path)
+    assert (scene.strip.height_ratio, scene.contact.smoothing) == (0.25, 8.0)
+    assert scene.model.fields == ("v", "beta")
+    np.testing.assert_array_equal(scene.contact.pressure, TABLE)
+
+
+@pytest.mark.parametrize("name", library.NAMES)
+def test_scenes_that_ship_survive_a_file(path, name):
+    scene = library.named(name)
+    write_scene(scene, path)
+    assert same(read_scene(path), scene)
+    assert same(getattr(library, name.replace("-", "_"))(), scene)
+    assert same(scene_from_values(library.values_of(name)), scene)
+    assert re.fullmatch(r"[A-Z].{20,90}\.", library.summary(name))
+
+
+def test_the_scenes_that_ship_are_the_files():
+    folder = pathlib.Path(library.__file__).parent / "shipped"
+    assert sorted(library.NAMES) == sorted(path.stem for path in folder.glob("*.toml"))
+    assert same(library.standard(), Scene())
+
+
+@pytest.mark.parametrize("ask", [library.named, library.values_of, library.summary])
+def test_unknown_scenes_name_the_nearest(ask):
+    with pytest.raises(InputError, match=r"unknown scene 'recedng': did you mean 'receding'\? \("):
+        ask("recedng")
+    with pytest.raises(InputError, match=r"unknown scene 'xyz': scenes are standard, calibrated,"):
+        ask("xyz")
+
+
+def test_own_functions_stay_in_code():
+    for own in (Scene(energy=lambda *strains: strains[0] ** 2), Scene(contact=Contact(law=Own()))):
+        with pytest.raises(InputError, match="cannot be written to TOML"):
+            scene_to_toml(own)
+
+
+class Own(FrictionLaw):
+    """A user's law."""
+
+    def traction(self, dv, t_n, cap, k_t):
+        return t_n
+
+
+def test_written_whole_or_not_at_all(tmp_path):
+    target = tmp_path / "scene.toml"
+    target.write_text("old")
+
+    def interrupted(error):
+        with written_whole(target) as draft:
+            draft.write_text("half a")
+            assert target.read_text() == "old"
+            assert draft.parent == tmp_path  # so that the renaming stays on one file system
+            raise error
+
+    for error in (RuntimeError("no picture"), KeyboardInterrupt()):
+        with pytest.raises(type(error)):
+            interrupted(error)
+        assert target.read_text() == "old"
+        assert list(tmp_path.iterdir()) == [target]
+    with written_whole(target) as draft:
+        draft.write_text("new")
+    assert target.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_renaming_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
+    target = tmp_path / "scene.toml"
+    target.write_text("old")
+
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(pathlib.Path, "replace", refuse)
+    with pytest.raises(InputError, match="cannot be written"):
+        write_scene(Scene(), target)
+    assert target.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize("name", ["missing/scene.toml", "."])
+def test_places_that_cannot_be_written(tmp_path, name):
+    with pytest.raises(InputError, match=r"cannot be written \((No such file|Is a dir)"):
+        write_scene(Scene(), tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+# --- keys ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("derived", DERIVED)
+@pytest.mark.parametrize("value", [0.37, 5e4])
+def test_derived_keys_are_read_back(derived, value):
+    before = Scene().replace({"strip.length": 3.0, "strip.poisson_ratio": 0.2})
+    scene = before.replace({derived: value})
+    np.testing.assert_allclose(scene.get(derived), value, rtol=1e-15)
+    assert scene.get(DERIVED[derived]) != before.get(DERIVED[derived])
+    for key in set(NUMBERS) - {*DERIVED, DERIVED[derived], "contact.smoothing"}:
+        assert scene.get(key) == before.get(key)
+
+
+def test_derived_keys_apply_after_what_they_depend_on():
+    values = {"strip.youngs_modulus": 7e4, "strip.half_height": 0.2, "strip.poisson_ratio": 0.1}
+    scene = Scene().replace(values | {"strip.length": 5.0})
+    for key, value in values.items():
+        np.testing.assert_allclose(scene.get(key), value, rtol=1e-15)
+    np.testing.assert_allclose(scene.strip.axial_stiffness, 7e4 / (1 - 0.01) * 0.4, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("values", "law"),
+    [
+        ({}, SharpSlip()),
+        ({"contact.smoothing": 8}, ElasticSlip(8.0)),
+        ({"contact.smoothing": np.inf}, SharpSlip()),
+        ({"contact.law": "smooth-cap"}, CappedTrial()),
+        ({"contact.law": "smooth-cap", "contact.smoothing": 8}, CappedTrial(8.0)),
+        ({"contact.law": "tanh-increment"}, TanhIncrement()),
+        ({"contact.law": Own()}, Own()),
+    ],
+)
+def test_friction_laws_by_name(values, law):
+    got = Scene().replace(values).contact.law
+    assert type(got) is type(law)
+    assert jax.tree.leaves(got) == jax.tree.leaves(law)
+
+
+def test_a_law_keeps_its_exponent():
+    smooth = Scene().replace({"contact.smoothing": 8})
+    assert smooth.replace({"contact.friction": 0.2}).contact.smoothing == 8
+    assert smooth.replace({"contact.law": "smooth-cap"}).contact.law.smoothing == 8
+    assert smooth.replace({"contact.smoothing": "sharp"}).contact.smoothing == np.inf
+
+
+@pytest.mark.parametrize(
+    ("key", "near"),
+    [
+        ("strip.hight_ratio", "strip.height_ratio"),
+        ("contact.mu_friction", "contact.friction"),
+        ("friction", "contact.friction"),
+        ("model.node", "model.nodes"),
+        ("load.steps", "load."),
+    ],
+)
+def test_unknown_keys_name_the_nearest(key, near):
+    for ask in (Scene().get, lambda k: Scene().replace({k: 1.0})):
+        with pytest.raises(InputError, match=rf"unknown key '{key}': did you mean '{near}"):
+            ask(key)
+
+
+# --- bad input ----------------------------------------------------------------------------------
+
+SIZES = ["length", "height_ratio", "half_height", "axial_stiffness", "youngs_modulus", "kappa_s"]
+POSITIVE = [f"strip.{name}" for name in SIZES] + [
+    "contact.stick_stiffness",
+    "contact.normal_stiffness",
+    "load.amplitude",
+    "model.end_size",
+]
+FLOATS = [-2.0, 0.0, float("nan"), float("inf")]
+NO_NUMBERS = ["2.0", True, [1.0, 2.0], np.array([1.0, 2.0]), None, {"a": 1}, 10**400, 1j]
+BAD = [
+    *[(key, value, "must be a positive number") for key in POSITIVE for value in FLOATS],
+    *[
+        (key, value, "number|thickness, E")
+        for key in NUMBERS
+        for value in NO_NUMBERS
+        if value is not None or key not in ("strip.layers", "strip.curvature")
+    ],
+    *[("contact.friction", value, "a number, not negative") for value in (-2.0, np.nan, np.inf)],
+    *[("strip.deviation", value, "must be a number") for value in (np.nan, np.inf)],
+    ("strip.layers", [[0.1, 1e4, 0.3], [0.1, 1e5, 0.2]], r"add up to 0\.2, .* 2H is 0\.2252; make"),
+    *[("strip.poisson_ratio", value, "between -1 and 0.5") for value in (-1.0, 0.5, 0.7, np.nan)],
+    *[("contact.smoothing", value, "above 1, or 'sharp'") for value in (1, -8.0, np.nan, "blunt")],
+    ("strip.layers", [], r"give rows \[thickness, E, nu\] from the bottom"),
+    ("strip.layers", [[0.2252, 1e4]], r"give rows \[thickness, E, nu\] from the bottom"),
+    ("strip.layers", [[0.1, 1e4, 0.3], [0.1252, 1e4]], r"give \[thickness, E, nu\] of every layer"),
+    ("contact.pressure", 0.0, "must press somewhere"),
+    ("contact.pressure", [[0.0, 0.0], [1.0, 0.0]], "must press somewhere"),
+    ("contact.pressure", [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]], "must press somewhere"),
+    *[
+        (f"contact.{pressure}", value, fix)
+        for pressure in ("pressure", "bottom_pressure")
+        for value, fix in [
+            (-1.0, "nowhere negative"),
+            ([], r"table of \[X, pressure\] rows"),
+            ([[0.0, 1.0]], r"table of \[X, pressure\] rows"),
+            ([[0.0, 1.0], [2.0]], r"table of \[X, pressure\] rows"),
+            ([[0.0, 1.0, 2.0]] * 2, r"table of \[X, pressure\] rows"),
+            ([[0.0, 1.0], [1.0, True]], r"table of \[X, pressure\] rows"),
+            ([[1.0, 1.0], [0.0, 2.0]], "X must not decrease from row to row"),
+            ([[0.0, 1.0], [1.0, 1.0], [1.0, 2.0], [1.0, 3.0]], "one X three times; two rows make"),
+            ([[0.0, 1.0], [1.0, -0.1]], r"nowhere negative \(no tension\)"),
+            ([[0.0, 1.0], [np.nan, 1.0]], "must be finite"),
+            ([[0.0, 1.0], [1.0, np.nan]], "must be finite"),
+        ]
+    ],
+    ("load.cycles", -1, "whole number, 0 to"),
+    ("load.cycles", 1.5, "whole number, 0 to"),
+    ("load.pressure_steps", 0, "whole number, 1 to"),
+    ("load.steps_per_half_cycle", 0, "whole number, 1 to"),
+    ("load.steps_per_half_cycle", 7, "must be 1, or even"),
+    ("model.nodes", 2, "whole number, 3 to"),
+    ("model.nodes", 41.0, "whole number, 3 to"),
+    ("model.nodes", True, "whole number, 3 to"),
+    ("model.nodes", "many", "whole number, 3 to"),
+    ("model.fields", ["v", "psi"], "make no model; choose"),
+    ("model.fields", ["beta"], "make no model; choose"),
+    ("model.fields", [], "make no model; choose"),
+    ("model.fields", ["v", "theta"], "fields are v, w, beta, psi"),
+    ("model.fields", "v", "give a list"),
+    ("model.fields", 3, "give a list"),
+    ("model.kinematics", "euler", "choose 'exact' or 'linear'"),
+    ("model.grid", 3, "must be a word"),
+    ("model.constants", "print", "choose 'consistent' or 'printed'"),
+    ("strip.far_end", "glued", "choose 'held' or 'pinned' or 'free'"),
+    ("load.control", "stress", "choose 'force' or 'displacement'"),
+    ("contact.law", "coulomb", "choose 'elastic-slip' or"),
+    ("contact.law", 3, "choose 'elastic-slip' or"),
+    ("contact.normal", "soft", "choose 'rigid' or 'compliant' or 'none'"),
+    ("strip.plane", "plain", "choose 'strain' or 'stress'"),
+    ("model.squeeze", "none", "choose 'field' or 'assumed'"),
+    ("model.squeeze", "assumed", "needs w and psi in model.fields"),
+    ("contact.normal", "compliant", "needs w in model.fields"),
+    ("contact.normal", "none", "needs w in model.fields"),
+    ("strip.curvature", 0.1, "needs w in model.fields"),
+]
+
+
+def shown(value):
+    """A value as a message spells it."""
+    return repr(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+@pytest.mark.parametrize(("key", "value", "fix"), BAD)
+def test_bad_values_are_refused(key, value, fix):
+    with pytest.raises(InputError, match=fix) as caught:
+        Scene().replace({key: value})
+    told = str(caught.value)
+    number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+    assert told.startswith(f"{key} = ")
+    assert shown(value) in told or (number and shown(float(value)) in told)
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda: Strip(length="long"), "strip.length = 'long': must be a number"),
+        (lambda: Strip(kappa_s=-1), "strip.kappa_s = -1.0: must be a positive"),
+        (lambda: Contact(pressure="high"), "contact.pressure = 'high': give a number or a table"),
+        (lambda: Contact(law=CappedTrial(0.5)), "contact.smoothing = 0.5: must be a number above"),
+        (lambda: Load(amplitude=True), "load.amplitude = True: must be a number"),
+        (lambda: Load("displacement"), "load.amplitude = None: give the amplitude"),
+        (lambda: Model(fields=("v", "psi")), r"model.fields = \['v', 'psi'\]: make no model"),
+    ],
+)
+def test_parts_check_themselves(make, told):
+    with pytest.raises(InputError, match=told):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        (
+            {"strip.half_height": 0.1, "strip.height_ratio": 0.1},
+            "strip.half_height and strip.height_ratio say the same thing",
+        ),
+        (
+            {"strip.axial_stiffness": 1e4, "strip.youngs_modulus": 1e4},
+            "strip.youngs_modulus and strip.axial_stiffness say the same thing",
+        ),
+        ({"model.grid": "collocation", "model.nodes": 40}, "model.nodes = 40: must be odd"),
+        ({"load.control": "displacement"}, "load.amplitude = None: give the amplitude"),
+        (
+            {"contact.law": "tanh-increment", "contact.smoothing": 8.0},
+            "contact.smoothing = 8.0: contact.law 'tanh-increment' has none",
+        ),
+        ({"contact.law": Own(), "contact.smoothing": 8.0}, "contact.smoothing = 8.0: contact.law"),
+        *[
+            ({"strip.layers": LAYERS, key: value}, f"{key} = {value}: strip.layers say it already")
+            for key, value in [
+                ("strip.axial_stiffness", 1e4),
+                ("strip.youngs_modulus", 1e4),
+                ("strip.poisson_ratio", 0.3),
+            ]
+        ],
+        (
+            {"strip.layers": LAYERS, "strip.half_height": 0.2},
+            "add up to 0.2252, .* 2H is 0.4; make",
+        ),
+        (
+            {"strip.layers": [[0.1, 1e4, 0.3], [0.1252, 1e5, 0.5]]},
+            r"strip.layers = \[0.1252, 1.+, 0.5\] \(row 2 from the bottom\): nu = 0.5 is",
+        ),
+        (
+            {"strip.layers": LAYERS, "model.squeeze": "assumed", "model.fields": LIFTING},
+            "model.squeeze = 'assumed': is for a homogeneous strip",
+        ),
+        (
+            {"model.squeeze": "assumed", "model.fields": ["v", "w", "beta"]},
+            "model.squeeze = 'assumed': needs w and psi",
+        ),
+        (
+            {"contact.pressure": [[0.0, 1.0], [2.5, 2.0]]},
+            r"contact.pressure = \[2.5\]: lies off the strip, whose X runs from 0 to 2",
+        ),
+        (
+            {"contact.bottom_pressure": [[-1.0, 1.0], [2.0, 2.0]]},
+            r"contact.bottom_pressure = \[-1.0\]: lies off the strip, whose X runs from 0 to 2",
+        ),
+        ({"contact.pressure": TABLE, "strip.length": 1.0}, r"contact.pressure = \[2.0\]: lies off"),
+        *[
+            (
+                {"contact.bottom_pressure": pressure, "model.fields": fields},
+                f"contact.bottom_pressure = {pressure}: nothing holds the strip down",
+            )
+            for pressure in (10.0, 20.0)
+            for fields in (LIFTING, ["v", "beta"])
+        ],
+        *[
+            (
+                {
+                    "contact.bottom_pressure": [[0.0, low], [1.0, low], [1.0, high], [2.0, high]],
+                    "model.fields": LIFTING,
+                    "strip.far_end": far_end,
+                },
+                "contact.bottom_pressure = .*: the strip tips over",
+            )
+            for far_end in ("pinned", "free")
+            for low, high in [(0.0, 19.0), (19.0, 0.0)]
+        ],
+        *[
+            (
+                {"contact.normal": "none", "model.fields": LIFTING, "strip.far_end": far_end},
+                f"strip.far_end = '{far_end}': is all that holds .* take 'held'",
+            )
+            for far_end in ("pinned", "free")
+        ],
+        (
+            {"contact.friction": 0.0, "strip.far_end": "free"},
+            "contact.friction = 0.0: nothing holds the strip along X .* give strip.far_end",
+        ),
+    ],
+)
+def test_values_that_do_not_go_together(values, told):
+    with pytest.raises(InputError, match=told):
+        Scene().replace(values)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"contact.friction": 0.0},
+        {"contact.friction": 0.0, "strip.far_end": "pinned", "model.fields": LIFTING},
+        {"contact.bottom_pressure": [[0.0, 19.0], [1.0, 0.0]], "model.fields": LIFTING},
+        {"strip.layers": None, "strip.curvature": None},
+        {
+            "contact.bottom_pressure": 20.0,
+            "contact.normal": "none",
+            "model.fields": LIFTING,
+        },
+        {"strip.layers": [[0.1, 1e4, 0.5], [0.1252, 1e5, 0.5]], "strip.plane": "stress"},
+        {"strip.layers": [[0.2, 1e4, 0.3], [0.2, 1e5, 0.3]], "strip.half_height": 0.2},
+        {"contact.pressure": [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]},
+        {"load.cycles": 0},
+    ],
+)
+def test_values_that_do_go_together(values):
+    scene = Scene().replace(values)
+    assert same(scene.replace(values), scene)
+
+
+@pytest.mark.parametrize("name", ["axial_stiffness", "youngs_modulus", "poisson_ratio"])
+def test_layers_leave_no_stiffness_to_differentiate_by(name):
+    layered = Scene().replace({"strip.layers": LAYERS})
+    told = f"strip.{name} = a traced value: strip.layers say it already"
+    with pytest.raises(InputError, match=told):
+        jax.grad(lambda value: layered.replace({f"strip.{name}": value}).strip.length)(0.3)
+
+
+def test_a_curvature_of_zero_is_a_straight_strip():
+    for bend in (0, 0.0, jnp.zeros(())):
+        assert Scene().replace({"strip.curvature": bend}).strip.curvature is None
+
+
+def test_an_amplitude_does_not_outlive_its_control():
+    moved = Scene().replace({"load.control": "displacement", "load.amplitude": 1e-5})
+    assert moved.replace({"contact.friction": 0.2}).load.amplitude == 1e-5
+    assert moved.replace({"load.control": "force"}).load.amplitude == Load().amplitude
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (b"[strip\n", "is not a TOML file"),
+        (b"\xff\xfe", "is not a TOML file"),
+        (b"[stripe]\nlength = 2.0", "unknown section 'stripe'; sections are strip, contact"),
+        (b"strip = 3", r"strip must be a table: write \[strip\]"),
+        (b"[strip]\nlenght = 2.0", "unknown key 'strip.lenght': did you mean 'strip.length'"),
+        (b"[strip]\nlength = 'two'", "strip.length = 'two': must be a number"),
+        (b"[strip]\nlength = 2024-01-01", "strip.length = .*: must be a number"),
+        (b"[load]\ncontrol = 'displacement'", "load.amplitude = None: give the amplitude"),
+    ],
+)
+def test_bad_files(path, text, told):
+    path.write_bytes(text)
+    with pytest.raises(InputError, match=told):
+        read_scene(path)
+
+
+@pytest.mark.parametrize(("name", "reason"), [("no.toml", "No such file"), (".", "Is a directory")])
+def test_files_that_cannot_be_read(tmp_path, name, reason):
+    with pytest.raises(InputError, match=rf"cannot be read \({reason}"):
+        read_scene(tmp_path / name)
+
+
+# --- gradients and batches ----------------------------------------------------------------------
+
+FULL = {
+    "contact.smoothing": 16.0,
+    "contact.bottom_pressure": 1.0,
+    "strip.deviation": 0.01,
+    "strip.curvature": 0.1,
+    "model.fields": LIFTING,
+}
+
+
+@pytest.mark.parametrize("key", NUMBERS)
+def test_gradients_and_batches_reach_every_number(key):
+    scene = Scene().replace(FULL | ({"strip.layers": LAYERS} if key == "strip.layers" else {}))
+    value = scene.get(key)
+
+    def weight(factor):
+        leaves = jax.tree.leaves(scene.replace({key: value * factor}))
+        return sum((i + 1.0) * jnp.sum(jnp.log(leaf)) for i, leaf in enumerate(leaves))
+
+    below, here, above = jax.vmap(weight)(jnp.array([0.999999, 1.0, 1.000001]))
+    np.testing.assert_allclose(here, weight(1.0), rtol=1e-14)
+    slope = jax.grad(weight)(1.0)
+    np.testing.assert_allclose(slope, (above - below) / 2e-6, rtol=1e-7)
+    assert abs(slope) > 0.5
+
+
+def test_gradients_reach_a_pressure_table():
+    def pressure(table):
+        return jnp.sum(Scene().replace({"contact.pressure": table}).contact.pressure ** 2)
+
+    slope = jax.jit(jax.grad(pressure))(jnp.asarray(TABLE))
+    np.testing.assert_allclose(slope, 2.0 * np.array(TABLE), rtol=1e-12)
+
+
+def test_the_load_path_turns_at_the_amplitude():
+    path = Load(cycles=3, steps_per_half_cycle=4).unit_path()
+    once = [0.5, 0, -0.5, -1, -0.5, 0, 0.5, 1]
+    np.testing.assert_allclose(path, [0.5, 1, *once * 3])
+    assert Load(cycles=0).unit_path().size == 0
+
+
+def test_a_full_disk_leaves_the_old_file_and_one_clear_line(tmp_path):
+    target = tmp_path / "result.json"
+    target.write_text("old")
+    with (
+        pytest.raises(InputError, match=r"result\.json: cannot be written \(No space left"),
+        written_whole(target),
+    ):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
+    assert target.read_text() == "old"

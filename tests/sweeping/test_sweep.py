@@ -1,0 +1,358 @@
+"""Sweeps: lane by lane what `solve` says, whatever the block, and nothing lost when cut off."""
+
+import csv
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.common.errors import InputError
+from jbeamshell.quasistatic.load_path import check
+from jbeamshell.sweeping import job, lanes, runner
+from jbeamshell.sweeping.lanes import Outcome, lanes_of
+
+TINY = {
+    "model.nodes": 9,
+    "model.kinematics": "linear",
+    "load.steps_per_half_cycle": 2,
+    "load.cycles": 1,
+}
+SCENE = jb.Scene().replace(TINY)
+OVER = {"load.amplitude": [0.3, 1.9, 1.1, 2.5, 0.7], "strip.height_ratio": [0.05, 0.4]}
+FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "reaction_max")
+PATCH = [[0.0, 12.0], [1.0, 12.0], [1.0, 5.0], [2.0, 8.0]]
+
+
+@pytest.fixture(scope="module")
+def result():
+    return jb.sweep(SCENE, OVER, FIGURES)
+
+
+def same(one, other):
+    assert list(one.axes) == list(other.axes)
+    np.testing.assert_array_equal(one.status, other.status)
+    for name in one.values:
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-12, atol=1e-18)
+
+
+def lanes_in(sweep):
+    """Every lane's place in the arrays and its numbers."""
+    places = itertools.product(*map(range, sweep.shape))
+    return zip(places, sweep.lanes.columns(np.arange(sweep.status.size)).T, strict=True)
+
+
+# --- what a lane says -----------------------------------------------------------------------------
+
+
+def test_every_lane_says_what_solve_says(result):
+    assert result.shape == (5, 2)
+    for at, numbers in lanes_in(result):
+        scene = SCENE.replace(dict(zip(OVER, numbers, strict=True)))
+        if numbers[0] > 2.0:
+            assert result.status[at] == Outcome.OUTSIDE
+            assert all(np.isnan(values[at]) for values in result.values.values())
+            continue
+        history = jb.solve(scene)
+        for name in FIGURES:
+            right = float(np.ravel(getattr(history, name))[-1])
+            # Where nothing slips the dissipation is round-off.
+            zero = {"dissipation": 1e-18, "dissipation_ratio": 1e-13}.get(name, 0.0)
+            assert result[name][at] == pytest.approx(right, rel=1e-9, abs=zero), (at, name)
+    assert (result.failed, result.outside, result.undefined) == (0, 2, 0)
+    assert "gross slip" in result.why_outside
+    assert "10 lanes" in str(result)
+    assert "8 converged, 0 failed, 2 outside" in str(result)
+
+
+def test_pairs_are_the_product_lane_by_lane(result):
+    columns = result.lanes.columns(np.arange(10))
+    paired = jb.sweep(SCENE, dict(zip(OVER, columns, strict=True)), FIGURES, paired=True)
+    assert paired.shape == (10,)
+    assert paired.compile_s < 1.0  # the same shape
+    for name in FIGURES:
+        np.testing.assert_array_equal(paired[name], result[name].ravel())
+    with pytest.raises(InputError, match="equally many"):
+        jb.sweep(SCENE, OVER, paired=True)
+
+
+def test_many_blocks_answer_as_one():
+    amplitudes = np.linspace(0.2, 2.1, 40)
+    heights = np.geomspace(0.03, 0.4, 30)
+    told = []
+    many = jb.sweep(
+        SCENE,
+        {"load.amplitude": amplitudes, "strip.height_ratio": heights},
+        FIGURES,
+        progress=lambda done, total: told.append((done, total)),
+    )
+    some = jb.sweep(SCENE, {"load.amplitude": amplitudes[::9], **_eta(heights[::7])}, FIGURES)
+    np.testing.assert_allclose(many["dissipation"][::9, ::7], some["dissipation"], rtol=1e-12)
+    inside = int(np.sum(amplitudes < 2.0)) * 30
+    assert told[0] == (0, inside)
+    assert told[-1] == (inside, inside)
+    assert len(told) > 15
+    assert many.computed == inside
+
+
+def _eta(heights):
+    return {"strip.height_ratio": heights}
+
+
+def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, monkeypatch):
+    batched, alone = runner.Runner._answers, []
+
+    def failing(self, batches):
+        """As if the first lane of every block had failed in the batch."""
+        values, status = map(np.array, batched(self, batches))
+        values[..., 0, 0], status[..., 0, 0] = np.nan, Outcome.MAX_ITERATIONS
+        return values, status
+
+    def solve(scene, **settings):
+        """Fails again at one height, and finds another lane to be no model."""
+        alone.append(float(scene.load.amplitude))
+        if scene.load.amplitude == 0.7:
+            raise InputError("no such thing")
+        history = jb.solve(scene)
+        bad = history.status.at[-1].set(Outcome.NOT_REACHED)
+        return dataclasses.replace(history, status=bad) if scene.load.amplitude == 1.1 else history
+
+    monkeypatch.setattr(runner.Runner, "_answers", failing)
+    monkeypatch.setattr(runner, "solve", solve)
+    over = {"load.amplitude": [0.3, 1.9, 1.1, 0.7], "strip.height_ratio": [0.05] * 31 + [0.4]}
+    hurt = jb.sweep(SCENE, over, FIGURES)
+    assert len(alone) == 4
+    assert set(alone) <= {0.3, 1.9, 1.1, 0.7}
+    assert hurt.failed == alone.count(1.1)
+    assert hurt.outside == alone.count(0.7)
+    known = hurt.status == Outcome.CONVERGED
+    for name in FIGURES:
+        right = result[name][[0, 1, 2, 4]][:, [0] * 31 + [1]]
+        np.testing.assert_allclose(hurt[name][known], right[known], rtol=1e-9, atol=1e-13)
+        assert np.all(np.isnan(hurt[name][~known]))
+
+
+def test_a_figure_of_nought_over_nought_is_told_from_a_failure(result, monkeypatch):
+    batched = runner.Runner._answers
+
+    def undefined(self, batches):
+        values, status = map(np.array, batched(self, batches))
+        values[:, 1] = np.nan
+        return values, status
+
+    monkeypatch.setattr(runner.Runner, "_answers", undefined)
+    monkeypatch.setattr(
+        runner, "_figures", lambda history, names: np.array([1.0, np.inf, 2.0, 3.0])
+    )
+    monkeypatch.setattr(runner, "solve", lambda scene, **settings: jb.solve(scene))
+    odd = jb.sweep(SCENE, {"load.amplitude": [0.3, 1.9], **_eta([0.05])}, FIGURES)
+    assert (odd.failed, odd.undefined) == (0, 2)
+    assert np.all(np.isnan(odd["dissipation_ratio"]))
+    assert np.all(odd["dissipation"] == 1.0)
+    assert "2 with a figure undefined" in str(odd)
+
+
+@pytest.mark.slow
+def test_steps_that_fail_in_the_batch_are_walked_in_pieces(result):
+    hasty = jb.Newton(max_iterations=3)
+    over = {"load.amplitude": np.linspace(0.2, 1.9, 6), **_eta([0.05, 0.1, 0.2])}
+    hurried = jb.sweep(SCENE, over, FIGURES, solver=hasty)
+    assert 0 < hurried.failed < 6
+    for at, numbers in lanes_in(hurried):
+        scene = SCENE.replace(dict(zip(over, numbers, strict=True)))
+        history = jb.solve(scene, solver=hasty, throw=False)
+        assert (hurried.status[at] == Outcome.CONVERGED) == history.converged
+        if history.converged:
+            assert hurried["dissipation"][at] == pytest.approx(float(history.dissipation), rel=1e-9)
+
+
+# --- the domain -----------------------------------------------------------------------------------
+
+EDGES = {
+    "strip.length": (-1.0, 0.0, 1.0, 3.0),
+    "strip.height_ratio": (-0.1, 0.0, 0.1),
+    "strip.half_height": (-0.1, 0.0, 0.1),
+    "strip.axial_stiffness": (0.0, 1.0),
+    "strip.youngs_modulus": (0.0, 1e4),
+    "strip.poisson_ratio": (-1.0, -0.9, 0.0, 0.49, 0.5),
+    "strip.kappa_s": (0.0, 0.4),
+    "strip.deviation": (-1.0, 0.0),
+    "strip.curvature": (-0.01, 0.0),
+    "contact.friction": (-0.1, 0.0, 0.03, 0.5),
+    "contact.pressure": (-1.0, 0.0, 3.0, 30.0),
+    "contact.bottom_pressure": (-1.0, 0.0, 5.0, 11.0),
+    "contact.stick_stiffness": (0.0, 10.0),
+    "contact.smoothing": (1.0, 16.0),
+    "contact.normal_stiffness": (0.0, 10.0),
+    "load.amplitude": (-1.0, 0.0, 0.5, 1.9999, 2.0, 3.0),
+}
+LIFTED = {"model.fields": ["v", "w", "beta", "psi"]}
+SCENES = {
+    "standard": SCENE,
+    "table": SCENE.replace({"contact.pressure": PATCH}),
+    "tipping": SCENE.replace(
+        LIFTED
+        | {"contact.pressure": PATCH, "strip.far_end": "free", "contact.bottom_pressure": 5.0}
+    ),
+    "unfounded": SCENE.replace(LIFTED | {"contact.normal": "none", "load.amplitude": 0.1}),
+    "layers": SCENE.replace({"strip.layers": [[0.1, 3e5, 0.3], [0.1252, 1e5, 0.2]]}),
+    "bar": SCENE.replace(
+        {"model.rung": "bar", "load.control": "displacement", "load.amplitude": 1e-5}
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_outside_is_what_a_scene_or_solve_refuses_one_by_one(name):
+    scene, seen = SCENES[name], []
+    for key, values in EDGES.items():
+        if key == "load.amplitude" and scene.load.control == "displacement":
+            values = (0.0, 1e-6, 1e-5, 1e-4)
+        for value, outside in zip(values, lanes_of(scene, {key: values}).outside(), strict=True):
+            try:
+                if key == "strip.curvature" and "w" not in scene.model.fields:
+                    continue  # refused whole
+                if name == "layers" and key in ("strip.axial_stiffness", "strip.youngs_modulus"):
+                    continue
+                if name == "layers" and key == "strip.poisson_ratio":
+                    continue
+                check(scene.replace({key: value}))
+                refused = False
+            except InputError:
+                refused = True
+            assert refused == outside, (key, value)
+            seen.append(refused)
+    assert {True, False} == set(seen)
+
+
+def test_the_domain_knows_of_keys_that_go_together():
+    over = {"contact.friction": [0.05, 0.1], "load.amplitude": [0.9, 1.5], **_eta([0.1])}
+    assert lanes_of(SCENE, over).outside()[..., 0].tolist() == [[False, True], [False, False]]
+    assert lanes_of(SCENE, over).amplitude_over_height[1, 1, 0] == pytest.approx(15.0)
+    moved = lanes_of(SCENE, {"load.amplitude": [1e-6]})
+    assert np.all(np.isfinite(moved.difficulty))
+
+
+def test_a_sweep_wholly_outside_runs_nothing():
+    nothing = jb.sweep(SCENE, {"load.amplitude": [2.0, 3.0], "strip.kappa_s": [0.44]}, processes=2)
+    assert (nothing.outside, nothing.computed) == (2, 0)
+    assert nothing["dissipation"].shape == (2, 1)
+    assert "0 converged, 0 failed, 2 outside" in str(nothing)
+
+
+# --- bad input ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("over", "says"),
+    [
+        ({}, "name at least one"),
+        ({"contact.frction": [0.1]}, "did you mean 'contact.friction'"),
+        ({"strip.layers": [1.0]}, "no single number"),
+        ({"model.nodes": [9]}, "no single number"),
+        ({"load.amplitude": []}, "is empty"),
+        ({"load.amplitude": [[1.0]]}, "not an array of shape"),
+        ({"load.amplitude": [0.1, np.nan]}, "must be finite"),
+        ({"load.amplitude": ["a"]}, "give numbers"),
+        ({"strip.half_height": [0.1], "strip.height_ratio": [0.1]}, "say the same thing"),
+        ({"strip.curvature": [0.1]}, "needs w"),
+        ({"load.amplitude": np.ones(5000), "strip.length": np.ones(5000)}, "25,000,000 lanes"),
+    ],
+)
+def test_axes_that_make_no_sweep_are_refused(over, says):
+    with pytest.raises(InputError, match=says) as caught:
+        jb.sweep(SCENE, over)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ({"figures": ()}, "name at least one"),
+        ({"figures": ("dissipatoin",)}, "choose"),
+        ({"figures": ("dissipation", "dissipation")}, "names one twice"),
+        ({"figures": ("traction",)}, "choose|no number"),
+        ({"figures": ("slip",)}, "is no number"),
+        ({"figures": ("loop",)}, "is no number"),
+        ({"figures": ("converged",)}, "give numbers|is no number"),
+        ({"processes": 0}, "whole number"),
+        ({"processes": 2, "devices": []}, "leave it out"),
+        ({"out": "sweep.txt"}, r"end the name in \.csv"),
+        ({"out": "nowhere/sweep.csv"}, "there is no folder"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_before_anything_is(more, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=says):
+        jb.sweep(SCENE, OVER, **more)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_sweep_within_the_limit_fits_into_memory():
+    with pytest.raises(InputError, match=r"take 1.19 GB .* sweep 3 times"):
+        lanes.check_size(12_000_000, 4)
+    lanes.check_size(4_000_000, 4)
+
+
+# --- what is left on disk -------------------------------------------------------------------------
+
+
+def test_the_table_holds_every_number_to_the_last_bit(result, tmp_path):
+    again = jb.sweep(SCENE, OVER, FIGURES, out=tmp_path / "sweep.csv")
+    same(result, again)
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep.csv"]
+    with (tmp_path / "sweep.csv").open(encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file))
+    assert header == [*OVER, *FIGURES, "status"]
+    for name, column in zip(header, zip(*rows, strict=True), strict=True):
+        known = result.table()[name]
+        if name == "status":
+            assert list(column) == known.tolist()
+        else:
+            read = np.array([float(word) if word else np.nan for word in column])
+            np.testing.assert_array_equal(read, known)
+
+
+def test_a_sweep_that_was_cut_off_goes_on(tmp_path):
+    over = {"load.amplitude": np.linspace(0.2, 1.9, 12), **_eta(np.geomspace(0.05, 0.4, 8))}
+    whole, out = jb.sweep(SCENE, over, FIGURES), tmp_path / "sweep.csv"
+    parts = tmp_path / "sweep.csv.parts"
+
+    def cut(done, total):
+        if done >= 40:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="keeps what is done"):
+        jb.sweep(SCENE, over, FIGURES, out=out, progress=cut)
+    assert not out.exists()
+    blocks = sorted(parts.glob("block-*"))
+    assert len(blocks) == 2
+    blocks[0].write_bytes(blocks[0].read_bytes()[:100])  # a disk that ran full
+    (parts / ".draft.npz").touch()
+
+    with pytest.raises(InputError, match="holds another sweep"):
+        jb.sweep(SCENE, over | _eta([0.1]), FIGURES, out=out)
+    with pytest.raises(InputError, match="holds another sweep"):
+        jb.sweep(SCENE.replace({"contact.friction": 0.11}), over, FIGURES, out=out)
+    rest = jb.sweep(SCENE, over, FIGURES, out=out)
+    assert rest.computed == 96 - 32
+    assert rest.notes == ("32 lanes were done before",)
+    same(whole, rest)
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep.csv"]
+
+
+def test_a_folder_that_is_no_sweep_is_left_alone(tmp_path):
+    parts = tmp_path / "sweep.csv.parts"
+    parts.mkdir()
+    (parts / "thesis.tex").touch()
+    with pytest.raises(InputError, match="is no unfinished sweep"):
+        jb.sweep(SCENE, OVER, FIGURES, out=tmp_path / "sweep.csv")
+    assert [path.name for path in parts.iterdir()] == ["thesis.tex"]
+
+
+def test_a_model_of_ones_own_is_not_kept_on_disk():
+    scene = jb.Scene(energy=lambda e, g, k, psi, dpsi: e**2)
+    with pytest.raises(InputError, match="without them and write the table with to_csv"):
+        job.Job(lanes_of(scene, OVER), FIGURES).description()
+    assert runner._ask(scene, tuple(OVER), FIGURES, None) not in runner._known.values()
