@@ -74,7 +74,7 @@ def whole_path(
 
 
 def check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:
-    """Nodes in contact (n,) from which a search starts; raises `InputError` where they fit no scene."""
+    """Nodes in contact (n,) from which a search starts; `InputError` where they fit no scene."""
     try:
         touching, nodes = np.asarray(contact, dtype=bool), scene.model.nodes
     except (TypeError, ValueError):

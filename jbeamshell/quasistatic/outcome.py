@@ -49,7 +49,7 @@ def raise_if_failed(steps: Steps, path: LoadPath, before: int = 0) -> None:
 
 @eqx.filter_jit
 def history_of(scene: Scene, steps: Steps, pressure: Array) -> History:
-    """History of the steps, without its cycles (with them every path would compile anew) and end."""
+    """History of the steps, without its end and its cycles, which would make paths compile anew."""
     system = System(scene)
     sound, level = steps.state.sound, steps.state.level
 

@@ -146,7 +146,7 @@ def foresee(system: System, start: Any, path: Any) -> Foreseen:
     Parameters
     ----------
     system : of a scene to which this `applies`
-    start, path : `jbeamshell.quasistatic.stepping.PathState` and `jbeamshell.quasistatic.load_path.LoadPath`
+    start, path : `stepping.PathState` and `load_path.LoadPath`
     """
     follow = custom_vmap(_follow)
 
@@ -172,7 +172,7 @@ def known(system: System) -> LinearStrip:
 
 
 def memory_of(state: Any) -> Memory:
-    """What the next step sees of a `jbeamshell.quasistatic.stepping.PathState`.  Derivatives do not pass."""
+    """Memory of a `stepping.PathState` for the next step.  Derivatives do not pass."""
     level = state.level
     memory = Memory(
         level.traction, level.cap, level.reaction, state.target, state.pressure, state.turn

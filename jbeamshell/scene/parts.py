@@ -320,7 +320,8 @@ class Model(eqx.Module):
     constants : "consistent" or "printed" (the dissertation's own)
     squeeze : "field" (psi has its own balance) or "assumed" (psi = -(F_N + R)/(2E), the earlier
         theory of Brink 2015, section 4.2, without Poisson's effect)
-    order : 0 is the beamshell; p from 1 up is a section of order p, see `jbeamshell.mechanics.hierarchic`
+    order : 0 is the beamshell; p from 1 up is a section of order p, see
+        `jbeamshell.mechanics.hierarchic`
     solution : "stepwise" (Newton's method at every load level), "masing" (the loop is the mean
         backbone of a pull and a push, doubled), "masing-pull" (of a pull alone), or "closed-form"
         (Goodman's bar)

@@ -5,7 +5,7 @@
 | ``bar`` | Goodman's one-dimensional bar, in closed form |
 | ``shell`` | fields v and beta |
 | ``squeeze`` | fields v, beta and psi |
-| ``p1``, ``p2``, ``p3``, ... | sections of order p through the height, see `jbeamshell.mechanics.hierarchic` |
+| ``p1``, ``p2``, ``p3``, ... | sections of order p, see `jbeamshell.mechanics.hierarchic` |
 | ``masing`` | Masing's rule from a pull and a push of ``squeeze`` |
 | ``masing-shell``, ``masing-p2``, ... | the same of another section |
 | ``masing-pull``, ``masing-pull-p2``, ... | from a pull alone |

@@ -270,6 +270,7 @@ def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:
 
 
 def law_name(law: FrictionLaw) -> Any:
+    """Name of a friction law in keys; the law itself where it is a user's own."""
     if isinstance(law, SharpSlip):
         return "elastic-slip"
     return next((name for name, kind in _LAWS.items() if type(law) is kind), law)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell import sweeping
 from jbeamshell.cli import main
 from jbeamshell.cli.sweep import values_of
 from jbeamshell.common.errors import InputError
@@ -108,7 +107,7 @@ def test_the_summary_counts_and_a_lane_that_fails_shows_in_the_exit_code(cli, mo
     code, out, err = cli(*WORDS, "--over", "load.amplitude=.5,1.5", *HEIGHTS)
     assert (code, err) == (0, "")
     assert out.startswith("4 lanes over load.amplitude (2), strip.height_ratio (2): 4 converged")
-    monkeypatch.setattr(sweeping, "sweep", failing)
+    monkeypatch.setattr(run, "sweep", failing)
     code, out, err = cli(*WORDS, "--over", "load.amplitude=.5,1.5", *HEIGHTS)
     assert code == 3
     assert "1 failed" in out

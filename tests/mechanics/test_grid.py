@@ -143,7 +143,7 @@ def in_geometry(length, half_height):
     return jax.jacrev(functools.partial(grid.vertices, 12), (0, 1))(length, half_height)
 
 
-@pytest.mark.parametrize("eta", [*ETAS, 20 * elements.FAR_SIZE])
+@pytest.mark.parametrize("eta", [*ETAS, 20 * grid.FAR_SIZE])
 def test_vertices_are_smooth_in_the_geometry(eta):
     slopes = in_geometry(2.0, eta)
     assert all(jnp.isfinite(s).all() for s in slopes)
@@ -172,7 +172,7 @@ def test_every_element_takes_its_share_of_the_size_it_should_have(steps):
     assert (np.diff(x) > 0).all()
     fine = np.linspace(0.0, 2.0, 400_001)
     distance = np.min(np.abs(fine - np.append(steps, 2.0)[:, None]), axis=0)
-    size = np.minimum(0.1 * 0.05 + elements.GROWTH * distance, elements.FAR_SIZE * 2.0)
+    size = np.minimum(0.1 * 0.05 + grid.GROWTH * distance, grid.FAR_SIZE * 2.0)
     middle = 0.5 * (1.0 / size[1:] + 1.0 / size[:-1])
     count = np.interp(x, fine, np.append(0.0, np.cumsum(middle * np.diff(fine))))
     np.testing.assert_allclose(count, count[-1] * np.arange(121) / 120, rtol=1e-6, atol=1e-6)
@@ -198,12 +198,12 @@ def test_a_load_without_a_step_leaves_the_grid_alone():
 def test_the_single_focus_is_geometric_and_then_uniform():
     """With sizes e + g d at the distance d from the end, d = e (exp(g n) - 1)/g after n of them."""
     x = vertices_at(60)
-    end, far = 0.1 * 0.05, elements.FAR_SIZE * 2.0
-    turn = (far - end) / elements.GROWTH
-    at_turn = np.log(far / end) / elements.GROWTH
+    end, far = 0.1 * 0.05, grid.FAR_SIZE * 2.0
+    turn = (far - end) / grid.GROWTH
+    at_turn = np.log(far / end) / grid.GROWTH
     total = at_turn + (2.0 - turn) / far
     n = total * np.arange(60, -1, -1) / 60
-    near = end * np.expm1(elements.GROWTH * np.minimum(n, at_turn)) / elements.GROWTH
+    near = end * np.expm1(grid.GROWTH * np.minimum(n, at_turn)) / grid.GROWTH
     np.testing.assert_allclose(x, 2.0 - near - far * np.maximum(n - at_turn, 0.0), atol=1e-14)
 
 

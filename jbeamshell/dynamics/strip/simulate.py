@@ -65,10 +65,10 @@ def simulate(
     released : force F, or a path of forces, under which the strip rests before t = 0; None is the
         pressed strip
     samples : instants, evenly spaced from 0 to ``span``, that are kept
-    method : how it is followed.  "midpoint", the default: `jbeamshell.dynamics.strip.midpoint`, implicit
-        and without damping of its own, with the friction law of load steps.  The others take
-        friction as a rate law, with the exponent `jbeamshell.dynamics.strip.rate_friction.SHARPEST` in place of
-        a sharp slider: "kvaerno3" and "kvaerno5" stiff, in steps chosen from the tolerance;
+    method : how it is followed.  "midpoint", the default, is implicit and without damping of its
+        own, with the friction law of load steps, see `jbeamshell.dynamics.strip.midpoint`.  The
+        others take friction as a rate law, with the exponent `rate_friction.SHARPEST` in place of a
+        sharp slider: "kvaerno3" and "kvaerno5" stiff, in steps chosen from the tolerance;
         "tsit5" and "bosh3" explicit
     tolerance : of a step's error (stiff), relative and to the sizes of a motion at gross slip
     step : largest time step; by default a `PER_PERIOD`-th of the stuck strip's first period, and
