@@ -85,7 +85,8 @@ def _write(folder: Path, study: Any, figures: dict[str, Any]) -> list[Path]:
     from jbeamshell.scene.toml import scene_to_toml
 
     motion = study.motion
-    names = ("time", "force", "displacement", "velocity", "kinetic", "stored", "given", "rubbed")
+    names = ("time", "force", "displacement", "velocity", "kinetic", "stored")
+    names += ("external_work", "friction_work")
     history = np.column_stack([np.asarray(getattr(motion, name)) for name in names])
     lists = {name: column for name, column in figures.items() if isinstance(column, list)}
     texts = {

@@ -33,5 +33,5 @@ from jbeamshell.dynamics.structure.modal import ModalCurve as ModalCurve
 from jbeamshell.dynamics.structure.modal import harmonic_balance as harmonic_balance
 from jbeamshell.dynamics.structure.modal import modal_curve as modal_curve
 from jbeamshell.dynamics.structure.shaking import InterruptedShakingError as InterruptedShakingError
-from jbeamshell.dynamics.structure.shaking import Shaken as Shaken
+from jbeamshell.dynamics.structure.shaking import StructureMotion as StructureMotion
 from jbeamshell.dynamics.structure.shaking import shake as shake

@@ -92,15 +92,15 @@ def let_go(
     own = float(2.0 * strip.half_height * strip.length * inertia.mean_density(scene))
     mass = HEAVY * own if payload is None else payload
     require_number("payload", mass)
-    riders = AttachedMasses(payload=mass)
+    attached = AttachedMasses(payload=mass)
     joint = Joint.of(scene, pull)
-    period = first_period(scene, inertia, riders)
+    period = first_period(scene, inertia, attached)
     motion = simulate(
         scene,
         cycles * period,
         Recorded([0.0, LET_GO * period], [pull, 0.0]),
         inertia=inertia,
-        riders=riders,
+        attached=attached,
         released=pull,
         samples=round(cycles * PER_CYCLE) + 1,
         step=period / per_cycle,

@@ -21,7 +21,12 @@ if TYPE_CHECKING:  # they bring diffrax, which pictures of other things need not
     from jbeamshell.dynamics.structure.modal import ModalCurve
 
 TIME, AMPLITUDE = "$t$  [time]", "amplitude of $u(L)$  [length]"
-LEDGER = {"kinetic": "kinetic", "stored": "stored", "rubbed": "friction", "damped": "damping"}
+LEDGER = {
+    "kinetic": "kinetic",
+    "stored": "stored",
+    "friction_work": "friction",
+    "damping_work": "damping",
+}
 WINDOWS = 12  # of a spectrogram, side by side
 FLOOR = -70.0  # dB
 HARMONICS = 8.5  # of the main frequency, shown in a spectrogram
@@ -49,8 +54,8 @@ def energies(motion: Motion, axes: Axes | None = None) -> Axes:
         least = float(np.nanmin(np.asarray(motion.stored)))
         parts = {name: np.asarray(getattr(motion, name)) for name in LEDGER}
         parts["stored"] = parts["stored"] - least
-        if not np.any(parts["damped"] > 0.0):
-            del parts["damped"]
+        if not np.any(parts["damping_work"] > 0.0):
+            del parts["damping_work"]
         time = np.asarray(motion.time)
         axes.stackplot(
             time,
@@ -59,7 +64,7 @@ def energies(motion: Motion, axes: Axes | None = None) -> Axes:
             colors=[PALETTE[0], PALETTE[5], PALETTE[1], PALETTE[4]],
             linewidth=0.0,
         )
-        whole = parts["kinetic"][0] + parts["stored"][0] + np.asarray(motion.given)
+        whole = parts["kinetic"][0] + parts["stored"][0] + np.asarray(motion.external_work)
         axes.plot(time, whole, color=DATA, linestyle="--", linewidth=1.0, label="given")
         axes.set(xlabel=TIME, ylabel="energy per width")
         axes.legend(loc="center right", frameon=True, framealpha=0.9)

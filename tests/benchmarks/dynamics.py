@@ -52,14 +52,14 @@ def scene(**values):
 def ringing(strip, cycles, per_cycle, **options):
     """A payload of 50 strips let go, in steps of a part of its period."""
     mass = HEAVY * 2.0 * float(strip.strip.half_height * strip.strip.length)
-    riders = dynamics.Riders(mass)
-    period = 2.0 * np.pi / float(dynamics.modes(strip, riders=riders).frequency[0])
+    attached = dynamics.AttachedMasses(mass)
+    period = 2.0 * np.pi / float(dynamics.modes(strip, attached=attached).frequency[0])
     step = {} if per_cycle is None else {"step": period / per_cycle}
     return dynamics.simulate(
         strip,
         cycles * period,
         dynamics.Recorded([0.0, 0.1 * period], [1.0, 0.0]),
-        riders=riders,
+        attached=attached,
         released=1.0,
         samples=round(50 * cycles) + 1,
         **step,
@@ -85,16 +85,18 @@ def slow_limit():
     """Work of friction under a slow harmonic load over that of the quasi-static loop."""
     strip = scene()
     loop = float(jb.solve(strip).dissipation)
-    riders = dynamics.Riders(HEAVY * 2.0 * float(strip.strip.half_height * strip.strip.length))
-    first = float(dynamics.modes(strip, riders=riders).frequency[0]) / (2.0 * np.pi)
+    attached = dynamics.AttachedMasses(
+        HEAVY * 2.0 * float(strip.strip.half_height * strip.strip.length)
+    )
+    first = float(dynamics.modes(strip, attached=attached).frequency[0]) / (2.0 * np.pi)
     rows = []
     for ratio in (0.1, 0.03, 0.01):
         slow = 1.0 / (ratio * first)
         load = dynamics.Harmonic(0.7855, 1.0 / slow, ramp=0.5)
         motion = dynamics.simulate(
-            strip, 2.5 * slow, load, riders=riders, samples=501, step=slow / 10000
+            strip, 2.5 * slow, load, attached=attached, samples=501, step=slow / 10000
         )
-        loss = float(motion.rubbed[-1] - motion.rubbed[-201])
+        loss = float(motion.friction_work[-1] - motion.friction_work[-201])
         rows.append({"frequency_ratio": ratio, "dissipation_over_quasi_static": loss / loop})
     return rows
 
@@ -143,7 +145,7 @@ def work_precision():
                 "steps": int(motion.steps),
                 "seconds": seconds,
                 "error": float(off),
-                "friction_off": float(motion.rubbed[-1] / reference.rubbed[-1] - 1.0),
+                "friction_off": float(motion.friction_work[-1] / reference.friction_work[-1] - 1.0),
                 "status": int(motion.status),
             }
         )

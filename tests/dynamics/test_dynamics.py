@@ -111,7 +111,7 @@ def test_the_first_thickness_stretch_is_ten_per_cent_off_unless_corrected():
     exact = 0.5 * np.pi * jnp.sqrt(c11 / RHO) / half
     for factor, off in ((1.0, np.sqrt(12.0) / np.pi), (dynamics.THICKNESS_STRETCH, 1.0)):
         inertia = dynamics.Inertia(RHO, squeeze_factor=factor)
-        masses = build(strip, inertia, dynamics.Riders(), dynamics.Excitation()).masses
+        masses = build(strip, inertia, dynamics.AttachedMasses(), dynamics.Excitation()).masses
         rates = jnp.array([0.0, -half, 0.0, 1.0])  # about mid-height
         found = jnp.sqrt(half * c11 / masses.section(jnp.zeros(4), rates))
         assert found / exact == pytest.approx(off, rel=1e-12)
@@ -122,7 +122,7 @@ def test_the_mass_of_layers_adds_up():
     layers = [[0.5 * half, 1e5, 0.3], [1.5 * half, 2e5, 0.3]]
     strip = scene(strip__layers=layers)
     inertia = dynamics.Inertia([8.0, 2.0])
-    masses = build(strip, inertia, dynamics.Riders(), dynamics.Excitation()).masses
+    masses = build(strip, inertia, dynamics.AttachedMasses(), dynamics.Excitation()).masses
     along = masses.section(jnp.zeros(4), jnp.array([1.0, 0.0, 0.0, 0.0]))
     turned = masses.section(jnp.zeros(4), jnp.array([0.0, 0.0, 1.0, 0.0]))
     assert along == pytest.approx(0.5 * (8.0 * 0.5 + 2.0 * 1.5) * half, rel=1e-12)
@@ -132,7 +132,9 @@ def test_the_mass_of_layers_adds_up():
 
 def test_exact_kinematics_keep_energy_and_momentum_of_a_turning_section():
     strip = jb.Scene().replace({"model.nodes": 11})
-    masses = build(strip, dynamics.Inertia(RHO), dynamics.Riders(3.0), dynamics.Excitation()).masses
+    masses = build(
+        strip, dynamics.Inertia(RHO), dynamics.AttachedMasses(3.0), dynamics.Excitation()
+    ).masses
     rng = np.random.default_rng(1)
     q, p = 0.3 * rng.standard_normal((2, 11, 4))
     blocks = jitted(masses.blocks, jnp.asarray(q))
@@ -142,7 +144,7 @@ def test_exact_kinematics_keep_energy_and_momentum_of_a_turning_section():
     )
     # Work of the inertia forces of free motion is the change of the kinetic energy: none, where
     # the accelerations balance them.
-    force = -jitted(masses.transport, jnp.asarray(q), jnp.asarray(p))
+    force = -jitted(masses.velocity_forces, jnp.asarray(q), jnp.asarray(p))
     speed = np.linalg.solve(blocks, np.asarray(force)[..., None])[..., 0]
     step = 1e-5
     ahead, behind = (
@@ -163,7 +165,7 @@ def test_the_rate_law_walks_the_quasi_static_loop(m):
         walked.append(float(t))
 
     def rate(s, t):
-        slid = rate_friction.slid(
+        slid = rate_friction.traction_rate(
             jnp.asarray(t[0]), jnp.asarray(speed(s)), jnp.asarray(1.0), 1.0, jnp.asarray(m), 1e-9
         )
         return [float(slid)]
@@ -177,10 +179,10 @@ def test_the_rate_law_walks_the_quasi_static_loop(m):
 
 def test_a_falling_cap_takes_the_traction_along():
     t, cap = jnp.asarray(0.9), jnp.asarray(0.5)
-    assert rate_friction.relaxing(t, cap, 0.1) == pytest.approx(-4.0)
-    assert rate_friction.relaxing(-t, cap, 0.1) == pytest.approx(4.0)
-    assert rate_friction.relaxing(0.4 * t, cap, 0.1) == 0.0
-    assert rate_friction.relaxing(t, -cap, 0.1) == pytest.approx(-9.0)
+    assert rate_friction.relaxation_rate(t, cap, 0.1) == pytest.approx(-4.0)
+    assert rate_friction.relaxation_rate(-t, cap, 0.1) == pytest.approx(4.0)
+    assert rate_friction.relaxation_rate(0.4 * t, cap, 0.1) == 0.0
+    assert rate_friction.relaxation_rate(t, -cap, 0.1) == pytest.approx(-9.0)
 
 
 def test_stability_limits_are_the_textbooks():
@@ -192,10 +194,10 @@ def test_stability_limits_are_the_textbooks():
 def test_reaction_has_elasticity_and_inertia():
     strip = scene(model__nodes=11)
     shaker = dynamics.Shaker(3.0, 0.25, direction="across")
-    equations = build(strip, dynamics.Inertia(RHO), dynamics.Riders(), shaker)
+    equations = build(strip, dynamics.Inertia(RHO), dynamics.AttachedMasses(), shaker)
     history = jb.solve(strip, np.zeros(1))
-    state = jitted(equations.state, history.fields[-1], history.traction[-1], jnp.zeros(()))
-    still, shaken = (jitted(equations.answer, jnp.asarray(t), state).reaction for t in (0.0, 1.0))
+    state = jitted(equations.initial_state, history.fields[-1], history.traction[-1], jnp.zeros(()))
+    still, shaken = (jitted(equations.response, jnp.asarray(t), state).reaction for t in (0.0, 1.0))
     assert np.allclose(still, 10.0, rtol=1e-9)
     # The strip weighs more on a foundation that rises, but for what its squeezing gives way.
     weight = 2.0 * float(strip.strip.half_height) * RHO * 3.0

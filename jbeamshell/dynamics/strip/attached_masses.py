@@ -33,22 +33,22 @@ class AttachedMasses(eqx.Module):
     def __init__(
         self, payload: Any = 0.0, masses: Any = (), springs: Any = (), dampers: Any = None
     ) -> None:
-        self.payload = as_leaf(payload, "riders.payload")
-        self.masses = as_leaf(list(masses), "riders.masses", CHAIN)
-        self.springs = as_leaf(list(springs), "riders.springs", CHAIN)
+        self.payload = as_leaf(payload, "attached.payload")
+        self.masses = as_leaf(list(masses), "attached.masses", CHAIN)
+        self.springs = as_leaf(list(springs), "attached.springs", CHAIN)
         own = np.zeros(self.masses.shape) if dampers is None else list(dampers)
-        self.dampers = as_leaf(own, "riders.dampers", CHAIN)
+        self.dampers = as_leaf(own, "attached.dampers", CHAIN)
 
     def __check_init__(self) -> None:
-        require_number("riders.payload", self.payload, NOT_NEGATIVE, low=-TINY)
-        require("riders.masses", self.masses, self.masses.ndim == 1, CHAIN)
+        require_number("attached.payload", self.payload, NOT_NEGATIVE, low=-TINY)
+        require("attached.masses", self.masses, self.masses.ndim == 1, CHAIN)
         for name, least in (("masses", 0.0), ("springs", 0.0), ("dampers", -TINY)):
             values = getattr(self, name)
-            require(f"riders.{name}", values, values.shape == self.masses.shape, CHAIN)
+            require(f"attached.{name}", values, values.shape == self.masses.shape, CHAIN)
             if not isinstance(values, jax.core.Tracer):
                 known = np.asarray(values)
                 sound = bool(np.all(np.isfinite(known) & (known > least)))
-                require(f"riders.{name}", values, sound, CHAIN)
+                require(f"attached.{name}", values, sound, CHAIN)
 
     @property
     def count(self) -> int:

@@ -79,7 +79,7 @@ class Equations(eqx.Module):
     system : the forces of equilibrium
     masses : inertia
     inertia : its constants
-    riders : what rides on the loaded end
+    attached : what rides on the loaded end
     excitation : what shakes it
     smoothing : m of the rate law
     relaxation : time in which a traction follows a falling cap, H over the speed of sound
@@ -92,7 +92,7 @@ class Equations(eqx.Module):
     system: System
     masses: Masses
     inertia: Inertia
-    riders: AttachedMasses
+    attached: AttachedMasses
     excitation: Excitation
     smoothing: Array
     relaxation: Array
@@ -102,17 +102,17 @@ class Equations(eqx.Module):
     inverse: Array | None
 
     def __init__(
-        self, scene: Scene, inertia: Inertia, riders: AttachedMasses, excitation: Excitation
+        self, scene: Scene, inertia: Inertia, attached: AttachedMasses, excitation: Excitation
     ) -> None:
         self.system = system = System(scene)
-        self.masses = Masses(scene, system, inertia, riders.payload)
-        self.inertia, self.riders, self.excitation = inertia, riders, excitation
+        self.masses = Masses(scene, system, inertia, attached.payload)
+        self.inertia, self.attached, self.excitation = inertia, attached, excitation
         self.smoothing = rate_friction.exponent(scene.contact.law)
         strip = scene.strip
         weight = 2.0 * strip.half_height * inertia.mean_density(scene) * strip.length
         speed = jnp.sqrt(strip.stretching_stiffness * strip.length / weight)
         self.relaxation = strip.half_height / speed
-        carried = riders.payload + jnp.sum(riders.masses)
+        carried = attached.payload + jnp.sum(attached.masses)
         self.time_unit = strip.length / speed * jnp.sqrt(1.0 + carried / weight)
         self.units = self._units(scene)
         self.factor = self.inverse = None
@@ -158,11 +158,11 @@ class Equations(eqx.Module):
         """All fields (n, m) of the nodes from the free ones (b, a)."""
         return self.system.embed(active[: self.n])
 
-    def state(self, q: Array, traction: Array, push: Array) -> MotionState:
+    def initial_state(self, q: Array, traction: Array, push: Array) -> MotionState:
         """At rest in fields q (n, m) under tractions (n,), but for a push on the loaded end."""
         conjugate = jnp.zeros_like(q).at[-1].set(self.conjugate(q))
         rate = self._accelerations(q, push * conjugate)
-        hung = jnp.full(self.riders.count, self.system.end_displacement(q))
+        hung = jnp.full(self.attached.count, self.system.end_displacement(q))
         return MotionState(
             self.joined(q, hung),
             self.joined(rate, jnp.zeros_like(hung)),
@@ -178,11 +178,11 @@ class Equations(eqx.Module):
 
     def __call__(self, time: Array, state: MotionState) -> MotionState:
         """Rates of a state."""
-        answer = self.answer(time, state)
-        slipping = jnp.pad(answer.slipping, (0, self.riders.count))
+        answer = self.response(time, state)
+        slipping = jnp.pad(answer.slipping, (0, self.attached.count))
         return MotionState(state.p, answer.acceleration, slipping, answer.power)
 
-    def answer(self, time: Array, state: MotionState) -> InstantResponse:
+    def response(self, time: Array, state: MotionState) -> InstantResponse:
         """What follows from a state at an instant."""
         system, n = self.system, self.n
         q, p, t = self.nodal(state.q), self.nodal(state.p), state.t[:n]
@@ -193,7 +193,7 @@ class Equations(eqx.Module):
         conjugate = self.conjugate(q)
         chain = self._chain(state, system.end_displacement(q), jnp.sum(conjugate * p[-1]))
         pull = pull.at[:, V].add(system.tributary * t).at[-1].add(-chain.force * conjugate)
-        force = -(pull + damping + carried + self.masses.transport(q, p))
+        force = -(pull + damping + carried + self.masses.velocity_forces(q, p))
         force = force.at[-1].add(end_force * conjugate)
         if isinstance(system.normal, Compliance):
             reaction = jax.vmap(system.normal.reaction)(q[:, W], system.gap(q))
@@ -207,7 +207,7 @@ class Equations(eqx.Module):
         slipping = self._slipping(t, p[:, V], cap)
         lost = t * p[:, V] - t * slipping / system.slip_stiffness
         given = end_force * jnp.sum(conjugate * p[-1]) - jnp.sum(carried * p)
-        given = given - shaken[0] * jnp.sum(self.riders.masses * chain.rates)
+        given = given - shaken[0] * jnp.sum(self.attached.masses * chain.rates)
         warmed = jnp.sum(damping * p) + chain.loss
         return InstantResponse(
             acceleration=self.joined(acceleration, chain.accelerations - shaken[0]),
@@ -221,9 +221,9 @@ class Equations(eqx.Module):
         """Kinetic and stored energy per width, the sliders', the contact's and the chain's too."""
         system, n = self.system, self.n
         q, p, t = self.nodal(state.q), self.nodal(state.p), state.t[:n]
-        chain = 0.5 * jnp.sum(self.riders.masses * state.p[n:, 0] ** 2)
+        chain = 0.5 * jnp.sum(self.attached.masses * state.p[n:, 0] ** 2)
         stretch = jnp.diff(jnp.append(system.end_displacement(q), state.q[n:, 0]))
-        springs = 0.5 * jnp.sum(self.riders.springs * stretch**2)
+        springs = 0.5 * jnp.sum(self.attached.springs * stretch**2)
         layer = jax.vmap(system.normal.energy)(system.gap(q)) + t**2 / (2.0 * system.slip_stiffness)
         stored = system.potential(q, 1.0) + jnp.sum(system.tributary * layer)
         return self.masses.kinetic(q, p) + chain, stored + springs
@@ -235,11 +235,11 @@ class Equations(eqx.Module):
         system = self.system
         if not self.rubs:
             return jnp.zeros_like(t)
-        slid = rate_friction.slid(
+        slid = rate_friction.traction_rate(
             t, speed, cap, system.slip_stiffness, self.smoothing, system.cap_floor
         )
         slid = jnp.where(system.friction > 0.0, slid, 0.0)
-        return slid + rate_friction.relaxing(t, cap, self.relaxation)
+        return slid + rate_friction.relaxation_rate(t, cap, self.relaxation)
 
     def damping(self, q: Array, p: Array) -> Array:
         """Rayleigh's forces (n, m)."""
@@ -255,17 +255,17 @@ class Equations(eqx.Module):
 
     def _chain(self, state: MotionState, end: Array, rate: Array) -> _Chain:
         """The chain's forces, from the loaded end's displacement and rate."""
-        riders, n = self.riders, self.n
+        attached, n = self.attached, self.n
         rates = state.p[n:, 0]
         stretch = jnp.diff(jnp.append(end, state.q[n:, 0]))
         pulling = jnp.diff(jnp.append(rate, rates))
-        held = riders.springs * stretch + riders.dampers * pulling
-        forces = jnp.append(held[1:], jnp.zeros(min(riders.count, 1))) - held
+        held = attached.springs * stretch + attached.dampers * pulling
+        forces = jnp.append(held[1:], jnp.zeros(min(attached.count, 1))) - held
         return _Chain(
             force=jnp.sum(held[:1]),
-            accelerations=forces / riders.masses,
+            accelerations=forces / attached.masses,
             rates=rates,
-            loss=jnp.sum(riders.dampers * pulling**2),
+            loss=jnp.sum(attached.dampers * pulling**2),
         )
 
     def _accelerations(self, q: Array, force: Array) -> Array:

@@ -160,7 +160,7 @@ class Masses(eqx.Module):
         squares = jax.vmap(square)(self.heights)
         return 0.5 * (jnp.sum(self.weights * squares) + self.extra * rates[PSI] ** 2)
 
-    def ride(self, fields: Array, rates: Array) -> Array:
+    def payload_energy(self, fields: Array, rates: Array) -> Array:
         """Kinetic energy of the payload, from the end section's fields and rates (m,)."""
         _, speed = jax.jvp(lambda f: self.system.end_displacement(f[None]), (fields,), (rates,))
         return 0.5 * self.payload * speed**2
@@ -169,7 +169,7 @@ class Masses(eqx.Module):
         """Kinetic energy of all, from nodal fields and rates (n, m)."""
         if self.constant is not None:
             return 0.5 * jnp.sum(rate * self.momentum(q, rate))
-        payload = self.ride(q[-1], rate[-1])
+        payload = self.payload_energy(q[-1], rate[-1])
         if self.mass == "lumped":
             return payload + jnp.sum(self.system.tributary * jax.vmap(self.section)(q, rate))
         values, weights = _exact_rule(self.system.model.grid)
@@ -187,7 +187,7 @@ class Masses(eqx.Module):
             return jnp.sum(self.constant * rate[:, None, :], axis=2)
         return jax.grad(self.kinetic, argnums=1)(q, rate)
 
-    def gained(
+    def step_forces(
         self, q: Array, p: Array, change: Array, gain: Array, at: Array, h: ArrayLike
     ) -> Array:
         """Forces of inertia (n, m) in a step h.
@@ -207,9 +207,9 @@ class Masses(eqx.Module):
         still = jnp.zeros_like(q)
         blocks = jax.vmap(jax.hessian(self.section, argnums=1))(q, still)
         blocks = self.system.tributary[:, None, None] * blocks
-        return blocks.at[-1].add(jax.hessian(self.ride, argnums=1)(q[-1], still[-1]))
+        return blocks.at[-1].add(jax.hessian(self.payload_energy, argnums=1)(q[-1], still[-1]))
 
-    def transport(self, q: Array, rate: Array) -> Array:
+    def velocity_forces(self, q: Array, rate: Array) -> Array:
         """What inertia adds to M q_tt while M changes: M_t q_t - dT/dq, (n, m)."""
         if self.system.model.kinematics == "linear":
             return jnp.zeros_like(q)

@@ -66,7 +66,7 @@ class Midpoint(diffrax.AbstractSolver):
 
     def init(self, terms: Any, t0: Any, t1: Any, y0: MotionState, args: Prepared) -> StepMemory:
         """Before the first step."""
-        n, cap = args.equations.n, args.equations.answer(jnp.asarray(t0), y0).cap
+        n, cap = args.equations.n, args.equations.response(jnp.asarray(t0), y0).cap
         none = jnp.zeros_like(y0.q)
         begun = jnp.zeros_like(y0.work[0])
         return StepMemory(args.equations.nodal(y0.q)[:, V], y0.t[:n], cap, none, none, begun)
@@ -160,7 +160,7 @@ class Prepared(eqx.Module):
             change = system.embed(nodal(system, unknown))
             half, rate = stride.reached(q0, change, ago), change / h
             gain = stride.gain(rate, p0, gained)
-            inertia = equations.masses.gained(q0, p0, change, gain, half, h)
+            inertia = equations.masses.step_forces(q0, p0, change, gain, half, h)
             damping = equations.damping(half, rate)
             forces = system.elastic(half, 1.0) + inertia + damping + carried
             moved = system.end_displacement(q0 + change) - end0
@@ -243,9 +243,9 @@ class Prepared(eqx.Module):
         self, stride: TimeStep, state: MotionState, last: StepMemory, end: Array, shaken: Array
     ) -> ChainPull:
         """How the chain answers during a step; ``end`` is u(L) at z* of an end that stands."""
-        riders, n = self.equations.riders, self.equations.n
+        attached, n = self.equations.attached, self.equations.n
         z, rate = state.q[n:, 0], state.p[n:, 0]
-        if not riders.count:
+        if not attached.count:
             nothing = jnp.zeros_like(end)
             return ChainPull(nothing, nothing, z, z)
 
@@ -254,12 +254,12 @@ class Prepared(eqx.Module):
             at = stride.reached(z, change, last.change[n:, 0])
             stretch = jnp.diff(jnp.append(end + stride.part * moved, at))
             drawn = jnp.diff(jnp.append(moved, change))
-            return riders.springs * stretch + riders.dampers * drawn / stride.h
+            return attached.springs * stretch + attached.dampers * drawn / stride.h
 
         def residual(change: Array, moved: Array) -> Array:
             held = forces(change, moved)
             gain = stride.gain(change / stride.h, rate, last.gain[n:, 0])
-            return riders.masses * (gain / stride.h + shaken) + held - jnp.append(held[1:], 0.0)
+            return attached.masses * (gain / stride.h + shaken) + held - jnp.append(held[1:], 0.0)
 
         still, none = jnp.zeros_like(z), jnp.zeros_like(end)
         system = jax.jacfwd(residual)(still, none)
@@ -280,16 +280,16 @@ class Prepared(eqx.Module):
     ) -> Array:
         """Work from outside, of friction (at q*, at the end) and of damping in a step, (3,)."""
         equations, system, n = self.equations, self.equations.system, self.equations.n
-        riders, excitation = equations.riders, equations.excitation
+        attached, excitation = equations.attached, equations.excitation
         q0, change, (acts, onward) = equations.nodal(state.q), equations.nodal(moved), tractions
         end = system.end_displacement(q0 + change) - system.end_displacement(q0)
         given = stride.mean(excitation.force) * end - jnp.sum(carried * change)
         shaken = stride.mean(excitation.acceleration)[0]
-        given = given - shaken * jnp.sum(riders.masses * moved[n:, 0])
+        given = given - shaken * jnp.sum(attached.masses * moved[n:, 0])
         kept = (onward**2 - state.t[:n] ** 2) / (2.0 * system.slip_stiffness)
         rubbed = jnp.sum(system.tributary * (acts * change[:, V] - kept))
         drawn = jnp.diff(jnp.append(end, moved[n:, 0]))
-        warmed = jnp.sum(damping * change) + jnp.sum(riders.dampers * drawn**2) / stride.h
+        warmed = jnp.sum(damping * change) + jnp.sum(attached.dampers * drawn**2) / stride.h
         return jnp.stack([given, rubbed, warmed])
 
 

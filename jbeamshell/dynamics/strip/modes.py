@@ -39,7 +39,7 @@ class Modes(NamedTuple):
 def modes(
     scene: Scene,
     inertia: Inertia | None = None,
-    riders: AttachedMasses | None = None,
+    attached: AttachedMasses | None = None,
     *,
     stuck: bool = True,
 ) -> Modes:
@@ -48,7 +48,7 @@ def modes(
     Parameters
     ----------
     scene : the strip; a compliant contact counts as closed
-    inertia, riders : as of `simulate`; a chain is left out
+    inertia, attached : as of `simulate`; a chain is left out
     stuck : whether friction holds everywhere, elastically, with k_t; else it is without
 
     Raises
@@ -56,9 +56,9 @@ def modes(
     InputError
         for a scene that cannot be set in motion
     """
-    inertia, riders = inertia or Inertia(), riders or AttachedMasses()
+    inertia, attached = inertia or Inertia(), attached or AttachedMasses()
     check(scene, inertia)
-    given = _matrices(scene, inertia, AttachedMasses(riders.payload), stuck)
+    given = _matrices(scene, inertia, AttachedMasses(attached.payload), stuck)
     mass, stiffness, x, moves = map(np.asarray, given)
     free = np.flatnonzero(moves)
     pick = np.ix_(free, free)
@@ -72,10 +72,10 @@ def modes(
 
 @eqx.filter_jit
 def _matrices(
-    scene: Scene, inertia: Inertia, riders: AttachedMasses, stuck: bool
+    scene: Scene, inertia: Inertia, attached: AttachedMasses, stuck: bool
 ) -> tuple[Array, ...]:
     """Mass and stiffness of the active fields (n a, n a), the nodes, and what moves."""
-    equations = Equations(scene, inertia, riders, Excitation())
+    equations = Equations(scene, inertia, attached, Excitation())
     system, columns = equations.system, list(scene.model.active)
     held = stuck and equations.rubs
 
@@ -95,22 +95,22 @@ def _matrices(
     return equations.dense_mass(), symmetric, system.x, jnp.asarray(equations.moves)
 
 
-def highest_frequency(scene: Scene, inertia: Inertia, riders: AttachedMasses) -> float:
+def highest_frequency(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> float:
     """Highest angular frequency of the stuck strip with what rides on it, or a bound of it."""
-    found = modes(scene, inertia, riders)
+    found = modes(scene, inertia, attached)
     own = float(found.frequency[-1])
-    if not riders.count:
+    if not attached.count:
         return own
     # A spring can at most add its stiffness over the masses at its two ends (Gershgorin).
-    springs, masses = np.asarray(riders.springs), np.asarray(riders.masses)
+    springs, masses = np.asarray(attached.springs), np.asarray(attached.masses)
     height = 2.0 * float(scene.strip.half_height)
     light = float(inertia.mean_density(scene)) * height * (found.x[-1] - found.x[-2]) / 24.0
     behind = np.append(springs[1:], 0.0)
     chain = float(np.max(2.0 * (springs + behind) / masses))
-    return float(np.sqrt(own**2 + chain + springs[0] / (light + float(riders.payload))))
+    return float(np.sqrt(own**2 + chain + springs[0] / (light + float(attached.payload))))
 
 
-def first_period(scene: Scene, inertia: Inertia, riders: AttachedMasses) -> float:
+def first_period(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> float:
     """Period of the stuck strip's first vibration, its chain's masses as if they sat on its end."""
-    carried = AttachedMasses(riders.payload + riders.masses.sum())
+    carried = AttachedMasses(attached.payload + attached.masses.sum())
     return 2.0 * np.pi / float(modes(scene, inertia, carried).frequency[0])

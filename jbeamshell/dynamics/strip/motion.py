@@ -32,7 +32,7 @@ class Motion(eqx.Module):
 
     Attributes
     ----------
-    scene, inertia, riders, excitation : what was set in motion
+    scene, inertia, attached, excitation : what was set in motion
     x, tributary : (n,) nodes and their contact lengths
     time : (T,) instants
     fields, rates : (T, n, m) v, w, beta, psi (and those of a hierarchic section), and their rates
@@ -41,14 +41,15 @@ class Motion(eqx.Module):
     chain : (T, k) displacements of the chain's masses
     force : (T,) F at the loaded end
     kinetic, stored : (T,) energies, the sliders', the contact's and the pressure's in the second
-    given, rubbed, damped : (T,) work since t = 0: from outside, lost by friction, by damping
+    external_work : (T,) work done by forces and by the foundation since t = 0
+    friction_work, damping_work : (T,) work lost by friction and by damping since t = 0
     steps, rejected : time steps taken, and those of them that were taken back
     status : code of `Ending`
     """
 
     scene: Scene
     inertia: Inertia
-    riders: AttachedMasses
+    attached: AttachedMasses
     excitation: Excitation
     x: Array
     tributary: Array
@@ -63,9 +64,9 @@ class Motion(eqx.Module):
     force: Array
     kinetic: Array
     stored: Array
-    given: Array
-    rubbed: Array
-    damped: Array
+    external_work: Array
+    friction_work: Array
+    damping_work: Array
     steps: Array
     rejected: Array
     status: Array
@@ -85,10 +86,10 @@ class Motion(eqx.Module):
     def imbalance(self) -> Array:
         """Energy that the ledger does not account for, (T,); zero but for errors of the steps."""
         change = self.energy - self.energy[0]
-        return change - self.given + self.rubbed + self.damped
+        return change - self.external_work + self.friction_work + self.damping_work
 
     @property
-    def sound(self) -> bool:
+    def complete(self) -> bool:
         """Whether the whole span was followed."""
         return int(self.status) == Ending.COMPLETE
 
@@ -109,10 +110,10 @@ class Motion(eqx.Module):
             "rejected_steps": int(self.rejected),
             "largest_displacement": float(np.max(np.abs(np.asarray(self.displacement)[known]))),
             "largest_kinetic_energy": scale,
-            "work_given": float(self.given[last]),
-            "work_of_friction": float(self.rubbed[last]),
-            "work_of_damping": float(self.damped[last]),
-            "energy_left_over": float(jnp.max(jnp.abs(self.imbalance[: last + 1]))),
+            "external_work": float(self.external_work[last]),
+            "friction_work": float(self.friction_work[last]),
+            "damping_work": float(self.damping_work[last]),
+            "energy_imbalance": float(jnp.max(jnp.abs(self.imbalance[: last + 1]))),
             "status": Ending(int(self.status)).name.lower(),
         }
         return figures

@@ -40,7 +40,7 @@ def exponent(law: FrictionLaw) -> Array:
     return getattr(law, "smoothing", jnp.asarray(SHARPEST))
 
 
-def slid(
+def traction_rate(
     t: Array, speed: Array, cap: Array, stiffness: ArrayLike, m: Array, floor: ArrayLike
 ) -> Array:
     """Rate of the traction, without the relaxation.
@@ -63,7 +63,7 @@ def slid(
     return jnp.multiply(stiffness, speed) * slowing
 
 
-def relaxing(t: Array, cap: Array, time: ArrayLike) -> Array:
+def relaxation_rate(t: Array, cap: Array, time: ArrayLike) -> Array:
     """What brings a traction back that a falling cap has left behind, traction per time."""
     room = jnp.maximum(cap, 0.0)
     return (jnp.clip(t, -room, room) - t) / time

@@ -42,7 +42,7 @@ def simulate(
     excitation: Excitation | None = None,
     *,
     inertia: Inertia | None = None,
-    riders: AttachedMasses | None = None,
+    attached: AttachedMasses | None = None,
     released: ArrayLike | None = None,
     samples: int = 1001,
     method: str = "midpoint",
@@ -61,7 +61,7 @@ def simulate(
     span : time that is followed
     excitation : what shakes it; None is free vibration
     inertia : density and what goes with it; None is density 1
-    riders : payload and chain at the loaded end
+    attached : payload and chain at the loaded end
     released : force F, or a path of forces, under which the strip rests before t = 0; None is the
         pressed strip
     samples : instants, evenly spaced from 0 to ``span``, that are kept
@@ -91,7 +91,7 @@ def simulate(
     InterruptedMotionError
         if the solver gives up; it carries the part computed
     """
-    inertia, riders = inertia or Inertia(), riders or AttachedMasses()
+    inertia, attached = inertia or Inertia(), attached or AttachedMasses()
     excitation = excitation or Excitation()
     check(scene, inertia)
     require_number("span", span, POSITIVE + " (time)")
@@ -102,7 +102,7 @@ def simulate(
     scene = scene if method == "midpoint" else smooth(scene)
     acts = is_traced(excitation) or released is not None or excitation.acts(float(span))
     require("excitation", type(excitation).__name__, acts, HAPPENS)
-    longest = longest_step(scene, inertia, riders, method, step)
+    longest = longest_step(scene, inertia, attached, method, step)
     start = _start(scene, released)
     if progress is None:
         progress = sys.stderr.isatty()
@@ -110,7 +110,7 @@ def simulate(
     between = 1 if longest is None else max(1, math.ceil(times[1] / longest * (1.0 - 1e-9)))
     instants = np.linspace(0.0, float(span), (samples - 1) * between + 1)
     motion = _run(
-        (scene, inertia, riders, excitation),
+        (scene, inertia, attached, excitation),
         start,
         jnp.asarray(instants),
         None if longest is None else between,
@@ -164,7 +164,7 @@ def _run(
     units, unit = equations.units, equations.time_unit
     times = instants[:: between or 1]
     fields, traction, rest = start
-    state = equations.state(fields, traction, parts[3].push)
+    state = equations.initial_state(fields, traction, parts[3].push)
     args = None
     if method == "midpoint":
         unit, units, args = (
@@ -229,7 +229,7 @@ def _motion(
 
     def seen(pair: tuple[Array, MotionState]) -> tuple[Array, ...]:
         time, state = pair
-        answer = equations.answer(time, state)
+        answer = equations.response(time, state)
         q, p = equations.nodal(state.q), equations.nodal(state.p)
         speed = jnp.sum(equations.conjugate(q) * p[-1])
         ends = (equations.system.end_displacement(q) - rest, speed)
@@ -241,7 +241,7 @@ def _motion(
     return Motion(
         scene=parts[0],
         inertia=parts[1],
-        riders=parts[2],
+        attached=parts[2],
         excitation=parts[3],
         x=equations.system.x,
         tributary=equations.system.tributary,
@@ -256,9 +256,9 @@ def _motion(
         force=jax.vmap(parts[3].force)(times),
         kinetic=kinetic,
         stored=stored,
-        given=states.work[:, 0],
-        rubbed=states.work[:, 1],
-        damped=states.work[:, 2],
+        external_work=states.work[:, 0],
+        friction_work=states.work[:, 1],
+        damping_work=states.work[:, 2],
         steps=solution.stats["num_steps"],
         rejected=solution.stats["num_rejected_steps"],
         status=_status(solution, reached),

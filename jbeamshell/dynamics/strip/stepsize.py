@@ -34,7 +34,7 @@ MARGIN = 0.9  # of the stable step, taken where none is given
 def stable_step(
     scene: Scene,
     inertia: Inertia | None = None,
-    riders: AttachedMasses | None = None,
+    attached: AttachedMasses | None = None,
     method: str = "tsit5",
 ) -> float:
     """Largest time step with which an explicit method stays stable.
@@ -44,14 +44,14 @@ def stable_step(
     does not count.  Points that slip fast have a faster decay of their own, k_t abs(v_t) m/cap,
     which no step known beforehand allows for: look at the energy left over.
     """
-    inertia, riders = inertia or Inertia(), riders or AttachedMasses()
+    inertia, attached = inertia or Inertia(), attached or AttachedMasses()
     require_choice("method", method, tuple(EXPLICIT))
     check(scene, inertia)
     vibration, decay = stability_limits(EXPLICIT[method]().tableau)
-    limit = vibration / highest_frequency(scene, inertia, riders)
+    limit = vibration / highest_frequency(scene, inertia, attached)
     rubs = float(scene.contact.friction) > 0.0 and scene.contact.normal != "none"
     if rubs:
-        limit = min(limit, decay * float(_relaxation(scene, inertia, riders)))
+        limit = min(limit, decay * float(_relaxation(scene, inertia, attached)))
     return limit
 
 
@@ -75,12 +75,12 @@ def stability_limits(tableau: Any) -> tuple[float, float]:
 
 
 @eqx.filter_jit
-def _relaxation(scene: Scene, inertia: Inertia, riders: AttachedMasses) -> Array:
-    return Equations(scene, inertia, riders, Excitation()).relaxation
+def _relaxation(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> Array:
+    return Equations(scene, inertia, attached, Excitation()).relaxation
 
 
 def longest_step(
-    scene: Scene, inertia: Inertia, riders: AttachedMasses, method: str, step: float | None
+    scene: Scene, inertia: Inertia, attached: AttachedMasses, method: str, step: float | None
 ) -> float | None:
     """The constant step to take; None where the solver chooses."""
     if step is not None:
@@ -88,13 +88,13 @@ def longest_step(
     if method in STIFF:
         require("step", step, step is None, f"{method} chooses its own from the tolerance")
         return None
-    if is_traced(scene, inertia, riders):
+    if is_traced(scene, inertia, attached):
         fix = "a traced scene's own cannot be known: give it"
         require("step", step, step is not None, fix)
         return step
     if method == "midpoint":
-        return step or first_period(scene, inertia, riders) / PER_PERIOD
-    limit = stable_step(scene, inertia, riders, method)
+        return step or first_period(scene, inertia, attached) / PER_PERIOD
+    limit = stable_step(scene, inertia, attached, method)
     fix = f"is above the largest stable one of {method}, {limit:.6g}: take less, or the midpoint"
     require("step", step, step is None or step <= limit, fix)
     return step or MARGIN * limit

@@ -29,7 +29,7 @@ FLOOR = 1e-12  # of a slider's limit that is zero
 HAPPENS = "nothing happens: give a force, or an initial displacement or velocity"
 
 
-class Shaken(NamedTuple):
+class StructureMotion(NamedTuple):
     """Motion of a structure, at evenly spaced instants; those not reached hold NaN.
 
     Attributes
@@ -37,7 +37,8 @@ class Shaken(NamedTuple):
     time : (T,)
     displacement, velocity : (T, n)
     kinetic, stored : (T,) energies, the sliders' in the second
-    given, rubbed, damped : (T,) work since t = 0 from outside, lost in joints, lost by C
+    external_work : (T,) work done by forces since t = 0
+    friction_work, damping_work : (T,) work lost in joints and by C since t = 0
     complete : whether the whole span was followed
     """
 
@@ -46,9 +47,9 @@ class Shaken(NamedTuple):
     velocity: Array
     kinetic: Array
     stored: Array
-    given: Array
-    rubbed: Array
-    damped: Array
+    external_work: Array
+    friction_work: Array
+    damping_work: Array
     complete: Array
 
     @property
@@ -61,15 +62,15 @@ class Shaken(NamedTuple):
     def imbalance(self) -> Array:
         """Energy that the ledger does not account for, (T,)."""
         change = self.kinetic + self.stored - self.kinetic[0] - self.stored[0]
-        return change - self.given + self.rubbed + self.damped
+        return change - self.external_work + self.friction_work + self.damping_work
 
 
 class InterruptedShakingError(UnconvergedError):
-    """A transient that ended too early; ``shaken`` is the part computed."""
+    """A transient that ended too early; ``motion`` is the part computed."""
 
-    def __init__(self, message: str, shaken: Shaken) -> None:
+    def __init__(self, message: str, motion: StructureMotion) -> None:
         super().__init__(message)
-        self.shaken = shaken
+        self.motion = motion
 
 
 class _Moving(NamedTuple):
@@ -104,7 +105,7 @@ def shake(
     most_steps: int = 1_000_000,
     progress: bool | None = None,
     throw: bool = True,
-) -> Shaken:
+) -> StructureMotion:
     """Follow a structure with joints in time.
 
     Parameters
@@ -177,13 +178,13 @@ def _run(
     tolerance: Any,
     smoothing: ArrayLike,
     settings: tuple[str, int, bool],
-) -> Shaken:
+) -> StructureMotion:
     method, most_steps, progress = settings
     least = FLOOR * jnp.max(parts.limits, initial=1e-30)
 
     def rates(time: Any, y: _Moving, _: Any) -> _Moving:
         speed = (parts.along.T @ y.v)[parts.owner]
-        slipping = rate_friction.slid(
+        slipping = rate_friction.traction_rate(
             y.held, speed, parts.limits, parts.springs, jnp.asarray(smoothing), least
         )
         outside = jnp.zeros_like(y.x) if force is None else force(time)
@@ -221,8 +222,8 @@ def _run(
     sliders = 0.5 * jnp.sum(y.held**2 / soft, axis=1)
     stored = 0.5 * jnp.einsum("ti,ij,tj->t", y.x, parts.stiffness, y.x) + sliders
     complete = (solution.result == diffrax.RESULTS.successful) & jnp.all(jnp.isfinite(kinetic))
-    given, rubbed, damped = y.work.T
-    return Shaken(times, y.x, y.v, kinetic, stored, given, rubbed, damped, complete)
+    external, friction, damping = y.work.T
+    return StructureMotion(times, y.x, y.v, kinetic, stored, external, friction, damping, complete)
 
 
 def _sizes(
