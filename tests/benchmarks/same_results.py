@@ -28,9 +28,19 @@ TABLE = {"contact.pressure": [[0.0, 4.0], [0.9, 12.0], [0.9, 6.0], [2.0, 10.0]]}
 DISPLACED = {"load.control": "displacement", "load.amplitude": 2e-5}
 ARC = {"load.control": "arc-length", "load.amplitude": 6e-5}
 MILD = {"strip.axial_stiffness": 3400.0}  # rotations that matter
-FIGURES = (
-    "force displacement fields gap traction reaction slip_work stored_energy sinking slipping status"
-).split()
+FIGURES = [
+    "force",
+    "displacement",
+    "fields",
+    "gap",
+    "traction",
+    "reaction",
+    "slip_work",
+    "stored_energy",
+    "sinking",
+    "slipping",
+    "status",
+]
 
 SCENES: dict[str, dict] = {
     "standard": {},
