@@ -18,6 +18,7 @@ Without a squeeze field sigma_y = 0 is condensed instead (chapter III):
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -97,6 +98,24 @@ def plane_stiffness(plane_modulus: Array, poisson_ratio: Array, plane: str) -> t
     nu = poisson_ratio
     coupling = nu / (1.0 - nu) if plane == "strain" else nu
     return coupling, plane_modulus / (1.0 - coupling**2)
+
+
+class _Plain(eqx.Module):
+    """Strain energy made of numbers, which are leaves, and functions, which are static."""
+
+    numbers: Any
+    functions: Any = eqx.field(static=True)
+
+    def __call__(self, e: Array, g: Array, k: Array, psi: Array, dpsi: Array) -> Array:
+        energy: Energy = eqx.combine(self.numbers, self.functions)
+        return energy(e, g, k, psi, dpsi)
+
+
+def as_energy(energy: Any) -> Any:
+    """Strain energy as a pytree whose leaves are numbers, so that a plain function is one too."""
+    if not any(map(callable, jax.tree.leaves(energy))):
+        return energy
+    return _Plain(*eqx.partition(energy, lambda leaf: not callable(leaf)))
 
 
 def forces(energy: Energy, strains: Strains) -> Strains:

@@ -32,7 +32,7 @@ from jbeamshell.common.checks import (
     static_word,
 )
 from jbeamshell.mechanics.elements import END_SIZE, ORDER
-from jbeamshell.mechanics.friction import CappedTrial, ElasticSlip, FrictionLaw, SharpSlip
+from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
 from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES, shear_modulus
 from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS
 from jbeamshell.mechanics.laminate import Laminate, check_layers
@@ -210,10 +210,10 @@ class Contact(eqx.Module):
     def __check_init__(self) -> None:
         require_number("contact.friction", self.friction, NOT_NEGATIVE, low=-TINY)
         require_number("contact.stick_stiffness", self.stick_stiffness)
-        if isinstance(self.law, ElasticSlip | CappedTrial):
-            require_number("contact.smoothing", self.law.smoothing, SMOOTHING, low=1.0)
         law = isinstance(self.law, FrictionLaw)
         require("contact.law", self.law, law, "give a jbeamshell.mechanics.friction.FrictionLaw")
+        if takes_smoothing(self.law):
+            require_number("contact.smoothing", self.smoothing, SMOOTHING, low=1.0)
         require_choice("contact.normal", self.normal, NORMALS)
         require_number("contact.normal_stiffness", self.normal_stiffness)
         for key in ("pressure", "bottom_pressure"):

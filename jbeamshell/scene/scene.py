@@ -21,26 +21,19 @@ from jbeamshell.common.checks import as_leaf, require, require_number
 from jbeamshell.common.errors import InputError
 from jbeamshell.mechanics.friction import (
     LAWS,
-    CappedTrial,
-    ElasticSlip,
     FrictionLaw,
-    SharpSlip,
-    TanhIncrement,
+    law_name,
+    law_named,
+    takes_smoothing,
 )
 from jbeamshell.mechanics.hierarchic import Hierarchic
-from jbeamshell.mechanics.homogeneous import Energy, Homogeneous
+from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy
 from jbeamshell.scene.keys import DERIVED, NUMBERS, OPTIONAL, WORDS, check_key
 from jbeamshell.scene.parts import CONTROLS, SMOOTHING, Contact, Load, Model, Strip
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.rungs import spelled_out
 
 SECTIONS = {"strip": Strip, "contact": Contact, "load": Load, "model": Model}
-
-_LAWS: dict[str, type[FrictionLaw]] = {
-    "elastic-slip": ElasticSlip,
-    "smooth-cap": CappedTrial,
-    "tanh-increment": TanhIncrement,
-}
 
 
 class Scene(eqx.Module):
@@ -49,15 +42,16 @@ class Scene(eqx.Module):
     Attributes
     ----------
     strip, contact, load, model : the parts
-    energy : the user's own strain energy Phi(e, g, k, psi, psi') per unit length, any JAX function
-        of five scalars (an `equinox.Module` may carry parameters); None is the homogeneous section
+    energy : strain energy Phi(e, g, k, psi, psi') per unit length of the user's own, any JAX
+        function of five scalars, such as ``lambda e, g, k, psi, dpsi: ...`` or an
+        `equinox.Module` that carries parameters; None is the strip's own section
     """
 
     strip: Strip = eqx.field(default_factory=Strip)
     contact: Contact = eqx.field(default_factory=Contact)
     load: Load = eqx.field(default_factory=Load)
     model: Model = eqx.field(default_factory=Model)
-    energy: Energy | None = None
+    energy: Energy | None = eqx.field(converter=as_energy, default=None)
 
     def __check_init__(self) -> None:
         for name, kind in SECTIONS.items():
@@ -253,27 +247,19 @@ def _with_youngs_modulus(strip: Strip, value: Any) -> Strip:
 
 
 def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:
-    name = contact.pop("law", law_name(current))
+    law = contact.pop("law", law_name(current))
     given = contact.pop("smoothing", None)
     smoothing = getattr(current, "smoothing", "sharp") if given is None else given
     m = np.inf if isinstance(smoothing, str) else smoothing
     exponent = as_leaf(m, "contact.smoothing", SMOOTHING)
     sharp = not isinstance(exponent, jax.core.Tracer) and bool(np.all(np.isposinf(exponent)))
     require("contact.smoothing", m, exponent.ndim == 0, SMOOTHING)
-    if name == "elastic-slip":
-        return SharpSlip() if sharp else ElasticSlip(exponent)
-    if name == "smooth-cap":
-        return CappedTrial() if sharp else CappedTrial(exponent)
+    own = isinstance(law, FrictionLaw)
+    if not own and takes_smoothing(LAWS[law]):
+        return law_named(law, None if sharp else exponent)
     unused = given is None or sharp
-    require("contact.smoothing", given, unused, f"contact.law {name!r} has none; leave it out")
-    return name if isinstance(name, FrictionLaw) else TanhIncrement()
-
-
-def law_name(law: FrictionLaw) -> Any:
-    """Name of a friction law in keys; the law itself where it is a user's own."""
-    if isinstance(law, SharpSlip):
-        return "elastic-slip"
-    return next((name for name, kind in _LAWS.items() if type(law) is kind), law)
+    require("contact.smoothing", given, unused, f"contact.law {law!r} has none; leave it out")
+    return law if own else law_named(law, None)
 
 
 def check_word(key: str, value: Any) -> None:

@@ -12,10 +12,11 @@ import tomli_w
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml, write_text
+from jbeamshell.mechanics.friction import law_name
 from jbeamshell.scene.keys import DERIVED, KEYS, LENGTHS, NUMBERS
 from jbeamshell.scene.parts import Load
 from jbeamshell.scene.rungs import spelled_out
-from jbeamshell.scene.scene import SECTIONS, Scene, check_word, law_name
+from jbeamshell.scene.scene import SECTIONS, Scene, check_word
 
 
 def scene_from_values(values: Mapping[str, Any]) -> Scene:

@@ -108,6 +108,21 @@ def test_own_energy_takes_the_place_of_the_homogeneous_one():
     assert (soft.displacement[1:3] > 1.05 * expected.displacement[1:3]).all()
 
 
+def test_a_plain_function_is_an_energy_as_a_module_is():
+    standard = Scene(model=Model(nodes=9), load=Load(steps_per_half_cycle=2))
+    section = standard.strain_energy()
+    module = Scene(model=standard.model, energy=Weighed(section, 0.5))
+
+    def weighed(e, g, k, psi, dpsi):
+        return section(e, jnp.sqrt(0.5) * g, k, psi, dpsi)
+
+    plain = Scene(model=standard.model, energy=weighed)
+    expected, got = (solve(scene, [0.3, 0.7, 0.1]) for scene in (module, plain))
+    np.testing.assert_allclose(got.displacement, expected.displacement, rtol=1e-12, atol=1e-18)
+    assert got.doubts == expected.doubts
+    assert all(map(eqx.is_array, jax.tree.leaves(plain.replace({"contact.friction": 0.2}))))
+
+
 @pytest.mark.parametrize(
     "energy",
     [

@@ -10,9 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import simpson
 
+from jbeamshell import Scene, read_scene, write_scene
+from jbeamshell.mechanics import friction
 from jbeamshell.mechanics.friction import (
     CappedTrial,
     ElasticSlip,
+    FrictionLaw,
     SharpSlip,
     TanhIncrement,
     plastic_slip,
@@ -227,3 +230,20 @@ def test_trap_a_tanh_of_the_increment_depends_on_the_number_of_steps():
     assert works[0] > 1.9 * works[1] > 3.6 * works[2] > 0
     np.testing.assert_allclose(works[0], 2 / K_T * np.tanh(2))
     assert step(TanhIncrement(), 0.0, 0.9, 1.0)[0] == 0
+
+
+class Doubled(FrictionLaw):
+    """A user's own law."""
+
+    def traction(self, dv, t_n, cap, k_t):
+        return jnp.clip(t_n + 2.0 * k_t * dv, -cap, cap)
+
+
+def test_a_law_is_known_everywhere_once_it_has_a_name(monkeypatch, tmp_path):
+    own = Scene().replace({"contact.law": Doubled()})
+    assert isinstance(own.get("contact.law"), Doubled)
+    monkeypatch.setitem(friction.LAWS, "doubled", Doubled)
+    scene = Scene().replace({"contact.smoothing": 8.0}).replace({"contact.law": "doubled"})
+    assert isinstance(scene.contact.law, Doubled)
+    write_scene(scene, tmp_path / "scene.toml")
+    assert read_scene(tmp_path / "scene.toml").get("contact.law") == "doubled"
