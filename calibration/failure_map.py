@@ -26,6 +26,7 @@ from provenance import provenance
 from tqdm import tqdm
 
 import jbeamshell as jb
+from calibration import charts
 from jbeamshell import plotting
 from jbeamshell.common.files import write_text
 from jbeamshell.history import reliability
@@ -355,7 +356,7 @@ def main() -> None:
             else:
                 record["maps"][name] = chart(name, 4 if options.quick else 1)
                 save()
-    for name, figure in plotting.failure_sheets(record).items():
+    for name, figure in charts.failure_sheets(record).items():
         plotting.save(figure, HERE / f"failures_{name}.png")
 
 

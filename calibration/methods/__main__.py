@@ -17,6 +17,7 @@ import jbeamshell as jb
 jb.configure()
 jax.config.update("jax_enable_x64", True)
 
+from calibration import charts  # noqa: E402
 from calibration.methods import (  # noqa: E402
     contacts,
     controls,
@@ -195,7 +196,7 @@ def main() -> None:
             record[name] = SECTIONS[name](options.quick)
             write_text(RECORD, json.dumps({"provenance": provenance()} | record) + "\n")
             jax.clear_caches()
-    plotting.save(plotting.methods_sheet(record), PICTURE)
+    plotting.save(charts.methods_sheet(record), PICTURE)
 
 
 if __name__ == "__main__":

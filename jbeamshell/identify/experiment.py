@@ -222,7 +222,7 @@ class Experiment:
         for measurement, observation, owner, rows in zip(
             self.measurements, self.observations, self.owners, self.slices, strict=True
         ):
-            column = response_of(measurement, self.scenes[owner])
+            column = response_of(measurement, self.scenes[owner].load.control)
             value = observation.answer(prediction[rows])
             answers.append(_with_column(measurement, column, value))
         return answers

@@ -133,7 +133,8 @@ class LoopObservation(Observation):
         cls, measurement: Loop | Backbone, scene: Scene, run_in: NDArray[np.float64]
     ) -> LoopObservation:
         drive = getattr(measurement, scene.load.control)
-        response = getattr(measurement, response_of(measurement, scene))
+        answering = response_of(measurement, scene.load.control)
+        response = getattr(measurement, answering)
         approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
         path = np.concatenate([approach, run_in, drive])
         check(scene, path)
@@ -149,8 +150,7 @@ class LoopObservation(Observation):
         if noise is not None and np.min(noise) >= np.ptp(response):
             raise InputError(
                 f"{measurement.label}: noise = {np.min(noise):.3g} is more than the range of "
-                f"{response_of(measurement, scene)}, {np.ptp(response):.3g}: give the noise of "
-                "that column, in its units"
+                f"{answering}, {np.ptp(response):.3g}: give the noise of that column, in its units"
             )
         weight = np.full(drive.size, 1.0 / np.ptp(response)) if noise is None else 1.0 / noise
         return cls(
@@ -238,7 +238,7 @@ class AmplitudeObservation(Observation):
     @classmethod
     def of(cls, curve: DissipationCurve | StiffnessCurve, scene: Scene) -> AmplitudeObservation:
         """The runs for a curve; raises `InputError` for forces beyond gross slip."""
-        figure = getattr(curve, response_of(curve, scene))
+        figure = getattr(curve, response_of(curve, scene.load.control))
         check(scene, np.sort(curve.amplitude))
         weight = np.ones(figure.size) if curve.noise is None else figure / curve.noise
         stiff = np.full(figure.size, isinstance(curve, StiffnessCurve))

@@ -1,24 +1,23 @@
-"""identify.report."""
+"""Report of a fit: tables, scenes, figures and pictures in a folder."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from jbeamshell import plotting
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
-from jbeamshell.scene.toml import scene_to_toml
-
-if TYPE_CHECKING:  # a run that draws and fits nothing need not wait for them
-    from jbeamshell.identify.likelihood import Profile
-    from jbeamshell.identify.results import Fit
-from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.plotting.folder import write_folder
+from jbeamshell.plotting.protocols import LikelihoodProfile, ModelOverData
+from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.toml import scene_to_toml
 
 # Table of a fit: types of its measurements, columns of the data, columns of the model.
 TABLES: dict[str, tuple[tuple[type, ...], tuple[str, ...], tuple[str, ...]]] = {
@@ -29,8 +28,20 @@ TABLES: dict[str, tuple[tuple[type, ...], tuple[str, ...], tuple[str, ...]]] = {
 }
 
 
+class Fitted(ModelOverData, Protocol):
+    """A model over its data, with the fitted scene of every specimen by its label."""
+
+    @property
+    def scene(self) -> Scene: ...
+    @property
+    def scenes(self) -> Mapping[str, Scene]: ...
+
+
 def write_fit(
-    folder: Path, result: Fit, figures: Mapping[str, Any], profiles: Sequence[Profile] = ()
+    folder: Path,
+    result: Fitted,
+    figures: Mapping[str, Any],
+    profiles: Sequence[LikelihoodProfile] = (),
 ) -> list[Path]:
     """Write the tables, the fitted scene, the figures as JSON, and the pictures.
 
@@ -38,8 +49,6 @@ def write_fit(
     the other curves, as far as there are any; scene.toml, or scene_1.toml and so on of several
     specimens; result.json, overlay.png and residuals.png; profiles.csv and profiles.png if asked.
     """
-    from jbeamshell import plotting
-
     texts: dict[str, str] = {}
     for name, (types, given, answered) in TABLES.items():
         pairs = [p for p in zip(result.data, result.model, strict=True) if isinstance(p[0], types)]
@@ -69,7 +78,10 @@ def write_fit(
         ]
         texts["profiles.csv"] = csv_text(("parameter", "value", "rise"), rows)
     texts["result.json"] = as_json(figures)
-    drawn = {"overlay.png": result.plot(), "residuals.png": result.plot_residuals()}
+    drawn: dict[str, Any] = {
+        "overlay.png": plotting.overlay(result),
+        "residuals.png": plotting.residuals(result),
+    }
     if profiles:
         drawn["profiles.png"] = plotting.likelihoods(profiles)
     pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}

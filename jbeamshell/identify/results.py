@@ -130,7 +130,8 @@ class Fit(NamedTuple):
         """Name of the column of every measurement that the model answers."""
         owners = [0] * len(self.data) if self.problem is None else self.problem.experiment.owners
         scenes = list(self.scenes.values()) or [self.scene]
-        return [response_of(d, scenes[owner]) for d, owner in zip(self.data, owners, strict=True)]
+        controls = (scenes[owner].load.control for owner in owners)
+        return [response_of(d, control) for d, control in zip(self.data, controls, strict=True)]
 
     @property
     def residuals(self) -> list[NDArray[np.float64]]:

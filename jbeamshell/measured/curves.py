@@ -17,7 +17,6 @@ from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.recordings import FEWEST_POINTS, HUGE, as_column
-from jbeamshell.scene.scene import Scene
 
 FEWEST_OF_BACKBONE = 3
 
@@ -37,7 +36,7 @@ class Curve(eqx.Module):
     weight: eqx.AbstractVar[float]
 
     @abc.abstractmethod
-    def response(self, scene: Scene) -> str:
+    def response(self, control: str) -> str:
         """Name of the column that the model answers."""
 
     def _check(self, fewest: int, **columns: NDArray[np.float64]) -> None:
@@ -111,7 +110,7 @@ class SqueezeCurve(Curve):
                 "negative; change the sign"
             )
 
-    def response(self, scene: Scene) -> str:
+    def response(self, control: str) -> str:
         """The stress, whatever drives."""
         return "stress"
 
@@ -158,13 +157,13 @@ class Backbone(Curve):
             if np.ptp(column) == 0.0:
                 raise InputError(f"{self.label}: {name} is constant ({column[0]:g}): no loading")
 
-    def response(self, scene: Scene) -> str:
+    def response(self, control: str) -> str:
         """The column that does not drive."""
-        return "displacement" if scene.load.control == "force" else "force"
+        return "displacement" if control == "force" else "force"
 
 
 class AmplitudeCurve(Curve):
-    """A figure of the steady cycle against the amplitude of what ``scene.load.control`` names."""
+    """A figure of the steady cycle against the amplitude of what drives the test."""
 
     amplitude: eqx.AbstractVar[NDArray[np.float64]]
 
@@ -211,7 +210,7 @@ class DissipationCurve(AmplitudeCurve):
     def __check_init__(self) -> None:
         self._check_positive(amplitude=self.amplitude, dissipation=self.dissipation)
 
-    def response(self, scene: Scene) -> str:
+    def response(self, control: str) -> str:
         """The dissipation, whatever drives."""
         return "dissipation"
 
@@ -248,7 +247,7 @@ class StiffnessCurve(AmplitudeCurve):
     def __check_init__(self) -> None:
         self._check_positive(amplitude=self.amplitude, stiffness=self.stiffness)
 
-    def response(self, scene: Scene) -> str:
+    def response(self, control: str) -> str:
         """The stiffness, whatever drives."""
         return "stiffness"
 
@@ -256,11 +255,11 @@ class StiffnessCurve(AmplitudeCurve):
 Measurement = Loop | Curve
 
 
-def response_of(measurement: Measurement, scene: Scene) -> str:
+def response_of(measurement: Measurement, control: str) -> str:
     """Name of the measurement's column that the model answers."""
     if isinstance(measurement, Loop):
-        return "displacement" if scene.load.control == "force" else "force"
-    return measurement.response(scene)
+        return "displacement" if control == "force" else "force"
+    return measurement.response(control)
 
 
 def noise_of(measurement: Measurement) -> NDArray[np.float64] | None:

@@ -14,8 +14,8 @@ from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.history.history import History
 from jbeamshell.numerics.cycles import turning_points
+from jbeamshell.plotting.protocols import LoadPath
 from jbeamshell.plotting.steps import checked_steps, default_contact_steps, load_label
 from jbeamshell.plotting.style import (
     DATA,
@@ -43,7 +43,7 @@ AROUND = 5.0  # heights H that `contact` shows on either side of where something
 
 
 def contact(
-    history: History,
+    history: LoadPath,
     steps: Sequence[int] | None = None,
     axes: ArrayLike | None = None,
     reference: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
@@ -56,7 +56,7 @@ def contact(
 
     Parameters
     ----------
-    history : History
+    history : LoadPath
         A solved load path.
     steps : sequence of int, optional
         Indices into the path. When not given: the pressed strip and the turning points of the last
@@ -136,13 +136,13 @@ def contact(
 
 
 def contact_map(
-    history: History, axes: Axes | None = None, *, xlim: tuple[float, float] | None = None
+    history: LoadPath, axes: Axes | None = None, *, xlim: tuple[float, float] | None = None
 ) -> Axes:
     """Draw which part of the contact sticks, slips or is lifted along the load path.
 
     Parameters
     ----------
-    history : History
+    history : LoadPath
         A solved load path.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
@@ -217,7 +217,7 @@ def _many(count: int) -> np.ndarray:
 
 
 def _checked_panels(
-    history: History, panels: Sequence[str] | None, reference: Mapping[str, Any]
+    history: LoadPath, panels: Sequence[str] | None, reference: Mapping[str, Any]
 ) -> list[str]:
     fields = history.scene.model.fields
     needs = {"gap": "w", "beta": "beta"} | dict.fromkeys(
@@ -235,7 +235,7 @@ def _checked_panels(
     return known if panels is None else list(panels)
 
 
-def _contact_ends(history: History) -> np.ndarray:
+def _contact_ends(history: LoadPath) -> np.ndarray:
     """X at which the contact ends, (steps+1,); NaN where it does not end before L, or failed."""
     if "w" not in history.scene.model.fields or history.scene.contact.normal == "none":
         return np.full(history.force.shape, np.nan)
@@ -243,7 +243,7 @@ def _contact_ends(history: History) -> np.ndarray:
     return np.where(failed | (ends >= float(history.x[-1])), np.nan, ends)
 
 
-def _surroundings(history: History, ends: np.ndarray) -> tuple[float, float]:
+def _surroundings(history: LoadPath, ends: np.ndarray) -> tuple[float, float]:
     """Part of X where something happens, or all of it if that is more than half."""
     contact, length = history.scene.contact, float(history.x[-1])
     tables = [np.asarray(p)[:, 0] for p in (contact.pressure, contact.bottom_pressure) if p.ndim]
@@ -256,7 +256,7 @@ def _surroundings(history: History, ends: np.ndarray) -> tuple[float, float]:
     return (low, high) if high - low < 0.5 * length else (0.0, length)
 
 
-def _pressure_corners(history: History, part: Any) -> tuple[np.ndarray, np.ndarray]:
+def _pressure_corners(history: LoadPath, part: Any) -> tuple[np.ndarray, np.ndarray]:
     """Corners of a part of the pressure on the top face, from end to end."""
     table, length = np.asarray(history.scene.contact.pressure), float(history.x[-1])
     if table.ndim == 0:
@@ -265,7 +265,7 @@ def _pressure_corners(history: History, part: Any) -> tuple[np.ndarray, np.ndarr
     return x, float(part) * np.pad(table[:, 1], 1, mode="edge")
 
 
-def _size(history: History, name: str) -> float:
+def _size(history: LoadPath, name: str) -> float:
     """What a profile is large or small against."""
     strip = history.scene.strip
     stress = float(history.scene.contact.largest_pressure)

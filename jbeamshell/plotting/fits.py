@@ -10,10 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.likelihood import Profile
-from jbeamshell.identify.results import Fit
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
+from jbeamshell.plotting.protocols import LikelihoodProfile, ModelOverData
 from jbeamshell.plotting.style import (
     DISPLACEMENT,
     DOTS,
@@ -57,7 +56,7 @@ KINDS = (
 )
 
 
-def overlay(fit: Fit, axes: Any = None) -> list[Any]:
+def overlay(fit: ModelOverData, axes: Any = None) -> list[Any]:
     """Draw the model over the data, with its 95 % bands, a panel for each kind of measurement.
 
     Parameters
@@ -94,7 +93,7 @@ def overlay(fit: Fit, axes: Any = None) -> list[Any]:
     return [panel for _, _, panel in panels]
 
 
-def residuals(fit: Fit, axes: Any = None) -> list[Any]:
+def residuals(fit: ModelOverData, axes: Any = None) -> list[Any]:
     """Draw what the model leaves unexplained, in per cent, over what drives or where it was taken.
 
     Parameters
@@ -126,7 +125,7 @@ def residuals(fit: Fit, axes: Any = None) -> list[Any]:
     return [panel for _, _, panel in panels]
 
 
-def _panels(fit: Fit, axes: Any) -> list[tuple[Kind, list[int], Any]]:
+def _panels(fit: ModelOverData, axes: Any) -> list[tuple[Kind, list[int], Any]]:
     """Kind, places of its measurements, and where to draw them."""
     kinds: list[tuple[Kind, list[int]]] = []
     for kind in KINDS:
@@ -137,7 +136,7 @@ def _panels(fit: Fit, axes: Any) -> list[tuple[Kind, list[int], Any]]:
     return [(kind, places, panel) for (kind, places), panel in zip(kinds, drawn, strict=True)]
 
 
-def likelihoods(profiles: Sequence[Profile], axes: Any = None) -> list[Axes]:
+def likelihoods(profiles: Sequence[LikelihoodProfile], axes: Any = None) -> list[Axes]:
     """Draw profile likelihoods: what it costs the data to hold a parameter elsewhere.
 
     Parameters

@@ -1,17 +1,14 @@
-"""plotting.folder."""
+"""Folders of results: tables as text, and pictures, each file written whole."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, write_text
-
-if TYPE_CHECKING:  # a run that draws and fits nothing need not wait for them
-    pass
 
 
 def check_folder(path: str | os.PathLike[str]) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,13 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
+from jbeamshell.plotting.protocols import ModalProperties, RingDownComparison, Vibration
 from jbeamshell.plotting.style import DATA, DISPLACEMENT, PALETTE, single, style
-
-if TYPE_CHECKING:  # they bring diffrax, which pictures of other things need not wait for
-    from jbeamshell.dynamics.let_go import RingDownStudy
-    from jbeamshell.dynamics.ringdown import RingDown
-    from jbeamshell.dynamics.strip.motion import Motion
-    from jbeamshell.dynamics.structure.modal import ModalCurve
 
 TIME, AMPLITUDE = "$t$  [time]", "amplitude of $u(L)$  [length]"
 LEDGER = {
@@ -32,7 +27,7 @@ FLOOR = -70.0  # dB
 HARMONICS = 8.5  # of the main frequency, shown in a spectrogram
 
 
-def vibration(motion: Motion, axes: Axes | None = None) -> Axes:
+def vibration(motion: Vibration, axes: Axes | None = None) -> Axes:
     """Draw u(L) over time."""
     with style():
         axes = single(axes)
@@ -41,7 +36,7 @@ def vibration(motion: Motion, axes: Axes | None = None) -> Axes:
     return axes
 
 
-def energies(motion: Motion, axes: Axes | None = None) -> Axes:
+def energies(motion: Vibration, axes: Axes | None = None) -> Axes:
     """Draw the energy ledger over time, stacked: what moves, what is stored, what is lost.
 
     Notes
@@ -72,7 +67,7 @@ def energies(motion: Motion, axes: Axes | None = None) -> Axes:
 
 
 def ring_down(
-    found: RingDown, *, label: str = "ring-down", axes: Sequence[Axes] | None = None
+    found: ModalProperties, *, label: str = "ring-down", axes: Sequence[Axes] | None = None
 ) -> Any:
     """Draw frequency and damping over amplitude, two axes.
 
@@ -86,7 +81,7 @@ def ring_down(
 
 
 def modal_curve(
-    curve: ModalCurve,
+    curve: ModalProperties,
     *,
     mass: float = 1.0,
     label: str = "quasi-static",
@@ -106,7 +101,7 @@ def modal_curve(
     return _pair((amplitude, frequency, curve.damping), axes, label, "", PALETTE[1])
 
 
-def spectrogram(motion: Motion, axes: Axes | None = None) -> Axes:
+def spectrogram(motion: Vibration, axes: Axes | None = None) -> Axes:
     """Draw the velocity's spectrum over time, in dB of its largest value."""
     time, velocity = np.asarray(motion.time), np.asarray(motion.velocity)
     length = max(16, 2 * time.size // WINDOWS)
@@ -131,7 +126,7 @@ def spectrogram(motion: Motion, axes: Axes | None = None) -> Axes:
     return axes
 
 
-def ring_down_sheet(study: RingDownStudy) -> Figure:
+def ring_down_sheet(study: RingDownComparison) -> Figure:
     """Draw a ring-down beside its prediction: motion, energies, frequency and damping."""
     with style():
         figure, axes = plt.subplots(2, 2, figsize=(10.0, 7.0))

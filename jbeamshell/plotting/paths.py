@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.history.history import History
+from jbeamshell.plotting.protocols import LoadPath
 from jbeamshell.plotting.steps import checked_steps, default_steps, load_label
 from jbeamshell.plotting.style import (
     DATA,
@@ -26,12 +26,12 @@ from jbeamshell.plotting.style import (
 )
 
 
-def loop(history: History, axes: Axes | None = None) -> Axes:
+def loop(history: LoadPath, axes: Axes | None = None) -> Axes:
     """Draw end force over end displacement: the whole path, its last closed cycle emphasised.
 
     Parameters
     ----------
-    history : History
+    history : LoadPath
         A solved load path.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
@@ -60,13 +60,13 @@ def loop(history: History, axes: Axes | None = None) -> Axes:
 
 
 def profiles(
-    history: History, steps: Sequence[int] | None = None, axes: ArrayLike | None = None
+    history: LoadPath, steps: Sequence[int] | None = None, axes: ArrayLike | None = None
 ) -> np.ndarray:
     """Draw slip, rotation, friction traction and normal reaction along X at chosen steps.
 
     Parameters
     ----------
-    history : History
+    history : LoadPath
         A solved load path.
     steps : sequence of int, optional
         Indices into the path, 0 being the strip before the load and -1 its end. When not given: the

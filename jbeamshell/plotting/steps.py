@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.history.history import History
 from jbeamshell.numerics.cycles import turning_points
+from jbeamshell.plotting.protocols import LoadPath
 
 
-def checked_steps(history: History, steps: Sequence[int]) -> list[int]:
+def checked_steps(history: LoadPath, steps: Sequence[int]) -> list[int]:
     """Indices into the path from its start; raises `InputError` for one that lies outside."""
     count = history.force.shape[0]
     for step in steps:
@@ -20,7 +20,7 @@ def checked_steps(history: History, steps: Sequence[int]) -> list[int]:
     return [int(step) % count for step in steps]
 
 
-def default_steps(history: History) -> list[int]:
+def default_steps(history: LoadPath) -> list[int]:
     """Zero crossings and turns of the last cycle, or steps spread over a path without one."""
     force, pressed = np.asarray(history.force), history.pressed
     if not history.cycles:
@@ -37,7 +37,7 @@ def default_steps(history: History) -> list[int]:
     return chosen
 
 
-def default_contact_steps(history: History) -> list[int]:
+def default_contact_steps(history: LoadPath) -> list[int]:
     """The pressed strip and the last cycle's turns; the end of a path without one."""
     if history.cycles:
         return [history.pressed, *history.cycles[-1][1:]]
@@ -51,7 +51,7 @@ def _four_steps(start: int, stop: int) -> list[int]:
     return sorted(set(np.maximum(steps, start + 1).tolist()))
 
 
-def load_label(history: History, step: int) -> str:
+def load_label(history: LoadPath, step: int) -> str:
     """The load of a step, and at a zero crossing which way it was going."""
     force, part = float(history.force[step]), float(history.pressure[step])
     if history.pressed + 1 == history.force.size:

@@ -14,8 +14,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.mechanics.bar import cubic_law
+from jbeamshell.plotting.protocols import SweptFigures
 from jbeamshell.plotting.style import DATA, PALETTE, colours, single, style
-from jbeamshell.sweeping.results import Sweep
 
 SYMBOLS = {
     "load.amplitude": "$A$",
@@ -55,7 +55,7 @@ FLOOR = 1e-6  # of the largest value: what a logarithmic axis still shows
 
 
 def sweep(
-    result: Sweep,
+    result: SweptFigures,
     axes: Axes | None = None,
     *,
     figure: str = "dissipation",
@@ -111,7 +111,7 @@ def sweep(
 
 
 def master_curve(
-    result: Sweep, axes: Axes | None = None, *, figure: str = "dissipation_ratio"
+    result: SweptFigures, axes: Axes | None = None, *, figure: str = "dissipation_ratio"
 ) -> Axes:
     """Draw the dissipation over the bar's against A/eta: strips of all heights on one curve.
 
@@ -149,7 +149,7 @@ def master_curve(
     return axes
 
 
-def sweep_sheet(result: Sweep) -> Figure:
+def sweep_sheet(result: SweptFigures) -> Figure:
     """A new sheet of a sweep: its first figure and, where there is one, the master curve.
 
     Parameters
@@ -173,7 +173,7 @@ def sweep_sheet(result: Sweep) -> Figure:
     return sheet
 
 
-def _keys(result: Sweep, along: str | None, per: str | None) -> tuple[str, str | None]:
+def _keys(result: SweptFigures, along: str | None, per: str | None) -> tuple[str, str | None]:
     keys = list(result.axes)
     for name, key in (("along", along), ("per", per)):
         if key is not None and key not in keys:
@@ -188,7 +188,7 @@ def _keys(result: Sweep, along: str | None, per: str | None) -> tuple[str, str |
 
 
 def _plane(
-    result: Sweep, values: np.ndarray, along: str, per: str | None
+    result: SweptFigures, values: np.ndarray, along: str, per: str | None
 ) -> tuple[np.ndarray, str]:
     """Rows of ``per`` along ``along``, the other keys at their middle value; and what that is."""
     kept, rest = [], []
@@ -222,7 +222,7 @@ def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, hue: np.ndarray, name: str |
     bar.ax.minorticks_off()
 
 
-def _cubic_law(result: Sweep, axes: Axes, figure: str, along: str) -> None:
+def _cubic_law(result: SweptFigures, axes: Axes, figure: str, along: str) -> None:
     lanes = result.lanes
     friction = lanes.gross_slip / lanes.value("strip.length")
     alike = all(np.ndim(number) == 0 for number in (lanes.stiffness, friction))
@@ -249,7 +249,7 @@ def _symbol(key: str | None) -> str:
     return SYMBOLS.get(key or "", (key or "").partition(".")[2].replace("_", " "))
 
 
-def _label(key: str, result: Sweep) -> str:
+def _label(key: str, result: SweptFigures) -> str:
     unit = UNITS.get(key)
     if key == "load.amplitude" and result.scene.load.control == "displacement":
         unit = "length"

@@ -39,6 +39,7 @@ import numpy as np  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
+from calibration import charts  # noqa: E402
 from jbeamshell import plotting  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.ladder.candidates import Candidate  # noqa: E402
@@ -333,8 +334,8 @@ def picture(record: dict[str, Any]) -> plt.Figure:
         figure, (work, advice) = plt.subplots(
             1, 2, figsize=(12.0, 5.0), gridspec_kw={"width_ratios": (1.35, 1.0)}
         )
-        plotting.work_precision(record, work)
-        plotting.advice_map(record, 0.05, advice)
+        charts.work_precision(record, work)
+        charts.advice_map(record, 0.05, advice)
     return figure
 
 

@@ -43,6 +43,7 @@ from speeds import batches, gradients, limits, machine, single, starting  # noqa
 from speeds.common import QUICK, Plan  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
+from calibration import charts  # noqa: E402
 from jbeamshell import plotting  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 
@@ -135,7 +136,7 @@ def main() -> None:
     print(report(record))
     print(f"record: {target}", file=sys.stderr)
     try:
-        plotting.save(plotting.speed_sheet(record), target.with_suffix(".png"))
+        plotting.save(charts.speed_sheet(record), target.with_suffix(".png"))
     except jb.InputError as error:  # of sections without a picture
         print(error, file=sys.stderr)
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from calibration import charts
 from calibration.methods import controls, events, grids, laws, shooting, solvers
 from calibration.methods.strips import scene_of
-from jbeamshell import plotting
 from jbeamshell.quasistatic.system import BETA, System, V, W
 
 CYCLE = 8  # load steps per half cycle at most; fewer are held, so that all paths compile once
@@ -201,21 +201,21 @@ def record():
 
 
 def test_charts_show_what_the_record_holds(record):
-    axes = plotting.methods_steps(record)
+    axes = charts.methods_steps(record)
     (row,) = (row for row in record["steps"]["rows"] if row["scene"] == "standard")
     lines = {line.get_label(): line for line in axes.lines}
     np.testing.assert_allclose(lines["standard"].get_ydata(), np.abs(row["off"]))
-    axes = plotting.methods_solvers(record)
+    axes = charts.methods_solvers(record)
     shares = [bar.get_width() for bar in axes.patches[: len(record["solvers"]["rows"])]]
     found = [100.0 * row["found"] for row in record["solvers"]["rows"]]
     np.testing.assert_allclose(shares[::-1], found)
-    assert sum(axes.axison for axes in plotting.methods_sheet(record).axes) == 9
+    assert sum(axes.axison for axes in charts.methods_sheet(record).axes) == 9
 
 
 def test_what_the_record_lacks_is_said(record):
     with pytest.raises(jb.InputError, match="no section 'laws'"):
-        plotting.methods_laws({})
+        charts.methods_laws({})
     with pytest.raises(jb.InputError, match="scene = 'curved'"):
-        plotting.methods_laws(record, scene="curved")
+        charts.methods_laws(record, scene="curved")
     with pytest.raises(jb.InputError, match="nothing to draw"):
-        plotting.methods_sheet({})
+        charts.methods_sheet({})

@@ -1,0 +1,229 @@
+"""Protocols of the results that can be drawn.
+
+Each lists the attributes that its pictures read, with their shapes, so that pictures know no
+class of results and any object with these attributes can be drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from jax import Array
+from numpy.typing import ArrayLike
+
+from jbeamshell.scene.scene import Scene
+
+
+class LoadPath(Protocol):
+    """A load path that was solved, step by step, such as `jbeamshell.History`.
+
+    Pictures along X also read the profiles ``gap``, ``beta``, ``psi``, ``squeeze_stress`` and
+    ``squeeze_couple``, (steps+1, n) or (steps+1, elements), as far as the scene has them.
+
+    Attributes
+    ----------
+    scene : the scene that was solved
+    x, tributary : (n,) positions of the nodes and their contact lengths
+    middles : (elements,) middles of the elements
+    pressed : first step at which the whole pressure acts
+    pressure : (steps+1,) part of the pressures that acts
+    force, displacement : (steps+1,) end force and end displacement
+    cycles : steps at the start, the turn and the end of each closed cycle
+    loop : force and displacement of the last closed cycle, (k,) each
+    slip, beta, psi : (steps+1, n) slip since the pressing, rotation, squeeze strain
+    traction, reaction : (steps+1, n) friction traction and normal reaction
+    slipping, touching : (steps+1, n) True where a node slips, or touches the foundation
+    contact_end : (steps+1,) position X at which the contact ends
+    """
+
+    @property
+    def scene(self) -> Scene: ...
+    @property
+    def x(self) -> Array: ...
+    @property
+    def tributary(self) -> Array: ...
+    @property
+    def middles(self) -> Array: ...
+    @property
+    def pressed(self) -> int: ...
+    @property
+    def pressure(self) -> Array: ...
+    @property
+    def force(self) -> Array: ...
+    @property
+    def displacement(self) -> Array: ...
+    @property
+    def cycles(self) -> Sequence[tuple[int, int, int]]: ...
+    @property
+    def loop(self) -> tuple[Array, Array]: ...
+    @property
+    def slip(self) -> Array: ...
+    @property
+    def beta(self) -> Array: ...
+    @property
+    def psi(self) -> Array: ...
+    @property
+    def traction(self) -> Array: ...
+    @property
+    def reaction(self) -> Array: ...
+    @property
+    def slipping(self) -> Array: ...
+    @property
+    def touching(self) -> Array: ...
+    @property
+    def contact_end(self) -> Array: ...
+
+
+class Vibration(Protocol):
+    """A transient, such as `jbeamshell.dynamics.Motion`, (T,) each; energies are per width.
+
+    Attributes
+    ----------
+    time : instants, evenly spaced
+    displacement, velocity : end displacement u(L) and its rate
+    kinetic, stored : energies
+    given, rubbed, damped : work since t = 0: done from outside, lost by friction, by damping
+    """
+
+    @property
+    def time(self) -> ArrayLike: ...
+    @property
+    def displacement(self) -> ArrayLike: ...
+    @property
+    def velocity(self) -> ArrayLike: ...
+    @property
+    def kinetic(self) -> ArrayLike: ...
+    @property
+    def stored(self) -> ArrayLike: ...
+    @property
+    def given(self) -> ArrayLike: ...
+    @property
+    def rubbed(self) -> ArrayLike: ...
+    @property
+    def damped(self) -> ArrayLike: ...
+
+
+class ModalProperties(Protocol):
+    """Frequency and damping ratio over amplitude, (k,) each."""
+
+    @property
+    def amplitude(self) -> np.ndarray: ...
+    @property
+    def frequency(self) -> np.ndarray: ...
+    @property
+    def damping(self) -> np.ndarray: ...
+
+
+class RingDownComparison(Protocol):
+    """A ring-down beside its quasi-static prediction.
+
+    Attributes
+    ----------
+    motion : the transient
+    found : its frequency, in cycles, and damping over the amplitude of u(L)
+    predicted : angular frequency and damping over the modal amplitude
+    payload : mass per width, whose root turns modal amplitudes into those of u(L)
+    """
+
+    @property
+    def motion(self) -> Vibration: ...
+    @property
+    def found(self) -> ModalProperties: ...
+    @property
+    def predicted(self) -> ModalProperties: ...
+    @property
+    def payload(self) -> float: ...
+
+
+class SweptLanes(Protocol):
+    """Quantities of the lanes of a sweep, arrays that broadcast to its shape."""
+
+    @property
+    def amplitude_over_height(self) -> np.ndarray: ...
+    @property
+    def height_ratio(self) -> np.ndarray: ...
+    @property
+    def gross_slip(self) -> np.ndarray: ...
+    @property
+    def stiffness(self) -> np.ndarray: ...
+    def value(self, key: str, /) -> np.ndarray: ...
+
+
+class SweptFigures(Protocol):
+    """Figures over the values of some keys, such as `jbeamshell.Sweep`.
+
+    A lane is one strip of the sweep: one value of each key.
+
+    Attributes
+    ----------
+    scene : scene with what was not varied
+    axes : (n,) values of every key
+    paired : True if the keys vary together
+    shape : shape of the arrays of figures
+    values : figures by name, which indexing by a name also gives
+    lanes : quantities of the lanes
+    """
+
+    @property
+    def scene(self) -> Scene: ...
+    @property
+    def axes(self) -> Mapping[str, np.ndarray]: ...
+    @property
+    def paired(self) -> bool: ...
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    @property
+    def values(self) -> Mapping[str, np.ndarray]: ...
+    @property
+    def lanes(self) -> SweptLanes: ...
+    def __getitem__(self, figure: str, /) -> np.ndarray: ...
+
+
+class ModelOverData(Protocol):
+    """Measurements beside what a fitted model answers, such as `jbeamshell.identify.Fit`.
+
+    Attributes
+    ----------
+    data, model : the measurements, and the model's at the same points
+    columns : name of the column that the model answers, of each measurement
+    residuals : (points,) model less data over the range of the data, of each measurement
+    problem : what was solved; None if the result cannot tell its confidence bands
+    """
+
+    @property
+    def data(self) -> Sequence[Any]: ...
+    @property
+    def model(self) -> Sequence[Any]: ...
+    @property
+    def columns(self) -> Sequence[str]: ...
+    @property
+    def residuals(self) -> Sequence[np.ndarray]: ...
+    @property
+    def problem(self) -> object: ...
+    def bands(self, level: float, /) -> Sequence[tuple[Any, Any]]: ...
+
+
+class LikelihoodProfile(Protocol):
+    """Profile likelihood of one parameter, such as `jbeamshell.identify.profile` gives.
+
+    Attributes
+    ----------
+    name : key of the parameter
+    values : (points,) its values, increasing
+    rises : (points,) rises of the cost, in units of the noise squared
+    interval : ends of its confidence interval
+    level : level of confidence
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def values(self) -> np.ndarray: ...
+    @property
+    def rises(self) -> np.ndarray: ...
+    @property
+    def interval(self) -> tuple[float, float]: ...
+    @property
+    def level(self) -> float: ...
