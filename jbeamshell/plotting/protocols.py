@@ -84,7 +84,8 @@ class Vibration(Protocol):
     time : instants, evenly spaced
     displacement, velocity : end displacement u(L) and its rate
     kinetic, stored : energies
-    given, rubbed, damped : work since t = 0: done from outside, lost by friction, by damping
+    external_work, friction_work, damping_work : work since t = 0, done from outside, and lost by
+        friction and by damping
     """
 
     @property
@@ -98,11 +99,11 @@ class Vibration(Protocol):
     @property
     def stored(self) -> ArrayLike: ...
     @property
-    def given(self) -> ArrayLike: ...
+    def external_work(self) -> ArrayLike: ...
     @property
-    def rubbed(self) -> ArrayLike: ...
+    def friction_work(self) -> ArrayLike: ...
     @property
-    def damped(self) -> ArrayLike: ...
+    def damping_work(self) -> ArrayLike: ...
 
 
 class ModalProperties(Protocol):
