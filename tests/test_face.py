@@ -1,0 +1,68 @@
+"""The names of `jbeamshell` itself: each is there, and loaded only when it is used."""
+
+import ast
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+
+import jbeamshell as jb
+
+STUB = Path(jb.__file__).with_suffix(".pyi")
+HEAVY = {"jax", "numpy", "matplotlib", "diffrax", "optax", "jaxopt", "pint", "scipy"}
+
+
+def promised():
+    """Names of the stub, by the module that it takes them from."""
+    tree = ast.parse(STUB.read_text("utf-8"))
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom):
+            yield from ((alias.asname, node.module) for alias in node.names)
+
+
+NAMES = dict(promised())
+
+
+def loaded_by(code):
+    """Modules that a fresh process has loaded after some code."""
+    tell = "; import sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code + tell], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.split())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_name_of_the_stub_is_there(name):
+    value = getattr(jb, name)
+    home = NAMES[name]
+    if isinstance(value, types.ModuleType):
+        assert value.__name__ == ".".join(filter(None, ("jbeamshell", home, name)))
+    else:
+        assert value is getattr(sys.modules[f"jbeamshell.{home}"], name)
+
+
+def test_the_face_lists_its_names_and_no_others():
+    assert sorted(jb.__all__) == sorted(NAMES)
+    assert set(NAMES) <= set(dir(jb))
+    with pytest.raises(AttributeError, match="sovle"):
+        _ = jb.sovle
+
+
+def test_a_room_and_a_function_of_its_name_are_told_apart():
+    assert callable(jb.response)
+    assert callable(jb.sweep)
+    assert callable(jb.plotting.loop)
+    assert callable(jb.identify.fit)
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    assert not loaded_by("import jbeamshell; dir(jbeamshell)") & HEAVY
+
+
+def test_a_name_loads_what_it_needs_alone():
+    solving = loaded_by("import jbeamshell; jbeamshell.solve; jbeamshell.Scene")
+    assert "jax" in solving
+    assert not solving & (HEAVY - {"jax", "numpy", "scipy"})
+    assert "matplotlib" in loaded_by("import jbeamshell; jbeamshell.plotting.loop")
