@@ -1,4 +1,8 @@
-"""Imports inside the package point downwards, and heavy libraries stay where they belong."""
+"""The order of the folders, no circle of imports, and the homes of the heavy libraries.
+
+All imports count: those at the top of a module, inside its functions and under TYPE_CHECKING.  The
+face, `jbeamshell/__init__.pyi`, is a stub and imports nothing.
+"""
 
 import ast
 from pathlib import Path
@@ -8,103 +12,165 @@ import pytest
 import jbeamshell
 
 PACKAGE = Path(jbeamshell.__file__).parent
-# fmt: off
-UPWARDS = [
-    "errors", "runtime", "native", "files", "kinematics", "rungs", "closed_form", "elasticity",
-    "energy",
-    "sections", "laminate", "friction", "contact", "grid", "parts", "scene", "scenes",
-    "block_tridiagonal", "newton", "equilibrium", "stiffness", "bands", "turning", "patterns",
-    "cycles", "trust", "history", "stepping", "masing", "quasistatic", "histories",
-    "response", "sweeping", "advice", "measured", "example", "identify", "dynamics", "plotting",
-    "output", "terminal", "fit_command", "sweep_command", "ringdown_command", "__init__",
-    "__main__",
+# A folder may import itself and the folders before it.
+ORDER = [
+    "common",
+    "numerics",
+    "mechanics",
+    "measured",
+    "scene",
+    "reference",
+    "plotting",
+    "history",
+    "quasistatic",
+    "ladder",
+    "sweeping",
+    "identify",
+    "dynamics",
+    "cli",
 ]
-INSIDE = {
-    "measured": [
-        "tables", "columns", "containers", "reversals", "recordings", "loops", "splitting",
-        "steady", "curves", "curve_files", "__init__",
-    ],
-    "identify": [
-        "observations", "parameters", "experiment", "problem", "search", "uncertainty", "results",
-        "likelihood", "fitting", "plan", "__init__",
-    ],
-    "sweeping": ["lanes", "runner", "store", "job", "results", "processes", "worker", "__init__"],
-    "dynamics": [
-        "sliding", "excitation", "riders", "inertia", "equations", "modes", "motion", "banded",
-        "stride", "midpoint", "stepsize", "transient", "ringdown", "joint", "structure", "modal",
-        "shaking", "study", "__init__",
-    ],
-    "plotting": [
-        "style", "steps", "failures", "motions", "paths", "contacts", "fits", "ladder", "speed",
-        "discretisations", "methods", "sweeps", "__init__",
-    ],
-}
-# fmt: on
-ONLY = {
-    "diffrax": "dynamics",
-    "lineax": "dynamics",
-    "optimistix": "dynamics",
-    "matplotlib": "plotting",
+# Imports that point up all the same: (importer, imported), with the reason beside it.
+EXCEPTIONS: set[tuple[str, str]] = set()
+ROOT = {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
+HOMES = {
+    "diffrax": "dynamics/",
+    "lineax": "dynamics/",
+    "optimistix": "dynamics/",
+    "matplotlib": "plotting/",
     "jaxopt": "identify/search.py",
     "optax": "identify/search.py",
     "pint": "measured/columns.py",
+    "lazy_loader": "__init__.py",
 }
 
 
-def files(module):
-    """The files of a module, or of a package."""
-    file = PACKAGE / f"{module}.py"
-    return [file] if file.exists() else sorted((PACKAGE / module).glob("*.py"))
+def name_of(file):
+    """Dotted name of a file below the package; a folder's for its `__init__.py`."""
+    parts = file.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def imports(file):
-    """What a file imports: (dotted name, whether at its top) each."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+def imported_names(source):
+    """Dotted names that a module imports, wherever it does."""
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            yield from ((alias.name, node.col_offset == 0) for alias in node.names)
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{file}: relative import"
-            yield from ((f"{node.module}.{a.name}", node.col_offset == 0) for a in node.names)
+            assert node.level == 0, "relative import: write the whole name"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def test_every_module_has_its_place():
-    rooms = [path.stem for path in PACKAGE.glob("*.py")]
-    rooms += [path.parent.name for path in PACKAGE.glob("*/__init__.py")]
-    assert sorted(UPWARDS) == sorted(rooms)
-    for room, inside in INSIDE.items():
-        assert sorted(inside) == sorted(path.stem for path in files(room))
+def inside(name, modules):
+    """Module of the package that a dotted name belongs to; None outside the package."""
+    package, *rest = name.split(".")
+    if package != "jbeamshell":
+        return None
+    while ".".join(rest) not in modules:  # "" is the package itself
+        rest.pop()
+    return ".".join(rest)
 
 
-@pytest.mark.parametrize("module", UPWARDS)
-def test_imports_point_downwards(module):
-    below = UPWARDS[: UPWARDS.index(module)]
-    for file in files(module):
-        for name, at_top in imports(file):
-            package, *rest = name.split(".")
-            if package == "jbeamshell" and at_top and rest[0] != module:
-                assert (rest[0] if rest[0] in UPWARDS else "__init__") in below, (file, name)
-            where = file.relative_to(PACKAGE).as_posix()
-            assert where.startswith(ONLY.get(package, "")), name
+def circles(graph):
+    """Sets of nodes that reach each other: the strongly connected components with an edge."""
+
+    def reached(start):
+        found, ahead = set(), [start]
+        while ahead:
+            fresh = set(graph[ahead.pop()]) - found
+            found |= fresh
+            ahead += fresh
+        return found
+
+    reach = {node: reached(node) for node in graph}
+    return {
+        frozenset(other for other in reach[node] if node in reach[other])
+        for node in graph
+        if node in reach[node]
+    }
 
 
-@pytest.mark.parametrize(("room", "module"), [(r, m) for r, rest in INSIDE.items() for m in rest])
-def test_imports_inside_a_package_point_downwards(room, module):
-    below = INSIDE[room][: INSIDE[room].index(module)]
-    for name, at_top in imports(PACKAGE / room / f"{module}.py"):
-        package, *rest = name.split(".")
-        if package == "jbeamshell" and rest[0] == room and at_top:
-            assert rest[1] in below, name
+def points_up(importer, imported):
+    """True if a module imports a folder above its own; the package's root is above all."""
+    above = [*ORDER, ""]
+    return above.index(importer.split(".")[0]) < above.index(imported.split(".")[0])
 
 
-@pytest.mark.parametrize(
-    ("name", "at_top", "file"),
-    [
-        ("jbeamshell.grid", True, "equilibrium.py"),
-        ("jbeamshell.plotting", False, "history.py"),
-        ("matplotlib.pyplot", True, "plotting/style.py"),
-        ("jaxopt", True, "identify/search.py"),
-        ("pint", False, "measured/columns.py"),
-    ],
-)
-def test_what_the_order_rests_on_is_seen(name, at_top, file):
-    assert (name, at_top) in imports(PACKAGE / file)
+FILES = {name_of(file): file for file in PACKAGE.rglob("*.py")}
+NAMES = {name: set(imported_names(file.read_text("utf-8"))) for name, file in FILES.items()}
+GRAPH = {
+    importer: {inside(name, FILES) for name in names} - {None} for importer, names in NAMES.items()
+}
+
+
+def test_the_root_holds_the_face_and_folders_alone():
+    entries = {path.name for path in PACKAGE.iterdir()} - {"__pycache__"}
+    assert entries == ROOT | set(ORDER)
+
+
+def test_no_module_imports_a_folder_above_its_own():
+    up = {
+        (importer, imported)
+        for importer, imports in GRAPH.items()
+        if importer not in ("", "__main__")
+        for imported in imports
+        if points_up(importer, imported)
+    }
+    assert up == EXCEPTIONS
+
+
+def test_no_modules_import_each_other():
+    assert circles(GRAPH) == set()
+
+
+@pytest.mark.parametrize("library", HOMES)
+def test_a_heavy_library_stays_at_home(library):
+    users = {
+        FILES[module].relative_to(PACKAGE).as_posix()
+        for module, names in NAMES.items()
+        if library in {name.split(".")[0] for name in names}
+    }
+    assert users
+    assert all(user.startswith(HOMES[library]) for user in users), users
+
+
+def test_the_package_needs_nothing_of_its_clone():
+    tops = {name.split(".")[0] for names in NAMES.values() for name in names}
+    assert not tops & {"calibration", "tests"}
+
+
+# --- the test can fail ----------------------------------------------------------------------------
+
+
+def test_circles_are_found_and_lines_are_none():
+    line = {"a": {"b", "c"}, "b": {"c"}, "c": set()}
+    assert circles(line) == set()
+    assert circles(line | {"c": {"a"}}) == {frozenset("abc")}
+    assert circles(line | {"c": {"b"}}) == {frozenset("bc")}
+    assert circles(line | {"c": {"c"}}) == {frozenset("c")}
+    two = {"a": {"b"}, "b": {"a", "c"}, "c": {"d"}, "d": {"c"}}
+    assert circles(two) == {frozenset("ab"), frozenset("cd")}
+
+
+def test_imports_are_seen_wherever_they_stand():
+    source = """
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    from jbeamshell.scene.scene import Scene
+def late():
+    import jaxopt
+    from jbeamshell import plotting
+"""
+    names = {"typing.TYPE_CHECKING", "jaxopt"}
+    inner = {"jbeamshell.scene.scene.Scene", "jbeamshell.plotting"}
+    assert set(imported_names(source)) == names | inner
+    assert {inside(name, FILES) for name in inner} == {"scene.scene", "plotting"}
+    assert inside("jbeamshell.solve", FILES) == ""
+    with pytest.raises(AssertionError, match="relative"):
+        list(imported_names("from . import plotting"))
+
+
+def test_an_import_that_points_up_is_seen():
+    assert points_up("plotting.fits", "identify.results")
+    assert points_up("cli.run", "")
+    assert not points_up("identify.results", "plotting")
+    assert not points_up("scene.toml", "scene.scene")
