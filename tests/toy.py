@@ -1,13 +1,13 @@
 """A measurement that a formula answers, so that tests of fits need no load steps."""
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 import jbeamshell as jb
 from jbeamshell.identify.observations import Observation, observe
-from jbeamshell.measured.curves import Curve, _noise
+from jbeamshell.measured.curves import Curve
+from jbeamshell.measured.form import Column, Form
 
 X = np.linspace(0.05, 1.0, 20)
 TRUTH = {"contact.friction": 0.1, "strip.height_ratio": 0.2, "strip.kappa_s": 0.44}
@@ -21,21 +21,13 @@ def formula(x, mu, eta, kappa_s):
 
 
 class Readings(Curve):
+    form = Form("toy", {"x": Column("x", ()), "y": Column("y", ())}, "x", "y", ("y",))
+
     x: np.ndarray
     y: np.ndarray
-    label: str = eqx.field(static=True)
-    noise: np.ndarray | None
-    weight: float = eqx.field(static=True)
 
     def __init__(self, x, y, label="toy", noise=None, weight=1.0):
-        self.x, self.y, self.label, self.weight = np.asarray(x), np.asarray(y), label, weight
-        self.noise = _noise(noise, self.x)
-
-    def __check_init__(self):
-        self._check(1, x=self.x, y=self.y)
-
-    def response(self, scene):
-        return "y"
+        self._hold(label, noise, weight, x=x, y=y)
 
 
 class Formula(Observation):

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.observations import Observation, observe
-from jbeamshell.measured.curves import Measurement, noise_of, response_of, weight_of
+from jbeamshell.measured.curves import Measurement, noise_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.recordings import as_column
 from jbeamshell.numerics.newton import Newton
@@ -222,7 +222,7 @@ class Experiment:
         for measurement, observation, owner, rows in zip(
             self.measurements, self.observations, self.owners, self.slices, strict=True
         ):
-            column = response_of(measurement, self.scenes[owner].load.control)
+            column = measurement.form.response(self.scenes[owner].load.control)
             value = observation.answer(prediction[rows])
             answers.append(_with_column(measurement, column, value))
         return answers

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.curves import (
+    AmplitudeCurve,
     Backbone,
     DissipationCurve,
     SqueezeCurve,
     StiffnessCurve,
     noise_of,
-    response_of,
 )
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
@@ -133,7 +133,7 @@ class LoopObservation(Observation):
         cls, measurement: Loop | Backbone, scene: Scene, run_in: NDArray[np.float64]
     ) -> LoopObservation:
         drive = getattr(measurement, scene.load.control)
-        answering = response_of(measurement, scene.load.control)
+        answering = measurement.form.response(scene.load.control)
         response = getattr(measurement, answering)
         approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
         path = np.concatenate([approach, run_in, drive])
@@ -213,17 +213,23 @@ class SqueezeObservation(Observation):
         return stress, jnp.all(history.status == 0)
 
 
+FIGURES: dict[type[AmplitudeCurve], str] = {
+    DissipationCurve: "dissipation",
+    StiffnessCurve: "secant_stiffness",
+}  # what a `History` answers to a curve over amplitude
+
+
 class AmplitudeObservation(Observation):
     """Logarithm of a figure of the steady cycle at several amplitudes.
 
     Attributes
     ----------
     amplitude : (n,) of what ``scene.load.control`` names
-    stiff : (n,) whether the figure is the secant stiffness; else it is the dissipation
+    figure : (n,) place of the figure in `FIGURES`, so that all kinds share one compiled program
     """
 
     amplitude: Array
-    stiff: Array
+    figure: Array
 
     @property
     def span(self) -> float:
@@ -236,27 +242,27 @@ class AmplitudeObservation(Observation):
         return np.exp(prediction)
 
     @classmethod
-    def of(cls, curve: DissipationCurve | StiffnessCurve, scene: Scene) -> AmplitudeObservation:
+    def of(cls, curve: AmplitudeCurve, scene: Scene) -> AmplitudeObservation:
         """The runs for a curve; raises `InputError` for forces beyond gross slip."""
-        figure = getattr(curve, response_of(curve, scene.load.control))
+        values = getattr(curve, curve.form.y)
         check(scene, np.sort(curve.amplitude))
-        weight = np.ones(figure.size) if curve.noise is None else figure / curve.noise
-        stiff = np.full(figure.size, isinstance(curve, StiffnessCurve))
-        return cls(*map(jnp.asarray, (np.log(figure), weight, curve.amplitude, stiff)))
+        weight = np.ones(values.size) if curve.noise is None else values / curve.noise
+        figure = np.full(values.size, list(FIGURES).index(type(curve)), dtype=np.int32)
+        return cls(*map(jnp.asarray, (np.log(values), weight, curve.amplitude, figure)))
 
     def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
         """Logarithms of the figure, (n,)."""
         cycles = max(scene.load.cycles, 1)
 
         def one(point: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            amplitude, stiff, measured = point
+            amplitude, figure, measured = point
             to = {"load.amplitude": amplitude, "load.cycles": cycles}
             history = solve(scene.replace(to), solver=solver, throw=False)
-            figure = jnp.where(stiff, history.secant_stiffness, history.dissipation)
+            value = lax.select_n(figure, *(getattr(history, name) for name in FIGURES.values()))
             least = NOTHING * jnp.exp(measured)
-            return jnp.log(jnp.maximum(figure, least)), jnp.all(history.status == 0)
+            return jnp.log(jnp.maximum(value, least)), jnp.all(history.status == 0)
 
-        logarithms, sound = lax.map(one, (self.amplitude, self.stiff, self.measured))
+        logarithms, sound = lax.map(one, (self.amplitude, self.figure, self.measured))
         return logarithms, jnp.all(sound)
 
 
@@ -275,14 +281,14 @@ def observe(measurement: Any, scene: Scene) -> Observation:
         if the scene cannot answer it
     """
     kind = type(measurement).__name__
+    *known, last = (known.__name__ for known in observe.registry if known is not object)
     raise InputError(
-        f"data: a {kind} is no measurement: give a Loop, a SqueezeCurve, a Backbone, a "
-        "DissipationCurve, a StiffnessCurve, or a list"
+        f"data: a {kind} is no measurement: give a {', a '.join(known)}, a {last}, or a list"
     )
 
 
 observe.register(Loop, LoopObservation.of)
-observe.register(Backbone, LoopObservation.of_backbone)
 observe.register(SqueezeCurve, SqueezeObservation.of)
-observe.register(DissipationCurve, AmplitudeObservation.of)
-observe.register(StiffnessCurve, AmplitudeObservation.of)
+observe.register(Backbone, LoopObservation.of_backbone)
+for _curve in FIGURES:
+    observe.register(_curve, AmplitudeObservation.of)

@@ -36,7 +36,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, read_toml
 from jbeamshell.identify.experiment import Specimen
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.measured.curve_files import read_curves
+from jbeamshell.measured.curve_files import CURVES, read_curves
 from jbeamshell.measured.curves import AmplitudeCurve, Backbone, Measurement
 from jbeamshell.measured.loops import Loop, driver_of
 from jbeamshell.measured.recordings import Recording, read_recordings
@@ -46,7 +46,7 @@ from jbeamshell.scene import library
 from jbeamshell.scene.parts import CONTROLS
 from jbeamshell.scene.toml import overridden, scene_from_values
 
-KINDS = ("loop", "backbone", "dissipation", "stiffness", "squeeze")
+KINDS = ("loop", "backbone", *CURVES)
 CYCLES = ("auto", "steady", "recorded")
 OPTIONS = ("method", "starts", "noise", "points", "max_iterations", "tolerance")
 QUIET = 1e-3  # of the range: a driving column with more noise is no load path as it stands

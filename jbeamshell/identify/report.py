@@ -12,20 +12,11 @@ import numpy as np
 from jbeamshell import plotting
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_json, csv_text
-from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
-from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.form import by_form
 from jbeamshell.plotting.folder import write_folder
 from jbeamshell.plotting.protocols import LikelihoodProfile, ModelOverData
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_to_toml
-
-# Table of a fit: types of its measurements, columns of the data, columns of the model.
-TABLES: dict[str, tuple[tuple[type, ...], tuple[str, ...], tuple[str, ...]]] = {
-    "overlay.csv": ((Loop, Backbone), ("force", "displacement"), ("force", "displacement")),
-    "squeeze.csv": ((SqueezeCurve,), ("x", "stress"), ("stress",)),
-    "dissipation.csv": ((DissipationCurve,), ("amplitude", "dissipation"), ("dissipation",)),
-    "stiffness.csv": ((StiffnessCurve,), ("amplitude", "stiffness"), ("stiffness",)),
-}
 
 
 class Fitted(ModelOverData, Protocol):
@@ -45,26 +36,11 @@ def write_fit(
 ) -> list[Path]:
     """Write the tables, the fitted scene, the figures as JSON, and the pictures.
 
-    These are overlay.csv of loops and backbones, squeeze.csv, dissipation.csv and stiffness.csv of
-    the other curves, as far as there are any; scene.toml, or scene_1.toml and so on of several
+    These are a table for each form of measurement, such as overlay.csv of loops and backbones or
+    dissipation.csv; scene.toml, or scene_1.toml and so on of several
     specimens; result.json, overlay.png and residuals.png; profiles.csv and profiles.png if asked.
     """
-    texts: dict[str, str] = {}
-    for name, (types, given, answered) in TABLES.items():
-        pairs = [p for p in zip(result.data, result.model, strict=True) if isinstance(p[0], types)]
-        rows = [
-            (data.label, *values)
-            for data, model in pairs
-            for values in zip(
-                *(getattr(data, column).tolist() for column in given),
-                *(getattr(model, column).tolist() for column in answered),
-                strict=True,
-            )
-        ]
-        if pairs:
-            first = "loop" if Loop in types else "curve"
-            header = (first, *given, *(f"model_{column}" for column in answered))
-            texts[name] = csv_text(header, rows)
+    texts = {f"{name}.csv": text for name, text in tables(result).items()}
     scenes = list(result.scenes.values()) or [result.scene]
     for number, scene in enumerate(scenes, 1):
         name = "scene.toml" if len(scenes) == 1 else f"scene_{number}.toml"
@@ -86,3 +62,21 @@ def write_fit(
         drawn["profiles.png"] = plotting.likelihoods(profiles)
     pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
     return write_folder(folder, texts, pictures)
+
+
+def tables(result: ModelOverData) -> dict[str, str]:
+    """CSV by name, for each form of measurement: labels, measured columns, the model's answers."""
+    texts = {}
+    for form, places in by_form(result.data):
+        rows = [
+            (result.data[i].label, *values)
+            for i in places
+            for values in zip(
+                *(getattr(result.data[i], name).tolist() for name in form.columns),
+                *(getattr(result.model[i], name).tolist() for name in form.answers),
+                strict=True,
+            )
+        ]
+        header = (form.heading, *form.columns, *(f"model_{name}" for name in form.answers))
+        texts[form.name] = csv_text(header, rows)
+    return texts

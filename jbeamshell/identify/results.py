@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from jbeamshell.identify.parameters import Space
 from jbeamshell.identify.problem import Point, Problem
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
-from jbeamshell.measured.curves import AmplitudeCurve, response_of
 from jbeamshell.scene.scene import Scene
 
 TOO_WRONG = 2.0  # misfit over noise beyond which the model, not the noise, is what is left
@@ -131,7 +130,7 @@ class Fit(NamedTuple):
         owners = [0] * len(self.data) if self.problem is None else self.problem.experiment.owners
         scenes = list(self.scenes.values()) or [self.scene]
         controls = (scenes[owner].load.control for owner in owners)
-        return [response_of(d, control) for d, control in zip(self.data, controls, strict=True)]
+        return [d.form.response(control) for d, control in zip(self.data, controls, strict=True)]
 
     @property
     def residuals(self) -> list[NDArray[np.float64]]:
@@ -139,7 +138,7 @@ class Fit(NamedTuple):
         left = []
         for data, model, column in zip(self.data, self.model, self.columns, strict=True):
             given, answer = getattr(data, column), getattr(model, column)
-            relative = isinstance(data, AmplitudeCurve)
+            relative = data.form.scale == "log"
             left.append(np.log(answer / given) if relative else (answer - given) / np.ptp(given))
         return left
 

@@ -36,9 +36,8 @@ class ArrayTable(Table):
             raise InputError(
                 f"{self.name}: is a MATLAB file of version 7.3: save it with save(..., '-v7')"
             )
-        reader = {".mat": _matlab, ".npz": _archive, ".npy": _array}[suffix]
         try:
-            columns = [column for item in reader(data) for column in _columns(*item)]
+            columns = [column for item in READERS[suffix](data) for column in _columns(*item)]
         except Exception as error:  # whatever a parser stumbles over in a broken file
             reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
             raise InputError(
@@ -95,7 +94,7 @@ def read_table(
     InputError
         naming the file, what is wrong with it, and the fix
     """
-    if Path(path).suffix.lower() in (".mat", ".npz", ".npy"):
+    if Path(path).suffix.lower() in READERS:
         return ArrayTable(path)
     return TextTable(path, recognised, decimal)
 
@@ -159,3 +158,11 @@ def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]
         kind, array = "row", array.T
     for j, column in enumerate(array.T, 1):
         yield f"{name} {kind} {j}".strip(), column.astype(float)
+
+
+# How the content of a file is read, by the end of its name: titles with arrays.
+READERS: dict[str, Callable[[bytes], Iterator[tuple[str, Any]]]] = {
+    ".mat": _matlab,
+    ".npz": _archive,
+    ".npy": _array,
+}

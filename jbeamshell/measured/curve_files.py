@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,20 +10,10 @@ import numpy as np
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.columns import bare, factor_of, unit_of
 from jbeamshell.measured.containers import read_table
-from jbeamshell.measured.curves import Curve, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.curves import IN_FILES, Curve
 from jbeamshell.measured.recordings import FilePath, check_words_of, labels_of
 
-# What the columns of a kind of curve are measured in, all per unit width.
-QUANTITIES: dict[str, dict[str, tuple[str, ...]]] = {
-    "dissipation": {"amplitude": ("N/m", "m"), "dissipation": ("J/m",)},
-    "stiffness": {"amplitude": ("N/m", "m"), "stiffness": ("N/m^2",)},
-    "squeeze": {"x": ("m",), "stress": ("N/m^2",)},
-}
-MAKERS: dict[str, Callable[..., Curve]] = {
-    "dissipation": DissipationCurve,
-    "stiffness": StiffnessCurve,
-    "squeeze": SqueezeCurve,
-}
+CURVES = {curve.form.name: curve for curve in IN_FILES}
 
 
 def read_curves(
@@ -58,9 +48,9 @@ def read_curves(
         naming the file, the line or column, and the fix
     """
     check_words_of(columns=columns, units=units)
-    if not (isinstance(kind, str) and kind in QUANTITIES):
-        raise InputError(f"kind = {kind!r}: choose among {', '.join(map(repr, QUANTITIES))}")
-    known = (*QUANTITIES[kind], "noise")
+    if not (isinstance(kind, str) and kind in CURVES):
+        raise InputError(f"kind = {kind!r}: choose among {', '.join(map(repr, CURVES))}")
+    known = (*CURVES[kind].form.columns, "noise")
     for name, given in (("columns", columns or {}), ("units", units or {})):
         for quantity in given:
             if quantity not in known:
@@ -80,7 +70,8 @@ def _read(
     given: Mapping[str, str],
     decimal: str | None,
 ) -> tuple[Curve, tuple[str, ...]]:
-    wanted = QUANTITIES[kind]
+    curve: Any = CURVES[kind]
+    wanted = {name: column.units for name, column in curve.form.columns.items()}
 
     def places(titles: Sequence[str]) -> dict[str, int]:
         names = [bare(title).strip().lower() for title in titles]
@@ -110,7 +101,7 @@ def _read(
     if not whole.all():
         notes = (f"{np.count_nonzero(~whole)} of {whole.size} rows lack a number: left out",)
     noise = rows[:, 2] if rows.shape[1] > 2 else None
-    return MAKERS[kind](rows[:, 0], rows[:, 1], label, noise), notes
+    return curve(rows[:, 0], rows[:, 1], label, noise), notes
 
 
 def _factors(

@@ -1,13 +1,15 @@
-"""What tests leave behind, besides a `Loop`: curves that a model can be compared with.
+"""Measured curves that a model can be compared with, besides a `Loop`.
 
-Every curve may carry its noise, the standard deviation of what the model answers, in that column's
-units: one number or one for each point; and a weight by which its residuals are multiplied.
+Every curve may carry its noise, the standard deviation of the column that the model answers, in
+that column's units: one number, or one for each point. Its weight multiplies its residuals.
+
+A new kind of curve is a class with two columns and a `Form`; its entry in `IN_FILES` lets it be
+read from files.
 """
 
 from __future__ import annotations
 
-import abc
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import numpy as np
@@ -15,36 +17,53 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
+from jbeamshell.measured.form import (
+    AMPLITUDE,
+    DISSIPATION,
+    LOOP,
+    POSITION,
+    SECANT_STIFFNESS,
+    SQUEEZE_STRESS,
+    Column,
+    Form,
+)
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.recordings import FEWEST_POINTS, HUGE, as_column
 
-FEWEST_OF_BACKBONE = 3
+Floats = NDArray[np.float64]
 
 
 class Curve(eqx.Module):
-    """A measurement with noise and weight.
+    """Measured curve: two columns of one length, their noise and weight.
 
     Attributes
     ----------
-    label : for pictures and messages
+    form : names, labels and units of its columns, the same for all curves of a class
+    fewest : fewest points that a curve of the class may have
+    label : name in pictures and messages
     noise : (points,) standard deviations; None where they are not known
     weight : factor of its residuals among those of other measurements
     """
 
-    label: eqx.AbstractVar[str]
-    noise: eqx.AbstractVar[NDArray[np.float64] | None]
-    weight: eqx.AbstractVar[float]
+    form: ClassVar[Form]
+    fewest: ClassVar[int] = 1
 
-    @abc.abstractmethod
-    def response(self, control: str) -> str:
-        """Name of the column that the model answers."""
+    label: str = eqx.field(static=True)
+    noise: Floats | None
+    weight: float = eqx.field(static=True)
 
-    def _check(self, fewest: int, **columns: NDArray[np.float64]) -> None:
-        """Columns of pairs, all finite; and what goes with them."""
-        (one, x), (other, y) = columns.items()
+    def _hold(self, label: str, noise: Any, weight: Any, **columns: Any) -> None:
+        """Keep columns as arrays, the noise as one of their length."""
+        for name, values in columns.items():
+            setattr(self, name, as_column(values, name, label))
+        self.label, self.weight = label, _weight(weight, label)
+        self.noise = _noise(noise, getattr(self, next(iter(columns))), label)
+
+    def __check_init__(self) -> None:
+        columns = {name: getattr(self, name) for name in self.form.columns}
         for name, column in columns.items():
-            if column.ndim != 1 or column.size < fewest:
-                fix = f"give {fewest} point{'s' * (fewest > 1)} or more"
+            if column.ndim != 1 or column.size < self.fewest:
+                fix = f"give {self.fewest} point{'s' * (self.fewest > 1)} or more"
                 raise InputError(f"{self.label}: {name} has shape {column.shape}: {fix}")
             bad = np.flatnonzero(~(np.abs(column) <= HUGE))
             if bad.size:
@@ -52,6 +71,7 @@ class Curve(eqx.Module):
                     f"{self.label}: {name} is {column[bad[0]]} at point {bad[0] + 1}: remove or "
                     "repair it"
                 )
+        (one, x), (other, y) = columns.items()
         if x.size != y.size:
             raise InputError(
                 f"{self.label}: {one} and {other} have {x.size} and {y.size} points: give pairs"
@@ -59,6 +79,10 @@ class Curve(eqx.Module):
         check_noise(self.label, self.noise, x.size)
         if not (np.isfinite(self.weight) and self.weight > 0.0):
             raise InputError(f"{self.label}: weight = {self.weight}: must be a positive number")
+        self._check_columns(columns)
+
+    def _check_columns(self, columns: dict[str, Floats]) -> None:
+        """Raise `InputError` for numbers that a curve of this kind cannot have."""
 
 
 class SqueezeCurve(Curve):
@@ -66,16 +90,16 @@ class SqueezeCurve(Curve):
 
     Attributes
     ----------
-    x : (points,) increasing positions X
+    x : (points,) positions X, increasing
     stress : (points,) mean of sigma_y over the height, compression negative
     label, noise, weight : see `Curve`
     """
 
-    x: NDArray[np.float64]
-    stress: NDArray[np.float64]
-    label: str = eqx.field(static=True)
-    noise: NDArray[np.float64] | None
-    weight: float = eqx.field(static=True)
+    form = Form("squeeze", {"x": POSITION, "stress": SQUEEZE_STRESS}, "x", "stress", ("stress",))
+    fewest = FEWEST_POINTS
+
+    x: Floats
+    stress: Floats
 
     def __init__(
         self,
@@ -85,12 +109,9 @@ class SqueezeCurve(Curve):
         noise: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        self.x, self.stress = as_column(x, "x", label), as_column(stress, "stress", label)
-        self.label, self.weight = label, _weight(weight, label)
-        self.noise = _noise(noise, self.x, label)
+        self._hold(label, noise, weight, x=x, stress=stress)
 
-    def __check_init__(self) -> None:
-        self._check(FEWEST_POINTS, x=self.x, stress=self.stress)
+    def _check_columns(self, columns: dict[str, Floats]) -> None:
         back = np.flatnonzero(np.diff(self.x) <= 0.0)
         if back.size:
             before, after = self.x[back[0] : back[0] + 2]
@@ -110,32 +131,28 @@ class SqueezeCurve(Curve):
                 "negative; change the sign"
             )
 
-    def response(self, control: str) -> str:
-        """The stress, whatever drives."""
-        return "stress"
-
     def between(self, low: float, high: float) -> SqueezeCurve:
-        """The part of the curve with low < x < high."""
+        """Part of the curve with low < x < high."""
         inside = (self.x > low) & (self.x < high)
         noise = None if self.noise is None else self.noise[inside]
         return SqueezeCurve(self.x[inside], self.stress[inside], self.label, noise, self.weight)
 
 
 class Backbone(Curve):
-    """The first loading from rest, up or down, without a reversal.
+    """First loading from zero, up or down, without a reversal.
 
     Attributes
     ----------
-    force : (points,) per unit width
-    displacement : (points,) of the loaded end since the pressure
+    force : (points,) end force per unit width
+    displacement : (points,) displacement of the loaded end since the pressure was applied
     label, noise, weight : see `Curve`; the noise is that of the column that does not drive
     """
 
-    force: NDArray[np.float64]
-    displacement: NDArray[np.float64]
-    label: str = eqx.field(static=True)
-    noise: NDArray[np.float64] | None
-    weight: float = eqx.field(static=True)
+    form = LOOP
+    fewest = 3
+
+    force: Floats
+    displacement: Floats
 
     def __init__(
         self,
@@ -145,30 +162,28 @@ class Backbone(Curve):
         noise: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        self.force = as_column(force, "force", label)
-        self.displacement = as_column(displacement, "displacement", label)
-        self.label, self.weight = label, _weight(weight, label)
-        self.noise = _noise(noise, self.force, label)
+        self._hold(label, noise, weight, force=force, displacement=displacement)
 
-    def __check_init__(self) -> None:
-        columns = {"force": self.force, "displacement": self.displacement}
-        self._check(FEWEST_OF_BACKBONE, **columns)
+    def _check_columns(self, columns: dict[str, Floats]) -> None:
         for name, column in columns.items():
             if np.ptp(column) == 0.0:
-                raise InputError(f"{self.label}: {name} is constant ({column[0]:g}): no loading")
-
-    def response(self, control: str) -> str:
-        """The column that does not drive."""
-        return "displacement" if control == "force" else "force"
+                raise InputError(
+                    f"{self.label}: {name} is constant ({column[0]:g}): no loading; give points "
+                    "of a rising load"
+                )
 
 
 class AmplitudeCurve(Curve):
-    """A figure of the steady cycle against the amplitude of what drives the test."""
+    """A figure of the steady cycle over its amplitude, compared by its logarithm.
 
-    amplitude: eqx.AbstractVar[NDArray[np.float64]]
+    Attributes
+    ----------
+    amplitude : (points,) half the range of the column that drives, force or displacement
+    """
 
-    def _check_positive(self, **columns: NDArray[np.float64]) -> None:
-        self._check(1, **columns)
+    amplitude: Floats
+
+    def _check_columns(self, columns: dict[str, Floats]) -> None:
         for name, column in columns.items():
             if np.any(column <= 0.0):
                 at = int(np.argmax(column <= 0.0))
@@ -178,21 +193,25 @@ class AmplitudeCurve(Curve):
                 )
 
 
+def _over_amplitude(name: str, column: Column) -> Form:
+    """Form of a figure over the amplitude."""
+    columns = {"amplitude": AMPLITUDE, name: column}
+    return Form(name, columns, "amplitude", name, (name,), scale="log")
+
+
 class DissipationCurve(AmplitudeCurve):
-    """Work dissipated per steady cycle against amplitude, compared by its logarithm.
+    """Work dissipated per steady cycle over amplitude, compared by its logarithm.
 
     Attributes
     ----------
-    amplitude : (points,) half the range of what drives
+    amplitude : (points,) half the range of the column that drives
     dissipation : (points,) area of the loop, per unit width
     label, noise, weight : see `Curve`
     """
 
-    amplitude: NDArray[np.float64]
-    dissipation: NDArray[np.float64]
-    label: str = eqx.field(static=True)
-    noise: NDArray[np.float64] | None
-    weight: float = eqx.field(static=True)
+    form = _over_amplitude("dissipation", DISSIPATION)
+
+    dissipation: Floats
 
     def __init__(
         self,
@@ -202,34 +221,22 @@ class DissipationCurve(AmplitudeCurve):
         noise: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        self.amplitude = as_column(amplitude, "amplitude", label)
-        self.dissipation = as_column(dissipation, "dissipation", label)
-        self.label, self.weight = label, _weight(weight, label)
-        self.noise = _noise(noise, self.amplitude, label)
-
-    def __check_init__(self) -> None:
-        self._check_positive(amplitude=self.amplitude, dissipation=self.dissipation)
-
-    def response(self, control: str) -> str:
-        """The dissipation, whatever drives."""
-        return "dissipation"
+        self._hold(label, noise, weight, amplitude=amplitude, dissipation=dissipation)
 
 
 class StiffnessCurve(AmplitudeCurve):
-    """Secant stiffness of the steady cycle against amplitude, compared by its logarithm.
+    """Secant stiffness of the steady cycle over amplitude, compared by its logarithm.
 
     Attributes
     ----------
-    amplitude : (points,) half the range of what drives
-    stiffness : (points,) range of force over range of displacement, per unit width
+    amplitude : (points,) half the range of the column that drives
+    stiffness : (points,) range of the force over the range of the displacement, per unit width
     label, noise, weight : see `Curve`
     """
 
-    amplitude: NDArray[np.float64]
-    stiffness: NDArray[np.float64]
-    label: str = eqx.field(static=True)
-    noise: NDArray[np.float64] | None
-    weight: float = eqx.field(static=True)
+    form = _over_amplitude("stiffness", SECANT_STIFFNESS)
+
+    stiffness: Floats
 
     def __init__(
         self,
@@ -239,33 +246,18 @@ class StiffnessCurve(AmplitudeCurve):
         noise: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        self.amplitude = as_column(amplitude, "amplitude", label)
-        self.stiffness = as_column(stiffness, "stiffness", label)
-        self.label, self.weight = label, _weight(weight, label)
-        self.noise = _noise(noise, self.amplitude, label)
+        self._hold(label, noise, weight, amplitude=amplitude, stiffness=stiffness)
 
-    def __check_init__(self) -> None:
-        self._check_positive(amplitude=self.amplitude, stiffness=self.stiffness)
 
-    def response(self, control: str) -> str:
-        """The stiffness, whatever drives."""
-        return "stiffness"
-
+IN_FILES: tuple[type[Curve], ...] = (DissipationCurve, StiffnessCurve, SqueezeCurve)
 
 Measurement = Loop | Curve
 
 
-def response_of(measurement: Measurement, control: str) -> str:
-    """Name of the measurement's column that the model answers."""
-    if isinstance(measurement, Loop):
-        return "displacement" if control == "force" else "force"
-    return measurement.response(control)
+def noise_of(measurement: Measurement) -> Floats | None:
+    """Standard deviations (points,) of the column that the model answers; None if unknown.
 
-
-def noise_of(measurement: Measurement) -> NDArray[np.float64] | None:
-    """Standard deviations (points,) of the column that the model answers, where they are known.
-
-    Those of a mean of several cycles are smaller than the noise of one.
+    A loop that is the mean of several cycles has less noise than one cycle.
     """
     if isinstance(measurement, Curve):
         return measurement.noise
@@ -278,11 +270,11 @@ def noise_of(measurement: Measurement) -> NDArray[np.float64] | None:
 
 
 def weight_of(measurement: Measurement) -> float:
-    """Factor of the measurement's residuals; a loop counts once."""
+    """Factor of the measurement's residuals; 1 for a loop."""
     return measurement.weight if isinstance(measurement, Curve) else 1.0
 
 
-def check_noise(label: str, noise: NDArray[np.float64] | None, points: int) -> None:
+def check_noise(label: str, noise: Floats | None, points: int) -> None:
     """Raise `InputError` unless the noise is positive, and one number or one for each point."""
     if noise is None:
         return
@@ -298,15 +290,15 @@ def check_noise(label: str, noise: NDArray[np.float64] | None, points: int) -> N
 
 
 def _weight(weight: Any, label: str) -> float:
+    """Weight as a number."""
     number = isinstance(weight, int | float | np.floating | np.integer)
     if number and not isinstance(weight, bool) and abs(weight) <= HUGE:
         return float(weight)
     raise InputError(f"{label}: weight = {shown(weight)}: must be a positive number")
 
 
-def _noise(
-    noise: Any, column: NDArray[np.float64], label: str = "noise"
-) -> NDArray[np.float64] | None:
+def _noise(noise: Any, column: Floats, label: str = "noise") -> Floats | None:
+    """Noise as an array of the column's shape, if it is one number."""
     if noise is None:
         return None
     values = as_column(noise, "noise", label)

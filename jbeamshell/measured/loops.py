@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.measured.form import LOOP, Form
 from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
 from jbeamshell.measured.recordings import FilePath, read_recordings, recording_from_arrays
 from jbeamshell.measured.reversals import find_driver, find_turns
@@ -45,6 +46,11 @@ class Loop(NamedTuple):
     notes: tuple[str, ...] = ()
     driver: str | None = None
     free_zero: bool = False
+
+    @property
+    def form(self) -> Form:
+        """Names, labels and units of its columns."""
+        return LOOP
 
     @property
     def closed(self) -> bool:

@@ -3,137 +3,102 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
-from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.form import Form, by_form
 from jbeamshell.plotting.protocols import LikelihoodProfile, ModelOverData
 from jbeamshell.plotting.style import (
-    DISPLACEMENT,
     DOTS,
     FAINT,
-    FORCE,
     PALETTE,
-    POSITION,
-    SQUEEZE,
     colours,
     style,
 )
 
 PER_CENT = "(model - data) / range  [%]"
+LOG_PER_CENT = r"$\ln$(model / data)  [%]"
 BAND = 0.95
 
 
-class Kind(NamedTuple):
-    """How measurements of some types are drawn.
-
-    Attributes
-    ----------
-    types : of the measurements
-    x, y : names of their columns
-    labels : of the axes
-    scale : of both axes
-    """
-
-    types: tuple[type, ...]
-    x: str
-    y: str
-    labels: tuple[str, str]
-    scale: str = "linear"
-
-
-AMPLITUDE = "amplitude"
-KINDS = (
-    Kind((Loop, Backbone), "displacement", "force", (DISPLACEMENT, FORCE)),
-    Kind((SqueezeCurve,), "x", "stress", (POSITION, SQUEEZE)),
-    Kind((DissipationCurve,), "amplitude", "dissipation", (AMPLITUDE, "work per cycle"), "log"),
-    Kind((StiffnessCurve,), "amplitude", "stiffness", (AMPLITUDE, "secant stiffness"), "log"),
-)
-
-
-def overlay(fit: ModelOverData, axes: Any = None) -> list[Any]:
-    """Draw the model over the data, with its 95 % bands, a panel for each kind of measurement.
+def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
+    """Draw the model over the data, with its 95 % bands.
 
     Parameters
     ----------
     fit : result of a fit
-    axes : as many as there are kinds; new ones when not given
+    axes : axes, one for each form of measurement; new ones when not given
 
     Returns
     -------
     list of matplotlib.axes.Axes
-        loops and backbones first, then squeeze, dissipation, stiffness
+        one for each form of measurement, in the order in which the data have them: loops and
+        backbones share one
     """
     bands = fit.bands(BAND) if fit.problem is not None else None
     with style():
         panels = _panels(fit, axes)
-        for kind, places, panel in panels:
+        for form, places, panel in panels:
             for place, colour in zip(places, colours(len(places)), strict=True):
                 data, model = fit.data[place], fit.model[place]
-                x, y = getattr(model, kind.x), getattr(model, kind.y)
-                panel.plot(x, y, color=colour, label=f"model, {data.label}")
+                panel.plot(*_xy(form, model), color=colour, label=f"model, {data.label}")
                 first = "data" if place == places[0] else "_nolegend_"
-                panel.plot(getattr(data, kind.x), getattr(data, kind.y), label=first, **DOTS)
+                panel.plot(*_xy(form, data), label=first, **DOTS)
                 if bands is not None:
-                    x, y = (
-                        np.append(
-                            getattr(bands[place][0], name), getattr(bands[place][1], name)[::-1]
-                        )
-                        for name in (kind.x, kind.y)
-                    )
+                    low, high = (_xy(form, end) for end in bands[place])
+                    x, y = (np.append(a, b[::-1]) for a, b in zip(low, high, strict=True))
                     panel.fill(x, y, color=colour, alpha=0.2, linewidth=0.0)
-            panel.set(xlabel=kind.labels[0], ylabel=kind.labels[1])
-            panel.set(xscale=kind.scale, yscale=kind.scale)
+            panel.set(xlabel=form.columns[form.x].label, ylabel=form.columns[form.y].label)
+            panel.set(xscale=form.scale, yscale=form.scale)
             panel.legend(loc="best")
     return [panel for _, _, panel in panels]
 
 
-def residuals(fit: ModelOverData, axes: Any = None) -> list[Any]:
-    """Draw what the model leaves unexplained, in per cent, over what drives or where it was taken.
+def residuals(fit: ModelOverData, axes: Any = None) -> list[Axes]:
+    """Draw the difference between model and data, in per cent.
+
+    It is drawn over the column that drives the model, or over the position.
 
     Parameters
     ----------
     fit : result of a fit
-    axes : as many as there are kinds of measurements; new ones when not given
+    axes : axes, one for each form of measurement; new ones when not given
 
     Returns
     -------
     list of matplotlib.axes.Axes
-        in the order of `overlay`
+        one for each form of measurement, in the order of `overlay`
     """
     left, columns = fit.residuals, fit.columns
     with style():
         panels = _panels(fit, axes)
-        for kind, places, panel in panels:
-            x, label = kind.x, kind.labels[0]
-            if columns[places[0]] == "displacement":
-                x, label = "force", FORCE
+        for form, places, panel in panels:
+            along = next(name for name in form.columns if name != columns[places[0]])
             for place, colour in zip(places, colours(len(places)), strict=True):
                 data = fit.data[place]
-                panel.plot(
-                    getattr(data, x), 100.0 * left[place], ".", color=colour, label=data.label
-                )
+                look = {"color": colour, "label": data.label}
+                panel.plot(getattr(data, along), 100.0 * left[place], ".", **look)
             panel.axhline(0.0, color=FAINT, linewidth=1.0, zorder=1.0)
-            panel.set(xlabel=label, xscale=kind.scale)
-            panel.set(ylabel="log(model / data)  [%]" if kind.scale == "log" else PER_CENT)
+            panel.set(xlabel=form.columns[along].label, xscale=form.scale)
+            panel.set(ylabel=LOG_PER_CENT if form.scale == "log" else PER_CENT)
             panel.legend(loc="best")
     return [panel for _, _, panel in panels]
 
 
-def _panels(fit: ModelOverData, axes: Any) -> list[tuple[Kind, list[int], Any]]:
-    """Kind, places of its measurements, and where to draw them."""
-    kinds: list[tuple[Kind, list[int]]] = []
-    for kind in KINDS:
-        places = [i for i, data in enumerate(fit.data) if isinstance(data, kind.types)]
-        if places:
-            kinds.append((kind, places))
-    drawn = _checked_axes(len(kinds), axes)
-    return [(kind, places, panel) for (kind, places), panel in zip(kinds, drawn, strict=True)]
+def _xy(form: Form, measurement: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of a measurement that are drawn along and up."""
+    return getattr(measurement, form.x), getattr(measurement, form.y)
+
+
+def _panels(fit: ModelOverData, axes: Any) -> list[tuple[Form, list[int], Axes]]:
+    """Forms, the places of their measurements, and the axes of each."""
+    forms = by_form(fit.data)
+    drawn = _checked_axes(len(forms), axes)
+    return [(form, places, panel) for (form, places), panel in zip(forms, drawn, strict=True)]
 
 
 def likelihoods(profiles: Sequence[LikelihoodProfile], axes: Any = None) -> list[Axes]:

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
+from jbeamshell.measured import form
 
 STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
@@ -50,10 +51,10 @@ DOTS: dict[str, Any] = {
     "markeredgewidth": 0.0,
     "zorder": 3.0,
 }
-FORCE = "$F$  [force per width]"
-DISPLACEMENT = "$u(L)$  [length]"
-POSITION = "$X$  [length]"
-SQUEEZE = r"$\chi\,/\,2H$  [stress]"
+FORCE = form.FORCE.label
+DISPLACEMENT = form.DISPLACEMENT.label
+POSITION = form.POSITION.label
+SQUEEZE = form.SQUEEZE_STRESS.label
 
 
 @contextlib.contextmanager
