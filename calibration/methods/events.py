@@ -81,8 +81,8 @@ def matrices(scene: jb.Scene) -> Matrices:
         np.asarray(system.load) / tributary,
         pull,
         tributary,
-        float(system.friction),
-        float(system.slip_stiffness),
+        float(system.foundation.friction),
+        float(system.foundation.slip_stiffness),
     )
 
 

@@ -20,8 +20,8 @@ from jax import Array, lax
 import jbeamshell as jb
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.numerics import block_tridiagonal
-from jbeamshell.quasistatic.system import Drive, Level, System, V
-from jbeamshell.quasistatic.tangent import Stiffness, matrix, stiffness_at_rest
+from jbeamshell.quasistatic.system import LoadLevel, Prescribed, System, V
+from jbeamshell.quasistatic.tangent import Stiffness, initial_stiffness, matrix
 
 TOLERANCE = 1e-10  # of mu F_N L, as the library's
 TRIES, HALVINGS = 100, 8
@@ -108,7 +108,7 @@ class Run(NamedTuple):
 class Attempt(NamedTuple):
     """Part of a load step; levels are where it starts and where it is."""
 
-    level: Level
+    level: LoadLevel
     part: Array
     size: Array
     work: Array
@@ -120,10 +120,10 @@ def march(scene: jb.Scene, method: Method) -> Run:
     """Press the strip and walk its cycles."""
     scenes = [*(stage(scene) for stage in method.stages), scene]
     systems = [System(one) for one in scenes]
-    stiffnesses = [stiffness_at_rest(system, 1.0) for system in systems]
+    stiffnesses = [initial_stiffness(system, 1.0) for system in systems]
     unit = jnp.asarray(np.append(0.0, scene.load.unit_path()))
 
-    def step(state: tuple[Level, Array], load: tuple[Array, Array]) -> tuple[Any, Any]:
+    def step(state: tuple[LoadLevel, Array], load: tuple[Array, Array]) -> tuple[Any, Any]:
         level, target = state
         to, rough = load
         found = _step(systems, stiffnesses, level, (target, to, rough), method)
@@ -131,7 +131,7 @@ def march(scene: jb.Scene, method: Method) -> Run:
 
     targets = scene.load.amplitude * unit
     rough = jnp.ones_like(unit).at[0].set(0.0)
-    start = (systems[-1].rest(), jnp.zeros_like(targets[0]))
+    start = (systems[-1].unloaded(), jnp.zeros_like(targets[0]))
     _, (work, given_up, tried) = lax.scan(step, start, (targets, rough))
     cycle = 2 * scene.load.steps_per_half_cycle
     return Run(jnp.sum(work[-cycle:]), jnp.sum(given_up), jnp.sum(tried), unit.size)
@@ -140,7 +140,7 @@ def march(scene: jb.Scene, method: Method) -> Run:
 def _step(
     systems: list[System],
     stiffnesses: list[Stiffness],
-    before: Level,
+    before: LoadLevel,
     load: tuple[Array, Array, Array],
     method: Method,
 ) -> Attempt:
@@ -151,17 +151,17 @@ def _step(
     def go_on(at: Attempt) -> Attempt:
         part = jnp.minimum(at.part + at.size, 1.0)
         zero = jnp.zeros_like(part)
-        drive = Drive(begin + part * (end - begin), zero + 1.0, zero, rough)
+        prescribed = Prescribed(begin + part * (end - begin), zero + 1.0, zero, rough)
         change, tried = jnp.zeros_like(at.level.q[:, list(systems[-1].model.active)]), at.tried
         for system, stiffness in zip(systems, stiffnesses, strict=True):
-            change, error, more = _newton(system, stiffness, change, at.level, drive, method)
+            change, error, more = _newton(system, stiffness, change, at.level, prescribed, method)
             tried = tried + more
-        after, *_ = systems[-1].advance(change, at.level, drive)
+        after, *_ = systems[-1].advance(change, at.level, prescribed)
         good = error <= TOLERANCE
         given_up = ~good & (at.size <= smallest)
         kept = good | given_up
         level = jax.tree.map(lambda new, old: jnp.where(kept, new, old), after, at.level)
-        work = drive.rough * systems[-1].slip_work(at.level, after)
+        work = prescribed.rough * systems[-1].slip_work(at.level, after)
         return Attempt(
             level,
             jnp.where(kept, part, at.part),
@@ -181,12 +181,12 @@ def _newton(
     system: System,
     stiffness: Stiffness,
     start: Array,
-    before: Level,
-    drive: Drive,
+    before: LoadLevel,
+    prescribed: Prescribed,
     method: Method,
 ) -> tuple[Array, Array, Array]:
     """Newton's iteration: change of the fields, largest residual left, iterations."""
-    limit = jax.vmap(system.law.limit, in_axes=(0, 0, 0, 0, None))
+    limit = jax.vmap(system.foundation.friction_law.limit, in_axes=(0, 0, 0, 0, None))
 
     def size(residual: Array) -> Array:
         return jnp.max(jnp.abs(residual))
@@ -197,12 +197,13 @@ def _newton(
 
     def improve(at: tuple) -> tuple:
         x, residual, seen, scale, tried = at
-        tangent = matrix(system, stiffness, seen, before, drive)
+        tangent = matrix(system, stiffness, seen, before, prescribed)
         new = x + scale * block_tridiagonal.solve(tangent, -residual)
         if method.limited:
-            limited = limit(x[:, V], new[:, V], before.traction, before.cap, system.slip_stiffness)
-            new = new.at[:, V].set(jnp.where(drive.rough > 0.0, limited, new[:, V]))
-        _, left, sees = system.advance(new, before, drive)
+            given = before.traction, before.cap, system.foundation.slip_stiffness
+            limited = limit(x[:, V], new[:, V], *given)
+            new = new.at[:, V].set(jnp.where(prescribed.rough > 0.0, limited, new[:, V]))
+        _, left, sees = system.advance(new, before, prescribed)
         better = jnp.linalg.norm(left) < jnp.linalg.norm(residual)
         taken = better | (scale <= 0.5**HALVINGS) | (not method.monotone)
         there = (new, left, sees, jnp.ones_like(scale))
@@ -210,8 +211,8 @@ def _newton(
         kept = jax.tree.map(lambda a, b: jnp.where(taken, a, b), there, here)
         return (*kept, tried + 1)
 
-    _, residual, seen = system.advance(start, before, drive)
-    at = (start, residual, seen, jnp.ones_like(drive.target), jnp.asarray(0))
+    _, residual, seen = system.advance(start, before, prescribed)
+    at = (start, residual, seen, jnp.ones_like(prescribed.controlled), jnp.asarray(0))
     x, residual, _, _, tried = lax.while_loop(unfinished, improve, at)
     return x, size(residual), tried
 

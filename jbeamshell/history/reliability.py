@@ -15,6 +15,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.history.linearisation import linear_error
+from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.scene.scene import Scene
 
 NEGLIGIBLE = 1e-9  # of the sticking range, or of the pressure: less than this is none
@@ -79,7 +80,7 @@ def dissipation_errors(cycle: SlipCycle) -> tuple[Array, ...]:
     grid, corner : infinite where nothing slips
     """
     numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
-    cap = cycle.friction * numbers.maximum(cycle.reaction, 0.0)
+    cap = coulomb_cap(cycle.friction, cycle.reaction)
     cap = 0.5 * (cap[1:] + cap[:-1])
     elastic = numbers.diff(cycle.traction, axis=0) / cycle.slip_stiffness
     slip = numbers.abs(numbers.diff(cycle.v, axis=0) - elastic)

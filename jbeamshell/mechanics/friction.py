@@ -32,6 +32,11 @@ import jax.numpy as jnp
 from jax import Array
 
 
+def coulomb_cap(friction: Any, reaction: Any) -> Any:
+    """Coulomb cap mu max(R, 0), for numbers and arrays of NumPy or of JAX."""
+    return friction * reaction.clip(0.0)
+
+
 class FrictionLaw(eqx.Module):
     """Friction law of one point; a subclass implements `traction`.
 

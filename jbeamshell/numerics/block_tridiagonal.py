@@ -188,7 +188,7 @@ def _solve_blocks(matrix: BlockTridiagonal, rhs: Array) -> Array:
         lower, diagonal, upper, b = row
         seen = _product(lower, above)  # of the row above: [its upper block, its right-hand side]
         pivot, right = diagonal - seen[:, :m], b - seen[:, m]
-        solved = _gauss_jordan(jnp.concatenate([pivot, upper, right[:, None]], axis=1))
+        solved = gauss_jordan(jnp.concatenate([pivot, upper, right[:, None]], axis=1))
         return solved, solved
 
     def substitute(below: Array, row: Array) -> tuple[Array, Array]:
@@ -217,10 +217,17 @@ def _product(a: Array, b: Array) -> Array:
     return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)
 
 
-def _gauss_jordan(augmented: Array) -> Array:
+def gauss_jordan(augmented: Array) -> Array:
     """Columns x of [a, b] reduced to [1, x] for a block (m, m + columns), without pivoting."""
     m = augmented.shape[0]
     for k in range(m):
         row = augmented[k] / augmented[k, k]
         augmented = (augmented - augmented[:, k : k + 1] * row).at[k].set(row)
     return augmented[:, m:]
+
+
+def inverse(block: Array) -> Array:
+    """Inverse of a small block (m, m), without pivoting."""
+    return gauss_jordan(
+        jnp.concatenate([block, jnp.eye(block.shape[0], dtype=block.dtype)], axis=1)
+    )

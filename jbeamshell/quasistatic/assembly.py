@@ -82,7 +82,7 @@ def _rows(
     tributary: Array,
 ) -> tuple[Blocks, Blocks, Blocks, Blocks]:
     """Blocks of nodes from the powers 1, 0 and -1 of the lengths of the elements around them."""
-    active, rule = system.model.active, system.rule
+    active, rule = system.model.active, system.element_rule
 
     def integral(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return np.einsum("q,qa,qb->ab", rule.weights, a, b)

@@ -20,10 +20,11 @@ from jax import Array, lax
 
 from jbeamshell.common.errors import Status
 from jbeamshell.mechanics.bar import bar_backbone, bar_slip_length, bar_slip_profile
+from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.load_path import LoadPath
 from jbeamshell.quasistatic.stepping import PathState, Steps, at_rest, march, walk
-from jbeamshell.quasistatic.system import Level, System, V
+from jbeamshell.quasistatic.system import LoadLevel, System, V
 from jbeamshell.scene.scene import Scene
 
 
@@ -41,7 +42,7 @@ class BackboneSteps(NamedTuple):
     """
 
     pressed: Steps
-    level: Level
+    level: LoadLevel
     displacement: Array
     sinking: Array
     slip_work: Array
@@ -145,7 +146,7 @@ def _bar_backbone(scene: Scene, path: LoadPath) -> BackboneSteps:
     reach = bar_slip_length(force, rubs)
     slid = jax.vmap(lambda f: bar_slip_profile(system.x, f, strip.length, stiffness, rubs))(force)
     nothing = jnp.zeros_like(slid)
-    level = Level(
+    level = LoadLevel(
         q=jnp.zeros((*slid.shape, scene.model.width)).at[..., V].set(slid),
         traction=rubs * (system.x > strip.length - reach[:, None]),
         cap=nothing,
@@ -207,7 +208,7 @@ def _doubled(scene: Scene, path: LoadPath, backbone: BackboneSteps) -> Steps:
         return steps(before, each[1::2], jnp.broadcast_to(each[-1], each.shape))
 
     level = jax.tree.map(doubled, pressed.state.level, backbone.level)
-    level = level._replace(cap=scene.contact.friction * jnp.maximum(level.reaction, 0.0))
+    level = level._replace(cap=coulomb_cap(scene.contact.friction, level.reaction))
     sound = reached(pressed.state.sound, backbone.sound)
     count = sound.size
     last: PathState = jax.tree.map(

@@ -51,7 +51,12 @@ def last_reversal(system: System, before: Any, to: Any) -> Reversal:
     stride, rough = to.target - before.target, to.rough > 0.0
     along = jnp.where(stride >= 0.0, 1.0, -1.0)
     # What the end load has changed of the cap changes sign with it.
-    mean = system.friction * to.pressure * (system.load - system.bottom_load) / system.tributary
+    mean = (
+        system.foundation.friction
+        * to.pressure
+        * (system.load - system.bottom_load)
+        / system.tributary
+    )
     left = jnp.maximum(2.0 * mean - before.cap - along * before.traction, 0.0)
     share = left * system.tributary
     used = jnp.cumsum(share[::-1], axis=0)[::-1] - 0.5 * share

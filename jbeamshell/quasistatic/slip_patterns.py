@@ -182,14 +182,14 @@ def memory_of(state: Any) -> Memory:
 
 def _parts(system: System) -> tuple[Array, Array, Array]:
     """Stiffness of the section, fields' part in the end's displacement, forces of the pressure."""
-    rest = system.rest().q
+    rest = system.unloaded().q
     pull = jax.grad(system.end_displacement)(rest)[-1]
     return system.section_stiffness(), pull, jax.grad(system.sinking)(rest)
 
 
 def _known(system: System, section: Array, pull: Array, press: Array) -> LinearStrip:
     rough = smooth = band(system, section, True)
-    if system.follows_friction:
+    if system.ends_depend_on_friction:
         smooth = band(system, section, False)
     active = system.model.active
     forces = [system.residual_scale(i) * press[:, i] for i in active]
@@ -232,13 +232,15 @@ def step(strip: LinearStrip, memory: Memory, to: Any) -> Foreseen:
     found = _settle(strip, memory.traction, given, drawn, load, slips, rubs)
     change = jnp.where(rubs, found.change, further * strip.pressed)
     reaction = given + times(strip.band.normal, [*change])
-    cap = system.cap(reaction)
-    slid = system.law.traction(change[V], memory.traction, cap, system.slip_stiffness)
-    traction = jnp.where(found.closed & rubs, slid, 0.0)
-    work = system.tributary * system.law.slip_work(
-        change[V], memory.traction, traction, memory.cap, cap, system.slip_stiffness
+    cap = system.foundation.cap(reaction)
+    slid = system.foundation.friction_law.traction(
+        change[V], memory.traction, cap, system.foundation.slip_stiffness
     )
-    pressed = jnp.maximum(memory.cap, cap) > 2.0 * system.cap_floor
+    traction = jnp.where(found.closed & rubs, slid, 0.0)
+    work = system.tributary * system.foundation.friction_law.slip_work(
+        change[V], memory.traction, traction, memory.cap, cap, system.foundation.slip_stiffness
+    )
+    pressed = system.foundation.has_friction(jnp.maximum(memory.cap, cap))
     return Foreseen(
         change,
         Memory(traction, cap, reaction, to.target, to.pressure, turn),
@@ -270,7 +272,7 @@ def _settle(
     rough : whether there is friction; if not, nothing is done
     """
     system, band = strip.system, strip.band
-    slider, friction = system.slip_stiffness, system.friction
+    slider, friction = system.foundation.slip_stiffness, system.foundation.friction
 
     def equations(slips: Array, closed: Array) -> tuple[Band, list[Array]]:
         sticks = closed & (slips == 0.0)
@@ -293,12 +295,12 @@ def _settle(
         beyond = jnp.where(jnp.abs(trial) > cap + little, jnp.sign(trial), 0.0)
         # A node that slips may stick next, but not slip back: else the search goes in circles.
         on = jnp.where(at.slips * trial >= cap - little, at.slips, 0.0)
-        closed = cap > 2.0 * system.cap_floor
+        closed = system.foundation.has_friction(cap)
         slips = jnp.where(closed, jnp.where(at.slips == 0.0, beyond, on), 0.0)
         same = jnp.all((slips == at.slips) & (closed == at.closed), axis=0)
         return Pattern(slips, closed, jnp.stack(change), at.error, at.solves + ~at.settled, same)
 
-    closed = friction * given > 2.0 * system.cap_floor
+    closed = system.foundation.has_friction(friction * given)
     nothing, zero = jnp.zeros((len(load), *traction.shape), traction.dtype), jnp.zeros_like(drawn)
     none = jnp.zeros(rough.shape, int)
     first = Pattern(jnp.where(closed, slips, 0.0), closed, nothing, zero, none, ~rough)

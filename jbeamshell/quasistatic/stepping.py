@@ -26,15 +26,24 @@ from jbeamshell.quasistatic.prediction import (
     last_reversal,
 )
 from jbeamshell.quasistatic.slip_patterns import Foreseen, Foresight, Memory
-from jbeamshell.quasistatic.system import Drive, Level, Seen, System, Touch, V
+from jbeamshell.quasistatic.system import (
+    ContactInput,
+    ContactResponse,
+    LoadLevel,
+    Prescribed,
+    System,
+    V,
+)
 from jbeamshell.quasistatic.tangent import (
     Stiffness,
     in_blocks,
+    initial_stiffness,
     matrix,
     nodal,
+    residual_in_blocks,
     stiffness_at,
-    stiffness_at_rest,
-    unknowns_at_rest,
+    with_v,
+    zero_unknowns,
 )
 from jbeamshell.scene.parts import ARC_LENGTH
 from jbeamshell.scene.scene import Scene
@@ -58,7 +67,7 @@ class PathState(NamedTuple):
     sound : whether all steps so far found equilibrium
     """
 
-    level: Level
+    level: LoadLevel
     rest: Array
     target: Array
     pressure: Array
@@ -99,21 +108,20 @@ def march(scene: Scene, start: PathState, path: LoadPath, solver: Newton) -> Ste
     if foresees:
         known = slip_patterns.known(system)
     else:
-        rough = stiffness_at_rest(system, 1.0)
-        if system.follows_friction:
-            smooth = stiffness_at_rest(system, 0.0)
+        rough = initial_stiffness(system, 1.0)
+        if system.ends_depend_on_friction:
+            smooth = initial_stiffness(system, 0.0)
 
     def step(state: PathState, to: LoadPath) -> tuple[PathState, Steps]:
-        drive = Drive(to.target, to.pressure, state.rest, to.rough)
         if foresees:
             foreseen = slip_patterns.step(
                 known, slip_patterns.memory_of(state), lax.stop_gradient(to)
             )
-            return _step(system, state, drive, solver, None, foreseen)
+            return _step(system, state, to, solver, None, foreseen)
         stiffness = rough
-        if system.follows_friction:
+        if system.ends_depend_on_friction:
             stiffness = jax.tree.map(lambda a, b: jnp.where(to.rough > 0.0, a, b), rough, smooth)
-        return _step(system, state, drive, solver, stiffness, None)
+        return _step(system, state, to, solver, stiffness, None)
 
     return lax.scan(step, start, path)[1]
 
@@ -130,7 +138,7 @@ def walk(scene: Scene, start: PathState, path: LoadPath, solver: Newton) -> Step
 def _step(
     system: System,
     state: PathState,
-    drive: Drive,
+    to: LoadPath,
     solver: Newton,
     stiffness: Stiffness | None,
     foreseen: Foreseen | None,
@@ -138,39 +146,35 @@ def _step(
     before = state.level
     if foreseen is None:
         turn = last_reversal(
-            system, BeforeStep(before.traction, before.cap, state.target, state.turn), drive
+            system, BeforeStep(before.traction, before.cap, state.target, state.turn), to
         )
-        guess = _guess(system, state, drive, turn)
+        guess = _guess(system, state, to, turn)
     else:
         turn, guess = foreseen.memory.turn, foreseen.change.T
-    target = drive.target
+    prescribed = Prescribed(to.target, to.pressure, state.rest, to.rough)
     if system.control == ARC_LENGTH:
-        drive = _onwards(system, state, drive, turn)
-        stiffness = stiffness_at_rest(system, drive.rough, drive.along)
+        prescribed = _onwards(system, state, prescribed, turn)
+        stiffness = initial_stiffness(system, prescribed.rough, prescribed.weights)
 
-    def evaluate(unknown: Array) -> tuple[Array, Seen]:
-        _, residual, seen = system.advance(nodal(system, unknown), before, drive)
-        filling = unknown.ravel()[: unknown.size - residual.size]
-        return jnp.append(filling, residual.ravel()).reshape(unknown.shape), seen
+    def evaluate(unknown: Array) -> tuple[Array, ContactInput]:
+        _, residual, contact = system.advance(nodal(system, unknown), before, prescribed)
+        return residual_in_blocks(residual, unknown), contact
 
-    def tangent(seen: Seen, stiffness: Stiffness) -> BlockTridiagonal:
-        return matrix(system, stiffness, seen, before, drive)
+    def tangent(contact: ContactInput, stiffness: Stiffness) -> BlockTridiagonal:
+        return matrix(system, stiffness, contact, before, prescribed)
 
     def refresh(unknown: Array) -> Stiffness:
         # Tied to the unknowns, lest the compiler finds it before it is needed.
         strip, unknown = lax.optimization_barrier((system, unknown))
-        level, _, seen = strip.advance(nodal(strip, unknown), before, drive)
-        return stiffness_at(strip, level.q, strip.touch(*seen, before, drive), drive)
+        level, _, contact = strip.advance(nodal(strip, unknown), before, prescribed)
+        return stiffness_at(
+            strip, level.q, strip.contact_response(contact, before, prescribed), prescribed
+        )
 
     def limit(old: Array, new: Array) -> Array:
         slip, was = nodal(system, new)[:, V], nodal(system, old)[:, V]
-        limited = jax.vmap(system.law.limit, in_axes=(0, 0, 0, 0, None))(
-            was, slip, before.traction, before.cap, system.slip_stiffness
-        )
-        # A point without reaction slides freely.
-        rubs = (drive.rough > 0.0) & (before.cap > 2.0 * system.cap_floor)
-        fields = nodal(system, new).at[:, V].set(jnp.where(rubs, limited, slip))
-        return in_blocks(fields, new)
+        limited = system.foundation.limited_slip(was, slip, before.traction, before.cap)
+        return with_v(system, new, jnp.where(prescribed.rough > 0.0, limited, slip))
 
     change, (iterations, error) = solver.solve(
         evaluate,
@@ -181,21 +185,21 @@ def _step(
         stiffness,
         refresh if stiffness is None or not system.linear else None,
     )
-    after, *_ = system.advance(nodal(system, change), before, drive)
+    after, *_ = system.advance(nodal(system, change), before, prescribed)
     sound = state.sound & (error <= solver.tolerance_for(system.x.dtype))
     end = system.end_displacement(after.q)
-    rest = jnp.where(drive.rough > 0.0, state.rest, end)
+    rest = jnp.where(prescribed.rough > 0.0, state.rest, end)
     kept = jax.tree.map(lambda new, old: jnp.where(sound, new, old), after, before)
     path = _place(system, after, rest) - _place(system, before, rest)
     gone = jnp.linalg.norm(path)
     along = jnp.where(gone > 0.0, path / jnp.where(gone > 0.0, gone, 1.0), state.along)
-    new = PathState(kept, rest, target, drive.pressure, turn, change, along, sound)
+    new = PathState(kept, rest, to.target, to.pressure, turn, change, along, sound)
     return new, Steps(
         state=new,
         displacement=end - rest,
-        slipping=_slipping(system, before, after, drive.rough),
-        slip_work=drive.rough * system.slip_work(before, after),
-        stored_energy=system.stored_energy(after, drive.pressure),
+        slipping=_slipping(system, before, after, prescribed.rough),
+        slip_work=prescribed.rough * system.slip_work(before, after),
+        stored_energy=system.stored_energy(after, prescribed.pressure),
         sinking=system.sinking(after.q),
         iterations=iterations if foreseen is None else iterations + foreseen.solves,
         error=error,
@@ -219,19 +223,21 @@ def _as_foreseen(system: System, start: PathState, path: LoadPath, solver: Fores
 
     q, rest, end = lax.scan(go, (start.level.q, start.rest), (path, change))[1]
     along = jnp.tile(start.along, (q.shape[0], 1))
-    drive = Drive(path.target, path.pressure, rest, path.rough, along)
+    prescribed = Prescribed(path.target, path.pressure, rest, path.rough, along)
 
-    def reached(q: Array, memory: Memory, drive: Drive) -> Level:
-        touch = Touch(memory.traction, jnp.zeros_like(system.x), memory.reaction)
-        force, _ = system.balance(system.elastic(q, drive.pressure), q, touch, drive)
-        return Level(q, memory.traction, memory.cap, memory.reaction, force)
+    def reached(q: Array, memory: Memory, prescribed: Prescribed) -> LoadLevel:
+        touch = ContactResponse(memory.traction, jnp.zeros_like(system.x), memory.reaction)
+        force, _ = system.balance(
+            system.elastic_forces(q, prescribed.pressure), q, touch, prescribed
+        )
+        return LoadLevel(q, memory.traction, memory.cap, memory.reaction, force)
 
-    level = jax.vmap(reached)(q, memory, drive)
+    level = jax.vmap(reached)(q, memory, prescribed)
     before = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b[:-1]]), start.level, level)
     error = foreseen.error
     if solver.checked:
         # One after the other: a loop stays small enough for what runs as one native function.
-        each = (change, before, drive)
+        each = (change, before, prescribed)
         error = lax.map(lambda at: jnp.max(jnp.abs(system.advance(*at)[1])), each)
     good = foreseen.settled & (error <= solver.tolerance_for(system.x.dtype))
     sound = start.sound & (jnp.cumsum(~good) == 0)
@@ -257,12 +263,14 @@ def _as_foreseen(system: System, start: PathState, path: LoadPath, solver: Fores
     )
 
 
-def _slipping(system: System, before: Level, after: Level, rough: Array) -> Array:
+def _slipping(system: System, before: LoadLevel, after: LoadLevel, rough: Array) -> Array:
     """Whether the nodes slip in a step, (n,)."""
     motion = after.q[:, V] - before.q[:, V]
-    inelastic = plastic_slip(motion, before.traction, after.traction, system.slip_stiffness)
-    noticeable = system.slip_stiffness * jnp.abs(inelastic) > SMALLEST_SHARE * after.cap
-    rubbing = (rough > 0.0) & (after.cap > 2.0 * system.cap_floor)
+    inelastic = plastic_slip(
+        motion, before.traction, after.traction, system.foundation.slip_stiffness
+    )
+    noticeable = system.foundation.slip_stiffness * jnp.abs(inelastic) > SMALLEST_SHARE * after.cap
+    rubbing = (rough > 0.0) & (system.foundation.has_friction(after.cap))
     return rubbing & noticeable & (jnp.abs(inelastic) > SLIPS * jnp.abs(motion))
 
 
@@ -272,29 +280,33 @@ def _status(sound: Array, sound_before: Array, error: Array) -> Array:
     return jnp.where(sound, Status.CONVERGED, failed)
 
 
-def _onwards(system: System, state: PathState, drive: Drive, turn: Reversal) -> Drive:
+def _onwards(
+    system: System, state: PathState, prescribed: Prescribed, turn: Reversal
+) -> Prescribed:
     """So far along the direction of the last step; on the middle way after a reversal."""
-    stride = drive.target - state.target
+    stride = prescribed.controlled - state.target
     middle = jnp.where(stride >= 0.0, EVENLY, -EVENLY)
     along = jnp.where(turn.target == state.target, middle, state.along)
     ahead = jnp.sum(along * _place(system, state.level, state.rest)) + jnp.abs(stride)
-    return drive._replace(target=jnp.where(drive.rough > 0.0, ahead, 0.0), along=along)
+    return prescribed._replace(
+        controlled=jnp.where(prescribed.rough > 0.0, ahead, 0.0), weights=along
+    )
 
 
-def _place(system: System, level: Level, rest: Array) -> Array:
+def _place(system: System, level: LoadLevel, rest: Array) -> Array:
     """Where a level is on the path: u(L) and F L/(E' 2H), (2,)."""
     u = system.end_displacement(level.q) - rest
     return jnp.stack([u, level.force / system.stiffness_scale])
 
 
-def _guess(system: System, state: PathState, drive: Drive, turn: Reversal) -> Array:
+def _guess(system: System, state: PathState, to: LoadPath, turn: Reversal) -> Array:
     """Increments of v that take those nodes to their caps which would slip in a bar."""
-    level, slips = state.level, first_to_slip(system, turn, drive.target)
-    beyond = (2.0 * level.cap - slips * level.traction) / system.slip_stiffness
+    level, slips = state.level, first_to_slip(system, turn, to.target)
+    beyond = (2.0 * level.cap - slips * level.traction) / system.foundation.slip_stiffness
     slip = slips * jnp.maximum(beyond, 0.0)
     fields = jnp.zeros_like(level.q).at[:, V].set(slip)[:, list(system.model.active)]
     bar = in_blocks(fields, state.change)
-    return lax.stop_gradient(jnp.where(drive.rough > 0.0, bar, state.change))
+    return lax.stop_gradient(jnp.where(to.rough > 0.0, bar, state.change))
 
 
 def at_rest(scene: Scene, touching: ArrayLike | None = None) -> PathState:
@@ -306,14 +318,14 @@ def at_rest(scene: Scene, touching: ArrayLike | None = None) -> PathState:
     touching : (n,) nodes from which the search for the contact starts; None is all of them
     """
     system, fields = System(scene), scene.model.fields
-    change, zero = unknowns_at_rest(system), jnp.zeros_like(system.x)
+    change, zero = zero_unknowns(system), jnp.zeros_like(system.x)
     if touching is not None:
         raised = jnp.where(jnp.asarray(touching), 0.0, scene.strip.half_height)
         lifted = jnp.zeros((zero.size, len(system.model.active)), zero.dtype)
         change = in_blocks(lifted.at[:, fields.index("w")].set(raised), change)
     turn = Reversal(zero[0], zero, zero[0])
     return PathState(
-        level=system.rest(),
+        level=system.unloaded(),
         rest=zero[0],
         target=zero[0],
         pressure=zero[0],

@@ -1,8 +1,8 @@
-"""Tangent stiffness of a load step: a part that hardly changes, and what the foundation answers.
+"""Tangent stiffness of a load step: a part that hardly changes, and the foundation's response.
 
 Elasticity, supports and loads make the first part.  It is constant where the strains are linear,
-and good for many iterations where they are not; the second follows at every iteration from the
-derivatives of the laws of friction and contact, node by node.
+and good for many iterations where they are not.  The second part is found anew at every iteration,
+node by node, from the derivatives of the laws of friction and contact.
 """
 
 from __future__ import annotations
@@ -16,41 +16,54 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from jbeamshell.mechanics.elements import ORDER
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
-from jbeamshell.quasistatic.system import Drive, Level, Seen, System, Touch, V, W
+from jbeamshell.quasistatic.system import (
+    ContactInput,
+    ContactResponse,
+    LoadLevel,
+    Prescribed,
+    System,
+    V,
+    W,
+)
 
 
 class Stiffness(NamedTuple):
-    """The part of the tangent stiffness that is constant where the strains are linear.
+    """Part of the tangent stiffness that is constant where the strains are linear.
 
-    The first axis of its parts says of which block the unknown is: the one before, its own, the
-    next.
+    Unknowns lie in blocks, see `zero_unknowns`.  The first axis of `entries` and of `contact`
+    stands for the block of the unknown: the one before, its own, the next.
 
     Attributes
     ----------
-    entries : (3, size, size, blocks) of the residual without the foundation's answer
-    balance, v, w : (3, size, n) what the foundation sees per unknown; see `System.touch`
-    answer : (size, blocks) residual per traction, contact or reaction, for those with an effect
+    entries : (3, size, size, blocks) stiffness without the foundation's response
+    contact : (3, size, n) each, input of the foundation per unknown
+    response : (size, blocks) each, residual per part of the foundation's response, by the part's
+        name
     """
 
     entries: Array
-    balance: Array
-    v: Array
-    w: Array
-    answer: dict[str, Array]
+    contact: ContactInput
+    response: dict[str, Array]
 
 
-def unknowns_at_rest(system: System) -> Array:
-    """No change of the unknowns, in blocks (blocks, size).
+def zero_unknowns(system: System) -> Array:
+    """Unknowns, increments of the active fields, in blocks (blocks, size); all are zero.
 
     An element's later nodes share a block, so that blocks couple to their neighbours only.  Where
-    the first block has too few nodes it is filled up with unknowns that stay zero.
+    the first block has too few nodes it is padded with unknowns that stay zero.
     """
-    order, active = ORDER[system.model.grid], len(system.model.active)
+    order, active = system.element_order, len(system.model.active)
     blocks = (system.x.size + order - 1) // order
     return jnp.zeros((blocks, order * active), system.x.dtype)
+
+
+def block_of_node(system: System) -> np.ndarray:
+    """Index of the block (n,) to which each node belongs."""
+    nodes, order = system.x.size, system.element_order
+    blocks = (nodes + order - 1) // order
+    return np.arange(blocks * order)[-nodes:] // order
 
 
 def nodal(system: System, unknown: Array) -> Array:
@@ -65,39 +78,50 @@ def in_blocks(active: Array, like: Array) -> Array:
     return jnp.pad(active.ravel(), (like.size - active.size, 0)).reshape(like.shape)
 
 
+def residual_in_blocks(residual: Array, unknown: Array, padding_scale: ArrayLike = 1.0) -> Array:
+    """Residual (n, active) in blocks like the unknowns, whose padding is its own residual."""
+    padding = padding_scale * unknown.ravel()[: unknown.size - residual.size]
+    return jnp.append(padding, residual.ravel()).reshape(unknown.shape)
+
+
+def with_v(system: System, unknown: Array, v: Array) -> Array:
+    """Unknowns (blocks, size) with other increments of v, (n,)."""
+    return in_blocks(nodal(system, unknown).at[:, V].set(v), unknown)
+
+
 @eqx.filter_jit  # traced once for its several uses in a solver
-def stiffness_at(system: System, q: Array, touch: Touch, drive: Drive) -> Stiffness:
-    """The stiffness at fields q (n, m), where the foundation answers so."""
-    like = unknowns_at_rest(system)
-    order = ORDER[system.model.grid]
-    block = np.arange(like.shape[0] * order)[-system.x.size :] // order  # of every node
+def stiffness_at(
+    system: System, q: Array, response: ContactResponse, prescribed: Prescribed
+) -> Stiffness:
+    """Stiffness at fields q (n, m) under the foundation's response."""
+    like, block = zero_unknowns(system), block_of_node(system)
+    padded = like.shape[0] * system.element_order - system.x.size
 
     def blocked(active: Array) -> Array:  # (..., n, active) to (..., size, blocks)
-        padding = [(0, 0)] * (active.ndim - 2) + [
-            (like.shape[0] * order - system.x.size, 0),
-            (0, 0),
-        ]
+        padding = [(0, 0)] * (active.ndim - 2) + [(padded, 0), (0, 0)]
         rows = jnp.pad(active, padding).reshape(*active.shape[:-2], *like.shape)
         return jnp.swapaxes(rows, -1, -2)
 
     probes = _probes(system, like)
-    forces, elastic = jax.linearize(lambda q: system.elastic(q, drive.pressure), q)
+    forces, elastic = jax.linearize(lambda q: system.elastic_forces(q, prescribed.pressure), q)
     along = block_tridiagonal.by_neighbour(jax.vmap(jax.vmap(elastic))(jnp.asarray(probes)), block)
     with jax.ensure_compile_time_eval():  # the compiler would do it anew in every run
         fields = block_tridiagonal.by_neighbour(probes, block)
 
-    _, ends = jax.linearize(lambda f, q, t: system.balance(f, q, t, drive)[1], forces, q, touch)
-    still, silent = jnp.zeros_like(q), jax.tree.map(jnp.zeros_like, touch)
-    columns = jax.vmap(jax.vmap(lambda f, q: ends(f, q, silent)))(along, fields)
+    _, residual = jax.linearize(
+        lambda f, q, r: system.balance(f, q, r, prescribed)[1], forces, q, response
+    )
+    zero, no_response = jnp.zeros_like(q), jax.tree.map(jnp.zeros_like, response)
+    columns = jax.vmap(jax.vmap(lambda f, q: residual(f, q, no_response)))(along, fields)
     entries = jnp.moveaxis(blocked(columns), 1, 2)
     filling = np.arange(like.size - system.x.size * len(system.model.active))
     if filling.size:
         entries = entries.at[1, filling, filling, 0].set(1.0)
     one = jnp.ones_like(system.x)
-    answer = {
-        name: blocked(ends(still, still, silent._replace(**{name: one})))
-        for name in Touch._fields
-        if system.feels(name)
+    per_response = {
+        name: blocked(residual(zero, zero, no_response._replace(**{name: one})))
+        for name in ContactResponse._fields
+        if system.enters_residual(name)
     }
     # There is no block before the first one, and none after the last one.
     first, last = block == 0, block == block[-1]
@@ -105,12 +129,9 @@ def stiffness_at(system: System, q: Array, touch: Touch, drive: Drive) -> Stiffn
     def inside(part: Array, first: Any = first, last: Any = last) -> Array:
         return part.at[0, ..., first].set(0.0).at[2, ..., last].set(0.0)
 
+    contact = ContactInput(along[..., W], fields[..., V], fields[..., W])
     return Stiffness(
-        inside(entries, 0, -1),
-        inside(along[..., W]),
-        inside(fields[..., V]),
-        inside(fields[..., W]),
-        answer,
+        inside(entries, 0, -1), ContactInput(*(inside(part) for part in contact)), per_response
     )
 
 
@@ -124,32 +145,36 @@ def _probes(system: System, like: Array) -> np.ndarray:
     return fields
 
 
-def stiffness_at_rest(
-    system: System, rough: ArrayLike, along: Array | tuple[float, float] = (1.0, 0.0)
+def initial_stiffness(
+    system: System, rough: ArrayLike, weights: Array | tuple[float, float] = (1.0, 0.0)
 ) -> Stiffness:
-    """The stiffness of the strip before anything acts on it, with or without friction."""
+    """Stiffness of the unloaded strip, with or without friction; see `Prescribed`."""
     zero = jnp.zeros_like(system.x)
-    drive = Drive(zero[0], zero[0] + 1.0, zero[0], zero[0] + rough, along)
-    return stiffness_at(system, system.rest().q, Touch(zero, zero, zero), drive)
+    prescribed = Prescribed(zero[0], zero[0] + 1.0, zero[0], zero[0] + rough, weights)
+    return stiffness_at(system, system.unloaded().q, ContactResponse(zero, zero, zero), prescribed)
 
 
 def matrix(
-    system: System, stiffness: Stiffness, seen: Seen, before: Level, drive: Drive
+    system: System,
+    stiffness: Stiffness,
+    contact: ContactInput,
+    before: LoadLevel,
+    prescribed: Prescribed,
 ) -> BlockTridiagonal:
-    """The matrix of the residual, from what the foundation sees."""
-    _, linear = jax.linearize(lambda f, v, w: system.touch(f, v, w, before, drive), *seen)
-    answers = jax.vmap(jax.vmap(linear))(stiffness.balance, stiffness.v, stiffness.w)
+    """Matrix of the residual, where the foundation's input is ``contact``."""
+    _, linear = jax.linearize(lambda c: system.contact_response(c, before, prescribed), contact)
+    responses = jax.vmap(jax.vmap(linear))(stiffness.contact)
     entries = stiffness.entries
-    for name, weight in stiffness.answer.items():
-        entries = entries + weight[:, None] * _of_rows(system, getattr(answers, name))
+    for name, weight in stiffness.response.items():
+        entries = entries + weight[:, None] * _in_rows(system, getattr(responses, name))
     return BlockTridiagonal(*entries)
 
 
-def _of_rows(system: System, answer: Array) -> Array:
-    """What the nodes answer, (..., k, n), row by row of the blocks: (..., size or 1, k, blocks)."""
-    order, active = ORDER[system.model.grid], len(system.model.active)
+def _in_rows(system: System, response: Array) -> Array:
+    """Responses of nodes (..., k, n), by rows of the blocks: (..., size or 1, k, blocks)."""
+    order, active = system.element_order, len(system.model.active)
     if order == 1:
-        return answer[..., None, :, :]
-    filled = jnp.pad(answer, [(0, 0)] * (answer.ndim - 1) + [(-answer.shape[-1] % order, 0)])
-    nodes = jnp.moveaxis(filled.reshape(*answer.shape[:-1], -1, order), -1, -3)
+        return response[..., None, :, :]
+    filled = jnp.pad(response, [(0, 0)] * (response.ndim - 1) + [(-response.shape[-1] % order, 0)])
+    nodes = jnp.moveaxis(filled.reshape(*response.shape[:-1], -1, order), -1, -3)
     return jnp.repeat(nodes, active, axis=-3)

@@ -39,7 +39,7 @@ from jbeamshell.mechanics.laminate import Laminate, check_layers
 from jbeamshell.scene.pressure import PRESSURE, check_pressure, pressure_values, resultant
 from jbeamshell.scene.rungs import LARGEST_ORDER, name_of
 
-FAR_ENDS = ("held", "pinned", "free")
+FAR_ENDS = {"held": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held at X = 0
 CONTROLS = ("force", "displacement")
 ARC_LENGTH = "arc-length"
 NORMALS = ("rigid", "compliant", "none")
@@ -136,7 +136,7 @@ class Strip(eqx.Module):
             require_number("strip.poisson_ratio", self.poisson_ratio, between, -1.0, 0.5)
         require_number("strip.kappa_s", self.kappa_s, POSITIVE + "; 0.44 fits the squeeze layer")
         require_number("strip.deviation", self.deviation, NUMBER, -np.inf)
-        require_choice("strip.far_end", self.far_end, FAR_ENDS)
+        require_choice("strip.far_end", self.far_end, tuple(FAR_ENDS))
         if self.curvature is not None:
             require_number("strip.curvature", self.curvature, NUMBER, -np.inf)
 

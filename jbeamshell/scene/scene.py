@@ -29,7 +29,7 @@ from jbeamshell.mechanics.friction import (
 from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy
 from jbeamshell.scene.keys import DERIVED, NUMBERS, OPTIONAL, WORDS, check_key
-from jbeamshell.scene.parts import CONTROLS, SMOOTHING, Contact, Load, Model, Strip
+from jbeamshell.scene.parts import CONTROLS, FAR_ENDS, SMOOTHING, Contact, Load, Model, Strip
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.rungs import spelled_out
 
@@ -143,13 +143,13 @@ class Scene(eqx.Module):
         layered = self.model.squeeze == "assumed" and strip.layers is not None
         require("model.squeeze", "assumed", not layered, "is for a homogeneous strip")
         if contact.normal == "none":
-            held = strip.far_end == "held"
+            held = "beta" in FAR_ENDS[strip.far_end]
             fix = "is all that holds a strip without a foundation: take 'held' (rigid-body motion)"
             require("strip.far_end", strip.far_end, held, fix)
         leaves = (strip.length, contact.friction, contact.pressure, contact.bottom_pressure)
         if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
             return
-        rough = float(contact.friction) > 0.0 or strip.far_end != "free"
+        rough = float(contact.friction) > 0.0 or "v" in FAR_ENDS[strip.far_end]
         fix = "nothing holds the strip along X without friction (rigid-body motion): give "
         require("contact.friction", 0.0, rough, fix + "strip.far_end or friction")
         length = float(strip.length)
@@ -163,7 +163,7 @@ class Scene(eqx.Module):
         if contact.normal != "none":
             fix = "nothing holds the strip down (rigid-body motion): press more on top"
             require("contact.bottom_pressure", contact.bottom_pressure, total > 0.0, fix)
-            upright = strip.far_end == "held" or not lift
+            upright = "beta" in FAR_ENDS[strip.far_end] or not lift
             inside = upright or 0.0 <= moment <= total * length
             fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
             require("contact.bottom_pressure", contact.bottom_pressure, inside, fix)

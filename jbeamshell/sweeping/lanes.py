@@ -15,6 +15,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.mechanics.bar import bar_backbone
 from jbeamshell.quasistatic.prediction import SMALLEST_SHARE
 from jbeamshell.scene.keys import DERIVED, NUMBERS, check_key
+from jbeamshell.scene.parts import FAR_ENDS
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
@@ -170,7 +171,7 @@ class Lanes:
             yield ~((values > low) & (values < high))
         strip, contact, model = self.scene.strip, self.scene.contact, self.scene.model
         length, friction = self.value("strip.length"), self.value("contact.friction")
-        if strip.far_end == "free" or model.solution == "closed-form":
+        if "v" not in FAR_ENDS[strip.far_end] or model.solution == "closed-form":
             yield friction == 0.0
         if strip.layers is not None:
             thickness, height = np.sum(np.asarray(strip.layers)[:, 0]), 2.0 * self.half_height
@@ -182,7 +183,7 @@ class Lanes:
         total, moment = self.resultant
         if contact.normal != "none":
             yield total <= 0.0
-            if strip.far_end != "held" and "w" in model.fields:
+            if "beta" not in FAR_ENDS[strip.far_end] and "w" in model.fields:
                 yield (moment < 0.0) | (moment > total * length)
         amplitude = self.value("load.amplitude")
         if self.scene.load.control == "force":

@@ -6,7 +6,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell.mechanics import homogeneous
 from jbeamshell.mechanics.friction import FrictionLaw
-from jbeamshell.quasistatic.system import Drive, System
+from jbeamshell.quasistatic.system import Prescribed, System
 from jbeamshell.reference import beams
 
 SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
@@ -253,10 +253,10 @@ def test_residual_couples_neighbours_only():
     scene = jb.Scene().replace({"model.nodes": 9, "model.fields": ["v", "w", "beta", "psi"]})
     for control in ("force", "displacement"):
         system = System(scene.replace({"load.control": control, "load.amplitude": 1e-6}))
-        drive = Drive(*map(jnp.asarray, (1e-6, 1.0, 0.0, 1.0)))
+        prescribed = Prescribed(*map(jnp.asarray, (1e-6, 1.0, 0.0, 1.0)))
         start = 1e-7 * jax.random.normal(jax.random.key(0), (9, 4))
-        before = system.rest()
-        dense = jax.jacfwd(lambda u: system.advance(u, before, drive)[1])(start)  # noqa: B023
+        before = system.unloaded()
+        dense = jax.jacfwd(lambda u: system.advance(u, before, prescribed)[1])(start)  # noqa: B023
         rows, columns = np.nonzero(np.any(np.asarray(dense) != 0.0, axis=(1, 3)))
         assert np.max(np.abs(rows - columns)) == 1
 

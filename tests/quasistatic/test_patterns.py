@@ -10,7 +10,7 @@ from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.assembly import band, times
 from jbeamshell.quasistatic.slip_patterns import Foresight
 from jbeamshell.quasistatic.system import System
-from jbeamshell.quasistatic.tangent import stiffness_at_rest
+from jbeamshell.quasistatic.tangent import initial_stiffness
 
 SCENE = jb.Scene().replace(
     {
@@ -68,15 +68,18 @@ def test_the_band_is_the_stiffness_that_derivatives_say():
     for change in ({}, {"strip.far_end": "free", "model.fields": ["v", "beta"]}):
         system = System(SCENE.replace(change))
         assembled = band(system, system.section_stiffness(), rough=True)
-        derived = stiffness_at_rest(system, 1.0)
+        derived = initial_stiffness(system, 1.0)
         for mine, right in zip(assembled[:3], derived.entries, strict=True):
             size = float(np.max(np.abs(derived.entries)))
             np.testing.assert_allclose(np.array(mine), right, rtol=0.0, atol=1e-13 * size)
-        weight = derived.answer["traction"][0]
+        weight = derived.response["traction"][0]
         np.testing.assert_allclose(assembled.rubbing, weight, rtol=1e-13)
         x = [jnp.sin((1.0 + i) * system.x) for i in range(len(system.model.active))]
         fields = system.embed(jnp.stack(x, axis=1))
-        force = system.elastic(fields, 1.0)[:, 1] - system.elastic(0.0 * fields, 1.0)[:, 1]
+        force = (
+            system.elastic_forces(fields, 1.0)[:, 1]
+            - system.elastic_forces(0.0 * fields, 1.0)[:, 1]
+        )
         found = times(assembled.normal, x) * system.tributary
         np.testing.assert_allclose(found, force, rtol=0.0, atol=1e-12 * float(np.abs(force).max()))
 

@@ -14,6 +14,7 @@ import lineax as lx
 from jax import Array, lax
 
 from jbeamshell.dynamics.strip.equations import MotionState
+from jbeamshell.numerics.block_tridiagonal import inverse as block_inverse
 from jbeamshell.numerics.block_tridiagonal import jacobian
 
 Factored = tuple[Array, Array, Array, Array, Array]
@@ -34,7 +35,7 @@ class Banded(lx.AbstractLinearSolver):
 
         def eliminate(above: Array, row: tuple[Array, Array, Array]) -> tuple[Array, Any]:
             low, own, up = row
-            inverse = _inverse(own - low @ above)
+            inverse = block_inverse(own - low @ above)
             right = inverse @ up
             return right, (inverse, right)
 
@@ -94,13 +95,3 @@ def _rows(state: MotionState) -> Array:
 def _state(rows: Array, work: Array) -> MotionState:
     fields = rows.shape[1] // 2
     return MotionState(rows[:, :fields], rows[:, fields : 2 * fields], rows[:, -1], work)
-
-
-def _inverse(block: Array) -> Array:
-    """Of a small block, by Gauss and Jordan without pivoting."""
-    size = block.shape[0]
-    both = jnp.concatenate([block, jnp.eye(size, dtype=block.dtype)], axis=1)
-    for k in range(size):
-        row = both[k] / both[k, k]
-        both = (both - both[:, k : k + 1] * row).at[k].set(row)
-    return both[:, size:]

@@ -30,7 +30,8 @@ from jbeamshell.dynamics.strip import rate_friction
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia, Masses, free, solved
-from jbeamshell.mechanics.normal_contact import Absent, Compliance
+from jbeamshell.mechanics.friction import coulomb_cap
+from jbeamshell.mechanics.normal_contact import Compliance
 from jbeamshell.quasistatic.system import System, V, W
 from jbeamshell.scene.scene import Scene
 
@@ -119,7 +120,7 @@ class Equations(eqx.Module):
         if inertia.mass == "consistent":
             self.factor = jnp.linalg.cholesky(self.dense_mass())
         elif scene.model.kinematics == "linear":
-            blocks = self._free_blocks(system.rest().q)
+            blocks = self._free_blocks(system.unloaded().q)
             unit = jnp.broadcast_to(jnp.eye(blocks.shape[1]), blocks.shape)
             columns = [solved(blocks, unit[..., j]) for j in range(blocks.shape[1])]
             self.inverse = jnp.stack(columns, axis=2)
@@ -150,7 +151,7 @@ class Equations(eqx.Module):
     @property
     def rubs(self) -> bool:
         """Whether there is a foundation to rub on."""
-        return not isinstance(self.system.normal, Absent)
+        return self.system.foundation.present
 
     # --- the state ------------------------------------------------------------------------------
 
@@ -189,23 +190,23 @@ class Equations(eqx.Module):
         shaken, end_force = self.excitation.acceleration(time), self.excitation.force(time)
         moved = jnp.zeros_like(q).at[:, V].set(shaken[0]).at[:, W].set(shaken[1])
         carried, damping = self.masses.momentum(q, moved), self.damping(q, p)
-        pull = system.elastic(q, 1.0)
+        pull = system.elastic_forces(q, 1.0)
         conjugate = self.conjugate(q)
         chain = self._chain(state, system.end_displacement(q), jnp.sum(conjugate * p[-1]))
         pull = pull.at[:, V].add(system.tributary * t).at[-1].add(-chain.force * conjugate)
         force = -(pull + damping + carried + self.masses.velocity_forces(q, p))
         force = force.at[-1].add(end_force * conjugate)
-        if isinstance(system.normal, Compliance):
-            reaction = jax.vmap(system.normal.reaction)(q[:, W], system.gap(q))
+        if isinstance(system.foundation.normal_law, Compliance):
+            reaction = system.foundation.reaction(q[:, W], system.gap(q))
             force = force.at[:, W].add(system.tributary * reaction)
             acceleration = self._accelerations(q, force)
         else:
             acceleration = self._accelerations(q, force)
             pressed = self.masses.momentum(q, acceleration)[:, W] - force[:, W]
             reaction = pressed / system.tributary if self.rubs else jnp.zeros_like(t)
-        cap = system.friction * jnp.maximum(reaction, 0.0)
+        cap = coulomb_cap(system.foundation.friction, reaction)
         slipping = self._slipping(t, p[:, V], cap)
-        lost = t * p[:, V] - t * slipping / system.slip_stiffness
+        lost = t * p[:, V] - t * slipping / system.foundation.slip_stiffness
         given = end_force * jnp.sum(conjugate * p[-1]) - jnp.sum(carried * p)
         given = given - shaken[0] * jnp.sum(self.attached.masses * chain.rates)
         warmed = jnp.sum(damping * p) + chain.loss
@@ -224,7 +225,7 @@ class Equations(eqx.Module):
         chain = 0.5 * jnp.sum(self.attached.masses * state.p[n:, 0] ** 2)
         stretch = jnp.diff(jnp.append(system.end_displacement(q), state.q[n:, 0]))
         springs = 0.5 * jnp.sum(self.attached.springs * stretch**2)
-        layer = jax.vmap(system.normal.energy)(system.gap(q)) + t**2 / (2.0 * system.slip_stiffness)
+        layer = system.foundation.stored_energy(system.gap(q), t)
         stored = system.potential(q, 1.0) + jnp.sum(system.tributary * layer)
         return self.masses.kinetic(q, p) + chain, stored + springs
 
@@ -235,17 +236,18 @@ class Equations(eqx.Module):
         system = self.system
         if not self.rubs:
             return jnp.zeros_like(t)
+        foundation = system.foundation
         slid = rate_friction.traction_rate(
-            t, speed, cap, system.slip_stiffness, self.smoothing, system.cap_floor
+            t, speed, cap, foundation.slip_stiffness, self.smoothing, foundation.cap_floor
         )
-        slid = jnp.where(system.friction > 0.0, slid, 0.0)
+        slid = jnp.where(foundation.friction > 0.0, slid, 0.0)
         return slid + rate_friction.relaxation_rate(t, cap, self.relaxation)
 
     def damping(self, q: Array, p: Array) -> Array:
         """Rayleigh's forces (n, m)."""
         if not self.inertia.damped:
             return jnp.zeros_like(q)
-        _, stiff = jax.jvp(lambda q: self.system.elastic(q, 1.0), (q,), (p,))
+        _, stiff = jax.jvp(lambda q: self.system.elastic_forces(q, 1.0), (q,), (p,))
         inertial = self.masses.momentum(q, p)
         return self.inertia.damping_mass * inertial + self.inertia.damping_stiffness * stiff
 
@@ -291,7 +293,7 @@ class Equations(eqx.Module):
 
     def dense_mass(self) -> Array:
         """Masses at rest of the free fields, (n a, n a); ones where nothing moves."""
-        q, columns = self.system.rest().q, list(self.system.model.active)
+        q, columns = self.system.unloaded().q, list(self.system.model.active)
         moves = jnp.asarray(self.moves)
 
         def carried(active: Array) -> Array:

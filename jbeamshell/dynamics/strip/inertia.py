@@ -141,7 +141,7 @@ class Masses(eqx.Module):
         about = (self.heights**2 * self.weights).sum()
         self.extra = (inertia.squeeze_factor - 1.0) * about
         fixed = scene.model.kinematics == "linear" and inertia.mass == "lumped"
-        self.constant = self.blocks(system.rest().q) if fixed else None
+        self.constant = self.blocks(system.unloaded().q) if fixed else None
 
     def section(self, fields: Array, rates: Array) -> Array:
         """Kinetic energy per length of a section with fields and rates (m,)."""
@@ -222,12 +222,7 @@ def free(system: System) -> np.ndarray:
     model = system.model
     moves = np.zeros((system.x.size, model.width), bool)
     moves[:, list(model.active)] = True
-    held = [] if system.far_end == "free" else [FIELDS.index("v")]
-    if system.far_end == "held":
-        held += [FIELDS.index("beta"), *range(len(FIELDS), model.width, 2)]
-    if not hasattr(system.normal, "stiffness"):  # no foundation: the support holds w too
-        held.append(FIELDS.index("w"))
-    moves[0, held] = False
+    moves[0, list(system.supports(True))] = False
     return moves
 
 

@@ -29,18 +29,20 @@ from jax import Array
 
 from jbeamshell.dynamics.strip.equations import Equations, MotionState
 from jbeamshell.dynamics.strip.time_step import ChainPull, StepMemory, TimeStep
-from jbeamshell.mechanics.elements import ORDER
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.system import BETA, PSI, Drive, Level, Seen, V, W
+from jbeamshell.quasistatic.system import ContactInput, LoadLevel, Prescribed, V, W
 from jbeamshell.quasistatic.tangent import (
     Stiffness,
+    block_of_node,
     in_blocks,
+    initial_stiffness,
     matrix,
     nodal,
-    stiffness_at_rest,
-    unknowns_at_rest,
+    residual_in_blocks,
+    with_v,
+    zero_unknowns,
 )
 
 FILTERING = 0.1
@@ -112,8 +114,8 @@ class Prepared(eqx.Module):
 
     def __init__(self, equations: Equations) -> None:
         self.equations, system = equations, equations.system
-        self.static = stiffness_at_rest(system, 1.0)
-        like, rest = unknowns_at_rest(system), system.rest().q
+        self.static = initial_stiffness(system, 1.0)
+        like, rest = zero_unknowns(system), system.unloaded().q
 
         def carried(unknown: Array) -> Array:
             return equations.masses.momentum(rest, system.embed(nodal(system, unknown)))
@@ -125,8 +127,7 @@ class Prepared(eqx.Module):
 
         self.inertial = jnp.stack(block_tridiagonal.jacobian(rows, like))
         probes = jnp.asarray(block_tridiagonal.seeds(like))
-        order = ORDER[system.model.grid]
-        block = np.arange(like.shape[0] * order)[-system.x.size :] // order
+        block = block_of_node(system)
         along = jax.vmap(jax.vmap(lambda unit: carried(unit)[:, W]))(probes)
         near = block_tridiagonal.by_neighbour(along, block)
         near = near.at[0, :, block == 0].set(0.0)
@@ -134,10 +135,9 @@ class Prepared(eqx.Module):
 
     @property
     def _per_force(self) -> Array:
-        """What turns forces (n, m) into residuals."""
+        """Residual per force, (m,)."""
         system = self.equations.system
-        moments = np.isin(np.arange(system.model.width), (BETA, PSI))
-        return jnp.where(moments, 1.0 / system.half_height, 1.0) / system.force_scale
+        return jnp.stack([system.residual_scale(field) for field in range(system.model.width)])
 
     def step(
         self, stride: TimeStep, state: MotionState, last: StepMemory, newton: Newton
@@ -148,71 +148,66 @@ class Prepared(eqx.Module):
         acting = stride.mean(equations.excitation.force)
         q0, p0 = equations.nodal(state.q), equations.nodal(state.p)
         ago, gained = equations.nodal(last.change), equations.nodal(last.gain)
-        before = Level(q0.at[:, V].set(last.v), last.traction, last.cap, last.cap, last.cap[0])
+        before = LoadLevel(q0.at[:, V].set(last.v), last.traction, last.cap, last.cap, last.cap[0])
         end0 = system.end_displacement(q0)
         drawn = system.end_displacement(stride.reached(q0, jnp.zeros_like(q0), ago)) - end0
         ride = self._ride(stride, state, last, end0 + drawn, shaken[0])
         pushed = jnp.zeros_like(q0).at[:, V].set(shaken[0]).at[:, W].set(shaken[1])
         carried = equations.masses.momentum(q0, pushed)
-        like = unknowns_at_rest(system)
+        like = zero_unknowns(system)
 
-        def parts(unknown: Array) -> tuple[Array, Seen, Array, Array, Drive]:
+        def parts(unknown: Array) -> tuple[Array, ContactInput, Array, Array, Prescribed]:
             change = system.embed(nodal(system, unknown))
             half, rate = stride.reached(q0, change, ago), change / h
             gain = stride.gain(rate, p0, gained)
             inertia = equations.masses.step_forces(q0, p0, change, gain, half, h)
             damping = equations.damping(half, rate)
-            forces = system.elastic(half, 1.0) + inertia + damping + carried
+            forces = system.elastic_forces(half, 1.0) + inertia + damping + carried
             moved = system.end_displacement(q0 + change) - end0
-            drive = _drive(acting + ride.still + ride.slope * moved)
-            return forces, (forces[:, W], half[:, V], half[:, W]), half, damping, drive
+            prescribed = _prescribed(acting + ride.still + ride.slope * moved)
+            contact = ContactInput(forces[:, W], half[:, V], half[:, W])
+            return forces, contact, half, damping, prescribed
 
-        def evaluate(unknown: Array) -> tuple[Array, Seen]:
-            forces, seen, half, _, drive = parts(unknown)
-            touch = system.touch(*seen, before, drive)
-            residual = system.balance(forces, half, touch, drive)[1]
-            filling = stride.part * unknown.ravel()[: unknown.size - residual.size]
-            return jnp.append(filling, residual.ravel()).reshape(unknown.shape), seen
+        def evaluate(unknown: Array) -> tuple[Array, ContactInput]:
+            forces, contact, half, _, prescribed = parts(unknown)
+            response = system.contact_response(contact, before, prescribed)
+            residual = system.balance(forces, half, response, prescribed)[1]
+            return residual_in_blocks(residual, unknown, stride.part), contact
 
         stiffness = self._stiffness(stride, ride.slope, q0)
 
-        def tangent(seen: Seen, stiffness: Stiffness) -> BlockTridiagonal:
-            return matrix(system, stiffness, seen, before, _drive(jnp.zeros_like(end0)))
+        def tangent(contact: ContactInput, stiffness: Stiffness) -> BlockTridiagonal:
+            return matrix(system, stiffness, contact, before, _prescribed(jnp.zeros_like(end0)))
 
         def limit(old: Array, new: Array) -> Array:
             here = stride.reached(q0, jnp.zeros_like(q0), ago)[:, V] - last.v
             slip, was = (here + stride.part * nodal(system, x)[:, V] for x in (new, old))
-            limited = jax.vmap(system.law.limit, in_axes=(0, 0, 0, 0, None))(
-                was, slip, last.traction, last.cap, system.slip_stiffness
-            )
-            rubs = last.cap > 2.0 * system.cap_floor
-            back = jnp.where(rubs, (limited - slip) / stride.part, 0.0)
-            return in_blocks(nodal(system, new).at[:, V].add(back), new)
+            limited = system.foundation.limited_slip(was, slip, last.traction, last.cap)
+            return with_v(system, new, nodal(system, new)[:, V] + (limited - slip) / stride.part)
 
         guess = in_blocks(h * p0[:, list(system.model.active)], like)
         root, (_, error) = newton.solve(
             evaluate, limit, guess, jnp.asarray(True), tangent, stiffness, None
         )
-        _, seen, half, damping, drive = parts(root)
-        touch = system.touch(*seen, before, drive)
+        _, contact, half, damping, prescribed = parts(root)
+        response = system.contact_response(contact, before, prescribed)
         change = nodal(system, root)
         chain = ride.first + ride.each * (system.end_displacement(q0 + system.embed(change)) - end0)
         moved = equations.joined(system.embed(change), chain)
-        cap = system.friction * jnp.maximum(touch.reaction, 0.0)
         gain = stride.gain(moved / h, state.p, last.gain)
         now = StepMemory(
             v=half[:, V],
-            traction=touch.traction,
-            cap=jnp.maximum(cap, system.cap_floor),
+            traction=response.traction,
+            cap=system.foundation.cap(response.reaction),
             change=moved,
             gain=gain,
             begun=jnp.ones_like(last.begun),
         )
         # At the end of the step the sliders stand where the motion since q* takes them.
         from_here = before._replace(q=half, traction=now.traction)
-        end = (seen[0], (q0 + system.embed(change))[:, V], seen[2])
-        onward = system.touch(*end, from_here, drive).traction
-        work = self._work(stride, state, moved, (touch.traction, onward), damping, carried)
+        end = contact._replace(v=(q0 + system.embed(change))[:, V])
+        onward = system.contact_response(end, from_here, prescribed).traction
+        work = self._work(stride, state, moved, (response.traction, onward), damping, carried)
         after = MotionState(
             state.q + moved,
             state.p + gain,
@@ -234,10 +229,10 @@ class Prepared(eqx.Module):
         held = slope * conjugate[active, None] * conjugate[active]
         held = held * self._per_force[active, None]
         entries = entries.at[1, -active.size :, -active.size :, -1].add(-held)
-        balance = elastic * static.balance + massive * self.heaving
-        return Stiffness(
-            entries, balance, stride.part * static.v, stride.part * static.w, static.answer
-        )
+        lift_force, v, w = static.contact
+        lift_force = elastic * lift_force + massive * self.heaving
+        contact = ContactInput(lift_force, stride.part * v, stride.part * w)
+        return Stiffness(entries, contact, static.response)
 
     def _ride(
         self, stride: TimeStep, state: MotionState, last: StepMemory, end: Array, shaken: Array
@@ -286,13 +281,13 @@ class Prepared(eqx.Module):
         given = stride.mean(excitation.force) * end - jnp.sum(carried * change)
         shaken = stride.mean(excitation.acceleration)[0]
         given = given - shaken * jnp.sum(attached.masses * moved[n:, 0])
-        kept = (onward**2 - state.t[:n] ** 2) / (2.0 * system.slip_stiffness)
+        kept = (onward**2 - state.t[:n] ** 2) / (2.0 * system.foundation.slip_stiffness)
         rubbed = jnp.sum(system.tributary * (acts * change[:, V] - kept))
         drawn = jnp.diff(jnp.append(end, moved[n:, 0]))
         warmed = jnp.sum(damping * change) + jnp.sum(attached.dampers * drawn**2) / stride.h
         return jnp.stack([given, rubbed, warmed])
 
 
-def _drive(force: Array) -> Drive:
+def _prescribed(force: Array) -> Prescribed:
     one = jnp.ones_like(force)
-    return Drive(force, one, jnp.zeros_like(force), one)
+    return Prescribed(force, one, jnp.zeros_like(force), one)

@@ -81,15 +81,19 @@ def _matrices(
 
     def forces(active: Array) -> Array:
         q = system.embed(active)
-        pull = system.elastic(q, 0.0)
+        pull = system.elastic_forces(q, 0.0)
         if held:
-            rubbed = jnp.where(system.friction > 0.0, system.slip_stiffness, 0.0)
+            rubbed = jnp.where(
+                system.foundation.friction > 0.0, system.foundation.slip_stiffness, 0.0
+            )
             pull = pull.at[:, V].add(system.tributary * rubbed * q[:, V])
-        if isinstance(system.normal, Compliance):
-            pull = pull.at[:, W].add(system.tributary * system.normal.stiffness * q[:, W])
+        if isinstance(system.foundation.normal_law, Compliance):
+            pull = pull.at[:, W].add(
+                system.tributary * system.foundation.normal_law.stiffness * q[:, W]
+            )
         return pull[:, columns]
 
-    rest = system.rest().q[:, columns]
+    rest = system.unloaded().q[:, columns]
     stiffness = jax.jacfwd(forces)(rest).reshape(rest.size, rest.size)
     symmetric = 0.5 * (stiffness + stiffness.T)
     return equations.dense_mass(), symmetric, system.x, jnp.asarray(equations.moves)

@@ -236,7 +236,7 @@ def _motion(
         return (q, p, answer.reaction, *ends, *equations.energies(state))
 
     q, p, reaction, displacement, velocity, kinetic, stored = jax.lax.map(seen, (times, states))
-    rubs = 0.0 if isinstance(equations.system.normal, Absent) else 1.0
+    rubs = 0.0 if isinstance(equations.system.foundation.normal_law, Absent) else 1.0
     n = equations.n
     return Motion(
         scene=parts[0],

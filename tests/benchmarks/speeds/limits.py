@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 import jbeamshell as jb
-from jbeamshell.quasistatic.system import Drive, System
-from jbeamshell.quasistatic.tangent import unknowns_at_rest
+from jbeamshell.quasistatic.system import Prescribed, System
+from jbeamshell.quasistatic.tangent import zero_unknowns
 
 from . import machine
 from .common import (
@@ -81,8 +81,8 @@ def residual(here: jb.Scene) -> float:
     """Operations of one residual."""
     system = System(here)
     zero = jnp.zeros(())
-    drive = Drive(zero, zero + 1.0, zero, zero + 1.0)
-    given = system, unknowns_at_rest(system), system.rest(), drive
+    prescribed = Prescribed(zero, zero + 1.0, zero, zero + 1.0)
+    given = system, zero_unknowns(system), system.unloaded(), prescribed
     program = compiled(lambda s, *rest: s.advance(*rest), *given)[0]
     return float(program.cost_analysis()["flops"])
 
