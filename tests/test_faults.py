@@ -19,7 +19,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell import identify
-from jbeamshell.cli import main, terminal
+from jbeamshell.cli import arguments, main, terminal
 from jbeamshell.common.errors import LONGEST
 from jbeamshell.identify import plan
 from jbeamshell.measured import containers, curve_files, curves, loops, steady
@@ -112,7 +112,7 @@ MADE = [
 @pytest.mark.parametrize("key", KEYS)
 def test_what_no_key_takes(key):
     def ask(value):
-        return lambda: scene_from_values(overridden({}, terminal.assignments([f"{key}={value}"])))
+        return lambda: scene_from_values(overridden({}, arguments.assignments([f"{key}={value}"])))
 
     none_of(refusal(ask(word), kind) for kind, word in hostile.WORDS.items())
     for kind, value in hostile.OBJECTS.items():

@@ -16,13 +16,11 @@ import jbeamshell as jb
 from calibration.finite_elements import solve
 from calibration.finite_elements.mesh import ORDERS
 from calibration.finite_elements.solving import check_reach
-from jbeamshell.cli.main import BAD_INPUT, INTERRUPTED, UNCONVERGED
-from jbeamshell.cli.terminal import assignments, put, say_written
+from jbeamshell.cli.arguments import add_folder, add_json, add_scene, add_settings, scene_of
+from jbeamshell.cli.terminal import BAD_INPUT, INTERRUPTED, UNCONVERGED, put, say_written
 from jbeamshell.common.files import as_json
 from jbeamshell.history.report import turning_steps, write_run
 from jbeamshell.plotting.folder import check_folder
-from jbeamshell.scene import library
-from jbeamshell.scene.toml import overridden, scene_from_values
 
 COUNTS = ("newton_iterations", "wall_s")  # of which a difference says nothing
 PICTURE = "finite_elements.png"
@@ -49,28 +47,20 @@ def _parser() -> argparse.ArgumentParser:
         description="A scene by finite elements (CalculiX), and by the beamshell beside it.",
         epilog="exit codes: 0 done, 2 bad input, 3 a load step did not converge",
     )
-    parser.add_argument(
-        "scene",
-        nargs="?",
-        metavar="NAME|SCENE.toml",
-        help="a scene that ships or one's own; default: the standard strip",
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key"
-    )
+    add_scene(parser)
+    add_settings(parser)
     parser.add_argument("--elements", choices=tuple(ORDERS), default="quadratic")
     parser.add_argument(
         "--refinement", type=float, default=1.0, metavar="R", help="divides all element sizes"
     )
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    parser.add_argument("--out", metavar="DIR", help="write tables and pictures there")
-    parser.add_argument("--keep", metavar="DIR", help="keep CalculiX's files there")
+    parser.add_argument("--keep", metavar="DIR", help="keep CalculiX's files in this folder")
+    add_folder(parser)
+    add_json(parser)
     return parser
 
 
 def _run(options: argparse.Namespace) -> int:
-    given = library.values_from(options.scene) if options.scene else {}
-    scene = scene_from_values(overridden(given, assignments(options.set)))
+    scene = scene_of(options)
     folder = check_folder(options.out) if options.out else None
     check_reach(scene)
     begin = time.perf_counter()

@@ -1,4 +1,4 @@
-"""`jbeamshell fit`: from files of measured or computed curves to parameters with uncertainty."""
+"""`jbeamshell fit`: parameters with uncertainty from files of measured or computed curves."""
 
 from __future__ import annotations
 
@@ -8,69 +8,82 @@ import time
 from pathlib import Path
 from typing import Any
 
-from jbeamshell.cli.terminal import assignments, pairs, put, say, say_written
+from jbeamshell.cli.arguments import add_folder, add_json, add_settings, assignments, pairs
+from jbeamshell.cli.terminal import put, say, say_written
 from jbeamshell.common.errors import InputError
 
 EXAMPLE_START = {"contact.friction": 0.15, "strip.height_ratio": 0.2}
 EXAMPLE_FREE = "contact.friction,strip.height_ratio"
 
+# Options by name: (placeholder of the value, help).
+REPEATED = {
+    "start": ("KEY=VALUE", "start of the search for a free parameter"),
+    "bounds": ("KEY=LOW:HIGH", "bounds of a free parameter; leave one side empty for none"),
+    "prior": ("KEY=MEAN:DEVIATION", "prior knowledge of a free parameter: a normal distribution"),
+    "profile": ("KEY", "also compute the profile likelihood of a free parameter"),
+    "column": ("QUANTITY=NAME", "name of the column that holds the force, the displacement, ..."),
+    "unit": ("QUANTITY=UNIT", "unit of the force, the displacement, ..."),
+}
+WORDS = {
+    "kind": "kind of data: loop (default), backbone, dissipation, stiffness or squeeze",
+    "cycles": "cycles to use of a recording: steady (the mean of the steady ones), recorded (all, "
+    "as they stand) or auto (default)",
+    "drift": "drift to remove from a recording: keep (default; none), linear or cycle",
+    "method": "search: levenberg-marquardt (default), l-bfgs-b or adam",
+    "decimal": "decimal sign, where the numbers alone do not show it",
+}
+NUMBERS = {
+    "noise": (float, "standard deviation of the data, as a fraction of their range"),
+    "width": (float, "width of the specimen, by which forces are divided"),
+    "starts": (int, "number of searches from different starts"),
+}
 
-def add_to(commands: Any) -> argparse.ArgumentParser:
-    """Add the command's options to a parser."""
-    fit = commands.add_parser(
+
+def add_to(commands: Any) -> None:
+    """Add the command and its options to the parser."""
+    parser = commands.add_parser(
         "fit",
-        help="fit a strip's parameters to loops and other curves",
-        description="Least squares of a strip's parameters on measured or computed curves, with "
-        "their uncertainty and a plain word on what the data cannot tell.",
+        help="fit parameters of a strip to measured or computed curves",
+        description="Fit parameters of a strip to measured or computed curves by least squares.  "
+        "Reports their uncertainty, and which of them the data cannot determine.",
     )
-    fit.add_argument(
+    parser.add_argument(
         "data",
         nargs="*",
         metavar="DATA|PLAN.toml",
         help="files of one specimen (.csv, .mat, .npz), or a plan of several specimens; "
         "default: the finite-element loops that ship",
     )
-    fit.add_argument(
-        "--scene", metavar="NAME|SCENE.toml", help="what stays fixed; default standard"
+    parser.add_argument(
+        "--scene",
+        metavar="NAME|SCENE.toml",
+        help="scene whose other keys stay fixed (default: the standard strip)",
     )
-    fit.add_argument("--free", metavar="KEY,KEY,...", help=f"default {EXAMPLE_FREE}")
-    several = {
-        "start": ("KEY=VALUE", "where a free parameter starts"),
-        "bounds": ("KEY=LOW:HIGH", "bounds of a free parameter; either may be left out"),
-        "prior": ("KEY=MEAN:DEVIATION", "what is known of a free parameter beforehand"),
-        "profile": ("KEY", "profile likelihood of a free parameter"),
-        "column": ("QUANTITY=NAME", "column of the force, the displacement, ..."),
-        "unit": ("QUANTITY=UNIT", "unit of the force, the displacement, ..."),
-    }
-    for name, (metavar, text) in several.items():
-        fit.add_argument(f"--{name}", action="append", default=[], metavar=metavar, help=text)
-    words = {
-        "kind": "of the data: loop (default), backbone, dissipation, stiffness or squeeze",
-        "cycles": "steady: average the steady ones; recorded: take all as it stands; default auto",
-        "drift": "keep (default), linear or cycle: what to remove from a recording",
-        "method": "levenberg-marquardt (default), l-bfgs-b or adam",
-        "decimal": "decimal sign, where the numbers alone do not tell",
-    }
-    for name, text in words.items():
-        fit.add_argument(f"--{name}", metavar="WORD", help=text)
-    numbers = {
-        "noise": (float, "standard deviation of the data, as a part of their range"),
-        "width": (float, "of the specimen, by which forces are divided"),
-        "starts": (int, "searches from different starts"),
-    }
-    for name, (kind, text) in numbers.items():
-        fit.add_argument(f"--{name}", type=kind, metavar="NUMBER", help=text)
-    fit.add_argument(
+    parser.add_argument(
+        "--free", metavar="KEY,KEY,...", help=f"parameters to fit (default {EXAMPLE_FREE})"
+    )
+    for name, (metavar, text) in REPEATED.items():
+        parser.add_argument(f"--{name}", action="append", default=[], metavar=metavar, help=text)
+    for name, text in WORDS.items():
+        parser.add_argument(f"--{name}", metavar="WORD", help=text)
+    for name, (kind, text) in NUMBERS.items():
+        parser.add_argument(f"--{name}", type=kind, metavar="NUMBER", help=text)
+    parser.add_argument(
         "--centre",
         action="store_true",
         default=None,
-        help="take the zeros of the sensors from closed loops",
+        help="shift closed loops so that their centres lie at the origin: removes the sensors' "
+        "offsets",
     )
-    fit.add_argument(
-        "--save", metavar="FILE", help="keep every model run there, and go on from what it holds"
+    parser.add_argument(
+        "--save",
+        metavar="FILE",
+        help="keep every run of the model in this file, and go on from what it holds",
     )
-    fit.set_defaults(run=run)
-    return fit
+    add_settings(parser)
+    add_folder(parser)
+    add_json(parser)
+    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -117,7 +130,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _plan(options: argparse.Namespace) -> Any:
-    """The plan of a file, or of the options."""
+    """Plan of a file, or of the options."""
     from jbeamshell.identify import plan
 
     if any(name.endswith(".toml") for name in options.data):
@@ -139,22 +152,22 @@ def _plan(options: argparse.Namespace) -> Any:
 
 
 def _plan_of_file(options: argparse.Namespace) -> Any:
-    """The plan of a file; options may change how it is solved, not what it says."""
+    """Plan of a file; options may change the search, not the data or the parameters."""
     from jbeamshell.identify import plan
 
     if len(options.data) > 1:
-        raise InputError(f"{' '.join(options.data)}: give one plan, or files of data")
+        raise InputError(f"{' '.join(options.data)}: give one plan, or files of data alone")
     ours = ("data", "json", "out", "save", "profile", "run", *plan.OPTIONS)
     for name in sorted(set(vars(options)) - set(ours)):
         if _given(options, name):
-            raise InputError(f"--{name}: {options.data[0]} is a plan; say so in there")
+            raise InputError(f"--{name}: {options.data[0]} is a plan; write this into the plan")
     read = plan.read_plan(options.data[0])
     changed = {name: getattr(options, name) for name in plan.OPTIONS if _given(options, name)}
     return read._replace(options=read.options | changed)
 
 
 def _example(values: dict[str, Any]) -> Any:
-    """The finite-element loops that ship."""
+    """Plan of the finite-element loops that ship."""
     from jbeamshell.identify import plan
     from jbeamshell.measured.example import example_loops
     from jbeamshell.scene import library
@@ -167,15 +180,16 @@ def _example(values: dict[str, Any]) -> Any:
 
 
 def _given(options: argparse.Namespace, name: str) -> bool:
+    """True if an option was given."""
     return getattr(options, name, None) not in (None, [])
 
 
 def _free(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
-    """Tables of the free parameters."""
+    """Table of each free parameter, as a plan has it."""
     words = EXAMPLE_FREE if options.free is None else options.free
     keys = [key.strip() for key in words.split(",") if key.strip()]
     if len(set(keys)) < len(keys):
-        raise InputError(f"--free {words}: names a key twice")
+        raise InputError(f"--free {words}: names a key twice; name it once")
     free: dict[str, dict[str, Any]] = {key: {} for key in keys}
 
     def table(option: str, key: str) -> dict[str, Any]:
@@ -194,12 +208,12 @@ def _free(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
 
 
 def _two(option: str, text: str) -> tuple[float | None, float | None]:
-    """Two numbers between a colon."""
+    """The numbers left and right of a colon; None where there is none."""
     parts = text.split(":")
     try:
         first, second = (float(part) if part.strip() else None for part in parts)
     except ValueError:
         raise InputError(
-            f"{option}: write two numbers and a colon between, such as 0.05:0.5"
+            f"{option}: write two numbers with a colon between them, such as 0.05:0.5"
         ) from None
     return first, second

@@ -7,35 +7,52 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
-from jbeamshell.cli.terminal import assignments, put, say, say_written
+from jbeamshell.cli.arguments import add_folder, add_json, add_scene, add_settings, scene_of
+from jbeamshell.cli.terminal import put, say, say_written
 from jbeamshell.common.errors import InputError
 
-ROWS = 12  # of the table that a person reads
+ROWS = 12  # rows of the printed table, about
 
 
-def add_to(commands: Any) -> argparse.ArgumentParser:
-    """Add the command's options to a parser."""
-    ringing = commands.add_parser(
+def add_to(commands: Any) -> None:
+    """Add the command and its options to the parser."""
+    parser = commands.add_parser(
         "ringdown",
         help="let a mass on a strip ring down",
-        description="Pull a mass on a strip, let it go, and report frequency and damping over "
-        "amplitude beside the quasi-static prediction by Masing's rule.",
+        description="Pull a mass on a strip, let it go, and report its frequency and damping over "
+        "the amplitude, beside the quasi-static prediction by Masing's rule.",
     )
-    ringing.add_argument("scene", nargs="?", metavar="NAME|SCENE.toml", help="as of run")
-    ringing.add_argument(
-        "--force", type=float, metavar="F", help="pull per width (default load.amplitude)"
+    add_scene(parser)
+    parser.add_argument(
+        "--force",
+        type=float,
+        metavar="F",
+        help="pull before it is let go, force per width (default: load.amplitude)",
     )
-    ringing.add_argument(
-        "--payload", type=float, metavar="MASS", help="per width (default 50 strips)"
+    parser.add_argument(
+        "--payload",
+        type=float,
+        metavar="MASS",
+        help="mass on the strip's end, per width (default: 50 times the strip's own)",
     )
-    ringing.add_argument(
-        "--density", type=float, default=1.0, metavar="RHO", help="mass per volume (default 1)"
+    parser.add_argument(
+        "--density",
+        type=float,
+        default=1.0,
+        metavar="RHO",
+        help="mass of the strip per volume (default 1)",
     )
-    ringing.add_argument(
-        "--cycles", type=float, default=20.0, metavar="N", help="to follow (default 20)"
+    parser.add_argument(
+        "--cycles",
+        type=float,
+        default=20.0,
+        metavar="N",
+        help="duration, in periods of the stuck strip (default 20)",
     )
-    ringing.set_defaults(run=run)
-    return ringing
+    add_settings(parser)
+    add_folder(parser)
+    add_json(parser)
+    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -44,11 +61,8 @@ def run(options: argparse.Namespace) -> int:
     from jbeamshell.dynamics.let_go import let_go
     from jbeamshell.dynamics.strip.inertia import Inertia
     from jbeamshell.plotting.folder import check_folder
-    from jbeamshell.scene import library
-    from jbeamshell.scene.toml import overridden, scene_from_values
 
-    given = {} if options.scene is None else library.values_from(options.scene)
-    scene = scene_from_values(overridden(given, assignments(options.set)))
+    scene = scene_of(options)
     folder = None if options.out is None else check_folder(options.out)
     say("compiling ...")
     study = let_go(
@@ -66,8 +80,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _table(figures: dict[str, Any]) -> str:
-    """What a person reads."""
-    lists = {name: column for name, column in figures.items() if isinstance(column, list)}
+    """Figures as text to read: single ones by name, then some rows of the lists."""
+    lists = _lists(figures)
     lines = [f"{name:24s} {value}" for name, value in figures.items() if name not in lists]
     lines += ["", "".join(f"{name:>21s}" for name in lists)]
     rows = list(zip(*lists.values(), strict=True))
@@ -75,36 +89,29 @@ def _table(figures: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def _lists(figures: dict[str, Any]) -> dict[str, list[float]]:
+    """Figures that are lists over the amplitude."""
+    return {name: column for name, column in figures.items() if isinstance(column, list)}
+
+
 def _write(folder: Path, study: Any, figures: dict[str, Any]) -> list[Path]:
-    """Tables, the scene, the figures as JSON and a picture, each whole or not at all."""
+    """Write tables, the scene, the figures as JSON and a picture; returns the files."""
     import numpy as np
 
     from jbeamshell import plotting
-    from jbeamshell.common import files
-    from jbeamshell.common.files import write_text
+    from jbeamshell.common.files import as_json, csv_text
+    from jbeamshell.plotting.folder import write_folder
     from jbeamshell.scene.toml import scene_to_toml
 
-    motion = study.motion
+    motion, lists = study.motion, _lists(figures)
     names = ("time", "force", "displacement", "velocity", "kinetic", "stored")
     names += ("external_work", "friction_work")
-    history = np.column_stack([np.asarray(getattr(motion, name)) for name in names])
-    lists = {name: column for name, column in figures.items() if isinstance(column, list)}
+    columns = np.column_stack([np.asarray(getattr(motion, name)) for name in names])
     texts = {
-        "motion.csv": _csv(names, history.tolist()),
-        "ringdown.csv": _csv(tuple(lists), zip(*lists.values(), strict=True)),
-        "result.json": files.as_json(figures),
+        "motion.csv": csv_text(names, columns.tolist()),
+        "ringdown.csv": csv_text(tuple(lists), zip(*lists.values(), strict=True)),
+        "result.json": as_json(figures),
     }
-    with contextlib.suppress(InputError):
+    with contextlib.suppress(InputError):  # a scene with a user's own law has no text
         texts["scene.toml"] = scene_to_toml(motion.scene)
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        write_text(folder / name, text)
-    sheet = plotting.ring_down_sheet(study)
-    plotting.save(sheet, folder / "ringdown.png")
-    plotting.close(sheet)
-    return [folder / name for name in (*texts, "ringdown.png")]
-
-
-def _csv(header: tuple[str, ...], rows: Any) -> str:
-    lines = [",".join(header), *(",".join(map(repr, row)) for row in rows)]
-    return "\n".join(lines) + "\n"
+    return write_folder(folder, texts, {"ringdown.png": plotting.ring_down_sheet(study)})

@@ -1,4 +1,4 @@
-"""cli.run."""
+"""`jbeamshell run`: one scene from its load path to figures, tables and pictures."""
 
 from __future__ import annotations
 
@@ -9,39 +9,33 @@ from typing import Any
 
 import jax
 
-from jbeamshell.cli.terminal import assignments, put, say, say_written, warn
+from jbeamshell.cli.advise import tell_rung
+from jbeamshell.cli.arguments import add_folder, add_json, add_scene, add_settings, scene_of
+from jbeamshell.cli.terminal import put, say, say_written, warn
 from jbeamshell.common.errors import DoubtfulWarning
-from jbeamshell.scene.scene import Scene
-from jbeamshell.scene.toml import overridden, scene_from_values
 
 
-def add_to(commands: Any) -> tuple[argparse.ArgumentParser, ...]:
-    """Add the commands' options to a parser; returns the parsers of run, scenes and advise."""
-    running = commands.add_parser("run", help="press a strip down, load it to and fro, and report")
-    running.add_argument(
-        "scene",
-        nargs="?",
-        metavar="NAME|SCENE.toml",
-        help="a scene that ships or one's own; default: the standard strip",
+def add_to(commands: Any) -> None:
+    """Add the command and its options to the parser."""
+    parser = commands.add_parser(
+        "run",
+        help="solve one scene: press the strip down, load it to and fro",
+        description="Press a strip down, load it to and fro, and report its hysteresis loop: "
+        "dissipation, stiffness, slip and contact.",
+        epilog="`jbeamshell keys` lists every KEY of --set with its default, unit and meaning.",
     )
-    running.add_argument(
-        "--tol", type=float, metavar="PART", help="take the model that `advise` names"
+    add_scene(parser)
+    parser.add_argument(
+        "--tol",
+        type=float,
+        metavar="ERROR",
+        help="first choose the cheapest model within this relative error, as `jbeamshell advise` "
+        "does",
     )
-    running.set_defaults(run=run)
-
-    listing = commands.add_parser("scenes", help="list the scenes that ship")
-    listing.set_defaults(run=scenes)
-
-    advising = commands.add_parser("advise", help="name the cheapest model that is accurate enough")
-    advising.add_argument("scene", nargs="?", metavar="NAME|SCENE.toml", help="as of run")
-    advising.add_argument(
-        "--tol", type=float, default=0.05, metavar="PART", help="relative error (default .05)"
-    )
-    advising.add_argument(
-        "--quantity", default="dissipation", metavar="FIGURE", help="of which (dissipation)"
-    )
-    advising.set_defaults(run=advise)
-    return running, listing, advising
+    add_settings(parser)
+    add_folder(parser)
+    add_json(parser)
+    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -52,10 +46,10 @@ def run(options: argparse.Namespace) -> int:
     from jbeamshell.plotting.folder import check_folder
     from jbeamshell.quasistatic import load_path, solver
 
-    scene = _scene(options)
+    scene = scene_of(options)
     load_path.check(scene)
     if options.tol is not None:
-        advised = advice.advise(scene, options.tol, tell=_tell)
+        advised = advice.advise(scene, options.tol, tell=tell_rung)
         say(str(advised))
         scene = advised.applied(scene)
     folder = None if options.out is None else check_folder(options.out)
@@ -65,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     compiled = time.perf_counter()
     say(f"compiled in {compiled - begin:.1f} s, solving ...")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DoubtfulWarning)  # told below
+        warnings.simplefilter("ignore", DoubtfulWarning)  # printed below, one line each
         history = jax.block_until_ready(solver.solve(scene))
     finished = time.perf_counter()
     timing = {"wall_s": finished - compiled, "compile_s": compiled - begin}
@@ -75,37 +69,4 @@ def run(options: argparse.Namespace) -> int:
     put(files.as_json(figures) if options.json else f"{history}\n")
     if folder is not None:
         say_written(report.write_run(folder, history, figures))
-    return 0
-
-
-def advise(options: argparse.Namespace) -> int:
-    """Name the cheapest model that is accurate enough; returns the exit code."""
-    from jbeamshell.common import files
-    from jbeamshell.ladder import advice
-
-    advised = advice.advise(_scene(options), options.tol, quantity=options.quantity, tell=_tell)
-    put(files.as_json(advised.figures()) if options.json else f"{advised}\n")
-    return 0
-
-
-def _tell(text: str) -> None:
-    say(f"solving on {text} ...")
-
-
-def _scene(options: argparse.Namespace) -> Scene:
-    """The scene of a name or a file, and what is set on top."""
-    from jbeamshell.scene import library
-
-    given = {} if options.scene is None else library.values_from(options.scene)
-    return scene_from_values(overridden(given, assignments(options.set)))
-
-
-def scenes(options: argparse.Namespace) -> int:
-    """List the scenes that ship; returns the exit code."""
-    from jbeamshell.common import files
-    from jbeamshell.scene import library
-
-    summaries = {name: library.summary(name) for name in library.NAMES}
-    lines = [f"{name:15s} {text}\n" for name, text in summaries.items()]
-    put(files.as_json(summaries) if options.json else "".join(lines))
     return 0

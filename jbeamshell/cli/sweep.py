@@ -14,70 +14,84 @@ from typing import Any
 import jax
 import numpy as np
 
-from jbeamshell.cli.terminal import assignments, put, say, say_written, warn
+from jbeamshell.cli.arguments import add_json, add_scene, add_settings, scene_of
+from jbeamshell.cli.terminal import UNCONVERGED, put, say, say_written, warn
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path
 
-UNCONVERGED = 3
 MOST = 2_000_000  # numbers in one JSON text
 RANGE = "write KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=a,b,c"
 
 
-def add_to(commands: Any) -> argparse.ArgumentParser:
-    """Add the command's options to a parser."""
-    sweep = commands.add_parser(
+def add_to(commands: Any) -> None:
+    """Add the command and its options to the parser."""
+    parser = commands.add_parser(
         "sweep",
         help="run many scenes over ranges of their numbers",
-        description="Dissipation and other figures of the last cycle over ranges of any of a "
-        "scene's numbers, on all local devices or in several processes.",
+        description="Compute the dissipation and other figures of the last cycle over ranges of "
+        "any of a scene's numbers, on all local devices or in several processes.  Each "
+        "combination of values is one lane: one strip of the sweep.",
     )
-    sweep.add_argument("scene", nargs="?", metavar="NAME|SCENE.toml", help="what is not varied")
-    sweep.add_argument(
+    add_scene(parser)
+    parser.add_argument(
         "--over",
         action="append",
         default=[],
         metavar="KEY=VALUES",
-        help="START:STOP:COUNT evenly, START:STOP:COUNT:log evenly in the logarithm, or a,b,c; "
-        "give it once for every key that is varied",
+        help="key to vary and its values: START:STOP:COUNT (evenly spaced), START:STOP:COUNT:log "
+        "(evenly spaced in the logarithm) or a,b,c; repeat it for several keys",
     )
-    sweep.add_argument(
-        "--paired", action="store_true", help="let the keys go together instead of as a product"
+    parser.add_argument(
+        "--paired",
+        action="store_true",
+        help="pair the first values of all keys, the second ones and so on, instead of combining "
+        "each with each",
     )
-    sweep.add_argument("--figures", metavar="NAME,NAME,...", help="of the last cycle")
-    sweep.add_argument(
-        "--out", metavar="FILE.csv", help="write the table there; what was cut off goes on"
+    parser.add_argument(
+        "--figures", metavar="NAME,NAME,...", help="figures of the last cycle to compute"
     )
-    sweep.add_argument("--plot", metavar="FILE.png", help="draw the sweep there")
-    sweep.add_argument(
-        "--processes", type=int, default=1, metavar="N", help="of this machine (default 1)"
+    parser.add_argument(
+        "--out",
+        metavar="FILE.csv",
+        help="write the table to this file; a sweep that was interrupted goes on from it",
     )
-    sweep.add_argument(
-        "--coordinator", metavar="HOST:PORT", help="of the first of several machines' processes"
+    parser.add_argument("--plot", metavar="FILE.png", help="draw the sweep to this file")
+    parser.add_argument(
+        "--processes",
+        type=int,
+        default=1,
+        metavar="N",
+        help="number of processes on this machine (default 1)",
     )
-    sweep.add_argument("--process", type=int, metavar="I", help="which of them this is, from 0")
-    sweep.add_argument("--of", type=int, metavar="N", help="how many they are")
-    sweep.set_defaults(run=run)
-    return sweep
+    parser.add_argument(
+        "--coordinator",
+        metavar="HOST:PORT",
+        help="address of the first process, for a sweep on several machines",
+    )
+    parser.add_argument(
+        "--process", type=int, metavar="I", help="number of this process on them, from 0"
+    )
+    parser.add_argument("--of", type=int, metavar="N", help="number of processes on all machines")
+    add_settings(parser)
+    add_json(parser)
+    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Sweep, report and write; returns the exit code."""
     from tqdm import tqdm
 
-    from jbeamshell.scene import library
-    from jbeamshell.scene.toml import overridden, scene_from_values
     from jbeamshell.sweeping.run import FIGURES, LOST, sweep
 
-    over = values_of(options.over)
-    figures = FIGURES if options.figures is None else words_of(options.figures)
-    first = _joined(options)  # before anything else asks JAX for its devices
-    given = {} if options.scene is None else library.values_from(options.scene)
-    scene = scene_from_values(overridden(given, assignments(options.set)))
+    over = ranges(options.over)
+    figures = FIGURES if options.figures is None else _names(options.figures)
+    first = _join(options)  # before anything else asks JAX for its devices
+    scene = scene_of(options)
     count = (max if options.paired else math.prod)([v.size for v in over.values()]) * len(figures)
     if options.json and count > MOST:
         raise InputError(
-            f"--json: {count:,} numbers are too many for one text, {MOST:,} the most: leave it out "
-            "and give --out FILE.csv"
+            f"--json: {count:,} numbers are more than the {MOST:,} that one JSON text may hold: "
+            "leave it out and give --out FILE.csv"
         )
     if options.plot is not None:
         _check_picture(options.plot)
@@ -100,13 +114,14 @@ def run(options: argparse.Namespace) -> int:
                 progress=progress,
             )
     code = _report(options, result, first)
-    if LOST in result.notes:  # else JAX would wait for it at the end, and abort
+    if LOST in result.notes:  # JAX would wait for the lost process at exit, and abort
         sys.stdout.flush()
         os._exit(code)
     return code
 
 
 def _report(options: argparse.Namespace, result: Any, first: bool) -> int:
+    """Print and draw the sweep, in the first of the processes; returns the exit code."""
     from jbeamshell import plotting
     from jbeamshell.common import files
 
@@ -116,9 +131,12 @@ def _report(options: argparse.Namespace, result: Any, first: bool) -> int:
     if result.outside:
         warn(f"{result.outside:,} lanes lie outside the model's domain: {result.why_outside}")
     if result.undefined:
-        warn(f"{result.undefined:,} lanes have a figure that means nothing there (0/0)")
+        warn(f"{result.undefined:,} lanes have a figure that is not defined there (0/0)")
     if result.failed:
-        warn(f"{result.failed:,} lanes found no equilibrium, batched and alone: see their status")
+        warn(
+            f"{result.failed:,} lanes found no equilibrium, neither in the batch nor alone: see "
+            "their status"
+        )
     written = [options.out] if options.out else []
     if options.plot:
         sheet = plotting.sweep_sheet(result)
@@ -130,8 +148,8 @@ def _report(options: argparse.Namespace, result: Any, first: bool) -> int:
     return UNCONVERGED if result.failed else 0
 
 
-def values_of(texts: Sequence[str]) -> dict[str, np.ndarray]:
-    """Values by key from texts KEY=START:STOP:COUNT and the like."""
+def ranges(texts: Sequence[str]) -> dict[str, np.ndarray]:
+    """Values by key from texts KEY=START:STOP:COUNT and the like, each (count,)."""
     from jbeamshell.scene.keys import check_key
 
     if not texts:
@@ -143,23 +161,25 @@ def values_of(texts: Sequence[str]) -> dict[str, np.ndarray]:
             raise InputError(f"--over {text}: {RANGE}")
         check_key(key)
         if key in over:
-            raise InputError(f"--over {text}: {key} is given twice: write its values in one")
+            raise InputError(f"--over {text}: {key} is given twice; write its values in one list")
         over[key] = _range(text, words) if ":" in words else _list(text, words)
     return over
 
 
-def words_of(text: str) -> tuple[str, ...]:
-    """Words between commas."""
+def _names(text: str) -> tuple[str, ...]:
+    """Names between commas."""
     return tuple(word.strip() for word in text.split(",") if word.strip())
 
 
 def _list(text: str, words: str) -> np.ndarray:
+    """Values of a,b,c; `text` is the whole option, for messages."""
     if not words:
-        raise InputError(f"--over {text}: is empty: {RANGE}")
+        raise InputError(f"--over {text}: is empty; {RANGE}")
     return np.array([_number(text, word) for word in words.split(",")])
 
 
 def _range(text: str, words: str) -> np.ndarray:
+    """Values of START:STOP:COUNT or START:STOP:COUNT:log."""
     from jbeamshell.sweeping.lanes import check_size
 
     parts = [part.strip() for part in words.split(":")]
@@ -171,7 +191,7 @@ def _range(text: str, words: str) -> np.ndarray:
     except ValueError:
         raise InputError(f"--over {text}: COUNT must be a whole number; {RANGE}") from None
     if count < 1:
-        raise InputError(f"--over {text}: is empty: COUNT must be 1 or more")
+        raise InputError(f"--over {text}: is empty; COUNT must be 1 or more")
     check_size(count, 1)
     if len(parts) == 3:
         return np.linspace(start, stop, count)
@@ -181,25 +201,26 @@ def _range(text: str, words: str) -> np.ndarray:
 
 
 def _number(text: str, word: str) -> float:
+    """A finite number."""
     with contextlib.suppress(ValueError):
         number = float(word)
         if math.isfinite(number):
             return number
-    raise InputError(f"--over {text}: {word.strip()!r} is no finite number; {RANGE}")
+    raise InputError(f"--over {text}: {word.strip()!r} is not a finite number; {RANGE}")
 
 
 def _check_picture(path: str) -> None:
-    """Refuse before the work what could not be written after it."""
+    """Raise `InputError` before the work for a picture that could not be written after it."""
     folder = as_path(path).parent
     if not os.path.isdir(folder):
-        raise InputError(f"--plot {path}: there is no folder {folder}")
+        raise InputError(f"--plot {path}: there is no folder {folder}; make it first")
     if Path(path).suffix.lower() not in (".png", ".pdf", ".svg"):
         raise InputError(f"--plot {path}: end the name in .png, .pdf or .svg")
 
 
 @contextlib.contextmanager
 def _clean_output(joined: bool) -> Iterator[None]:
-    """What the processes' collectives say on the way goes where it does not mix with a result."""
+    """Send what JAX prints among joined processes to standard error, away from the result."""
     if not joined:
         yield
         return
@@ -213,17 +234,22 @@ def _clean_output(joined: bool) -> Iterator[None]:
         os.close(kept)
 
 
-def _joined(options: argparse.Namespace) -> bool:
-    """Whether this is the first of the processes; joins those of other machines."""
+def _join(options: argparse.Namespace) -> bool:
+    """Join the processes of other machines, if asked; True in the first of them."""
     parts = {name: getattr(options, name) for name in ("coordinator", "process", "of")}
     missing = [f"--{name}" for name, value in parts.items() if value is None]
     if len(missing) == len(parts):
         return True
     if missing:
-        raise InputError(f"{' and '.join(missing)}: several machines need all three of them")
+        raise InputError(
+            f"{' and '.join(missing)}: is missing; several machines need --coordinator, --process "
+            "and --of"
+        )
     host, _, port = options.coordinator.rpartition(":")
     if not host or not port.isdigit():
-        raise InputError(f"--coordinator {options.coordinator}: write HOST:PORT")
+        raise InputError(
+            f"--coordinator {options.coordinator}: write HOST:PORT, such as 10.0.0.1:1234"
+        )
     if not 0 <= options.process < options.of:
         raise InputError(f"--process {options.process}: count from 0 to {options.of - 1}")
     try:

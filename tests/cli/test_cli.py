@@ -17,7 +17,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell import identify
-from jbeamshell.cli import main, terminal
+from jbeamshell.cli import arguments, main
 from jbeamshell.measured.loops import read_loops
 from jbeamshell.quasistatic import solver, stepping
 from jbeamshell.scene import library
@@ -162,7 +162,7 @@ def test_set_overrides_the_file_and_an_alias_its_twin(cli, tmp_path):
 
 def test_words_numbers_and_lists_of_the_command_line():
     texts = ["a = 3", "b=.5", "c=8.", "d=inf", "e=free", "f=v,beta", "g=[1, [.2, 3.]]", 'h="v"']
-    values = terminal.assignments([*texts, "i=a=b", "model.fields=v", "k=true"])
+    values = arguments.assignments([*texts, "i=a=b", "model.fields=v", "k=true"])
     assert values == dict(
         zip(
             "abcdefghi",
@@ -631,14 +631,14 @@ def test_bad_scenes_are_refused(refused, tmp_path, command, content, told):
         (["--start", "contact.friction=-1"], "contact.friction = -1.0: must be a number, not"),
         (["--bounds", "contact.friction=0.2"], "--bounds contact.friction=0.2: write two numbers"),
         (["--bounds", "contact.friction=0.2:0.3"], "start = 0.15: must lie between low = 0.2"),
-        (["--prior", "contact.friction=0.1:a"], "write two numbers and a colon between"),
+        (["--prior", "contact.friction=0.1:a"], "write two numbers with a colon between"),
         (["--profile", "strip.kappa_s"], "--profile strip.kappa_s: is not among the free keys"),
         (["--noise", "-1"], "noise = -1.0: give a positive part of the range"),
         (["--starts", "0"], "starts = 0: give a whole number, 1 or more"),
         (["--method", "simplex"], "method = 'simplex': choose"),
         (["plan.toml"], "plan.toml: cannot be read (No such file"),
         (["plan.toml", "a.csv"], "plan.toml a.csv: give one plan, or files of data"),
-        (["plan.toml", "--kind", "loop"], "--kind: plan.toml is a plan; say so in there"),
+        (["plan.toml", "--kind", "loop"], "--kind: plan.toml is a plan; write this into the plan"),
         (["a.csv", "--kind", "lop"], "kind = 'lop': choose among 'loop', 'backbone'"),
         (["a.csv", "--unit", "kN"], "'kN': write KEY=VALUE, such as force=kN"),
         (["--set", "load.control=stress"], "load.control = 'stress': choose 'force' or 'displ"),

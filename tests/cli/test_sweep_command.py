@@ -10,7 +10,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.cli import main
-from jbeamshell.cli.sweep import values_of
+from jbeamshell.cli.sweep import ranges
 from jbeamshell.common.errors import InputError
 from jbeamshell.sweeping import lanes, run
 from jbeamshell.sweeping.lanes import Outcome
@@ -46,7 +46,7 @@ def cli(capsys):
     ],
 )
 def test_ranges_are_what_they_say(text, values):
-    np.testing.assert_allclose(values_of([text])["load.amplitude"], values, rtol=1e-14)
+    np.testing.assert_allclose(ranges([text])["load.amplitude"], values, rtol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -56,22 +56,22 @@ def test_ranges_are_what_they_say(text, values):
         (["load.amplitude"], "write KEY=START:STOP:COUNT"),
         (["load.amplitud=1:2:3"], "did you mean 'load.amplitude'"),
         (["load.amplitude="], "is empty"),
-        (["load.amplitude=1:2:0"], "is empty: COUNT"),
-        (["load.amplitude=1:2:-3"], "is empty: COUNT"),
+        (["load.amplitude=1:2:0"], "is empty; COUNT"),
+        (["load.amplitude=1:2:-3"], "is empty; COUNT"),
         (["load.amplitude=1:2:2.5"], "COUNT must be a whole number"),
         (["load.amplitude=1:2"], "write KEY"),
         (["load.amplitude=1:2:3:cubic"], "write KEY"),
         (["load.amplitude=0:2:3:log"], "must be positive for a log range"),
-        (["load.amplitude=1,,2"], "'' is no finite number"),
-        (["load.amplitude=1,two"], "'two' is no finite number"),
-        (["load.amplitude=0:inf:3"], "'inf' is no finite number"),
+        (["load.amplitude=1,,2"], "'' is not a finite number"),
+        (["load.amplitude=1,two"], "'two' is not a finite number"),
+        (["load.amplitude=0:inf:3"], "'inf' is not a finite number"),
         (["load.amplitude=0:1:99999999999"], "99,999,999,999 lanes .* take"),
         (["load.amplitude=1", "load.amplitude=2"], "is given twice"),
     ],
 )
 def test_ranges_that_are_none_are_refused_in_one_line(texts, says):
     with pytest.raises(InputError, match=says) as caught:
-        values_of(texts)
+        ranges(texts)
     assert "\n" not in str(caught.value)
 
 
@@ -120,12 +120,15 @@ def test_the_summary_counts_and_a_lane_that_fails_shows_in_the_exit_code(cli, mo
         (["--over", "contact.law=1"], "no single number"),
         ([*AMPLITUDES, "--paired", "--over", "contact.friction=0.1,0.2"], "equally many"),
         ([*AMPLITUDES, "--figures", "nonsense"], "choose"),
-        (["--json", "--over", "load.amplitude=0:1:600000"], "2,400,000 numbers are too many"),
+        (["--json", "--over", "load.amplitude=0:1:600000"], "2,400,000 numbers are more than"),
         ([*AMPLITUDES, "--processes", "0"], "processes = 0: must be a whole number"),
         ([*AMPLITUDES, "--out", "folder"], "end the name in .csv"),
         ([*AMPLITUDES, "--plot", "nowhere/sweep.png"], "there is no folder nowhere"),
         ([*AMPLITUDES, "--plot", "sweep.doc"], "end the name in .png"),
-        ([*AMPLITUDES, "--coordinator", "here:1"], "need all three"),
+        (
+            [*AMPLITUDES, "--coordinator", "here:1"],
+            "several machines need --coordinator, --process and --of",
+        ),
         ([*AMPLITUDES, "--coordinator", "here", "--process", "0", "--of", "2"], "HOST:PORT"),
         ([*AMPLITUDES, "--coordinator", "here:1", "--process", "2", "--of", "2"], "from 0 to 1"),
         (["no-such-scene", *AMPLITUDES], "no-such-scene"),

@@ -1,0 +1,92 @@
+"""Options that several commands share, and the KEY=VALUE texts among them."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import contextlib
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import parsed_toml
+
+if TYPE_CHECKING:
+    from jbeamshell.scene.scene import Scene
+
+
+def add_scene(parser: argparse.ArgumentParser) -> None:
+    """Add the scene as a positional argument."""
+    parser.add_argument(
+        "scene",
+        nargs="?",
+        metavar="NAME|SCENE.toml",
+        help="a scene that ships (`jbeamshell scenes` lists them) or a TOML file; "
+        "default: the standard strip",
+    )
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add ``--set``."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="override one key of the scene; repeat it for several "
+        "(`jbeamshell keys` lists all keys)",
+    )
+
+
+def add_folder(parser: argparse.ArgumentParser) -> None:
+    """Add ``--out`` for a folder."""
+    parser.add_argument("--out", metavar="DIR", help="write tables and pictures to this folder")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json``."""
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+
+
+def scene_of(options: argparse.Namespace) -> Scene:
+    """Scene of the options: the one named, with ``--set`` on top."""
+    from jbeamshell.scene import library
+    from jbeamshell.scene.toml import overridden, scene_from_values
+
+    below = {} if options.scene is None else library.values_from(options.scene)
+    return scene_from_values(overridden(below, assignments(options.set)))
+
+
+def assignments(texts: Sequence[str]) -> dict[str, Any]:
+    """Values by key from texts KEY=VALUE."""
+    values = {key: _value(text) for key, text in pairs(texts, "contact.friction=0.2").items()}
+    if isinstance(values.get("model.fields"), str):  # one field alone has no comma
+        values["model.fields"] = [values["model.fields"]]
+    return values
+
+
+def pairs(texts: Sequence[str], example: str) -> dict[str, str]:
+    """Texts by key from texts KEY=TEXT."""
+    found = {}
+    for text in texts:
+        key, separator, value = text.partition("=")
+        if not separator:
+            raise InputError(f"{text!r}: write KEY=VALUE, such as {example}")
+        found[key.strip()] = value.strip()
+    return found
+
+
+def _value(text: str) -> Any:
+    """A TOML value; else a number such as .5, a list of them, a word, or words between commas."""
+    with contextlib.suppress(ValueError):
+        tables = parsed_toml(f"value = {text}")
+        if len(tables) == 1:  # more than one if the text has further lines
+            return tables["value"]
+    try:
+        if text.startswith("["):
+            return ast.literal_eval(text)
+        number = float(text)
+        return text if math.isinf(number) and "inf" not in text.lower() else number
+    except (ValueError, SyntaxError, RecursionError, MemoryError):  # brackets nested too deeply
+        return [word.strip() for word in text.split(",")] if "," in text else text
