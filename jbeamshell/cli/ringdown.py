@@ -104,8 +104,8 @@ def _write(folder: Path, study: Any, figures: dict[str, Any]) -> list[Path]:
     from jbeamshell.scene.toml import scene_to_toml
 
     motion, lists = study.motion, _lists(figures)
-    names = ("time", "force", "displacement", "velocity", "kinetic", "stored")
-    names += ("external_work", "friction_work")
+    names = ["time", "force", "displacement", "velocity", "kinetic", "stored"]
+    names += ["external_work", "friction_work"]
     columns = np.column_stack([np.asarray(getattr(motion, name)) for name in names])
     texts = {
         "motion.csv": csv_text(names, columns.tolist()),
