@@ -356,7 +356,7 @@ def main() -> None:
             else:
                 record["maps"][name] = chart(name, 4 if options.quick else 1)
                 save()
-    for name, figure in charts.failure_sheets(record).items():
+    for name, figure in charts.failures.sheets(record).items():
         plotting.save(figure, HERE / f"failures_{name}.png")
 
 

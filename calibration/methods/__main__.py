@@ -196,7 +196,7 @@ def main() -> None:
             record[name] = SECTIONS[name](options.quick)
             write_text(RECORD, json.dumps({"provenance": provenance()} | record) + "\n")
             jax.clear_caches()
-    plotting.save(charts.methods_sheet(record), PICTURE)
+    plotting.save(charts.methods.sheet(record), PICTURE)
 
 
 if __name__ == "__main__":

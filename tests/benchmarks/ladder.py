@@ -334,8 +334,8 @@ def picture(record: dict[str, Any]) -> plt.Figure:
         figure, (work, advice) = plt.subplots(
             1, 2, figsize=(12.0, 5.0), gridspec_kw={"width_ratios": (1.35, 1.0)}
         )
-        charts.work_precision(record, work)
-        charts.advice_map(record, 0.05, advice)
+        charts.ladder.work_precision(record, work)
+        charts.ladder.advice_map(record, 0.05, advice)
     return figure
 
 

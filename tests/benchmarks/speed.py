@@ -136,7 +136,7 @@ def main() -> None:
     print(report(record))
     print(f"record: {target}", file=sys.stderr)
     try:
-        plotting.save(charts.speed_sheet(record), target.with_suffix(".png"))
+        plotting.save(charts.speed.sheet(record), target.with_suffix(".png"))
     except jb.InputError as error:  # of sections without a picture
         print(error, file=sys.stderr)
 

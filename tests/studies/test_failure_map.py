@@ -53,7 +53,7 @@ def _close():
     ],
 )
 def test_what_becomes_of_a_run(changes, name):
-    assert charts.outcome([changes.get(i, value) for i, value in enumerate(RIGHT)]) == name
+    assert charts.failures.outcome([changes.get(i, value) for i, value in enumerate(RIGHT)]) == name
 
 
 @pytest.mark.slow
@@ -65,7 +65,7 @@ def test_a_cell_of_the_map(script):
     assert cell[0] == pytest.approx(float(strip.dissipation_ratio), rel=1e-5)
     assert max(cell[1:3]) == pytest.approx(float(strip.dissipation_error), rel=1e-5)
     assert 0.0 < abs(cell[0] / cell[6] - 1.0) < 0.1
-    assert charts.outcome(script.cell(COARSE, fine, {"load": 1.0})) == "fails, and says so"
+    assert charts.failures.outcome(script.cell(COARSE, fine, {"load": 1.0})) == "fails, and says so"
     points = script.random_points(*script.SCENES["scenes"])
     assert points.shape == (2000, 6)
     assert points.min(axis=0) == pytest.approx(
@@ -74,19 +74,19 @@ def test_a_cell_of_the_map(script):
 
 
 def test_every_map_of_the_record_is_drawn(record):
-    sheets = charts.failure_sheets(record)
+    sheets = charts.failures.sheets(record)
     assert "scenes" in sheets
     for name, chart in record["maps"].items():
         assert [len(row) for row in chart["cells"]] == [len(chart["columns"])] * len(chart["rows"])
         titles = [axes.get_title() for sheet in sheets.values() for axes in sheet.axes]
         assert titles.count(name) == 1
     with pytest.raises(jb.InputError, match="the record has"):
-        charts.failure_map(record, "nothing")
+        charts.failures.outcome_map(record, "nothing")
 
 
 def test_the_defaults_are_nowhere_wrong_silently(record):
     for name, chart in record["maps"].items():
         for label, row in zip(chart["rows"], chart["cells"], strict=True):
             if label == "default" or name in ("height and load", "friction and load"):
-                silent = [charts.outcome(cell) for cell in row].count("wrong, silently")
+                silent = [charts.failures.outcome(cell) for cell in row].count("wrong, silently")
                 assert silent == 0, (name, label)

@@ -24,7 +24,7 @@ def closed():
 
 
 def test_every_run_is_a_dot(record):
-    axes = charts.work_precision(record)
+    axes = charts.ladder.work_precision(record)
     dots = {
         (float(line.get_xdata()[0]), float(line.get_ydata()[0]))
         for line in axes.lines
@@ -41,21 +41,22 @@ def test_every_run_is_a_dot(record):
 
 
 def test_maps_show_the_cells_and_the_picks(record):
-    axes = charts.error_map(record, "masing")
+    axes = charts.ladder.error_map(record, "masing")
     cells = record["map"]["cells"]
     drawn = np.asarray(axes.collections[0].get_array()).ravel()
     off = sorted(100.0 * abs(cell["masing"] - 1.0) for cell in cells)
     np.testing.assert_allclose(sorted(drawn), off, rtol=1e-9)
-    told = {text.get_text() for text in charts.advice_map(record, 0.05).get_legend().get_texts()}
+    legend = charts.ladder.advice_map(record, 0.05).get_legend()
+    told = {text.get_text() for text in legend.get_texts()}
     assert {"bar", "finite elements"} <= told
 
 
 def test_what_the_record_lacks_is_said(record):
     with pytest.raises(jb.InputError, match="error = 'speed': choose one of dissipation"):
-        charts.work_precision(record, error="speed")
+        charts.ladder.work_precision(record, error="speed")
     with pytest.raises(jb.InputError):
-        charts.work_precision(record, strip=(0.3, 1.0))
+        charts.ladder.work_precision(record, strip=(0.3, 1.0))
     with pytest.raises(jb.InputError):
-        charts.error_map(record, "p5")
+        charts.ladder.error_map(record, "p5")
     with pytest.raises(jb.InputError):
-        charts.advice_map(record, 0.3)
+        charts.ladder.advice_map(record, 0.3)

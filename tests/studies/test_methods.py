@@ -201,21 +201,21 @@ def record():
 
 
 def test_charts_show_what_the_record_holds(record):
-    axes = charts.methods_steps(record)
+    axes = charts.methods.draw(record, "steps")
     (row,) = (row for row in record["steps"]["rows"] if row["scene"] == "standard")
     lines = {line.get_label(): line for line in axes.lines}
     np.testing.assert_allclose(lines["standard"].get_ydata(), np.abs(row["off"]))
-    axes = charts.methods_solvers(record)
+    axes = charts.methods.draw(record, "solvers")
     shares = [bar.get_width() for bar in axes.patches[: len(record["solvers"]["rows"])]]
     found = [100.0 * row["found"] for row in record["solvers"]["rows"]]
     np.testing.assert_allclose(shares[::-1], found)
-    assert sum(axes.axison for axes in charts.methods_sheet(record).axes) == 9
+    assert sum(axes.axison for axes in charts.methods.sheet(record).axes) == 9
 
 
 def test_what_the_record_lacks_is_said(record):
     with pytest.raises(jb.InputError, match="no section 'laws'"):
-        charts.methods_laws({})
-    with pytest.raises(jb.InputError, match="scene = 'curved'"):
-        charts.methods_laws(record, scene="curved")
+        charts.methods.draw({}, "laws")
+    with pytest.raises(jb.InputError, match="name = 'heat': choose one of laws, steps"):
+        charts.methods.draw(record, "heat")
     with pytest.raises(jb.InputError, match="nothing to draw"):
-        charts.methods_sheet({})
+        charts.methods.sheet({})

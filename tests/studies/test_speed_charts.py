@@ -82,7 +82,7 @@ def points(axes, marker):
 
 
 def test_every_time_stands_at_both_its_errors(record):
-    axes = charts.speed_errors(record)
+    axes = charts.speed.draw(record, "errors")
     np.testing.assert_allclose(sorted(points(axes, "s")), [(900.0, 0.2), (900.0, 0.8)])
     assert len(points(axes, "o")) == 4  # the first of either family
     assert "[µs]" in axes.get_xlabel()
@@ -92,27 +92,27 @@ def test_every_time_stands_at_both_its_errors(record):
 
 
 def test_slopes_and_ratios_are_those_of_the_record(record):
-    told = [text.get_text() for text in charts.speed_nodes(record).get_legend().get_texts()]
+    told = [text.get_text() for text in charts.speed.draw(record, "nodes").get_legend().get_texts()]
     assert "slope 1.00" in told
-    shown = [text.get_text() for text in charts.speed_gradients(record).texts]
+    shown = [text.get_text() for text in charts.speed.draw(record, "gradients").texts]
     assert shown == ["1.00", "4.00"]
-    shown = [text.get_text() for text in charts.speed_processes(record).texts]
+    shown = [text.get_text() for text in charts.speed.draw(record, "processes").texts]
     assert shown == ["1.00", "1.90"]
-    (label,) = (t.get_text() for t in charts.speed_batches(record).get_legend().get_texts())
+    (label,) = (t.get_text() for t in charts.speed.draw(record, "batches").get_legend().get_texts())
     assert "worst 2 %" in label
 
 
 def test_the_reference_itself_is_left_out(record):
-    axes = charts.speed_derivative(record)
+    axes = charts.speed.draw(record, "derivative")
     for line in axes.lines:
         np.testing.assert_allclose(line.get_xdata(), [21, 41])
 
 
 def test_a_sheet_holds_what_the_record_has(record):
-    assert sum(axes.axison for axes in charts.speed_sheet(record).axes) == 6
+    assert sum(axes.axison for axes in charts.speed.sheet(record).axes) == 6
     del record["one"]
-    assert len(charts.speed_sheet({"nodes": record["nodes"]}).axes) == 1
+    assert len(charts.speed.sheet({"nodes": record["nodes"]}).axes) == 1
     with pytest.raises(jb.InputError, match="no section 'one'"):
-        charts.speed_errors(record)
+        charts.speed.draw(record, "errors")
     with pytest.raises(jb.InputError, match="nothing to draw"):
-        charts.speed_sheet({})
+        charts.speed.sheet({})
