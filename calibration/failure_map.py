@@ -119,7 +119,7 @@ def runner(settings: tuple[tuple[str, Any], ...]) -> Callable[[jax.Array], jax.A
     @jax.jit
     def run(numbers: jax.Array) -> jax.Array:
         history = jb.solve(scene_of(base, numbers), throw=False, solver=jb.Newton(tolerance))
-        grid, corner = reliability.dissipation_errors(history.rubbing)
+        grid, corner = reliability.dissipation_errors(history.slip_cycle)
         effort = jnp.sum(history.iterations) / history.force.size
         found = (history.dissipation_ratio, grid, corner, history.closure, effort)
         return jnp.stack([*found, jnp.max(history.status)]).astype(float)
@@ -172,7 +172,7 @@ def cell(
 def doubts_beforehand(settings: Mapping[str, Any], point: Mapping[str, float]) -> int:
     """How many doubts the scene alone raises."""
     base = jb.Scene().replace({key: v for key, v in settings.items() if "." in key})
-    return len(reliability.doubts_before(scene_of(base, list((STANDARD | point).values()))))
+    return len(reliability.doubts_of_scene(scene_of(base, list((STANDARD | point).values()))))
 
 
 def _figures(settings: Mapping[str, Any], point: Mapping[str, float]) -> list[Any]:

@@ -1,1 +1,1 @@
-"""The history of a load path: fields, figures of the last cycle, reliability, reports."""
+"""History of a load path: fields, figures of the last cycle, reliability, reports."""

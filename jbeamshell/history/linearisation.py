@@ -1,4 +1,4 @@
-"""Whether linear kinematics will do: a bound on what they change, without solving anything."""
+"""Error of linear kinematics: a bound that needs no solution."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from jbeamshell.scene.scene import Scene
 
-# Of `bound`, fitted by calibration/map_kinematics.py to map_kinematics.json beside it.
+# Constants of `bound`, fitted by calibration/map_kinematics.py to map_kinematics.json beside it.
 BEAMSHELL = (3.2, 3.6, 3.6, 0.5, 0.0, 3.0)
 SECTIONS = (14.0, 2.7, 3.5, 1.7, 1.7, 3.0)
 
@@ -22,7 +22,20 @@ def bound(
     softness: ArrayLike,
     constants: Sequence[float] | np.ndarray = BEAMSHELL,
 ) -> np.ndarray:
-    """Bound of `linear_error` from F_N/E', the slip length over H, mu, and E'/(2G)."""
+    """Bound of `linear_error` from ratios of the strip.
+
+    Parameters
+    ----------
+    pressed : F_N/E'
+    slip : slip length over H
+    friction : Coulomb friction coefficient mu
+    softness : E'/(2G)
+    constants : `BEAMSHELL` or `SECTIONS`
+
+    Returns
+    -------
+    relative error, of the shape that the ratios broadcast to
+    """
     near, reach, power, far, stretch, growth = constants
     p, x, soft = np.asarray(pressed), np.asarray(slip), np.asarray(softness)
     corner = near / (1.0 + (x / (reach * soft)) ** power)
@@ -30,31 +43,36 @@ def bound(
 
 
 def linear_error(scene: Scene) -> float:
-    """How much linear kinematics change a strip's loop, at most.
+    """Largest relative error of a strip's loop that linear kinematics make.
 
-    Bounds the relative difference that they make to the dissipation per cycle and to the secant
-    stiffness.  It goes with the strain p = F_N/E' of the pressure, whatever the load's own is, and
-    is largest where the slip length s of the bar is a few H: with x = 2 s G/(H E'),
+    It bounds the error of the dissipation per cycle and of the secant stiffness.  It grows with the
+    strain p = F_N/E' of the pressure, not with that of the load, and is largest if the slip length
+    s of the bar is a few H.  With x = 2 s G/(H E'),
 
-        p (1 + 3 p) (3.2/(1 + (x/3.6)^3.6) + 0.5 mu).
+        error <= p (1 + 3 p) (3.2/(1 + (x/3.6)^3.6) + 0.5 mu).
 
-    Sections of order p have other constants, and stretch St. Venant and Kirchhoff's material.
-    Measured for loads up to E' 2H/10 and pressures up to E'/3 (calibration/map_kinematics.json);
-    beyond, and for a strip that is curved or on a compliant foundation, it is a guess.
+    Sections of order p have other constants, because their exact material is St. Venant and
+    Kirchhoff's.  The bound was measured for loads up to E' 2H/10 and pressures up to E'/3
+    (calibration/map_kinematics.json).  Beyond, and for a strip that is curved or on a compliant
+    foundation, it is a guess.
 
     Parameters
     ----------
-    scene : with a foundation, and without traced leaves
+    scene : scene with a foundation and without traced leaves
+
+    Returns
+    -------
+    relative error, 0.01 for 1 %
     """
     strip, contact, load = scene.strip, scene.contact, scene.load
     stiffness, pressure = float(strip.stretching_stiffness), float(contact.largest_pressure)
     slip, height = float(strip.length), float(strip.half_height)
-    rub, amplitude = float(contact.friction) * pressure, float(load.amplitude)
-    if rub > 0.0:  # else the whole strip slips
+    limit, amplitude = float(contact.friction) * pressure, float(load.amplitude)
+    if limit > 0.0:  # else the whole strip slips
         displaced = load.control == "displacement"
-        force = math.sqrt(2.0 * stiffness * rub * amplitude) if displaced else amplitude
-        slip = min(slip, force / rub)
+        force = math.sqrt(2.0 * stiffness * limit * amplitude) if displaced else amplitude
+        slip = min(slip, force / limit)
     softness = float(strip.plane_modulus / (2.0 * strip.shear_modulus))
     pressed = 2.0 * height * pressure / stiffness
     constants = SECTIONS if scene.model.order > 0 else BEAMSHELL
-    return float(bound(pressed, slip / height, rub / pressure, softness, constants))
+    return float(bound(pressed, slip / height, limit / pressure, softness, constants))

@@ -1,9 +1,11 @@
-"""What a run's own fields say about how far its figures can be trusted.
+"""Reliability of a run: how far its own fields let one trust its figures.
 
-Newton's method finds the equilibrium of a grid, whether or not the grid resolves what happens.  At
-the loaded end two things go wrong unseen: so few nodes slip that the grid decides what they
-dissipate, or the reaction gathers in the corner's last node, which it goes on doing as the grid is
-refined, down to the tension of a strip that may not lift.
+Newton's method finds the equilibrium of a grid, no matter if the grid resolves the contact.  Two
+errors at the loaded end would stay unseen.  So few nodes may slip that the grid decides how much
+they dissipate.  And the reaction may gather in the last node at the corner: the finer the grid, the
+more, and a strip that may not lift is even held down there by tension.
+
+A doubt is a sentence that says what may be wrong, by how much, and what to change.
 """
 
 from __future__ import annotations
@@ -18,16 +20,16 @@ from jbeamshell.history.linearisation import linear_error
 from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.scene.scene import Scene
 
-NEGLIGIBLE = 1e-9  # of the sticking range, or of the pressure: less than this is none
-CLOSES = 1e-3  # of its width: a loop that ends further off is not steady yet
-SAFETY = 1.2  # of the corner's estimate
-TOLERANCE = 0.02  # of the dissipation: a smaller error is not told
+NEGLIGIBLE = 1e-9  # slip over the sticking range, or tension over the pressure, taken as zero
+CLOSES = 1e-3  # distance between the ends of a steady loop, over its width
+SAFETY = 1.2  # factor on the estimated error of the corner
+TOLERANCE = 0.02  # relative error of the dissipation below which there is no doubt
 LOCKS = 0.491  # nu beyond which the midpoint rule is off by more than 1 % of the dissipation
 FINER = "take a smaller model.end_size or more model.nodes"
 
 
 class Run(Protocol):
-    """What is asked of a history; see `jbeamshell.History`."""
+    """Parts of a `jbeamshell.History` that doubts are found from."""
 
     scene: Scene
     x: Array
@@ -37,23 +39,23 @@ class Run(Protocol):
     @property
     def converged(self) -> bool: ...
     @property
-    def loop(self) -> tuple[Array, Array]: ...
+    def closure(self) -> Array: ...
     @property
-    def rubbing(self) -> SlipCycle: ...
+    def slip_cycle(self) -> SlipCycle: ...
 
 
 class SlipCycle(NamedTuple):
-    """A cycle at the contact's nodes, as arrays of NumPy or of JAX.
+    """One load cycle at the nodes of the contact, as arrays of NumPy or of JAX.
 
     Attributes
     ----------
-    x : (n,) positions
+    x : (n,) positions X, length
     tributary : (n,) contact length of each node
-    v : (levels, n) tangential displacement
-    traction, reaction : (levels, n) of friction, normal
-    friction : mu
+    v : (levels, n) tangential displacement, length
+    traction, reaction : (levels, n) friction traction and normal reaction, stress
+    friction : Coulomb friction coefficient mu
     slip_stiffness : k_t, traction per slip
-    half_height : H
+    half_height : H, length
     """
 
     x: Array
@@ -67,17 +69,17 @@ class SlipCycle(NamedTuple):
 
 
 def dissipation_errors(cycle: SlipCycle) -> tuple[Array, ...]:
-    """Estimates of the relative error of a cycle's dissipation, by its grid and by the corner.
+    """Estimated relative errors of a cycle's dissipation: of the grid, and of the loaded corner.
 
-    With the friction work W_i of the nodes, as many as (sum W_i)^2 / sum W_i^2 would share it if
-    they all did the same (the participation ratio); the grid's error is that to the power -3/2.
-    The corner's is the part of the work that is due to what the nodes' reactions have beyond their
-    neighbours', times how much less the contact slips one H from the end.  Both are measured,
-    rather too large than too small (calibration/failure_map.py).
+    With the friction work W_i of node i, the number of nodes that share the work is the
+    participation ratio P = (sum W_i)^2 / sum W_i^2.  The error of the grid is P^(-3/2).  The error
+    of the corner is the part of the work that comes from the jumps of the reaction between
+    neighbouring nodes, times the relative fall of the slip over the last H before the end.  Both
+    are measured rules, rather too large than too small (calibration/failure_map.py).
 
     Returns
     -------
-    grid, corner : infinite where nothing slips
+    grid, corner : scalars; infinite if nothing slips
     """
     numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
     cap = coulomb_cap(cycle.friction, cycle.reaction)
@@ -103,22 +105,22 @@ def dissipation_errors(cycle: SlipCycle) -> tuple[Array, ...]:
     return tuple(numbers.where(slips, error, numbers.inf) for error in both)
 
 
-def doubts_of(history: Run) -> tuple[str, ...]:
-    """What is doubtful about a run, by how much, and what to change; a sentence each."""
+def doubts_of_run(history: Run) -> tuple[str, ...]:
+    """Doubts about a run that was solved."""
     plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
     if not plain.converged:
-        return ("a load step found no equilibrium: the steps from there on hold no numbers",)
+        return ("a load step found no equilibrium: that step and all after it hold NaN",)
     scene = plain.scene
     if scene.model.solution == "closed-form" or scene.contact.normal == "none":
         return ()
     if not plain.cycles:
         return _tension(plain)
-    rubbing = _rubbing(plain) if scene.contact.friction > 0.0 else ()
-    return (*_unsteady(plain), *rubbing, *_tension(plain), *doubts_before(scene))
+    resolution = _resolution(plain) if scene.contact.friction > 0.0 else ()
+    return (*_unsteady(plain), *resolution, *_tension(plain), *doubts_of_scene(scene))
 
 
-def doubts_before(scene: Scene) -> tuple[str, ...]:
-    """What can be doubted of a scene's loop before it is run."""
+def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
+    """Doubts about the loop of a scene that need no run."""
     model, strip, found = scene.model, scene.strip, []
     if model.kinematics == "linear" and (error := linear_error(scene)) > TOLERANCE:
         found.append(f"{_off(error)} by linear kinematics; take model.kinematics = exact")
@@ -133,23 +135,24 @@ def doubts_before(scene: Scene) -> tuple[str, ...]:
 
 
 def _unsteady(history: Run) -> tuple[str, ...]:
-    force, displacement = history.loop
-    answer = displacement if history.scene.load.control == "force" else force
-    open_by = abs(answer[-1] - answer[0]) / max(np.ptp(answer), np.finfo(float).tiny)
-    if open_by <= CLOSES:
+    """Doubt about a loop that does not close."""
+    with np.errstate(invalid="ignore"):  # a loop without width
+        open_by = abs(history.closure)
+    if not open_by > CLOSES:
         return ()
     return (
-        f"the last loop does not close (by {open_by:.2g} of its width): give more load.cycles for "
-        "a steady one",
+        f"the last loop does not close (by {open_by:.2g} of its width): take more load.cycles "
+        "until it is steady",
     )
 
 
-def _rubbing(history: Run) -> tuple[str, ...]:
-    grid, corner = map(float, dissipation_errors(jax.tree.map(np.asarray, history.rubbing)))
+def _resolution(history: Run) -> tuple[str, ...]:
+    """Doubts about the slip zone's resolution by the grid."""
+    grid, corner = map(float, dissipation_errors(jax.tree.map(np.asarray, history.slip_cycle)))
     if np.isinf(grid):
         return (
-            "nothing slips in the last cycle: if something does, this grid cannot show it; "
-            "take a smaller model.end_size",
+            "nothing slips in the last cycle: slip that is smaller than the elements would not be "
+            "seen; take a smaller model.end_size",
         )
     found = []
     if grid > TOLERANCE:
@@ -163,12 +166,13 @@ def _rubbing(history: Run) -> tuple[str, ...]:
 
 
 def _off(error: float) -> str:
+    """Beginning of a doubt about the dissipation."""
     by = f"about {100.0 * error:.2g} %" if error < 1.0 else "its own size"
     return f"the dissipation may be off by {by}"
 
 
 def _tension(history: Run) -> tuple[str, ...]:
-    """Where a strip that may not lift is held down; at the very corner only if that matters."""
+    """Doubt about a strip that is held down; in a cycle, the corner is left to `_resolution`."""
     reaction, scene = history.reaction, history.scene
     if history.cycles and scene.contact.friction > 0.0:
         reaction = reaction[:, history.x < history.x[-1] - scene.strip.half_height]
@@ -176,6 +180,6 @@ def _tension(history: Run) -> tuple[str, ...]:
     if "w" in scene.model.fields or least >= -NEGLIGIBLE * np.max(np.abs(history.reaction)):
         return ()
     return (
-        f"tension at the contact (reaction_min = {least:.4g}): the lift is frozen; add w to "
+        f"tension at the contact (reaction_min = {least:.4g}): the strip may not lift; add w to "
         "model.fields for unilateral contact, or take fewer model.nodes",
     )

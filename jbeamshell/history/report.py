@@ -1,31 +1,41 @@
-"""What a run or a fit leaves in a folder: tables, pictures, the scene, the figures as JSON."""
+"""Report of a run: tables, pictures, the scene and the figures as files in a folder."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.history.history import History
-from jbeamshell.scene.toml import scene_to_toml
-
-if TYPE_CHECKING:  # a run that draws and fits nothing need not wait for them
-    pass
 from jbeamshell.common.files import as_json, csv_text
+from jbeamshell.history.history import History
 from jbeamshell.plotting.folder import write_folder
+from jbeamshell.scene.toml import scene_to_toml
 
 
 def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> list[Path]:
-    """Write the tables, the scene, the figures as JSON, and the pictures that show something.
+    """Write the files of a run, and return their paths.
 
-    These are loop.csv, profiles.csv, sections.csv, scene.toml and result.json; loop.png of a path
-    that goes on after the pressure, profiles.png if friction acts on it, and contact.png if w or
-    psi is a field.  A scene with a user's own energy or law has no scene.toml.
+    | file | content |
+    |---|---|
+    | ``loop.csv`` | force, displacement and convergence of every step |
+    | ``profiles.csv`` | fields and contact along X at the `turning_steps` |
+    | ``sections.csv`` | section forces along X at the `turning_steps` |
+    | ``result.json`` | the figures |
+    | ``scene.toml`` | the scene, unless it has an energy or a law of the user's own |
+    | ``loop.png`` | the loop, if there are loads after the pressure |
+    | ``profiles.png`` | slip, rotation, traction and reaction, if there are loads and friction |
+    | ``contact.png`` | reaction, gap and squeeze, if w or psi is a field |
+
+    Parameters
+    ----------
+    folder : folder to write into, made if it does not exist
+    history : run to report
+    figures : content of result.json, such as ``history.figures()``
     """
     steps = turning_steps(history)
     texts = {
@@ -48,9 +58,10 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
 
 
 def turning_steps(history: History) -> list[int]:
-    """Steps to look at: the end of the pressing, the first peak, the last cycle's turns and end.
+    """Steps to look at: the end of the pressing, and where the first and the last cycle turn.
 
-    A path without a cycle has its end instead, and the pressing's first and middle step.
+    These are the start of the first cycle, and the start, turn and end of the last.  A path without
+    a cycle gives the first and the middle step of the pressing instead, and its last step.
     """
     pressed, end = history.pressed, history.force.size - 1
     marks = [pressed]
@@ -62,9 +73,10 @@ def turning_steps(history: History) -> list[int]:
 
 
 def loop_table(history: History) -> str:
-    """CSV of the load path: what acts and answers, work of friction, and how it converged.
+    """CSV of the load path, a row for every step.
 
-    With unilateral contact also where the contact ends.
+    The columns are the step, force, displacement, part of the pressure, accumulated work of
+    friction, end of the contact (with unilateral contact only), Newton iterations and error.
     """
     columns = {
         "step": range(history.force.size),
@@ -82,7 +94,7 @@ def loop_table(history: History) -> str:
 
 
 def profile_table(history: History, steps: Sequence[int]) -> str:
-    """CSV of the fields and the contact at the nodes at chosen steps."""
+    """CSV of the fields and the contact, a row for every node at each of the steps."""
     names = ("slip", "w", "beta", "psi", "gap", "traction", "reaction", "slipping")
     columns = {name: getattr(history, name) for name in names}
     loads = {step: float(history.force[step]) for step in steps}
@@ -91,7 +103,7 @@ def profile_table(history: History, steps: Sequence[int]) -> str:
 
 
 def section_table(history: History, steps: Sequence[int]) -> str:
-    """CSV of the section forces and the mean squeeze stress of the elements at chosen steps."""
+    """CSV of section forces and mean squeeze stress, a row for every element at each step."""
     names = ("N", "Q", "M", "chi", "xi")
     columns = dict(zip(names, history.sections, strict=True))
     columns["squeeze_stress"] = history.squeeze_stress
@@ -101,7 +113,7 @@ def section_table(history: History, steps: Sequence[int]) -> str:
 def _along(
     x: ArrayLike, columns: Mapping[str, ArrayLike], steps: Sequence[int]
 ) -> Iterator[tuple[Any, ...]]:
-    """Step, X and the columns' (steps, points) values, for chosen steps."""
+    """Rows of step, X and the values of columns (steps, points)."""
     tables = [np.asarray(column) for column in columns.values()]
     for step in steps:
         values = [table[step].tolist() for table in tables]

@@ -1,7 +1,8 @@
-"""Histories in files.
+"""Writing of histories to files; `jbeamshell.read_history` reads them.
 
-A file is NumPy's .npz without any pickled object: the arrays of a history by name, the strip's
-state after the last step among them, and one line of JSON with the scene's TOML.
+A file is an .npz of NumPy without pickled objects.  It holds the arrays of a history by name,
+including the state of the strip after the last step, and as ``about`` one line of JSON: the
+format, the scene as TOML, the data type and the cycles.
 """
 
 from __future__ import annotations
@@ -22,7 +23,18 @@ FORMAT = "jbeamshell history 2"
 
 
 def write_history(history: Any, path: str | os.PathLike[str]) -> None:
-    """Write a history, whole or not at all; `InputError` for a scene with one's own functions."""
+    """Write a history to a file, whole or not at all.
+
+    Parameters
+    ----------
+    history : `jbeamshell.History` to write
+    path : file to write, with the suffix .npz
+
+    Raises
+    ------
+    InputError
+        for another suffix, and for a scene with an energy or a law of the user's own
+    """
     about = {
         "format": FORMAT,
         "scene": scene_to_toml(history.scene),
@@ -37,7 +49,7 @@ def write_history(history: Any, path: str | os.PathLike[str]) -> None:
 
 
 def named_arrays(history: Any) -> list[tuple[str, Any]]:
-    """Arrays of a history by name, without those of the scene, which its TOML has."""
+    """Arrays of a history by name, without those of its scene, which go into the TOML."""
     leaves = jax.tree_util.tree_leaves_with_path(without_scene(history))
     return [
         (jax.tree_util.keystr(place, simple=True, separator="."), leaf) for place, leaf in leaves
@@ -45,5 +57,5 @@ def named_arrays(history: Any) -> list[tuple[str, Any]]:
 
 
 def without_scene(history: Any) -> Any:
-    """History whose scene is left out."""
+    """Copy of a history with None as its scene."""
     return dataclasses.replace(history, scene=None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 
 import jax
@@ -25,7 +26,7 @@ FEW = 200  # nodes: beyond, the arithmetic takes longer than calling it
 RESPONSES = (
     "force",
     "displacement",
-    *(name for name, value in vars(History).items() if isinstance(value, property)),
+    *(n for n, value in inspect.getmembers(History) if isinstance(value, property) and n[0] != "_"),
 )
 
 

@@ -1,0 +1,77 @@
+"""Contact with the foundation at every step of a history: where it is, and how hard it presses."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jbeamshell.scene.scene import Scene
+
+
+class ContactLine(eqx.Module):
+    """Extent and reaction of the contact, from the arrays of a `jbeamshell.History`."""
+
+    scene: eqx.AbstractVar[Scene]
+    x: eqx.AbstractVar[Array]
+    tributary: eqx.AbstractVar[Array]
+    gap: eqx.AbstractVar[Array]
+    reaction: eqx.AbstractVar[Array]
+
+    @property
+    def touching(self) -> Array:
+        """True if a node is in contact, (steps+1, n)."""
+        if self.scene.contact.normal == "none":
+            return jnp.zeros(self.gap.shape, bool)
+        if self.scene.contact.normal == "compliant":
+            return self.gap <= 0.0
+        strip = self.scene.strip  # the same weight as in the search for the contact
+        return self.reaction > self.gap * strip.plane_modulus / strip.half_height
+
+    @property
+    def contact_end(self) -> Array:
+        """Position X at which the contact ends, (steps+1,); zero if nothing touches.
+
+        The contact ends inside the tributary length of the last node that touches.  The reaction
+        is continued linearly from the nodes before; the contact reaches as far as the nodal force
+        of that last node needs.
+        """
+        return _contact_ends(self.x, self.tributary, self.touching, self.reaction)
+
+    @property
+    def reaction_max(self) -> Array:
+        """Largest normal reaction, (steps+1,), stress."""
+        return jnp.max(self.reaction, axis=1)
+
+    @property
+    def reaction_max_at(self) -> Array:
+        """Position X of the largest normal reaction, (steps+1,)."""
+        return self.x[jnp.argmax(self.reaction, axis=1)]
+
+    @property
+    def reaction_min(self) -> Array:
+        """Smallest normal reaction of the path, stress; negative is tension (w frozen)."""
+        return jnp.min(self.reaction)
+
+
+@jax.jit
+def _contact_ends(x: Array, tributary: Array, touching: Array, reaction: Array) -> Array:
+    """Positions X at which the contact ends; see `ContactLine.contact_end`."""
+    last = x.size - 1
+    share_begins = jnp.cumsum(tributary) - tributary
+
+    def end(touching: Array, reaction: Array) -> Array:
+        j = last - jnp.argmax(touching[::-1])
+        before = jnp.maximum(j - 1, 1)
+        slope = (reaction[before] - reaction[before - 1]) / (x[before] - x[before - 1])
+        force, begin = reaction[j] * tributary[j], share_begins[j]
+        width = tributary[j]
+        for _ in range(3):
+            level = reaction[before] + slope * (begin + 0.5 * width - x[before])
+            width = jnp.where(level > 0.0, force / jnp.where(level > 0.0, level, 1.0), width)
+            width = jnp.clip(width, 0.0, tributary[j])  # beyond its share the next node would touch
+        found = jnp.where(j == last, x[last], begin + width)
+        return jnp.where(jnp.any(touching), found, 0.0)
+
+    return jax.vmap(end)(touching, reaction)
