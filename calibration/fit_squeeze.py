@@ -28,7 +28,7 @@ from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.measured.curves import SqueezeCurve  # noqa: E402
 from jbeamshell.measured.example import data_folder, example_loops  # noqa: E402
 from jbeamshell.measured.loops import Loop, make_loop  # noqa: E402
-from jbeamshell.reference.elasticity import best_kappa_s, squeeze_decay_length  # noqa: E402
+from jbeamshell.reference import best_kappa_s, squeeze_decay_length  # noqa: E402
 from jbeamshell.scene import library  # noqa: E402
 
 HERE = Path(__file__).parent

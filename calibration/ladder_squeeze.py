@@ -36,7 +36,7 @@ from jbeamshell import plotting  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.measured.example import data_folder  # noqa: E402
 from jbeamshell.mechanics.homogeneous import shear_coefficient  # noqa: E402
-from jbeamshell.reference.elasticity import filon_average_step, reaction_jump  # noqa: E402
+from jbeamshell.reference import filon_average_step, reaction_jump  # noqa: E402
 from jbeamshell.scene import library  # noqa: E402
 
 HERE = Path(__file__).parent

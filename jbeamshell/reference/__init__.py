@@ -1,1 +1,40 @@
-"""Exact solutions from the literature, each with its source."""
+"""Exact solutions from the literature, each with its source.
+
+The bar on a frictional foundation and Masing's rule, the stuck strip, Filon's squeezed strip and
+the psi model beside it, the bimetal strip, and receding contact.  Units are any consistent set; a
+strip has unit width, so forces are per width.
+
+Examples
+--------
+>>> import jbeamshell as jb
+>>> jb.reference.cubic_law(0.7855, 3.4e4, 1.0)  # dissipation per cycle of a bar
+"""
+
+from jbeamshell.mechanics.bar import bar_backbone as bar_backbone
+from jbeamshell.mechanics.bar import bar_slip_length as bar_slip_length
+from jbeamshell.mechanics.bar import bar_slip_profile as bar_slip_profile
+from jbeamshell.mechanics.bar import cubic_law as cubic_law
+from jbeamshell.mechanics.homogeneous import shear_coefficient as shear_coefficient
+from jbeamshell.reference.bimetal import bimetal_curvature as bimetal_curvature
+from jbeamshell.reference.bimetal import tip_deflection as tip_deflection
+from jbeamshell.reference.filon import filon_average as filon_average
+from jbeamshell.reference.filon import filon_average_step as filon_average_step
+from jbeamshell.reference.filon import filon_midplane as filon_midplane
+from jbeamshell.reference.filon import filon_midplane_step as filon_midplane_step
+from jbeamshell.reference.masing import bar_hysteresis as bar_hysteresis
+from jbeamshell.reference.masing import masing_dissipation as masing_dissipation
+from jbeamshell.reference.masing import masing_loop as masing_loop
+from jbeamshell.reference.masing import masing_pull_push as masing_pull_push
+from jbeamshell.reference.receding import beam_contact_length as beam_contact_length
+from jbeamshell.reference.receding import strip_contact_length as strip_contact_length
+from jbeamshell.reference.squeeze import best_decay_ratio as best_decay_ratio
+from jbeamshell.reference.squeeze import best_kappa_s as best_kappa_s
+from jbeamshell.reference.squeeze import reaction_jump as reaction_jump
+from jbeamshell.reference.squeeze import squeeze_decay_length as squeeze_decay_length
+from jbeamshell.reference.squeeze import squeeze_kappa_s as squeeze_kappa_s
+from jbeamshell.reference.squeeze import squeeze_step as squeeze_step
+from jbeamshell.reference.squeeze import squeeze_symbol as squeeze_symbol
+from jbeamshell.reference.stuck import first_slip_force as first_slip_force
+from jbeamshell.reference.stuck import gross_slip_force as gross_slip_force
+from jbeamshell.reference.stuck import stuck_decay_rate as stuck_decay_rate
+from jbeamshell.reference.stuck import stuck_rotation as stuck_rotation

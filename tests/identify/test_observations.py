@@ -17,7 +17,7 @@ from jbeamshell.measured.curves import (
 )
 from jbeamshell.measured.example import data_folder
 from jbeamshell.measured.loops import Loop, make_loop
-from jbeamshell.reference.elasticity import squeeze_decay_length, squeeze_step
+from jbeamshell.reference import squeeze_decay_length, squeeze_step
 from jbeamshell.scene import library
 
 X = np.linspace(45.0, 55.0, 11)

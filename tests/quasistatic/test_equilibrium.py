@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from jbeamshell import reference
 from jbeamshell.mechanics import homogeneous
 from jbeamshell.mechanics.friction import FrictionLaw
 from jbeamshell.quasistatic.system import Prescribed, System
-from jbeamshell.reference import beams
 
 SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
 
@@ -144,7 +144,7 @@ def test_stuck_strip_rotates_as_the_closed_form():
         )
         history = jb.solve(scene, np.array([1.0]))
         strip = scene.strip
-        exact = beams.stuck_rotation(
+        exact = reference.stuck_rotation(
             history.x,
             1.0,
             strip.length,

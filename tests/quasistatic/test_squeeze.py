@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from jbeamshell import reference
 from jbeamshell.measured.example import data_folder
-from jbeamshell.reference import elasticity
 from jbeamshell.scene import library
 
 PRESSURE, SOFT = 0.209, 2090.0
-DECAY = elasticity.squeeze_decay_length(1.0, 0.44, 0.3)
+DECAY = reference.squeeze_decay_length(1.0, 0.44, 0.3)
 EVEN = 1.0 / 0.6  # of H: makes the end elements of a strip of 100 H as large as the others
 
 
@@ -21,10 +21,10 @@ def reference(name):
 @pytest.mark.parametrize("plane", ["stress", "strain"])
 def test_a_squeezed_laminate_bends_as_the_closed_form_and_the_finite_elements(plane):
     history = jb.solve(library.bimaterial().replace({"strip.plane": plane}))
-    closed = elasticity.bimetal_curvature(PRESSURE, 2.0, SOFT, 100 * SOFT, 0.3, plane)
+    closed = reference.bimetal_curvature(PRESSURE, 2.0, SOFT, 100 * SOFT, 0.3, plane)
     curvature = np.diff(history.beta[0]) / np.diff(history.x)
     np.testing.assert_allclose(curvature, closed, rtol=1e-8)
-    tip = elasticity.tip_deflection(closed, 100.0)
+    tip = reference.tip_deflection(closed, 100.0)
     assert float(history.tip_deflection[0]) == pytest.approx(float(tip), rel=1e-8)
     measured = reference(f"b1_{plane}.csv")
     at = np.arange(10.0, 91.0, 10.0)  # nodes of both
@@ -36,7 +36,7 @@ def test_a_squeezed_laminate_bends_as_the_closed_form_and_the_finite_elements(pl
 
 def test_one_squeeze_strain_shared_by_the_layers_cannot_bend():
     history = jb.solve(library.bimaterial().replace({"model.constants": "printed"}))
-    consistent = elasticity.bimetal_curvature(PRESSURE, 2.0, SOFT, 100 * SOFT, 0.3, "stress")
+    consistent = reference.bimetal_curvature(PRESSURE, 2.0, SOFT, 100 * SOFT, 0.3, "stress")
     assert abs(float(history.curvature[0])) < 1e-10 * float(consistent)
 
 
@@ -47,7 +47,7 @@ def squeezed():
 
 def test_the_squeeze_reaches_beyond_the_load_as_exponentials(squeezed):
     distance = np.asarray(squeezed.middles) - 50.0
-    closed = -100.0 * elasticity.squeeze_step(distance, DECAY)
+    closed = -100.0 * reference.squeeze_step(distance, DECAY)
     assert float(jnp.max(jnp.abs(squeezed.squeeze_stress[0] - closed))) < 0.1
 
 
@@ -80,7 +80,7 @@ def test_nodal_quadrature_does_not_oscillate_and_converges():
         assert np.ptp(np.diff(history.x)) < 1e-9
         assert np.all(np.diff(stress) > -1e-8)  # monotonic, so no oscillation
         assert np.min(stress) > -100.0 - 1e-8
-        closed = -100.0 * elasticity.squeeze_step(np.asarray(history.middles) - 10.0, DECAY)
+        closed = -100.0 * reference.squeeze_step(np.asarray(history.middles) - 10.0, DECAY)
         errors.append(np.sqrt(np.mean((stress - closed) ** 2)))
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert np.all(orders[1:] > 1.8), (errors, orders)

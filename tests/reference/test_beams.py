@@ -7,8 +7,7 @@ import pytest
 from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
-from jbeamshell.mechanics import bar, homogeneous
-from jbeamshell.reference import beams
+from jbeamshell import reference
 
 EA, Q, LENGTH = 3.4e4, 1.0, 2.0
 NU = 0.3
@@ -21,27 +20,27 @@ def strip(eta):
     """H, E', G, kappa of the standard strip."""
     half_height = eta * LENGTH / 2
     youngs = EA / (2 * half_height)
-    return half_height, youngs, youngs * (1 - NU) / 2, float(homogeneous.shear_coefficient(NU))
+    return half_height, youngs, youngs * (1 - NU) / 2, float(reference.shear_coefficient(NU))
 
 
 def test_shear_coefficient_of_a_rectangle():
-    np.testing.assert_allclose(homogeneous.shear_coefficient(0.0), 5 / 6)
-    np.testing.assert_allclose(homogeneous.shear_coefficient(0.3), 13 / 15.3, rtol=1e-14)
+    np.testing.assert_allclose(reference.shear_coefficient(0.0), 5 / 6)
+    np.testing.assert_allclose(reference.shear_coefficient(0.3), 13 / 15.3, rtol=1e-14)
 
 
 def test_bar_backbone_is_odd_and_is_the_end_of_the_slip_profile():
     force = jnp.array([-1.9, -0.3, 0.0, 0.7, 1.6])
-    ends = bar.bar_slip_profile(LENGTH, force, LENGTH, EA, Q)
-    np.testing.assert_allclose(bar.bar_backbone(force, EA, Q), ends, rtol=1e-14)
+    ends = reference.bar_slip_profile(LENGTH, force, LENGTH, EA, Q)
+    np.testing.assert_allclose(reference.bar_backbone(force, EA, Q), ends, rtol=1e-14)
     assert (jnp.sign(ends) == jnp.sign(force)).all()
 
 
 @pytest.mark.parametrize("force", [1.3, -0.6])
 def test_slip_profile_balances_forces(force):
     def profile(x):
-        return bar.bar_slip_profile(x, force, LENGTH, EA, Q)
+        return reference.bar_slip_profile(x, force, LENGTH, EA, Q)
 
-    inner = LENGTH - float(bar.bar_slip_length(force, Q))
+    inner = LENGTH - float(reference.bar_slip_length(force, Q))
     stuck, slipping = jnp.linspace(0, inner, 9), jnp.linspace(inner + 1e-9, LENGTH, 9)
     strain, curvature = jax.vmap(jax.grad(profile)), jax.vmap(jax.grad(jax.grad(profile)))
 
@@ -53,41 +52,45 @@ def test_slip_profile_balances_forces(force):
 
 
 def test_gross_slip_is_the_slip_zone_reaching_the_held_end():
-    limit = beams.gross_slip_force(0.1, 10.0, LENGTH)
+    limit = reference.gross_slip_force(0.1, 10.0, LENGTH)
     np.testing.assert_allclose(limit, 2.0)
-    np.testing.assert_allclose(bar.bar_slip_length(limit, 0.1 * 10.0), LENGTH)
+    np.testing.assert_allclose(reference.bar_slip_length(limit, 0.1 * 10.0), LENGTH)
 
 
 @pytest.mark.parametrize("amplitude", [0.1, 1.9])
 def test_masing_of_the_bar_is_the_cubic_law(amplitude):
-    law = bar.cubic_law(amplitude, EA, Q)
+    law = reference.cubic_law(amplitude, EA, Q)
     uniform = jnp.linspace(0, amplitude, 3)
     graded = amplitude * jnp.linspace(0, 1, 21) ** 1.7
     for force in (uniform, graded, -uniform):
-        dissipation = beams.masing_dissipation(force, bar.bar_backbone(force, EA, Q))
+        dissipation = reference.masing_dissipation(force, reference.bar_backbone(force, EA, Q))
         np.testing.assert_allclose(dissipation, law, rtol=1e-13)
 
 
 def test_masing_dissipation_is_exact_for_cubics_on_a_uniform_table():
     force = jnp.linspace(0, 1.5, 7)
     # 4 A u(A) - 8 A^4/4 for u = F^3
-    np.testing.assert_allclose(beams.masing_dissipation(force, force**3), 2 * 1.5**4, rtol=1e-13)
-    np.testing.assert_allclose(beams.masing_dissipation(force, force), 0, atol=1e-14)
+    np.testing.assert_allclose(
+        reference.masing_dissipation(force, force**3), 2 * 1.5**4, rtol=1e-13
+    )
+    np.testing.assert_allclose(reference.masing_dissipation(force, force), 0, atol=1e-14)
 
 
 def test_bar_hysteresis_closes_and_encloses_the_cubic_law():
     amplitude, points = 1.6, 101
-    force, displacement = beams.bar_hysteresis(amplitude, EA, Q, points)
+    force, displacement = reference.bar_hysteresis(amplitude, EA, Q, points)
     unload, reload = force[:points], force[points - 1 :]
 
     assert force.shape == displacement.shape == (2 * points - 1,)
     assert (jnp.diff(unload) < 0).all()
     assert (jnp.diff(reload) > 0).all()
-    tip = bar.bar_backbone(amplitude, EA, Q)
+    tip = reference.bar_backbone(amplitude, EA, Q)
     ends = displacement[jnp.array([0, points - 1, -1])]
     np.testing.assert_allclose(ends, tip * np.array([1, -1, 1]), rtol=1e-12)
     area = jnp.trapezoid(force, displacement)  # chords of a parabola miss 1 / intervals^2
-    np.testing.assert_allclose(area, bar.cubic_law(amplitude, EA, Q), rtol=2 / (points - 1) ** 2)
+    np.testing.assert_allclose(
+        area, reference.cubic_law(amplitude, EA, Q), rtol=2 / (points - 1) ** 2
+    )
 
 
 def test_masing_loop_is_what_sliders_in_parallel_do():
@@ -101,7 +104,7 @@ def test_masing_loop_is_what_sliders_in_parallel_do():
         slip = u - spring / stiffness
         stepped.append(spring.sum())
 
-    force, displacement = beams.masing_loop(np.array(stepped[:25]), first)
+    force, displacement = reference.masing_loop(np.array(stepped[:25]), first)
     np.testing.assert_allclose(displacement, path[24::2], atol=1e-14)
     np.testing.assert_allclose(force, stepped[24::2], atol=1e-13)
 
@@ -109,23 +112,23 @@ def test_masing_loop_is_what_sliders_in_parallel_do():
 def test_masing_pull_push_is_the_mean_and_ignores_the_sign_of_the_push():
     force = jnp.linspace(0, 1.2, 21)
     pull, push = (
-        (force, bar.bar_backbone(force, EA, 0.8)),
-        (force, bar.bar_backbone(force, EA, 1.2)),
+        (force, reference.bar_backbone(force, EA, 0.8)),
+        (force, reference.bar_backbone(force, EA, 1.2)),
     )
-    mean = (bar.cubic_law(1.2, EA, 0.8) + bar.cubic_law(1.2, EA, 1.2)) / 2
-    np.testing.assert_allclose(beams.masing_pull_push(pull, push), mean, rtol=1e-13)
+    mean = (reference.cubic_law(1.2, EA, 0.8) + reference.cubic_law(1.2, EA, 1.2)) / 2
+    np.testing.assert_allclose(reference.masing_pull_push(pull, push), mean, rtol=1e-13)
     signed = (-push[0], -push[1])
-    np.testing.assert_allclose(beams.masing_pull_push(pull, signed), mean, rtol=1e-13)
+    np.testing.assert_allclose(reference.masing_pull_push(pull, signed), mean, rtol=1e-13)
 
 
 def test_backbone_tables_that_cannot_be_meant_are_refused():
     line = jnp.linspace(0, 1, 6)
     with pytest.raises(ValueError, match="odd number of points, at least 3, not 6"):
-        beams.masing_dissipation(line, line)
+        reference.masing_dissipation(line, line)
     with pytest.raises(ValueError, match="not 1"):
-        beams.masing_dissipation(line[:1], line[:1])
+        reference.masing_dissipation(line[:1], line[:1])
     with pytest.raises(ValueError, match=r"\(6,\), \(1,\)"):
-        beams.masing_loop(line, line[:1])
+        reference.masing_loop(line, line[:1])
 
 
 def test_stuck_decay_rate_with_and_without_a_bending_stiffness():
@@ -133,7 +136,7 @@ def test_stuck_decay_rate_with_and_without_a_bending_stiffness():
     classical = 2 / 3 * youngs * half_height**3
     expected = np.sqrt(2 * kappa * shear * half_height / (8 / 3 * youngs * half_height**3))
     rates = [
-        beams.stuck_decay_rate(half_height, youngs, shear, kappa, bending)
+        reference.stuck_decay_rate(half_height, youngs, shear, kappa, bending)
         for bending in (None, classical, 10 * classical)
     ]
     np.testing.assert_allclose(rates[:2], expected, rtol=1e-14)
@@ -149,7 +152,9 @@ def test_stuck_rotation_solves_its_equation(bending_over_classical):
     force = 0.7
 
     def beta(x):
-        return beams.stuck_rotation(x, force, LENGTH, half_height, youngs, shear, kappa, bending)
+        return reference.stuck_rotation(
+            x, force, LENGTH, half_height, youngs, shear, kappa, bending
+        )
 
     slope = jax.grad(beta)
     x = jnp.linspace(0, LENGTH, 13)
@@ -180,18 +185,18 @@ def test_stuck_rotation_minimises_the_discretised_energy():
     rest = jnp.zeros(cells)
     rotation = -jnp.linalg.solve(jax.hessian(energy)(rest), jax.grad(energy)(rest))
     x = jnp.linspace(0, LENGTH, cells + 1)[1:]
-    exact = beams.stuck_rotation(x, force, LENGTH, half_height, youngs, shear, kappa)
+    exact = reference.stuck_rotation(x, force, LENGTH, half_height, youngs, shear, kappa)
     np.testing.assert_allclose(rotation, exact, atol=1.2e-5 * abs(exact[-1]))
 
 
 def test_stuck_rotation_does_not_overflow():
     half_height, *material = strip(9e-5)
-    decay = beams.stuck_decay_rate(half_height, *material)
+    decay = reference.stuck_decay_rate(half_height, *material)
     assert decay * LENGTH > 1e4
     x = jnp.array([0.0, 0.5, 1.0]) * LENGTH
 
     def beta(x):
-        return beams.stuck_rotation(x, 1.0, LENGTH, half_height, *material)
+        return reference.stuck_rotation(x, 1.0, LENGTH, half_height, *material)
 
     slope = -half_height / (8 / 3 * material[0] * half_height**3)
     np.testing.assert_allclose(beta(x), [0, 0, slope / decay], rtol=1e-12)
@@ -203,7 +208,7 @@ def test_stuck_rotation_does_not_overflow():
     [("printed", 1.768, -0.0015), ("consistent", 2.693, -0.0047)],
 )
 def test_first_slip_force_fits_a_line(constants, slope, intercept):
-    force = beams.first_slip_force(FIGURE_3_11, constants=constants)
+    force = reference.first_slip_force(FIGURE_3_11, constants=constants)
     fitted = np.polyfit(FIGURE_3_11, np.asarray(force), 1)
     assert abs(fitted[0] - slope) < 0.002
     assert abs(fitted[1] - intercept) < 0.0003
@@ -211,13 +216,13 @@ def test_first_slip_force_fits_a_line(constants, slope, intercept):
 
 def test_printed_first_slip_is_the_printed_line():
     """Brink 2015, eq. 3.65, within what the curve leaves its line."""
-    force = beams.first_slip_force(FIGURE_3_11, constants="printed")
+    force = reference.first_slip_force(FIGURE_3_11, constants="printed")
     np.testing.assert_allclose(force, 1.767 * FIGURE_3_11 - 0.0013, atol=0.005)
 
 
 def test_consistent_first_slip_of_the_standard_strip():
     expected = FIGURE_3_11 / (0.3542 * np.tanh(0.4723 * LENGTH / FIGURE_3_11) + 0.0223)
-    np.testing.assert_allclose(beams.first_slip_force(FIGURE_3_11), expected, rtol=2e-4)
+    np.testing.assert_allclose(reference.first_slip_force(FIGURE_3_11), expected, rtol=2e-4)
 
 
 @pytest.mark.parametrize(("constants", "bending_share"), [("consistent", 1.0), ("printed", 1 / 16)])
@@ -253,7 +258,7 @@ def test_first_slip_force_by_a_boundary_value_solver(
         return np.max(np.abs(traction) - friction * reaction)
 
     force = brentq(margin, 1e-3, 10.0, xtol=1e-9)
-    expected = beams.first_slip_force(
+    expected = reference.first_slip_force(
         eta, length=length, friction=friction, pressure=pressure, constants=constants
     )
     np.testing.assert_allclose(expected, force, rtol=1e-6)
@@ -261,14 +266,16 @@ def test_first_slip_force_by_a_boundary_value_solver(
 
 def test_first_slip_force_names_an_unknown_choice():
     with pytest.raises(ValueError, match=r"\['consistent', 'printed'\], not 'exact'"):
-        beams.first_slip_force(0.1, constants="exact")
+        reference.first_slip_force(0.1, constants="exact")
 
 
 def test_closed_forms_differentiate():
-    grad = jax.grad(beams.first_slip_force)(0.1126)
-    difference = (beams.first_slip_force(0.1136) - beams.first_slip_force(0.1116)) / 0.002
+    grad = jax.grad(reference.first_slip_force)(0.1126)
+    difference = (reference.first_slip_force(0.1136) - reference.first_slip_force(0.1116)) / 0.002
     np.testing.assert_allclose(grad, difference, rtol=1e-5)
 
     force = jnp.linspace(0, 1.0, 11)
-    slope = jax.grad(lambda q: beams.masing_dissipation(force, bar.bar_backbone(force, EA, q)))(Q)
-    np.testing.assert_allclose(slope, -bar.cubic_law(1.0, EA, Q) / Q, rtol=1e-12)
+    slope = jax.grad(
+        lambda q: reference.masing_dissipation(force, reference.bar_backbone(force, EA, q))
+    )(Q)
+    np.testing.assert_allclose(slope, -reference.cubic_law(1.0, EA, Q) / Q, rtol=1e-12)
