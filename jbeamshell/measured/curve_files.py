@@ -11,6 +11,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.measured.columns import bare, factor_of, unit_of
 from jbeamshell.measured.containers import read_table
 from jbeamshell.measured.curves import IN_FILES, Curve
+from jbeamshell.measured.form import NUMBER
 from jbeamshell.measured.recordings import FilePath, check_words_of, labels_of
 
 CURVES = {curve.form.name: curve for curve in IN_FILES}
@@ -113,12 +114,13 @@ def _factors(
 ) -> list[float]:
     """Factors of the columns; the noise is in the unit of what it belongs to, unless it has one."""
     units = {q: given.get(q) or unit_of(title) or below[q] for q, title in titles.items()}
-    first, second = wanted
-    if bool(units[first]) != bool(units[second]):
-        without = first if units[second] else second
+    second = list(wanted)[1]
+    measured = [quantity for quantity in wanted if wanted[quantity] != NUMBER]
+    without = [quantity for quantity in measured if not units[quantity]]
+    if without and len(without) < len(measured):
         raise InputError(
-            f"{name}: column {titles[without]!r} names no unit but the other one does: write "
-            f"'{without} [{wanted[without][0]}]'"
+            f"{name}: column {titles[without[0]]!r} names no unit but the other one does: write "
+            f"'{without[0]} [{wanted[without[0]][0]}]'"
         )
     factors = {}
     for quantity, unit in units.items():

@@ -6,13 +6,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 
+NUMBER = ("dimensionless",)
+
+
 class Column(NamedTuple):
     """A column of measured numbers.
 
     Attributes
     ----------
     label : label of an axis, with symbol and unit
-    units : SI units to which a file's unit may be converted; forces are per unit width
+    units : SI units to which a file's unit may be converted, forces per unit width; `NUMBER` for
+        a pure number, whose column needs no unit
     """
 
     label: str
