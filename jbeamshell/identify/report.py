@@ -20,7 +20,7 @@ from jbeamshell.scene.toml import scene_to_toml
 
 
 class Fitted(ModelOverData, Protocol):
-    """A model over its data, with the fitted scene of every specimen by its label."""
+    """Model over its data, with the fitted scenes: the first, and all by the specimens' labels."""
 
     @property
     def scene(self) -> Scene: ...
@@ -34,11 +34,28 @@ def write_fit(
     figures: Mapping[str, Any],
     profiles: Sequence[LikelihoodProfile] = (),
 ) -> list[Path]:
-    """Write the tables, the fitted scene, the figures as JSON, and the pictures.
+    """Write tables, fitted scenes, figures and pictures of a fit.
 
-    These are a table for each form of measurement, such as overlay.csv of loops and backbones or
-    dissipation.csv; scene.toml, or scene_1.toml and so on of several
-    specimens; result.json, overlay.png and residuals.png; profiles.csv and profiles.png if asked.
+    The files are a table for each form of measurement, such as overlay.csv of loops and backbones
+    or dissipation.csv; scene.toml, or scene_1.toml and so on for several specimens; result.json,
+    overlay.png and residuals.png. With profiles there are profiles.csv and profiles.png too.
+
+    Parameters
+    ----------
+    folder : folder to write to; it is made if it is not there
+    result : fit with its data
+    figures : content of result.json
+    profiles : profile likelihoods
+
+    Returns
+    -------
+    list of Path
+        paths of the files
+
+    Raises
+    ------
+    InputError
+        if the folder cannot be made, or a file cannot be written
     """
     texts = {f"{name}.csv": text for name, text in tables(result).items()}
     scenes = list(result.scenes.values()) or [result.scene]
@@ -65,7 +82,7 @@ def write_fit(
 
 
 def tables(result: ModelOverData) -> dict[str, str]:
-    """CSV by name, for each form of measurement: labels, measured columns, the model's answers."""
+    """CSV texts by name, one for each form: labels, measured columns, answers of the model."""
     texts = {}
     for form, places in by_form(result.data):
         rows = [

@@ -61,13 +61,13 @@ class Form(NamedTuple):
         return next(name for name in self.answers if name != control)
 
 
-FORCE = Column("$F$  [force per width]", ("N/m",))
+FORCE = Column("$F$  [force/width]", ("N/m",))
 DISPLACEMENT = Column("$u(L)$  [length]", ("m",))
 POSITION = Column("$X$  [length]", ("m",))
 SQUEEZE_STRESS = Column(r"$\chi\,/\,2H$  [stress]", ("N/m^2",))
-AMPLITUDE = Column("amplitude of $F$ or $u(L)$  [force per width or length]", ("N/m", "m"))
-DISSIPATION = Column("$D$  [force]", ("J/m",))
-SECANT_STIFFNESS = Column("secant stiffness  [force per width / length]", ("N/m^2",))
+AMPLITUDE = Column("amplitude of $F$ or $u(L)$  [force/width or length]", ("N/m", "m"))
+DISSIPATION = Column("$D$, work per cycle  [force]", ("J/m",))
+SECANT_STIFFNESS = Column("secant stiffness  [force/width/length]", ("N/m^2",))
 
 LOOP = Form(
     "overlay",

@@ -1,4 +1,4 @@
-"""Measured or computed loops of force over displacement."""
+"""Loops of force over displacement, measured or computed."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
 from jbeamshell.measured.recordings import FilePath, read_recordings, recording_from_arrays
 from jbeamshell.measured.reversals import find_driver, find_turns
 
-CLOSED = 0.05  # of the range: a loop whose ends lie closer than this is taken as closed
+CLOSED = 0.05  # part of the range within which the ends of a closed loop lie
 
 
 class Loop(NamedTuple):
-    """One loop, or one pull.
+    """One loop of force over displacement, or one pull.
 
     Attributes
     ----------
-    force : (points,) per unit width
-    displacement : (points,) of the loaded end
-    label : for pictures and messages
-    noise : standard deviation of a single sample of the column that answers, estimated from the
-        scatter of repeated cycles; None if there were none
-    cycles : how many cycles this loop is the mean of
-    dropped : rows of the data that lacked a number and were left out
-    scatter : (points,) standard deviation over the cycles of the column that answers, at each
-        point; None if there were no repeated cycles
-    notes : one line on each thing that was done to the data
-    driver : "force" or "displacement", whichever drove the test; None where nobody looked
-    free_zero : whether the zero of the column that answers is unknown, as after taking away a drift
+    force : (points,) end force per unit width
+    displacement : (points,) displacement of the loaded end
+    label : name in pictures and messages
+    noise : standard deviation of a single sample of the responding column, from the scatter of
+        repeated cycles; None without repeated cycles
+    cycles : number of cycles of which this loop is the mean
+    dropped : number of rows that lacked a number and were left out
+    scatter : (points,) standard deviation over the cycles of the responding column, at each point;
+        None without repeated cycles
+    notes : one line on each change made to the data
+    driver : column that drove the test, "force" or "displacement"; None if unknown
+    free_zero : True if the zero of the responding column is unknown, as after removing a drift
     """
 
     force: NDArray[np.float64]
@@ -54,45 +54,54 @@ class Loop(NamedTuple):
 
     @property
     def closed(self) -> bool:
-        """Whether it ends where it starts: a steady loop, not a first loading."""
+        """True if the loop ends where it starts; a first loading does not."""
         columns = (self.force, self.displacement)
         return all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) for c in columns)
 
     @property
     def standard_error(self) -> float | None:
-        """Of a point of the answering column: the cycles' scatter over the root of their number.
+        """Standard error of a point of the responding column; None without repeated cycles.
 
-        None where there were no repeated cycles.
+        It is the scatter of the cycles over the root of their number.
         """
         if self.scatter is None:
             return None
         return float(np.sqrt(np.mean(self.scatter**2) / self.cycles))
 
     def centred(self) -> Loop:
-        """The loop without the zeros of its sensors.
+        """Loop without the offsets of its sensors.
 
-        What drives is shifted to the middle of its range, and the answer by its mean along the way;
-        as a model's loop need not have its mean there, a fit is told by ``free_zero`` not to mind.
+        The driving column is shifted to the middle of its range, the responding one by its mean
+        along the path. A model's loop may have another mean, so ``free_zero`` is set: a fit then
+        ignores the offset of the responding column.
 
         Raises
         ------
         InputError
-            for a loop that is not closed, whose zeros mean something
+            for a loop that is not closed: its zeros are those of the unloaded strip
         """
         if not self.closed:
-            raise InputError(f"{self.label}: is not closed: its zeros are where it started")
+            raise InputError(
+                f"{self.label}: is not closed: its zeros are where it started; leave out centre"
+            )
         driver = self.driver or find_driver(self.force, self.displacement)
         answer = "displacement" if driver == "force" else "force"
         drive, column = getattr(self, driver), getattr(self, answer)
         middle = 0.5 * float(np.max(drive) + np.min(drive))
         way = np.abs(np.diff(drive))
         mean = float(np.sum(0.5 * (column[1:] + column[:-1]) * way) / np.sum(way))
-        note = f"taken away as zeros of the sensors: {driver} {middle:.3g} and {answer} {mean:.3g}"
+        note = f"removed, zeros of the sensors: {driver} {middle:.3g} and {answer} {mean:.3g}"
         shifted = {driver: drive - middle, answer: column - mean}
         return self._replace(**shifted, notes=(*self.notes, note), free_zero=True)
 
     def thinned(self, points: int, driver: str) -> Loop:
-        """About ``points`` of the loop's points, even along the driving column; turns are kept."""
+        """Loop with fewer points, spaced evenly along the driving column; turning points are kept.
+
+        Parameters
+        ----------
+        points : number of points to keep, about
+        driver : driving column, "force" or "displacement"
+        """
         if self.force.size <= points:
             return self
         drive = getattr(self, driver)
@@ -108,7 +117,26 @@ class Loop(NamedTuple):
 
 
 def make_loop(force: ArrayLike, displacement: ArrayLike, label: str = "loop") -> Loop:
-    """A checked loop from two arrays (points,); points with NaN are dropped and counted."""
+    """Loop of two arrays, checked; points with NaN are left out and counted.
+
+    Parameters
+    ----------
+    force : (points,) end force per unit width
+    displacement : (points,) displacement of the loaded end
+    label : name in pictures and messages
+
+    Raises
+    ------
+    InputError
+        for arrays that are no columns of one length, hold too few points or an infinite one, or are
+        constant
+
+    Examples
+    --------
+    >>> phase = np.linspace(0.0, 2.0 * np.pi, 65)
+    >>> make_loop(np.cos(phase), 1e-5 * np.cos(phase - 0.2)).closed
+    True
+    """
     recording = recording_from_arrays(force, displacement, label)
     return Loop(
         recording.force,
@@ -126,17 +154,17 @@ def read_loops(
     units: Mapping[str, str] | None = None,
     decimal: str | None = None,
 ) -> list[Loop]:
-    """Loops of one file or several, as they stand there: `read_recordings` says what it reads.
+    """Loops of one file or several, as recorded; see `read_recordings` for the formats.
 
-    A recording of many noisy cycles makes one long loop; `steady_loops` makes of it one mean loop
-    per amplitude.
+    A recording of many noisy cycles makes one long loop; `steady_loops` makes one mean loop per
+    amplitude instead.
 
     Parameters
     ----------
-    paths : the file, or several
-    columns : name of a column by "force" or "displacement", where names alone do not tell
-    units : unit by the same, such as {"force": "kN"}, whatever the header says
-    decimal : "," or ".", where the numbers alone do not tell
+    paths : file, or several
+    columns : titles of the columns by "force" and "displacement", if the titles alone do not tell
+    units : units by "force" and "displacement", such as {"force": "kN"}; they override the header
+    decimal : decimal sign, "," or ".", if the numbers alone do not tell
 
     Raises
     ------
@@ -150,6 +178,6 @@ def read_loops(
 
 
 def driver_of(loops: Sequence[Loop]) -> str:
-    """Which column drove a test, "force" or "displacement", by most of its loops."""
+    """Column that drove most of the loops, "force" or "displacement"."""
     drivers = [loop.driver or find_driver(loop.force, loop.displacement) for loop in loops]
     return "displacement" if 2 * drivers.count("displacement") > len(drivers) else "force"

@@ -1,8 +1,12 @@
-"""Pictures of a history (its loop, profiles along X, contact), fits, motions and sweeps.
+"""Pictures of load paths (loop, profiles along X, contact), fits, motions and sweeps.
 
-The only package that imports matplotlib.  Every function draws into the axes it is given or into
-new ones, returns them, and neither shows them nor changes matplotlib's settings.  `style` dresses
-figures of your own alike.
+Only this package imports matplotlib. Every function draws into the axes it is given or into new
+ones and returns them; it neither shows them nor changes matplotlib's settings. `style` gives your
+own figures the same look. Pictures know no class of results: `jbeamshell.plotting.protocols` says
+which attributes they read.
+
+>>> axes = plotting.loop(jb.solve(jb.Scene()))
+>>> plotting.save(axes.figure, "loop.png")
 """
 
 from jbeamshell.plotting.contacts import contact as contact

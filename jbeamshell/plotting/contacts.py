@@ -1,4 +1,4 @@
-"""Where a strip is squeezed, touches, sticks and slips."""
+"""Pictures of the contact: where a strip is squeezed, touches, sticks, slips and lifts."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from jbeamshell.plotting.style import (
     style,
 )
 
-# Title and label of the profiles that `contact` can draw, by their names in a history.
+# Titles and labels of the profiles that `contact` can draw, by their names in a history.
 PROFILES = {
     "reaction": ("normal reaction", "$R$  [stress]"),
     "gap": ("gap under the strip", "gap  [length]"),
     "beta": ("rotation", r"$\beta$  [rad]"),
     "squeeze_stress": ("mean squeeze stress", SQUEEZE),
     "psi": ("squeeze strain", r"$\psi$  [1]"),
-    "squeeze_couple": ("squeeze couple", r"$\xi$  [couple per width]"),
+    "squeeze_couple": ("squeeze couple", r"$\xi$  [couple/width]"),
 }
 STATES = ("0.93", "#56B4E9", "#E69F00")  # lifted, touching, slipping
-AROUND = 5.0  # heights H that `contact` shows on either side of where something happens
+AROUND = 5.0  # half heights H that `contact` shows beside corners and ends of contact
 
 
 def contact(
@@ -52,27 +52,27 @@ def contact(
     xlim: tuple[float, float] | None = None,
     reference_label: str = "finite elements",
 ) -> np.ndarray:
-    """Draw how a strip is squeezed and where it lifts off, along X at chosen steps.
+    """Draw profiles of squeeze, lift and rotation along X at chosen steps.
 
     Parameters
     ----------
     history : LoadPath
-        A solved load path.
+        Solved load path, such as a `jbeamshell.History`.
     steps : sequence of int, optional
         Indices into the path. When not given: the pressed strip and the turning points of the last
-        cycle; the end of a path without one; four steps where only the pressure grows.
+        cycle; the end of a path without a cycle; four steps if only the pressure grows.
     axes : array_like of matplotlib.axes.Axes, optional
-        As many axes as there are panels; a new figure when not given.
+        One for each panel; a new figure when not given.
     reference : mapping of str to (x, values), optional
-        Curves to put beside the history's, by the name of their panel; drawn as dots.
+        Points to compare with, by the name of their panel; drawn as dots.
     panels : sequence of str, optional
-        What to draw, among "reaction", "gap", "beta", "squeeze_stress", "psi" and "squeeze_couple";
-        when not given, all that the scene has.
+        Profiles to draw, among "reaction", "gap", "beta", "squeeze_stress", "psi" and
+        "squeeze_couple"; all that the scene has when not given.
     xlim : (float, float), optional
-        Part of X to show. When not given: the surroundings of the corners of a pressure table and
-        of the ends of contact, or the whole strip if those are all over it.
+        Part of X to show. When not given: the corners of a pressure table and the ends of contact
+        with their surroundings, or the whole strip if these cover half of it.
     reference_label : str
-        What the legend calls the reference.
+        Name of the reference in the legend.
 
     Returns
     -------
@@ -82,8 +82,8 @@ def contact(
     Raises
     ------
     InputError
-        If a step lies outside the path, the scene does not have a panel, or the axes are not as
-        many as the panels.
+        If a step lies outside the path, a panel is none of the scene, or there are not as many axes
+        as panels.
 
     Notes
     -----
@@ -99,7 +99,9 @@ def contact(
     with style():
         grid = _many(len(names)) if axes is None else np.asarray(axes, dtype=object)
         if grid.size != len(names):
-            raise InputError(f"axes: {', '.join(names)} need {len(names)}, not {grid.size}")
+            raise InputError(
+                f"axes: {', '.join(names)} need {len(names)}, not {grid.size}: give one for each"
+            )
         for name, panel in zip(names, grid.ravel(), strict=True):
             title, label = PROFILES[name]
             if name == "gap" and not founded:
@@ -138,12 +140,12 @@ def contact(
 def contact_map(
     history: LoadPath, axes: Axes | None = None, *, xlim: tuple[float, float] | None = None
 ) -> Axes:
-    """Draw which part of the contact sticks, slips or is lifted along the load path.
+    """Draw the parts of the contact that stick, slip or are lifted along the load path.
 
     Parameters
     ----------
     history : LoadPath
-        A solved load path.
+        Solved load path, such as a `jbeamshell.History`.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
     xlim : (float, float), optional
@@ -161,16 +163,17 @@ def contact_map(
 
     Notes
     -----
-    After the pressure, the path goes by load steps, with ticks of the end force where it turns; the
-    pressure alone goes by its part that acts. Steps without equilibrium stay blank.
+    The horizontal axis counts load steps after the pressing, with the end force at its turning
+    points; of a growing pressure alone, it is the part that acts. Steps without equilibrium stay
+    blank.
     """
     scene = history.scene
     if scene.contact.normal == "none":
-        raise InputError("contact.normal = 'none': there is no contact to draw")
+        raise InputError("contact.normal = 'none': there is no contact to draw; take another one")
     pressing = history.pressed + 1 == history.force.size
     path = slice(None) if pressing else slice(history.pressed, None)
     driver = np.asarray(history.pressure if pressing else history.force)[path]
-    # A step's cell is what led to it.
+    # The cell of a step lies before it.
     edges = np.append(0.0, driver) if pressing else np.arange(driver.size + 1) - 0.5
     smooth = pressing or float(scene.contact.friction) == 0.0
     names = ["lifted", "touches"] if smooth else ["lifted", "sticks", "slips"]
@@ -207,7 +210,7 @@ def contact_map(
 
 
 def _many(count: int) -> np.ndarray:
-    """A new figure's axes (count,), in rows of up to three."""
+    """Axes of a new figure, (count,), in rows of up to three."""
     columns = 2 if count == 4 else min(count, 3)
     rows = -(-count // columns)
     figure, grid = plt.subplots(rows, columns, figsize=(3.8 * columns, 3.0 * rows), squeeze=False)
@@ -219,6 +222,7 @@ def _many(count: int) -> np.ndarray:
 def _checked_panels(
     history: LoadPath, panels: Sequence[str] | None, reference: Mapping[str, Any]
 ) -> list[str]:
+    """Names of the panels; raises `InputError` for one that the scene does not have."""
     fields = history.scene.model.fields
     needs = {"gap": "w", "beta": "beta"} | dict.fromkeys(
         ("squeeze_stress", "psi", "squeeze_couple"), "psi"
@@ -236,7 +240,7 @@ def _checked_panels(
 
 
 def _contact_ends(history: LoadPath) -> np.ndarray:
-    """X at which the contact ends, (steps+1,); NaN where it does not end before L, or failed."""
+    """Ends of contact X, (steps+1,); NaN without equilibrium, or where it does not end before L."""
     if "w" not in history.scene.model.fields or history.scene.contact.normal == "none":
         return np.full(history.force.shape, np.nan)
     ends, failed = np.asarray(history.contact_end), np.isnan(np.asarray(history.force))
@@ -244,7 +248,7 @@ def _contact_ends(history: LoadPath) -> np.ndarray:
 
 
 def _surroundings(history: LoadPath, ends: np.ndarray) -> tuple[float, float]:
-    """Part of X where something happens, or all of it if that is more than half."""
+    """Part of X around corners of the pressure and ends of contact; all of X if more than half."""
     contact, length = history.scene.contact, float(history.x[-1])
     tables = [np.asarray(p)[:, 0] for p in (contact.pressure, contact.bottom_pressure) if p.ndim]
     places = np.concatenate([*tables, ends])
@@ -257,7 +261,7 @@ def _surroundings(history: LoadPath, ends: np.ndarray) -> tuple[float, float]:
 
 
 def _pressure_corners(history: LoadPath, part: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Corners of a part of the pressure on the top face, from end to end."""
+    """Corners of the pressure on the top face, times the part that acts."""
     table, length = np.asarray(history.scene.contact.pressure), float(history.x[-1])
     if table.ndim == 0:
         return np.array([0.0, length]), np.full(2, float(part) * table)
@@ -266,7 +270,7 @@ def _pressure_corners(history: LoadPath, part: Any) -> tuple[np.ndarray, np.ndar
 
 
 def _size(history: LoadPath, name: str) -> float:
-    """What a profile is large or small against."""
+    """Size that a profile typically has, so that rounding errors are not magnified."""
     strip = history.scene.strip
     stress = float(history.scene.contact.largest_pressure)
     strain, half = stress / float(strip.plane_modulus), float(strip.half_height)
@@ -275,7 +279,7 @@ def _size(history: LoadPath, name: str) -> float:
 
 
 def _show(panel: Axes, lines: Sequence[Line2D], low: float, high: float, size: float) -> None:
-    """Show a part of X, as high as the lines are there, but no rounding errors."""
+    """Limit the panel to a part of X and to the lines' range there, but not to rounding errors."""
     inside, seen = np.linspace(low, high, 400), [np.zeros(0)]
     for line in lines:
         x, y = (np.asarray(a) for a in (line.get_xdata(), line.get_ydata()))

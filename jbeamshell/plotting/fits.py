@@ -1,4 +1,4 @@
-"""Pictures of a fit: the model over its data, and what it leaves unexplained."""
+"""Pictures of a fit: model over data, what the model leaves unexplained, likelihoods."""
 
 from __future__ import annotations
 
@@ -102,17 +102,22 @@ def _panels(fit: ModelOverData, axes: Any) -> list[tuple[Form, list[int], Axes]]
 
 
 def likelihoods(profiles: Sequence[LikelihoodProfile], axes: Any = None) -> list[Axes]:
-    """Draw profile likelihoods: what it costs the data to hold a parameter elsewhere.
+    """Draw profile likelihoods: the rise of the misfit while a parameter is held at other values.
 
     Parameters
     ----------
-    profiles : of fitted parameters
-    axes : one for each; new ones when not given
+    profiles : profiles of fitted parameters, as `jbeamshell.identify.profile` gives them
+    axes : axes, one for each profile; new ones when not given
+
+    Returns
+    -------
+    list of matplotlib.axes.Axes
+        one for each profile; dotted lines mark the ends of its interval
     """
     with style():
         panels = _checked_axes(len(profiles), axes)
         for profile, panel in zip(profiles, panels, strict=True):
-            # The root of the rise is about straight to either side of the minimum.
+            # The root of the rise is nearly straight on either side of the minimum.
             side = np.sign(profile.values - profile.values[np.argmin(profile.rises)])
             fine = np.linspace(profile.values[0], profile.values[-1], 200)
             root = np.interp(fine, profile.values, side * np.sqrt(profile.rises))
@@ -122,16 +127,17 @@ def likelihoods(profiles: Sequence[LikelihoodProfile], axes: Any = None) -> list
                 if np.isfinite(end):
                     panel.axvline(end, color=PALETTE[1], linestyle=":", linewidth=1.2)
             low, high = profile.interval
-            panel.set(xlabel=profile.name, ylabel="rise of the misfit, in units of the noise  [1]")
+            panel.set(xlabel=profile.name, ylabel="rise of the misfit, over the noise squared  [1]")
             panel.set_title(f"{100.0 * profile.level:g} %: {low:.4g} to {high:.4g}")
     return panels
 
 
 def _checked_axes(count: int, axes: Any) -> list[Axes]:
+    """Axes as given if there are as many, or new ones."""
     if axes is None:
         size = (5.2 * count, 4.2)
         return list(plt.subplots(1, count, figsize=size, squeeze=False)[1][0])
     drawn = list(np.ravel(axes))
     if len(drawn) != count:
-        raise InputError(f"axes: there are {count} to draw, not {len(drawn)}")
+        raise InputError(f"axes: there are {count} to draw, not {len(drawn)}: give one for each")
     return drawn

@@ -1,4 +1,4 @@
-"""Motions: displacement, energies, frequency and damping over amplitude, spectrogram."""
+"""Pictures of motions: displacement, energies, frequency and damping, spectrogram."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ from jbeamshell.plotting.protocols import ModalProperties, RingDownComparison, V
 from jbeamshell.plotting.style import DATA, DISPLACEMENT, PALETTE, single, style
 
 TIME, AMPLITUDE = "$t$  [time]", "amplitude of $u(L)$  [length]"
+FREQUENCY, DAMPING = "frequency  [1/time]", r"damping ratio $\zeta$  [1]"
 LEDGER = {
     "kinetic": "kinetic",
     "stored": "stored",
     "friction_work": "friction",
     "damping_work": "damping",
 }
-WINDOWS = 12  # of a spectrogram, side by side
-FLOOR = -70.0  # dB
-HARMONICS = 8.5  # of the main frequency, shown in a spectrogram
+WINDOWS = 12  # windows of a spectrogram, side by side
+FLOOR = -70.0  # dB, the darkest shade of a spectrogram
+HARMONICS = 8.5  # multiples of the main frequency up to which a spectrogram goes
 
 
 def vibration(motion: Vibration, axes: Axes | None = None) -> Axes:
@@ -37,12 +38,12 @@ def vibration(motion: Vibration, axes: Axes | None = None) -> Axes:
 
 
 def energies(motion: Vibration, axes: Axes | None = None) -> Axes:
-    """Draw the energy ledger over time, stacked: what moves, what is stored, what is lost.
+    """Draw kinetic energy, stored energy and the losses over time, one on top of the other.
 
     Notes
     -----
-    Stored energy is counted from its least value.  The dashed line is what there was at the start
-    and what has been given since.
+    Stored energy is counted from its least value. The dashed line is the energy at the start plus
+    the work done from outside since.
     """
     with style():
         axes = single(axes)
@@ -60,8 +61,8 @@ def energies(motion: Vibration, axes: Axes | None = None) -> Axes:
             linewidth=0.0,
         )
         whole = parts["kinetic"][0] + parts["stored"][0] + np.asarray(motion.external_work)
-        axes.plot(time, whole, color=DATA, linestyle="--", linewidth=1.0, label="given")
-        axes.set(xlabel=TIME, ylabel="energy per width")
+        axes.plot(time, whole, color=DATA, linestyle="--", linewidth=1.0, label="supplied")
+        axes.set(xlabel=TIME, ylabel="energy  [force]")
         axes.legend(loc="center right", frameon=True, framealpha=0.9)
     return axes
 
@@ -69,12 +70,12 @@ def energies(motion: Vibration, axes: Axes | None = None) -> Axes:
 def ring_down(
     found: ModalProperties, *, label: str = "ring-down", axes: Sequence[Axes] | None = None
 ) -> Any:
-    """Draw frequency and damping over amplitude, two axes.
+    """Draw frequency and damping over amplitude on two axes.
 
     Parameters
     ----------
-    found : what `jbeamshell.dynamics.ring_down` gives
-    label : for the legend
+    found : result of `jbeamshell.dynamics.ring_down`
+    label : words of the legend
     axes : two axes; a new figure when not given
     """
     return _pair((found.amplitude, found.frequency, found.damping), axes, label, "o", DATA)
@@ -87,13 +88,13 @@ def modal_curve(
     label: str = "quasi-static",
     axes: Sequence[Axes] | None = None,
 ) -> Any:
-    """Draw frequency and damping over amplitude, two axes.
+    """Draw frequency and damping over amplitude on two axes.
 
     Parameters
     ----------
-    curve : what `jbeamshell.dynamics.modal_curve` or `harmonic_balance` gives
-    mass : whose root turns modal displacements into those drawn
-    label : for the legend
+    curve : result of `jbeamshell.dynamics.modal_curve` or `harmonic_balance`
+    mass : mass whose root divides the modal displacements, to give those drawn
+    label : words of the legend
     axes : two axes; a new figure when not given
     """
     amplitude = np.asarray(curve.amplitude) / np.sqrt(mass)
@@ -102,7 +103,7 @@ def modal_curve(
 
 
 def spectrogram(motion: Vibration, axes: Axes | None = None) -> Axes:
-    """Draw the velocity's spectrum over time, in dB of its largest value."""
+    """Draw the spectrum of the velocity over time, in dB of its largest value."""
     time, velocity = np.asarray(motion.time), np.asarray(motion.velocity)
     length = max(16, 2 * time.size // WINDOWS)
     frequency, at, power = scipy.signal.spectrogram(
@@ -118,16 +119,16 @@ def spectrogram(motion: Vibration, axes: Axes | None = None) -> Axes:
         shown = axes.pcolormesh(
             at, frequency, level, vmin=FLOOR, vmax=0.0, cmap="magma", shading="auto"
         )
-        axes.figure.colorbar(shown, ax=axes, label="dB")
+        axes.figure.colorbar(shown, ax=axes, label="power of the velocity  [dB]")
         axes.grid(False)
         main = frequency[np.argmax(power.sum(axis=1))]
-        axes.set(xlabel=TIME, ylabel="frequency  [1/time]")
+        axes.set(xlabel=TIME, ylabel=FREQUENCY)
         axes.set_ylim(0.0, min(HARMONICS * main, frequency[-1]))
     return axes
 
 
 def ring_down_sheet(study: RingDownComparison) -> Figure:
-    """Draw a ring-down beside its prediction: motion, energies, frequency and damping."""
+    """Draw motion, energies, frequency and damping of a ring-down, beside the prediction."""
     with style():
         figure, axes = plt.subplots(2, 2, figsize=(10.0, 7.0))
         vibration(study.motion, axes[0, 0])
@@ -148,6 +149,7 @@ def ring_down_sheet(study: RingDownComparison) -> Figure:
 def _pair(
     columns: tuple[Any, Any, Any], axes: Sequence[Axes] | None, label: str, marker: str, colour: str
 ) -> Any:
+    """Draw frequency and damping over amplitude on two axes."""
     amplitude, frequency, damping = map(np.asarray, columns)
     line: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 3.0, "label": label}
     line["linestyle"] = "" if marker else "-"
@@ -156,10 +158,10 @@ def _pair(
         pair[0].plot(amplitude, frequency, **line)
         shown = damping > 0.0
         pair[1].plot(amplitude[shown], damping[shown], **line)
-        pair[0].set(xlabel=AMPLITUDE, ylabel="frequency  [1/time]", xscale="log")
-        pair[1].set(xlabel=AMPLITUDE, ylabel=r"damping ratio $\zeta$", xscale="log", yscale="log")
+        pair[0].set(xlabel=AMPLITUDE, ylabel=FREQUENCY, xscale="log")
+        pair[1].set(xlabel=AMPLITUDE, ylabel=DAMPING, xscale="log", yscale="log")
         pair[1].legend(loc="upper left")
-        for below in pair:  # less than a decade, often: 1, 2 and 5 of each
+        for below in pair:  # often less than a decade: marks at 1, 2 and 5
             below.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             below.xaxis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(99, 99)))
             below.xaxis.set_minor_formatter(NullFormatter())

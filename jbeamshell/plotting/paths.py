@@ -1,4 +1,4 @@
-"""The loop of a history, and its profiles along X."""
+"""Pictures of a load path: its loop, and its profiles along X."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from jbeamshell.plotting.style import (
 
 
 def loop(history: LoadPath, axes: Axes | None = None) -> Axes:
-    """Draw end force over end displacement: the whole path, its last closed cycle emphasised.
+    """Draw end force over end displacement, with the last closed cycle emphasised.
 
     Parameters
     ----------
     history : LoadPath
-        A solved load path.
+        Solved load path, such as a `jbeamshell.History`.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
 
@@ -67,10 +67,10 @@ def profiles(
     Parameters
     ----------
     history : LoadPath
-        A solved load path.
+        Solved load path, such as a `jbeamshell.History`.
     steps : sequence of int, optional
-        Indices into the path, 0 being the strip before the load and -1 its end. When not given: the
-        zero crossings and turning points of the last cycle, or four steps of a path without one.
+        Indices into the path: 0 is its first step, -1 its end. When not given: the zero crossings
+        and turning points of the last cycle, or four steps of a path without a cycle.
     axes : array_like of matplotlib.axes.Axes, optional
         Four axes, for slip, rotation, traction and reaction; a new figure when not given.
 
@@ -86,9 +86,8 @@ def profiles(
 
     Notes
     -----
-    Traction and reaction are shown over mu F_N and F_N; a pressure that varies along X counts with
-    its largest value. Without friction the traction has no such measure and is shown as it is. Dots
-    mark the contact points that slipped in the step.
+    Traction is divided by mu F_N and the reaction by F_N, the largest pressure along X. Without
+    friction the traction itself is shown. Dots mark the nodes that slipped in the step.
     """
     chosen = checked_steps(history, default_steps(history) if steps is None else steps)
     contact = history.scene.contact
@@ -131,9 +130,10 @@ def profiles(
 
 
 def _four(axes: ArrayLike | None) -> np.ndarray:
+    """Four axes, new ones unless given."""
     if axes is None:
         return plt.subplots(2, 2, figsize=(9.0, 6.0), sharex=True)[1]
     grid = np.asarray(axes, dtype=object)
     if grid.size != 4:
-        raise InputError(f"axes: profiles need four, not {grid.size}")
+        raise InputError(f"axes: profiles need four, not {grid.size}: give four")
     return grid

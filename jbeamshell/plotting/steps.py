@@ -1,4 +1,4 @@
-"""Steps of a history that are worth drawing, and what they are called."""
+"""Steps of a load path that pictures show unless told otherwise, and their labels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jbeamshell.plotting.protocols import LoadPath
 
 
 def checked_steps(history: LoadPath, steps: Sequence[int]) -> list[int]:
-    """Indices into the path from its start; raises `InputError` for one that lies outside."""
+    """Indices counted from the start of the path; raises `InputError` for one that lies outside."""
     count = history.force.shape[0]
     for step in steps:
         if not -count <= step < count:
@@ -21,7 +21,7 @@ def checked_steps(history: LoadPath, steps: Sequence[int]) -> list[int]:
 
 
 def default_steps(history: LoadPath) -> list[int]:
-    """Zero crossings and turns of the last cycle, or steps spread over a path without one."""
+    """Zero crossings and turning points of the last cycle; without one, turns or four steps."""
     force, pressed = np.asarray(history.force), history.pressed
     if not history.cycles:
         if pressed + 1 == force.size:
@@ -38,7 +38,7 @@ def default_steps(history: LoadPath) -> list[int]:
 
 
 def default_contact_steps(history: LoadPath) -> list[int]:
-    """The pressed strip and the last cycle's turns; the end of a path without one."""
+    """Pressed strip and turning points of the last cycle; without one, the end of the path."""
     if history.cycles:
         return [history.pressed, *history.cycles[-1][1:]]
     last = history.force.size - 1
@@ -46,13 +46,13 @@ def default_contact_steps(history: LoadPath) -> list[int]:
 
 
 def _four_steps(start: int, stop: int) -> list[int]:
-    """Up to four steps after the start, the last one being the stop."""
+    """Up to four steps after the start; the last one is the stop."""
     steps = np.linspace(start, stop, 5)[1:].round().astype(int)
     return sorted(set(np.maximum(steps, start + 1).tolist()))
 
 
 def load_label(history: LoadPath, step: int) -> str:
-    """The load of a step, and at a zero crossing which way it was going."""
+    """Label of a step: its load, and at a zero crossing whether the load rises or falls."""
     force, part = float(history.force[step]), float(history.pressure[step])
     if history.pressed + 1 == history.force.size:
         return f"{100.0 * part:.3g} % of $F_N$"

@@ -1,4 +1,4 @@
-"""How pictures look, and how they are saved."""
+"""Style of all pictures, and how they are saved."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ STYLE: dict[Any, Any] = {
     "ytick.color": "0.3",
     "ytick.labelsize": 9,
 }
-# Okabe and Ito's palette, told apart by colour-blind readers too.
+# Palette of Okabe and Ito, told apart by colour-blind readers too.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DATA = "0.15"
 FAINT = "0.65"
@@ -59,7 +59,11 @@ SQUEEZE = form.SQUEEZE_STRESS.label
 
 @contextlib.contextmanager
 def style() -> Iterator[None]:
-    """Settings `STYLE` for the figures made in a ``with`` block."""
+    """Use the settings `STYLE` for the figures made in a ``with`` block.
+
+    >>> with plotting.style():
+    ...     figure, axes = plt.subplots()
+    """
     # Not plt.rc_context: it would also restore what a notebook sets when it makes its first figure.
     before = {key: plt.rcParams[key] for key in STYLE}
     plt.rcParams.update(STYLE)
@@ -75,7 +79,7 @@ def colours(count: int) -> list[Any]:
     Parameters
     ----------
     count : int
-        Number of curves.
+        Number of curves, at least 0.
 
     Returns
     -------
@@ -93,7 +97,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     Parameters
     ----------
     figure : matplotlib.figure.Figure
-        The figure; of axes it is ``axes.figure``.
+        Figure to write; that of axes is ``axes.figure``.
     path : str or path
         File to write; its suffix (.png, .pdf, .svg, ...) chooses the format.
 
@@ -111,10 +115,10 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
 
 
 def single(axes: Axes | None) -> Axes:
-    """The axes, or new ones."""
+    """Axes as given, or new ones."""
     return plt.subplots(figsize=(5.6, 4.0))[1] if axes is None else axes
 
 
 def close(figure: Figure) -> None:
-    """Let go of a figure that is saved; matplotlib keeps it otherwise."""
+    """Close a figure that is saved, which matplotlib would keep in memory otherwise."""
     plt.close(figure)

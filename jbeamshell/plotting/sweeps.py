@@ -1,4 +1,7 @@
-"""Pictures of a sweep: a figure along one key for values of another, and the master curve."""
+"""Pictures of a sweep: a figure over one key for values of another, and the master curve.
+
+A lane is one strip of a sweep: one value of each key.
+"""
 
 from __future__ import annotations
 
@@ -49,9 +52,9 @@ FIGURES = {
     "secant_stiffness": "secant stiffness  [force per width / length]",
     "loss_factor": "loss factor  [1]",
 }
-WIDE = 20.0  # last value over first from which on an axis is logarithmic
-NAMED = 10  # curves at the most that the legend names
-FLOOR = 1e-6  # of the largest value: what a logarithmic axis still shows
+WIDE = 20.0  # ratio of largest to smallest value above which an axis is logarithmic
+NAMED = 10  # most curves that the legend names
+FLOOR = 1e-6  # part of the largest value at which a logarithmic axis ends
 
 
 def sweep(
@@ -62,26 +65,33 @@ def sweep(
     along: str | None = None,
     per: str | None = None,
 ) -> Axes:
-    """Draw a figure along one key, a curve for each value of another.
+    """Draw a figure over one key, with a curve for each value of another.
+
+    Further keys stay at their middle value. The lanes of a paired sweep are drawn as dots. Dashed
+    is the bar's cubic law, if one holds for all curves.
 
     Parameters
     ----------
-    result : of `jbeamshell.sweep`
+    result : result of `jbeamshell.sweep`
     axes : where to draw; new ones when not given
-    figure : one of the result's
-    along : key along the axis; the amplitude, or else the first
-    per : key of which every value has its curve; the first of the others.  Further keys stay at
-        their middle value; of a paired sweep all lanes are drawn, as dots
+    figure : name of one of the result's figures
+    along : key along the axis; the amplitude, or else the first key, when not given
+    per : key with a curve for each of its values; the first of the others when not given
 
     Returns
     -------
     matplotlib.axes.Axes
-        the axes drawn into; dashed is the bar's cubic law, where one holds for all curves
+        the axes drawn into
 
     Raises
     ------
     InputError
         if the result has no such figure or key
+
+    Examples
+    --------
+    >>> axes = {"load.amplitude": np.linspace(0.2, 1.6, 8), "strip.height_ratio": [0.05, 0.1, 0.2]}
+    >>> plotting.sweep(jb.sweep(jb.Scene(), axes), figure="dissipation_ratio")
     """
     along, per = _keys(result, along, per)
     values = result[figure]
@@ -113,18 +123,18 @@ def sweep(
 def master_curve(
     result: SweptFigures, axes: Axes | None = None, *, figure: str = "dissipation_ratio"
 ) -> Axes:
-    """Draw the dissipation over the bar's against A/eta: strips of all heights on one curve.
+    """Draw the dissipation over the bar's against A/eta, which puts all heights on one curve.
 
     Parameters
     ----------
-    result : of `jbeamshell.sweep`, under force control
+    result : result of `jbeamshell.sweep`, under force control
     axes : where to draw; new ones when not given
-    figure : one of the result's that is a pure number
+    figure : name of one of the result's figures that is a pure number
 
     Returns
     -------
     matplotlib.axes.Axes
-        the axes drawn into: a dot for each lane that converged, in the colour of its eta
+        the axes drawn into: a dot for each lane that converged, coloured by its eta
 
     Raises
     ------
@@ -135,7 +145,8 @@ def master_curve(
     eta = np.broadcast_to(result.lanes.height_ratio, result.shape)
     good = np.isfinite(x) & np.isfinite(y)
     if not np.any(good):
-        raise InputError("sweep: has no lane with a force, friction and an answer to draw")
+        fix = "sweep a scene with friction under force control"
+        raise InputError(f"sweep: has no lane with a force, friction and a finite figure: {fix}")
     with style():
         axes = single(axes)
         key = "strip.height_ratio" if np.ptp(eta) > 0.0 else None
@@ -150,16 +161,16 @@ def master_curve(
 
 
 def sweep_sheet(result: SweptFigures) -> Figure:
-    """A new sheet of a sweep: its first figure and, where there is one, the master curve.
+    """Draw a sheet of a sweep: its first figure and, if there is one, the master curve.
 
     Parameters
     ----------
-    result : of `jbeamshell.sweep`
+    result : result of `jbeamshell.sweep`
 
     Returns
     -------
     matplotlib.figure.Figure
-        the figure, to be saved and closed
+        the sheet, to be saved with `save` and closed with `close`
     """
     ratio, scaled = "dissipation_ratio", result.lanes.amplitude_over_height
     both = ratio in result.values and bool(np.any(np.isfinite(scaled + result.values[ratio])))
@@ -174,6 +185,7 @@ def sweep_sheet(result: SweptFigures) -> Figure:
 
 
 def _keys(result: SweptFigures, along: str | None, per: str | None) -> tuple[str, str | None]:
+    """Key along the axis and key of the curves, as given or chosen."""
     keys = list(result.axes)
     for name, key in (("along", along), ("per", per)):
         if key is not None and key not in keys:
@@ -182,7 +194,7 @@ def _keys(result: SweptFigures, along: str | None, per: str | None) -> tuple[str
         first = [key for key in ("load.amplitude", *keys) if key in keys and key != per]
         along = first[0] if first else keys[0]
     if along == per:
-        raise InputError(f"per = {per!r}: is along the axis already")
+        raise InputError(f"per = {per!r}: is along the axis already: choose another key")
     others = [key for key in keys if key != along]
     return along, others[0] if per is None and others else per
 
@@ -190,7 +202,7 @@ def _keys(result: SweptFigures, along: str | None, per: str | None) -> tuple[str
 def _plane(
     result: SweptFigures, values: np.ndarray, along: str, per: str | None
 ) -> tuple[np.ndarray, str]:
-    """Rows of ``per`` along ``along``, the other keys at their middle value; and what that is."""
+    """Values (per, along) at the middle values of the other keys, and a text that names these."""
     kept, rest = [], []
     for key, numbers in result.axes.items():
         if key in (along, per):
@@ -204,7 +216,7 @@ def _plane(
 
 
 def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, hue: np.ndarray, name: str | None) -> None:
-    """Dots in colours of a third number, explained by a bar."""
+    """Draw dots coloured by a third number, with a colour bar."""
     if name is None:
         axes.plot(x, y, linestyle="", marker="o", markersize=3, color=PALETTE[0])
         return
@@ -223,6 +235,7 @@ def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, hue: np.ndarray, name: str |
 
 
 def _cubic_law(result: SweptFigures, axes: Axes, figure: str, along: str) -> None:
+    """Draw the bar's cubic law if it is the same for all curves."""
     lanes = result.lanes
     friction = lanes.gross_slip / lanes.value("strip.length")
     alike = all(np.ndim(number) == 0 for number in (lanes.stiffness, friction))
@@ -236,6 +249,7 @@ def _cubic_law(result: SweptFigures, axes: Axes, figure: str, along: str) -> Non
 
 
 def _scales(axes: Axes, x: np.ndarray, values: np.ndarray) -> None:
+    """Make axes with a wide range of values logarithmic."""
     if x.min() > 0.0 and x.max() > WIDE * x.min():
         axes.set_xscale("log")
     known = values[np.isfinite(values)]
@@ -246,10 +260,12 @@ def _scales(axes: Axes, x: np.ndarray, values: np.ndarray) -> None:
 
 
 def _symbol(key: str | None) -> str:
+    """Symbol of a key, or its words."""
     return SYMBOLS.get(key or "", (key or "").partition(".")[2].replace("_", " "))
 
 
 def _label(key: str, result: SweptFigures) -> str:
+    """Label of an axis: symbol and unit of a key."""
     unit = UNITS.get(key)
     if key == "load.amplitude" and result.scene.load.control == "displacement":
         unit = "length"
