@@ -26,7 +26,7 @@ from jbeamshell.measured.curves import Measurement, noise_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.recordings import as_column
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.scene.parts import CONTROLS
+from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.scene import Scene
 
 

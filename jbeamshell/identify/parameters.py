@@ -17,16 +17,9 @@ from scipy.special import expit, logit
 
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
-from jbeamshell.scene.keys import NUMBERS, check_key
+from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
 from jbeamshell.scene.scene import Scene
 
-# Open intervals in which parameters live; all others are positive.
-LIMITS = {
-    "strip.deviation": (-np.inf, np.inf),
-    "strip.curvature": (-np.inf, np.inf),
-    "strip.poisson_ratio": (-1.0, 0.5),
-    "contact.smoothing": (1.0, np.inf),
-}
 SCALES = ("log", "linear")
 FARTHEST = 40.0  # in the search space: exp of more than this says nothing
 INSET = 1e-9  # of a box: the model is run inside its open bounds only
@@ -41,10 +34,9 @@ class Parameter:
     ----------
     key : dotted key, such as "contact.friction"
     start : where the search starts; None is the scene's own value
-    low, high : bounds, both excluded; None is where the parameter makes sense (positive; nu between
-        -1 and 0.5; the smoothing above 1; deviation and curvature of either sign)
-    scale : "log" for what is known by its order of magnitude, "linear"; None is "log" for what must
-        be positive, else "linear"
+    low, high : bounds, both excluded; None is the bound in the table of keys
+    scale : "log" for a number known by its order of magnitude, or "linear"; None is the scale in
+        the table of keys
     prior : mean and standard deviation of what is known beforehand, in the parameter's own units
     each : whether every specimen has a value of its own; else all share one
 
@@ -75,7 +67,7 @@ class Parameter:
         known = isinstance(self.scale, str) and self.scale in SCALES
         self._require("scale", self.scale, self.scale is None or known, fix)
         low, high = self.bounds
-        least, most = LIMITS.get(self.key, (0.0, np.inf))
+        least, most = TABLE[self.key].low, TABLE[self.key].high
         fix = f"the parameter lives between {least:g} and {most:g}: give a bound in there"
         self._require("low", self.low, least <= low < most, fix)
         self._require("high", self.high, least < high <= most, fix)
@@ -86,7 +78,7 @@ class Parameter:
     @property
     def bounds(self) -> tuple[float, float]:
         """The open interval in which to search."""
-        least, most = LIMITS.get(self.key, (0.0, np.inf))
+        least, most = TABLE[self.key].low, TABLE[self.key].high
         low = least if self.low is None else float(self.low)
         return low, most if self.high is None else float(self.high)
 
@@ -100,8 +92,8 @@ class Parameter:
         low, high = self.bounds
         fix = f"must lie between low = {low:g} and high = {high:g}, both excluded: move one"
         self._require("start", start, low < start < high, fix)
-        log = low >= 0.0 and self.key not in LIMITS if self.scale is None else self.scale == "log"
-        return Bijection(start, low, high, log)
+        scale = TABLE[self.key].scale if self.scale is None else self.scale
+        return Bijection(start, low, high, scale == "log")
 
     def _check_prior(self) -> None:
         if self.prior is None:
@@ -315,7 +307,8 @@ def _start(scene: Scene, key: str) -> float:
         raise InputError(f"free {key!r}: is a table; only a single number can be fitted")
     if not np.isfinite(start):
         raise InputError(f"free {key!r}: is 'sharp'; give it a number to start from, such as 16")
-    if float(start) == 0.0 and key != "strip.poisson_ratio":
+    spread = -np.inf < TABLE[key].low < 0.0  # finite bounds around 0 give the search its scale
+    if float(start) == 0.0 and not spread:
         raise InputError(f"free {key!r}: is 0; give it another number to start from")
     return float(start)
 

@@ -43,7 +43,7 @@ from jbeamshell.measured.recordings import Recording, read_recordings
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import DRIFTS, steady_loops
 from jbeamshell.scene import library
-from jbeamshell.scene.parts import CONTROLS
+from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.toml import overridden, scene_from_values
 
 KINDS = ("loop", "backbone", *CURVES)

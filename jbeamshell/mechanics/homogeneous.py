@@ -93,6 +93,16 @@ def shear_modulus(plane_modulus: Array, poisson_ratio: Array, plane: str) -> Arr
     return 0.5 * plane_modulus / (1.0 + poisson_ratio)
 
 
+def youngs_modulus(plane_modulus: Any, poisson_ratio: Any, plane: str) -> Any:
+    """Young's modulus E from the plane modulus E' and nu, stress; any shapes that broadcast."""
+    return plane_modulus if plane == "stress" else plane_modulus * (1.0 - poisson_ratio**2)
+
+
+def plane_modulus(youngs_modulus: Any, poisson_ratio: Any, plane: str) -> Any:
+    """Plane modulus E' from Young's modulus E and nu, stress; inverse of `youngs_modulus`."""
+    return youngs_modulus if plane == "stress" else youngs_modulus / (1.0 - poisson_ratio**2)
+
+
 def plane_stiffness(plane_modulus: Array, poisson_ratio: Array, plane: str) -> tuple[Array, Array]:
     """Nu' and C11 = E'/(1-nu'^2), stress: sigma_x = C11 (eps_x + nu' eps_y)."""
     nu = poisson_ratio

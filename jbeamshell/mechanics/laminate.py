@@ -35,17 +35,13 @@ Timoshenko, S. (1925). Analysis of bi-metal thermostats. J. Opt. Soc. Am. 11, 23
 
 from __future__ import annotations
 
-from typing import Any
-
 import equinox as eqx
-import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES, shear_coefficient
+from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES, plane_modulus, shear_coefficient
 from jbeamshell.mechanics.kinematics import Strains
 
 
@@ -68,7 +64,7 @@ class Laminate(eqx.Module):
     Raises
     ------
     InputError
-        If `plane` or `constants` is not one of the choices; `check_layers` looks at the layers.
+        If `plane` or `constants` is not one of the choices.
     """
 
     layers: Array = eqx.field(converter=jnp.asarray)
@@ -157,10 +153,9 @@ class Laminate(eqx.Module):
     @property
     def _in_plane(self) -> tuple[Array, Array]:
         """Eb and nb of every layer: sigma_x = Eb eps_x and eps_y = -nb eps_x when sigma_y = 0."""
-        modulus, nu = self.layers[:, 1], self.layers[:, 2]
-        if self.plane == "stress":
-            return modulus, nu
-        return modulus / (1.0 - nu**2), nu / (1.0 - nu)
+        nu = self.layers[:, 2]
+        modulus = plane_modulus(self.layers[:, 1], nu, self.plane)
+        return modulus, nu if self.plane == "stress" else nu / (1.0 - nu)
 
     @property
     def _shear_moduli(self) -> Array:
@@ -198,71 +193,3 @@ class Laminate(eqx.Module):
         if self.constants == "printed":
             first, second = 0.0, 24.0 * second
         return 0.5 * zeroth * mean**2 + first * mean * squeeze + 0.5 * second * squeeze**2
-
-
-def check_layers(layers: Any, height: ArrayLike, plane: str) -> None:
-    """Refuse layers that make no section of the height 2H; traced values are left unchecked.
-
-    Parameters
-    ----------
-    layers : array_like, (n, 3)
-        Rows from the bottom to the top: thickness (length), E (stress), nu.
-    height : array_like, scalar
-        2H, length.
-    plane : str
-        "strain" or "stress".
-
-    Raises
-    ------
-    InputError
-        If the layers are no table of such rows, if a thickness or an E is not a positive number,
-        if a nu is out of its range (-1 < nu < 0.5 in plane strain, -1 < nu <= 0.5 in plane
-        stress), or if the thicknesses miss the height by more than 1e-6 of it.
-    """
-    if _traced(layers):
-        return
-    table = _table(layers)
-    for place, row in enumerate(table.tolist(), start=1):
-        fix = _fault(row, plane)
-        if fix:
-            raise InputError(f"strip.layers = {row} (row {place} from the bottom): {fix}")
-    if _traced(height):
-        return
-    total, whole = float(table[:, 0].sum()), float(np.asarray(height))
-    if not abs(total - whole) <= 1e-6 * whole:
-        raise InputError(
-            f"strip.layers = {table.tolist()}: the thicknesses add up to {total:.9g}, but the "
-            f"height 2H is {whole:.9g}; make them equal"
-        )
-
-
-def _traced(value: Any) -> bool:
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value))
-
-
-def _table(layers: Any) -> np.ndarray:
-    """The layers in double precision, refused unless they are rows of three numbers."""
-    try:
-        table = np.asarray(layers)
-    except (ValueError, OverflowError):  # rows of different length
-        table = np.empty(0)
-    shaped = table.ndim == 2 and table.shape[0] > 0 and table.shape[1] == 3
-    if not shaped or table.dtype.kind not in "fiu":
-        shown = layers.tolist() if isinstance(layers, jax.Array | np.ndarray) else layers
-        raise InputError(
-            f"strip.layers = {shown!r}: give rows [thickness, E, nu] from the bottom to the top"
-        )
-    return table.astype(np.float64)
-
-
-def _fault(row: list[float], plane: str) -> str:
-    """What is wrong with a layer, in words; nothing if it can be used."""
-    thickness, modulus, nu = row
-    for name, value in (("thickness", thickness), ("E", modulus)):
-        if not 0.0 < value < np.inf:
-            return f"the {name} must be a positive number, not {value!r}"
-    if plane == "strain" and nu == 0.5:
-        return "nu = 0.5 is incompressible: C11 is infinite; give 0.499 or choose plane stress"
-    if not -1.0 < nu <= 0.5:
-        return f"nu must lie between -1 and 0.5, not {nu!r}"
-    return ""

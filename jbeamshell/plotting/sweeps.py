@@ -19,37 +19,12 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.plotting.protocols import SweptFigures
 from jbeamshell.plotting.style import DATA, PALETTE, colours, single, style
+from jbeamshell.scene.keys import LENGTHS, TABLE
 
-SYMBOLS = {
-    "load.amplitude": "$A$",
-    "strip.height_ratio": r"$\eta$",
-    "strip.half_height": "$H$",
-    "strip.length": "$L$",
-    "strip.poisson_ratio": r"$\nu$",
-    "strip.kappa_s": r"$\kappa_s$",
-    "strip.axial_stiffness": "$E' 2H$",
-    "strip.youngs_modulus": "$E$",
-    "contact.friction": r"$\mu$",
-    "contact.pressure": "$F_N$",
-    "contact.stick_stiffness": r"$\alpha$",
-}
-UNITS = {
-    "load.amplitude": "force per width",
-    "strip.half_height": "length",
-    "strip.length": "length",
-    "strip.axial_stiffness": "force per width",
-    "strip.youngs_modulus": "stress",
-    "contact.pressure": "stress",
-    "strip.height_ratio": "1",
-    "strip.poisson_ratio": "1",
-    "strip.kappa_s": "1",
-    "contact.friction": "1",
-    "contact.stick_stiffness": "1",
-}
 FIGURES = {
     "dissipation": "$D$  [force]",
     "dissipation_ratio": "$D\\,/\\,D_{bar}$  [1]",
-    "secant_stiffness": "secant stiffness  [force per width / length]",
+    "secant_stiffness": "secant stiffness  [force/width/length]",
     "loss_factor": "loss factor  [1]",
 }
 WIDE = 20.0  # ratio of largest to smallest value above which an axis is logarithmic
@@ -238,13 +213,14 @@ def _cubic_law(result: SweptFigures, axes: Axes, figure: str, along: str) -> Non
     """Draw the bar's cubic law if it is the same for all curves."""
     lanes = result.lanes
     friction = lanes.gross_slip / lanes.value("strip.length")
-    alike = all(np.ndim(number) == 0 for number in (lanes.stiffness, friction))
+    stiffness = lanes.value("strip.axial_stiffness")
+    alike = all(np.ndim(number) == 0 for number in (stiffness, friction))
     pulled = result.scene.load.control == "force" and along == "load.amplitude"
     if figure != "dissipation" or not alike or not pulled or float(friction) <= 0.0:
         return
     inside = np.sort(result.axes[along])
     inside = inside[(inside > 0.0) & (inside < float(lanes.gross_slip))]
-    law = np.asarray(cubic_law(inside, float(lanes.stiffness), float(friction)))
+    law = np.asarray(cubic_law(inside, float(stiffness), float(friction)))
     axes.plot(inside, law, color=DATA, linestyle="--", linewidth=0.9, label="bar", zorder=1.5)
 
 
@@ -261,12 +237,10 @@ def _scales(axes: Axes, x: np.ndarray, values: np.ndarray) -> None:
 
 def _symbol(key: str | None) -> str:
     """Symbol of a key, or its words."""
-    return SYMBOLS.get(key or "", (key or "").partition(".")[2].replace("_", " "))
+    return TABLE[key].label if key else ""
 
 
 def _label(key: str, result: SweptFigures) -> str:
     """Label of an axis: symbol and unit of a key."""
-    unit = UNITS.get(key)
-    if key == "load.amplitude" and result.scene.load.control == "displacement":
-        unit = "length"
-    return _symbol(key) + (f"  [{unit}]" if unit else "")
+    moved = key == "load.amplitude" and result.scene.load.control in LENGTHS
+    return f"{_symbol(key)}  [{'length' if moved else TABLE[key].unit}]"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -12,11 +11,8 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.jax_options import memory
-from jbeamshell.mechanics.bar import bar_backbone
 from jbeamshell.numerics.cycles import closed_cycles
-from jbeamshell.quasistatic.prediction import (
-    SMALLEST_SHARE,
-)
+from jbeamshell.scene.domain import bar_rule, gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
 LEFT = 13  # numbers that a load step leaves at a node, besides twice its fields
@@ -30,8 +26,8 @@ def check(
     whole, cycles = whole_path(scene, path)
     if not is_traced(scene, whole):
         _check_size(scene, whole)
-        _check_gross_slip(scene, whole)
-        _check_bar(scene)
+        gross_slip_rule(scene.load, scene.number, whole.target, whole.pressure).demand()
+        bar_rule(scene.load, scene.model, scene.number).demand()
     return whole, cycles
 
 
@@ -91,34 +87,6 @@ def _check_size(scene: Scene, path: LoadPath) -> None:
     need, most = 8.0 * levels * nodes * (2 * scene.model.width + LEFT), memory()
     fix = f"and {levels} load steps take {need:.2g} bytes of memory, this machine has {most:.2g}"
     require("model.nodes", nodes, need < most, f"{fix}: take fewer")
-
-
-def _check_gross_slip(scene: Scene, path: LoadPath) -> None:
-    if scene.load.control != "force" or float(scene.contact.friction) == 0.0:
-        return
-    pressing, _ = scene.contact.resultant(scene.strip.length)
-    limit = float(scene.contact.friction) * pressing
-    targets, limits = np.abs(path.target), limit * np.asarray(path.pressure)
-    beyond = (targets > 0.0) & (targets >= (1.0 - SMALLEST_SHARE) * limits)
-    require(
-        "load.amplitude",
-        float(targets[beyond].max(initial=0.0)),
-        not np.any(beyond),
-        f"must stay below gross slip, mu F_N L = {limit:.6g}; "
-        "set load.control to 'displacement' or 'arc-length' to go beyond",
-    )
-
-
-def _check_bar(scene: Scene) -> None:
-    if scene.model.solution != "closed-form" or scene.load.control == "force":
-        return
-    strip = scene.strip
-    with jax.ensure_compile_time_eval():
-        rubs = scene.contact.friction * scene.contact.pressure
-        limit = float(bar_backbone(rubs * strip.length, strip.stretching_stiffness, rubs))
-    amplitude = float(scene.load.amplitude)
-    fix = f"must stay below the bar's gross slip, {limit:.6g}; take model.fields = ['v'] beyond"
-    require("load.amplitude", amplitude, amplitude < limit, fix)
 
 
 class LoadPath(NamedTuple):

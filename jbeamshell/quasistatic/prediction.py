@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jbeamshell.quasistatic.system import System
-from jbeamshell.scene.parts import ARC_LENGTH
+from jbeamshell.scene.keys import ARC_LENGTH
 
 CORNER, REACH = 1.7, 0.4  # H by which a strip slips less deep than a bar, and over which it grows
 SMALLEST_SHARE = 1e-9  # of the cap, or of gross slip: less than this is no difference

@@ -26,7 +26,7 @@ from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.assembly import Band, Blocks, band, node, times, unheld
 from jbeamshell.quasistatic.prediction import SMALLEST_SHARE, Reversal, first_to_slip, last_reversal
 from jbeamshell.quasistatic.system import System, V
-from jbeamshell.scene.parts import CONTROLS
+from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.scene import Scene
 
 MOST = 40  # guesses of one step

@@ -45,7 +45,7 @@ from jbeamshell.quasistatic.tangent import (
     with_v,
     zero_unknowns,
 )
-from jbeamshell.scene.parts import ARC_LENGTH
+from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.scene import Scene
 
 SLIPS = 0.5  # a node slips in a step when more than this part of its motion is inelastic

@@ -21,7 +21,7 @@ from jax import Array
 from jbeamshell.mechanics.kinematics import FIELDS
 from jbeamshell.quasistatic.elastic_strip import BETA, PSI, ElasticStrip, V, W
 from jbeamshell.quasistatic.foundation import Foundation
-from jbeamshell.scene.parts import ARC_LENGTH, FAR_ENDS
+from jbeamshell.scene.keys import ARC_LENGTH, FAR_ENDS
 from jbeamshell.scene.scene import Scene
 
 

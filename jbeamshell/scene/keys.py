@@ -1,70 +1,267 @@
-"""scene.keys."""
+"""Table of the keys of a scene: default, domain, scale, symbol, unit and meaning of each.
+
+The rows are the fields of the scene's parts, declared here once: `StripKeys` is the section
+``[strip]`` of a TOML file, and so on.  Scenes, fits, sweeps, pictures and the command line's help
+read `TABLE`.  A new number needs its row here and the physics that uses it, nothing else.
+"""
 
 from __future__ import annotations
 
 import difflib
+import math
+import textwrap
+from typing import ClassVar
+
+from jax import Array
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.scene.parts import ARC_LENGTH
+from jbeamshell.mechanics.elements import END_SIZE, ORDER
+from jbeamshell.mechanics.friction import LAWS
+from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES
+from jbeamshell.mechanics.kinematics import KINEMATICS
+from jbeamshell.scene.rows import Key, Part, count, number, rows, setting, word
+from jbeamshell.scene.rungs import LARGEST_ORDER
 
+FAR_ENDS = {"held": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held at X = 0
+CONTROLS = ("force", "displacement")
+ARC_LENGTH = "arc-length"
 LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
+NORMALS = ("rigid", "compliant", "none")
+SQUEEZES = ("field", "assumed")
+SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form")
 
-# Keys that set a leaf through others, in the order in which they apply.
-DERIVED = {
-    "strip.half_height": "strip.height_ratio",
-    "strip.youngs_modulus": "strip.axial_stiffness",
-}
+LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
+PRESSURE = "give a number or a table of [X, pressure] rows"
+WIDTH = 96  # characters of a line of the printed table
 
-NUMBERS = (
-    "strip.length",
-    "strip.height_ratio",
-    "strip.half_height",
-    "strip.axial_stiffness",
-    "strip.youngs_modulus",
-    "strip.poisson_ratio",
-    "strip.kappa_s",
-    "strip.layers",
-    "strip.deviation",
-    "strip.curvature",
-    "contact.friction",
-    "contact.pressure",
-    "contact.bottom_pressure",
-    "contact.stick_stiffness",
-    "contact.smoothing",
-    "contact.normal_stiffness",
-    "load.amplitude",
+
+class StripKeys(Part):
+    """Geometry and material of the strip, section ``[strip]``."""
+
+    heading: ClassVar[str] = "strip"
+
+    length: Array = number(2.0, "Length L of the strip.", symbol="L", unit="length")
+    height_ratio: Array = number(
+        0.1126, "Half height over half the length, eta = H/(L/2).", symbol=r"\eta"
+    )
+    axial_stiffness: Array | None = number(
+        3.4e4,
+        "Stretching stiffness E' 2H; E' = E/(1-nu^2) in plane strain, E in plane stress.",
+        left_out=None,
+        symbol="E' 2H",
+        unit="force/width",
+    )
+    poisson_ratio: Array | None = number(
+        0.3,
+        "Poisson's ratio.",
+        left_out=None,
+        symbol=r"\nu",
+        low=-1.0,
+        high=0.5,
+        scale="linear",
+    )
+    kappa_s: Array = number(
+        0.44, "Squeeze-shear factor; 0.44 fits the squeeze layer.", symbol=r"\kappa_s"
+    )
+    far_end: str = word(
+        "held", FAR_ENDS, "Support at X = 0: held (v = beta = 0), pinned (v = 0) or free."
+    )
+    layers: Array | None = number(
+        None,
+        "Rows [thickness, E, nu] of the layers from the bottom up, in place of the stiffness "
+        "and Poisson's ratio.",
+        unit="mixed",
+        table=True,
+        fix=LAYERS,
+    )
+    deviation: Array = number(
+        0.0,
+        "Height above mid-height at which a laminate's shear is split from its squeeze-shear.",
+        symbol="d",
+        unit="length",
+        low=-math.inf,
+        scale="linear",
+    )
+    plane: str = word("strain", PLANES, "Plane strain or plane stress.")
+    curvature: Array | None = number(
+        None,
+        "Curvature alpha' before loading, positive if the ends point up; none is straight.",
+        symbol=r"\alpha'",
+        unit="1/length",
+        low=-math.inf,
+        scale="linear",
+    )
+
+
+class ContactKeys(Part):
+    """Rough foundation and pressures, section ``[contact]``."""
+
+    heading: ClassVar[str] = "contact"
+
+    friction: Array = number(
+        0.1, "Coulomb friction coefficient; 0 is frictionless.", symbol=r"\mu", closed=True
+    )
+    pressure: Array = number(
+        10.0,
+        "Pressure on the top face, positive downwards: a number, or rows [X, p] with linear "
+        "interpolation; two rows of one X make a step.",
+        symbol="F_N",
+        unit="stress",
+        closed=True,
+        table=True,
+        fix=PRESSURE,
+    )
+    bottom_pressure: Array = number(
+        0.0,
+        "Pressure on the bottom face, positive upwards; a number or rows [X, p].",
+        unit="stress",
+        closed=True,
+        table=True,
+        fix=PRESSURE,
+    )
+    stick_stiffness: Array = number(
+        1000.0,
+        "Elastic slip stiffness in units of G/H: k_t = alpha G/H.",
+        symbol=r"\alpha",
+    )
+    normal: str = word(
+        "rigid", NORMALS, "Normal contact: rigid, compliant, or none (no foundation)."
+    )
+    normal_stiffness: Array = number(
+        50.0, "Stiffness of the compliant foundation, in units of E'/H.", symbol="k_n", unit="E'/H"
+    )
+
+
+class LoadKeys(Part):
+    """Load on the end X = L after the pressure, section ``[load]``."""
+
+    heading: ClassVar[str] = "load"
+
+    control: str = word(
+        "force",
+        (*CONTROLS, ARC_LENGTH),
+        "Controlled quantity: force (F), displacement (u at X = L) or arc-length (along the path "
+        "of u and F L/(E' 2H)).",
+    )
+    amplitude: Array = number(
+        0.7855,
+        "Amplitude of the controlled quantity; a length, without default, unless the force is "
+        "controlled.",
+        left_out=None,
+        symbol="A",
+        unit="force/width",
+    )
+    cycles: int = count(2, 0, "Full cycles after the first loading; 0 is the pressure alone.")
+    steps_per_half_cycle: int = count(40, 1, "Equal load steps from A to -A; 1, or even.")
+    pressure_steps: int = count(1, 1, "Equal steps in which the pressure is applied.")
+
+
+class ModelKeys(Part):
+    """Extent and resolution of the model, section ``[model]``."""
+
+    heading: ClassVar[str] = "model"
+
+    fields: tuple[str, ...] = word(
+        ("v", "beta", "psi"), (), "Fields of a section: v, with beta, with psi; w lets it lift off."
+    )
+    kinematics: str = word("exact", KINEMATICS, "Rotations: exact or linear.")
+    grid: str = word(
+        "finite-difference",
+        ORDER,
+        "Grid: finite-difference (second order) or collocation (fourth).",
+    )
+    nodes: int = count(161, 3, "Nodes along X.")
+    constants: str = word(
+        "consistent", CONSTANTS, "Section constants: consistent, or printed (the dissertation's)."
+    )
+    squeeze: str = word(
+        "field", SQUEEZES, "Squeeze strain: a field, or assumed from the pressures."
+    )
+    order: int = count(
+        0, 0, "Order p of the displacements through the height; 0 is the beamshell.", LARGEST_ORDER
+    )
+    solution: str = word(
+        "stepwise",
+        SOLUTIONS,
+        "Solution: stepwise, masing or masing-pull (a loop from backbones), closed-form (the bar).",
+    )
+    end_size: float = setting(
+        END_SIZE, "Smallest elements, at the loaded end and at steps of the pressure.", unit="H"
+    )
+
+
+# Keys that are no field of their own: they set, or read, a field in another form.
+INDIRECT = (
+    Key(
+        "strip.half_height",
+        "number",
+        None,
+        "Half height H; sets the height ratio.",
+        symbol="H",
+        unit="length",
+        through="strip.height_ratio",
+    ),
+    Key(
+        "strip.youngs_modulus",
+        "number",
+        None,
+        "Young's modulus E; sets the stretching stiffness.",
+        symbol="E",
+        unit="stress",
+        through="strip.axial_stiffness",
+    ),
+    Key("contact.law", "word", "elastic-slip", "Friction law by its name.", choices=tuple(LAWS)),
+    Key(
+        "contact.smoothing",
+        "number",
+        math.inf,
+        "Exponent m of the friction law, 8 to 32 in practice; sharp is the Jenkins slider.",
+        symbol="m",
+        low=1.0,
+        scale="linear",
+        fix="must be a number above 1, or 'sharp'",
+    ),
+    Key(
+        "model.rung",
+        "word",
+        "squeeze",
+        "Fields, order and solution by one name: bar, shell, squeeze, p2, p3, ..., masing.",
+    ),
 )
-SETTINGS = (
-    "load.cycles",
-    "load.steps_per_half_cycle",
-    "load.pressure_steps",
-    "model.nodes",
-    "model.order",
-    "model.end_size",
-)
-WORDS = (
-    "strip.far_end",
-    "strip.plane",
-    "contact.law",
-    "contact.normal",
-    "load.control",
-    "model.fields",
-    "model.kinematics",
-    "model.grid",
-    "model.constants",
-    "model.squeeze",
-    "model.solution",
-    "model.rung",
+
+
+TABLE: dict[str, Key] = {}
+for _part in (StripKeys, ContactKeys, LoadKeys, ModelKeys):
+    _others = (row for row in INDIRECT if row.name.startswith(f"{_part.heading}."))
+    TABLE |= {row.name: row for row in (*rows(_part).values(), *_others)}
+# Keys that set a field through another number, in the order in which they apply.
+DERIVED = {row.name: row.through for row in INDIRECT if row.through}
+NUMBERS, SETTINGS, WORDS = (
+    tuple(name for name, key in TABLE.items() if key.kind == kind)
+    for kind in ("number", "setting", "word")
 )
 KEYS = NUMBERS + SETTINGS + WORDS
-OPTIONAL = ("strip.layers", "strip.curvature")  # may be None
+
+
+def key_table(section: str = "") -> str:
+    """Table as text with key, default, unit and meaning; of one section, or of all."""
+    shown = [key for key in TABLE.values() if key.name.startswith(section)]
+    heads = [("key", "default", "unit")]
+    cells = heads + [(key.name, key.shown_default, key.shown_unit) for key in shown]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = []
+    for row, text in zip(cells, ["meaning", *(key.sentence for key in shown)], strict=True):
+        begin = "".join(cell.ljust(width + 2) for cell, width in zip(row, widths, strict=True))
+        margin = " " * len(begin)
+        lines += textwrap.wrap(text, WIDTH, initial_indent=begin, subsequent_indent=margin)
+    return "\n".join(lines)
 
 
 def check_key(key: str) -> None:
     """Raise `InputError` for a key that does not exist, with the nearest one that does."""
     if not isinstance(key, str):
         raise InputError(f"{key!r}: is no key; keys are {', '.join(KEYS)}")
-    if key not in KEYS:
+    if key not in TABLE:
         near = difflib.get_close_matches(key, KEYS, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"keys are {', '.join(KEYS)}"
         raise InputError(f"unknown key {key!r}: {hint}")

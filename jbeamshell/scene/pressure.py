@@ -1,4 +1,8 @@
-"""scene.pressure."""
+"""Pressures on the faces of a strip: their checks, their resultant force and its moment.
+
+A pressure is one number, or a table (n, 2) of X and pressure with linear interpolation between its
+rows and the end values beyond them; two rows of the same X make a step.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,33 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import require
+from jbeamshell.scene.keys import PRESSURE
 
-PRESSURE = "give a number or a table of [X, pressure] rows"
+
+def is_table(pressure: np.ndarray) -> bool:
+    """True for a table of [X, pressure] rows.
+
+    An array over the strips of a sweep is none: it has one axis of more than one entry at most.
+    """
+    return pressure.ndim == 2 and pressure.shape[1] == 2 and pressure.shape[0] >= 2
 
 
-@np.errstate(over="ignore", invalid="ignore")  # infinite forces are told by those who ask
-def resultant(
-    pressure: ArrayLike, length: ArrayLike, *, table: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """Force of a pressure, a table or numbers, on strips; and its moment about X = 0."""
+@np.errstate(over="ignore", invalid="ignore")  # the caller checks for forces that are infinite
+def face_resultant(pressure: ArrayLike, length: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Force of a pressure on strips, per unit width, and its moment about X = 0.
+
+    Parameters
+    ----------
+    pressure : a number, an array of numbers over strips, or one table (n, 2), stress
+    length : L of the strips, any shape
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        force (stress times length) and moment (stress times length squared), in double precision.
+    """
     load, length = np.asarray(pressure, float), np.asarray(length, float)
-    if not table:
+    if not is_table(load):
         return load * length, 0.5 * load * length**2
     end = length[..., None]
     x, p = (np.broadcast_to(column, (*length.shape, column.size)) for column in load.T)
@@ -28,14 +48,26 @@ def resultant(
     return np.sum(force, axis=-1), np.sum(moment, axis=-1)
 
 
+@np.errstate(over="ignore", invalid="ignore")
+def resultant(
+    top: ArrayLike, bottom: ArrayLike, length: ArrayLike
+) -> tuple[np.ndarray, np.ndarray]:
+    """Force of both pressures on strips, downwards, and its moment about X = 0.
+
+    Parameters and units are those of `face_resultant`.
+    """
+    (down, turning), (up, lifting) = face_resultant(top, length), face_resultant(bottom, length)
+    return down - up, turning - lifting
+
+
 def pressure_values(pressure: np.ndarray) -> np.ndarray:
-    """Pressures of a table, or the one number."""
+    """Pressures of a table without their X, or the one number."""
     return pressure[:, 1] if pressure.ndim == 2 else pressure
 
 
 def check_pressure(key: str, pressure: np.ndarray) -> None:
-    """Raise `InputError` unless it is a number or a table of [X, pressure] rows."""
-    table = pressure.ndim == 2 and pressure.shape[1] == 2 and pressure.shape[0] >= 2
+    """Raise `InputError` unless a pressure is a number or a table of [X, pressure] rows."""
+    table = is_table(pressure)
     require(key, pressure, pressure.ndim == 0 or table, PRESSURE)
     compressive = bool(np.all(np.isfinite(pressure)) and np.all(pressure_values(pressure) >= 0.0))
     require(key, pressure, compressive, "must be finite and nowhere negative (no tension)")

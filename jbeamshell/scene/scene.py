@@ -1,4 +1,4 @@
-"""A Scene: everything that defines a run, as a frozen pytree whose physical parameters are leaves.
+"""Scene: everything that defines a run, as a frozen pytree whose physical parameters are leaves.
 
 ``Scene()`` is the standard strip.  Units are the user's own, as long as they are consistent; forces
 are per unit width.  Dotted keys ("strip.height_ratio") name the same things in the TOML file, on
@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import as_leaf, require, require_number
+from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.errors import InputError
 from jbeamshell.mechanics.friction import (
     LAWS,
@@ -27,24 +27,33 @@ from jbeamshell.mechanics.friction import (
     takes_smoothing,
 )
 from jbeamshell.mechanics.hierarchic import Hierarchic
-from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy
-from jbeamshell.scene.keys import DERIVED, NUMBERS, OPTIONAL, WORDS, check_key
-from jbeamshell.scene.parts import CONTROLS, FAR_ENDS, SMOOTHING, Contact, Load, Model, Strip
-from jbeamshell.scene.pressure import resultant
+from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
+from jbeamshell.scene.domain import support_rules
+from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
+from jbeamshell.scene.parts import SECTIONS, Contact, Load, Model, Strip
 from jbeamshell.scene.rungs import spelled_out
-
-SECTIONS = {"strip": Strip, "contact": Contact, "load": Load, "model": Model}
 
 
 class Scene(eqx.Module):
-    """A strip, its contact, its load and the model of it.
+    """Strip, its contact, its load and the model of it.
 
     Attributes
     ----------
-    strip, contact, load, model : the parts
+    strip, contact, load, model : parts of the scene, see `jbeamshell.scene.parts`
     energy : strain energy Phi(e, g, k, psi, psi') per unit length of the user's own, any JAX
         function of five scalars, such as ``lambda e, g, k, psi, dpsi: ...`` or an
         `equinox.Module` that carries parameters; None is the strip's own section
+
+    Raises
+    ------
+    InputError
+        if a value lies outside its domain, or if values do not go together
+
+    Examples
+    --------
+    >>> scene = Scene().replace({"strip.height_ratio": 0.05, "contact.friction": 0.2})
+    >>> float(scene.get("strip.half_height"))
+    0.05
     """
 
     strip: Strip = eqx.field(default_factory=Strip)
@@ -76,7 +85,7 @@ class Scene(eqx.Module):
         )
 
     def strain_energy(self) -> Energy:
-        """Phi(e, g, k, psi, psi') of this scene's section."""
+        """Strain energy Phi(e, g, k, psi, psi') of this scene's section."""
         if self.energy is not None:
             return self.energy
         strip = self.strip
@@ -96,7 +105,7 @@ class Scene(eqx.Module):
         )
 
     def hierarchic_section(self) -> Hierarchic | None:
-        """The section of order p; None where the beamshell's is meant."""
+        """Section of order p; None if the section is the beamshell's."""
         strip, model = self.strip, self.model
         if model.order == 0:
             return None
@@ -110,7 +119,7 @@ class Scene(eqx.Module):
         )
 
     def _check_rung(self) -> None:
-        """What the model cannot represent."""
+        """Refuse what the model cannot represent."""
         strip, contact, model = self.strip, self.contact, self.model
         plain = self.energy is None and strip.layers is None and strip.curvature is None
         fix = "is for a straight homogeneous strip without an energy of its own; take 0"
@@ -134,39 +143,22 @@ class Scene(eqx.Module):
             require("contact.friction", contact.friction, rubs, "the bar needs friction")
 
     def _check_contact(self) -> None:
-        """What the parts cannot see alone: a strip that nothing holds, a load off the strip."""
-        strip, contact, fields = self.strip, self.contact, self.model.fields
-        lift = "w" in fields
+        """Refuse a strip that nothing holds, and a load off the strip."""
+        strip, contact, model = self.strip, self.contact, self.model
+        lift = "w" in model.fields
         needs = "needs w in model.fields"
         require("contact.normal", contact.normal, lift or contact.normal == "rigid", needs)
         require("strip.curvature", strip.curvature, lift or strip.curvature is None, needs)
-        layered = self.model.squeeze == "assumed" and strip.layers is not None
+        layered = model.squeeze == "assumed" and strip.layers is not None
         require("model.squeeze", "assumed", not layered, "is for a homogeneous strip")
         if contact.normal == "none":
             held = "beta" in FAR_ENDS[strip.far_end]
             fix = "is all that holds a strip without a foundation: take 'held' (rigid-body motion)"
             require("strip.far_end", strip.far_end, held, fix)
-        leaves = (strip.length, contact.friction, contact.pressure, contact.bottom_pressure)
-        if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
-            return
-        rough = float(contact.friction) > 0.0 or "v" in FAR_ENDS[strip.far_end]
-        fix = "nothing holds the strip along X without friction (rigid-body motion): give "
-        require("contact.friction", 0.0, rough, fix + "strip.far_end or friction")
-        length = float(strip.length)
-        _check_on_strip("contact.pressure", contact.pressure, length)
-        _check_on_strip("contact.bottom_pressure", contact.bottom_pressure, length)
-        down, _ = resultant(contact.pressure, length, table=contact.pressure.ndim == 2)
-        require("contact.pressure", contact.pressure, bool(down > 0.0), "must press somewhere")
-        total, moment = contact.resultant(length)
-        fix = "overflows together with contact.pressure: take other units"
-        require("strip.length", length, bool(np.isfinite(moment)), fix)
-        if contact.normal != "none":
-            fix = "nothing holds the strip down (rigid-body motion): press more on top"
-            require("contact.bottom_pressure", contact.bottom_pressure, total > 0.0, fix)
-            upright = "beta" in FAR_ENDS[strip.far_end] or not lift
-            inside = upright or 0.0 <= moment <= total * length
-            fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
-            require("contact.bottom_pressure", contact.bottom_pressure, inside, fix)
+        pressures = (contact.pressure, contact.bottom_pressure)
+        if not is_traced(strip.length, contact.friction, *pressures):
+            for rule in support_rules(strip, contact, model, self.number):
+                rule.demand()
 
     @property
     def slip_stiffness(self) -> Array:
@@ -175,18 +167,27 @@ class Scene(eqx.Module):
         return self.contact.stick_stiffness * strip.shear_modulus / strip.half_height
 
     def get(self, key: str) -> Any:
-        """The value behind a dotted key, e.g. ``scene.get("strip.height_ratio")``."""
+        """Value of a dotted key, such as ``scene.get("strip.height_ratio")``."""
         check_key(key)
         section, name = key.split(".")
         if key == "contact.law":
             return law_name(self.contact.law)
         return getattr(getattr(self, section), name)
 
-    def replace(self, values: Mapping[str, Any]) -> Scene:
-        """A copy with other values, e.g. ``scene.replace({"contact.friction": 0.2})``.
+    def number(self, key: str) -> np.ndarray:
+        """Number or table of a dotted key in double precision, for the rules of `domain`."""
+        return np.asarray(self.get(key), dtype=float)
 
-        Keys are those of the TOML file and the command line; values may be traced, so gradients and
-        batches reach every number through it.
+    def replace(self, values: Mapping[str, Any]) -> Scene:
+        """Copy with other values, such as ``scene.replace({"contact.friction": 0.2})``.
+
+        Keys are those of the TOML file and the command line.  Values may be traced, so that
+        gradients and batches reach every number of the scene.
+
+        Raises
+        ------
+        InputError
+            if a key does not exist, or a value is no good
         """
         known = isinstance(values, Mapping)
         require("values", values, known, "give a dictionary, such as {'contact.friction': 0.2}")
@@ -202,18 +203,17 @@ class Scene(eqx.Module):
                 section, name = key.split(".")
                 parts[section][name] = value
         if "strip.half_height" in values:
-            height = as_leaf(values["strip.half_height"], "strip.half_height")
-            require_number("strip.half_height", height)
+            height = _number("strip.half_height", values["strip.half_height"])
             length = parts["strip"].get("length", self.strip.length)
             parts["strip"]["height_ratio"] = 2.0 * height / as_leaf(length, "strip.length")
         if parts["strip"].get("layers") is not None:
-            # The layers say what the stiffness and nu are; giving both is refused by the strip.
+            # The layers give the stiffness and nu; the strip refuses both being given.
             for name in ("axial_stiffness", "poisson_ratio"):
                 parts["strip"].setdefault(name, None)
         contact = parts["contact"]
         if "law" in contact or "smoothing" in contact:
             contact["law"] = _make_law(self.contact.law, contact)
-        # A number keeps its meaning when the control changes only if it is given anew.
+        # An amplitude of another control has another unit: it must be given anew.
         if parts["load"].get("control", self.load.control) != self.load.control:
             parts["load"].setdefault("amplitude", None)
         fresh = {
@@ -227,22 +227,18 @@ class Scene(eqx.Module):
         return scene
 
 
-def _check_on_strip(key: str, pressure: Any, length: float) -> None:
-    table = np.asarray(pressure, dtype=float)
-    if table.ndim == 2:
-        x = table[:, 0]
-        off = (x < 0.0) | (x > length * (1.0 + 1e-12))
-        fix = f"lies off the strip, whose X runs from 0 to {length:.6g}"
-        require(key, x[off], not np.any(off), fix)
+def _number(key: str, value: Any) -> Array:
+    """Leaf of a key that is no field, checked."""
+    leaf = TABLE[key].convert(value)
+    TABLE[key].check(leaf)
+    return leaf
 
 
 def _with_youngs_modulus(strip: Strip, value: Any) -> Strip:
     key = "strip.youngs_modulus"
-    value = as_leaf(value, key)
-    require_number(key, value)
+    value = _number(key, value)
     require(key, value, strip.layers is None, "strip.layers say it already; leave it out")
-    nu = jnp.asarray(strip.poisson_ratio)
-    plane = value if strip.plane == "stress" else value / (1.0 - nu**2)
+    plane = plane_modulus(value, jnp.asarray(strip.poisson_ratio), strip.plane)
     return dataclasses.replace(strip, axial_stiffness=plane * 2.0 * strip.half_height)
 
 
@@ -251,9 +247,10 @@ def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:
     given = contact.pop("smoothing", None)
     smoothing = getattr(current, "smoothing", "sharp") if given is None else given
     m = np.inf if isinstance(smoothing, str) else smoothing
-    exponent = as_leaf(m, "contact.smoothing", SMOOTHING)
+    key = TABLE["contact.smoothing"]
+    exponent = key.convert(m)
     sharp = not isinstance(exponent, jax.core.Tracer) and bool(np.all(np.isposinf(exponent)))
-    require("contact.smoothing", m, exponent.ndim == 0, SMOOTHING)
+    require("contact.smoothing", m, exponent.ndim == 0, key.words)
     own = isinstance(law, FrictionLaw)
     if not own and takes_smoothing(LAWS[law]):
         return law_named(law, None if sharp else exponent)
@@ -262,17 +259,18 @@ def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:
     return law if own else law_named(law, None)
 
 
-def check_word(key: str, value: Any) -> None:
-    """Raise `InputError` for a static value of the wrong type; numbers check theirs as leaves."""
-    if key == "contact.law":
+def check_word(name: str, value: Any) -> None:
+    """Raise `InputError` for a value of the wrong type, before it is put into a part."""
+    key = TABLE[name]
+    if name == "contact.law":
         known = isinstance(value, FrictionLaw) or (isinstance(value, str) and value in LAWS)
-        require(key, value, known, f"choose {' or '.join(map(repr, LAWS))}")
-    elif key == "contact.smoothing" and isinstance(value, str):
-        require(key, value, value == "sharp", SMOOTHING)
-    elif key == "model.fields":
+        require(name, value, known, f"choose {' or '.join(map(repr, LAWS))}")
+    elif name == "contact.smoothing" and isinstance(value, str):
+        require(name, value, value == "sharp", key.words)
+    elif name == "model.fields":
         words = isinstance(value, list | tuple) and all(isinstance(f, str) for f in value)
-        require(key, value, words, "give a list such as ['v', 'beta', 'psi']")
-    elif key in WORDS:
-        require(key, value, isinstance(value, str), "must be a word")
-    elif key in NUMBERS and key not in OPTIONAL:
-        require(key, value, value is not None, "must be a number")
+        require(name, value, words, "give a list such as ['v', 'beta', 'psi']")
+    elif key.kind == "word":
+        require(name, value, isinstance(value, str), "must be a word")
+    elif key.kind == "number" and not key.optional:
+        require(name, value, value is not None, "must be a number")

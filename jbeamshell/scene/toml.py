@@ -1,4 +1,4 @@
-"""scene.toml."""
+"""Scenes as TOML text and files, by dotted keys."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml, write_text
 from jbeamshell.mechanics.friction import law_name
 from jbeamshell.scene.keys import DERIVED, KEYS, LENGTHS, NUMBERS
-from jbeamshell.scene.parts import Load
+from jbeamshell.scene.parts import SECTIONS, Load
 from jbeamshell.scene.rungs import spelled_out
-from jbeamshell.scene.scene import SECTIONS, Scene, check_word
+from jbeamshell.scene.scene import Scene, check_word
 
 
 def scene_from_values(values: Mapping[str, Any]) -> Scene:
-    """A scene from dotted keys on top of the standard strip."""
+    """Scene from dotted keys on top of the standard strip."""
     if values.get("load.control") in LENGTHS and "load.amplitude" not in values:
-        return Scene(load=Load(values["load.control"]))  # says what is missing
+        return Scene(load=Load(values["load.control"]))  # raises: the amplitude is missing
     return Scene().replace(values)
 
 
 def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """Dotted keys with others on top; half_height replaces height_ratio and the like."""
+    """Dotted keys with others on top, in which ``half_height`` replaces ``height_ratio``, etc."""
     same = DERIVED | {primary: derived for derived, primary in DERIVED.items()}
     for given in (values, overrides):
         if "model.rung" in given:
@@ -39,7 +39,7 @@ def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[
 
 
 def read_values(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The dotted keys of a TOML file, flat."""
+    """Values of a TOML file by dotted key."""
     values: dict[str, Any] = {}
     for section, table in read_toml(path).items():
         if section not in SECTIONS:
@@ -53,16 +53,22 @@ def read_values(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
-    """The scene described by a TOML file; what it leaves out is the standard strip's."""
+    """Scene of a TOML file; keys that it leaves out are those of the standard strip.
+
+    Raises
+    ------
+    InputError
+        if the file cannot be read, is no TOML, or describes no scene
+    """
     return scene_from_values(read_values(path))
 
 
 def scene_to_toml(scene: Scene) -> str:
-    """TOML text that `read_scene` turns into the same scene, to the last bit."""
+    """TOML text of a scene; `read_scene` makes the same scene of it, to the last bit."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     if scene.energy is not None or not isinstance(law_name(scene.contact.law), str):
         raise InputError(
-            "energy, law: a user's own function cannot be written to TOML; keep it in code"
+            "energy, law: a function of your own cannot be written to TOML; keep it in code"
         )
     tables: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
     for key in KEYS:
@@ -70,7 +76,7 @@ def scene_to_toml(scene: Scene) -> str:
             continue
         section, name = key.split(".")
         value = scene.get(key)
-        if value is None:  # no layers, no curvature
+        if value is None:  # such as no layers
             continue
         if key in NUMBERS:
             value = np.asarray(value, dtype=float).tolist()

@@ -1,4 +1,4 @@
-"""What a sweep varies: axes into lanes, which of them the model knows, and how hard they are."""
+"""Lanes of a sweep, one strip each: their numbers, their domain and an estimate of their cost."""
 
 from __future__ import annotations
 
@@ -6,51 +6,45 @@ import dataclasses
 import enum
 import math
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, require
 from jbeamshell.common.errors import InputError
-from jbeamshell.mechanics.bar import bar_backbone
-from jbeamshell.quasistatic.prediction import SMALLEST_SHARE
-from jbeamshell.scene.keys import DERIVED, NUMBERS, check_key
-from jbeamshell.scene.parts import FAR_ENDS
+from jbeamshell.mechanics.homogeneous import plane_modulus
+from jbeamshell.scene.domain import bar_rule, gross_slip_rule, support_rules
+from jbeamshell.scene.keys import DERIVED, NUMBERS, TABLE, check_key
+from jbeamshell.scene.layers import fill_height
+from jbeamshell.scene.parts import SECTIONS
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
-LARGEST = 400_000_000  # bytes of a sweep's arrays: with what compiling takes less than 1 GB
-# Where a number must lie, both ends excluded; as the scene's parts have it.
-BOUNDS = {
-    "strip.poisson_ratio": (-1.0, 0.5),
-    "strip.deviation": (-math.inf, math.inf),
-    "strip.curvature": (-math.inf, math.inf),
-    "contact.smoothing": (1.0, math.inf),
-    **dict.fromkeys(("contact.friction", "contact.bottom_pressure"), (-5e-324, math.inf)),
-}
+LARGEST = 400_000_000  # bytes of a sweep's arrays; with those of the compiler less than 1 GB
 
 
 class Outcome(enum.IntEnum):
-    """How a lane ended; up to NOT_REACHED the codes of `jbeamshell.Status`."""
+    """Outcome of a lane; up to NOT_REACHED the codes of `jbeamshell.Status`."""
 
     CONVERGED = 0
     MAX_ITERATIONS = 1
     NOT_FINITE = 2
     NOT_REACHED = 3
     OUTSIDE = 4  # the model's domain: not run
-    UNDEFINED = 5  # solved, but a figure is nought over nought, such as a ratio without friction
+    UNDEFINED = 5  # solved, but a figure is 0/0, such as a ratio without friction
 
 
 @dataclasses.dataclass(frozen=True)
 class Lanes:
-    """The lanes of a sweep.
+    """Lanes of a sweep: strips that differ in some numbers.
 
     Attributes
     ----------
-    scene : what is not varied
-    axes : values by dotted key, (n,) each; the lanes are their product, the last key running
-        fastest, or, paired, the n rows of all
-    paired : whether they are
+    scene : scene with all that is not varied
+    axes : values (n,) by dotted key.  The lanes are their product, the last key running fastest;
+        if they are paired, lane i has value i of every key
+    paired : True if the keys' values go together
     """
 
     scene: Scene
@@ -59,16 +53,17 @@ class Lanes:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of arrays with one number for each lane."""
+        """Shape of arrays with one number for each lane."""
         sizes = tuple(values.size for values in self.axes.values())
         return sizes[:1] if self.paired else sizes
 
     @property
     def size(self) -> int:
+        """Number of lanes."""
         return math.prod(self.shape)
 
     def columns(self, lanes: ArrayLike) -> np.ndarray:
-        """What the keys are in lanes of these (flat) numbers, (keys, lanes)."""
+        """Values of the keys in lanes of these flat numbers, (keys, lanes)."""
         places = np.unravel_index(np.asarray(lanes), self.shape)
         if self.paired:
             places *= len(self.axes)
@@ -76,62 +71,52 @@ class Lanes:
         return np.stack([values[at] for values, at in zip(axes, places, strict=True)])
 
     def grid(self, key: str) -> np.ndarray:
-        """Values of a key that is varied, in a shape that broadcasts to that of the lanes."""
+        """Values of a varied key, in a shape that broadcasts to that of the lanes."""
         values, place = self.axes[key], list(self.axes).index(key)
         if self.paired:
             return values
         return values.reshape([-1 if axis == place else 1 for axis in range(len(self.axes))])
 
     def value(self, key: str) -> np.ndarray:
-        """A number of the scene in every lane, broadcasting; tables are the scene's own."""
+        """Number of the scene in every lane, broadcasting; a table is the same in all lanes.
+
+        A number that depends on others, such as the half height, follows those that are varied.
+        """
         if key in self.axes:
             return self.grid(key)
-        return np.asarray(self.scene.get(key), dtype=float)
+        if key == "strip.half_height":
+            return 0.5 * self.value("strip.height_ratio") * self.value("strip.length")
+        if key == "strip.height_ratio" and "strip.half_height" in self.axes:
+            return 2.0 * self.grid("strip.half_height") / self.value("strip.length")
+        if key == "strip.axial_stiffness":
+            return self._stiffness()
+        return self.scene.number(key)
+
+    def _stiffness(self) -> np.ndarray:
+        """Stretching stiffness E' 2H of lanes that do not give it, force per unit width."""
+        strip = self.scene.strip
+        if "strip.youngs_modulus" not in self.axes:
+            return np.asarray(strip.stretching_stiffness, dtype=float)
+        modulus, nu = self.grid("strip.youngs_modulus"), self.value("strip.poisson_ratio")
+        return plane_modulus(2.0 * self.value("strip.half_height") * modulus, nu, strip.plane)
 
     # --- quantities of the lanes, broadcasting to their shape -------------------------------------
 
     @property
-    def half_height(self) -> np.ndarray:
-        """H, length."""
-        if "strip.half_height" in self.axes:
-            return self.grid("strip.half_height")
-        return 0.5 * self.value("strip.height_ratio") * self.value("strip.length")
-
-    @property
     def height_ratio(self) -> np.ndarray:
-        """Eta = H/(L/2)."""
-        return 2.0 * self.half_height / self.value("strip.length")
-
-    @property
-    def stiffness(self) -> np.ndarray:
-        """E' 2H, force per unit width."""
-        strip = self.scene.strip
-        if "strip.youngs_modulus" in self.axes:
-            given = 2.0 * self.half_height * self.grid("strip.youngs_modulus")
-            plane_stress = strip.plane == "stress"
-            return given if plane_stress else given / (1.0 - self.value("strip.poisson_ratio") ** 2)
-        if "strip.axial_stiffness" in self.axes:
-            return self.grid("strip.axial_stiffness")
-        return np.asarray(strip.stretching_stiffness, dtype=float)
-
-    @property
-    def resultant(self) -> tuple[np.ndarray, np.ndarray]:
-        """Force of the pressures on the strip, down, and its moment about X = 0."""
-        length = self.value("strip.length")
-        (down, turning), (up, lifting) = (
-            resultant(self.value(f"contact.{name}"), length, table=self._table(name))
-            for name in ("pressure", "bottom_pressure")
-        )
-        return down - up, turning - lifting
+        """Height ratio eta = H/(L/2)."""
+        return 2.0 * self.value("strip.half_height") / self.value("strip.length")
 
     @property
     def gross_slip(self) -> np.ndarray:
         """End force at which the whole contact slides: mu times the pressures' force."""
-        return self.value("contact.friction") * self.resultant[0]
+        top, bottom = self.value("contact.pressure"), self.value("contact.bottom_pressure")
+        force, _ = resultant(top, bottom, self.value("strip.length"))
+        return self.value("contact.friction") * force
 
     @property
     def amplitude_over_height(self) -> np.ndarray:
-        """A/eta with A in units of mu F_N L/2: what the dissipation's ratio mostly depends on.
+        """Load A/eta with A in units of mu F_N L/2, on which the dissipation ratio mostly depends.
 
         An array of the lanes' shape; NaN without friction, and under displacement control, where
         the force is not known beforehand.
@@ -143,10 +128,10 @@ class Lanes:
 
     @property
     def difficulty(self) -> np.ndarray:
-        """Estimate that puts lanes of like cost beside each other: the farther slip goes, more."""
+        """Estimate of a lane's cost, which grows with the slip zone; an array of their shape."""
         amplitude, load = self.value("load.amplitude"), self.scene.load
         if load.control == "displacement":
-            amplitude = amplitude * self.stiffness / self.value("strip.length")
+            amplitude = amplitude * self.value("strip.axial_stiffness") / self.value("strip.length")
         with np.errstate(all="ignore"):
             ratio = amplitude / self.gross_slip / self.height_ratio
         return np.broadcast_to(np.nan_to_num(ratio, posinf=0.0, neginf=0.0), self.shape)
@@ -154,57 +139,50 @@ class Lanes:
     # --- domain ---------------------------------------------------------------------------------
 
     def outside(self) -> np.ndarray:
-        """Which lanes lie outside the model's domain, an array of the lanes' shape.
+        """True for lanes outside the model's domain, an array of the lanes' shape.
 
-        What `Scene` and `jbeamshell.solve` refuse one by one, for all at once.
+        `Scene` and `jbeamshell.solve` refuse them one by one, by the same rules.
         """
         out = np.zeros(self.shape, bool)
         with np.errstate(all="ignore"):
-            for refused in self._refusals():
-                out |= refused
+            for holds in self._conditions():
+                out |= ~np.asarray(holds)
         return out
 
-    def _refusals(self) -> Iterator[np.ndarray]:
+    def _conditions(self) -> Iterator[Any]:
+        """Truths of every rule, broadcasting to the lanes' shape."""
         for key in self.axes:
-            low, high = BOUNDS.get(key, (0.0, math.inf))
-            values = self.grid(key)
-            yield ~((values > low) & (values < high))
-        strip, contact, model = self.scene.strip, self.scene.contact, self.scene.model
-        length, friction = self.value("strip.length"), self.value("contact.friction")
-        if "v" not in FAR_ENDS[strip.far_end] or model.solution == "closed-form":
-            yield friction == 0.0
+            yield TABLE[key].holds(self.grid(key))
+        strip, contact, load, model = (getattr(self.scene, part) for part in SECTIONS)
         if strip.layers is not None:
-            thickness, height = np.sum(np.asarray(strip.layers)[:, 0]), 2.0 * self.half_height
-            yield abs(thickness - height) > 1e-6 * height
-        for name in ("pressure", "bottom_pressure"):
-            if self._table(name):
-                x = self.value(f"contact.{name}")[:, 0]
-                yield (x.max() > length * (1.0 + 1e-12)) | (x.min() < 0.0)
-        total, moment = self.resultant
-        if contact.normal != "none":
-            yield total <= 0.0
-            if "beta" not in FAR_ENDS[strip.far_end] and "w" in model.fields:
-                yield (moment < 0.0) | (moment > total * length)
-        amplitude = self.value("load.amplitude")
-        if self.scene.load.control == "force":
-            slides = amplitude >= (1.0 - SMALLEST_SHARE) * friction * total
-            yield slides & (friction > 0.0) & bool(self.scene.load.cycles)
-        elif model.solution == "closed-form":
-            limit = bar_backbone(friction * total, self.stiffness, friction * total / length)
-            yield amplitude >= np.asarray(limit)
-
-    def _table(self, name: str) -> bool:
-        return f"contact.{name}" not in self.axes and getattr(self.scene.contact, name).ndim > 0
+            thickness = np.sum(np.asarray(strip.layers)[:, 0])
+            yield fill_height(thickness, 2.0 * self.value("strip.half_height"))
+        if model.solution == "closed-form":
+            yield self.value("contact.friction") > 0.0
+        targets = self.value("load.amplitude") if load.cycles else 0.0
+        for rule in (
+            *support_rules(strip, contact, model, self.value),
+            gross_slip_rule(load, self.value, targets),
+            bar_rule(load, model, self.value),
+        ):
+            yield rule.holds
 
 
 def lanes_of(scene: Scene, over: Mapping[str, ArrayLike], paired: bool = False) -> Lanes:
-    """Lanes of axes that are checked; raises `InputError` with the fix where they make none."""
+    """Lanes of a sweep; raises `InputError` for axes that make none.
+
+    Parameters
+    ----------
+    scene : scene with all that is not varied
+    over : values (n,) by dotted key of a single number
+    paired : True if the keys' values go together
+    """
     some = isinstance(over, Mapping) and len(over) > 0
     require("over", over, some, "name at least one key and its values, in a dictionary")
     for key in over:
         check_key(key)
         number = key in NUMBERS and key != "strip.layers"
-        require("over", key, number, "is no single number of the scene: give it to the scene")
+        require("over", key, number, "is no single number of the scene: set it in the scene")
         if DERIVED.get(key) in over:
             raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")
     axes = {}
@@ -225,7 +203,7 @@ def lanes_of(scene: Scene, over: Mapping[str, ArrayLike], paired: bool = False) 
 
 
 def check_size(lanes: int, figures: int) -> None:
-    """Refuse a sweep whose arrays would not fit into the memory that one may take."""
+    """Raise `InputError` for a sweep whose arrays are larger than `LARGEST`."""
     need = lanes * (8 * (2 * figures + 4) + 3)
     if need > LARGEST:
         raise InputError(

@@ -176,7 +176,7 @@ def test_a_curve_for_every_height_and_the_bar_for_all(pyplot):
     assert len(curves) == 3  # friction varies: no one bar for all
     np.testing.assert_array_equal(curves[1].get_ydata(), result["dissipation"][:, 1, 1])
     assert axes.get_title() == r"$\mu$ = 0.2"
-    assert "force per width" in axes.get_xlabel()
+    assert "force/width" in axes.get_xlabel()
     bar = made_up(**AXES).plot().lines[-1]
     assert bar.get_label() == "bar"
     assert np.all(np.diff(bar.get_ydata()) > 0.0)

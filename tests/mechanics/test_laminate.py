@@ -9,7 +9,8 @@ import pytest
 from jbeamshell.common.errors import InputError
 from jbeamshell.mechanics.homogeneous import PLANES, Homogeneous, forces, shear_coefficient
 from jbeamshell.mechanics.kinematics import Strains
-from jbeamshell.mechanics.laminate import Laminate, check_layers
+from jbeamshell.mechanics.laminate import Laminate
+from jbeamshell.scene.layers import check_layers
 
 KAPPA_S = 0.44
 SAMPLES = 200
@@ -379,7 +380,7 @@ def test_gradients_with_respect_to_every_number(plane, constants):
 
 # --- what is refused -----------------------------------------------------------------------------
 
-TABLE = "give rows [thickness, E, nu] from the bottom to the top"
+TABLE = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,8 @@ from jbeamshell.mechanics.friction import (
     TanhIncrement,
 )
 from jbeamshell.scene import library
-from jbeamshell.scene.keys import DERIVED, KEYS, NUMBERS
-from jbeamshell.scene.parts import FAR_ENDS, MODELS
+from jbeamshell.scene.keys import DERIVED, FAR_ENDS, KEYS, NUMBERS
+from jbeamshell.scene.parts import MODELS
 from jbeamshell.scene.toml import scene_from_values, write_scene
 
 TABLE = [[0.0, 3.0], [0.7, 0.0], [0.7, 5.0], [2.0, 12.5]]  # with a step
@@ -325,9 +325,13 @@ BAD = [
     ("strip.layers", [[0.1, 1e4, 0.3], [0.1, 1e5, 0.2]], r"add up to 0\.2, .* 2H is 0\.2252; make"),
     *[("strip.poisson_ratio", value, "between -1 and 0.5") for value in (-1.0, 0.5, 0.7, np.nan)],
     *[("contact.smoothing", value, "above 1, or 'sharp'") for value in (1, -8.0, np.nan, "blunt")],
-    ("strip.layers", [], r"give rows \[thickness, E, nu\] from the bottom"),
-    ("strip.layers", [[0.2252, 1e4]], r"give rows \[thickness, E, nu\] from the bottom"),
-    ("strip.layers", [[0.1, 1e4, 0.3], [0.1252, 1e4]], r"give \[thickness, E, nu\] of every layer"),
+    ("strip.layers", [], "of all layers, from the bottom"),
+    ("strip.layers", [[0.2252, 1e4]], "of all layers, from the bottom"),
+    (
+        "strip.layers",
+        [[0.1, 1e4, 0.3], [0.1252, 1e4]],
+        "of all layers, from the bottom",
+    ),
     ("contact.pressure", 0.0, "must press somewhere"),
     ("contact.pressure", [[0.0, 0.0], [1.0, 0.0]], "must press somewhere"),
     ("contact.pressure", [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]], "must press somewhere"),

@@ -1,0 +1,124 @@
+"""Domain of the model: rules on numbers that go together, for one scene or for a sweep.
+
+Every rule is an array function.  For one scene its numbers are scalars, and a rule that does not
+hold raises `InputError`.  For a sweep they are arrays over its strips, and those where it does not
+hold are marked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jbeamshell.common.checks import require
+from jbeamshell.mechanics.bar import bar_backbone
+from jbeamshell.scene.parts import Contact, Load, Model, Strip
+from jbeamshell.scene.pressure import face_resultant, is_table, resultant
+
+EDGE = 1e-12  # part of the length by which a table may run beyond the strip, for round-off
+MARGIN = 1e-9  # part of gross slip: a force that is closer to it counts as beyond
+
+Numbers = Callable[[str], np.ndarray]  # value of a dotted key: a scalar, or an array over strips
+
+
+class Rule(NamedTuple):
+    """Condition on a scene.
+
+    Attributes
+    ----------
+    key : dotted key that the message names
+    value : value that the message shows
+    holds : True where the condition holds, one truth or an array of them
+    fix : fix in words, for one scene
+    """
+
+    key: str
+    value: Any
+    holds: Any
+    fix: str
+
+    def demand(self) -> None:
+        """Raise `InputError` unless the condition holds everywhere."""
+        require(self.key, self.value, bool(np.all(self.holds)), self.fix)
+
+
+def support_rules(strip: Strip, contact: Contact, model: Model, numbers: Numbers) -> Iterator[Rule]:
+    """Rules by which pressures, friction and supports hold the strip, in the order of the checks.
+
+    Parameters
+    ----------
+    strip, contact, model : parts of the scene, for their words
+    numbers : values by dotted key
+    """
+    length, friction = numbers("strip.length"), numbers("contact.friction")
+    bottom = numbers("contact.bottom_pressure")
+    fix = "nothing holds the strip along X (rigid-body motion): give strip.far_end or friction"
+    yield Rule("contact.friction", friction, (friction > 0.0) | (strip.far_end != "free"), fix)
+    for key in ("contact.pressure", "contact.bottom_pressure"):
+        if is_table(numbers(key)):
+            yield _on_strip(key, numbers(key)[:, 0], length)
+    down, _ = face_resultant(numbers("contact.pressure"), length)
+    yield Rule("contact.pressure", numbers("contact.pressure"), down > 0.0, "must press somewhere")
+    force, moment = resultant(numbers("contact.pressure"), bottom, length)
+    fix = "overflows together with contact.pressure: take other units"
+    yield Rule("strip.length", length, np.isfinite(moment), fix)
+    if contact.normal == "none":
+        return
+    fix = "nothing holds the strip down (rigid-body motion): press more on top"
+    yield Rule("contact.bottom_pressure", bottom, force > 0.0, fix)
+    if strip.far_end != "held" and "w" in model.fields:
+        inside = (moment >= 0.0) & (moment <= force * length)
+        fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
+        yield Rule("contact.bottom_pressure", bottom, inside, fix)
+
+
+def gross_slip_rule(load: Load, numbers: Numbers, targets: Any, part: Any = 1.0) -> Rule:
+    """Rule that a controlled force stays below gross slip, mu F_N L.
+
+    Parameters
+    ----------
+    load : for its control
+    numbers : values by dotted key
+    targets : controlled loads, any shape
+    part : part of the pressures that acts with each
+    """
+    key, friction, size = "load.amplitude", numbers("contact.friction"), np.abs(np.asarray(targets))
+    if load.control != "force":
+        return Rule(key, size, True, "")
+    force, _ = resultant(
+        numbers("contact.pressure"), numbers("contact.bottom_pressure"), numbers("strip.length")
+    )
+    limit = friction * force
+    below = (size == 0.0) | (friction == 0.0) | (size < (1.0 - MARGIN) * (limit * np.asarray(part)))
+    worst = np.max(np.broadcast_to(size, np.shape(below)), where=~below, initial=0.0)
+    return Rule(
+        key,
+        float(worst),
+        below,
+        f"must stay below gross slip, mu F_N L = {np.max(limit):.6g}; "
+        "set load.control to 'displacement' or 'arc-length' to go beyond",
+    )
+
+
+def bar_rule(load: Load, model: Model, numbers: Numbers) -> Rule:
+    """Rule that a controlled displacement stays below the gross slip of a bar in closed form."""
+    key, amplitude = "load.amplitude", numbers("load.amplitude")
+    if model.solution != "closed-form" or load.control == "force":
+        return Rule(key, amplitude, True, "")
+    per_length = numbers("contact.friction") * numbers("contact.pressure")
+    with jax.ensure_compile_time_eval():
+        slipping = per_length * numbers("strip.length")
+        limit = np.asarray(bar_backbone(slipping, numbers("strip.axial_stiffness"), per_length))
+    fix = f"must stay below the bar's gross slip, {np.max(limit):.6g}; take model.fields = ['v']"
+    return Rule(key, amplitude, amplitude < limit, f"{fix} beyond")
+
+
+def _on_strip(key: str, x: np.ndarray, length: np.ndarray) -> Rule:
+    """Rule that the X of a table lie on the strip."""
+    end = length * (1.0 + EDGE)
+    off = x[(x < 0.0) | (x > np.max(end))]
+    fix = f"lies off the strip, whose X runs from 0 to {np.max(length):.6g}"
+    return Rule(key, off, (x.min() >= 0.0) & (x.max() <= end), fix)
