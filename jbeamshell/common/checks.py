@@ -1,9 +1,8 @@
-"""common.checks."""
+"""Checks of input: conversion to floating-point leaves, and messages with key, value and fix."""
 
 from __future__ import annotations
 
 import contextlib
-import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,9 +14,8 @@ from jax import Array
 
 from jbeamshell.common.errors import InputError
 
-TINY = np.finfo(float).tiny
-
-MOST_SHOWN = 100  # numbers of an array in a message
+TINY = np.finfo(float).tiny  # ``low=-TINY`` in `require_number` includes zero
+MOST_SHOWN = 100  # numbers of an array that a message shows
 
 NUMBER = "must be a number"
 POSITIVE = "must be a positive number"
@@ -25,12 +23,18 @@ NOT_NEGATIVE = "must be a number, not negative"
 
 
 def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
-    """A floating-point leaf from numbers or nested lists of them; arrays keep their precision."""
+    """Floating-point leaf from a number or nested lists of them; JAX arrays keep their precision.
+
+    Raises
+    ------
+    InputError
+        naming the key, the value and the fix, for anything else
+    """
     if isinstance(value, jax.Array) and value.dtype in (jnp.float32, jnp.float64):
         return value
     require(key, value, is_numeric(value), fix)
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value))
-    # Plain numbers stay concrete inside jit too, where they must still be checked.
+    # Inside jit, plain numbers stay concrete, so that they can be checked.
     concrete = contextlib.nullcontext() if traced else jax.ensure_compile_time_eval()
     try:
         with concrete:
@@ -40,7 +44,7 @@ def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
 
 
 def is_numeric(value: Any) -> bool:
-    """Whether there are only numbers in a value, words and truths being none."""
+    """True if a value is a number, or an array or list of numbers; words and truths are none."""
     if isinstance(value, list | tuple):
         return all(map(is_numeric, value))
     if np.ma.is_masked(value):
@@ -50,24 +54,13 @@ def is_numeric(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def number_leaf(key: str, default: float, fix: str = NUMBER) -> Any:
-    """Field of a module that holds a number; see `as_leaf`."""
-    convert = functools.partial(as_leaf, key=key, fix=fix)
-    return eqx.field(converter=convert, default=default)
-
-
-def static_word(default: Any) -> Any:
-    """Field of a module that holds a word or a count, which is no leaf."""
-    return eqx.field(static=True, default=default, converter=as_plain)
-
-
 def as_words(value: Any) -> Any:
-    """A list of words as a tuple."""
+    """Tuple of a list of words; anything else as `as_plain` gives it."""
     return tuple(map(as_plain, value)) if isinstance(value, list | tuple) else as_plain(value)
 
 
 def as_plain(value: Any) -> Any:
-    """A word or a number as Python has it; with arrays it is neither, as the check will find."""
+    """Plain Python value of a NumPy scalar; text in place of arrays, which checks then refuse."""
     if isinstance(value, np.generic):
         return value.item()
     return shown(value) if any(map(eqx.is_array, jax.tree.leaves(value))) else value
@@ -80,7 +73,7 @@ def require(key: str, value: Any, holds: bool, fix: str) -> None:
 
 
 def shown(value: Any) -> str:
-    """A value as messages have it."""
+    """Value as a message shows it, in one piece of text."""
     if isinstance(value, jax.core.Tracer):
         return "a traced value"
     if isinstance(value, jax.Array | np.ndarray):
@@ -89,14 +82,17 @@ def shown(value: Any) -> str:
         value = np.asarray(value).tolist()
     try:
         return repr(value)
-    except (ValueError, RecursionError):  # Python writes no whole number of thousands of digits
+    except (ValueError, RecursionError):  # such as a whole number of thousands of digits
         return f"a {type(value).__name__} too long to show"
 
 
 def require_number(
     key: str, value: Any, fix: str = POSITIVE, low: float = 0.0, high: float = np.inf
 ) -> None:
-    """A single number strictly between low and high; traced values are left to the solver."""
+    """Raise `InputError` unless a value is one number between low and high, both excluded.
+
+    Traced values pass: they have no number yet.
+    """
     if isinstance(value, jax.core.Tracer):
         return
     number = np.asarray(value)
@@ -105,23 +101,23 @@ def require_number(
 
 
 def check_words(key: str, words: Any) -> None:
-    """Raise `InputError` unless it is a list of words."""
+    """Raise `InputError` unless a value is a list of words."""
     several = isinstance(words, list | tuple) and all(isinstance(word, str) for word in words)
     require(key, words, several, "give a list of words")
 
 
 def require_choice(key: str, value: Any, choices: Sequence[Any]) -> None:
-    """Raise `InputError` with the choices unless the value is one of them."""
+    """Raise `InputError` with the choices unless a value is one of them."""
     known = not isinstance(value, jax.Array | np.ndarray) and value in choices
     require(key, value, known, "choose " + " or ".join(map(repr, choices)))
 
 
 def require_count(key: str, value: Any, low: int, high: int = 10**6) -> None:
-    """Raise `InputError` unless it is a whole number from low to high."""
+    """Raise `InputError` unless a value is a whole number from low to high, both included."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     require(key, value, whole and low <= value <= high, f"must be a whole number, {low} to {high}")
 
 
 def is_traced(*trees: object) -> bool:
-    """Whether any leaf is traced."""
+    """True if any leaf of the trees is traced by a JAX transformation."""
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(trees))

@@ -1,4 +1,4 @@
-"""The two ways a run can fail, each with one clear line."""
+"""Errors and warnings, one line each, and the status of a load step."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ LONGEST = 800  # characters of a message
 
 
 class InputError(ValueError):
-    """Input that makes no model; the message names the field, the value and the fix.
+    """Input that makes no model; the message names the key, the value and the fix.
 
-    It is one line; of a very long one, the middle is left out.
+    The message is one line; the middle of a very long one is left out.
     """
 
     def __init__(self, message: object = "") -> None:
@@ -21,15 +21,15 @@ class InputError(ValueError):
 
 
 class UnconvergedError(RuntimeError):
-    """A load step without equilibrium; the message names the step and what to try."""
+    """Load step without equilibrium; the message names the step and what to try."""
 
 
 class DoubtfulWarning(UserWarning):
-    """A result that converged and may be wrong all the same; see `jbeamshell.History.doubts`."""
+    """Result that converged and may still be wrong; see `jbeamshell.History.doubts`."""
 
 
 class Status(enum.IntEnum):
-    """How a load step ended."""
+    """End of the search for a load step's equilibrium."""
 
     CONVERGED = 0
     MAX_ITERATIONS = 1

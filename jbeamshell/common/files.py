@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Files: written whole or not at all; TOML, JSON and CSV."""
 
 from __future__ import annotations
 
@@ -7,23 +7,19 @@ import csv
 import io
 import json
 import os
+import tempfile
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jbeamshell.common.errors import InputError
 
-if TYPE_CHECKING:  # a run that draws and fits nothing need not wait for them
-    pass
-
-import tempfile
-import tomllib
-
-LARGEST_TOML = 10_000_000  # bytes: a pressure table of 100,000 rows is a quarter of it
+LARGEST_TOML = 10_000_000  # bytes; a pressure table of 100,000 rows takes a quarter of it
 
 
 def as_path(path: Any) -> Path:
-    """The path of a file's name; `InputError` for what is none."""
+    """Path of a file's name; raises `InputError` for anything that is no file name."""
     if isinstance(path, str | os.PathLike):
         name = os.fspath(path)
         if isinstance(name, str) and "\0" not in name:
@@ -33,7 +29,22 @@ def as_path(path: Any) -> Path:
 
 @contextlib.contextmanager
 def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A draft to write to, renamed to ``path`` when the block ends well, else removed."""
+    """Context with a draft to write to, which is renamed to ``path`` if the block succeeds.
+
+    If the block fails, the draft is removed and ``path`` stays as it was.
+
+    Raises
+    ------
+    InputError
+        if the file cannot be written
+
+    Examples
+    --------
+    ::
+
+        with written_whole("numbers.txt") as draft:
+            draft.write_text("1 2 3")
+    """
     target, draft = as_path(path), None
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
@@ -44,7 +55,7 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         draft.replace(target)
     except OSError as error:  # no folder, no permission, a full disk
         raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
-    except UnicodeEncodeError as error:  # of a file's name that is not text itself
+    except UnicodeEncodeError as error:  # a file name with half a character
         raise InputError(f"{target}: cannot be written ({error})") from None
     finally:
         if draft is not None:
@@ -52,21 +63,23 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a text file whole or not at all."""
+    """Write a text file, whole or not at all."""
     with written_whole(path) as draft:
         draft.write_text(text, encoding="utf-8")
 
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The tables of a TOML file; `InputError` for what is none, or too large to be one of ours."""
+    """Tables of a TOML file; raises `InputError` if it is none, or larger than `LARGEST_TOML`."""
     try:
         with as_path(path).open("rb") as file:
             data = file.read(LARGEST_TOML + 1)
-    except (OSError, UnicodeEncodeError) as error:  # the latter for a name that is no text
+    except (OSError, UnicodeEncodeError) as error:  # the latter: a name with half a character
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({reason})") from None
     if len(data) > LARGEST_TOML:
-        raise InputError(f"{path}: is no scene or plan: holds more than {LARGEST_TOML:,} bytes")
+        raise InputError(
+            f"{path}: is no scene or plan: it holds more than {LARGEST_TOML:,} bytes; name another"
+        )
     try:
         return parsed_toml(data.decode("utf-8"))
     except ValueError as error:
@@ -74,7 +87,7 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def parsed_toml(text: str) -> dict[str, Any]:
-    """The tables of TOML text; `ValueError` for any other."""
+    """Tables of TOML text; raises `ValueError` for any other text."""
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -87,12 +100,8 @@ def _umask() -> int:
     return current
 
 
-if TYPE_CHECKING:  # a run that draws and fits nothing need not wait for them
-    pass
-
-
 def as_json(figures: Mapping[str, Any]) -> str:
-    """JSON text; a number that is not finite is refused rather than written as NaN."""
+    """JSON text; raises `ValueError` for a number that is not finite, which JSON cannot write."""
     return json.dumps(figures, indent=2, allow_nan=False) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""Options of the whole process that make JAX start and run faster, taken only when asked for."""
+"""Options of the whole process that make JAX start and run faster; opt in by `configure`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jbeamshell.common.errors import InputError
 EXTRA = "--xla_backend_extra_options="
 FAST_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
 ASYNCHRONOUS = "jax_cpu_enable_async_dispatch"
-WORTH_KEEPING = 0.2  # seconds of compiling
+WORTH_KEEPING = 0.2  # seconds of compilation, from which on a program is kept in the cache
 
 
 def configure(
@@ -23,26 +23,36 @@ def configure(
     asynchronous: bool = False,
     cache: str | os.PathLike[str] | None = None,
 ) -> None:
-    """Choose how JAX compiles and calls, for this process and, but for calls, those it starts.
+    """Choose how JAX compiles and calls in this process.
+
+    Processes that this one starts inherit ``fast_loops``, not the other options.
 
     Parameters
     ----------
-    fast_loops : whether every loop on a CPU becomes one native function, instead of a call for each
-        of its operations: load paths run several times faster, and compile a little slower.  It is
-        the compiler's own option and holds for all that the process compiles.
-    asynchronous : whether a call on a CPU computes in another thread, as JAX's do unless told
-        otherwise; handing over takes as long as a small strip's cycle
+    fast_loops : True to compile every loop on a CPU to one native function, instead of a call for
+        each of its operations.  Load paths then run several times faster, and compile a little
+        slower.  The option is the compiler's and holds for everything the process compiles.
+    asynchronous : True to compute calls on a CPU in another thread, which is JAX's own default.
+        Handing over to that thread takes as long as a cycle of a small strip.
     cache : folder in which compiled programs are kept, so that the next process need not compile
-        them again; None leaves that as it is
+        them again; None leaves JAX's setting as it is
 
     Raises
     ------
     InputError
-        if JAX has already started, so that these would come too late
+        if JAX has already started: it takes no options any more
 
     Notes
     -----
-    The command line does this by itself, with the folder that `default_cache` names.
+    The command line calls this by itself, with the folder of `default_cache`.
+
+    Examples
+    --------
+    ::
+
+        import jbeamshell as jb
+
+        jb.configure(cache="compiled")  # before anything is computed
     """
     if cache is not None:
         jax.config.update("jax_compilation_cache_dir", str(cache))
@@ -54,7 +64,7 @@ def configure(
     if not fast_loops or FAST_LOOPS in flags:
         return
     _check_not_started("fast_loops = True")
-    if EXTRA in flags:  # given once only, with commas
+    if EXTRA in flags:  # the compiler reads the option once, as a list with commas
         flags = flags.replace(EXTRA, f"{EXTRA}{FAST_LOOPS},", 1)
     else:
         flags = f"{flags} {EXTRA}{FAST_LOOPS}".strip()
@@ -68,20 +78,20 @@ def _check_not_started(asked: str) -> None:
 
 
 def is_asynchronous() -> bool:
-    """Whether JAX is set to compute in other threads than calls come from."""
+    """True if JAX computes calls on a CPU in another thread."""
     config: Any = jax.config
     return bool(config.values[ASYNCHRONOUS])
 
 
 def started() -> bool:
-    """Whether JAX has started, after which its compiler takes no options."""
-    from jax._src import xla_bridge  # nothing public tells without starting it
+    """True if JAX has started; its compiler takes no options afterwards."""
+    from jax._src import xla_bridge  # no public function tells without starting it
 
     return xla_bridge.backends_are_initialized()
 
 
 def memory() -> float:
-    """Bytes of memory that this machine has; infinite where it does not say."""
+    """Memory of this machine in bytes; infinite if it does not say."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, OSError, ValueError):
@@ -89,7 +99,7 @@ def memory() -> float:
 
 
 def start_of_a_command() -> None:
-    """What the command line chooses: fast loops, and a cache unless the user has one."""
+    """Configure JAX for a command: fast loops, and a cache unless the user has one."""
     if started():
         return
     cache = None
@@ -97,11 +107,11 @@ def start_of_a_command() -> None:
         try:
             cache = default_cache()
             cache.mkdir(parents=True, exist_ok=True)
-        except (OSError, RuntimeError):  # no home, or none to write to: everything works without
+        except (OSError, RuntimeError):  # no home folder to write to: it works without a cache
             cache = None
     configure(cache=cache)
 
 
 def default_cache() -> Path:
-    """Folder of the compiled programs that the command line keeps."""
+    """Folder in which the command line keeps compiled programs."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "jbeamshell"

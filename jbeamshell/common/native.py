@@ -1,4 +1,4 @@
-"""Functions that a core runs as one piece of native code."""
+"""Functions compiled to one native function of a CPU."""
 
 from __future__ import annotations
 
@@ -8,22 +8,27 @@ from typing import Any
 import jax
 from jax.experimental.xla_metadata import set_xla_metadata
 
-# The compiler's own mark of calls that become one function: it ignores what it does not know.
+# The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
 MARK = {"inlineable": "false", "xla_cpu_small_call": "true"}
-REFUSED = ("custom_call", "stablehlo.sort", "stablehlo.fft")  # they need the runtime around them
+REFUSED = ("custom_call", "stablehlo.sort", "stablehlo.fft")  # operations that need the runtime
 
 
 class Native:
-    """A function of numbers that runs as one native function on a CPU, where that can be had.
+    """Function of numbers that runs as one native function on a CPU, if the compiler can do it.
 
-    Otherwise each of its operations is a call of its own, and they take turns on several threads,
-    which takes longer than the arithmetic of a strip of some dozen nodes.
+    Otherwise each of its operations is a call of its own.  The calls take turns on several threads,
+    which costs more time than the arithmetic of a strip of a few dozen nodes.
 
     Attributes
     ----------
-    ordinary : the compiled function
-    whole : another form of it: one call, which is marked
-    fits : whether that can be had; None is not tried yet
+    ordinary : compiled function
+    whole : same function, marked for the compiler as one call
+    fits : True if the compiler takes ``whole``; None before the first call
+
+    Parameters
+    ----------
+    function : function of JAX arrays
+    worth : False to use ``ordinary`` always
     """
 
     def __init__(self, function: Callable[..., Any], *, worth: bool = True) -> None:
@@ -33,11 +38,11 @@ class Native:
 
     def _marked(self, *given: Any) -> Any:
         leaves, tree = jax.tree.flatten(self.ordinary(*given))
-        leaves[0] = set_xla_metadata(leaves[0], **MARK)  # the call that makes it
+        leaves[0] = set_xla_metadata(leaves[0], **MARK)  # marks the call that makes the leaf
         return jax.tree.unflatten(tree, leaves)
 
     def now(self, *given: Any) -> Any | None:
-        """The function's value, or None if it is asked by a transformation: it is for numbers."""
+        """Value for numbers; None if a JAX transformation asks with traced values."""
         if any(isinstance(each, jax.core.Tracer) for each in given):
             return None
         with jax.ensure_compile_time_eval():  # now, even while another function is traced
@@ -46,12 +51,13 @@ class Native:
             if self.fits:
                 try:
                     return self.whole(*given)
-                except jax.errors.JaxRuntimeError:  # the compiler cannot take something in
+                except jax.errors.JaxRuntimeError:  # the compiler refuses an operation
                     self.fits = False
             return self.ordinary(*given)
 
 
 def _may_fit(whole: Any, given: tuple[Any, ...]) -> bool:
+    """True if the program runs on a CPU and has no operation that needs the runtime."""
     if jax.default_backend() != "cpu":
         return False
     text = whole.lower(*given).as_text()

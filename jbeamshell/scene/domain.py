@@ -7,7 +7,7 @@ hold are marked.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -45,7 +45,8 @@ class Rule(NamedTuple):
         require(self.key, self.value, bool(np.all(self.holds)), self.fix)
 
 
-def support_rules(strip: Strip, contact: Contact, model: Model, numbers: Numbers) -> Iterator[Rule]:
+@np.errstate(over="ignore", invalid="ignore")  # one of the rules refuses infinite forces
+def support_rules(strip: Strip, contact: Contact, model: Model, numbers: Numbers) -> list[Rule]:
     """Rules by which pressures, friction and supports hold the strip, in the order of the checks.
 
     Parameters
@@ -54,27 +55,29 @@ def support_rules(strip: Strip, contact: Contact, model: Model, numbers: Numbers
     numbers : values by dotted key
     """
     length, friction = numbers("strip.length"), numbers("contact.friction")
-    bottom = numbers("contact.bottom_pressure")
+    top, bottom = numbers("contact.pressure"), numbers("contact.bottom_pressure")
+    down, _ = face_resultant(top, length)
+    force, moment = resultant(top, bottom, length)
+    rough = (friction > 0.0) | (strip.far_end != "free")
     fix = "nothing holds the strip along X (rigid-body motion): give strip.far_end or friction"
-    yield Rule("contact.friction", friction, (friction > 0.0) | (strip.far_end != "free"), fix)
-    for key in ("contact.pressure", "contact.bottom_pressure"):
-        if is_table(numbers(key)):
-            yield _on_strip(key, numbers(key)[:, 0], length)
-    down, _ = face_resultant(numbers("contact.pressure"), length)
-    yield Rule("contact.pressure", numbers("contact.pressure"), down > 0.0, "must press somewhere")
-    force, moment = resultant(numbers("contact.pressure"), bottom, length)
+    rules = [Rule("contact.friction", friction, rough, fix)]
+    for key, pressure in (("contact.pressure", top), ("contact.bottom_pressure", bottom)):
+        if is_table(pressure):
+            rules.append(_on_strip(key, pressure[:, 0], length))
+    rules.append(Rule("contact.pressure", top, down > 0.0, "must press somewhere"))
     fix = "overflows together with contact.pressure: take other units"
-    yield Rule("strip.length", length, np.isfinite(moment), fix)
-    if contact.normal == "none":
-        return
-    fix = "nothing holds the strip down (rigid-body motion): press more on top"
-    yield Rule("contact.bottom_pressure", bottom, force > 0.0, fix)
-    if strip.far_end != "held" and "w" in model.fields:
-        inside = (moment >= 0.0) & (moment <= force * length)
-        fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
-        yield Rule("contact.bottom_pressure", bottom, inside, fix)
+    rules.append(Rule("strip.length", length, np.isfinite(moment), fix))
+    if contact.normal != "none":
+        fix = "nothing holds the strip down (rigid-body motion): press more on top"
+        rules.append(Rule("contact.bottom_pressure", bottom, force > 0.0, fix))
+        if strip.far_end != "held" and "w" in model.fields:
+            inside = (moment >= 0.0) & (moment <= force * length)
+            fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
+            rules.append(Rule("contact.bottom_pressure", bottom, inside, fix))
+    return rules
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def gross_slip_rule(load: Load, numbers: Numbers, targets: Any, part: Any = 1.0) -> Rule:
     """Rule that a controlled force stays below gross slip, mu F_N L.
 
@@ -103,6 +106,7 @@ def gross_slip_rule(load: Load, numbers: Numbers, targets: Any, part: Any = 1.0)
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def bar_rule(load: Load, model: Model, numbers: Numbers) -> Rule:
     """Rule that a controlled displacement stays below the gross slip of a bar in closed form."""
     key, amplitude = "load.amplitude", numbers("load.amplitude")

@@ -12,7 +12,9 @@ import jax
 import numpy as np
 
 from jbeamshell.common.checks import (
+    NOT_NEGATIVE,
     NUMBER,
+    POSITIVE,
     as_leaf,
     as_words,
     require,
@@ -71,8 +73,8 @@ class Key:
             ends = "included" if self.closed else "excluded"
             return f"must lie between {self.low:g} and {self.high:g} (both {ends})"
         if self.low == 0.0:
-            return "must be a number, not negative" if self.closed else "must be a positive number"
-        return "must be a number" if self.low == -math.inf else f"must be above {self.low:g}"
+            return NOT_NEGATIVE if self.closed else POSITIVE
+        return NUMBER if self.low == -math.inf else f"must be a number above {self.low:g}"
 
     @property
     def optional(self) -> bool:
