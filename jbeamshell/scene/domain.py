@@ -15,6 +15,7 @@ import numpy as np
 
 from jbeamshell.common.checks import require
 from jbeamshell.mechanics.bar import bar_backbone
+from jbeamshell.scene.keys import FAR_ENDS
 from jbeamshell.scene.parts import Contact, Load, Model, Strip
 from jbeamshell.scene.pressure import face_resultant, is_table, resultant
 
@@ -56,9 +57,10 @@ def support_rules(strip: Strip, contact: Contact, model: Model, numbers: Numbers
     """
     length, friction = numbers("strip.length"), numbers("contact.friction")
     top, bottom = numbers("contact.pressure"), numbers("contact.bottom_pressure")
+    held = FAR_ENDS[strip.far_end]
     down, _ = face_resultant(top, length)
     force, moment = resultant(top, bottom, length)
-    rough = (friction > 0.0) | (strip.far_end != "free")
+    rough = (friction > 0.0) | ("v" in held)
     fix = "nothing holds the strip along X (rigid-body motion): give strip.far_end or friction"
     rules = [Rule("contact.friction", friction, rough, fix)]
     for key, pressure in (("contact.pressure", top), ("contact.bottom_pressure", bottom)):
@@ -70,7 +72,7 @@ def support_rules(strip: Strip, contact: Contact, model: Model, numbers: Numbers
     if contact.normal != "none":
         fix = "nothing holds the strip down (rigid-body motion): press more on top"
         rules.append(Rule("contact.bottom_pressure", bottom, force > 0.0, fix))
-        if strip.far_end != "held" and "w" in model.fields:
+        if "beta" not in held and "w" in model.fields:
             inside = (moment >= 0.0) & (moment <= force * length)
             fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
             rules.append(Rule("contact.bottom_pressure", bottom, inside, fix))

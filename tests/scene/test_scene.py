@@ -64,7 +64,7 @@ def values_of_all_keys(draw):
     fields = draw(st.sampled_from(MODELS))
     lifting, squeezing = "w" in fields, "psi" in fields
     normal = draw(st.sampled_from(["rigid", "compliant", "none"] if lifting else ["rigid"]))
-    far_end = draw(st.sampled_from(["held"] if normal == "none" else FAR_ENDS))
+    far_end = draw(st.sampled_from(["held"] if normal == "none" else list(FAR_ENDS)))
     law = draw(st.sampled_from(["elastic-slip", "smooth-cap", "tanh-increment"]))
     smoothing = st.just("sharp") if law == "tanh-increment" else st.floats(1.01, 1e3)
     presses_up = positive | tables(length) if normal == "none" else st.just(0.0)
