@@ -24,7 +24,7 @@ from jbeamshell.common.errors import LONGEST
 from jbeamshell.identify import plan
 from jbeamshell.measured import containers, curve_files, curves, loops, steady
 from jbeamshell.measured.recordings import read_recordings
-from jbeamshell.quasistatic import stepping
+from jbeamshell.quasistatic import recovery
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import KEYS, NUMBERS
 from jbeamshell.scene.toml import overridden, scene_from_values
@@ -249,7 +249,7 @@ def test_precision_and_masks_are_minded():
 
 
 def test_numbers_at_the_ends_of_what_there_is_give_figures_or_one_line(capsys, monkeypatch):
-    monkeypatch.setattr(stepping, "PIECES", ())
+    monkeypatch.setattr(recovery, "PIECES", ())
     for key in (key for key in NUMBERS if key != "strip.layers"):
         for value in ("5e-324", "1.7e308"):
             code = main.main(["run", *BASE, "--json", "--set", f"{key}={value}"])

@@ -12,7 +12,8 @@ import numpy as np
 import jbeamshell as jb
 from calibration.methods.strips import number, scene_of
 from jbeamshell.quasistatic.load_path import LoadPath
-from jbeamshell.quasistatic.stepping import at_rest, march
+from jbeamshell.quasistatic.path_state import initial_state
+from jbeamshell.quasistatic.stepping import march
 
 LARGE = 1.0  # an amplitude for paths of their own, for which it means nothing
 
@@ -61,8 +62,8 @@ def to_gross_slip(
         one = jnp.ones_like(pull)
         zero = jnp.zeros(1)
         path = LoadPath(jnp.append(zero, target), jnp.append(1.0, one), jnp.append(zero, one))
-        found = march(scene, at_rest(scene), path, jb.Newton())  # `solve` refuses gross slip
-        sound = found.state.sound
+        found = march(scene, initial_state(scene), path, jb.Newton())  # `solve` refuses gross slip
+        sound = found.state.converged
         return found.state.level.force, found.iterations, found.error, sound
 
     rows = []

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from jbeamshell.mechanics.bar import bar_force
 from jbeamshell.scene.scene import Scene
 
 # Constants of `bound`, fitted by calibration/map_kinematics.py to map_kinematics.json beside it.
@@ -70,7 +70,7 @@ def linear_error(scene: Scene) -> float:
     limit, amplitude = float(contact.friction) * pressure, float(load.amplitude)
     if limit > 0.0:  # else the whole strip slips
         displaced = load.control == "displacement"
-        force = math.sqrt(2.0 * stiffness * limit * amplitude) if displaced else amplitude
+        force = bar_force(amplitude, stiffness, limit) if displaced else amplitude
         slip = min(slip, force / limit)
     softness = float(strip.plane_modulus / (2.0 * strip.shear_modulus))
     pressed = 2.0 * height * pressure / stiffness

@@ -19,7 +19,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.files import as_path, written_whole
 from jbeamshell.scene.toml import scene_to_toml
 
-FORMAT = "jbeamshell history 2"
+FORMAT = "jbeamshell history 3"
 
 
 def write_history(history: Any, path: str | os.PathLike[str]) -> None:

@@ -1,4 +1,6 @@
-"""mechanics.bar."""
+"""Goodman's bar: one-dimensional elastic bar on frictional ground, in closed form."""
+
+from typing import Any
 
 import jax.numpy as jnp
 from jax import Array
@@ -29,6 +31,28 @@ def bar_backbone(
     Goodman 1959; Brink 2015, eq. 3.11 with the slip length of eq. 3.12.
     """
     return jnp.abs(force) * force / axial_stiffness / friction_per_length / 2
+
+
+def bar_force(displacement: Any, axial_stiffness: ArrayLike, friction_per_length: ArrayLike) -> Any:
+    """End force of the first loading of a bar, ``F = sqrt(2 EA q u)``, for ``u >= 0``.
+
+    Inverse of `bar_backbone`, for numbers and arrays of NumPy or of JAX.
+
+    Parameters
+    ----------
+    displacement : array_like, shape (...)
+        End displacement ``u >= 0`` [length], below gross slip.
+    axial_stiffness : array_like, shape (...)
+        EA [force].
+    friction_per_length : array_like, shape (...)
+        q [force / length].
+
+    Returns
+    -------
+    array_like, shape (...)
+        F [force].
+    """
+    return (2.0 * axial_stiffness * friction_per_length * displacement) ** 0.5
 
 
 def bar_slip_length(force: ArrayLike, friction_per_length: ArrayLike) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -15,25 +15,48 @@ from jbeamshell.common.checks import require, require_count
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
 
-Seen = TypeVar("Seen")
-Stiffness = TypeVar("Stiffness")
-PATIENCE = 100  # iterations; contact that recedes node by node needs many
-CHORDS = 12  # iterations between refreshes of what hardly changes
+PATIENCE = 100  # iterations after which the residual must fall; receding contact needs many
+CHORDS = 12  # iterations between two refreshes of the stiffness
+
+
+class Problem(NamedTuple):
+    """Residual whose rows couple to neighbouring rows only, with its tangent.
+
+    The tangent is made from two things: an input that `evaluate` finds along with the residual, and
+    a stiffness that hardly changes.
+
+    Attributes
+    ----------
+    evaluate : from the unknowns (n, m) to the residual (n, m), in units of the friction force
+        mu F_N L, and the tangent's input
+    limit : from an iterate and the next one to the one to go on with
+    tangent : from its input and the stiffness to the matrix of the residual
+    refresh : from the unknowns to the stiffness; None if the stiffness is constant and given
+    """
+
+    evaluate: Callable[[Array], tuple[Array, Any]]
+    limit: Callable[[Array, Array], Array]
+    tangent: Callable[[Any, Any], BlockTridiagonal]
+    refresh: Callable[[Array], Any] | None = None
 
 
 class Newton(eqx.Module):
-    """Newton's method with a non-monotone line search, differentiable at the root.
+    """Settings of Newton's method with a non-monotone line search, differentiable at the root.
 
     Friction's kinks raise the residual for an iteration or two, by no more than the friction force
-    itself; a search that forbids this stalls there.  So a step is halved only when the residual
-    grows by more than that.
+    itself, and a search that forbids this stalls there.  So a step is halved only if it raises the
+    residual by more than that.
 
     Attributes
     ----------
     tolerance : largest out-of-balance force at a node over mu F_N L; None is 1e-10 in double and
         1e-4 in single precision
-    max_iterations : Newton iterations per load step
-    max_halvings : of one Newton step
+    max_iterations : largest number of Newton iterations in a load step
+    max_halvings : largest number of halvings of one Newton step
+
+    Examples
+    --------
+    >>> history = jb.solve(scene, solver=jb.Newton(tolerance=1e-8))
     """
 
     tolerance: float | None = eqx.field(static=True, default=None)
@@ -48,7 +71,7 @@ class Newton(eqx.Module):
         require_count("solver.max_halvings", self.max_halvings, 0)
 
     def tolerance_for(self, dtype: jnp.dtype) -> float:
-        """The tolerance in force at a precision."""
+        """Tolerance in force at a precision; `InputError` if the precision cannot reach it."""
         double = dtype == jnp.float64
         tolerance = self.tolerance or (1e-10 if double else 1e-4)
         require(
@@ -60,91 +83,35 @@ class Newton(eqx.Module):
         return tolerance
 
     def solve(
-        self,
-        evaluate: Callable[[Array], tuple[Array, Seen]],
-        limit: Callable[[Array, Array], Array],
-        guess: Array,
-        enabled: Array,
-        tangent: Callable[[Seen, Stiffness], BlockTridiagonal],
-        stiffness: Stiffness | None,
-        refresh: Callable[[Array], Stiffness] | None = None,
+        self, problem: Problem, guess: Array, stiffness: Any = None, enabled: ArrayLike = True
     ) -> tuple[Array, tuple[Array, Array]]:
-        """Find a root of a residual whose rows couple to neighbouring rows only.
+        """Find a root.
 
         Parameters
         ----------
-        evaluate : from (n, m) unknowns to the residual (n, m), in units of the friction force
-            mu F_N L, and to what the tangent sees of it
-        limit : from an iterate and the next one to the one to go on with
-        guess : (n, m)
-        enabled : false skips the iteration
-        tangent : the residual's matrix from what it sees and from the part that hardly changes
-        stiffness : that part; None where the guess is likely to be a root, so that it is found only
-            when it is needed
-        refresh : that part at some unknowns; None where it is the same everywhere and known
+        problem : residual and tangent
+        guess : (n, m) unknowns to start from
+        stiffness : stiffness at the guess; None finds it by ``problem.refresh`` when it is needed,
+            which saves it where the guess is a root
+        enabled : False skips the iteration
 
         Returns
         -------
         root : (n, m); forward and reverse derivatives by the implicit function theorem
-        iterations, error : count, and the largest residual left
+        iterations, error : number of iterations, and the largest residual left
         """
+        # An iteration that approaches the root slowly goes on for once when it is close.
+        once_more = problem.refresh is not None and stiffness is not None
         tolerance = self.tolerance_for(guess.dtype)
-        creeping = refresh is not None and stiffness is not None
-
-        def close(at: Iterate) -> Array:
-            return jnp.max(jnp.abs(at.residual)) <= tolerance
-
-        def unfinished(at: Iterate) -> Array:
-            # What approaches the root a little at a time goes on for once when it is close.
-            done = close(at) & at.was_close if creeping else close(at)
-            return enabled & ~done & (at.tried < self.max_iterations)
-
-        def improve(at: Iterate, stiffness: Stiffness) -> Iterate:
-            step = block_tridiagonal.solve(tangent(at.seen, stiffness), -at.residual)
-            x = limit(at.x, at.x + at.scale * step)
-            residual, seen = evaluate(x)
-            # Friction's kinks raise the residual, but by no more than the friction force itself;
-            # a search that goes round in circles must lower it.
-            rise = jnp.where(at.tried < PATIENCE, 1.0, 0.0)
-            most = jnp.linalg.norm(at.residual) + rise
-            good = (jnp.linalg.norm(residual) <= most) | (at.scale <= 0.5**self.max_halvings)
-            new = Iterate(x, residual, seen, jnp.ones_like(at.scale), close(at), at.tried)
-            old = at._replace(scale=0.5 * at.scale)
-            kept: Iterate = jax.tree.map(lambda a, b: jnp.where(good, a, b), new, old)
-            return kept._replace(tried=at.tried + 1)
-
-        def search(at: Iterate, stiffness: Stiffness, until: ArrayLike) -> Iterate:
-            return lax.while_loop(
-                lambda at: unfinished(at) & (at.tried < until),
-                lambda at: improve(at, stiffness),
-                at,
-            )
-
-        def refreshing(
-            start: Iterate, stiffness: Stiffness, anew: Callable[[Array], Stiffness]
-        ) -> Iterate:
-            def chords(state: tuple[Iterate, Stiffness]) -> tuple[Iterate, Stiffness]:
-                at = search(*state, state[0].tried + CHORDS)
-                return at, lax.cond(unfinished(at), anew, lambda _: state[1], at.x)
-
-            return lax.while_loop(lambda s: unfinished(s[0]), chords, (start, stiffness))[0]
+        search = _Search(self, problem, tolerance, jnp.asarray(enabled), once_more)
 
         def iterate(_: Callable[[Array], Array], start: Array) -> tuple[Array, tuple]:
-            one, none = jnp.ones((), start.dtype), jnp.asarray(0)
-            at = Iterate(start, *evaluate(start), one, jnp.asarray(False), none)
-            if stiffness is not None and refresh is not None:
-                at = refreshing(at, stiffness, refresh)
-            elif stiffness is not None:
-                at = search(at, stiffness, self.max_iterations)
-            elif refresh is not None:
-                at = lax.while_loop(
-                    unfinished, lambda at: search(at, refresh(at.x), self.max_iterations), at
-                )
-            # As a float: custom_root has no tangent for integers.
-            return at.x, (at.tried.astype(at.x.dtype), jnp.max(jnp.abs(at.residual)))
+            end = search.run(start, stiffness)
+            # The count is a float because custom_root has no tangent for integers.
+            return end.x, (end.tried.astype(end.x.dtype), jnp.max(jnp.abs(end.residual)))
 
         root, (count, error) = lax.custom_root(
-            lambda x: evaluate(x)[0],
+            lambda x: problem.evaluate(x)[0],
             guess,
             iterate,
             block_tridiagonal.linear_solve,
@@ -153,20 +120,92 @@ class Newton(eqx.Module):
         return root, (count.astype(int), error)
 
 
-class Iterate(NamedTuple):
-    """Where a search stands.
+class _Iterate(NamedTuple):
+    """Iterate of a search.
 
     Attributes
     ----------
-    x, residual, seen : unknowns, their residual and what the tangent sees of it
-    scale : part of the next step that is taken
-    was_close : whether the iterate before was within the tolerance
-    tried : steps tried so far
+    x, residual, tangent_input : unknowns, their residual and the input of the tangent there
+    scale : part of the next Newton step that is taken
+    was_close : True if the iterate before was within the tolerance
+    tried : number of steps tried so far
     """
 
     x: Array
     residual: Array
-    seen: Any
+    tangent_input: Any
     scale: Array
     was_close: Array
     tried: Array
+
+
+class _Search(NamedTuple):
+    """Search for a root of a problem.
+
+    Attributes
+    ----------
+    settings : settings of Newton's method
+    problem : residual and tangent
+    tolerance : largest residual of a root
+    enabled : False skips the iteration
+    once_more : True if the iterate before must be within the tolerance too
+    """
+
+    settings: Newton
+    problem: Problem
+    tolerance: float
+    enabled: Array
+    once_more: bool
+
+    def run(self, start: Array, stiffness: Any) -> _Iterate:
+        """Iterate from unknowns ``start``."""
+        refresh, most = self.problem.refresh, self.settings.max_iterations
+        one, none = jnp.ones((), start.dtype), jnp.asarray(0)
+        evaluated = self.problem.evaluate(start)
+        first = _Iterate(start, *evaluated, one, jnp.asarray(False), none)
+        if refresh is None:
+            return self._chords(first, stiffness, most)
+        if stiffness is None:
+            return lax.while_loop(
+                self._unfinished, lambda at: self._chords(at, refresh(at.x), most), first
+            )
+
+        def refreshed(state: tuple[_Iterate, Any]) -> tuple[_Iterate, Any]:
+            at = self._chords(*state, state[0].tried + CHORDS)
+            return at, lax.cond(self._unfinished(at), refresh, lambda _: state[1], at.x)
+
+        return lax.while_loop(lambda s: self._unfinished(s[0]), refreshed, (first, stiffness))[0]
+
+    def _chords(self, start: _Iterate, stiffness: Any, until: ArrayLike) -> _Iterate:
+        """Iterate with one stiffness up to so many steps."""
+        return lax.while_loop(
+            lambda at: self._unfinished(at) & (at.tried < until),
+            lambda at: self._improved(at, stiffness),
+            start,
+        )
+
+    def _improved(self, at: _Iterate, stiffness: Any) -> _Iterate:
+        """Iterate after a Newton step, or the same with half the scale if the step is rejected."""
+        problem = self.problem
+        matrix = problem.tangent(at.tangent_input, stiffness)
+        step = block_tridiagonal.solve(matrix, -at.residual)
+        x = problem.limit(at.x, at.x + at.scale * step)
+        residual, tangent_input = problem.evaluate(x)
+        # Friction's kinks raise the residual, but by no more than the friction force itself.  A
+        # search that goes round in circles must lower it.
+        rise = jnp.where(at.tried < PATIENCE, 1.0, 0.0)
+        most = jnp.linalg.norm(at.residual) + rise
+        smallest = at.scale <= 0.5**self.settings.max_halvings
+        accepted = (jnp.linalg.norm(residual) <= most) | smallest
+        close, whole = self._close(at), jnp.ones_like(at.scale)
+        new = _Iterate(x, residual, tangent_input, whole, close, at.tried)
+        old = at._replace(scale=0.5 * at.scale)
+        kept: _Iterate = jax.tree.map(lambda a, b: jnp.where(accepted, a, b), new, old)
+        return kept._replace(tried=at.tried + 1)
+
+    def _close(self, at: _Iterate) -> Array:
+        return jnp.max(jnp.abs(at.residual)) <= self.tolerance
+
+    def _unfinished(self, at: _Iterate) -> Array:
+        done = self._close(at) & at.was_close if self.once_more else self._close(at)
+        return self.enabled & ~done & (at.tried < self.settings.max_iterations)

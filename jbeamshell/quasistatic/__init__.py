@@ -1,1 +1,1 @@
-"""Load paths solved step by step: one residual, Newton's method, one scan over the path."""
+"""Quasi-static load paths: one residual, Newton's method, one scan over the steps."""

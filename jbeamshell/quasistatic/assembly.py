@@ -1,12 +1,12 @@
-r"""The stiffness of a strip with linear strains, entry by entry.
+r"""Stiffness of a strip with linear strains, entry by entry.
 
 An element of length h has, for the fields i and j of its ends a and b, the stiffness
 
     K = h c M_ss + c' M_sd + c'' M_ds + c''' M_dd/h,
 
 where M is the Hessian of the section's strain energy in its fields s and their slopes d, and the c
-are integrals of the element's shapes.  Each of a block's entries is an array over the nodes; any
-further axes are lanes, strips that are treated together.
+are integrals of the element's shapes.  Each entry of a block is an array over the nodes; further
+axes are lanes: strips that are solved together.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Blocks = list[list[Array]]  # m x m entries, (n, ...) each
 
 
 class Band(NamedTuple):
-    """A strip's residual as a linear function of its unknowns, in units of mu F_N L.
+    """Residual of a strip as a linear function of its unknowns, in units of mu F_N L.
 
     Attributes
     ----------
@@ -45,13 +45,13 @@ class Band(NamedTuple):
 
 
 def band(system: System, section: Array, rough: bool) -> Band:
-    """The band of a strip, with the supports it has with or without friction.
+    """Band of a strip, with its supports with or without friction.
 
     Parameters
     ----------
     system : its arrays may have lanes behind their nodes
-    section : (2, m, 2, m, ...) the section's stiffness; see `System.section_stiffness`
-    rough : whether there is friction
+    section : (2, m, 2, m, ...) stiffness of the section, see `System.section_stiffness`
+    rough : True if there is friction
     """
     h, supports = system.lengths, system.supports(rough)
     none, one = jnp.zeros_like(h[:1]), jnp.ones_like(h)
@@ -65,7 +65,7 @@ def band(system: System, section: Array, rough: bool) -> Band:
         return _rows(system, section, supports, *near)
 
     near = before, after, system.tributary
-    # One strip's nodes are a vector; of several strips, the lanes are, node by node.
+    # For one strip its nodes form a vector; for several strips the lanes do, node by node.
     lower, diagonal, upper, normal = rows(near) if h.ndim == 1 else lax.map(rows, near)
     rubbing = system.residual_scale(V) * system.tributary
     if V in supports:
@@ -128,14 +128,14 @@ def _rows(
 
 
 def node(x: Array, node: int) -> np.ndarray:
-    """Which entry of an array over the nodes belongs to one of them."""
+    """True at one node, in an array over the nodes."""
     here = np.zeros(x.shape[0], bool)
     here[node] = True
     return here.reshape(-1, *[1] * (x.ndim - 1))
 
 
 def unheld(system: System, band: Band, load: list[Array]) -> list[Array]:
-    """A load, m entries (n, ...), without what acts on held fields."""
+    """Load, m entries (n, ...), without the part that acts on held fields."""
     first = node(system.x, 0)
     return [
         jnp.where(first, 0.0, each) if field in band.held else each
@@ -144,7 +144,7 @@ def unheld(system: System, band: Band, load: list[Array]) -> list[Array]:
 
 
 def times(rows: Sequence[Sequence[Array]], change: Sequence[Array]) -> Array:
-    """Rows of a band times the unknowns: m arrays (n, ...) to (n, ...)."""
+    """Product (n, ...) of rows of a band and the unknowns, m arrays (n, ...)."""
     none = jnp.zeros_like(change[0][:1])
     near = (
         [jnp.append(none, each[:-1], 0) for each in change],

@@ -1,4 +1,4 @@
-"""Load paths that go on from where one ended."""
+"""Continuation of a load path from the end of another."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from jbeamshell.quasistatic.outcome import (
     raise_if_failed,
     warn_of_doubts,
 )
-from jbeamshell.quasistatic.slip_patterns import Foresight
-from jbeamshell.quasistatic.stepping import PathState, Steps, march, recover
-from jbeamshell.scene.scene import Scene
+from jbeamshell.quasistatic.path_state import PathState, StepResults
+from jbeamshell.quasistatic.recovery import recover
+from jbeamshell.quasistatic.stepping import Method, compiled_march
 
 
 class PathEnd(eqx.Module):
-    """End of a load path that was walked step by step, from which another one can go on.
+    """End of a load path that was walked step by step, from which another path can go on.
 
     Attributes
     ----------
-    state : the strip after the last step
+    state : state after the last step
     """
 
     state: PathState
@@ -46,27 +46,26 @@ class PathEnd(eqx.Module):
         solver: Newton | None = None,
         throw: bool = True,
     ) -> History:
-        """History with further load steps, as `jbeamshell.solve` gives it of both paths in one.
+        """History with further load steps, equal to that of both paths solved as one.
 
-        It is the same to the last bit where both paths have two load steps or more, else to
-        round-off.
+        It is equal to the last bit if both paths have two load steps or more, else to round-off.
 
         Parameters
         ----------
-        history : the history that ends here
-        path : loads to go on with, as of `jbeamshell.solve`; None is the scene's own cycles once
-            more, where the last load is its amplitude
-        solver, throw : as of `jbeamshell.solve`
+        history : history that ends here
+        path : further loads, see `jbeamshell.solve`; None is the scene's own cycles once more, for
+            which the last load must be the amplitude
+        solver, throw : see `jbeamshell.solve`
 
         Raises
         ------
         InputError
-            if the last step found no equilibrium, or the path makes no sense
+            if the last step found no equilibrium, or the path is invalid
         UnconvergedError
-            if a step has no equilibrium, even when it is walked in smaller steps
+            if a step has no equilibrium, even if it is walked in smaller steps
         """
         check_solver(solver)
-        if not bool(self.state.sound):
+        if not bool(self.state.converged):
             raise InputError("history: its last step found no equilibrium: go on from one that did")
         scene, solver = history.scene, solver or Newton()
         whole, _ = check(scene, path)
@@ -81,13 +80,13 @@ class PathEnd(eqx.Module):
             require("path", None, last == amplitude, fix)
             begun += max(half // 2, 1)
         further: LoadPath = jax.tree.map(lambda column: np.asarray(column)[begun:], whole)
-        # A single step would be compiled without its loop, and rounded otherwise.
+        # A single step would be compiled without a loop and rounded differently.
         count, least = further.target.size, max(further.target.size, 2)
         walked: LoadPath = jax.tree.map(
             lambda a: np.pad(a, (0, least - count), mode="edge"), further
         )
-        steps = _march(scene, self.state, walked, Foresight.of(solver, checked=True))
-        if not np.asarray(steps.state.sound)[count - 1]:
+        steps = compiled_march(scene, self.state, walked, solver, Method.STATUS_ITERATION)
+        if not np.asarray(steps.state.converged)[count - 1]:
             steps = recover(scene, steps, walked, solver, self.state)
             if throw:
                 part = jax.tree.map(lambda a: a[:count], steps)
@@ -108,21 +107,16 @@ class PathEnd(eqx.Module):
         return result
 
 
-def with_end(history: History, steps: Steps) -> History:
-    """History with the end of its path, where it was walked step by step."""
+def with_end(history: History, steps: StepResults) -> History:
+    """History with the end of its path, if that was walked step by step."""
     if history.scene.model.solution != "stepwise":
         return history
     last = jax.tree.map(lambda a: a[-1], steps.state)
     return dataclasses.replace(history, end=PathEnd(last))
 
 
-@eqx.filter_jit
-def _march(scene: Scene, start: PathState, path: LoadPath, solver: Newton) -> Steps:
-    return march(scene, start, path, solver)
-
-
 def _steps_of(history: History) -> dict[str, Any]:
-    """The fields that have an entry for every step."""
-    rest = {"scene", "cycles", "end", "middles", "x", "tributary", "load"}
-    names = [field.name for field in dataclasses.fields(history) if field.name not in rest]
+    """Fields of a history that have an entry for every step, by name."""
+    others = {"scene", "cycles", "end", "middles", "x", "tributary", "load"}
+    names = [field.name for field in dataclasses.fields(history) if field.name not in others]
     return {name: getattr(history, name) for name in names}

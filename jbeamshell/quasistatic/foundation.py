@@ -12,7 +12,7 @@ from jbeamshell.mechanics.friction import FrictionLaw, coulomb_cap
 from jbeamshell.mechanics.normal_contact import Absent, Compliance, NormalLaw, Rigid
 from jbeamshell.scene.scene import Scene
 
-CAP_FLOOR = 1e-6  # smallest cap over mu F_N/L: gradients need a cap that is not zero
+CAP_FLOOR = 1e-6  # smallest cap over mu F_N: gradients need a cap that is not zero
 # Range over which a compliant contact closes, over its approach under the mean pressure.
 CLOSING_RANGE = 0.05
 
@@ -41,8 +41,8 @@ class Foundation(eqx.Module):
         Parameters
         ----------
         scene : scene with its contact
-        normal_force : F_N, resultant of the pressure on the top face
-        force_scale : mu F_N, or F_N without friction
+        normal_force : F_N L, resultant of the pressure on the top face
+        force_scale : mu F_N L, or F_N L without friction
         area : contact area per unit width
         """
         strip, contact = scene.strip, scene.contact

@@ -1,4 +1,4 @@
-"""quasistatic.load_path."""
+"""Load paths: the pressing and the loads after it, checked against the scene."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.domain import bar_rule, gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
-LEFT = 13  # numbers that a load step leaves at a node, besides twice its fields
+NUMBERS_PER_NODE = 13  # numbers that a load step stores at a node, besides twice its fields
 LOADS = "give (steps,) loads, or (steps, 2) with pressures"
 
 
 def check(
     scene: Scene, path: ArrayLike | None = None
 ) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
-    """The whole path and its closed cycles; raises `InputError` where `solve` would."""
+    """Whole path and its closed cycles (start, turn, end); see `solve` for its `InputError`."""
     whole, cycles = whole_path(scene, path)
     if not is_traced(scene, whole):
         _check_size(scene, whole)
@@ -34,13 +34,13 @@ def check(
 def whole_path(
     scene: Scene, path: ArrayLike | None
 ) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
-    """The pressing, then the given loads or the scene's own; and the closed cycles among them."""
+    """Path of the pressing and of the given loads or the scene's own, and its closed cycles."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     pressing, known = scene.load.pressure_steps, scene.load.unit_path()
     solution = scene.model.solution
     fix = "knows the scene's own cycles only: leave the path out, or take 'stepwise'"
     require("model.solution", solution, path is None or solution == "stepwise", fix)
-    numbers: Any = jnp if is_traced(scene.load.amplitude, path) else np  # the faster, where it can
+    numbers: Any = jnp if is_traced(scene.load.amplitude, path) else np  # NumPy is faster
     amplitude = numbers.asarray(scene.load.amplitude)
     if path is None:
         targets = amplitude * known.astype(amplitude.dtype)
@@ -70,31 +70,31 @@ def whole_path(
 
 
 def check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:
-    """Nodes in contact (n,) from which a search starts; `InputError` where they fit no scene."""
+    """Nodes in contact (n,) where a search starts; `InputError` if they do not fit the scene."""
     try:
         touching, nodes = np.asarray(contact, dtype=bool), scene.model.nodes
     except (TypeError, ValueError):
-        require("contact", contact, False, "give one truth for each of the nodes")
+        require("contact", contact, False, "give True or False for each of the nodes")
     fits = touching.shape == (nodes,) and "w" in scene.model.fields
-    fix = f"give one truth for each of the {nodes} nodes, and w in model.fields"
+    fix = f"give True or False for each of the {nodes} nodes, and w in model.fields"
     require("contact", touching.shape, fits, fix)
     return touching
 
 
 def _check_size(scene: Scene, path: LoadPath) -> None:
-    """Refuse what would fill this machine's memory."""
+    """Raise `InputError` for a path whose results would fill this machine's memory."""
     levels, nodes = path.target.size, scene.model.nodes
-    need, most = 8.0 * levels * nodes * (2 * scene.model.width + LEFT), memory()
+    need, most = 8.0 * levels * nodes * (2 * scene.model.width + NUMBERS_PER_NODE), memory()
     fix = f"and {levels} load steps take {need:.2g} bytes of memory, this machine has {most:.2g}"
     require("model.nodes", nodes, need < most, f"{fix}: take fewer")
 
 
 class LoadPath(NamedTuple):
-    """What a path prescribes, (steps,) each.
+    """Quantities that a load path prescribes, (steps,) each.
 
     Attributes
     ----------
-    target : the controlled load, F or u(L)
+    target : controlled load: F, u(L) or, for the arc length, the way gone (signed by its direction)
     pressure : part of the pressures that acts
     rough : 1 with friction, 0 while the strip is pressed down before it
     """

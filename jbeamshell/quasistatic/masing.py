@@ -1,13 +1,13 @@
-"""Load cycles from backbones alone, by Masing's rule; and the bar, whose backbone is closed form.
+"""Load cycles from backbones by Masing's rule, and the bar, whose backbone has a closed form.
 
-The branches of a loop are the backbone, doubled (Masing 1926).  With the increments q(F) that a
-pull from the pressed strip makes,
+The branches of a loop are the backbone, doubled (Masing 1926).  With the increments q(F) under a
+pull of the pressed strip,
 
     q(F) = q(A) - 2 q((A - F)/2) on the way down,    q(F) = -q(A) + 2 q((A + F)/2) on the way up.
 
-A pull and a push differ where the strip has height, because the reaction does; the mean of the two
-takes that out of the loop at first order.  For the one-dimensional bar (Goodman 1959) pull and push
-are the same and the rule is exact.
+A pull and a push differ if the strip has height, because the reaction does.  The mean of the two
+removes this difference from the loop at first order.  For the one-dimensional bar (Goodman 1959)
+pull and push are the same and the rule is exact.
 """
 
 from __future__ import annotations
@@ -19,29 +19,31 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from jbeamshell.common.errors import Status
-from jbeamshell.mechanics.bar import bar_backbone, bar_slip_length, bar_slip_profile
+from jbeamshell.mechanics.bar import bar_backbone, bar_force, bar_slip_length, bar_slip_profile
 from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.load_path import LoadPath
-from jbeamshell.quasistatic.stepping import PathState, Steps, at_rest, march, walk
+from jbeamshell.quasistatic.path_state import PathState, StepResults, initial_state
+from jbeamshell.quasistatic.recovery import walk
+from jbeamshell.quasistatic.stepping import Method, march
 from jbeamshell.quasistatic.system import LoadLevel, System, V
 from jbeamshell.scene.scene import Scene
 
 
-class BackboneSteps(NamedTuple):
-    """A pull from the pressed strip in equal steps to the amplitude.
+class Backbone(NamedTuple):
+    """Backbone: a pull of the pressed strip in equal steps up to the amplitude.
 
     Attributes
     ----------
-    pressed : the steps in which the pressure is applied
+    pressed : results of the steps in which the pressure is applied
     level : increments since then, (half+1, ...) from zero to the amplitude
-    displacement, sinking : (half+1,) likewise
-    slip_work : (half,) of every step
-    slipping : (half, n) whether a node slips in a step
-    iterations, error, sound, status : (half,) of every step
+    displacement, sinking : (half+1,) increments since then
+    slip_work : (half,) work of friction in every step
+    slipping : (half, n) True if a node slips in a step
+    iterations, error, converged, status : (half,) one for every step
     """
 
-    pressed: Steps
+    pressed: StepResults
     level: LoadLevel
     displacement: Array
     sinking: Array
@@ -49,27 +51,32 @@ class BackboneSteps(NamedTuple):
     slipping: Array
     iterations: Array
     error: Array
-    sound: Array
+    converged: Array
     status: Array
 
 
 def masing(
-    scene: Scene, start: PathState, path: LoadPath, solver: Newton, recovering: bool = False
-) -> Steps:
-    """The scene's own cycles from the backbones of a pull and of a push, or of a pull alone.
+    scene: Scene,
+    start: PathState,
+    path: LoadPath,
+    solver: Newton,
+    method: Method = Method.NEWTON,
+    recovering: bool = False,
+) -> StepResults:
+    """Solve the scene's own cycles by the backbones of a pull and of a push, or of a pull alone.
 
     Parameters
     ----------
-    scene, start, path, solver : as of `jbeamshell.quasistatic.stepping.march`
-    recovering : whether failed steps are walked in pieces, which cannot be traced
+    scene, start, path, solver, method : see `jbeamshell.quasistatic.stepping.march`
+    recovering : True walks failed steps in pieces, which cannot be traced
     """
     signs = (1.0, -1.0) if scene.model.solution == "masing" else (1.0,)
     if recovering:
         ways = [walk(scene, start, _backbone_path(scene, path, s), solver) for s in signs]
     else:
 
-        def way(sign: Array) -> Steps:
-            return march(scene, start, _backbone_path(scene, path, sign), solver)
+        def way(sign: Array) -> StepResults:
+            return march(scene, start, _backbone_path(scene, path, sign), solver, method)
 
         both = lax.map(way, jnp.asarray(signs))  # compiled once
         ways = [jax.tree.map(lambda a, i=i: a[i], both) for i in range(len(signs))]
@@ -77,13 +84,13 @@ def masing(
     return _doubled(scene, path, _mean(*found) if len(found) == 2 else found[0])
 
 
-def bar_cycles(scene: Scene, path: LoadPath) -> Steps:
-    """The scene's own cycles of Goodman's bar, in closed form."""
+def bar_cycles(scene: Scene, path: LoadPath) -> StepResults:
+    """Solve the scene's own cycles of Goodman's bar in closed form."""
     return _doubled(scene, path, _bar_backbone(scene, path))
 
 
 def _backbone_path(scene: Scene, path: LoadPath, sign: float | Array) -> LoadPath:
-    """The pressing, then a pull (or a push) to the amplitude."""
+    """Load path of the pressing, and of a pull or a push to the amplitude after it."""
     pressing, half = scene.load.pressure_steps, scene.load.steps_per_half_cycle
     levels = sign * scene.load.amplitude * jnp.arange(1, half + 1) / half
     ones = jnp.ones_like(levels)
@@ -91,13 +98,14 @@ def _backbone_path(scene: Scene, path: LoadPath, sign: float | Array) -> LoadPat
     return jax.tree.map(lambda a, b: jnp.append(a[:pressing], b), path, after)
 
 
-def _since_pressed(scene: Scene, steps: Steps) -> BackboneSteps:
+def _since_pressed(scene: Scene, steps: StepResults) -> Backbone:
+    """Backbone as increments since the end of the pressing."""
     pressing = scene.load.pressure_steps
 
     def since(values: Array) -> Array:
         return values[pressing - 1 :] - values[pressing - 1]
 
-    return BackboneSteps(
+    return Backbone(
         pressed=jax.tree.map(lambda a: a[:pressing], steps),
         level=jax.tree.map(since, steps.state.level),
         displacement=since(steps.displacement),
@@ -106,18 +114,18 @@ def _since_pressed(scene: Scene, steps: Steps) -> BackboneSteps:
         slipping=steps.slipping[pressing:],
         iterations=steps.iterations[pressing:],
         error=steps.error[pressing:],
-        sound=steps.state.sound[pressing:],
+        converged=steps.state.converged[pressing:],
         status=steps.status[pressing:],
     )
 
 
-def _mean(pull: BackboneSteps, push: BackboneSteps) -> BackboneSteps:
-    """What a pull and a push have in common, as a pull."""
+def _mean(pull: Backbone, push: Backbone) -> Backbone:
+    """Mean of the backbones of a pull and of a push, as a pull."""
 
     def odd(a: Array, b: Array) -> Array:
         return 0.5 * (a - b)
 
-    return BackboneSteps(
+    return Backbone(
         pressed=pull.pressed,
         level=jax.tree.map(odd, pull.level, push.level),
         displacement=odd(pull.displacement, push.displacement),
@@ -126,12 +134,13 @@ def _mean(pull: BackboneSteps, push: BackboneSteps) -> BackboneSteps:
         slipping=pull.slipping | push.slipping,
         iterations=pull.iterations + push.iterations,
         error=jnp.maximum(pull.error, push.error),
-        sound=pull.sound & push.sound,
+        converged=pull.converged & push.converged,
         status=jnp.maximum(pull.status, push.status),
     )
 
 
-def _bar_backbone(scene: Scene, path: LoadPath) -> BackboneSteps:
+def _bar_backbone(scene: Scene, path: LoadPath) -> Backbone:
+    """Backbone of Goodman's bar in closed form."""
     system, strip, load = System(scene), scene.strip, scene.load
     half = load.steps_per_half_cycle
     rubs = scene.contact.friction * scene.contact.pressure
@@ -142,7 +151,8 @@ def _bar_backbone(scene: Scene, path: LoadPath) -> BackboneSteps:
         displacement = bar_backbone(force, stiffness, rubs)
     else:
         displacement = load.amplitude * part
-        force = jnp.sqrt(2.0 * stiffness * rubs * load.amplitude) * jnp.sqrt(part)
+        # The root of the part is taken alone, because its slope at zero is infinite.
+        force = bar_force(load.amplitude, stiffness, rubs) * jnp.sqrt(part)
     reach = bar_slip_length(force, rubs)
     slid = jax.vmap(lambda f: bar_slip_profile(system.x, f, strip.length, stiffness, rubs))(force)
     nothing = jnp.zeros_like(slid)
@@ -154,7 +164,7 @@ def _bar_backbone(scene: Scene, path: LoadPath) -> BackboneSteps:
         force=force,
     )
     work = force**3 / (6.0 * stiffness * rubs)  # q times the integral of the slip
-    return BackboneSteps(
+    return Backbone(
         pressed=_pressed_bar(scene, system, path),
         level=level,
         displacement=displacement,
@@ -163,20 +173,20 @@ def _bar_backbone(scene: Scene, path: LoadPath) -> BackboneSteps:
         slipping=level.traction[1:] > 0.0,
         iterations=jnp.zeros(half, int),
         error=jnp.zeros(half),
-        sound=jnp.ones(half, bool),
+        converged=jnp.ones(half, bool),
         status=jnp.full(half, Status.CONVERGED),
     )
 
 
-def _pressed_bar(scene: Scene, system: System, path: LoadPath) -> Steps:
-    """The bar under pressure: it feels nothing but the reaction."""
+def _pressed_bar(scene: Scene, system: System, path: LoadPath) -> StepResults:
+    """Results of pressing the bar, in which only the reaction changes."""
     count = scene.load.pressure_steps
-    start, none = at_rest(scene), jnp.zeros(count)
+    start, none = initial_state(scene), jnp.zeros(count)
     part = path.pressure[:count]
     state: PathState = jax.tree.map(lambda a: jnp.broadcast_to(a, (count, *a.shape)), start)
     reaction = part[:, None] * (system.load / system.tributary)
     level = state.level._replace(reaction=reaction, cap=scene.contact.friction * reaction)
-    return Steps(
+    return StepResults(
         state=state._replace(level=level, pressure=part),
         displacement=none,
         slipping=jnp.zeros((count, system.x.size), bool),
@@ -189,8 +199,8 @@ def _pressed_bar(scene: Scene, system: System, path: LoadPath) -> Steps:
     )
 
 
-def _doubled(scene: Scene, path: LoadPath, backbone: BackboneSteps) -> Steps:
-    """The scene's own cycles from a backbone, by Masing's rule."""
+def _doubled(scene: Scene, path: LoadPath, backbone: Backbone) -> StepResults:
+    """Results of the scene's own cycles from a backbone, by Masing's rule."""
     pressed, cycles = backbone.pressed, scene.load.cycles
 
     def joined(before: Array, first: Array, down: Array, up: Array) -> Array:
@@ -204,19 +214,21 @@ def _doubled(scene: Scene, path: LoadPath, backbone: BackboneSteps) -> Steps:
         return joined(before, first, branch, branch)
 
     def reached(before: Array, each: Array) -> Array:
-        """Of a backbone that must be known to its end before a branch is."""
+        """Values of the branches that depend on the whole backbone."""
         return steps(before, each[1::2], jnp.broadcast_to(each[-1], each.shape))
 
     level = jax.tree.map(doubled, pressed.state.level, backbone.level)
     level = level._replace(cap=coulomb_cap(scene.contact.friction, level.reaction))
-    sound = reached(pressed.state.sound, backbone.sound)
-    count = sound.size
+    converged = reached(pressed.state.converged, backbone.converged)
+    count = converged.size
     last: PathState = jax.tree.map(
         lambda a: jnp.broadcast_to(a[-1], (count, *a.shape[1:])), pressed.state
     )
     work, slips, taken = backbone.slip_work, backbone.slipping, backbone.iterations
-    return Steps(
-        state=last._replace(level=level, target=path.target, pressure=path.pressure, sound=sound),
+    return StepResults(
+        state=last._replace(
+            level=level, target=path.target, pressure=path.pressure, converged=converged
+        ),
         displacement=doubled(pressed.displacement, backbone.displacement),
         slipping=steps(pressed.slipping, slips[::2] | slips[1::2], slips),
         slip_work=steps(pressed.slip_work, work[::2] + work[1::2], 2.0 * work),

@@ -1,4 +1,4 @@
-"""Outcome of a walked load path: its history, or the error that says which step failed."""
+"""Outcome of a load path: its history, or the error that says which step failed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.load_path import LoadPath
-from jbeamshell.quasistatic.stepping import Steps
+from jbeamshell.quasistatic.path_state import StepResults
 from jbeamshell.quasistatic.system import System
 from jbeamshell.scene.scene import Scene
 
@@ -25,18 +25,24 @@ ADVICE = (
 
 
 def check_solver(solver: Newton | None) -> None:
-    """Raise `InputError` for settings that are none."""
+    """Raise `InputError` unless the solver is None or a `Newton`."""
     fix = "give a jbeamshell.Newton"
     require("solver", solver, solver is None or isinstance(solver, Newton), fix)
 
 
-def raise_if_failed(steps: Steps, path: LoadPath, before: int = 0) -> None:
-    """Raise `UnconvergedError` with the first step that failed, after so many of another path."""
-    sound = np.asarray(steps.state.sound)
-    if sound.all():
+def raise_if_failed(steps: StepResults, path: LoadPath, before: int = 0) -> None:
+    """Raise `UnconvergedError` with the first failed step.
+
+    Parameters
+    ----------
+    steps, path : results of a load path, and the path
+    before : number of steps of the history that the path continues
+    """
+    converged = np.asarray(steps.state.converged)
+    if converged.all():
         return
-    first = int(np.argmin(sound))
-    number, last = before + first, before + sound.size - 1
+    first = int(np.argmin(converged))
+    number, last = before + first, before + converged.size - 1
     where = f"load step {number} of {last} (load {float(path.target[first]):.6g})"
     if not path.rough[first]:
         where = f"pressing down (to {100.0 * float(path.pressure[first]):.3g} % of the pressure)"
@@ -48,13 +54,13 @@ def raise_if_failed(steps: Steps, path: LoadPath, before: int = 0) -> None:
 
 
 @eqx.filter_jit
-def history_of(scene: Scene, steps: Steps, pressure: Array) -> History:
-    """History of the steps, without its end and its cycles, which would make paths compile anew."""
+def history_of(scene: Scene, steps: StepResults, pressure: Array) -> History:
+    """History of the steps without its end and cycles, so that paths share compilations."""
     system = System(scene)
-    sound, level = steps.state.sound, steps.state.level
+    converged, level = steps.state.converged, steps.state.level
 
     def masked(values: Array) -> Array:
-        return jnp.where(sound.reshape(-1, *[1] * (values.ndim - 1)), values, jnp.nan)
+        return jnp.where(converged.reshape(-1, *[1] * (values.ndim - 1)), values, jnp.nan)
 
     return History(
         scene=scene,
@@ -83,6 +89,6 @@ def history_of(scene: Scene, steps: Steps, pressure: Array) -> History:
 
 
 def warn_of_doubts(history: History, stacklevel: int) -> None:
-    """Warn of everything that is doubtful about a history, at a caller's line."""
+    """Warn of everything that is doubtful about a history, at the line of a caller."""
     for doubt in history.doubts:
         warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=stacklevel + 1)

@@ -1,4 +1,4 @@
-"""Where slip is expected: reversals of the load, and how deep a bar would slip since the last."""
+"""Prediction of slip: reversals of the load, and the slip that a bar would have since the last."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ from jax import Array
 from jbeamshell.quasistatic.system import System
 from jbeamshell.scene.keys import ARC_LENGTH
 
-CORNER, REACH = 1.7, 0.4  # H by which a strip slips less deep than a bar, and over which it grows
-SMALLEST_SHARE = 1e-9  # of the cap, or of gross slip: less than this is no difference
+# Length over H by which the slip zone of a strip is shorter than that of a bar, and the length over
+# H within which this difference grows.
+CORNER, REACH = 1.7, 0.4
+SMALLEST_SHARE = 1e-9  # smallest difference that counts, over the cap or over gross slip
 
 
 class Reversal(NamedTuple):
-    """A reversal of the load.
+    """Reversal of the load.
 
     Attributes
     ----------
-    target : the controlled load there
-    depth : (n,) force since then that takes the slip to a node
-    left : friction left at the loaded end, up to the cap of the other sign
+    target : controlled load at the reversal
+    depth : (n,) increment of force since the reversal at which the slip reaches a node
+    left : change of traction left at the loaded end up to the cap of the other sign
     """
 
     target: Array
@@ -31,26 +33,26 @@ class Reversal(NamedTuple):
 
 
 class BeforeStep(NamedTuple):
-    """What a reversal sees: traction and cap (n,), controlled load, and the reversal before."""
+    """State before a step: traction and cap (n,), controlled load, and the last reversal."""
 
     traction: Array
     cap: Array
     target: Array
-    turn: Reversal
+    reversal: Reversal
 
 
 def last_reversal(system: System, before: Any, to: Any) -> Reversal:
-    """The last reversal of the load, which may be now.
+    """Last reversal of the load, which may be at the start of this step.
 
     Parameters
     ----------
     system : its arrays may have lanes behind their nodes
-    before : has the traction (n,), the cap (n,), the target and the turn of the step before
-    to : has the target, the pressure and the roughness of this one
+    before : traction (n,), cap (n,), target and reversal before the step, see `BeforeStep`
+    to : target, pressure and roughness of the step
     """
     stride, rough = to.target - before.target, to.rough > 0.0
     along = jnp.where(stride >= 0.0, 1.0, -1.0)
-    # What the end load has changed of the cap changes sign with it.
+    # The end load's part of the cap changes sign with the load.
     mean = (
         system.foundation.friction
         * to.pressure
@@ -63,24 +65,24 @@ def last_reversal(system: System, before: Any, to: Any) -> Reversal:
     away = (system.x[-1] - system.x) / (REACH * system.half_height)
     corner = CORNER * system.half_height * (1.0 - jnp.exp(-away))
     now = Reversal(before.target, used + corner * left, left[-1])
-    back = rough & (stride * (before.target - before.turn.target) <= 0.0)
-    return jax.tree.map(lambda new, old: jnp.where(back, new, old), now, before.turn)
+    back = rough & (stride * (before.target - before.reversal.target) <= 0.0)
+    return jax.tree.map(lambda new, old: jnp.where(back, new, old), now, before.reversal)
 
 
-def first_to_slip(system: System, turn: Reversal, target: Array) -> Array:
-    """Directions (n,) in which those nodes slip that would if the strip were a bar, else zero.
+def first_to_slip(system: System, reversal: Reversal, target: Array) -> Array:
+    """Directions (n,) in which nodes slip if the strip is a bar; zero for those that stick.
 
-    A bar slips from the loaded end to where the friction left at the last reversal is used up by
-    the load since.
+    A bar slips from the loaded end to the node where the load since the last reversal has used up
+    the friction that was left.
     """
-    rise = target - turn.target
+    rise = target - reversal.target
     along, load = jnp.where(rise >= 0.0, 1.0, -1.0), jnp.abs(rise)
     if system.control != "force":  # by the bar's u = F^2/(2 E' 2H q)
         stretch = system.stiffness_scale * jnp.sum(system.tributary, axis=0)
-        square = 2.0 * stretch * turn.left
+        square = 2.0 * stretch * reversal.left
         load = square * load
-        if system.control == ARC_LENGTH:  # the way is about the chord of u and F L/(E' 2H)
+        if system.control == ARC_LENGTH:  # the arc length is about the chord of u and F L/(E' 2H)
             soft = (square / system.stiffness_scale) ** 2 / 2.0
             load = load**2 / (soft + jnp.hypot(soft, load) + jnp.finfo(load.dtype).tiny)
         load = jnp.sqrt(load)
-    return along * (turn.depth < load)
+    return along * (reversal.depth < load)

@@ -1,4 +1,4 @@
-"""Histories read from the files that `History.save` writes."""
+"""Reader of the files that `History.save` writes."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from jbeamshell.history.history import History
 from jbeamshell.history.saved import FORMAT, named_arrays, without_scene
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.quasistatic.continuation import PathEnd
-from jbeamshell.quasistatic.stepping import at_rest
+from jbeamshell.quasistatic.path_state import initial_state
 from jbeamshell.scene.toml import scene_from_values
 
-# Arrays of a history by what they run along.
+# Names of a history's arrays, by what their axes run along.
 ALONG_X = ("x", "tributary", "load")
 ALONG_PATH = (
     *("force", "displacement", "pressure", "target"),
@@ -34,16 +34,16 @@ COUNTS = ("iterations", "status")
 
 
 def read_history(path: str | os.PathLike[str]) -> History:
-    """The history in a file, to the last bit; nothing in the file is executed.
+    """Read a history from a file, equal to the last bit; nothing in the file is executed.
 
     Raises
     ------
     InputError
-        for a file that cannot be read, is damaged or none of ours, and in single precision for one
-        that was written in double
+        if the file cannot be read, is damaged or of another format, or if it was written in double
+        precision and JAX runs in single precision
     """
     try:
-        # A handle of our own: NumPy leaves its own open where the file is damaged.
+        # The file is opened here because NumPy leaves its own handle open if the file is damaged.
         with as_path(path).open("rb") as handle, np.load(handle, allow_pickle=False) as file:
             about = json.loads(str(file["about"]))
             if about["format"] != FORMAT:
@@ -53,7 +53,7 @@ def read_history(path: str | os.PathLike[str]) -> History:
         blank = _blank(about, arrays) if precise else None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except Exception as error:  # whatever a parser stumbles over in a broken file
+    except Exception as error:  # a broken file may raise anything in a parser
         reason = f"{type(error).__name__}: {error}"[:200]
         raise InputError(
             f"{path}: is no history that can be read ({reason}): save it anew"
@@ -71,7 +71,7 @@ def read_history(path: str | os.PathLike[str]) -> History:
 
 
 def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
-    """A history of the scene in a file, with shapes for arrays, as many steps as its loads."""
+    """History of the scene in a file, with shapes in place of arrays."""
     tables = tomllib.loads(about["scene"])
     flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
     scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
@@ -92,5 +92,5 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     }
     cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])
     stepwise = scene.model.solution == "stepwise"
-    end = PathEnd(eqx.filter_eval_shape(at_rest, scene)) if stepwise else None
+    end = PathEnd(eqx.filter_eval_shape(initial_state, scene)) if stepwise else None
     return History(scene=scene, cycles=cycles, end=end, **shapes)

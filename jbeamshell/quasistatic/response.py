@@ -1,4 +1,4 @@
-"""Figures of a scene's last cycle as a compiled function of some of its numbers."""
+"""Compiled function from some of a scene's numbers to figures of its last cycle."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.scene.keys import NUMBERS, check_key
 from jbeamshell.scene.scene import Scene
 
 Response = Callable[..., dict[str, Array]]
 
-FEW = 200  # nodes: beyond, the arithmetic takes longer than calling it
+FEW = 200  # number of nodes beyond which the arithmetic takes longer than the calls
 RESPONSES = (
     "force",
     "displacement",
@@ -36,31 +37,40 @@ def response(
     figures: Sequence[str] = ("dissipation",),
     *,
     solver: Newton | None = None,
+    method: Method | None = None,
 ) -> Response:
-    """A pure function of some of a scene's numbers, for `jax.jit`, `jax.vmap` and `jax.grad`.
+    """Make a pure function of some of a scene's numbers, for `jax.jit`, `jax.vmap`, `jax.grad`.
 
-    Only what the figures need is computed, so that it costs less than `jbeamshell.solve`.  Called
-    with numbers, and not in a transformation, it is one native function on a CPU where the compiler
-    allows that: a strip of some dozen nodes takes less time than handing its parts to threads.
+    It computes only its figures, so it costs less than `jbeamshell.solve`.  A call with numbers
+    outside of a transformation runs as one native function on a CPU, if the compiler allows
+    that: for some dozen nodes handing parts to threads takes longer than the arithmetic.
 
     Parameters
     ----------
-    scene : what is not varied
-    over : dotted keys of the numbers that are, in the order of the function's arguments
+    scene : scene with all other numbers
+    over : dotted keys of the numbers that vary, in the order of the function's arguments
     figures : names of `jbeamshell.History`, such as "dissipation" or "secant_stiffness"
     solver : settings of Newton's method
+    method : method of the load steps; None is status iteration where it applies and Newton's method
+        elsewhere, in transformations and for steps that do not settle
 
     Returns
     -------
     Callable
-        from the numbers to a dictionary of the figures and ``status``, the worst code of
-        `jbeamshell.Status` on the way: a figure with another one than zero is NaN or not to be
-        trusted.  Numbers are not checked: the domain is the caller's.
+        from the numbers to a dictionary of the figures and ``status``, the largest code of
+        `jbeamshell.Status` of all steps.  Unless it is zero the figures are NaN or wrong.  Numbers
+        are not checked against the scene's domain.
 
     Raises
     ------
     InputError
         if a key or a figure is unknown
+
+    Examples
+    --------
+    >>> ask = jb.response(jb.Scene(), ["load.amplitude", "contact.friction"])
+    >>> ask(0.5, 0.1)["dissipation"]
+    >>> jax.grad(lambda mu: ask(0.5, mu)["dissipation"])(0.1)
     """
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     check_words("over", over)
@@ -71,26 +81,25 @@ def response(
     for name in figures:
         require_choice("figures", name, RESPONSES)
 
-    def asked(solver: Newton | None) -> Response:
-        def answer(*values: Array) -> dict[str, Array]:
-            history = solve(
-                scene.replace(dict(zip(over, values, strict=True))), throw=False, solver=solver
-            )
+    def solved_by(method: Method) -> Response:
+        def figures_of(*values: Array) -> dict[str, Array]:
+            varied = scene.replace(dict(zip(over, values, strict=True)))
+            history = solve(varied, throw=False, solver=solver, method=method)
             found = {name: getattr(history, name) for name in figures}
             return found | {"status": jnp.max(history.status)}
 
-        return answer
+        return figures_of
 
-    compiled = jax.jit(asked(solver))
+    compiled = jax.jit(solved_by(method or Method.NEWTON))
     if is_traced(scene):
         return compiled
-    foresees = slip_patterns.applies(scene) and not isinstance(solver, slip_patterns.Foresight)
-    quick = asked(slip_patterns.Foresight.of(solver, checked=True) if foresees else solver)
-    first = Native(quick, worth=scene.model.nodes <= FEW)
+    again = method is None and slip_patterns.applies(scene)  # what does not settle, by Newton
+    first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
+    first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)
 
     def ask(*values: Array) -> dict[str, Array]:
         found: dict[str, Array] | None = first.now(*values)
-        if found is None or (foresees and np.asarray(found["status"]).item() != Status.CONVERGED):
+        if found is None or (again and np.asarray(found["status"]).item() != Status.CONVERGED):
             return compiled(*values)
         return found
 

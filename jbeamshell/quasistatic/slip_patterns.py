@@ -1,12 +1,12 @@
-r"""Load steps of sharp sliders under linear strains: who sticks, who slips, one linear solve.
+r"""Stick-slip status iteration: load steps of sharp sliders under linear strains.
 
 With a guess of every node's status the equilibrium of a step is linear, because a node that sticks
-has t = t_n + k_t dv and one that slips has t = +-mu R, and its solution says what every node does:
-again, until nothing changes.  That is Newton's method without a residual, a line search, or
-anything evaluated twice.
+has t = t_n + k_t dv and one that slips has t = +-mu R.  Its solution gives every node a new status.
+This is repeated until no status changes.  It is Newton's method without a residual and without a
+line search.
 
-Arrays have their nodes (and what else is said) first; any further axes are lanes that are solved
-together.  Under `jax.vmap` the lanes come last here, where a core's vectors run along them.
+The first axis of an array runs along the nodes.  Further axes are lanes: strips that are solved
+together.  Under `jax.vmap` the lanes come last here, so that a core's vectors run along them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from __future__ import annotations
 import functools
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array, lax
@@ -22,39 +21,38 @@ from jax.custom_batching import custom_vmap
 
 from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.numerics import block_tridiagonal
-from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.assembly import Band, Blocks, band, node, times, unheld
 from jbeamshell.quasistatic.prediction import SMALLEST_SHARE, Reversal, first_to_slip, last_reversal
 from jbeamshell.quasistatic.system import System, V
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.scene import Scene
 
-MOST = 40  # guesses of one step
-TIES = 64.0  # machine precisions of a displacement: less than this decides nothing
+MOST = 40  # largest number of guesses in a step
+TIES = 64.0  # smallest difference of displacements that counts, in machine precisions
 
 
 class Memory(NamedTuple):
-    """What a step leaves to the next one; see `jbeamshell.quasistatic.stepping.PathState`."""
+    """State after a step that the next one needs; see `PathState`."""
 
     traction: Array
     cap: Array
     reaction: Array
     target: Array
     pressure: Array
-    turn: Reversal
+    reversal: Reversal
 
 
 class Pattern(NamedTuple):
-    """A guess and its answer.
+    """Guess of the statuses in a step, and its solution.
 
     Attributes
     ----------
     slips : (n,) 1 and -1 for nodes that slip along and against v, 0 for those that stick
-    closed : (n,) whether there is a reaction to rub
+    closed : (n,) True if there is a reaction, so that friction acts
     change : (m, n) increments of the unknowns
-    error : largest residual of the answer; of the last one only
-    solves : guesses so far
-    settled : whether the answer is what was guessed
+    error : largest residual of the last solution
+    solves : number of guesses so far
+    settled : True if the solution has the guessed statuses
     """
 
     slips: Array
@@ -65,17 +63,17 @@ class Pattern(NamedTuple):
     settled: Array
 
 
-class Foreseen(NamedTuple):
-    """Steps of a path, stacked along the first axis.
+class StatusSteps(NamedTuple):
+    """Results of the steps of a path, stacked along the first axis.
 
     Attributes
     ----------
     change : (m, n) increments of the unknowns
-    memory : what the step leaves
+    memory : state after the step
     slip_work : work of friction
     error : largest out-of-balance force over mu F_N L, by the assembled stiffness
-    solves : guesses it took
-    settled : whether the last one was right
+    solves : number of guesses
+    settled : True if the last guess was right
     """
 
     change: Array
@@ -87,13 +85,13 @@ class Foreseen(NamedTuple):
 
 
 class LinearStrip(NamedTuple):
-    """A system with what is constant in it.
+    """System of equations with its constant parts.
 
     Attributes
     ----------
     system : its arrays may have lanes behind their nodes
-    band : its stiffness with friction
-    pull : m fields' parts in the displacement of the loaded end
+    band : stiffness with friction
+    pull : m derivatives of u(L) with respect to the fields of the loaded end
     press : m entries (n,) of the whole pressure, as residuals
     pressed : (m, n) change of the unknowns by the whole pressure without friction
     """
@@ -105,28 +103,8 @@ class LinearStrip(NamedTuple):
     pressed: Array
 
 
-class Foresight(Newton):
-    """Takes what is foreseen for the answer where it can be; derivatives do not pass.
-
-    It is for runs whose failures are walked again with Newton's method, which is only compiled
-    then.
-
-    Attributes
-    ----------
-    checked : whether the answer's residual is evaluated like any other; else by the assembled
-        stiffness
-    """
-
-    checked: bool = eqx.field(static=True, default=True)
-
-    @classmethod
-    def of(cls, solver: Newton | None, *, checked: bool) -> Foresight:
-        """With the settings of a solver."""
-        return cls(**(vars(solver or Newton()) | {"checked": checked}))
-
-
 def applies(scene: Scene) -> bool:
-    """Whether only the statuses of sharp sliders make a scene's steps nonlinear."""
+    """True if only the statuses of sharp sliders make a scene's steps nonlinear."""
     model = scene.model
     return (
         model.kinematics == "linear"
@@ -140,13 +118,13 @@ def applies(scene: Scene) -> bool:
     )
 
 
-def foresee(system: System, start: Any, path: Any) -> Foreseen:
-    """Walk a load path.  Derivatives do not pass.
+def solve_path(system: System, start: Any, path: Any) -> StatusSteps:
+    """Solve the steps of a load path by status iteration.  Derivatives do not pass.
 
     Parameters
     ----------
-    system : of a scene to which this `applies`
-    start, path : `stepping.PathState` and `load_path.LoadPath`
+    system : equations of a scene to which the iteration `applies`
+    start, path : `PathState` and `LoadPath`
     """
     follow = custom_vmap(_follow)
 
@@ -162,32 +140,32 @@ def foresee(system: System, start: Any, path: Any) -> Foreseen:
         return first, jax.tree.map(lambda _: True, first)
 
     given = (system, *_parts(system), memory_of(start), path)
-    found: Foreseen = follow(*lax.stop_gradient(given))
+    found: StatusSteps = follow(*lax.stop_gradient(given))
     return found
 
 
-def known(system: System) -> LinearStrip:
-    """What is constant in a system.  Derivatives do not pass."""
-    return _known(*lax.stop_gradient((system, *_parts(system))))
+def linear_strip(system: System) -> LinearStrip:
+    """System with its constant parts.  Derivatives do not pass."""
+    return _linear_strip(*lax.stop_gradient((system, *_parts(system))))
 
 
 def memory_of(state: Any) -> Memory:
-    """Memory of a `stepping.PathState` for the next step.  Derivatives do not pass."""
+    """Memory of a `PathState`.  Derivatives do not pass."""
     level = state.level
     memory = Memory(
-        level.traction, level.cap, level.reaction, state.target, state.pressure, state.turn
+        level.traction, level.cap, level.reaction, state.target, state.pressure, state.reversal
     )
     return lax.stop_gradient(memory)
 
 
 def _parts(system: System) -> tuple[Array, Array, Array]:
-    """Stiffness of the section, fields' part in the end's displacement, forces of the pressure."""
+    """Stiffness of the section, derivative of the end's displacement, forces of the pressure."""
     rest = system.unloaded().q
     pull = jax.grad(system.end_displacement)(rest)[-1]
     return system.section_stiffness(), pull, jax.grad(system.sinking)(rest)
 
 
-def _known(system: System, section: Array, pull: Array, press: Array) -> LinearStrip:
+def _linear_strip(system: System, section: Array, pull: Array, press: Array) -> LinearStrip:
     rough = smooth = band(system, section, True)
     if system.ends_depend_on_friction:
         smooth = band(system, section, False)
@@ -201,33 +179,33 @@ def _known(system: System, section: Array, pull: Array, press: Array) -> LinearS
 
 def _follow(
     system: System, section: Array, pull: Array, press: Array, start: Memory, path: Any
-) -> Foreseen:
-    strip = _known(system, section, pull, press)
+) -> StatusSteps:
+    strip = _linear_strip(system, section, pull, press)
 
-    def go(memory: Memory, to: Any) -> tuple[Memory, Foreseen]:
+    def go(memory: Memory, to: Any) -> tuple[Memory, StatusSteps]:
         found = step(strip, memory, to)
         return found.memory, found
 
-    found: Foreseen = lax.scan(go, start, path)[1]
+    found: StatusSteps = lax.scan(go, start, path)[1]
     return found
 
 
-def step(strip: LinearStrip, memory: Memory, to: Any) -> Foreseen:
-    """One load step.
+def step(strip: LinearStrip, memory: Memory, to: Any) -> StatusSteps:
+    """Solve one load step.
 
     Parameters
     ----------
-    strip : what is loaded
-    memory : of the step before
-    to : has the target, the pressure and the roughness of this one
+    strip : system with its constant parts
+    memory : state before the step
+    to : target, pressure and roughness of the step
     """
     system = strip.system
-    rubs, turn = to.rough > 0.0, last_reversal(system, memory, to)
+    rubs, reversal = to.rough > 0.0, last_reversal(system, memory, to)
     further = to.pressure - memory.pressure
     net = (system.load - system.bottom_load) / system.tributary
     given = memory.reaction + further * net
     load = [-further * each for each in strip.press]
-    slips = first_to_slip(system, turn, to.target)
+    slips = first_to_slip(system, reversal, to.target)
     drawn = to.target - memory.target
     found = _settle(strip, memory.traction, given, drawn, load, slips, rubs)
     change = jnp.where(rubs, found.change, further * strip.pressed)
@@ -241,9 +219,9 @@ def step(strip: LinearStrip, memory: Memory, to: Any) -> Foreseen:
         change[V], memory.traction, traction, memory.cap, cap, system.foundation.slip_stiffness
     )
     pressed = system.foundation.has_friction(jnp.maximum(memory.cap, cap))
-    return Foreseen(
+    return StatusSteps(
         change,
-        Memory(traction, cap, reaction, to.target, to.pressure, turn),
+        Memory(traction, cap, reaction, to.target, to.pressure, reversal),
         jnp.where(rubs, jnp.sum(jnp.where(pressed, work, 0.0), axis=0), 0.0),
         found.error,
         found.solves,
@@ -260,16 +238,16 @@ def _settle(
     slips: Array,
     rough: Array,
 ) -> Pattern:
-    """Find who sticks and who slips in a step.
+    """Find which nodes stick and which slip in a step.
 
     Parameters
     ----------
-    strip : what is loaded
-    traction, given : (n,) friction before the step, and R but for what the step adds
-    drawn : the step of the controlled load
+    strip : system with its constant parts
+    traction, given : (n,) traction before the step, and R without the part of the increments
+    drawn : increment of the controlled load
     load : m entries (n,) of the step's other forces, as residuals
-    slips : (n,) a first guess
-    rough : whether there is friction; if not, nothing is done
+    slips : (n,) first guess
+    rough : True if there is friction; if not, nothing is done
     """
     system, band = strip.system, strip.band
     slider, friction = system.foundation.slip_stiffness, system.foundation.friction
@@ -293,7 +271,7 @@ def _settle(
         largest = jnp.max(jnp.abs(change[V]), axis=0)
         little = SMALLEST_SHARE * cap + TIES * jnp.finfo(cap.dtype).eps * slider * largest
         beyond = jnp.where(jnp.abs(trial) > cap + little, jnp.sign(trial), 0.0)
-        # A node that slips may stick next, but not slip back: else the search goes in circles.
+        # A node that slips may stick next, but not slip back, or the search would go in circles.
         on = jnp.where(at.slips * trial >= cap - little, at.slips, 0.0)
         closed = system.foundation.has_friction(cap)
         slips = jnp.where(closed, jnp.where(at.slips == 0.0, beyond, on), 0.0)
@@ -317,14 +295,14 @@ def _settle(
 def _drawn(
     strip: LinearStrip, rows: Band, right: list[Array], drawn: Array
 ) -> tuple[Band, list[Array]]:
-    """The equations with the step of the controlled load at the loaded end."""
+    """Equations with the increment of the controlled load at the loaded end."""
     system, last = strip.system, node(strip.system.x, -1)
     scales = [system.residual_scale(i) for i in system.model.active]
     forces = [scale * pull for scale, pull in zip(scales, strip.pull, strict=True)]
     if system.control == "force":
         ends = [jnp.where(last, force * drawn, 0.0) for force in forces]
         return rows, [r + end for r, end in zip(right, ends, strict=True)]
-    # The balance along v says what the force is, for the other rows; its own says u(L).
+    # The balance along v gives the force for the other rows; its own row prescribes u(L).
     shares = [jnp.where(last, force / forces[V], 0.0) for force in forces[1:]]
     stiffness = system.stiffness_scale * scales[V]
 

@@ -1,4 +1,4 @@
-"""Load paths: press a strip down, load it to and fro, a History out."""
+"""Quasi-static solver: a strip is pressed down and loaded along a path, which gives a History."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from jbeamshell.quasistatic.outcome import (
     raise_if_failed,
     warn_of_doubts,
 )
-from jbeamshell.quasistatic.slip_patterns import Foresight
-from jbeamshell.quasistatic.stepping import Steps, at_rest, march, recover
+from jbeamshell.quasistatic.path_state import StepResults, initial_state
+from jbeamshell.quasistatic.recovery import recover
+from jbeamshell.quasistatic.stepping import Method, march
 from jbeamshell.scene.scene import Scene
 
-STACK = 3  # frames from a warning to whoever called `jbeamshell.solve`
+STACK = 3  # frames from a warning to the caller of `jbeamshell.solve`
 
 
 def solve(
@@ -37,50 +38,59 @@ def solve(
     contact: ArrayLike | None = None,
     solver: Newton | None = None,
     throw: bool = True,
+    method: Method | None = None,
 ) -> History:
-    """Press the strip down, walk a load path, and report what happened.
+    """Press the strip down and walk along a load path.
 
     Parameters
     ----------
-    scene : what is loaded; may hold traced leaves, so `jax.grad` and `jax.vmap` go through
-    path : loads after the pressing, (steps,): F, u(L) or the way gone, by ``scene.load.control``;
+    scene : strip, contact, load and model; traced leaves pass, so `jax.grad` and `jax.vmap` work
+    path : loads after the pressing, (steps,): F, u(L) or the arc length, by ``scene.load.control``;
         or (steps, 2) with the part of the pressures that acts in the second column; None is the
         scene's own cycles
-    contact : (n,) nodes from which the search for the contact starts; None is all of them
+    contact : (n,) True at the nodes in contact where the search for the contact starts; None starts
+        with all of them
     solver : settings of Newton's method
-    throw : whether a step without equilibrium raises, and what is doubtful warns; if not, read
+    throw : True raises for a step without equilibrium and warns of doubts; False leaves both to
         ``history.status`` and ``history.doubts``
+    method : method of the load steps; None is the fastest that the run allows
 
     Returns
     -------
     History
-        steps without equilibrium hold NaN.
+        history of the path, with NaN in steps without equilibrium
 
     Raises
     ------
     InputError
-        if the path makes no sense or exceeds gross slip under force control
+        if the path is invalid or exceeds gross slip under force control
     UnconvergedError
-        if a step has no equilibrium, even when it is walked in smaller steps
+        if a step has no equilibrium, even if it is walked in smaller steps
 
     Warns
     -----
     DoubtfulWarning
-        if what converged may be wrong all the same, see `jbeamshell.History.doubts`; never in a
-        traced run, whose estimate is `jbeamshell.History.dissipation_error`
+        if a converged result may still be wrong, see `jbeamshell.History.doubts`; never in a traced
+        run, which has `jbeamshell.History.dissipation_error`
+
+    Examples
+    --------
+    >>> history = jb.solve(jb.Scene())
+    >>> float(history.dissipation)
     """
     check_solver(solver)
     solver = solver or Newton()
     whole, cycles = check(scene, path)
     touching = None if contact is None else check_contact(scene, contact)
-    steps, history = _solve(scene, touching, whole, _first(scene, whole, solver), np.asarray(True))
+    method = method or _first_method(scene, whole)
+    steps, history = _solve(scene, touching, whole, solver, method, np.asarray(True))
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
-        sound = steps.state.sound[-1]
+        converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
-        history = eqx.error_if(history, ~sound, message) if throw else history
+        history = eqx.error_if(history, ~converged, message) if throw else history
         return dataclasses.replace(history, cycles=cycles)
-    if not np.asarray(steps.state.sound)[-1]:  # an index of JAX's would compile
-        start = at_rest(scene, touching)
+    if not np.asarray(steps.state.converged)[-1]:  # indexing a JAX array would compile
+        start = initial_state(scene, touching)
         if scene.model.solution == "stepwise":
             steps = recover(scene, steps, whole, solver, start)
         else:
@@ -97,16 +107,17 @@ def solve(
 def compile_for(
     scene: Scene, path: ArrayLike | None = None, *, solver: Newton | None = None
 ) -> None:
-    """Compile what `solve` needs, without solving anything."""
+    """Compile the programs that `solve` needs, without solving anything."""
     whole, _ = whole_path(scene, path)
-    first = _first(scene, whole, solver or Newton())
-    jax.block_until_ready(_solve(scene, None, whole, first, np.asarray(False)))
+    method = _first_method(scene, whole)
+    compiled = _solve(scene, None, whole, solver or Newton(), method, np.asarray(False))
+    jax.block_until_ready(compiled)
 
 
-def _first(scene: Scene, path: LoadPath, solver: Newton) -> Newton:
-    """The solver of a first attempt: foresight, unless derivatives may be taken of it."""
-    staged = is_traced(scene, path, jnp.zeros(()))  # the last by a caller's jit
-    return solver if staged else Foresight.of(solver, checked=True)
+def _first_method(scene: Scene, path: LoadPath) -> Method:
+    """Method of a first attempt: Newton's where derivatives may be taken, else statuses."""
+    traced = is_traced(scene, path, jnp.zeros(()))  # the last by a caller's jit
+    return Method.NEWTON if traced else Method.STATUS_ITERATION
 
 
 @eqx.filter_jit
@@ -115,13 +126,14 @@ def _solve(
     touching: np.ndarray | None,
     path: LoadPath,
     solver: Newton,
+    method: Method,
     enabled: ArrayLike,
-) -> tuple[Steps, History]:
-    start = at_rest(scene, touching)._replace(sound=jnp.asarray(enabled))
+) -> tuple[StepResults, History]:
+    start = initial_state(scene, touching)._replace(converged=jnp.asarray(enabled))
     if scene.model.solution == "closed-form":
         steps = bar_cycles(scene, path)
     elif scene.model.solution == "stepwise":
-        steps = march(scene, start, path, solver)
+        steps = march(scene, start, path, solver, method)
     else:
-        steps = masing(scene, start, path, solver)
+        steps = masing(scene, start, path, solver, method)
     return steps, with_end(history_of(scene, steps, path.pressure), steps)

@@ -102,7 +102,7 @@ class System(ElasticStrip):
     ----------
     foundation : friction and normal contact
     stiffness_scale : E' 2H/L, which turns support conditions into forces
-    force_scale : mu F_N, or F_N without friction, which makes residuals dimensionless
+    force_scale : mu F_N L, or F_N L without friction, which makes residuals dimensionless
     far_end : support at X = 0
     control : controlled quantity at the loaded end
     """
@@ -162,8 +162,8 @@ class System(ElasticStrip):
         Returns
         -------
         level : load level after the change
-        residual : (n, active) out-of-balance forces over mu F_N, moments over mu F_N H; zero in
-            equilibrium
+        residual : (n, active) out-of-balance forces over mu F_N L, moments over mu F_N L H; zero
+            in equilibrium
         contact : input of `contact_response`
         """
         q = before.q + self.embed(change)

@@ -20,6 +20,7 @@ from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.response import response
 from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_to_toml
 from jbeamshell.sweeping.lanes import Outcome
@@ -100,9 +101,7 @@ class Runner:
         self.devices = list(devices or jax.local_devices())
         self.width = width_of_chunks(scene)
         self._mesh = Mesh(np.array(self.devices), "lanes")
-        ask = _ask(
-            scene, self.keys, self.figures, slip_patterns.Foresight.of(solver, checked=False)
-        )
+        ask = _ask(scene, self.keys, self.figures, solver, Method.UNCHECKED_STATUS_ITERATION)
         self._about = ask, self.figures, self._shape, self.dtype, self._mesh
 
     def lower(self) -> None:
@@ -160,17 +159,23 @@ class Runner:
 
 
 def _ask(
-    scene: Scene, keys: tuple[str, ...], figures: tuple[str, ...], solver: Newton | None
+    scene: Scene,
+    keys: tuple[str, ...],
+    figures: tuple[str, ...],
+    solver: Newton | None,
+    method: Method | None = None,
 ) -> Answers:
     """The scene's response: the same function for the same scene, so that it compiles once."""
     try:
-        name = f"{scene_to_toml(scene)} {scene.strip.length.dtype} {keys} {figures} {solver}"
+        name = (
+            f"{scene_to_toml(scene)} {scene.strip.length.dtype} {keys} {figures} {solver} {method}"
+        )
     except InputError:  # a user's own energy has no text
-        return response(scene, keys, figures, solver=solver)
+        return response(scene, keys, figures, solver=solver, method=method)
     if name not in _known:
         while len(_known) >= KEPT:
             del _known[next(iter(_known))]
-        _known[name] = response(scene, keys, figures, solver=solver)
+        _known[name] = response(scene, keys, figures, solver=solver, method=method)
     return _known[name]
 
 

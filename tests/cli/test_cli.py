@@ -19,7 +19,7 @@ import jbeamshell as jb
 from jbeamshell import identify
 from jbeamshell.cli import arguments, main
 from jbeamshell.measured.loops import read_loops
-from jbeamshell.quasistatic import solver, stepping
+from jbeamshell.quasistatic import recovery, solver
 from jbeamshell.scene import library
 
 # One shape for nearly everything, so that it compiles once.
@@ -701,7 +701,7 @@ def test_commands_that_do_not_exist(cli, capsys, words):
 def test_a_step_without_equilibrium(refused, monkeypatch):
     # One Newton iteration per step: enough for the pressure and for sticking, not for slip.
     monkeypatch.setattr(solver, "Newton", functools.partial(jb.Newton, max_iterations=1))
-    monkeypatch.setattr(stepping, "PIECES", ())
+    monkeypatch.setattr(recovery, "PIECES", ())
     line = refused("run", *BASE, "--set", "contact.smoothing=16", "--json", code=3)
     pattern = r"load step \d+ of 20 \(load \S+\) found no equilibrium \(max iterations, .*\): take"
     assert re.match(pattern, line)

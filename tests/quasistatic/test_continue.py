@@ -109,7 +109,7 @@ def test_what_cannot_go_on_says_why(begun):
 
 
 def test_a_path_that_goes_on_to_where_nothing_converges_is_loud(begun, monkeypatch):
-    monkeypatch.setattr("jbeamshell.quasistatic.stepping.PIECES", ())
+    monkeypatch.setattr("jbeamshell.quasistatic.recovery.PIECES", ())
     hasty = jb.Newton(max_iterations=1, tolerance=1e-18)
     with pytest.raises(jb.UnconvergedError, match=r"load step [6-9] of 9 \(load \S+\) found"):
         begun.continued(MORE, solver=hasty)
@@ -168,7 +168,7 @@ def damaged(path, evil):
         "pickled array": replaced(path, displacement=np.array([Evil(evil)], object)),
         "pickled about": replaced(path, about=np.array([Evil(evil)], object)),
         "of other arrays": other.getvalue(),
-        "lacking one": replaced(path, **{"end.turn.depth": None}),
+        "lacking one": replaced(path, **{"end.state.reversal.depth": None}),
         "shorter": replaced(path, displacement=displacement[:-1]),
         "turned": replaced(path, displacement=displacement[:, None]),
         "single": replaced(path, displacement=displacement.astype(np.float32)),

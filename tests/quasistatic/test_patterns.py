@@ -8,7 +8,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.assembly import band, times
-from jbeamshell.quasistatic.slip_patterns import Foresight
+from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.quasistatic.system import System
 from jbeamshell.quasistatic.tangent import initial_stiffness
 
@@ -88,14 +88,16 @@ def test_lanes_side_by_side_answer_as_one_by_one():
     """Also with what no lane varies, and where lanes need different numbers of guesses."""
     keys = ("load.amplitude", "strip.height_ratio")
     values = jnp.geomspace(0.2, 1.9, 5), jnp.array([0.3, 0.02, 0.1, 0.05, 0.2])
-    ask = jb.response(SCENE, keys, ("dissipation", "peak_displacement"), solver=Foresight())
+    ask = jb.response(
+        SCENE, keys, ("dissipation", "peak_displacement"), method=Method.STATUS_ITERATION
+    )
     together = jax.vmap(ask)(*values)
     assert np.all(np.asarray(together["status"]) == 0)
     for lane, (amplitude, height) in enumerate(zip(*values, strict=True)):
         alone = jb.solve(SCENE.replace({keys[0]: amplitude, keys[1]: height}), throw=False)
         for name in ("dissipation", "peak_displacement"):
             assert together[name][lane] == pytest.approx(float(getattr(alone, name)), rel=1e-9)
-    rest = jax.vmap(jb.response(SCENE, keys[:1], solver=Foresight()))(values[0])
+    rest = jax.vmap(jb.response(SCENE, keys[:1], method=Method.STATUS_ITERATION))(values[0])
     height = SCENE.strip.height_ratio
     again = jax.vmap(ask, in_axes=(0, None))(values[0], height)
     np.testing.assert_allclose(rest["dissipation"], again["dissipation"], rtol=1e-12)
@@ -115,9 +117,8 @@ def test_what_was_not_foreseen_is_walked_by_newton(fault, monkeypatch):
             slip_patterns, "_solve", lambda *given: [1.000001 * x for x in solved(*given)]
         )
         scene = scene.replace({"load.pressure_steps": 4})
-    for checked in (True, False):
-        solver = Foresight(checked=checked)
-        assert jb.response(scene, ("load.amplitude",), solver=solver)(0.7855)["status"] != 0
+    for method in (Method.STATUS_ITERATION, Method.UNCHECKED_STATUS_ITERATION):
+        assert jb.response(scene, ("load.amplitude",), method=method)(0.7855)["status"] != 0
     walked = jb.solve(scene)
     assert walked.converged
     assert float(walked.dissipation) == pytest.approx(float(right.dissipation), rel=1e-9)

@@ -31,7 +31,7 @@ from jbeamshell.dynamics.strip.equations import Equations, MotionState
 from jbeamshell.dynamics.strip.time_step import ChainPull, StepMemory, TimeStep
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
-from jbeamshell.numerics.newton import Newton
+from jbeamshell.numerics.newton import Newton, Problem
 from jbeamshell.quasistatic.system import ContactInput, LoadLevel, Prescribed, V, W
 from jbeamshell.quasistatic.tangent import (
     Stiffness,
@@ -186,9 +186,7 @@ class Prepared(eqx.Module):
             return with_v(system, new, nodal(system, new)[:, V] + (limited - slip) / stride.part)
 
         guess = in_blocks(h * p0[:, list(system.model.active)], like)
-        root, (_, error) = newton.solve(
-            evaluate, limit, guess, jnp.asarray(True), tangent, stiffness, None
-        )
+        root, (_, error) = newton.solve(Problem(evaluate, limit, tangent), guess, stiffness)
         _, contact, half, damping, prescribed = parts(root)
         response = system.contact_response(contact, before, prescribed)
         change = nodal(system, root)
