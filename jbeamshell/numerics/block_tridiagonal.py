@@ -1,4 +1,4 @@
-"""Linear algebra of residuals that couple only neighbouring blocks.  No physics."""
+"""Linear algebra of block-tridiagonal matrices.  No physics."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 from jax import Array, lax
 from jax.typing import ArrayLike
 
-SMALL = 4  # largest blocks that are solved entry by entry: compiling grows with their cube
+SMALL = 4  # largest size of blocks solved entry by entry; compiling time grows with its cube
 
 
 class BlockTridiagonal(NamedTuple):
-    """A matrix of n x n blocks of size m x m, zero beyond the first off-diagonals.
+    """Matrix of n x n blocks of size m x m, zero beyond the first off-diagonals.
 
     Attributes
     ----------
@@ -29,15 +29,20 @@ class BlockTridiagonal(NamedTuple):
 
     @property
     def transpose(self) -> BlockTridiagonal:
-        """The transposed matrix."""
+        """Transposed matrix."""
         lower, diagonal, upper = (jnp.swapaxes(blocks, 0, 1) for blocks in self)
         return BlockTridiagonal(jnp.roll(upper, 1, axis=-1), diagonal, jnp.roll(lower, -1, axis=-1))
 
 
 def jacobian(linear: Callable[[Array], Array], like: Array) -> BlockTridiagonal:
-    """The matrix of a linear map between (n, m) arrays that couples only neighbouring rows.
+    """Matrix of a linear map between (n, m) arrays that couples only neighbouring rows.
 
-    Every third row is probed at once, so it costs 3 m applications whatever n is.
+    Every third row is probed at once, so it costs 3 m applications for any n.
+
+    Parameters
+    ----------
+    linear : linear map from (n, m) to (n, m)
+    like : (n, m) array with the shape and type of its argument
     """
     response = jax.vmap(jax.vmap(linear))(jnp.asarray(seeds(like)))
     columns = by_neighbour(response, np.arange(like.shape[0]))
@@ -46,7 +51,7 @@ def jacobian(linear: Callable[[Array], Array], like: Array) -> BlockTridiagonal:
 
 
 def seeds(like: Array) -> np.ndarray:
-    """Probes of an (n, m) array, (3, m, n, m): a unit in every third row, for each column."""
+    """Probes (3, m, n, m) of an (n, m) array: a unit in every third row, for each column."""
     n, m = like.shape
     colour = np.arange(n) % 3
     units = (colour[None, :, None, None] == np.arange(3)[:, None, None, None]) * np.eye(m)
@@ -54,21 +59,21 @@ def seeds(like: Array) -> np.ndarray:
 
 
 def by_neighbour(response: ArrayLike, rows: np.ndarray) -> Array:
-    """Responses to the probes sorted by where the unit is: in the row before, here, in the next.
+    """Sort responses to the probes by the row of the unit: the row before, the same, the next.
 
     Parameters
     ----------
-    response : (3, m, k, ...) to `seeds`, of k things that belong to rows
-    rows : (k,) which row each belongs to
+    response : (3, m, k, ...) responses of k items to `seeds`
+    rows : (k,) row to which each item belongs
 
     Returns
     -------
-    (3, m, k, ...)
+    (3, m, k, ...) responses to a unit in the row before, in the same row and in the next
     """
     response = jnp.asarray(response)
     colour = (rows % 3).reshape(1, -1, *[1] * (response.ndim - 3))
 
-    def shifted(by: int) -> Array:  # selected, not gathered: the compiler does whole vectors of it
+    def shifted(by: int) -> Array:  # a selection is vectorised by the compiler, a gather is not
         first, second, third = (response[(c + by) % 3] for c in range(3))
         return jnp.where(colour == 0, first, jnp.where(colour == 1, second, third))
 
@@ -78,7 +83,7 @@ def by_neighbour(response: ArrayLike, rows: np.ndarray) -> Array:
 def solve(matrix: BlockTridiagonal, rhs: Array) -> Array:
     """Solve matrix x = rhs, (n, m), by block elimination without pivoting.
 
-    The residuals of this package have diagonal blocks that dominate or are positive definite.
+    It is stable for diagonal blocks that dominate or are positive definite, as in this package.
     """
     m = rhs.shape[1]
     if m > SMALL:
@@ -88,23 +93,25 @@ def solve(matrix: BlockTridiagonal, rhs: Array) -> Array:
 
 
 def solve_entries(matrix: Sequence, rhs: Sequence[Array]) -> list[Array]:
-    """Every entry a scalar: twice as fast where the compiler makes the loop one function.
+    """Solve matrix x = rhs by block elimination with every entry of a block as a scalar.
+
+    It is twice as fast as with whole blocks if the compiler makes the loop one function.
 
     Parameters
     ----------
-    matrix : lower, diagonal and upper blocks, m x m entries (n, ...) each; further axes than the
-        rows are systems that are solved together
+    matrix : lower, diagonal and upper blocks, m x m entries (n, ...) each; axes behind the rows are
+        systems that are solved together
     rhs : m entries (n, ...)
 
     Returns
     -------
-    m entries (n, ...)
+    m entries (n, ...) of x
     """
     m = len(rhs)
 
     def eliminate(above: list, row: tuple) -> tuple[list, list]:
         lower, diagonal, upper, right = row
-        # Of the row above: [its upper block, its right-hand side].
+        # Product of the lower block with [upper block, right-hand side] of the row above.
         seen = [[_dot(low, column) for column in zip(*above, strict=True)] for low in lower]
         pivot = [[diagonal[i][j] - seen[i][j] for j in range(m)] for i in range(m)]
         left = [r - each[m] for r, each in zip(right, seen, strict=True)]
@@ -122,15 +129,15 @@ def solve_entries(matrix: Sequence, rhs: Sequence[Array]) -> list[Array]:
 
 
 def _divided(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Array]]:
-    """The inverse of a small block times some columns, entry by entry."""
+    """Inverse of a small block times some columns, entry by entry."""
     m = len(pivot)
     if pivot[0][0].ndim:
         return _by_quotients(pivot, known)
-    if m == 3:  # by cofactors: a short way from every entry to every other
-        turn = [(1, 2), (2, 0), (0, 1)]
+    if m == 3:  # cofactors have the shortest chain of operations
+        pairs = [(1, 2), (2, 0), (0, 1)]
         cofactors = [
-            [pivot[i][k] * pivot[j][n] - pivot[i][n] * pivot[j][k] for k, n in turn]
-            for i, j in turn
+            [pivot[i][k] * pivot[j][n] - pivot[i][n] * pivot[j][k] for k, n in pairs]
+            for i, j in pairs
         ]
         scale = 1.0 / _dot(pivot[0], cofactors[0])
         inverse = [[c * scale for c in column] for column in zip(*cofactors, strict=True)]
@@ -140,12 +147,12 @@ def _divided(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Ar
 
 
 def divided(pivot: Sequence[Sequence[Array]], known: Sequence[Sequence[Array]]) -> list:
-    """The inverse of a block times some columns, entry by entry, by Gauss and Jordan, no pivoting.
+    """Inverse of a block times some columns, by Gauss-Jordan elimination without pivoting.
 
     Parameters
     ----------
-    pivot : m x m entries, arrays of any one shape
-    known : m rows of any number of columns
+    pivot : m x m entries, arrays of one shape
+    known : m rows of any number of columns, arrays of that shape
     """
     m = len(pivot)
     rows = [[*p, *k] for p, k in zip(pivot, known, strict=True)]
@@ -159,7 +166,10 @@ def divided(pivot: Sequence[Sequence[Array]], known: Sequence[Sequence[Array]]) 
 
 
 def _by_quotients(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Array]]:
-    """For whole vectors: the compiler keeps quotients, but computes all else anew for each use."""
+    """Inverse of a block times some columns for entries that are vectors.
+
+    The compiler keeps quotients, but computes all other terms anew for each use.
+    """
     m = len(pivot)
     rows = [[*p, *k] for p, k in zip(pivot, known, strict=True)]
 
@@ -178,15 +188,17 @@ def _by_quotients(pivot: list[list[Array]], known: list[list[Array]]) -> list[li
 
 
 def _dot(a: Sequence[Array], b: Sequence[Array]) -> Array:
+    """Sum of products."""
     return sum((x * y for x, y in zip(a[1:], b[1:], strict=True)), a[0] * b[0])
 
 
 def _solve_blocks(matrix: BlockTridiagonal, rhs: Array) -> Array:
+    """Solve matrix x = rhs with whole blocks."""
     m = rhs.shape[1]
 
     def eliminate(above: Array, row: tuple[Array, ...]) -> tuple[Array, Array]:
         lower, diagonal, upper, b = row
-        seen = _product(lower, above)  # of the row above: [its upper block, its right-hand side]
+        seen = _product(lower, above)  # above: [upper block, right-hand side] of the row above
         pivot, right = diagonal - seen[:, :m], b - seen[:, m]
         solved = gauss_jordan(jnp.concatenate([pivot, upper, right[:, None]], axis=1))
         return solved, solved
@@ -202,7 +214,10 @@ def _solve_blocks(matrix: BlockTridiagonal, rhs: Array) -> Array:
 
 
 def linear_solve(linear: Callable[[Array], Array], rhs: Array) -> Array:
-    """Solve linear(x) = rhs for a map that couples only neighbouring rows; transposable in rhs."""
+    """Solve linear(x) = rhs, (n, m), for a map that couples only neighbouring rows.
+
+    Derivatives with respect to the right-hand side pass in both directions.
+    """
     matrix = jacobian(linear, rhs)
     return lax.custom_linear_solve(
         linear,
@@ -213,12 +228,12 @@ def linear_solve(linear: Callable[[Array], Array], rhs: Array) -> Array:
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Matrix product of small blocks, as arithmetic that fuses instead of a library call."""
+    """Matrix product of small blocks, as arithmetic that the compiler fuses."""
     return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)
 
 
 def gauss_jordan(augmented: Array) -> Array:
-    """Columns x of [a, b] reduced to [1, x] for a block (m, m + columns), without pivoting."""
+    """Columns x of a block [a, b], (m, m + columns), that is reduced to [1, x] without pivoting."""
     m = augmented.shape[0]
     for k in range(m):
         row = augmented[k] / augmented[k, k]

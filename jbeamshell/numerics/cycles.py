@@ -1,4 +1,4 @@
-"""Closed cycles in a load path, and the work along their branches."""
+"""Closed cycles of a load path, and the work along their branches."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ def branch_work(force: Array, displacement: Array) -> Array:
 
     Parameters
     ----------
-    force, displacement : (steps+1,) along the branch; an odd last step is taken as straight
+    force, displacement : (steps+1,) along the branch; with an odd number of steps the last one is
+        taken as straight
     """
     even = 2 * ((force.shape[0] - 1) // 2)
     f, u = force[: even + 1], displacement[: even + 1]
@@ -25,7 +26,7 @@ def branch_work(force: Array, displacement: Array) -> Array:
 
 
 def turning_points(path: np.ndarray) -> list[int]:
-    """Indices of a load path's start, reversals and end; (steps,) to a list."""
+    """Indices of the start, the reversals and the end of a load path (steps,)."""
     moves = np.flatnonzero(np.diff(path)) + 1
     signs = np.sign(path[moves] - path[moves - 1])
     turns = moves[:-1][signs[1:] != signs[:-1]] if moves.size else []
@@ -33,7 +34,7 @@ def turning_points(path: np.ndarray) -> list[int]:
 
 
 def closed_cycles(path: np.ndarray) -> tuple[tuple[int, int, int], ...]:
-    """Cycles of a load path that return to the load they started from: (start, turn, end) each."""
+    """Cycles (start, turn, end) of a load path (steps,) that return to the load at their start."""
     turns = turning_points(path)
     close = 1e-6 * np.ptp(path)
     cycles, i = [], 0
