@@ -14,7 +14,7 @@ from jbeamshell.scene.keys import ARC_LENGTH
 # Length over H by which the slip zone of a strip is shorter than that of a bar, and the length over
 # H within which this difference grows.
 CORNER, REACH = 1.7, 0.4
-SMALLEST_SHARE = 1e-9  # smallest difference that counts, over the cap or over gross slip
+SMALLEST_SHARE = 1e-9  # smallest difference of tractions that counts, over the cap
 
 
 class Reversal(NamedTuple):
