@@ -253,7 +253,8 @@ def key_table(section: str = "") -> str:
     for row, text in zip(cells, ["meaning", *(key.sentence for key in shown)], strict=True):
         begin = "".join(cell.ljust(width + 2) for cell, width in zip(row, widths, strict=True))
         margin = " " * len(begin)
-        lines += textwrap.wrap(text, WIDTH, initial_indent=begin, subsequent_indent=margin)
+        wrap = textwrap.TextWrapper(WIDTH, begin, margin, break_on_hyphens=False)
+        lines += wrap.wrap(text)
     return "\n".join(lines)
 
 

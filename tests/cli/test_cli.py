@@ -21,6 +21,7 @@ from jbeamshell.cli import arguments, main
 from jbeamshell.measured.loops import read_loops
 from jbeamshell.quasistatic import recovery, solver
 from jbeamshell.scene import library
+from jbeamshell.scene.keys import TABLE
 
 # One shape for nearly everything, so that it compiles once.
 COARSE = {
@@ -191,6 +192,21 @@ def test_a_reader_that_leaves_early_costs_no_files(monkeypatch, tmp_path):
         monkeypatch.setattr(sys, "stdout", pipe)
         assert main.main(["run", *BASE, "--out", str(tmp_path)]) == 0
     assert names(tmp_path) == RUN_FILES
+
+
+# --- help -----------------------------------------------------------------------------------------
+
+
+def test_all_keys_are_listed_and_help_points_to_the_list(cli, capsys):
+    code, out, err = cli("keys")
+    assert (code, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines() if not line.startswith(" ")][1:] == [
+        *TABLE
+    ]
+    for command in ("run", "sweep", "fit", "advise", "ringdown"):
+        with pytest.raises(SystemExit, match="0"):
+            cli(command, "--help")
+        assert "`jbeamshell keys`" in " ".join(capsys.readouterr().out.split())
 
 
 # --- scenes that ship ---------------------------------------------------------------------------
