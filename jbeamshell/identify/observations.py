@@ -1,9 +1,8 @@
-"""How the model answers what is measured.
+"""Observations: the runs of the model that reproduce a measurement.
 
-A measurement is what a test left behind: a `Loop`, or a curve of `jbeamshell.measured.curves`.
-`observe` makes of it an `Observation`: the run of the model that answers it, and the weights that
-make residuals dimensionless.  Observations hold arrays only, so those of one kind and length are
-compiled once.
+A measurement is a `Loop`, or a curve of `jbeamshell.measured.curves`.  `observe` turns it into an
+`Observation`: a run of the model, and the weights that make residuals dimensionless.  Observations
+hold arrays only, so those of one kind and length are compiled once.
 """
 
 from __future__ import annotations
@@ -33,74 +32,74 @@ from jbeamshell.quasistatic.load_path import check
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.scene.scene import Scene
 
-LENGTH_STEP = 32  # where points to fill up cost next to nothing
+LENGTH_STEP = 32  # runs are filled up to multiples of this, where further points are cheap
 APPROACH = 8  # load steps from zero to the first point of a loop
-RUN_IN = 32  # and about so many through a closed loop, before it is compared
-POSITION_ROUNDING = 1e-6  # of L: so far tables may round a position off the strip
-HOPELESS = 10.0  # residual, in ranges, of a trial without equilibrium: never accepted
-NOTHING = 1e-6  # of what was measured: a model that dissipates less has a logarithm all the same
+RUN_IN = 32  # approximate load steps of a closed loop's first, uncompared pass
+POSITION_ROUNDING = 1e-6  # distance over L by which tables may round a position off the strip
+UNSOLVED_RESIDUAL = 10.0  # residual over the range of a trial without equilibrium: never accepted
+NEGLIGIBLE = 1e-6  # least figure over the measured one, so that its logarithm exists
 
 
 class Observation(eqx.Module):
-    """A run of the model that answers a measurement, (n,) each.
+    """Run of the model that reproduces a measurement at n points.
 
     Attributes
     ----------
-    measured : what the prediction is compared with
-    weight : of the difference: 1 over the noise where that is known, else in the mean 1 over the
-        range of what was measured; 0 where nothing is compared
+    measured : (n,) values with which the prediction is compared
+    weight : (n,) factors of the difference: 1 over the noise if that is known, else 1 over the
+        measured range in the mean; 0 at points that are not compared
     """
 
     measured: Array
     weight: Array
-    length_step: ClassVar[int] = 1  # runs are filled up to multiples of it
+    length_step: ClassVar[int] = 1  # the number of points is filled up to a multiple of this
 
     @property
     def span(self) -> float:
-        """The range of what was measured, in which misfits are counted."""
+        """Range of the measured values, by which misfits are divided."""
         return float(np.ptp(np.asarray(self.measured)[np.asarray(self.weight) > 0.0]))
 
     @staticmethod
-    def answer(prediction: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The measurement's column from the prediction, which may be on another scale."""
+    def response_from(prediction: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Column of the measurement from the prediction, which may be on another scale."""
         return prediction
 
     @abc.abstractmethod
     def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
-        """The model's answer.
+        """Run the model.
 
         Parameters
         ----------
-        scene : what is run; may hold traced leaves
+        scene : strip, contact and load; may hold traced leaves
         solver : settings of Newton's method
 
         Returns
         -------
-        prediction : (n,) in the places of ``measured``
-        sound : whether every load step found equilibrium
+        prediction : (n,) values to compare with ``measured``
+        converged : True if every load step found equilibrium
         """
 
     def residual(self, scene: Scene, solver: Newton) -> tuple[Array, Array, Array]:
-        """The weighted difference (n,), the prediction (n,), and whether it is sound."""
-        prediction, sound = self.predict(scene, solver)
+        """Weighted difference (n,), prediction (n,), and whether every load step converged."""
+        prediction, converged = self.predict(scene, solver)
         difference = (prediction - self.measured) * self.weight
-        # A weight of 1 over the noise makes the range a large residual itself.
+        # With weights of 1 over the noise, a difference of one range is a large residual itself.
         ranges = jnp.maximum(1.0, self.weight * jnp.ptp(self.measured))
-        hopeless = jnp.where(self.weight > 0.0, HOPELESS * ranges, 0.0)
-        return jnp.where(sound, difference, hopeless), prediction, sound
+        unsolved = jnp.where(self.weight > 0.0, UNSOLVED_RESIDUAL * ranges, 0.0)
+        return jnp.where(converged, difference, unsolved), prediction, converged
 
 
 class LoopObservation(Observation):
-    """One column of a loop as the answer to the other, which ``scene.load.control`` names.
+    """Response to the column of a loop or backbone that ``scene.load.control`` names.
 
-    A closed loop is run through twice, in larger steps at first, so that its second pass is steady;
-    anything else is run once, from rest.
+    A closed loop is run through twice, first in larger steps, so that its second pass is steady.
+    Anything else is run once, from the unloaded strip.
 
     Attributes
     ----------
-    path : (n,) the load: an approach from zero, a closed loop's run-in, then the points
-    free_zero : whether the zero of what answers is unknown, so that the model's is put where it
-        fits best
+    path : (n,) load: an approach from zero, a closed loop's first pass, then the compared points
+    free_zero : True if the zero of the response is unknown; the model's is then shifted to where
+        it fits best
     """
 
     path: Array
@@ -109,14 +108,14 @@ class LoopObservation(Observation):
 
     @classmethod
     def of(cls, loop: Loop, scene: Scene) -> LoopObservation:
-        """The path of a loop; raises `InputError` for forces beyond gross slip."""
+        """Run of a loop; raises `InputError` if a force exceeds gross slip."""
         control = scene.load.control
         run_in = getattr(loop.thinned(RUN_IN, control), control) if loop.closed else np.zeros(0)
         return cls._through(loop, scene, run_in)
 
     @classmethod
     def of_backbone(cls, backbone: Backbone, scene: Scene) -> LoopObservation:
-        """The path of a first loading; raises `InputError` for one that turns back as well."""
+        """Run of a first loading; raises `InputError` if it turns back or exceeds gross slip."""
         drive = getattr(backbone, scene.load.control)
         steps = np.diff(drive, prepend=0.0) * np.sign(drive[-1])
         back = np.flatnonzero(steps[1:] <= 0.0)
@@ -124,7 +123,7 @@ class LoopObservation(Observation):
             at = back[0] + 2 if back.size else 1
             raise InputError(
                 f"{backbone.label}: {scene.load.control} = {drive[at - 1]:g} turns back at point "
-                f"{at}: a backbone only goes on from rest; give a Loop instead"
+                f"{at}, but a backbone only rises from zero; give a Loop instead"
             )
         return cls._through(backbone, scene, np.zeros(0))
 
@@ -138,13 +137,13 @@ class LoopObservation(Observation):
         approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
         path = np.concatenate([approach, run_in, drive])
         check(scene, path)
-        unseen = np.zeros(path.size - drive.size)
+        uncompared = np.zeros(path.size - drive.size)
         noise = noise_of(measurement)
         driver = getattr(measurement, "driver", None) or scene.load.control
         if noise is not None and driver != scene.load.control:
             raise InputError(
                 f"{measurement.label}: its {driver} drives, so its noise is not that of the "
-                f"{driver}, which load.control = {scene.load.control!r} makes the model answer: "
+                f"{driver}, which is the response under load.control = {scene.load.control!r}: "
                 f"set load.control to {driver!r}"
             )
         if noise is not None and np.min(noise) >= np.ptp(response):
@@ -154,28 +153,28 @@ class LoopObservation(Observation):
             )
         weight = np.full(drive.size, 1.0 / np.ptp(response)) if noise is None else 1.0 / noise
         return cls(
-            jnp.asarray(np.append(unseen, response)),
-            jnp.asarray(np.append(unseen, weight)),
+            jnp.asarray(np.append(uncompared, response)),
+            jnp.asarray(np.append(uncompared, weight)),
             jnp.asarray(path),
             getattr(measurement, "free_zero", False),
         )
 
     def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
-        """The column that answers, (n,)."""
+        """Responding column (n,), and whether every load step converged."""
         history = solve(scene, self.path, solver=solver, throw=False)
         column = "displacement" if scene.load.control == "force" else "force"
-        answer = getattr(history, column)[history.pressed + 1 :]
+        response = getattr(history, column)[history.pressed + 1 :]
         if self.free_zero:
             share = self.weight**2 / jnp.sum(self.weight**2)
-            answer = answer - jnp.sum(share * (answer - self.measured))
-        return answer, jnp.all(history.status == 0)
+            response = response - jnp.sum(share * (response - self.measured))
+        return response, jnp.all(history.status == 0)
 
 
 class SqueezeObservation(Observation):
-    """The squeeze stress at given positions under the scene's whole pressure.
+    """Squeeze stress at given positions under the scene's whole pressure.
 
-    A point counts with the length it stands for, so that the misfit is that of the curve and does
-    not hang on where a mesh or a test has its points; with measured noise every point counts by it.
+    Every point counts with the length it represents, so the misfit is that of the curve and does
+    not depend on the spacing of the points.  With measured noise every point counts by its noise.
 
     Attributes
     ----------
@@ -187,10 +186,10 @@ class SqueezeObservation(Observation):
 
     @classmethod
     def of(cls, curve: SqueezeCurve, scene: Scene) -> SqueezeObservation:
-        """The run for a curve; raises `InputError` if it has none."""
+        """Run of a curve; raises `InputError` if the scene cannot reproduce it."""
         if "psi" not in scene.model.fields:
             raise InputError(
-                f"{curve.label}: model.fields = {list(scene.model.fields)} know no squeeze stress: "
+                f"{curve.label}: model.fields = {list(scene.model.fields)} have no squeeze stress: "
                 "add psi"
             )
         length = float(scene.strip.length)
@@ -207,25 +206,26 @@ class SqueezeObservation(Observation):
         return cls(*map(jnp.asarray, (curve.stress, weight, curve.x)))
 
     def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
-        """Squeeze stress (n,), linear between the middles of the elements."""
+        """Squeeze stress (n,), linear between element midpoints, and whether it converged."""
         history = solve(scene.replace({"load.cycles": 0}), solver=solver, throw=False)
         stress = jnp.interp(self.x, history.middles, history.squeeze_stress[-1])
         return stress, jnp.all(history.status == 0)
 
 
+# Figure of a `History` that each curve over amplitude measures.
 FIGURES: dict[type[AmplitudeCurve], str] = {
     DissipationCurve: "dissipation",
     StiffnessCurve: "secant_stiffness",
-}  # what a `History` answers to a curve over amplitude
+}
 
 
 class AmplitudeObservation(Observation):
-    """Logarithm of a figure of the steady cycle at several amplitudes.
+    """Logarithm of dissipation or secant stiffness of the steady cycle at several amplitudes.
 
     Attributes
     ----------
-    amplitude : (n,) of what ``scene.load.control`` names
-    figure : (n,) place of the figure in `FIGURES`, so that all kinds share one compiled program
+    amplitude : (n,) amplitudes of the column that ``scene.load.control`` names
+    figure : (n,) index of the figure in `FIGURES`, so that all kinds share one compiled program
     """
 
     amplitude: Array
@@ -233,17 +233,17 @@ class AmplitudeObservation(Observation):
 
     @property
     def span(self) -> float:
-        """One: a difference of logarithms is relative already."""
+        """One, as a difference of logarithms is relative already."""
         return 1.0
 
     @staticmethod
-    def answer(prediction: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The figure itself."""
+    def response_from(prediction: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Figure from its logarithm."""
         return np.exp(prediction)
 
     @classmethod
     def of(cls, curve: AmplitudeCurve, scene: Scene) -> AmplitudeObservation:
-        """The runs for a curve; raises `InputError` for forces beyond gross slip."""
+        """Runs of a curve; raises `InputError` if a force exceeds gross slip."""
         values = getattr(curve, curve.form.y)
         check(scene, np.sort(curve.amplitude))
         weight = np.ones(values.size) if curve.noise is None else values / curve.noise
@@ -251,7 +251,7 @@ class AmplitudeObservation(Observation):
         return cls(*map(jnp.asarray, (np.log(values), weight, curve.amplitude, figure)))
 
     def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
-        """Logarithms of the figure, (n,)."""
+        """Logarithms (n,) of the figure, and whether every load step converged."""
         cycles = max(scene.load.cycles, 1)
 
         def one(point: tuple[Array, Array, Array]) -> tuple[Array, Array]:
@@ -259,26 +259,26 @@ class AmplitudeObservation(Observation):
             to = {"load.amplitude": amplitude, "load.cycles": cycles}
             history = solve(scene.replace(to), solver=solver, throw=False)
             value = lax.select_n(figure, *(getattr(history, name) for name in FIGURES.values()))
-            least = NOTHING * jnp.exp(measured)
+            least = NEGLIGIBLE * jnp.exp(measured)
             return jnp.log(jnp.maximum(value, least)), jnp.all(history.status == 0)
 
-        logarithms, sound = lax.map(one, (self.amplitude, self.figure, self.measured))
-        return logarithms, jnp.all(sound)
+        logarithms, converged = lax.map(one, (self.amplitude, self.figure, self.measured))
+        return logarithms, jnp.all(converged)
 
 
 @functools.singledispatch
 def observe(measurement: Any, scene: Scene) -> Observation:
-    """The run of a scene that answers a measurement.
+    """Run of a scene that reproduces a measurement.
 
     Parameters
     ----------
     measurement : a `Loop`, or a curve of `jbeamshell.measured.curves`
-    scene : what the measurement is of
+    scene : strip, contact and load that were measured
 
     Raises
     ------
     InputError
-        if the scene cannot answer it
+        if the scene cannot reproduce the measurement, or if it is of an unknown kind
     """
     kind = type(measurement).__name__
     *known, last = (known.__name__ for known in observe.registry if known is not object)

@@ -1,16 +1,16 @@
-"""A plan of a fit: which files, of what kind, on which specimens, and what is free.
+"""Plans of a fit: files, their kind, the specimens they belong to, and the free parameters.
 
-The command line makes one of its options; anything larger is a TOML file:
+The command line makes a plan of its options; larger studies are written in a TOML file:
 
-    scene = "standard"                 # a scene that ships, or a file; this is the default
-    noise = 0.01                       # of the range; leave it out where the data bring their own
+    scene = "standard"                 # name of a scene, or a file; this is the default
+    noise = 0.01                       # over the range; leave it out if the data carry noise
 
-    [set]                              # keys of all specimens
+    [set]                              # values of all specimens
     "load.control" = "displacement"
 
     [free."contact.friction"]          # one value for all specimens
     [free."strip.height_ratio"]
-    each = true                        # one for each
+    each = true                        # one value for each specimen
     low = 0.01
     high = 0.5
 
@@ -24,8 +24,7 @@ The command line makes one of its options; anything larger is a TOML file:
 from __future__ import annotations
 
 import dataclasses
-import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,33 +33,27 @@ import numpy as np
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, read_toml
-from jbeamshell.identify.experiment import Specimen
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.measured.curve_files import CURVES, read_curves
-from jbeamshell.measured.curves import AmplitudeCurve, Backbone, Measurement
+from jbeamshell.identify.sources import Source
+from jbeamshell.identify.specimens import Specimen
+from jbeamshell.measured.curves import AmplitudeCurve, Measurement
 from jbeamshell.measured.loops import Loop, driver_of
-from jbeamshell.measured.recordings import Recording, read_recordings
-from jbeamshell.measured.splitting import split_cycles
-from jbeamshell.measured.steady import DRIFTS, steady_loops
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.toml import overridden, scene_from_values
 
-KINDS = ("loop", "backbone", *CURVES)
-CYCLES = ("auto", "steady", "recorded")
 OPTIONS = ("method", "starts", "noise", "points", "max_iterations", "tolerance")
-QUIET = 1e-3  # of the range: a driving column with more noise is no load path as it stands
 
 
 class Plan(NamedTuple):
-    """What `identify.fit` needs.
+    """Arguments of `identify.fit`.
 
     Attributes
     ----------
     specimens : scenes with their measurements
-    free : parameters
-    options : of `identify.fit`
-    notes : what was done to the data, and what was chosen for want of a word
+    free : parameters to fit
+    options : further arguments of `identify.fit`
+    notes : sentences on what was done to the data, and what was chosen by default
     """
 
     specimens: list[Specimen]
@@ -69,103 +62,24 @@ class Plan(NamedTuple):
     notes: list[str]
 
 
-@dataclasses.dataclass(frozen=True)
-class Source:
-    """Files of one kind that belong to one specimen.
-
-    Attributes
-    ----------
-    data : files
-    kind : what is in them, one of `KINDS`
-    cycles : of recordings: "steady" averages the steady cycles of every amplitude, "recorded" takes
-        all as it stands, "auto" averages where cycles repeat or what drives them is noisy
-    driver, drift : see `steady_loops`
-    centre : whether to take the zeros of the sensors from closed loops, see `Loop.centred`
-    width : of the specimen, by which forces, works and stiffnesses are divided
-    columns, units, decimal : see `read_recordings`
-    label : of the specimen
-    set : dotted keys of its own
-    """
-
-    data: Sequence[str]
-    kind: str = "loop"
-    cycles: str = "auto"
-    driver: str | None = None
-    drift: str = "keep"
-    centre: bool = False
-    width: float = 1.0
-    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    decimal: str | None = None
-    label: str = ""
-    set: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        files = isinstance(self.data, list | tuple) and all(isinstance(f, str) for f in self.data)
-        if not (files and self.data):
-            raise InputError(f"specimen {self.label!r}: data = {self.data!r}: list its files")
-        words = {"kind": KINDS, "cycles": CYCLES, "drift": DRIFTS, "driver": (None, *CONTROLS)}
-        for name, known in words.items():
-            value = getattr(self, name)
-            if not (value is None or isinstance(value, str)) or value not in known:
-                names = ", ".join(repr(word) for word in known if word)
-                raise InputError(f"{name} = {shown(value)}: choose among {names}")
-        if not isinstance(self.centre, bool):
-            raise InputError(f"centre = {self.centre!r}: give true or false")
-        number = isinstance(self.width, int | float) and not isinstance(self.width, bool)
-        if not (number and 0.0 < self.width <= sys.float_info.max):
-            raise InputError(f"width = {shown(self.width)}: give a positive number")
-
-    def measurements(self, folder: Path) -> Iterator[tuple[Measurement, Sequence[str]]]:
-        """What is in the files, each with a note or two on what was done to it."""
-        files = [folder / name for name in self.data]
-        if self.kind not in ("loop", "backbone"):
-            if self.width != 1.0:
-                raise InputError(f"width = {self.width:g}: a {self.kind} curve is per unit width")
-            yield from read_curves(
-                files, self.kind, columns=self.columns, units=self.units, decimal=self.decimal
-            )
-            return
-        for recording in read_recordings(
-            files, columns=self.columns, units=self.units, decimal=self.decimal
-        ):
-            per_width = recording._replace(force=recording.force / self.width)
-            if self.kind == "backbone":
-                pull = per_width.force, per_width.displacement, per_width.label
-                yield Backbone(*pull), per_width.notes
-            else:
-                loops = self._loops(per_width)
-                loops = [loop.centred() for loop in loops] if self.centre else loops
-                yield from ((loop, loop.notes) for loop in loops)
-
-    def _loops(self, recording: Recording) -> list[Loop]:
-        whole = Loop(
-            recording.force,
-            recording.displacement,
-            recording.label,
-            dropped=recording.dropped,
-            notes=recording.notes,
-        )
-        if self.cycles == "recorded" and self.drift == "keep":
-            return [whole]
-        if self.cycles == "auto" and self.drift == "keep":
-            try:
-                found = split_cycles(recording, self.driver)
-            except InputError:  # a first loading, or an unsteady path
-                return [whole]
-            noise = found.noise / np.ptp(found.path)
-            if len(found.cycles) == 1 and noise < QUIET:
-                return [whole]
-        return steady_loops(recording, self.driver, self.drift)
-
-
 def read_plan(path: str | Path) -> Plan:
-    """The plan in a TOML file; files in it are looked for beside it.
+    """Read a plan from a TOML file; the files it names are looked for in its folder.
+
+    Parameters
+    ----------
+    path : TOML file, see `jbeamshell.identify.plan`
 
     Raises
     ------
     InputError
-        naming the file, the entry and the fix
+        if the file, an entry or a data file cannot be read, naming the entry and the fix
+
+    Examples
+    --------
+    ::
+
+        plan = jb.identify.read_plan("study.toml")
+        fit = jb.identify.fit(plan.specimens, free=plan.free, **plan.options)
     """
     values = read_toml(path)
     try:
@@ -175,17 +89,17 @@ def read_plan(path: str | Path) -> Plan:
 
 
 def plan_from_values(values: Mapping[str, Any], folder: Path) -> Plan:
-    """The plan of a file's values; see the module.
+    """Plan from the entries of a TOML file.
 
     Parameters
     ----------
-    values : entries of the file
-    folder : where its files are looked for
+    values : entries, see `jbeamshell.identify.plan`
+    folder : folder in which data files are looked for
 
     Raises
     ------
     InputError
-        for an entry that is unknown or of the wrong kind, and for files that cannot be read
+        if an entry is unknown or of the wrong kind, or if a file cannot be read
     """
     _check_table("plan", values)
     given = values.get("specimen", [])
@@ -195,19 +109,19 @@ def plan_from_values(values: Mapping[str, Any], folder: Path) -> Plan:
     for number, table in enumerate(given, 1):
         source = _source(table, table.get("label") or (f"{number}" if len(given) > 1 else ""))
         read = list(source.measurements(folder))
-        plan.notes.extend(f"{item.label}: {remark}" for item, remarks in read for remark in remarks)
+        plan.notes.extend(f"{item.label}: {note}" for item, notes in read for note in notes)
         own = overridden(common, source.set)
         plan = _with_specimen(plan, own, [item for item, _ in read], source.label)
     return plan
 
 
 def plan_for(values: Mapping[str, Any], data: Sequence[Measurement]) -> Plan:
-    """The plan of a file's values without specimens, for one specimen with such data."""
+    """Plan of one specimen from entries without [[specimen]], for measurements at hand."""
     return _with_specimen(*_without_specimens(values, Path()), data, "")
 
 
 def _without_specimens(values: Mapping[str, Any], folder: Path) -> tuple[Plan, dict[str, Any]]:
-    """A plan still empty, and the keys of all specimens."""
+    """Plan without specimens, and the scene values that all specimens share."""
     _check_names("entry", values, ("scene", "set", "free", "specimen", *OPTIONS))
     tables = {name: values.get(name, {}) for name in ("set", "free")}
     for name, table in tables.items():
@@ -221,16 +135,16 @@ def _without_specimens(values: Mapping[str, Any], folder: Path) -> tuple[Plan, d
 def _with_specimen(
     plan: Plan, values: Mapping[str, Any], data: Sequence[Measurement], label: str
 ) -> Plan:
-    """A plan with one more specimen.
+    """Plan with one more specimen.
 
-    Without load.control the data tell which column drives, and without load.amplitude how far.
+    If load.control is not given, it follows from the data; so does load.amplitude.
     """
     own, notes = dict(values), list(plan.notes)
     loops = [item for item in data if isinstance(item, Loop)]
     if "load.control" not in own and loops:
         driver = own["load.control"] = driver_of(loops)
         which = f"{label}: " if label else ""
-        notes.append(f"{which}the {driver} drives these loops (set load.control to override)")
+        notes.append(f"{which}the {driver} drives these loops (set load.control to change it)")
         if driver != "force":
             own.pop("load.amplitude", None)
     control = own.get("load.control", "force")
@@ -247,11 +161,11 @@ def _with_specimen(
 
 
 def _base(scene: Any, folder: Path) -> dict[str, Any]:
-    """Dotted values of a scene that ships, or of a file beside the plan; none is standard."""
+    """Dotted values of a named scene or of a file; none means the standard scene."""
     if scene is None:
         return {}
     if not isinstance(scene, str):
-        raise InputError(f"scene = {scene!r}: give the name of one that ships, or a file")
+        raise InputError(f"scene = {scene!r}: give the name of a scene, or a file")
     return library.values_from(scene, folder)
 
 

@@ -1,4 +1,4 @@
-"""What a fit found: values with their uncertainty, how well they do, and words of warning."""
+"""Result of a fit: values with their uncertainty, misfits, and warnings."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.identify.parameters import Space
-from jbeamshell.identify.problem import Point, Problem
+from jbeamshell.identify.problem import Problem
+from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
 from jbeamshell.scene.scene import Scene
 
-TOO_WRONG = 2.0  # misfit over noise beyond which the model, not the noise, is what is left
+WRONG_MODEL = 2.0  # misfit over noise above which the model must be wrong
 
 
 class Fit(NamedTuple):
@@ -23,23 +23,23 @@ class Fit(NamedTuple):
 
     Attributes
     ----------
-    scene : the scene with the fitted values, ready to run; of several specimens the first
-    values, errors : fitted value and standard error (one sigma) by key, "key[specimen]" where every
-        specimen has its own; where the noise was not measured, the errors take what the model
-        leaves unexplained as independent noise, so a model that is wrong makes them too small
-    correlation : (n, n) of the fitted values, in the order of ``values``
+    scene : scene with the fitted values, ready to run; of several specimens the first
+    values, errors : fitted value and standard error (one sigma) by key, or by "key[specimen]" where
+        every specimen has its own.  If the noise was not measured, the errors treat the residual as
+        independent noise, so they are too small if the model is wrong
+    correlation : (n, n) correlation of the fitted values, in the order of ``values``
     misfit : root mean square of the residual over the range of the response
     misfits : the same for every measurement
-    data, model : the measurements fitted, loops thinned, and the model's at the same points
+    data, model : fitted measurements, loops thinned, and the model's at the same points
     status : "converged" or "max_iterations"
-    model_runs : how often the model was run through all measurements, derivatives included
-    labels : of the measurements, no two alike
-    scenes : of every specimen by its label, with the fitted values
-    intervals : 95 % interval by key
-    warnings : what to know before using the values
-    minima : values and cost where each start ended, the best first
-    uncertainty : what the data leave open, for other levels and questions
-    problem : what was solved, for `bands` and `identify.profile`
+    model_runs : number of model runs through all measurements, derivatives included
+    labels : labels of the measurements, no two alike
+    scenes : scene of every specimen by its label, with the fitted values
+    intervals : 95 % confidence interval by key
+    warnings : sentences on what to know before using the values
+    minima : values and cost at the end of each search, the best first
+    uncertainty : what the data do not determine, for other levels and noise
+    problem : least-squares problem, for `bands` and `identify.profile`
     """
 
     scene: Scene
@@ -70,7 +70,7 @@ class Fit(NamedTuple):
         return "\n".join([*lines, *(f"  {warning}" for warning in self.warnings)])
 
     def figures(self) -> dict[str, Any]:
-        """The result as plain numbers, fit for JSON: an end at infinity is None."""
+        """Result as plain numbers for JSON; an infinite end is None."""
         labels = self.labels or [d.label for d in self.data]
         values: dict[str, dict[str, Any]] = {
             key: {"value": value, "error": _finite(self.errors[key])}
@@ -102,31 +102,35 @@ class Fit(NamedTuple):
         return figures
 
     def intervals_at(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Confidence interval of every value at another level."""
+        """Confidence interval of every value at a level between 0 and 1."""
         ends = self._uncertainty.intervals(level).tolist()
         return {key: (low, high) for key, (low, high) in zip(self.values, ends, strict=True)}
 
     def bands(self, level: float = 0.95, *, noise: bool = False) -> list[tuple[Any, Any]]:
-        """Lower and upper end of the model's answer to every measurement.
+        """Confidence band of the model's response to every measurement.
 
         Parameters
         ----------
-        level : of confidence, point by point
-        noise : whether to cover a single measurement with its noise; else the model alone
+        level : confidence level, point by point
+        noise : True to cover a single measurement with its noise; False for the model alone
+
+        Returns
+        -------
+        Lower and upper end for every measurement, each a measurement of the same kind
         """
         problem, uncertainty = self._problem, self._uncertainty
-        point, experiment = self._point, problem.experiment
+        best, experiment = problem(uncertainty.space, uncertainty.point), problem.experiment
         per_noise = 1.0 / experiment.weight
         rows = experiment.weight.size
-        plain = point.jacobian[:rows] * (per_noise / experiment.emphasis)[:, None]
+        plain = best.jacobian[:rows] * (per_noise / experiment.emphasis)[:, None]
         own = uncertainty.sigma * per_noise if noise else None
         width = band_widths(uncertainty, plain, level, own)
-        ends = (experiment.answered(point.prediction + side * width) for side in (-1.0, 1.0))
-        return list(zip(*ends, strict=True))
+        sides = (best.prediction + side * width for side in (-1.0, 1.0))
+        return list(zip(*map(experiment.as_measurements, sides), strict=True))
 
     @property
     def columns(self) -> list[str]:
-        """Name of the column of every measurement that the model answers."""
+        """Name of the responding column of every measurement."""
         owners = [0] * len(self.data) if self.problem is None else self.problem.experiment.owners
         scenes = list(self.scenes.values()) or [self.scene]
         controls = (scenes[owner].load.control for owner in owners)
@@ -134,12 +138,12 @@ class Fit(NamedTuple):
 
     @property
     def residuals(self) -> list[NDArray[np.float64]]:
-        """Model less data over its range, (points,) each; logarithms for amplitude curves."""
+        """Model less data over the range, (points,) each; of logarithms for amplitude curves."""
         left = []
         for data, model, column in zip(self.data, self.model, self.columns, strict=True):
-            given, answer = getattr(data, column), getattr(model, column)
+            given, found = getattr(data, column), getattr(model, column)
             relative = data.form.scale == "log"
-            left.append(np.log(answer / given) if relative else (answer - given) / np.ptp(given))
+            left.append(np.log(found / given) if relative else (found - given) / np.ptp(given))
         return left
 
     def plot(self, axes: Any = None) -> Any:
@@ -165,75 +169,70 @@ class Fit(NamedTuple):
     @property
     def _uncertainty(self) -> Uncertainty:
         if self.uncertainty is None:
-            raise ValueError("this result was made by hand: it has no uncertainty to ask")
+            raise ValueError("uncertainty: this result was not made by fit and has none")
         return self.uncertainty
 
     @property
     def _problem(self) -> Problem:
         if self.problem is None:
-            raise ValueError("this result was made by hand: it has no problem to ask")
+            raise ValueError("problem: this result was not made by fit and has none")
         return self.problem
-
-    @property
-    def _point(self) -> Point:
-        return self._problem(self._uncertainty.space, self._uncertainty.point)
 
 
 def fit_at(
     problem: Problem,
-    space: Space,
-    at: NDArray[np.float64],
+    space: SearchSpace,
+    point: NDArray[np.float64],
     labels: Sequence[str],
     status: str,
     minima: Sequence[tuple[NDArray[np.float64], float]],
 ) -> Fit:
-    """The result of a problem whose search ended somewhere.
+    """Result at the point where the search ended.
 
     Parameters
     ----------
-    problem : what was solved
-    space : search space, n entries
-    at : (n,) where the search ended
-    labels : of the specimens
-    status : how it ended
-    minima : values and cost where each start ended
+    problem : least-squares problem
+    space : search space, n axes
+    point : (n,) end of the best search
+    labels : labels of the specimens
+    status : status of the best search
+    minima : values and cost at the end of each search
     """
     experiment = problem.experiment
-    point, values = problem(space, at), space.values(at)
+    best, values = problem(space, point), space.values(point)
     rows = experiment.weight.size
     uncertainty = uncertainty_of(
         space,
-        at,
-        point.residual,
-        point.jacobian,
+        point,
+        best.residual,
+        best.jacobian,
         emphasis=experiment.emphasis,
         relative=experiment.relative,
         noisy=experiment.noisy,
     )
-    plain = point.residual[:rows] / experiment.emphasis
+    plain = best.residual[:rows] / experiment.emphasis
     relative = plain * experiment.relative
     scenes = {
         label: scene.replace(space.of(values, specimen))
         for specimen, (label, scene) in enumerate(zip(labels, experiment.scenes, strict=True))
     }
-    named = dict(zip(space.names, values.tolist(), strict=True))
     ends = uncertainty.intervals().tolist()
     return Fit(
         scene=next(iter(scenes.values())),
-        values=named,
-        errors=dict(zip(space.names, uncertainty.errors.tolist(), strict=True)),
+        values=space.named(values),
+        errors=space.named(uncertainty.errors),
         correlation=uncertainty.correlation,
         misfit=float(np.sqrt(np.mean(relative**2))),
         misfits=[float(np.sqrt(np.mean(relative[own] ** 2))) for own in experiment.slices],
         data=experiment.measurements,
-        model=experiment.answered(point.prediction),
+        model=experiment.as_measurements(best.prediction),
         status=status,
         model_runs=problem.runs,
         labels=experiment.labels,
         scenes=scenes,
         intervals={k: (low, high) for k, (low, high) in zip(space.names, ends, strict=True)},
         warnings=_warnings(problem, uncertainty, values, plain, minima),
-        minima=[(dict(zip(space.names, v.tolist(), strict=True)), cost) for v, cost in minima],
+        minima=[(space.named(own), cost) for own, cost in minima],
         uncertainty=uncertainty,
         problem=problem,
     )
@@ -248,26 +247,26 @@ def _warnings(
 ) -> list[str]:
     space, warnings = uncertainty.space, []
     for name, bijection, value in zip(space.names, space.bijections, values, strict=True):
-        bound = bijection.held_by(float(value))
+        bound = bijection.bound_at(float(value))
         if bound is not None:
             warnings.append(
-                f"{name} = {value:.6g} ends at its bound {bound:g}: it has no error, and others "
-                "are as if it were fixed"
+                f"{name} = {value:.6g} ends at its bound {bound:g}: it has no error, and the "
+                "errors of the others take it as fixed"
             )
     excess = float(np.sqrt(np.sum(plain**2) / max(plain.size - values.size, 1)))
-    if problem.experiment.noisy and excess > TOO_WRONG:
+    if problem.experiment.noisy and excess > WRONG_MODEL:
         warnings.append(
             f"the model leaves {excess:.2g} times the measured noise unexplained: it is wrong in "
-            "some way, and the errors are too small by that much or more"
+            "some way, and the errors are too small by this factor or more"
         )
     costs = [cost for _, cost in minima]
     others = [cost for cost in costs if cost > 1.01 * costs[0]]
     if others:
         warnings.append(
-            f"{len(others)} of {len(costs)} starts ended in worse minima (cost {others[0]:.4g} and "
-            f"more, against {costs[0]:.4g}): the problem has several"
+            f"{len(others)} of {len(costs)} starts ended in worse minima (cost {others[0]:.4g} or "
+            f"more, against {costs[0]:.4g}): the problem has several minima"
         )
-    return warnings + uncertainty.words()
+    return warnings + uncertainty.limitations()
 
 
 def _finite(value: float) -> float | None:

@@ -1,7 +1,7 @@
-"""What data leave open: covariance, intervals, the directions nobody can tell, and bands.
+"""Uncertainty of a fit: covariance, intervals, directions that the data do not fix, and bands.
 
-All from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where most
-parameters are logarithms, mapped out through the parameters' bijections.
+All follow from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where
+most parameters are logarithms.  The parameters' bijections map them to values.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.parameters import Space
+from jbeamshell.identify.search_space import SearchSpace
 
 LEVELS = (0.68, 0.95)
-LEAST = 1e-14  # of the largest eigenvalue of J'J: smaller ones are rounding
-HARDLY, NOT = 0.1, 0.5  # relative standard errors from which a parameter is hardly, not known
-TAKES_PART = 0.3  # in a direction, relative to its largest component
+LEAST = 1e-14  # eigenvalue of J'J over the largest one, below which it is rounding
+HARDLY, NOT = 0.1, 0.5  # relative standard errors above which a parameter is hardly or not known
+TAKES_PART = 0.3  # component of a direction over its largest one, above which it is named
 STEP = 0.1  # relative change by which a direction is described
 
 
-class Direction(NamedTuple):
-    """An eigenvector of the Fisher information.
+class FisherDirection(NamedTuple):
+    """Eigenvector of the Fisher information.
 
     Attributes
     ----------
-    eigenvalue : of the information in the search space; 1 over the variance along the vector
-    vector : (n,) of unit length in the search space
+    eigenvalue : eigenvalue of the information; 1 over the variance along the vector
+    vector : (n,) vector of unit length in the search space
     """
 
     eigenvalue: float
@@ -40,51 +40,52 @@ class Uncertainty(NamedTuple):
 
     Attributes
     ----------
-    space : search space, n entries
-    point : (n,) of the minimum
+    space : search space, n axes
+    point : (n,) minimum
     inverse : (n, n) covariance in the search space for residuals of unit noise
-    held : (n,) whether the value ended at a bound; it then counts as fixed, and has no error
-    sigma : noise of the residuals: 1 where it was measured, else estimated from what is left
-    freedom : rows less parameters where the noise was estimated; None where it was measured
-    noise : the noise as a part of the responses' range, in the mean
+    at_bound : (n,) True where the value ended at a bound; it then counts as fixed without error
+    sigma : noise of the residuals: 1 if it was measured, else estimated from the residuals
+    freedom : degrees of freedom, rows less parameters, of an estimated noise; None if it was
+        measured
+    noise : noise over the range of the responses, in the mean
     """
 
-    space: Space
+    space: SearchSpace
     point: NDArray[np.float64]
     inverse: NDArray[np.float64]
-    held: NDArray[np.bool_]
+    at_bound: NDArray[np.bool_]
     sigma: float
     freedom: int | None
     noise: float
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """(n, n) in the search space."""
+        """Covariance (n, n) in the search space."""
         return self.sigma**2 * self.inverse
 
     @property
     def errors(self) -> NDArray[np.float64]:
-        """Standard errors (n,) of the parameters; NaN for those held by a bound."""
+        """Standard errors (n,) of the parameters; NaN for values at a bound."""
         errors = np.abs(self.space.slopes(self.point)) * self._spread
-        return np.where(self.held, np.nan, errors)
+        return np.where(self.at_bound, np.nan, errors)
 
     @property
     def correlation(self) -> NDArray[np.float64]:
-        """(n, n) of the parameters, in the search space."""
-        spread = np.where(self.held, 1.0, np.sqrt(np.diag(self.inverse)))
+        """Correlation (n, n) of the parameters in the search space."""
+        spread = np.where(self.at_bound, 1.0, np.sqrt(np.diag(self.inverse)))
         return np.where(np.eye(spread.size) > 0.0, 1.0, self.inverse / np.outer(spread, spread))
 
     def intervals(self, level: float = 0.95) -> NDArray[np.float64]:
-        """Confidence intervals (n, 2) of the parameters at a level, within their bounds.
+        """Confidence intervals (n, 2) of the parameters, within their bounds.
 
-        Student's distribution where the noise was estimated, else the normal one.
+        They use Student's distribution if the noise was estimated, else the normal distribution.
         """
         width = self.quantile(level) * self._spread
         ends = [self.space.values(self.point + side * width) for side in (-1.0, 1.0)]
-        return np.where(self.held[:, None], np.nan, np.sort(np.transpose(ends), axis=1))
+        return np.where(self.at_bound[:, None], np.nan, np.sort(np.transpose(ends), axis=1))
 
     def quantile(self, level: float) -> float:
-        """Standard errors to either side of a value within which a level lies."""
+        """Half width of the interval of a confidence level, in standard errors."""
         check_level(level)
         upper = 0.5 * (1.0 + level)
         if self.freedom is None:
@@ -92,23 +93,23 @@ class Uncertainty(NamedTuple):
         return float(stats.t.ppf(upper, self.freedom))
 
     def at_noise(self, noise: float) -> Uncertainty:
-        """What noise of another size, a part of the responses' range, would leave open."""
+        """Uncertainty under noise of another size, given over the range of the responses."""
         if not (np.isfinite(noise) and noise > 0.0):
             raise InputError(f"noise = {noise}: give a positive part of the range, such as 0.01")
         per_sigma = self.noise / self.sigma
         return self._replace(sigma=noise / per_sigma, noise=noise, freedom=None)
 
-    def directions(self) -> list[Direction]:
-        """Eigenvectors of the Fisher information of what no bound holds, the least known first."""
-        free = np.flatnonzero(~self.held)
+    def directions(self) -> list[FisherDirection]:
+        """Eigenvectors of the Fisher information of parameters inside their bounds, worst first."""
+        free = np.flatnonzero(~self.at_bound)
         variances, vectors = np.linalg.eigh(self.covariance[np.ix_(free, free)])
-        whole = np.zeros((free.size, self.held.size))
+        whole = np.zeros((free.size, self.at_bound.size))
         whole[:, free] = vectors.T
         pairs = zip(variances[::-1], whole[::-1], strict=True)
-        return [Direction(1.0 / max(v, np.finfo(float).tiny), vector) for v, vector in pairs]
+        return [FisherDirection(1.0 / max(v, np.finfo(float).tiny), vector) for v, vector in pairs]
 
-    def words(self, level: float = 0.95) -> list[str]:
-        """What the data cannot tell, in sentences; none when they fix everything."""
+    def limitations(self, level: float = 0.95) -> list[str]:
+        """Sentences on what the data do not determine; none if they determine all parameters."""
         low_high = self.intervals(level)
         values, noise = self.space.values(self.point), f"{100.0 * self.noise:.2g} % noise"
         relative = self.errors / self._sizes(values)
@@ -123,7 +124,7 @@ class Uncertainty(NamedTuple):
         return sentences
 
     def _trades(self, values: NDArray[np.float64]) -> list[str]:
-        """Combinations of parameters that change the response by less than the noise."""
+        """Sentences on combinations of parameters that change the response less than the noise."""
         sizes, slopes = self._sizes(values), self.space.slopes(self.point)
         sentences, named = [], set()
         for eigenvalue, vector in self.directions():
@@ -153,7 +154,7 @@ class Uncertainty(NamedTuple):
         return np.sqrt(np.diag(self.covariance))
 
     def _sizes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What parameters are counted in: themselves, or their start where they come near zero."""
+        """Sizes (n,) for relative errors: the values, or their starts if these are larger."""
         starts = np.array([bijection.start for bijection in self.space.bijections])
         logs = np.array([bijection.log for bijection in self.space.bijections])
         sizes = np.where(logs, np.abs(values), np.maximum(np.abs(values), np.abs(starts)))
@@ -161,7 +162,7 @@ class Uncertainty(NamedTuple):
 
 
 def uncertainty_of(
-    space: Space,
+    space: SearchSpace,
     point: NDArray[np.float64],
     residual: NDArray[np.float64],
     jacobian: NDArray[np.float64],
@@ -174,38 +175,39 @@ def uncertainty_of(
 
     Parameters
     ----------
-    space : search space, n entries
-    point : (n,) of the minimum
-    residual, jacobian : (rows,) and (rows, n), priors at the end
-    emphasis : factors of the rows without priors that say nothing of their noise
-    relative : of the same rows, from residuals to parts of the range
-    noisy : whether the residuals are in units of measured noise
+    space : search space, n axes
+    point : (n,) minimum
+    residual, jacobian : (rows,) and (rows, n), priors in the last rows
+    emphasis : factors that the user gave to the rows without priors, whatever their noise
+    relative : factors of the same rows from residuals to parts of the range
+    noisy : True if the residuals are in units of measured noise
     """
     values = space.values(point)
     pairs = zip(space.bijections, values.tolist(), strict=True)
-    held = np.array([bijection.held_by(value) is not None for bijection, value in pairs])
-    free = np.ix_(~held, ~held)
+    at_bound = np.array([bijection.bound_at(value) is not None for bijection, value in pairs])
+    free = np.ix_(~at_bound, ~at_bound)
     eigenvalues, vectors = np.linalg.eigh((jacobian.T @ jacobian)[free])
-    # Directions that nothing depends on are open, not known: a pseudo-inverse would hide them.
+    # A pseudo-inverse would give directions without influence no variance; theirs is large.
     safe = np.maximum(eigenvalues, LEAST * np.max(eigenvalues, initial=0.0))
     inverse = np.zeros((point.size, point.size))
     inverse[free] = (vectors / safe) @ vectors.T
     factors = np.append(emphasis, np.ones(residual.size - emphasis.size))
     if np.any(factors != 1.0):
-        meat = jacobian.T @ (factors[:, None] ** 2 * jacobian)
-        inverse = inverse @ meat @ inverse
+        # Sandwich estimator: the factors change the minimum, not the noise.
+        inner = jacobian.T @ (factors[:, None] ** 2 * jacobian)
+        inverse = inverse @ inner @ inverse
     freedom = max(residual.size - point.size, 1)
     sigma = 1.0 if noisy else float(np.sqrt(np.sum((residual / factors) ** 2) / freedom))
     noise = sigma * float(np.sqrt(np.mean(relative**2)))
-    # A model that repeats its own data to the last bit leaves no noise to divide by.
+    # A model fitted to its own data leaves no noise to divide by.
     sigma, noise = (max(size, np.finfo(float).tiny ** 0.25) for size in (sigma, noise))
-    return Uncertainty(space, point, inverse, held, sigma, None if noisy else freedom, noise)
+    return Uncertainty(space, point, inverse, at_bound, sigma, None if noisy else freedom, noise)
 
 
 def check_level(level: float) -> None:
-    """Raise `InputError` for a level of confidence that is none."""
+    """Raise `InputError` unless a confidence level lies between 0 and 1."""
     if not 0.0 < level < 1.0:
-        raise InputError(f"level = {level}: give a part of one, such as 0.95")
+        raise InputError(f"level = {level}: give a number between 0 and 1, such as 0.95")
 
 
 def band_widths(
@@ -214,14 +216,15 @@ def band_widths(
     level: float,
     noise: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Half widths (rows,) of the band about a prediction.
+    """Half widths (rows,) of the confidence band about a prediction.
 
     Parameters
     ----------
-    uncertainty : of the parameters
-    jacobian : (rows, n) of the prediction with respect to the search space
-    level : of confidence
-    noise : (rows,) of a single measurement, to be covered as well; None is the model alone
+    uncertainty : uncertainty of the parameters
+    jacobian : (rows, n) derivatives of the prediction with respect to the search space
+    level : confidence level
+    noise : (rows,) noise of a single measurement, which the band then covers as well; None for the
+        band of the model alone
     """
     variance = np.einsum("ri,ij,rj->r", jacobian, uncertainty.covariance, jacobian)
     variance = np.maximum(variance, 0.0) + (0.0 if noise is None else noise**2)

@@ -12,9 +12,11 @@ from toy import KEYS, START, Formula, X, formula, readings, scene
 
 import jbeamshell as jb
 from jbeamshell import identify
-from jbeamshell.identify.experiment import Experiment, Specimen
-from jbeamshell.identify.parameters import Parameter, as_parameters, search_space
+from jbeamshell.identify.experiment import Experiment
+from jbeamshell.identify.parameters import Parameter, as_parameters
 from jbeamshell.identify.problem import Problem
+from jbeamshell.identify.search_space import search_space
+from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.example import example_loops
 from jbeamshell.measured.loops import Loop, make_loop
@@ -125,7 +127,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(method, tmp_path, monkeypatch):
         monkeypatch.setattr(Experiment, name, run)
 
     counted("__call__", 0)
-    counted("together", 1)
+    counted("batch", 1)
 
     def stop(progress):
         if progress.step == 3:
@@ -230,7 +232,7 @@ def test_a_state_that_can_no_longer_be_written(tmp_path):
         ({"free": Parameter(MU, prior=(0.1, 0.01))}, "prior .* give noise"),
         ({"free": Parameter(MU, start=60.0)}, "no equilibrium at the start values"),
         ({"method": "nelder-mead"}, "method = 'nelder-mead': choose 'levenberg-marquardt' or"),
-        ({"starts": 0}, "starts = 0: give a whole number"),
+        ({"starts": 0}, "starts = 0: must be a whole number"),
         ({"starts": 1.5}, "starts = 1.5"),
         ({"noise": -0.01}, "noise = -0.01: give a positive part"),
         ({"weights": (1.0, 2.0)}, r"weights = \[1.0, 2.0\]: give one positive number for each"),
@@ -255,7 +257,7 @@ def test_what_cannot_be_fitted(options, message):
 
 
 def test_an_unfinished_fit_is_loud():
-    with pytest.raises(jb.UnconvergedError, match="not settled after 2 iterations"):
+    with pytest.raises(jb.UnconvergedError, match="not converged after 2 iterations"):
         identify.fit(readings(), scene(), KEYS, max_iterations=2)
     fit = identify.fit(readings(), scene(), KEYS, max_iterations=2, throw=False)
     assert fit.status == "max_iterations"
@@ -268,7 +270,7 @@ def test_starts_side_by_side_answer_as_one_after_the_other():
         for _ in range(2)
     )
     points = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 3))
-    for point, one in zip(points, problem.together(space, points), strict=True):
+    for point, one in zip(points, problem.batch(space, points), strict=True):
         np.testing.assert_allclose(one.residual, other(space, point).residual, rtol=1e-12)
         np.testing.assert_allclose(one.jacobian, other(space, point).jacobian, rtol=1e-12)
     assert problem.runs == other.runs == 3
@@ -422,9 +424,9 @@ def test_what_a_scene_cannot_answer(planted):
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"points": 3}, "points = 3: give a whole number, 8 or more"),
-        ({"max_iterations": "a"}, "max_iterations = 'a': give a whole number, 1 or more"),
-        ({"starts": True}, "starts = True: give a whole number, 1 or more"),
+        ({"points": 3}, "points = 3: must be a whole number, 8 to 1000000"),
+        ({"max_iterations": "a"}, "max_iterations = 'a': must be a whole number, 1 to 1000000"),
+        ({"starts": True}, "starts = True: must be a whole number, 1 to 1000000"),
         ({"tolerance": -1.0}, r"tolerance = -1\.0: give a positive number, such as 1e-7"),
         ({"noise": "a"}, "noise = 'a': give a positive part of the range"),
     ],

@@ -7,7 +7,7 @@ import toy
 
 import jbeamshell as jb
 from jbeamshell import identify
-from jbeamshell.identify.observations import HOPELESS, observe
+from jbeamshell.identify.observations import UNSOLVED_RESIDUAL, observe
 from jbeamshell.measured.curves import (
     Backbone,
     DissipationCurve,
@@ -119,7 +119,7 @@ def test_curves_that_a_scene_cannot_answer():
     scene = library.squeezed()
     with pytest.raises(jb.InputError, match=r"far end: x = 105 lies off the strip.*0 to 100"):
         identify.fit_kappa_s(SqueezeCurve(X + 60.0, STRESS, "far end"), scene)
-    with pytest.raises(jb.InputError, match=r"know no squeeze stress: add psi"):
+    with pytest.raises(jb.InputError, match=r"have no squeeze stress: add psi"):
         observe(SqueezeCurve(X, STRESS), scene.replace({"model.fields": ["v", "w", "beta"]}))
     observe(SqueezeCurve(X + 45.00001, STRESS), scene)  # rounded by the table it came from
 
@@ -219,8 +219,8 @@ def test_a_backbone_only_goes_on():
 def test_a_trial_without_equilibrium_is_hopeless_where_it_is_compared():
     formula = observe(toy.readings(), toy.scene(**{"contact.friction": 60.0}))
     rows, _, sound = formula.residual(toy.scene(**{"contact.friction": 60.0}), jb.Newton())
-    np.testing.assert_array_equal(rows, HOPELESS)
+    np.testing.assert_array_equal(rows, UNSOLVED_RESIDUAL)
     assert not bool(sound)
     noisy = observe(toy.readings(1e-3, known=True), toy.scene())
     rows, _, _ = noisy.residual(toy.scene(**{"contact.friction": 60.0}), jb.Newton())
-    np.testing.assert_allclose(rows, HOPELESS * np.ptp(noisy.measured) / 1e-3)
+    np.testing.assert_allclose(rows, UNSOLVED_RESIDUAL * np.ptp(noisy.measured) / 1e-3)

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 
 import jbeamshell as jb
-from jbeamshell.identify.parameters import Parameter, as_parameters, search_space
+from jbeamshell.identify.parameters import Parameter, as_parameters
+from jbeamshell.identify.search_space import search_space
 
 MU = "contact.friction"
 INTERVALS = (
@@ -30,7 +31,7 @@ def bijections(draw):
 @given(bijections(), st.floats(0.0102, 2.99))
 def test_there_and_back(bijection, value):
     assert bijection.value(bijection.point(value)) == pytest.approx(value, rel=1e-9)
-    free, (low, high) = bijection.straight()
+    free, (low, high) = bijection.boxed()
     assert low < free.point(value) < high
     assert free.value(free.point(value)) == pytest.approx(value, rel=1e-12)
 
@@ -73,10 +74,10 @@ def test_where_parameters_live(key, start, low, high):
 
 def test_what_stands_at_a_bound():
     bijection = Parameter(MU, low=0.1, high=10.0).bijection(1.0)
-    assert bijection.held_by(0.1001) == 0.1
-    assert bijection.held_by(9.99) == 10.0
-    assert bijection.held_by(0.12) is None
-    assert Parameter(MU).bijection(1.0).held_by(1e-12) is None  # of a logarithm zero is no end
+    assert bijection.bound_at(0.1001) == 0.1
+    assert bijection.bound_at(9.99) == 10.0
+    assert bijection.bound_at(0.12) is None
+    assert Parameter(MU).bijection(1.0).bound_at(1e-12) is None  # of a logarithm zero is no end
 
 
 @pytest.mark.parametrize(
@@ -87,7 +88,7 @@ def test_what_stands_at_a_bound():
         ({"key": "load.amplitude"}, "is not a parameter"),
         ({"start": np.nan}, "start = nan: give a finite number"),
         ({"low": True}, "low = True: give a finite number"),
-        ({"low": -0.1}, "low = -0.1: the parameter lives between 0 and inf"),
+        ({"low": -0.1}, "low = -0.1: must lie between 0 and inf"),
         ({"key": "strip.poisson_ratio", "high": 0.6}, r"high = 0.6: .* between -1 and 0.5"),
         ({"low": 2.0, "high": 1.0}, "low = 2.0: must lie below high = 1"),
         ({"scale": "cubic"}, "scale = 'cubic': choose 'log' or 'linear'"),

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.plan import Source, plan_from_values, read_plan
+from jbeamshell.identify.plan import plan_from_values, read_plan
+from jbeamshell.identify.sources import Source
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop

@@ -139,7 +139,7 @@ def test_a_profile_ends_where_the_others_can_no_longer_follow():
 def test_profiles_of_what_was_not_fitted(quiet):
     with pytest.raises(jb.InputError, match=r"'strip.length': was not fitted; names are contact"):
         identify.profile(quiet, "strip.length")
-    with pytest.raises(jb.InputError, match="level = 95: give a part of one"):
+    with pytest.raises(jb.InputError, match="level = 95: give a number between"):
         identify.profile(quiet, MU, level=95)
 
 
@@ -157,7 +157,7 @@ def test_what_the_data_leave_open_is_said_in_words():
     # Exact data hide it until one asks what noise would do.
     exact = identify.fit(Readings(X, short.y), begin, KEYS, max_iterations=100)
     assert not exact.warnings
-    (sentence, *_) = exact.uncertainty.at_noise(0.01).words()
+    (sentence, *_) = exact.uncertainty.at_noise(0.01).limitations()
     assert "is not identifiable from these data: 1 % noise leaves it anywhere" in sentence
     with pytest.raises(jb.InputError, match="noise = 0: give a positive part"):
         exact.uncertainty.at_noise(0)

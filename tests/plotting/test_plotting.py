@@ -10,7 +10,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell import plotting
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.likelihood import Profile
+from jbeamshell.identify.profile_likelihood import Profile
 
 COARSE = {
     "model.nodes": 21,

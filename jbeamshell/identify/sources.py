@@ -1,0 +1,121 @@
+"""Files of one specimen: what kind of measurement they hold, and how it is prepared."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jbeamshell.common.checks import shown
+from jbeamshell.common.errors import InputError
+from jbeamshell.identify.parameters import is_number
+from jbeamshell.measured.curve_files import read_curves
+from jbeamshell.measured.curves import Backbone, Measurement
+from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.recordings import Recording, read_recordings
+from jbeamshell.measured.splitting import split_cycles
+from jbeamshell.measured.steady import DRIFTS, steady_loops
+from jbeamshell.scene.keys import CONTROLS
+
+KINDS = ("loop", "backbone", "dissipation", "stiffness", "squeeze")
+CYCLES = ("auto", "steady", "recorded")
+QUIET = 1e-3  # noise of the driving column, over its range, above which cycles are averaged
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """Files of one kind that belong to one specimen.
+
+    Attributes
+    ----------
+    data : names of the files
+    kind : kind of measurement in them, one of `KINDS`
+    cycles : treatment of recordings: "steady" averages the steady cycles of every amplitude;
+        "recorded" takes the recording as one loop; "auto" averages if cycles repeat or if the
+        driving column is noisy
+    driver, drift : arguments of `steady_loops`
+    centre : True to take the zeros of the sensors from closed loops, see `Loop.centred`
+    width : width of the specimen, by which forces are divided
+    columns, units, decimal : arguments of `read_recordings`
+    label : label of the specimen
+    set : values of its scene by dotted key
+
+    Raises
+    ------
+    InputError
+        if an entry is of the wrong kind, naming the entry, the value and the fix
+    """
+
+    data: Sequence[str]
+    kind: str = "loop"
+    cycles: str = "auto"
+    driver: str | None = None
+    drift: str = "keep"
+    centre: bool = False
+    width: float = 1.0
+    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    decimal: str | None = None
+    label: str = ""
+    set: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        files = isinstance(self.data, list | tuple) and all(isinstance(f, str) for f in self.data)
+        if not (files and self.data):
+            raise InputError(f"specimen {self.label!r}: data = {self.data!r}: list its files")
+        words = {"kind": KINDS, "cycles": CYCLES, "drift": DRIFTS, "driver": (None, *CONTROLS)}
+        for name, known in words.items():
+            value = getattr(self, name)
+            if not (value is None or isinstance(value, str)) or value not in known:
+                names = ", ".join(repr(word) for word in known if word)
+                raise InputError(f"{name} = {shown(value)}: choose among {names}")
+        if not isinstance(self.centre, bool):
+            raise InputError(f"centre = {self.centre!r}: give true or false")
+        if not (is_number(self.width) and self.width > 0.0):
+            raise InputError(f"width = {shown(self.width)}: give a positive number")
+
+    def measurements(self, folder: Path) -> Iterator[tuple[Measurement, Sequence[str]]]:
+        """Measurements in the files of a folder, each with notes on what was done to the data."""
+        files = [folder / name for name in self.data]
+        if self.kind not in ("loop", "backbone"):
+            if self.width != 1.0:
+                fix = f"a {self.kind} curve is per unit width; leave width out"
+                raise InputError(f"width = {self.width:g}: {fix}")
+            yield from read_curves(
+                files, self.kind, columns=self.columns, units=self.units, decimal=self.decimal
+            )
+            return
+        for recording in read_recordings(
+            files, columns=self.columns, units=self.units, decimal=self.decimal
+        ):
+            per_width = recording._replace(force=recording.force / self.width)
+            if self.kind == "backbone":
+                columns = per_width.force, per_width.displacement
+                yield Backbone(*columns, per_width.label), per_width.notes
+            else:
+                loops = self._loops(per_width)
+                loops = [loop.centred() for loop in loops] if self.centre else loops
+                yield from ((loop, loop.notes) for loop in loops)
+
+    def _loops(self, recording: Recording) -> list[Loop]:
+        whole = Loop(
+            recording.force,
+            recording.displacement,
+            recording.label,
+            dropped=recording.dropped,
+            notes=recording.notes,
+        )
+        if self.cycles == "recorded" and self.drift == "keep":
+            return [whole]
+        if self.cycles == "auto" and self.drift == "keep":
+            try:
+                found = split_cycles(recording, self.driver)
+            except InputError:  # a first loading, or an unsteady path
+                return [whole]
+            noise = found.noise / np.ptp(found.path)
+            if len(found.cycles) == 1 and noise < QUIET:
+                return [whole]
+        return steady_loops(recording, self.driver, self.drift)

@@ -1,0 +1,96 @@
+"""Specimens of a fit: a strip, and what was measured on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import InputError
+from jbeamshell.measured.curves import Measurement
+from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.recordings import as_column
+from jbeamshell.scene.keys import CONTROLS
+from jbeamshell.scene.scene import Scene
+
+
+class Specimen(NamedTuple):
+    """One strip and what was measured on it.
+
+    Attributes
+    ----------
+    scene : start values, and all values that stay fixed
+    data : one measurement or several
+    label : name in messages and in the names of the specimen's own values
+    weights : factors of the measurements' residuals, besides the curves' own; all 1 if empty
+    """
+
+    scene: Scene
+    data: Measurement | Sequence[Measurement]
+    label: str = ""
+    weights: Sequence[float] = ()
+
+    @property
+    def measurements(self) -> list[Measurement]:
+        """Measurements as a list."""
+        # A Loop is a tuple itself.
+        one = isinstance(self.data, Loop) or not isinstance(self.data, Sequence)
+        return [self.data] if one else list(self.data)  # type: ignore[list-item, arg-type]
+
+    def checked_weights(self) -> NDArray[np.float64]:
+        """Weights (measurements,); raises `InputError` unless there are none or one for each."""
+        count, where = len(self.measurements), f" of {self.label!r}" if self.label else ""
+        fix = f"give one positive number for each of the {count} measurements"
+        several = isinstance(self.weights, list | tuple | np.ndarray)
+        require(f"weights{where}", self.weights, several, fix)
+        given = as_column(self.weights, f"weights{where}", "data")
+        weights = given if given.size else np.ones(count)
+        if weights.shape != (count,) or not np.all(np.isfinite(weights) & (weights > 0.0)):
+            raise InputError(f"weights{where} = {given.tolist()}: {fix}")
+        return weights
+
+    def check(self) -> None:
+        """Raise `InputError` if there is nothing to compare, or no load that could drive it."""
+        driver = self.scene.load.control
+        fix = "does not drive a measurement: take " + " or ".join(map(repr, CONTROLS))
+        require("load.control", driver, driver in CONTROLS, fix)
+        if not self.measurements:
+            where = f" of specimen {self.label!r}" if self.label else ""
+            raise InputError(f"data{where}: no measurement given; read loops with read_loops")
+
+
+def as_specimens(data: Any, scene: Scene | None, weights: Sequence[float]) -> list[Specimen]:
+    """Specimens with labels, no two alike, from what `fit` was given.
+
+    Raises
+    ------
+    InputError
+        if specimens are mixed with measurements or given a scene or weights besides their own, if
+        measurements come without a scene, or if two specimens have one label
+    """
+    given = [data] if isinstance(data, Specimen) else data
+    several = isinstance(given, Sequence) and not isinstance(given, Loop)
+    if not (several and any(isinstance(item, Specimen) for item in given)):
+        if scene is None:
+            raise InputError(
+                "scene: give one, or a Specimen (a scene with its data) in place of data"
+            )
+        require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+        return [Specimen(scene, data, weights=weights)]
+    if not all(isinstance(item, Specimen) for item in given):
+        raise InputError("data: mixes specimens with measurements: make each a Specimen")
+    for name, present in {"scene": scene is not None, "weights": len(weights) > 0}.items():
+        if present:
+            raise InputError(f"{name}: the specimens bring their own; leave it out")
+    labelled = [
+        specimen._replace(label=specimen.label or f"specimen {number}")
+        for number, specimen in enumerate(given, 1)
+    ]
+    labels = [specimen.label for specimen in labelled]
+    repeated = [label for label in labels if labels.count(label) > 1]
+    if repeated:
+        raise InputError(f"specimens: two have the label {repeated[0]!r}: give each its own")
+    return labelled
