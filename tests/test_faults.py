@@ -22,7 +22,7 @@ from jbeamshell import identify
 from jbeamshell.cli import arguments, main, terminal
 from jbeamshell.common.errors import LONGEST
 from jbeamshell.identify import plan
-from jbeamshell.measured import containers, curve_files, curves, loops, steady
+from jbeamshell.measured import array_tables, curve_files, curves, loops, steady
 from jbeamshell.measured.recordings import read_recordings
 from jbeamshell.quasistatic import recovery
 from jbeamshell.scene import library
@@ -304,7 +304,7 @@ def test_plans_that_are_none(folder, fault):
 
 
 def test_files_that_hold_no_loop_and_execute_nothing(folder, fault, monkeypatch):
-    monkeypatch.setattr(containers, "LARGEST", 8 * hostile.MANY - 1)
+    monkeypatch.setattr(array_tables, "LARGEST", 8 * hostile.MANY - 1)
     evil, faults = folder / "evil", []
     for name, content in hostile.data_files(evil).items():
         (folder / name).write_bytes(content)

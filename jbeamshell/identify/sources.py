@@ -12,15 +12,16 @@ import numpy as np
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.parameters import is_number
-from jbeamshell.measured.curve_files import read_curves
+from jbeamshell.measured.curve_files import CURVES, read_curves
 from jbeamshell.measured.curves import Backbone, Measurement
+from jbeamshell.measured.drift import DRIFTS
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.recordings import Recording, read_recordings
 from jbeamshell.measured.splitting import split_cycles
-from jbeamshell.measured.steady import DRIFTS, steady_loops
+from jbeamshell.measured.steady import steady_loops
 from jbeamshell.scene.keys import CONTROLS
 
-KINDS = ("loop", "backbone", "dissipation", "stiffness", "squeeze")
+KINDS = ("loop", "backbone", *CURVES)
 CYCLES = ("auto", "steady", "recorded")
 QUIET = 1e-3  # noise of the driving column, over its range, above which cycles are averaged
 

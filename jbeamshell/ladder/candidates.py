@@ -1,4 +1,4 @@
-"""What `advise` chooses from: rungs, each on grids and load paths that suit it."""
+"""Candidates of `advise`: rungs, each with the grids and load paths that suit it."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 
 class Candidate(NamedTuple):
-    """A rung with its resolution.
+    """Rung with its resolution.
 
     Attributes
     ----------
-    rung : its name, see `jbeamshell.scene.rungs`
-    nodes : along X
+    rung : name of the rung, see `jbeamshell.scene.rungs`
+    nodes : number of nodes along X
     steps : load steps per half cycle
     """
 
@@ -21,20 +21,20 @@ class Candidate(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Such as "p3@81x10"."""
+        """Name of rung and resolution, such as "p3@81x10"."""
         return f"{self.rung}@{self.nodes}x{self.steps}"
 
     @property
     def section(self) -> str:
-        """The rung whose section it has: "squeeze" for "masing", "p3" for "masing-p3"."""
+        """Rung with the same section: "squeeze" for "masing", "p3" for "masing-p3"."""
         last = self.rung.rpartition("-")[2]
         return "squeeze" if last in ("masing", "pull") else last
 
     @property
     def resolution(self) -> dict[str, Any]:
-        """Dotted values of its grid and its load path."""
-        # Coarse grids spend their nodes at the loaded end; the beamshell's point reaction there
-        # goes into tension on finer elements than this.
+        """Dotted values of the grid and the load path."""
+        # Coarse grids need their nodes at the loaded end.  On finer elements than these the
+        # beamshell's point reaction there turns into tension.
         fine = self.nodes <= 41 or self.section.startswith("p")
         return {
             "model.nodes": self.nodes,
@@ -44,7 +44,7 @@ class Candidate(NamedTuple):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Dotted values that make a scene's model this one, all but the kinematics."""
+        """Dotted values of the model, except its kinematics."""
         return {"model.rung": self.rung} | self.resolution
 
 

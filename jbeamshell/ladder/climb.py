@@ -1,8 +1,8 @@
-"""The ladder climbed on the scene itself, where no map knows it.
+"""Climb of the ladder: errors of the rungs from solving a scene off the map on each of them.
 
-A rung's error is what the rungs above it change, twice the last change standing for those beyond;
-the error of a grid and a load path is what halving both changes.  Nothing is known of rungs that
-the scene does not have: a laminate has no section of order p.
+The error of a rung is its difference from the highest rung that was solved, plus the last change
+for the rungs beyond.  The error of a grid and a load path is the change when both are halved.  The
+errors of rungs that a scene does not have stay unknown: a laminate has no section of order p.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from jbeamshell.scene.scene import Scene
 UPWARDS = ("squeeze", "p2", "p3", "p4", "p6")
 CHEAP = ("bar", "masing", "shell")
 LEAST_NODES = 11
-FINER = 4.0  # times the work: twice the nodes and twice the steps
+FINER = 4.0  # ratio of the times of the fine and the coarse grid: twice the nodes and the steps
 
 
 class Option(NamedTuple):
-    """A rung on its grid, with what it costs and how far off it is.
+    """Rung on a grid, with its cost and its error.
 
     Attributes
     ----------
-    rung : its name
-    settings : dotted values that make the scene's model this one
+    rung : name of the rung
+    settings : dotted values of the model for `Scene.replace`
     error : estimated relative error
-    ms : time of a warm run
+    ms : time of a warm run [ms]
     """
 
     rung: str
@@ -52,15 +52,15 @@ def climb(
 
     Parameters
     ----------
-    scene : whose kinematics, grid family and finest resolution are kept
+    scene : scene whose kinematics, grid family and finest resolution are kept
     tolerance : relative error at which the climb may stop
     quantity : name of a figure of `History.figures`
-    tell : called with what is being solved
+    tell : called with the name and the nodes of each rung that is solved
 
     Returns
     -------
-    options : cheapest rungs first
-    note : what the estimate rests on, and what it does not know
+    options : rungs with their errors and times, the lowest rungs first
+    note : rungs that were solved, and errors that are not included
     """
     fine, coarse = _resolution(scene, 1), _resolution(scene, 2)
     runs: dict[tuple[str, bool], tuple[dict[str, Any], float]] = {}
@@ -92,7 +92,7 @@ def climb(
     note = f"solved on {', '.join(climbed)}"
     if alone:
         note += "; the scene has no rung above, so the section's own error is not in the estimate"
-    # What the grid and the path do is much the same on every rung: the cheapest of them tells.
+    # The error of grid and path is about the same on every rung: take that of the cheapest.
     grid = _off(best if alone else run(climbed[0], False), run(climbed[0], True))
     options = []
     for rung in (*CHEAP, *climbed):
@@ -108,7 +108,7 @@ def climb(
 
 
 def _resolution(scene: Scene, part: int) -> dict[str, Any]:
-    """The scene's own grid and load path, or a part of it."""
+    """Dotted values of the scene's own grid and load path, or of one coarser by a whole factor."""
     order = ORDER[scene.model.grid]
     elements = max((scene.model.nodes - 1) // part // order, LEAST_NODES // order)
     half = max(scene.load.steps_per_half_cycle // part // 2, 1)
@@ -116,7 +116,7 @@ def _resolution(scene: Scene, part: int) -> dict[str, Any]:
 
 
 def _has(scene: Scene, rung: str, resolution: dict[str, Any]) -> bool:
-    """Whether a scene can be solved on a rung."""
+    """True if a scene can be solved on a rung."""
     try:
         check(scene.replace({"model.rung": rung} | resolution))
     except InputError:
@@ -125,15 +125,15 @@ def _has(scene: Scene, rung: str, resolution: dict[str, Any]) -> bool:
 
 
 def _solved(scene: Scene) -> tuple[dict[str, Any], float]:
-    """Figures of a scene, none where it has no equilibrium, and the time of its warm run in ms."""
+    """Figures of a scene, none if it has no equilibrium, and the time of its warm run [ms]."""
     compile_for(scene)
     begin = time.perf_counter()
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DoubtfulWarning)  # the climb finds out by itself
+            warnings.simplefilter("ignore", DoubtfulWarning)  # the climb estimates the errors
             history = jax.block_until_ready(solve(scene))
     except UnconvergedError:
-        return {}, np.inf  # no rung to choose, and no reason to give up the others
+        return {}, np.inf  # such a rung is never chosen; the others may be
     return history.figures(), 1e3 * (time.perf_counter() - begin)
 
 
@@ -144,7 +144,7 @@ def _check_quantity(quantity: str, figures: dict[str, Any]) -> None:
 
 
 def _off(value: float, reference: float) -> float:
-    """Relative difference; infinite where there is none."""
+    """Relative difference; infinite if one of the values is missing."""
     if not np.isfinite(value) or not np.isfinite(reference):
         return np.inf
     return abs(value - reference) / abs(reference) if reference else float(value != reference)

@@ -1,4 +1,4 @@
-"""The front door: a scene in, a history out, with the cheapest model that keeps a tolerance."""
+"""Front door of the solver: a history from a scene, on request by the cheapest adequate model."""
 
 from __future__ import annotations
 
@@ -21,34 +21,42 @@ def solve(
     throw: bool = True,
     tolerance: float | None = None,
 ) -> History:
-    """Press the strip down, walk a load path, and report what happened.
+    """Press the strip down, follow a load path, and return the history of all load steps.
 
     Parameters
     ----------
     scene, path, contact, solver, throw : see `jbeamshell.quasistatic.solver.solve`
-    tolerance : largest relative error of the dissipation, against plane elasticity; the scene's
-        model gives way to the cheapest that is estimated to keep it, see `jbeamshell.advise`.
-        None keeps the scene's model.
+    tolerance : largest relative error of the dissipation against plane elasticity, .005 to 1.  The
+        scene's model is replaced by the cheapest one that `jbeamshell.advise` finds.  None keeps
+        the scene's model
 
     Returns
     -------
     History
-        whose steps without equilibrium hold NaN
+        fields, forces and works at every step; steps without equilibrium hold NaN
 
     Raises
     ------
     InputError
-        if the path makes no sense or exceeds gross slip under force control, or if no model keeps
-        the tolerance
+        if the path is invalid or exceeds gross slip under force control, or if no model is accurate
+        enough
     UnconvergedError
-        if a step has no equilibrium, even when it is walked in smaller steps
+        if a step has no equilibrium, even in smaller steps
 
     Warns
     -----
     DoubtfulWarning
-        if what converged may be wrong all the same, see `jbeamshell.History.doubts`
+        if a converged history may be wrong, see `jbeamshell.History.doubts`
+
+    Examples
+    --------
+    ::
+
+        history = jb.solve(jb.library.standard(), tolerance=0.05)
+        history.dissipation, history.scene.model.rung
     """
     if tolerance is not None:
-        require("path", "given", path is None, "a tolerance is for the scene's own cycles")
+        fix = "a tolerance is for the scene's own cycles; leave the path out"
+        require("path", "given", path is None, fix)
         scene = advise(scene, tolerance).applied(scene)
     return quasistatic.solve(scene, path, contact=contact, solver=solver, throw=throw)

@@ -1,8 +1,8 @@
-"""What tests leave behind: files, recordings of many cycles, steady loops, and curves.
+"""Measured data: recordings of many cycles, steady loops, curves, and their readers.
 
-`read_loops` takes a file as it stands; `read_recordings` and `steady_loops` average the cycles of a
-noisy one; `Loop`, `Backbone`, `DissipationCurve`, `StiffnessCurve` and `SqueezeCurve` are what
-`jbeamshell.identify` compares a model with.
+`read_loops` reads the loops of a file unchanged.  `read_recordings` and `steady_loops` average the
+cycles of a noisy recording.  `jbeamshell.identify` compares a model with a `Loop`, `Backbone`,
+`DissipationCurve`, `StiffnessCurve` or `SqueezeCurve`.
 """
 
 from jbeamshell.measured.curve_files import read_curves as read_curves

@@ -1,4 +1,4 @@
-"""Which columns of a table are the force and the displacement, and what they are measured in.
+"""Columns of a table: which hold the force and the displacement, and in which units.
 
 The only file that imports pint.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from jbeamshell.common.errors import InputError
 
-# What they are measured in; a force per width is as good, as the model is of unit width.
+# Base units; a force per width will do, as the model has unit width.
 QUANTITIES = {"force": ("N", "N/m"), "displacement": ("m",)}
 FURTHER = {"time": ("s",), "normal_force": ("N", "N/m")}
 GROUPS = ("loop", "a", "amplitude")
@@ -31,12 +32,12 @@ SHORT = {
     "normal_force": {"fn", "normal"},
 }
 NORMAL = ("normal", "clamp", "preload", "pretension")
-COUNTERS = {"step", "number", "no", "case", "cycle", "rate", "time"}  # of a load, no forces
+COUNTERS = {"step", "number", "no", "case", "cycle", "rate", "time"}  # a load step is no force
 
-# A unit: letters, powers of one digit, products and quotients.  Sums and towers are none.
+# A unit: letters, powers of one digit, products and quotients; no sums, no nested powers.
 TERM = r"[^\W\d_]+(?:(?:\^|\*\*)?-?[1-4]|[²³])?|[%°]"
 UNIT = re.compile(rf"(?:{TERM})(?:(?: ?[/*·.] ?| )(?:{TERM}))*")
-# Units after a space or an underscore, where other words stand too.
+# Units after a space or an underscore, which may be followed by other words too.
 TAIL = re.compile(
     r"(?:[GMkcmuµμn]?N(?:/[cmuµμn]?m)?|[kdcmuµμnp]?m|[mkuµμn]?s|sec|%|rad|deg|in|inch|ft|mil|"
     r"thou|micron|k?lbf?|kip|[kg]?gf|dyn|"
@@ -47,20 +48,21 @@ TAIL = re.compile(
 def find_columns(
     titles: Sequence[str], chosen: Mapping[str, str], name: str, place: str
 ) -> dict[str, int]:
-    """Where force and displacement are, and time, normal force and group, if there.
+    """Find the columns of force and displacement, and those of time, normal force and group.
 
-    A title with the quantity's own name counts; only where there is none, one with another word for
-    it.  A column of a normal force or a preload is never the force.
+    A title with the name of the quantity counts first; a title with another word for it counts if
+    there is no such title.  A column of a normal force or a preload is never the force.
 
     Parameters
     ----------
-    titles : of the columns
-    chosen : title by quantity, for those that are not to be found by name
-    name, place : of the table and the titles, for messages
+    titles : titles of the columns
+    chosen : title by quantity, for columns that are not found by name
+    name, place : name of the table and place of its titles, for messages
 
     Returns
     -------
-    column by "force", "displacement", and where there is just one, "time", "normal_force", "group"
+    Index of the column by "force" and "displacement"; also by "time", "normal_force" and "group" if
+    there is exactly one
 
     Raises
     ------
@@ -83,14 +85,16 @@ def find_columns(
         elif quantity in QUANTITIES:
             needed = f"{name}: needs one column named {quantity!r} {place}, which holds {held}: "
             if not found:
-                raise InputError(f"{needed}name it there, or choose it with the argument columns")
+                raise InputError(
+                    f"{needed}name it there, or choose it by {choice(quantity, 'NAME')}"
+                )
             rivals = _listed([titles[i] for i in found])
-            choice = f"columns={{{quantity!r}: {titles[found[0]].strip()[:60]!r}}}"
-            raise InputError(f"{needed}choose among {rivals[:90]} with the argument {choice}")
+            option = choice(quantity, titles[found[0]].strip()[:60])
+            raise InputError(f"{needed}choose among {rivals[:90]} by {option}")
     if columns["force"] == columns["displacement"]:
         whole = titles[columns["force"]].strip()[:60]
         raise InputError(
-            f"{name}: its first row is one column: separate columns by commas, semicolons or tabs"
+            f"{name}: has one column only {place}: separate columns by commas, semicolons or tabs"
             if len(titles) == 1
             else f"{name}: {whole!r} cannot be both force and displacement: name one of them"
         )
@@ -102,13 +106,13 @@ def find_columns(
 
 
 def is_header(titles: Sequence[str], chosen: Mapping[str, str]) -> bool:
-    """Whether a row of cells holds a title for the force and another for the displacement."""
+    """True if a row of cells holds a title for the force and another for the displacement."""
     if not any(re.search(r"[^\W\d_]", title) for title in titles):
         return False
     try:
         find_columns(titles, chosen, "", "")
     except InputError:
-        # A header all the same, if only too many columns are named: to be told, not skipped.
+        # With several columns for one quantity it is a header too, to be refused, not skipped.
         wanted = [q for q in QUANTITIES if q not in chosen]
         return len(titles) > 1 and all(_candidates(titles, q) for q in wanted) and bool(wanted)
     return True
@@ -124,19 +128,19 @@ def unit_factors(
 
     Parameters
     ----------
-    titles : by quantity: a unit in brackets or after an underscore or space is the column's
-    below : units from a row below the header
-    given : units that count whatever the titles say
-    name : of the table, for messages
+    titles : title by quantity, which may end in a unit in brackets, or after an underscore or space
+    below : unit by quantity in the row below the header
+    given : unit by quantity that overrides titles and row
+    name : name of the table, for messages
 
     Returns
     -------
-    factor by quantity; None for a time or normal force in no unit that goes with the others
+    Factor by quantity; None for a time or normal force whose unit does not suit the others
 
     Raises
     ------
     InputError
-        for a unit that is none of the quantity, or that only one of force and displacement has
+        if a unit does not suit its quantity, or if only one of force and displacement has one
     """
     units: dict[str, str | None] = {}
     for quantity, title in titles.items():
@@ -144,7 +148,7 @@ def unit_factors(
         if own and row and own != row and quantity not in given:
             raise InputError(
                 f"{name}: column {title!r} has the unit {row!r} in the row below the header: "
-                "leave one of them"
+                "keep one of the two units"
             )
         units[quantity] = given.get(quantity) or own or row
     named = [bool(units[q]) for q in QUANTITIES]
@@ -164,7 +168,8 @@ def unit_factors(
         elif found is None:
             raise InputError(
                 f"{name}: column {title!r}: {str(unit)[:40]!r} is no unit of {quantity}: write one "
-                f"in brackets, such as '{quantity} [{bases[0]}]', or give it in the argument units"
+                f"in brackets, such as '{quantity} [{bases[0]}]', or give it by "
+                f"{choice(quantity, bases[0], 'unit')}"
             )
         else:
             factors[quantity] = found
@@ -172,7 +177,7 @@ def unit_factors(
 
 
 def unit_of(title: str) -> str | None:
-    """The unit a title names, in brackets or at its end; None if none."""
+    """Unit in a title, in brackets or at its end; None if there is none."""
     bracket = re.findall(r"\[([^\]]*)\]", title) or re.findall(r"\(([^)]*)\)", title)
     if bracket:
         unit = bracket[-1].strip()
@@ -217,7 +222,7 @@ def _words(title: str) -> set[str]:
 
 
 def bare(title: str) -> str:
-    """A title without its unit in brackets."""
+    """Title without its unit in brackets."""
     return re.sub(r"\[[^\]]*\]?|\([^)]*\)?", " ", title)
 
 
@@ -228,10 +233,16 @@ def _chosen(titles: Sequence[str], quantity: str, title: str, name: str, held: s
         found = [i for i, t in enumerate(titles) if key(t) == key(str(title))]
         if len(found) == 1:
             return found[0]
-    fix = "rename them, they are alike" if found else "choose one of these"
+    fix = "rename columns of the same name" if found else "choose one of these"
     raise InputError(
         f"{name}: columns has {quantity!r}: {str(title)[:60]!r}, but the table holds {held}: {fix}"
     )
+
+
+def choice(quantity: str, value: str, option: str = "column") -> str:
+    """Option that sets the column or the unit of a quantity, as the shell and Python have it."""
+    shell = f"--{option} {quantity}={shlex.quote(value)}"
+    return f"{shell} (in Python {option}s={{{quantity!r}: {value!r}}})"
 
 
 def _listed(titles: Sequence[str]) -> str:
@@ -239,7 +250,7 @@ def _listed(titles: Sequence[str]) -> str:
 
 
 def factor_of(unit: str, bases: Sequence[str]) -> float | None:
-    """What converts a unit to the first base that goes with it; None if none does."""
+    """Factor that converts a unit to the first base unit that suits it; None if none does."""
     if unit in bases:
         return 1.0
     if len(unit) > 32 or not UNIT.fullmatch(unit):
@@ -248,7 +259,7 @@ def factor_of(unit: str, bases: Sequence[str]) -> float | None:
     for base in bases:
         try:
             factor = float(registry.Quantity(1.0, unit).to(base).magnitude)
-        except Exception:  # whatever pint's parser stumbles over, it is no unit
+        except Exception:  # pint's parser may raise anything for what is no unit
             continue
         if np.isfinite(factor) and factor > 0.0:
             return factor
@@ -257,6 +268,6 @@ def factor_of(unit: str, bases: Sequence[str]) -> float | None:
 
 @functools.cache
 def _registry() -> Any:
-    import pint  # only files with units other than N and m pay for it
+    import pint  # slow to import
 
     return pint.UnitRegistry()

@@ -1,4 +1,4 @@
-"""Curves in files: dissipation or stiffness over amplitude, squeeze stress along a strip."""
+"""Readers of curves: dissipation or stiffness over amplitude, squeeze stress along a strip."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.columns import bare, factor_of, unit_of
-from jbeamshell.measured.containers import read_table
+from jbeamshell.measured.columns import bare, choice, factor_of, unit_of
 from jbeamshell.measured.curves import IN_FILES, Curve
 from jbeamshell.measured.form import NUMBER
+from jbeamshell.measured.read_table import read_table
 from jbeamshell.measured.recordings import FilePath, check_words_of, labels_of
 
 CURVES = {curve.form.name: curve for curve in IN_FILES}
@@ -25,28 +25,28 @@ def read_curves(
     units: Mapping[str, str] | None = None,
     decimal: str | None = None,
 ) -> list[tuple[Curve, tuple[str, ...]]]:
-    """Curves of one kind from one file or several, of the formats that `read_recordings` reads.
+    """Read curves of one kind from files of the formats that `read_recordings` reads.
 
-    Columns are found by their names, "amplitude" and "dissipation", "amplitude" and "stiffness",
-    "x" and "stress", with units or not; all forces are per width.  A column "noise" holds the
-    standard deviation of the second, in its unit.
+    Columns are found by their names: "amplitude" and "dissipation", "amplitude" and "stiffness", or
+    "x" and "stress", with units or without.  All forces are per width.  A column "noise" holds the
+    standard deviation of the second column, in its unit.
 
     Parameters
     ----------
-    paths : the file, or several; labels are the files' names
+    paths : one file or several; the files' names are the labels
     kind : "dissipation", "stiffness" or "squeeze"
-    columns : name of a column by what is in it
-    units : unit by the same, whatever the header says
-    decimal : "," or ".", where the numbers alone do not tell
+    columns : name of a column by quantity, such as {"stress": "sigma_y"}
+    units : unit by quantity, such as {"x": "mm"}, which overrides the header
+    decimal : decimal mark, "," or "."; None infers it from the numbers
 
     Returns
     -------
-    each curve, with a line on each thing that was done to the data
+    Curve and notes on what was done to the data, for each file
 
     Raises
     ------
     InputError
-        naming the file, the line or column, and the fix
+        if a file cannot be read or a column cannot be found, naming the file, the place and the fix
     """
     check_words_of(columns=columns, units=units)
     if not (isinstance(kind, str) and kind in CURVES):
@@ -55,7 +55,7 @@ def read_curves(
     for name, given in (("columns", columns or {}), ("units", units or {})):
         for quantity in given:
             if quantity not in known:
-                raise InputError(f"{name}: {quantity!r} is unknown: choose among {known}")
+                raise InputError(f"{name}: {quantity!r} is no quantity: choose among {known}")
     files: list[Any] = list(paths) if isinstance(paths, list | tuple) else [paths]
     return [
         _read(path, label, kind, columns or {}, units or {}, decimal)
@@ -88,7 +88,7 @@ def _read(
             name = chosen.get(quantity, quantity)
             raise InputError(
                 f"{table.name}: needs a column {name!r} {table.place}, which holds {held}: name it "
-                "there, or choose it with the argument columns"
+                f"there, or choose it by {choice(quantity, 'NAME')}"
             )
     below = dict(zip(found, table.units(list(found.values())), strict=True))
     rows = table.numbers(
@@ -112,7 +112,7 @@ def _factors(
     given: Mapping[str, str],
     name: str,
 ) -> list[float]:
-    """Factors of the columns; the noise is in the unit of what it belongs to, unless it has one."""
+    """Factors of the columns; noise without a unit has that of the second column."""
     units = {q: given.get(q) or unit_of(title) or below[q] for q, title in titles.items()}
     second = list(wanted)[1]
     measured = [quantity for quantity in wanted if wanted[quantity] != NUMBER]
@@ -130,7 +130,8 @@ def _factors(
         if factor is None:
             raise InputError(
                 f"{name}: column {titles[quantity]!r}: {str(unit)[:40]!r} is no unit of "
-                f"{quantity}: write one in brackets, such as '{quantity} [{bases[0]}]'"
+                f"{quantity}: write one in brackets, such as '{quantity} [{bases[0]}]', or give it "
+                f"by {choice(quantity, bases[0], 'unit')}"
             )
         factors[quantity] = factor
     return [factors[quantity] for quantity in (*wanted, "noise") if quantity in factors]

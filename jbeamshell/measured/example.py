@@ -1,4 +1,4 @@
-"""The finite-element loops that ship with the library."""
+"""Example data: finite-element loops that ship with the library."""
 
 from __future__ import annotations
 
@@ -13,25 +13,30 @@ HEIGHT_RATIOS = (0.0305, 0.0511, 0.1126, 0.2358, 0.4)
 
 
 def data_folder() -> Path:
-    """Where the finite-element data lie: in the installed package, or in the source tree."""
+    """Folder of the finite-element data, in the installed package or in the source tree."""
     installed = Path(str(resources.files("jbeamshell"))) / "finite_elements"
     source = Path(__file__).resolve().parents[2] / "calibration" / "data"
     for folder in (installed, source):
         if folder.is_dir():
             return folder
-    raise InputError(f"{source}: the finite-element data are missing; reinstall jbeamshell")
+    raise InputError(f"{source}: the finite-element data are missing: reinstall jbeamshell")
 
 
 def example_loops(
     height_ratio: float = 0.1126, amplitudes: tuple[float, ...] | None = EXAMPLE_AMPLITUDES
 ) -> list[Loop]:
-    """Steady loops of the standard strip by plane-strain finite elements (mu = 0.1, F_N = 10).
+    """Read steady loops of the standard strip by plane-strain finite elements (mu = .1, F_N = 10).
 
     Parameters
     ----------
     height_ratio : eta, one of 0.0305, 0.0511, 0.1126, 0.2358, 0.4
-    amplitudes : of the force, among 0.1, 0.2, 0.3247, 0.4359, 0.5851, 0.7855, 1, 1.3, 1.6, 1.9;
-        None for all
+    amplitudes : amplitudes of the force, among 0.1, 0.2, 0.3247, 0.4359, 0.5851, 0.7855, 1, 1.3,
+        1.6 and 1.9; None for all
+
+    Raises
+    ------
+    InputError
+        if there are no such data
     """
     if height_ratio not in HEIGHT_RATIOS:
         raise InputError(f"height_ratio = {height_ratio}: choose one of {HEIGHT_RATIOS}")

@@ -12,26 +12,26 @@ from numpy.typing import ArrayLike, NDArray
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path
 from jbeamshell.measured.columns import FURTHER, QUANTITIES, find_columns, is_header, unit_factors
-from jbeamshell.measured.containers import read_table
+from jbeamshell.measured.read_table import read_table
 
 FEWEST_POINTS = 8
-HUGE = 1e100  # squares and quotients of anything smaller are finite
+HUGE = 1e100  # squares and quotients of smaller numbers are finite
 
 FilePath = str | os.PathLike[str]
 
 
 class Recording(NamedTuple):
-    """What a test left behind.
+    """Force and displacement of a test in the order of time.
 
     Attributes
     ----------
-    force : (points,) in N or N/m, or in the Scene's own unit
-    displacement : (points,) in m, or in the Scene's own unit
-    label : for pictures and messages
-    time : (points,) in s, or None
-    normal_force : (points,) in N or N/m, or None
-    dropped : rows that lacked a number and were left out
-    notes : one line on each thing that was done to the data
+    force : (points,) force [N or N/m, or the Scene's own unit]
+    displacement : (points,) displacement [m, or the Scene's own unit]
+    label : name in pictures and messages
+    time : (points,) time [s], or None
+    normal_force : (points,) normal force [N or N/m], or None
+    dropped : number of rows that were left out because a number was missing
+    notes : sentences on what was done to the data
     """
 
     force: NDArray[np.float64]
@@ -51,19 +51,18 @@ def recording_from_arrays(
     time: ArrayLike | None = None,
     normal_force: ArrayLike | None = None,
 ) -> Recording:
-    """A checked recording; points with NaN for force or displacement are dropped and counted.
+    """Make a recording of arrays; points without force or displacement are left out and counted.
 
     Parameters
     ----------
-    force, displacement : (points,)
-    label : for pictures and messages
-    time, normal_force : (points,) if they were recorded
+    force, displacement : (points,) numbers in one system of units; NaN marks a missing one
+    label : name in pictures and messages
+    time, normal_force : (points,) numbers, if they were recorded
 
     Raises
     ------
     InputError
-        for arrays that are no columns of one length, that hold too few points or an infinite one,
-        or that are constant
+        if the arrays differ in length, hold fewer than 8 points or an infinite one, or are constant
     """
     given = {"force": force, "displacement": displacement}
     given |= {"time": time} if time is not None else {}
@@ -82,7 +81,7 @@ def recording_from_arrays(
         if infinite.size:
             raise InputError(
                 f"{label}: {name} is infinite or above {HUGE:g} at {infinite.size} of "
-                f"{columns[name].size} points (first at point {infinite[0] + 1}): repair them"
+                f"{columns[name].size} points (first at point {infinite[0] + 1}): correct them"
             )
     whole = ~(np.isnan(columns["force"]) | np.isnan(columns["displacement"]))
     dropped = int(whole.size - np.count_nonzero(whole))
@@ -100,7 +99,8 @@ def recording_from_arrays(
                 f"give {FEWEST_POINTS} or more"
             )
         if np.ptp(column) < 1.0 / HUGE:
-            raise InputError(f"{label}: {name} is constant ({column[0]:g}): no loop to fit")
+            fix = "no loop to fit; give a column that varies"
+            raise InputError(f"{label}: {name} is constant ({column[0]:g}): {fix}")
     notes = () if not dropped else (f"{dropped} of {whole.size} rows lack a number: left out",)
     return Recording(
         columns["force"],
@@ -114,7 +114,7 @@ def recording_from_arrays(
 
 
 def as_column(values: ArrayLike, name: str, label: str) -> NDArray[np.float64]:
-    """Numbers as an array, NaN for masked ones and None; words, truths, complex ones are none."""
+    """Array of floats from real numbers, NaN for None and masked ones; raises `InputError` else."""
     try:
         if isinstance(values, np.ma.MaskedArray):
             values = np.ma.filled(values.astype(float), np.nan)
@@ -123,7 +123,7 @@ def as_column(values: ArrayLike, name: str, label: str) -> NDArray[np.float64]:
             return given.astype(float)
     except (TypeError, ValueError, OverflowError):
         pass
-    raise InputError(f"{label}: {name} is no array of numbers: give one")
+    raise InputError(f"{label}: {name} is no array of numbers: give a list of numbers")
 
 
 def read_recordings(
@@ -133,42 +133,56 @@ def read_recordings(
     units: Mapping[str, str] | None = None,
     decimal: str | None = None,
 ) -> list[Recording]:
-    """Recordings from one file or several.
+    """Read recordings from one file or several.
 
-    Text: separated by commas, semicolons or tabs, with a header, with decimal points or commas.
-    Its first lines may be anything; lines that start with "#" or "%" are comments; the row below
-    the header may hold units.  MATLAB (.mat, up to version 7.2): vectors, columns of matrices and
-    fields of structs.  NumPy: .npz and .npy.
+    Text files: columns separated by commas, semicolons or tabs, numbers with decimal points or
+    commas, and a header, which other lines may precede.  Lines that start with "#" or "%" are
+    comments; the row below the header may hold units.  MATLAB files (.mat, up to version 7.2):
+    vectors, columns of matrices and fields of structs.  NumPy files: .npz and .npy.
 
-    One column's name contains "force" (a normal force is none), another's "displacement"; failing
-    these, "load", "slip", "stroke", "position" and the like will do.  A unit in brackets or after
-    an underscore ("force [kN]", "displacement_mm") converts the column to N and m; without units
-    the numbers are in the Scene's own.  A column "loop", "A" or "amplitude" separates several
-    recordings; it holds numbers.  Rows without force or displacement are left out and counted.
+    The name of one column contains "force" (a normal force does not count) and that of another
+    "displacement"; otherwise "load", "slip", "stroke", "position" and similar words count.  A unit
+    in brackets or after an underscore ("force [kN]", "displacement_mm") converts the column to N
+    and m; without units the numbers are in the Scene's own.  A column "loop", "A" or "amplitude" of
+    numbers separates several recordings.  Rows without force or displacement are left out and
+    counted.
 
     Parameters
     ----------
-    paths : the file, or several; labels are the files' names
-    columns : name of a column by "force", "displacement", "time" or "normal_force", where names
-        alone do not tell
-    units : unit by the same, such as {"force": "kN"}, whatever the header says
-    decimal : "," or ".", where the numbers alone do not tell
+    paths : one file or several; the files' names are the labels
+    columns : name of a column by "force", "displacement", "time" or "normal_force", for columns
+        that cannot be found by name
+    units : unit by the same quantities, such as {"force": "kN"}, which overrides the header
+    decimal : decimal mark, "," or "."; None infers it from the numbers
+
+    Returns
+    -------
+    Recordings in the order of the files; columns are (points,) in N and m, or the Scene's own units
 
     Raises
     ------
     InputError
-        naming the file, the line or column, and the fix
+        if a file cannot be read or a column cannot be found, naming the file, the place and the fix
+
+    Examples
+    --------
+    ::
+
+        recordings = jb.measured.read_recordings(
+            "rig.csv", columns={"force": "load cell 1"}, units={"displacement": "um"}
+        )
     """
     check_words_of(columns=columns, units=units)
     if not (decimal is None or (isinstance(decimal, str) and decimal in (",", "."))):
         raise InputError(f"decimal = {decimal!r}: give ',' or '.'")
     for quantity in units or {}:
         if quantity not in (*QUANTITIES, *FURTHER):
-            raise InputError(f"units: {quantity!r} is no quantity: give force and displacement")
+            known = (*QUANTITIES, *FURTHER)
+            raise InputError(f"units: {quantity!r} is no quantity: choose among {known}")
     if isinstance(paths, str | os.PathLike):
         return _read(paths, None, columns or {}, units or {}, decimal)
     if not (isinstance(paths, list | tuple) and paths):
-        raise InputError("no file given: name at least one")
+        raise InputError("paths: no file given: name at least one")
     found = []
     for path, label in zip(paths, labels_of(paths), strict=True):
         found += _read(path, label, columns or {}, units or {}, decimal)
@@ -176,17 +190,17 @@ def read_recordings(
 
 
 def check_words_of(**given: Any) -> None:
-    """Raise `InputError` for options that are no dictionary of words."""
+    """Raise `InputError` unless options are dictionaries of words."""
     for name, words in given.items():
         if words is not None and not (
             isinstance(words, Mapping)
             and all(isinstance(w, str) for w in (*words, *words.values()))
         ):
-            raise InputError(f"{name} = {words!r}: give a dictionary of words")
+            raise InputError(f"{name} = {words!r}: give a dictionary of words by quantity")
 
 
 def labels_of(paths: Sequence[FilePath]) -> list[str]:
-    """The files' names, with as much of their folders as tells them apart."""
+    """Names of the files, with their folders below the common one if two names are equal."""
     whole = [as_path(path).absolute() for path in paths]
     for i, path in enumerate(whole):
         if path in whole[:i]:
@@ -217,7 +231,7 @@ def _read(
     for quantity, column in zip((*must, *may), rows.T, strict=True):
         factor = factors.get(quantity, 1.0)
         empty = quantity in may and bool(np.all(np.isnan(column)))
-        with np.errstate(over="ignore"):  # infinite numbers are told by their place, below
+        with np.errstate(over="ignore"):  # infinite numbers are refused below, with their place
             arrays[quantity] = None if factor is None or empty else column * factor
     if "group" not in columns:
         everything = np.full(rows.shape[0], True)
@@ -227,7 +241,7 @@ def _read(
     if unmarked.size:
         raise InputError(
             f"{table.name}: {table.where(int(unmarked[0]))}, column {title!r} holds no number: "
-            "every row needs one, as it tells the loops apart"
+            "every row needs one, as this column separates the loops"
         )
     found = []
     for mark in dict.fromkeys(marks.tolist()):

@@ -1,4 +1,4 @@
-"""Where a noisy load path turns, and which of two columns is the load path."""
+"""Reversals of a noisy load path, and the choice of the column that drives a test."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-SMALLEST = 0.05  # of the range: a move back that is smaller is no reversal
-NESTED = 0.1  # of both its neighbours: a move back that is smaller is a back-slip
-GROSS_SLIP = 0.02  # of the secant stiffness: where the tangent is lower, everything slides
-SLIDING = 0.1  # of the way: where more of it slides, the displacement drives
-CALM = 0.001  # to and fro, over the way from turn to turn, of a column without noise
+SMALLEST = 0.05  # move back over the range, below which it is no reversal
+NESTED = 0.1  # move back over each of its neighbours, below which it is a back-slip
+GROSS_SLIP = 0.02  # tangent over secant stiffness, below which everything slides
+SLIDING = 0.1  # sliding part of the travel, above which the displacement drives
+CALM = 0.001  # excess travel over the travel from turn to turn of a column without noise
 
 Floats = NDArray[np.float64]
 
 
 class SmoothPath(NamedTuple):
-    """A load path without its noise.
+    """Load path without its noise.
 
     Attributes
     ----------
-    smooth : (points,) the path, smoothed if it is noisy
-    noise : standard deviation of the noise left in it
-    band : smallest move that counts as one
+    smooth : (points,) path, smoothed if it is noisy
+    noise : standard deviation of the remaining noise
+    band : dead band: smallest move that counts
     """
 
     smooth: Floats
@@ -32,21 +32,21 @@ class SmoothPath(NamedTuple):
 
 
 def noise_of(column: Floats) -> float:
-    """Standard deviation of the white noise on a smooth column, (points,), robustly."""
-    third = np.abs(np.diff(column, 3))  # of a smooth column, next to nothing
+    """Standard deviation of the white noise on a smooth column (points,), by a robust estimate."""
+    third = np.abs(np.diff(column, 3))  # almost zero for a smooth column
     return float(np.median(third) / (0.6745 * np.sqrt(20.0))) if third.size else 0.0
 
 
 def smoothed_path(drive: Floats, smallest: float = SMALLEST) -> SmoothPath:
-    """A load path (points,) smoothed as much as its noise asks for and its turns allow.
+    """Smooth a load path as much as its noise requires and its turns allow.
 
-    Local parabolas over w points cut a sharp turn by 3/32 of w steps and leave 3/2 of the noise
-    over the root of w; the width makes both alike.
+    Local parabolas over w points cut a sharp turn by 3 w / 32 steps and leave 3/2 of the noise over
+    the square root of w; the width makes both errors about equal.
 
     Parameters
     ----------
-    drive : (points,)
-    smallest : move that counts at least, over the range
+    drive : (points,) load path
+    smallest : least dead band, over the range
     """
     scale, noise = float(np.ptp(drive)), noise_of(drive)
     band = max(smallest * scale, min(_extremes(drive.size) * noise, 0.7 * scale))
@@ -61,16 +61,16 @@ def smoothed_path(drive: Floats, smallest: float = SMALLEST) -> SmoothPath:
 
 
 def find_turns(drive: Floats, smallest: float = SMALLEST) -> list[int]:
-    """Indices at which a noisy path (points,) turns, its ends left out."""
+    """Indices at which a noisy path (points,) turns, without its ends."""
     path = smoothed_path(drive, smallest)
     return extremes(path.smooth, path.band)[1:-1]
 
 
 def extremes(path: Floats, band: float) -> list[int]:
-    """Indices of a path's first extreme, its turns and its last extreme; none if it never moves.
+    """Indices of a path's first extreme, its turns and its last extreme; none if it does not move.
 
-    Moves by no more than the dead band are no moves; nor is a back-slip, which is a move back by
-    less than a tenth of the moves before and after it.
+    Moves within the dead band do not count.  Neither does a back-slip: a move back by less than a
+    tenth of the moves before and after it.
     """
     level = path.tolist()
     found: list[int] = []
@@ -92,11 +92,15 @@ def extremes(path: Floats, band: float) -> list[int]:
 
 
 def find_driver(force: Floats, displacement: Floats) -> str:
-    """Which of two columns (points,) drove the test.
+    """Find the column, "force" or "displacement", that drove a test.
 
-    The one that runs from turn to turn with less to and fro; where neither has any, the
-    displacement if much of it happens at a force that stays, which no force can command; else the
-    force.
+    It is the column that travels from turn to turn with less movement to and fro.  If both are
+    smooth, it is the displacement if much of its travel happens at constant force, which force
+    control cannot do; else it is the force.
+
+    Parameters
+    ----------
+    force, displacement : (points,) columns of a recording
     """
     excess = {}
     for name, column in (("force", force), ("displacement", displacement)):
@@ -113,7 +117,7 @@ def find_driver(force: Floats, displacement: Floats) -> str:
 
 
 def _corners(path: Floats) -> list[int]:
-    """First point, local extremes (a plateau's first point) and last point."""
+    """Indices of first point, local extremes (first point of a plateau) and last point."""
     moves = np.append(0, np.flatnonzero(np.diff(path)) + 1)
     signs = np.sign(np.diff(path[moves]))
     corners = moves[1:-1][signs[1:] != signs[:-1]]
@@ -121,7 +125,7 @@ def _corners(path: Floats) -> list[int]:
 
 
 def _without_slips(path: Floats, found: list[int]) -> list[int]:
-    """Extremes without the pairs that enclose a back-slip, the smallest taken first."""
+    """Extremes without the pairs that enclose a back-slip; the smallest is removed first."""
     kept = np.asarray(found, dtype=int)
     while kept.size > 3:
         moves = np.abs(np.diff(path[kept]))
@@ -134,12 +138,12 @@ def _without_slips(path: Floats, found: list[int]) -> list[int]:
 
 
 def _extremes(points: float) -> float:
-    """From the lowest to the highest of so many independent values of unit noise, and a bit."""
+    """Expected range of so many independent values of unit noise, with a margin of one."""
     return 2.0 * float(np.sqrt(2.0 * np.log(max(points, 2.0)))) + 1.0
 
 
 def _local_parabolas(column: Floats, width: int) -> Floats:
-    """Least-squares parabola around every point (Savitzky & Golay), mirrored at the ends."""
+    """Column smoothed by least-squares parabolas (Savitzky & Golay), mirrored at its ends."""
     half = width // 2
     offset = np.arange(-half, half + 1.0)
     second, fourth = np.sum(offset**2), np.sum(offset**4)
@@ -147,3 +151,11 @@ def _local_parabolas(column: Floats, width: int) -> Floats:
     start = 2.0 * column[0] - column[half:0:-1]
     end = 2.0 * column[-1] - column[-2 : -half - 2 : -1]
     return np.convolve(np.concatenate([start, column, end]), weights, mode="valid")
+
+
+def median_slope(x: Floats, y: Floats) -> float:
+    """Median slope (Theil) between points half of the points apart; outliers do not change it."""
+    half = max(x.size // 2, 1)
+    if x.size < 2:
+        return 0.0
+    return float(np.median((y[half:] - y[:-half]) / (x[half:] - x[:-half])))

@@ -1,4 +1,4 @@
-"""Cycles in a recording: where they start, turn and end, and which are of one amplitude."""
+"""Cycles of a recording: their starts, turns and ends, and their groups of one amplitude."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from jbeamshell.measured.reversals import (
     smoothed_path,
 )
 
-ALIKE = 0.05  # of a cycle's range: levels that differ by less belong together
-MORE = 1.1  # times the points in cycles that make the other column the driver
-COMPLETE = 0.02  # of the branch beside it: an end that misses a turn by less is one
+ALIKE = 0.05  # difference of levels over a cycle's range, below which they are alike
+MORE = 1.1  # ratio of points in whole cycles above which the other column is the driver
+COMPLETE = 0.02  # distance of an end from a turn over the branch, below which it is a turn
 
 
 class Cycle(NamedTuple):
-    """One cycle, from a turn to the next but one, which is at the same level.
+    """Cycle from a turn to the second next turn, which is at the same level.
 
     Attributes
     ----------
-    start, turn, end : points of the recording
-    levels : of the driving column at the start, the turn and the end; where the recording begins or
-        ends shortly before a turn, that of the turn opposite
+    start, turn, end : indices of points of the recording
+    levels : levels of the driving column at start, turn and end; if the recording begins or ends
+        shortly before a turn, the level of that turn is taken from the other end
     group : number of its amplitude group, by increasing amplitude
     """
 
@@ -53,19 +53,20 @@ class Cycle(NamedTuple):
 
 
 class Cycles(NamedTuple):
-    """A recording taken apart.
+    """Recording split into cycles.
 
     Attributes
     ----------
-    recording : as given; a single cycle that starts between its turns is rolled to start at one
+    recording : recording as given; a single cycle that starts between its turns is rotated in time
+        to start at one
     driver : "force" or "displacement"
-    path : (points,) the driving column without its noise
-    noise : standard deviation of the noise left in the path
-    band : smallest move that counts as one
-    turns : points of the recording where the path turns
-    cycles : in the order of time; parts between cycles of two groups belong to none
-    approach, tail : (first, last) point before the first cycle, such as a first loading, and after
-        the last, such as an incomplete cycle
+    path : (points,) driving column without its noise
+    noise : standard deviation of the remaining noise of the path
+    band : dead band: smallest move that counts
+    turns : indices of the points at which the path turns
+    cycles : cycles in the order of time; points between two groups may belong to no cycle
+    approach, tail : (first, last) index of the points before the first cycle, such as a first
+        loading, and after the last, such as an incomplete cycle
     """
 
     recording: Recording
@@ -85,16 +86,16 @@ class Cycles(NamedTuple):
 
     @property
     def response(self) -> Floats:
-        """The column that answers, (points,)."""
+        """Column (points,) that does not drive."""
         return getattr(self.recording, self.answer)
 
     def group(self, number: int) -> list[Cycle]:
-        """The cycles of one amplitude."""
+        """Cycles of one amplitude group."""
         return [cycle for cycle in self.cycles if cycle.group == number]
 
     @property
     def groups(self) -> int:
-        """How many amplitudes there are."""
+        """Number of amplitude groups."""
         return 1 + max(cycle.group for cycle in self.cycles)
 
 
@@ -103,27 +104,32 @@ def split_cycles(
 ) -> Cycles:
     """Find the cycles of a recording.
 
-    The driving column turns where it moves back by more than a dead band: the larger of
-    ``smallest`` of its range and what its noise does.  A move back by less than a tenth of the
-    moves before and after is a back-slip and no turn.  Three turns make a cycle if the third is at
-    the level of the first, to 5 % of its range; cycles whose levels agree to 5 % are of one
-    amplitude.
+    The driving column turns where it moves back by more than the dead band, which is ``smallest``
+    of its range or the range of its noise if that is larger.  A move back by less than a tenth of
+    the moves before and after it is a back-slip and no turn.  Three turns make a cycle if the third
+    is at the level of the first, to 5 % of the cycle's range.  Cycles whose levels agree to 5 % are
+    of one amplitude.
 
     Parameters
     ----------
-    recording : of one test
-    driver : "force" or "displacement"; None takes the column that `find_driver` does, or the other
-        if that repeats its levels over a good part more of the recording
+    recording : recording of one test
+    driver : "force" or "displacement"; None takes the column of `find_driver`, or the other if its
+        whole cycles cover at least 10 % more points
     smallest : range of the smallest cycle to be found, over the whole range
+
+    Returns
+    -------
+    Cycles
+        the driving column without noise, and the cycles in the order of time
 
     Raises
     ------
     InputError
-        if there is no reversal, or no whole cycle
+        if there is no reversal or no whole cycle, or if an argument is out of range
     """
     if not isinstance(recording, Recording | Loop):
         kind = type(recording).__name__
-        raise InputError(f"recording: a {kind} is none: give a Recording or a Loop")
+        raise InputError(f"recording: a {kind} is no recording: give a Recording or a Loop")
     if not (driver is None or (isinstance(driver, str) and driver in ("force", "displacement"))):
         raise InputError(f"driver = {driver!r}: give 'force' or 'displacement'")
     if not 0.0 < smallest < 1.0:
@@ -170,7 +176,7 @@ def _driver(recording: Recording, smallest: float) -> str:
 
 
 def _turns(path: Floats, band: float) -> tuple[list[int], list[int]]:
-    """All turns, ends that complete a branch included, and those inside the path."""
+    """Turns with the ends that complete a branch, and turns inside the path."""
     found = extremes(path, band)
     inner = found[1:-1]
     if len(found) < 3:
@@ -198,7 +204,7 @@ def _cycles(path: Floats, turns: list[int], noise: float) -> list[Cycle]:
 
 
 def _grouped(cycles: list[Cycle], noise: float) -> list[Cycle]:
-    """Cycles with the numbers of their groups: alike in range, and then in mean level."""
+    """Cycles with the numbers of their groups, which are alike in range and in mean level."""
     ranges = np.array([c.high - c.low for c in cycles])
     means = np.array([0.5 * (c.high + c.low) for c in cycles])
     number, group = 0, np.zeros(len(cycles), dtype=int)
@@ -210,14 +216,14 @@ def _grouped(cycles: list[Cycle], noise: float) -> list[Cycle]:
 
 
 def _clusters(values: Floats, gap: Floats) -> list[np.ndarray]:
-    """Indices of values, (n,), that no gap in their order parts; by increasing value."""
+    """Indices of values (n,) in clusters without a larger gap, by increasing value."""
     order = np.argsort(values, kind="stable")
-    parted = np.flatnonzero(np.diff(values[order]) > gap[order][1:]) + 1
-    return [np.sort(own) for own in np.split(order, parted)]
+    splits = np.flatnonzero(np.diff(values[order]) > gap[order][1:]) + 1
+    return [np.sort(own) for own in np.split(order, splits)]
 
 
 def _once_round(recording: Recording, inner: list[int]) -> int | None:
-    """The turn to start from, if the recording is one cycle that starts between its turns."""
+    """Turn to start from if the recording is one cycle that starts between its turns, else None."""
     columns = (recording.force, recording.displacement)
     once = all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) + 4.0 * noise_of(c) for c in columns)
     return inner[0] if once and len(inner) == 2 else None
@@ -236,16 +242,16 @@ def _rolled(recording: Recording, start: int) -> Recording:
 
 
 def _no_cycle(label: str, driver: str, path: SmoothPath, inner: list[int]) -> str:
-    """What was found instead of a cycle, and what to do."""
+    """Message on what was found instead of a cycle, and what to do."""
     ends = f"{label}: {driver} runs from {path.smooth[0]:.4g} to {path.smooth[-1]:.4g}"
     if not inner:
         return (
             f"{ends} and never turns back by more than {path.band:.2g}: no cycle to average; "
-            "record whole cycles, or fit it as it is, a first loading"
+            "record whole cycles, or fit it as a backbone, which is a first loading"
         )
     levels = ", ".join(f"{level:.4g}" for level in path.smooth[inner[:6]])
     times = "once" if len(inner) == 1 else f"{len(inner)} times"
     return (
         f"{ends} and turns {times}, at {levels}{', ...' if len(inner) > 6 else ''}: no three turns "
-        "make a cycle that returns to its level; record on until it does"
+        "make a cycle that returns to its level; record whole cycles"
     )

@@ -677,7 +677,7 @@ def test_free_keys_that_the_loops_do_not_depend_on(refused, planted):
     [
         ("", "rig.csv: is empty: give a header and rows"),
         ("force,displacement\n1,2\n1,x\n", "rig.csv: line 3, column 'displacement' holds 'x'"),
-        ("force,travel\n1,2\n", "rig.csv: needs one column named 'displacement' in its first row"),
+        ("force,travel\n1,2\n", "rig.csv: needs one column named 'displacement' in line 1"),
         (None, "rig.csv: cannot be read (No such file"),
     ],
 )

@@ -208,7 +208,9 @@ def test_a_free_zero_is_put_where_it_fits():
 
 def test_a_backbone_only_goes_on():
     up = Backbone([0.1, 0.3, 0.2], [1.0, 2.0, 3.0])
-    with pytest.raises(jb.InputError, match=r"force = 0.2 turns back at point 3: .* give a Loop"):
+    with pytest.raises(
+        jb.InputError, match=r"force = 0.2 turns back at point 3, but .*; give a Loop"
+    ):
         observe(up, jb.Scene())
     down = observe(Backbone([-0.1, -0.2, -0.3], [-1.0, -2.0, -3.0]), jb.Scene())
     assert np.all(np.diff(down.path) <= 0.0)

@@ -147,9 +147,9 @@ def test_what_users_fit_starts_from_the_scene(key, expected):
 @pytest.mark.parametrize(
     ("free", "message"),
     [
-        (("contact.smoothing",), "'sharp'; give it a number"),
-        (("strip.curvature",), "the scene has none"),
-        (("contact.bottom_pressure",), "is 0; give it another"),
+        (("contact.smoothing",), "'sharp' in this scene; give a number"),
+        (("strip.curvature",), "the scene has no value for it; give a start"),
+        (("contact.bottom_pressure",), "is 0 in this scene; give another"),
         ((Parameter(MU, low=0.2),), "start = 0.1: must lie between low = 0.2 and high = inf"),
         ((Parameter(MU, start=0.5, high=0.4),), "start = 0.5: must lie between"),
     ],
@@ -167,5 +167,5 @@ def test_a_shared_parameter_needs_one_start():
 
 def test_a_table_is_no_number():
     rows = [[0.0, 10.0], [2.0, 5.0]]
-    with pytest.raises(jb.InputError, match="is a table"):
+    with pytest.raises(jb.InputError, match="is a table in this scene"):
         space_of("contact.pressure", one=jb.Scene().replace({"contact.pressure": rows}))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.ladder import chart
+from jbeamshell.ladder import error_map
 from jbeamshell.ladder.candidates import CANDIDATES
 
 CALIBRATION = Path(__file__).parents[2] / "calibration"
@@ -51,7 +51,7 @@ def name_of(advice):
 
 
 def test_every_candidate_is_on_the_map():
-    known = chart.chart()
+    known = error_map.load()
     assert set(CANDIDATES) == set(known.ratios) == set(known.linear_ms)
     assert {c.rung for c in CANDIDATES.values()} == set(known.exact_over_linear)
     for name, candidate in CANDIDATES.items():
@@ -150,7 +150,7 @@ def test_other_figures_of_the_loop():
 def test_plane_stress_is_a_plane_strain_of_another_ratio():
     strain = STRIP.replace({"strip.poisson_ratio": 0.25})
     stress = STRIP.replace({"strip.poisson_ratio": 1.0 / 3.0, "strip.plane": "stress"})
-    np.testing.assert_allclose(chart.place(stress), chart.place(strain), rtol=1e-12)
+    np.testing.assert_allclose(error_map.place(stress), error_map.place(strain), rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_plane_stress_is_a_plane_strain_of_another_ratio():
     ],
 )
 def test_where_the_map_ends(key, value, why):
-    assert chart.place(STRIP.replace({key: value})) == why
+    assert error_map.place(STRIP.replace({key: value})) == why
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -0.1, 1e-9, 1.5, float("nan"), True, "5%"])
@@ -208,7 +208,7 @@ def test_a_figure_that_the_scene_lacks():
 def test_a_climb_without_any_equilibrium_is_loud(monkeypatch):
     module = import_module("jbeamshell.ladder.climb")
     monkeypatch.setattr(module, "_solved", lambda scene: ({}, np.inf))
-    with pytest.raises(jb.UnconvergedError, match="no rung's error can be told"):
+    with pytest.raises(jb.UnconvergedError, match="no rung's error can be estimated"):
         jb.advise(STRIP.replace({"strip.far_end": "pinned"}), 0.1)
 
 

@@ -256,7 +256,7 @@ def test_a_drift_is_removed_and_told(driver, noise, drift, drifts):
     answer = "displacement" if driver == "force" else "force"
     assert loop.notes[0].startswith(f"removed from the recording: a {drift} drift of {driver} ")
     assert f" and {answer} " in loop.notes[0]
-    assert not any("meanwhile" in note for note in loop.notes)
+    assert not any("drifts by" in note for note in loop.notes)
     np.testing.assert_allclose(area(loop), planted_area(driver), rtol=0.01 + 2.0 * noise)
     if noise:
         np.testing.assert_allclose(loop.noise / range_of(driver), noise, rtol=0.15)
@@ -275,7 +275,7 @@ def test_a_drift_that_turns_is_removed_cycle_by_cycle():
 def test_a_drift_that_is_kept_is_told():
     recording = recorded(driven([1.0] * 8, 200), "force", 0.01, drifts=(0.1, 0.0))
     (loop,) = steady_loops(recording, "force")
-    assert any("meanwhile: the argument drift removes it" in note for note in loop.notes)
+    assert any("remove it by --drift" in note for note in loop.notes)
 
 
 # --- bad recordings -----------------------------------------------------------------------------

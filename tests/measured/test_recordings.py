@@ -242,9 +242,9 @@ NAN = np.where(TIME < 7, np.nan, FORCE)
         (FORCE, DISPLACEMENT[:, None], r"rig: displacement has shape \(13, 1\): give 8 points"),
         (FORCE[:7], DISPLACEMENT[:7], r"rig: force has shape \(7,\): give 8 points"),
         (1.0, 2.0, r"rig: force has shape \(\): give 8 points"),
-        (["a"] * 9, DISPLACEMENT, "rig: force is no array of numbers: give one"),
+        (["a"] * 9, DISPLACEMENT, "rig: force is no array of numbers: give a list"),
         (None, DISPLACEMENT, r"rig: force has shape \(\): give 8 points"),
-        ([[1.0], [1.0, 2.0]], DISPLACEMENT, "rig: force is no array of numbers: give one"),
+        ([[1.0], [1.0, 2.0]], DISPLACEMENT, "rig: force is no array of numbers: give a list"),
         (np.zeros(13), DISPLACEMENT, r"rig: force is constant \(0\): no loop to fit"),
         (FORCE, np.full(13, 0.3), r"rig: displacement is constant \(0.3\): no loop to fit"),
         (

@@ -146,7 +146,10 @@ def test_commas_that_another_number_proves_decimal(read, cells, value):
 
 def test_commas_that_may_be_thousands_are_asked_about(read):
     table = text(rows=[[f"{i},500", f"{i * i}"] for i in range(1, 14)], delimiter=";")
-    with pytest.raises(InputError, match="'1,500' may be a decimal comma or thousands: say decima"):
+    with pytest.raises(
+        InputError,
+        match="'1,500' may have a decimal comma or a thousands separator: give --decimal ,",
+    ):
         read(table)
     assert columns(read(table, decimal=","))[0][0] == 1.5
 
@@ -225,23 +228,28 @@ BAD = {
     "header and units": (text(rows=[["N", "m"]]), "holds a header only: give"),
     "no displacement": (
         text(["force", "travel"]),
-        "data.csv: needs one column named 'displacement' in its first row, "
+        "data.csv: needs one column named 'displacement' in line 1, "
         "which holds 'force', 'travel': name it there",
     ),
     "no header": (
         text(ROWS[0], ROWS[1:]),
-        "data.csv: needs one column named 'force' in its first row, which holds '3.0', '0.2388",
+        "data.csv: needs one column named 'force' in line 1, which holds '3.0', '0.2388",
     ),
     "two forces": (
         text(["force left", "force right", "displacement"], [[f, f, u] for f, u in ROWS]),
         "which holds 'force left', 'force right', 'displacement': choose among 'force left', "
-        "'force right' with the argument columns={'force': 'force left'}",
+        "'force right' by --column force='force left' (in Python columns={'force': 'force left'})",
+    ),
+    "two forces in line 5": (
+        "rig 7\n\n# by hand\n\n"
+        + text(["force left", "force right", "displacement"], [[f, f, u] for f, u in ROWS]),
+        "data.csv: needs one column named 'force' in line 5, which holds 'force left', ",
     ),
     "normal force only": (text(["normal_force", "displacement"]), "one column named 'force'"),
     "one column": (text(["force"], [[f] for f, _ in ROWS]), "one column named 'displacement'"),
     "spaces between columns": (
         text(delimiter=" "),
-        "data.csv: its first row is one column: separate columns by commas, semicolons or tabs",
+        "data.csv: has one column only in line 1: separate columns by commas, semicolons or tabs",
     ),
     "infinite": (with_cell(4, "1e999", 1), "line 4, column 'displacement' holds '1e999': give a"),
     "text": (with_cell(5, "off"), "data.csv: line 5, column 'force' holds 'off': give a finite"),
@@ -263,7 +271,10 @@ BAD = {
         text(rows=[*ROWS, ["1", "2", "3"]], delimiter=";"),
         "data.csv: line 15 has 3 cells, the header 2: give every row as many cells as there are",
     ),
-    "quotes": (with_cell(3, '"1.0'), "data.csv: line 3 is no row of a table: mend its quotes"),
+    "quotes": (
+        with_cell(3, '"1.0'),
+        "data.csv: line 3 is no row of a table: close the quotes in it",
+    ),
     "after comments": (
         "# made by hand\n\n" + with_cell(3, "x"),
         "data.csv: line 5, column 'force' holds 'x'",
@@ -279,7 +290,7 @@ BAD = {
     ),
     "units twice": (
         text(["force [N]", "displacement [m]"], [["kN", "m"], *ROWS]),
-        "column 'force [N]' has the unit 'kN' in the row below the header: leave one of them",
+        "column 'force [N]' has the unit 'kN' in the row below the header: keep one of",
     ),
     "one unit": (
         text(["force [kN]", "displacement"]),
@@ -366,7 +377,7 @@ def test_bad_tables_are_refused(read, case):
             "choose one of these",
         ),
         ({"columns": {"force": "displacement"}}, "'displacement' cannot be both force and displ"),
-        ({"units": {"weight": "N"}}, "units: 'weight' is no quantity: give force and displacement"),
+        ({"units": {"weight": "N"}}, "units: 'weight' is no quantity: choose among"),
         ({"units": {"force": "N"}}, "'displacement' names no unit but the other one does"),
         ({"units": {"force": "m", "displacement": "m"}}, "'m' is no unit of force"),
     ],

@@ -1,4 +1,4 @@
-"""Columns of numbers from MATLAB and NumPy files; nothing in a file is ever executed."""
+"""Tables in MATLAB and NumPy files; nothing in a file is ever executed."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import io
 import math
 import os
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.tables import LARGEST, Table, TextTable, read_bytes
+from jbeamshell.measured.tables import LARGEST, Table, read_bytes
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
-FEW = 8  # a matrix with no more rows than this, and more columns, lies on its side
+FEW = 8  # a matrix of more columns than rows, and at most so many rows, holds rows of numbers
 
 
 class ArrayTable(Table):
-    """Columns of a MATLAB or NumPy file.
+    """Table in a MATLAB or NumPy file.
 
     Parameters
     ----------
-    path : file that ends in .mat, .npz or .npy
+    path : file whose name ends in .mat, .npz or .npy
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -38,10 +38,10 @@ class ArrayTable(Table):
             )
         try:
             columns = [column for item in READERS[suffix](data) for column in _columns(*item)]
-        except Exception as error:  # whatever a parser stumbles over in a broken file
+        except Exception as error:  # a parser may raise anything for a broken file
             reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
             raise InputError(
-                f"{self.name}: is no {suffix} file of numbers ({reason}): save it anew"
+                f"{self.name}: is no {suffix} file of numbers ({reason}): save it again"
             ) from None
         if not columns:
             raise InputError(f"{self.name}: holds no columns of numbers: give named vectors")
@@ -76,31 +76,8 @@ class ArrayTable(Table):
         return f"element {row + 1}"
 
 
-def read_table(
-    path: str | os.PathLike[str],
-    recognised: Callable[[Sequence[str]], bool],
-    decimal: str | None = None,
-) -> Table:
-    """The table in a file, by the end of its name; all but .mat, .npz and .npy is text.
-
-    Parameters
-    ----------
-    path : the file
-    recognised : whether a row of titles is the header of a table of text
-    decimal : mark of the numbers in text, "." or ","; None finds out
-
-    Raises
-    ------
-    InputError
-        naming the file, what is wrong with it, and the fix
-    """
-    if Path(path).suffix.lower() in READERS:
-        return ArrayTable(path)
-    return TextTable(path, recognised, decimal)
-
-
 def _matlab(data: bytes) -> Iterator[tuple[str, Any]]:
-    from scipy.io import loadmat, whosmat  # only files of MATLAB's pay for it
+    from scipy.io import loadmat, whosmat  # slow to import
 
     if sum(8 * math.prod(shape) for _, shape, _ in whosmat(io.BytesIO(data))) > LARGEST:
         raise ValueError(f"more than {LARGEST // 10**6} MB when unpacked")
@@ -111,7 +88,7 @@ def _matlab(data: bytes) -> Iterator[tuple[str, Any]]:
 
 
 def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """A variable, or the fields of a struct, of a row of structs, of structs in structs."""
+    """Variable with its name, or all fields of a struct, of a row of structs, of nested structs."""
     if not (isinstance(value, np.ndarray) and value.dtype.names):
         yield name, value
         return
@@ -131,7 +108,7 @@ def _archive(data: bytes) -> Iterator[tuple[str, Any]]:
                 try:
                     array = np.lib.format.read_array(file, allow_pickle=False)
                 except ValueError as error:
-                    if "allow_pickle" in str(error):  # remarks beside the numbers, left closed
+                    if "allow_pickle" in str(error):  # objects beside the numbers are not unpacked
                         continue
                     raise
             yield member.filename.removesuffix(".npy"), array
@@ -146,7 +123,7 @@ def _array(data: bytes) -> Iterator[tuple[str, Any]]:
 
 
 def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    """The vectors in a variable; text, single numbers and what else is no table gives none."""
+    """Vectors in a variable; none for text, single numbers and arrays of three dimensions."""
     array = np.asarray(value)
     if array.dtype.kind not in "iuf" or array.ndim > 2 or array.size < 2:
         return

@@ -1,9 +1,9 @@
-"""The map of the rungs' errors: strips that finite elements and every rung have solved.
+"""Map of the rungs' errors: strips that were solved by finite elements and by every rung.
 
 `measured.json` holds strips drawn at random over eta, A/(mu F_N a), mu and nu, with the ratio of
-every candidate's answer to that of plane-strain finite elements (`calibration/map_ladder.py`).  The
-error at another strip is read off its nearest neighbours: a local plane through the logarithms of
-their ratios, and what they scatter about it.
+every candidate's figure to that of plane-strain finite elements (`calibration/map_ladder.py`).  The
+error at another strip follows from its nearest neighbours: a local plane through the logarithms of
+their ratios, and their scatter about it.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from jbeamshell.ladder.candidates import Candidate
 from jbeamshell.mechanics.friction import ElasticSlip, SharpSlip
 from jbeamshell.scene.scene import Scene
 
-# Distances over which errors change alike: of log(A/eta), A, log(mu) and nu.
+# Distances of log(A/eta), A, log(mu) and nu over which errors change by about as much.
 SCALES = np.array([0.15, 0.5, 0.7, 0.3])
 NEIGHBOURS = 14
-CAUTION = 2.5  # how many times their scatter is taken for granted
+CAUTION = 2.5  # multiple of the scatter that is added to an error
 RANGES = {
     "eta": (0.008, 0.45),
     "A/(mu F_N a)": (0.08, 1.95),
     "mu": (0.045, 0.55),
     "nu": (0.0, 0.455),
 }
-KAPPA_S = (0.4, 0.48)  # of the beamshell with a squeeze strain: measured at .44
-STIFFEST, SMOOTHEST = 200.0, 16.0  # alpha and m below which the contact's compliance shows
+KAPPA_S = (0.4, 0.48)  # range of kappa_s for which the map, measured at .44, holds
+LEAST_STIFFNESS, LEAST_SMOOTHING = 200.0, 16.0  # alpha, m below which the contact is too soft
 QUANTITIES = {
     "dissipation": {"dissipation": 1},
     "secant_stiffness": {"secant_stiffness": 1},
@@ -38,15 +38,15 @@ QUANTITIES = {
 }
 
 
-class Chart(NamedTuple):
-    """The map.
+class ErrorMap(NamedTuple):
+    """Strips of the map, the errors of all candidates on them, and their times.
 
     Attributes
     ----------
-    strips : (n, 4) their eta, A/(mu F_N a), mu and nu
-    ratios : (n,) to finite elements, by candidate and quantity
-    linear_ms : time of a warm run with linear kinematics, by candidate
-    exact_over_linear : how much longer it takes with exact ones, by rung
+    strips : (n, 4) eta, A/(mu F_N a), mu and nu of the strips
+    ratios : (n,) ratios to finite elements, by candidate and quantity
+    linear_ms : time of a warm run with linear kinematics [ms], by candidate
+    exact_over_linear : ratio of the times with exact and linear kinematics, by rung
     """
 
     strips: np.ndarray
@@ -56,22 +56,22 @@ class Chart(NamedTuple):
 
 
 @functools.cache
-def chart() -> Chart:
-    """The map that ships."""
+def load() -> ErrorMap:
+    """Map in the file `measured.json`."""
     record = json.loads(Path(__file__).with_name("measured.json").read_text(encoding="utf-8"))
     strips = np.array([record["strips"][key] for key in ("eta", "A", "mu", "nu")]).T
     ratios = {
         name: {quantity: np.array(values) for quantity, values in own.items()}
         for name, own in record["ratios"].items()
     }
-    return Chart(strips, ratios, record["linear_ms"], record["exact_over_linear"])
+    return ErrorMap(strips, ratios, record["linear_ms"], record["exact_over_linear"])
 
 
 def place(scene: Scene) -> np.ndarray | str:
-    """Where a scene is on the map, its (4,) numbers; or why it is not."""
+    """Coordinates (4,) of a scene on the map, eta, A/(mu F_N a), mu and nu; or why it is off."""
     strip, contact, load = scene.strip, scene.contact, scene.load
     sharp = isinstance(contact.law, SharpSlip) or (
-        isinstance(contact.law, ElasticSlip) and float(contact.smoothing) >= SMOOTHEST
+        isinstance(contact.law, ElasticSlip) and float(contact.smoothing) >= LEAST_SMOOTHING
     )
     reasons = {
         "an energy of its own": scene.energy is not None,
@@ -85,7 +85,7 @@ def place(scene: Scene) -> np.ndarray | str:
         "displacement control": load.control != "force",
         "fewer than two cycles": load.cycles < 2,
         "a smooth friction law": not sharp,
-        "a soft contact": float(contact.stick_stiffness) < STIFFEST,
+        "a soft contact": float(contact.stick_stiffness) < LEAST_STIFFNESS,
         "constants of its own": scene.model.constants != "consistent",
         "an assumed squeeze strain": scene.model.squeeze != "field",
     }
@@ -94,20 +94,20 @@ def place(scene: Scene) -> np.ndarray | str:
             return reason
     half = 0.5 * float(strip.length)
     mu, nu = float(contact.friction), float(np.asarray(strip.poisson_ratio))
-    if strip.plane == "stress":  # as plane strain with the ratio that has the same E'/G
+    if strip.plane == "stress":  # equals plane strain with the Poisson's ratio of the same E'/G
         nu = nu / (1.0 + nu)
     amplitude = float(load.amplitude) / max(mu * float(contact.pressure) * half, 1e-300)
-    here = np.array([float(strip.height_ratio), amplitude, mu, nu])
-    for (name, (low, high)), value in zip(RANGES.items(), here, strict=True):
+    coordinates = np.array([float(strip.height_ratio), amplitude, mu, nu])
+    for (name, (low, high)), value in zip(RANGES.items(), coordinates, strict=True):
         if not low <= value <= high:
             return f"{name} = {value:.4g}, beyond {low:g} to {high:g}"
-    return here
+    return coordinates
 
 
-def estimates(here: np.ndarray, quantity: str) -> dict[str, float]:
-    """Estimated relative error of every candidate at a place of the map."""
-    known = chart()
-    at, strips = _coordinates(here[None])[0], _coordinates(known.strips)
+def estimates(coordinates: np.ndarray, quantity: str) -> dict[str, float]:
+    """Estimated relative error of every candidate at coordinates (4,) of the map."""
+    known = load()
+    at, strips = _scaled(coordinates[None])[0], _scaled(known.strips)
     distance = np.linalg.norm(strips - at, axis=1)
     near = np.argsort(distance)[:NEIGHBOURS]
     reach = distance[near]
@@ -119,21 +119,22 @@ def estimates(here: np.ndarray, quantity: str) -> dict[str, float]:
         [sum(np.log(own[q][near]) * p for q, p in powers.items()) for own in known.ratios.values()]
     )
     planes, *_ = np.linalg.lstsq(root * design, root * logs, rcond=1e-6)
-    left = logs - design @ planes
+    residual = logs - design @ planes
     freedom = NEIGHBOURS / (NEIGHBOURS - design.shape[1])
-    scatter = np.sqrt(freedom * np.sum(weight[:, None] * left**2, axis=0) / np.sum(weight))
+    scatter = np.sqrt(freedom * np.sum(weight[:, None] * residual**2, axis=0) / np.sum(weight))
     errors = np.abs(np.expm1(planes[0])) + CAUTION * scatter
     return dict(zip(known.ratios, map(float, errors), strict=True))
 
 
 def suits(candidate: Candidate, scene: Scene) -> bool:
-    """Whether the map's figures of a candidate hold for a scene's constants."""
+    """True if the errors of a candidate on the map hold for a scene's constants."""
     if candidate.section != "squeeze":
         return True
     return KAPPA_S[0] <= float(scene.strip.kappa_s) <= KAPPA_S[1]
 
 
-def _coordinates(strips: np.ndarray) -> np.ndarray:
+def _scaled(strips: np.ndarray) -> np.ndarray:
+    """Coordinates (n, 4) in which equal distances mean similar changes of the errors."""
     eta, amplitude, mu, nu = strips.T
     ratio = np.log(amplitude / eta)
     return np.stack([ratio, amplitude, np.log(mu), nu], axis=1) / SCALES
