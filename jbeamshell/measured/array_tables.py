@@ -6,7 +6,7 @@ import io
 import math
 import os
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -137,7 +137,7 @@ def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]
         yield f"{name} {kind} {j}".strip(), column.astype(float)
 
 
-# How the content of a file is read, by the end of its name: titles with arrays.
+# Reader of titles and arrays from the content of a file, by the end of its name.
 READERS: dict[str, Callable[[bytes], Iterator[tuple[str, Any]]]] = {
     ".mat": _matlab,
     ".npz": _archive,

@@ -373,7 +373,7 @@ def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
     hasty = functools.partial(identify.fit, max_iterations=1)
     monkeypatch.setattr(identify, "fit", hasty)
     line = refused("fit", planted, *FIT, "--json", code=3)
-    assert line.startswith("the fit has not settled after 1 iterations, at contact.friction = ")
+    assert line.startswith("the fit has not converged after 1 iterations, at contact.friction = ")
 
 
 @pytest.mark.slow
@@ -640,7 +640,7 @@ def test_bad_scenes_are_refused(refused, tmp_path, command, content, told):
         (["--free", "contact.friction,contact.friction"], "names a key twice"),
         (["--free", "load.amplitude"], "free 'load.amplitude': is not a parameter of the strip"),
         (["--free", "model.nodes"], "free 'model.nodes': is not a parameter of the strip"),
-        (["--free", "contact.smoothing"], "is 'sharp'; give it a number to start from"),
+        (["--free", "contact.smoothing"], "is 'sharp' in this scene; give a number"),
         (["--start", "strip.kappa_s=1"], "--start strip.kappa_s: is not among the free keys cont"),
         (["--start", "contact.friction"], "'contact.friction': write KEY=VALUE, such as"),
         (["--start", "contact.friction=high"], "start = 'high': give a finite number"),
@@ -650,7 +650,7 @@ def test_bad_scenes_are_refused(refused, tmp_path, command, content, told):
         (["--prior", "contact.friction=0.1:a"], "write two numbers with a colon between"),
         (["--profile", "strip.kappa_s"], "--profile strip.kappa_s: is not among the free keys"),
         (["--noise", "-1"], "noise = -1.0: give a positive part of the range"),
-        (["--starts", "0"], "starts = 0: give a whole number, 1 or more"),
+        (["--starts", "0"], "starts = 0: must be a whole number, 1 to"),
         (["--method", "simplex"], "method = 'simplex': choose"),
         (["plan.toml"], "plan.toml: cannot be read (No such file"),
         (["plan.toml", "a.csv"], "plan.toml a.csv: give one plan, or files of data"),
