@@ -26,7 +26,7 @@ class ContactLine(eqx.Module):
             return jnp.zeros(self.gap.shape, bool)
         if self.scene.contact.normal == "compliant":
             return self.gap <= 0.0
-        strip = self.scene.strip  # the same weight as in the search for the contact
+        strip = self.scene.strip  # the weight of `jbeamshell.mechanics.normal_contact.Rigid`
         return self.reaction > self.gap * strip.plane_modulus / strip.half_height
 
     @property
@@ -70,7 +70,7 @@ def _contact_ends(x: Array, tributary: Array, touching: Array, reaction: Array) 
         for _ in range(3):
             level = reaction[before] + slope * (begin + 0.5 * width - x[before])
             width = jnp.where(level > 0.0, force / jnp.where(level > 0.0, level, 1.0), width)
-            width = jnp.clip(width, 0.0, tributary[j])  # beyond its share the next node would touch
+            width = jnp.clip(width, 0.0, tributary[j])  # beyond it, the next node would touch
         found = jnp.where(j == last, x[last], begin + width)
         return jnp.where(jnp.any(touching), found, 0.0)
 

@@ -75,7 +75,7 @@ class CycleFigures(eqx.Module):
     @property
     def friction_per_length(self) -> Array:
         """Mean q of mu F_N where the strip is pressed, force per length and width."""
-        # Weighted by the pressure itself, so that what is not pressed does not count.
+        # Weighted by the pressure itself, so that unloaded parts do not count.
         mean = jnp.sum(self.load**2 / self.tributary) / jnp.sum(self.load)
         return self.scene.contact.friction * mean
 

@@ -1,1 +1,1 @@
-"""Laws of one point, one section or one element, each written once as a scalar function."""
+"""Mechanics of one point, one section and one element, each written once as a scalar function."""

@@ -1,4 +1,19 @@
-"""Goodman's bar: one-dimensional elastic bar on frictional ground, in closed form."""
+"""Bar on a frictional foundation, in closed form (Goodman 1959).
+
+A bar of axial stiffness EA lies on X in [0, L], is held at X = 0 and is pulled at X = L by F.
+Friction of at most q per length resists, and EA v'' = sign(F) q where it slips:
+
+    s = abs(F)/q,   u = F abs(F)/(2 EA q),   D = (2/3) A^3/(EA q)
+
+are the slip length, the end displacement and the energy dissipated in a cycle between A and -A.
+
+References
+----------
+Brink, A. R. (2015). Modeling complex contact phenomena with nonlinear beamshells. Dissertation,
+    The University of Akron.
+Goodman, L. E. (1959). A review of progress in analysis of interfacial slip damping. In: Structural
+    Damping, ASME, 35-48.
+"""
 
 from typing import Any
 
@@ -17,14 +32,14 @@ def bar_backbone(
     force : array_like, shape (...)
         End force F [force], below gross slip: ``|F| <= q length``.
     axial_stiffness : array_like, shape (...)
-        EA [force]; ``2 H E'`` for a strip in plane strain.
+        Axial stiffness EA [force]; ``2 H E'`` for a strip in plane strain.
     friction_per_length : array_like, shape (...)
-        q [force / length]; friction coefficient times pressure.
+        Friction force q [force / length]: friction coefficient times pressure.
 
     Returns
     -------
     Array, shape (...)
-        u(length) [length].
+        End displacement u [length].
 
     Notes
     -----
@@ -43,14 +58,14 @@ def bar_force(displacement: Any, axial_stiffness: ArrayLike, friction_per_length
     displacement : array_like, shape (...)
         End displacement ``u >= 0`` [length], below gross slip.
     axial_stiffness : array_like, shape (...)
-        EA [force].
+        Axial stiffness EA [force].
     friction_per_length : array_like, shape (...)
-        q [force / length].
+        Friction force q [force / length].
 
     Returns
     -------
     array_like, shape (...)
-        F [force].
+        End force F [force].
     """
     return (2.0 * axial_stiffness * friction_per_length * displacement) ** 0.5
 
@@ -63,12 +78,12 @@ def bar_slip_length(force: ArrayLike, friction_per_length: ArrayLike) -> Array:
     force : array_like, shape (...)
         End force F of a first loading [force].
     friction_per_length : array_like, shape (...)
-        q [force / length].
+        Friction force q [force / length].
 
     Returns
     -------
     Array, shape (...)
-        s [length].
+        Slip length s [length].
 
     Notes
     -----
@@ -95,14 +110,14 @@ def bar_slip_profile(
     length : array_like, shape (...)
         Length of the bar [length].
     axial_stiffness : array_like, shape (...)
-        EA [force].
+        Axial stiffness EA [force].
     friction_per_length : array_like, shape (...)
-        q [force / length].
+        Friction force q [force / length].
 
     Returns
     -------
     Array, shape (...)
-        v(X) [length], zero outside the slip zone of length ``s = |F| / q``.
+        Displacement v(X) [length], zero outside the slip zone of length ``s = |F| / q``.
 
     Notes
     -----
@@ -124,14 +139,14 @@ def cubic_law(
     amplitude : array_like, shape (...)
         Largest end force ``A >= 0`` [force], below gross slip: ``A <= q length``.
     axial_stiffness : array_like, shape (...)
-        EA [force].
+        Axial stiffness EA [force].
     friction_per_length : array_like, shape (...)
-        q [force / length].
+        Friction force q [force / length].
 
     Returns
     -------
     Array, shape (...)
-        D [force length].
+        Dissipated energy D [force length].
 
     Notes
     -----

@@ -1,18 +1,18 @@
-r"""Nodes along X and the rule that integrates an element.
+r"""Elements along X: their nodes, and the rule that integrates over one of them.
 
-One family of rules: an element of order p has p+1 Gauss-Lobatto nodes, strains are collocated at
-its p Gauss points, and friction, contact and pressure act at the nodes with Lobatto weights.
+An element of order p has p+1 Gauss-Lobatto nodes.  Strains are taken at its p Gauss points;
+friction, contact and pressure act at the nodes with Lobatto weights.
 
 * ``finite-difference``: p = 1, the midpoint (box) scheme, second order.  The squeeze strain itself
-  (not its slope) is taken at the two nodes instead of the midpoint; that keeps its matrix an
-  M-matrix, so that a load edge does not make it oscillate when an element is longer than its decay
-  length.
+  (not its slope) is taken at the two nodes instead of the midpoint.  That keeps its matrix an
+  M-matrix: psi does not oscillate at a load edge even if an element is longer than the decay
+  length of psi.
 * ``collocation``: p = 2, the two-point Gauss scheme, fourth order on smooth problems.
 
-Nodes are graded at the loaded end X = L, where the traction concentrates, and at steps of the
-pressure: the element size at the distance d from there goes linearly (which is geometric grading)
-from a part of H to a part of L, and the node count scales all sizes together, so that doubling it
-halves every element.
+Elements are graded towards the loaded end X = L, where the traction concentrates, and towards
+steps of the pressure.  Their size grows linearly with the distance from there (geometric grading),
+from a fraction of H to a fraction of L.  The number of nodes scales all sizes together: twice the
+nodes halve every element.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from numpy.polynomial import Polynomial, legendre
 
 ORDER = {"finite-difference": 1, "collocation": 2}
 
-# Element sizes before scaling.  With 161 nodes the end element of the standard strips is about
-# H/16: with the lift frozen a smaller one would put the shell's point reaction into tension.
+# Element sizes before scaling.  With 161 nodes the end element of the standard strip is about H/16.
+# If the strip may not lift, a smaller one would turn its point reaction there into tension.
 END_SIZE = 1.0 / 6.0  # of H, at the loaded end
-FAR_SIZE = 1.0 / 60.0  # of L, away from it
-GROWTH = 0.08  # of the element size over the distance
+FAR_SIZE = 1.0 / 60.0  # of L, far from it
+GROWTH = 0.08  # of the element size per distance
 
 
 class Rule(NamedTuple):
@@ -58,7 +58,7 @@ class Rule(NamedTuple):
 
 @functools.cache
 def element_rule(name: str) -> Rule:
-    """The rule called ``finite-difference`` or ``collocation``."""
+    """Element rule of a name, ``finite-difference`` or ``collocation``."""
     order = ORDER[name]
     inner = legendre.Legendre.basis(order).deriv().roots()
     nodes = 0.5 * (1.0 + np.concatenate([[-1.0], np.sort(inner), [1.0]]))
@@ -81,7 +81,7 @@ def _gauss(order: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _shapes(nodes: np.ndarray) -> list[Polynomial]:
-    """Lagrange's polynomials of an element's nodes."""
+    """Lagrange polynomials of the nodes of an element."""
     shapes = [Polynomial.fromroots(np.delete(nodes, i)) for i in range(nodes.size)]
     return [shape / shape(node) for shape, node in zip(shapes, nodes, strict=True)]
 
@@ -93,25 +93,29 @@ def vertices(
     end_size: float = END_SIZE,
     steps: Array | None = None,
 ) -> Array:
-    """End points of the elements, graded towards X = L and towards the steps of the load.
+    """End points of the elements, graded towards X = L and towards steps of the pressure.
 
     Parameters
     ----------
     elements : number of elements
-    length : L
-    half_height : H
+    length : length L of the strip
+    half_height : half height H
     end_size : size of the smallest elements before scaling, over H
-    steps : (k,) increasing positions of the steps, in [0, L]; they need not fall on nodes
+    steps : (k,) increasing positions X of the steps, in [0, L]; nodes need not lie on them
 
     Returns
     -------
-    (elements + 1,) increasing positions from 0 to L; smooth in L, H and the steps.
+    (elements + 1,) increasing positions from 0 to L, differentiable in L, H and the steps
+
+    Examples
+    --------
+    >>> vertices(4, length=2.0, half_height=0.1)
     """
     length = jnp.asarray(length)
     far, end = FAR_SIZE * length, end_size * jnp.asarray(half_height)
     rate = jnp.where(far >= end, GROWTH, -GROWTH)
-    # Elements between a focus and the distance d: int dd/h(d) with h = end + rate d up to far,
-    # a logarithm and then a straight line.
+    # The size is h(d) = end + rate d at the distance d from a focus, up to the size far.  So the
+    # number of elements within d, int dd/h(d), is a logarithm and then a straight line.
     turn = (far - end) / rate
 
     def count(distance: Array) -> Array:
@@ -125,7 +129,8 @@ def vertices(
         return end * jnp.expm1(rate * near) / rate + far * (elements - near)
 
     foci = length[None] if steps is None else jnp.append(steps, length)
-    # Pieces run to and from a focus by turns: 0, first focus, half way to the next one, and so on.
+    # Pieces run alternately towards a focus and away from one: from 0 to the first focus, from
+    # there half way to the next focus, and so on.
     half_way = 0.5 * (foci[:-1] + foci[1:])
     edges = jnp.append(0.0, jnp.append(jnp.stack([foci[:-1], half_way], 1).ravel(), length))
     counts = jnp.append(0.0, jnp.cumsum(count(jnp.diff(edges))))
@@ -138,30 +143,32 @@ def vertices(
 
 
 def table_steps(table: Array, length: ArrayLike) -> Array:
-    """Positions (rows - 1,) at which a table of (X, value) rows jumps; L stands for no jump."""
+    """Positions X at which a table of (X, value) jumps, (rows - 1,); L where it does not."""
     return jnp.sort(jnp.where(jnp.diff(table[:, 0]) > 0.0, length, table[1:, 0]))
 
 
 def nodal_loads(rule: Rule, ends: Array, load: Array) -> Array:
-    """Integrals of a distributed load times the nodes' shape functions, (n,).
+    """Nodal forces of a distributed load: its integrals with the shape functions, (n,).
+
+    The integrals are exact, wherever the steps of the load lie.
 
     Parameters
     ----------
-    rule : of the elements
-    ends : (elements + 1,) their end points
-    load : load per length: one number, or a table (rows, 2) of X and value, linear in between, two
-        rows of the same X making a step; exact, wherever the steps fall
+    rule : rule of the elements
+    ends : (elements + 1,) end points of the elements
+    load : load per length, as one number or as a table (rows, 2) of X and value, linear in between;
+        two rows of the same X make a step
     """
     if load.ndim == 0:
         return load * tributary_lengths(rule, ends)
-    table = jnp.concatenate([load[:1], load, load[-1:]])  # it goes on with its end values
+    table = jnp.concatenate([load[:1], load, load[-1:]])  # end values go on beyond the table
     x, value = table[:, 0].at[0].min(ends[0]).at[-1].max(ends[-1]), table[:, 1]
     run = jnp.where(jnp.diff(x) > 0.0, jnp.diff(x), 1.0)
     begin, size = ends[:-1, None], jnp.diff(ends)[:, None]
     low = jnp.maximum(begin, x[:-1])
     cut = jnp.maximum(jnp.minimum(begin + size, x[1:]) - low, 0.0)  # (elements, rows + 1)
     total = jnp.zeros((ends.size - 1, rule.nodes.size), ends.dtype)
-    for point, weight in zip(*_gauss(2), strict=True):  # linear times quadratic is exact
+    for point, weight in zip(*_gauss(2), strict=True):  # exact for linear times quadratic
         at = low + point * cut
         along = jnp.clip((at - x[:-1]) / run, 0.0, 1.0)
         part = weight * cut * (value[:-1] + along * jnp.diff(value))
@@ -172,13 +179,13 @@ def nodal_loads(rule: Rule, ends: Array, load: Array) -> Array:
 
 
 def nodes(rule: Rule, ends: Array) -> Array:
-    """All nodes of the elements between ``ends``, (order * elements + 1,)."""
+    """Positions of all nodes of the elements between ``ends``, (order * elements + 1,)."""
     inner = ends[:-1, None] + jnp.diff(ends)[:, None] * rule.nodes[:-1]
     return jnp.append(inner.ravel(), ends[-1])
 
 
 def tributary_lengths(rule: Rule, ends: Array) -> Array:
-    """Length l_i of contact that belongs to each node; they add up to L."""
+    """Contact length l_i of each node, (n,); they add up to L."""
     return scatter(jnp.diff(ends)[:, None] * rule.node_weights.astype(ends.dtype))
 
 

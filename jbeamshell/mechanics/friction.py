@@ -44,9 +44,10 @@ class FrictionLaw(eqx.Module):
 
     Examples
     --------
-    >>> class Viscous(FrictionLaw):
+    >>> class Stiffer(FrictionLaw):
     ...     def traction(self, dv, t_n, cap, k_t):
-    ...         return jnp.clip(1e-3 * k_t * dv, -cap, cap)
+    ...         return jnp.clip(t_n + 2.0 * k_t * dv, -cap, cap)
+    >>> scene = jb.Scene().replace({"contact.law": Stiffer()})
     """
 
     @abc.abstractmethod
@@ -198,11 +199,11 @@ class ElasticSlip(FrictionLaw):
     def _slip_and_work(self, z: Array) -> tuple[Array, Array]:
         """Plastic slip s = z - S and dissipated work int S ds = S s - int s dS up to z."""
         m, r = self.smoothing, _virgin_curve(z, self.smoothing)
-        # int s dr' of s = r' (1 - r'^m)^(-1/m) - r' by incomplete beta functions of x = r'^m up to
-        # 1/2 and of y = 1 - r'^m beyond it, where their series at least halve at every term.
+        # int s dr' of s = r' (1 - r'^m)^(-1/m) - r' by incomplete beta functions: of x = r'^m up to
+        # 1/2, of y = 1 - r'^m beyond.  So the terms of their series at least halve.
         below, above = jnp.minimum(z, 1.0) ** m, jnp.maximum(z, 1.0) ** -m
         x, y = below / (1.0 + below), above / (1.0 + above)
-        y = jnp.maximum(y, jnp.finfo(jnp.result_type(y)).tiny)  # y**b has no slope at zero
+        y = jnp.maximum(y, jnp.finfo(jnp.result_type(y)).tiny)  # y**b is steep at zero
         a, b = 2.0 / m, 1.0 - 1.0 / m
         rising = jnp.minimum(r, 0.5 ** (1.0 / m)) ** 2 * _beta_series(x, a, b)
         half = jnp.full_like(y, 0.5)

@@ -1,21 +1,29 @@
-r"""Hierarchic sections: displacements of order p through the height, and no shear factors.
+r"""Hierarchic section: displacements of order p through the height, without shear factors.
 
-A beamshell's section stays straight; that of order p bends.  To its four fields v, w, beta and psi
-come, for j = 2 ... p, the displacements a_j along and b_j across the section, times the integrated
+The section of a beamshell stays straight; that of order p bends.  It adds to the four fields v, w,
+beta and psi, for j = 2 ... p, the displacements a_j along X and b_j across, times the integrated
 Legendre polynomials N_j of t = s/H (Szabo & Babuska 1991, section 6.2),
 
-    N_j(t) = (P_j(t) - P_{j-2}(t)) / sqrt(2 (2j-1)),
+    N_j(t) = (P_j(t) - P_{j-2}(t)) / sqrt(2 (2j-1)).
 
-which vanish on both faces, so that contact, friction and pressures are the beamshell's.  With T and
-B of `jbeamshell.mechanics.kinematics`, the material point at height s is moved to
+They vanish on both faces, so contact, friction and pressures stay those of the beamshell.  In the
+axes T and B of `jbeamshell.mechanics.kinematics`, the material point at height s moves to
 
     x = X + v - (H+s)(1+psi) sin(beta) + a cos(beta) - b sin(beta),      a = sum a_j N_j,
     y = w + (H+s)(1+psi) cos(beta) + a sin(beta) + b cos(beta),          b = sum b_j N_j,
 
-and the energy is that of the plane, integrated over s.  Exact kinematics take Green and Lagrange's
-strains, so the material is St. Venant and Kirchhoff's; linear ones the gradients' symmetric part.
-p = 1 is the beamshell with kappa = kappa_s = 1 and shear that varies over the height; p to infinity
-is plane elasticity.
+and the energy is that of plane elasticity, integrated over s:
+
+    Phi = int C11 (eps_x + nu' eps_y)^2/2 + E' eps_y^2/2 + G gamma^2/2 ds.
+
+Exact kinematics take the strains of Green and Lagrange, hence the material of St. Venant and
+Kirchhoff.  Linear kinematics take the symmetric part of the displacement gradient.  p = 1 is the
+beamshell with kappa = kappa_s = 1 and shear that varies over the height.  p to infinity is plane
+elasticity.
+
+References
+----------
+Szabo, B. & Babuska, I. (1991). Finite Element Analysis. Wiley.
 """
 
 from __future__ import annotations
@@ -32,14 +40,14 @@ from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS, Section, Strains
 
 
 class Hierarchic(eqx.Module):
-    """A homogeneous section of order p; its fields are v, w, beta, psi, a_2, b_2, ..., a_p, b_p.
+    """Homogeneous section of order p; its fields are v, w, beta, psi, a_2, b_2, ..., a_p, b_p.
 
     Attributes
     ----------
-    half_height : H, length
+    half_height : half height H, length
     plane_modulus : E', stress: E/(1-nu^2) in plane strain, E in plane stress
-    poisson_ratio : nu
-    order : p
+    poisson_ratio : Poisson's ratio nu
+    order : order p, from 1 up
     kinematics : "exact" or "linear"
     plane : "strain" or "stress"
     """
@@ -56,23 +64,23 @@ class Hierarchic(eqx.Module):
 
         Parameters
         ----------
-        section : (2p+2,) fields
+        section : (2p+2,) fields of the section
         slope : (2p+2,) their derivatives along X
         """
-        # The product of two gradients of order p is integrated exactly, the rest of the exact
-        # strains, which is as small as the strains themselves, nearly.
+        # Exact for the product of two gradients of order p.  Exact strains have products of four,
+        # whose quadrature error is as small as the strains.
         points, weights = legendre.leggauss(self.order + (2 if self.kinematics == "exact" else 1))
         density = jax.vmap(lambda t: self._density(section, slope, t))(jnp.asarray(points))
         return self.half_height * jnp.sum(weights * density)
 
     def forces(self, section: Section, slope: Section) -> Strains:
-        """N, Q, M, chi and xi of one section: conjugate to the rates of its straight part.
+        """Section forces N, Q, M, chi and xi, conjugate to the strains of the straight part.
 
-        See `energy` for the parameters.  Exact for small rotations.
+        They are exact for small rotations.  The parameters are those of `energy`.
         """
         of_section, of_slope = jax.grad(self.energy, argnums=(0, 1))(section, slope)
         normal, shear, about_base, squeeze = (of_slope[field] for field in range(len(FIELDS)))
-        # e = v' - H beta', k = beta' and g = w' - beta + H psi' turn the conjugates of the slopes.
+        # From e = v' - H beta', k = beta' and g = w' - beta + H psi' by the chain rule.
         return Strains(
             normal,
             shear,
@@ -82,7 +90,7 @@ class Hierarchic(eqx.Module):
         )
 
     def displacement(self, section: Section, height: Array) -> tuple[Array, Array]:
-        """Displacement (x, y) of the material point at ``height`` s of one section."""
+        """Displacement (x, y) of the material point at ``height`` s above mid-height."""
         straight, bubbles = section[: len(FIELDS)], section[len(FIELDS) :]
         x, y = KINEMATICS[self.kinematics].position(straight, self.half_height, height)
         if self.order == 1:
@@ -96,13 +104,13 @@ class Hierarchic(eqx.Module):
         return x + along * cos - across * sin, y + along * sin + across * cos
 
     def mean_displacement(self, section: Section) -> Array:
-        """Mean over the height of the displacement along X, the conjugate of a uniform traction."""
+        """Mean displacement along X over the height, conjugate to a uniform traction."""
         points, weights = legendre.leggauss(self.order + 1)
         moved = jax.vmap(lambda t: self.displacement(section, t * self.half_height)[0])
         return 0.5 * jnp.sum(weights * moved(jnp.asarray(points)))
 
     def _density(self, section: Section, slope: Section, t: Array) -> Array:
-        """Energy per area at t = s/H."""
+        """Strain energy per area at t = s/H."""
         height = t * self.half_height
 
         def moved(section: Section, height: Array) -> Array:

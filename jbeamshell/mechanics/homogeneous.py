@@ -1,18 +1,24 @@
-r"""Strain energy per unit length, Phi(e, g, k, psi, psi'), and the forces conjugate to the strains.
+r"""Strain energy of a homogeneous section per unit length, Phi(e, g, k, psi, psi').
 
-A strain energy is any JAX function of five scalars that returns a scalar; `forces` and the
-solver's tangent come from it by automatic differentiation.  The homogeneous section (Brink 2015,
-eqs. 4.59-4.68, with the bending and squeeze-shear constants made consistent):
+With the constants of bending and squeeze-shear made consistent (Brink 2015, eqs. 4.59-4.68),
 
     Phi = H C11 (e + nu' psi)^2 + H E' psi^2 + kappa G H g^2 + D k^2/2 + S psi'^2/2
     D = (2/3) E' H^3,   S = (2/3) kappa_s G H^3,   kappa = 10(1+nu)/(12+11nu)   (Cowper 1966)
 
-with C11 = E'/(1-nu'^2), and E' = E/(1-nu^2), nu' = nu/(1-nu) in plane strain; E and nu in plane
-stress.
-
-Without a squeeze field sigma_y = 0 is condensed instead (chapter III):
+with C11 = E'/(1-nu'^2).  E' = E/(1-nu^2) and nu' = nu/(1-nu) in plane strain; E' = E and nu' = nu
+in plane stress.  Without a squeeze field, sigma_y = 0 gives (Brink 2015, chapter III)
 
     Phi = H E' e^2 + kappa G H g^2 + D k^2/2.
+
+A strain energy is any JAX function of five scalars that returns a scalar.  Automatic
+differentiation of it gives the section `forces` and the solver's tangent.
+
+References
+----------
+Brink, A. R. (2015). Modeling complex contact phenomena with nonlinear beamshells. Dissertation,
+    The University of Akron.
+Cowper, G. R. (1966). The shear coefficient in Timoshenko's beam theory. J. Appl. Mech. 33,
+    335-340.
 """
 
 from __future__ import annotations
@@ -39,14 +45,19 @@ class Homogeneous(eqx.Module):
 
     Attributes
     ----------
-    half_height : H, length
+    half_height : half height H, length
     plane_modulus : E', stress: E/(1-nu^2) in plane strain, E in plane stress
-    poisson_ratio : nu
+    poisson_ratio : Poisson's ratio nu
     kappa_s : squeeze-shear factor
-    squeeze : whether psi is a field; if not, sigma_y = 0 is condensed
-    constants : "consistent", or "printed" for the dissertation's own bending stiffness
-        (eq. 3.45, 1/16 of the consistent one) and squeeze-shear stiffness (eq. 4.73, 24 times)
+    squeeze : True if psi is a field; if not, sigma_y = 0
+    constants : "consistent", or "printed" for those of Brink 2015: a bending stiffness of 1/16
+        (eq. 3.45) and a squeeze-shear stiffness of 24 times (eq. 4.73) the consistent one
     plane : "strain" or "stress"
+
+    Examples
+    --------
+    >>> section = Homogeneous(half_height=0.1, plane_modulus=1.5e5, poisson_ratio=0.3, kappa_s=0.44)
+    >>> normal_force = forces(section, Strains(e=1e-3, g=0.0, k=0.0, psi=0.0, dpsi=0.0)).e
     """
 
     half_height: Array = eqx.field(converter=jnp.asarray)
@@ -59,23 +70,23 @@ class Homogeneous(eqx.Module):
 
     @property
     def shear_modulus(self) -> Array:
-        """G = E/(2(1+nu)), stress."""
+        """Shear modulus G = E/(2(1+nu)), stress."""
         return shear_modulus(self.plane_modulus, self.poisson_ratio, self.plane)
 
     @property
     def bending_stiffness(self) -> Array:
-        """D, force times length (per unit width)."""
+        """Bending stiffness D per unit width, force times length."""
         factor = 2.0 / 3.0 if self.constants == "consistent" else 1.0 / 24.0
         return factor * self.plane_modulus * self.half_height**3
 
     @property
     def squeeze_stiffness(self) -> Array:
-        """S, force times length (per unit width)."""
+        """Squeeze-shear stiffness S per unit width, force times length."""
         factor = 2.0 / 3.0 if self.constants == "consistent" else 16.0
         return factor * self.kappa_s * self.shear_modulus * self.half_height**3
 
     def __call__(self, e: Array, g: Array, k: Array, psi: Array, dpsi: Array) -> Array:
-        """Phi at one section, energy per unit length and width."""
+        """Strain energy Phi of one section, per unit length and width."""
         h, nu, plane = self.half_height, self.poisson_ratio, self.plane_modulus
         shear = shear_coefficient(nu) * self.shear_modulus * h * g**2
         bending = 0.5 * self.bending_stiffness * k**2
@@ -87,7 +98,7 @@ class Homogeneous(eqx.Module):
 
 
 def shear_modulus(plane_modulus: Array, poisson_ratio: Array, plane: str) -> Array:
-    """G from E' and nu, stress."""
+    """Shear modulus G from E' and nu, stress."""
     if plane == "strain":
         return 0.5 * (1.0 - poisson_ratio) * plane_modulus
     return 0.5 * plane_modulus / (1.0 + poisson_ratio)
@@ -104,14 +115,14 @@ def plane_modulus(youngs_modulus: Any, poisson_ratio: Any, plane: str) -> Any:
 
 
 def plane_stiffness(plane_modulus: Array, poisson_ratio: Array, plane: str) -> tuple[Array, Array]:
-    """Nu' and C11 = E'/(1-nu'^2), stress: sigma_x = C11 (eps_x + nu' eps_y)."""
+    """Contraction nu' and stiffness C11 of sigma_x = C11 (eps_x + nu' eps_y), C11 a stress."""
     nu = poisson_ratio
     coupling = nu / (1.0 - nu) if plane == "strain" else nu
     return coupling, plane_modulus / (1.0 - coupling**2)
 
 
 class _Plain(eqx.Module):
-    """Strain energy made of numbers, which are leaves, and functions, which are static."""
+    """Strain energy whose functions are static parts of its pytree."""
 
     numbers: Any
     functions: Any = eqx.field(static=True)
@@ -122,24 +133,24 @@ class _Plain(eqx.Module):
 
 
 def as_energy(energy: Any) -> Any:
-    """Strain energy as a pytree whose leaves are numbers, so that a plain function is one too."""
+    """Strain energy as a pytree of numbers; plain functions in it become static parts."""
     if not any(map(callable, jax.tree.leaves(energy))):
         return energy
     return _Plain(*eqx.partition(energy, lambda leaf: not callable(leaf)))
 
 
 def forces(energy: Energy, strains: Strains) -> Strains:
-    """Forces conjugate to the strains of one section: N, Q, M, chi and xi.
+    """Section forces N, Q, M, chi and xi, the derivatives of Phi.
 
     Parameters
     ----------
     energy : Phi(e, g, k, psi, psi')
-    strains : one section's strains, scalars
+    strains : strains of one section, scalars
 
     Returns
     -------
     Strains
-        (N, Q, M, chi, xi) in the places of (e, g, k, psi, psi').
+        (N, Q, M, chi, xi) in the places of (e, g, k, psi, psi'), per unit width.
     """
     return Strains(*jax.grad(lambda s: energy(*s))(strains))
 

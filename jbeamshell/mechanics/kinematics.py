@@ -1,7 +1,7 @@
-r"""Section fields of one point to the strains of the beamshell.
+r"""Kinematics of a beamshell: strains and positions from the fields of a section.
 
 A section carries four fields: the tangential displacement ``v`` and the lift ``w`` of the contact
-point (bottom face), the rotation ``beta`` and the squeeze strain ``psi``.  With
+point (bottom face), the rotation ``beta`` and the squeeze strain ``psi``.  With the axes
 T = (cos beta, sin beta) and B = (-sin beta, cos beta), the material point at height s in [-H, H] is
 
     x = X + v - (H+s)(1+psi) sin(beta),      y = w + (H+s)(1+psi) cos(beta),
@@ -13,21 +13,28 @@ with 3.39-3.40 extended by the lift and the squeeze strain)
     g = u_y' cos(beta) - (1+u_x') sin(beta),
     k = beta'.
 
-Inserting u_x = v - H(1+psi) sin(beta), u_y = w + H(1+psi) cos(beta) - H leaves
+With u_x = v - H(1+psi) sin(beta) and u_y = w + H(1+psi) cos(beta) - H these become
 
     e = v' cos(beta) + w' sin(beta) - 2 sin^2(beta/2) - H (1+psi) beta'
     g = w' cos(beta) - (1+v') sin(beta) + H psi'
 
-in which nothing of order one cancels.
+where no terms of order one cancel.
 
 A strip that is curved before loading has the angle alpha(X) and the curvature alpha' (Libai &
-Simmonds 1998; Brink 2015, eqs. 2.25-2.28).  In the frame of the undeformed section, into which
-`turned` takes displacements and slopes, the same derivation gives
+Simmonds 1998; Brink 2015, eqs. 2.25-2.28).  In the axes of the undeformed section, into which
+`rotated` takes displacements and slopes, the strains are
 
     e = v' cos(beta) + w' sin(beta) - 2 (1+H alpha') sin^2(beta/2) - H (1+psi) beta' - H psi alpha'
     g = w' cos(beta) - (1+H alpha' + v') sin(beta) + H psi'
 
 where primes are derivatives along the undeformed mid-height curve.
+
+References
+----------
+Brink, A. R. (2015). Modeling complex contact phenomena with nonlinear beamshells. Dissertation,
+    The University of Akron.
+Libai, A. & Simmonds, J. G. (1998). The Nonlinear Theory of Elastic Shells. Cambridge University
+    Press.
 """
 
 from __future__ import annotations
@@ -63,14 +70,14 @@ class Strains(NamedTuple):
 
 
 def _rotation(beta: Array) -> tuple[Array, Array, Array]:
-    """sin(beta), cos(beta) and 1 - cos(beta); the half angle keeps the last from cancelling."""
+    """Sine, cosine and 1 - cosine of beta, the last by the half angle to avoid cancellation."""
     sin, cos = jnp.sin(0.5 * beta), jnp.cos(0.5 * beta)
     versine = 2.0 * sin * sin
     return 2.0 * sin * cos, 1.0 - versine, versine
 
 
 def rotated(x: Array, y: Array, angle: ArrayLike) -> tuple[Array, Array]:
-    """Components of the vector (x, y) in axes turned by an angle, counter-clockwise, rad."""
+    """Components of the vector (x, y) in axes rotated counter-clockwise by an angle, rad."""
     sin, cos = jnp.sin(angle), jnp.cos(angle)
     return x * cos + y * sin, y * cos - x * sin
 
@@ -83,9 +90,9 @@ def exact_strains(
     Parameters
     ----------
     section : (4,) fields v, w, beta, psi
-    slope : (4,) their derivatives along X, in the frame of the undeformed section
-    half_height : H
-    curvature : alpha' of the undeformed strip, 1/length; None is a straight one
+    slope : (4,) their derivatives along X, in the axes of the undeformed section
+    half_height : half height H, length
+    curvature : alpha' of the undeformed strip, 1/length; None for a straight strip
     """
     _, _, beta, psi = section
     dv, dw, dbeta, dpsi = slope
@@ -117,9 +124,9 @@ def exact_position(
 
     Parameters
     ----------
-    section : (4,) fields v, w, beta, psi; v, w and the result in the undeformed section's frame
-    half_height : H
-    height : s in [-H, H]
+    section : (4,) fields v, w, beta, psi; v, w and the result in the undeformed section's axes
+    half_height : half height H, length
+    height : s in [-H, H], length
     """
     v, w, beta, psi = section
     sin, _, versine = _rotation(beta)
@@ -137,7 +144,13 @@ def linear_position(
 
 
 class Kinematics(NamedTuple):
-    """A consistent pair of strains and positions."""
+    """Strains and positions that belong together.
+
+    Attributes
+    ----------
+    strains : function such as `exact_strains`
+    position : function such as `exact_position`
+    """
 
     strains: Callable[..., Strains]
     position: Callable[[Section, ArrayLike, ArrayLike], tuple[Array, Array]]

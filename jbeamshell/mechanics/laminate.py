@@ -1,7 +1,7 @@
-r"""Strain energy per unit length, Phi(e, g, k, psi, psi'), of a section of layers.
+r"""Strain energy of a laminated section per unit length, Phi(e, g, k, psi, psi').
 
-Layers that press on each other share the stress sigma_y, not the squeeze strain psi.  With
-sigma_y = q uniform over the height h and psi the mean of eps_y, eliminating q leaves
+Layers that press on each other share the stress sigma_y, not the squeeze strain (Reuss 1929).  With
+sigma_y = q uniform over the height h and psi the mean of eps_y, eliminating q gives
 
     Phi = A e^2/2 - B e k + D k^2/2 + (h psi + P0 e - P1 k)^2/(2 F) + shear,
     A, B, D = int Eb (1, s, s^2) ds,   P0, P1 = int nb (1, s) ds,   F = int (1 - nb^2)/Eb ds,
@@ -9,18 +9,16 @@ sigma_y = q uniform over the height h and psi the mean of eps_y, eliminating q l
     shear = int G (sqrt(kappa) (g + d psi') + sqrt(kappa_s) (s - d) psi')^2/2 ds,
 
 with eps_x = e - s k, gamma = g + s psi', s from -h/2 at the bottom to h/2 at the top, and per layer
-Eb = E, nb = nu in plane stress, Eb = E/(1-nu^2), nb = nu/(1-nu) in plane strain.  d is the height
-at which the shear is split into its mean and its squeeze part; nothing else depends on it.  The
-shear is an integral of squares, hence never negative; its coupling factor is
-kappa_c = sqrt(kappa kappa_s).
+Eb = E, nb = nu in plane stress, Eb = E/(1-nu^2), nb = nu/(1-nu) in plane strain.  At the height d
+the shear is split into its mean and its squeeze part; nothing else depends on d.  The shear energy
+is an integral of squares, hence never negative; its coupling factor is sqrt(kappa kappa_s).
 
-One psi shared by all layers (Brink 2015, eqs. 4.79-4.86) puts all of eps_y = psi into every layer
-instead:
+If all layers share one psi instead (Brink 2015, eqs. 4.79-4.86), eps_y = psi in every layer:
 
     Phi = int C11 (eps_x^2 + 2 nb eps_x psi + psi^2)/2 ds + shear,   C11 = Eb/(1 - nb^2).
 
-Under a uniform squeeze it leaves a laminate of equal nu straight whatever its moduli, for the
-free layers would all lengthen by the same -nb psi.
+Such a laminate stays straight under a uniform squeeze if all its nu are equal, whatever its
+moduli, because every layer would lengthen by the same -nb psi.
 
 References
 ----------
@@ -48,23 +46,28 @@ from jbeamshell.mechanics.kinematics import Strains
 class Laminate(eqx.Module):
     """Strain energy of a laminated section.
 
-    The strains are those of the mid-height curve; the deviation enters the shear only.
+    The strains are those of the mid-height curve.
 
     Attributes
     ----------
     layers : (n, 3) rows from the bottom to the top: thickness (length), E (stress), nu
     kappa_s : squeeze-shear factor, positive
-    deviation : d, height above mid-height at which the shear is split, length
-    plane : "strain", or "stress"
-    squeeze : whether psi is a field; if not, sigma_y = 0 is condensed: q = 0, without psi'
+    deviation : height d above mid-height at which the shear is split, length
+    plane : "strain" or "stress"
+    squeeze : True if psi is a field; if not, sigma_y = q = 0
     constants : "consistent", or "printed" for one psi shared by all layers (Brink 2015, eqs.
         4.79-4.86), no coupling of g and psi' (eq. 4.80) and a squeeze-shear stiffness 24 times
-        larger; without squeeze both are the same
+        larger; without psi both are the same
 
     Raises
     ------
     InputError
         If `plane` or `constants` is not one of the choices.
+
+    Examples
+    --------
+    >>> layers = [[1.0, 2.1e3, 0.3], [1.0, 2.1e5, 0.3]]
+    >>> Laminate(layers, kappa_s=0.44, plane="stress").uniform_squeeze(50.0).k
     """
 
     layers: Array = eqx.field(converter=jnp.asarray)
@@ -83,27 +86,27 @@ class Laminate(eqx.Module):
 
     @property
     def height(self) -> Array:
-        """h, sum of the thicknesses, length."""
+        """Height h, the sum of the thicknesses, length."""
         return self.layers[:, 0].sum()
 
     @property
     def stretching_stiffness(self) -> Array:
-        """A = int Eb ds, force per unit width: 2 H E' of one layer in plane strain."""
+        """Stretching stiffness A = int Eb ds, force per unit width; 2 H E' for a single layer."""
         return (self.layers[:, 0] * self._in_plane[0]).sum()
 
     @property
     def mean_shear_modulus(self) -> Array:
-        """Mean of G = E/(2(1+nu)) over the height, stress."""
+        """Mean of the shear modulus G = E/(2(1+nu)) over the height, stress."""
         return (self.layers[:, 0] * self._shear_moduli).sum() / self.height
 
     @property
     def shear_coefficient(self) -> Array:
-        """Cowper's kappa at the mean of nu, each layer weighing in by its shear stiffness."""
+        """Shear coefficient kappa (Cowper 1966) at the mean of nu, weighted by shear stiffness."""
         weights = self.layers[:, 0] * self._shear_moduli
         return shear_coefficient((weights * self.layers[:, 2]).sum() / weights.sum())
 
     def __call__(self, e: Array, g: Array, k: Array, psi: Array, dpsi: Array) -> Array:
-        """Phi at one section, energy per unit length and width."""
+        """Strain energy Phi of one section, per unit length and width."""
         modulus, contraction = self._in_plane
         if not self.squeeze:
             mean = 0.5 * self.shear_coefficient * self.mean_shear_modulus * self.height * g**2
@@ -119,26 +122,26 @@ class Laminate(eqx.Module):
         return self._bending(modulus, e, k) + squeezed + self._shear(g, dpsi)
 
     def uniform_squeeze(self, pressure: ArrayLike) -> Strains:
-        """Strains under equal and opposite pressures on both faces, no force and no moment.
+        """Strains under the same pressure on both faces, without end force and moment.
 
-        The solution of [A, -B; -B, D] (e, k) = p (P0, -P1), with psi from q = -p.
+        They solve [A, -B; -B, D] (e, k) = p (P0, -P1), with psi from q = -p.
 
         Parameters
         ----------
         pressure : array_like, scalar
-            p, stress, positive pressing.
+            Pressure p, stress, positive in compression.
 
         Returns
         -------
         Strains
-            Of the mid-height curve; k > 0 bends the end at X = L up when the top is the stiffer.
+            Strains of the mid-height curve; k > 0, for a stiffer top, bends the end at X = L up.
 
         Notes
         -----
-        The solution of the consistent section with psi, whatever `constants` and `squeeze` say.
-        For two layers of equal thickness and n = E_top/E_bottom it is Timoshenko's (1925) bi-metal
-        strip, k = 24 (eps_b - eps_t)/(h (14 + n + 1/n)), with the free strains eps = nb p/Eb in
-        place of the thermal ones.
+        The section is taken as consistent and with psi, whatever `constants` and `squeeze` are.
+        For two layers of equal thickness and n = E_top/E_bottom this is the bimetal strip of
+        Timoshenko (1925), k = 24 (eps_b - eps_t)/(h (14 + n + 1/n)), with the free strains
+        eps = nb p/Eb in place of the thermal ones.
         """
         modulus, contraction = self._in_plane
         neutral = self._neutral(modulus)
@@ -152,41 +155,42 @@ class Laminate(eqx.Module):
 
     @property
     def _in_plane(self) -> tuple[Array, Array]:
-        """Eb and nb of every layer: sigma_x = Eb eps_x and eps_y = -nb eps_x when sigma_y = 0."""
+        """Modulus Eb and contraction nb of every layer: sigma_x = Eb eps_x, eps_y = -nb eps_x."""
         nu = self.layers[:, 2]
         modulus = plane_modulus(self.layers[:, 1], nu, self.plane)
         return modulus, nu if self.plane == "stress" else nu / (1.0 - nu)
 
     @property
     def _shear_moduli(self) -> Array:
+        """Shear modulus G of every layer."""
         return 0.5 * self.layers[:, 1] / (1.0 + self.layers[:, 2])
 
     @property
     def _compliance(self) -> Array:
-        """F = int ds/C11, length/stress."""
+        """Compliance F = int ds/C11, length/stress."""
         modulus, contraction = self._in_plane
         return (self.layers[:, 0] * (1.0 - contraction**2) / modulus).sum()
 
     def _integrals(self, values: Array, about: ArrayLike = 0.0) -> Array:
-        """Integrals of a value per layer times (1, s - about, (s - about)^2) over the height."""
+        """Integrals over s of a value per layer times (1, s - about, (s - about)^2)."""
         thickness = self.layers[:, 0]
         middle = jnp.cumsum(thickness) - 0.5 * thickness - 0.5 * self.height - about
         powers = jnp.stack([jnp.ones_like(middle), middle, middle**2 + thickness**2 / 12.0])
         return (powers * thickness * values).sum(axis=-1)
 
     def _neutral(self, modulus: Array) -> Array:
-        """Height of the line that pure bending leaves unstretched."""
+        """Height s of the neutral line, which pure bending does not stretch."""
         stretching, coupling, _ = self._integrals(modulus)
         return coupling / stretching
 
     def _bending(self, modulus: Array, e: Array, k: Array) -> Array:
-        """Energy int modulus eps_x^2/2 ds, about the neutral line, where it is a sum of squares."""
+        """Energy int modulus eps_x^2/2 ds, written about the neutral line as a sum of squares."""
         neutral = self._neutral(modulus)
         stretching, _, bending = self._integrals(modulus, neutral)
         return 0.5 * stretching * (e - neutral * k) ** 2 + 0.5 * bending * k**2
 
     def _shear(self, g: Array, dpsi: Array) -> Array:
-        """Shear energy of a section with psi, split at the deviation."""
+        """Shear energy of a section with psi, split at the height d."""
         mean = jnp.sqrt(self.shear_coefficient) * (g + self.deviation * dpsi)
         squeeze = jnp.sqrt(self.kappa_s) * dpsi
         zeroth, first, second = self._integrals(self._shear_moduli, self.deviation)

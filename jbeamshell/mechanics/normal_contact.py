@@ -1,8 +1,16 @@
-r"""Normal contact of one point with the foundation.
+r"""Normal contact of one point with the foundation: reaction R from the gap g.
 
-A law sees the gap between the strip and the foundation and the force per length R* with which the
-strip's own balance presses there.  It gives the reaction R that the foundation returns and the
-residual that is zero in equilibrium.  All arguments are scalars; `jax.vmap` makes the field.
+    rigid:       g >= 0,  R >= 0,  g R = 0          (Signorini's conditions)
+    compliant:   R = k_n max(-g, 0), rounded off around first touch
+
+A law sees the gap and the force per length R* with which the strip presses onto the foundation at
+this point.  It gives the reaction R and a residual that is zero in equilibrium.  All arguments are
+scalars; `jax.vmap` makes the field.
+
+References
+----------
+Hintermueller, M., Ito, K. & Kunisch, K. (2002). The primal-dual active set strategy as a
+    semismooth Newton method. SIAM J. Optim. 13, 865-888.
 """
 
 from __future__ import annotations
@@ -15,55 +23,61 @@ from jax import Array
 
 
 class NormalLaw(eqx.Module):
-    """One point's normal contact; subclass it and implement `reaction` and `residual`."""
+    """Normal contact of one point; a subclass implements `reaction` and `residual`."""
 
     @abc.abstractmethod
     def reaction(self, balance: Array, gap: Array) -> Array:
-        """R, pressure of the foundation on the strip; ``balance`` is R* above."""
+        """Reaction R of the foundation on the strip.
+
+        Parameters
+        ----------
+        balance : R*, force per length with which the strip presses, stress
+        gap : height of the strip over the foundation, length
+        """
 
     @abc.abstractmethod
     def residual(self, balance: Array, gap: Array) -> Array:
-        """Pressure that is zero in equilibrium."""
+        """Residual, a stress that is zero in equilibrium; see `reaction` for the parameters."""
 
     def energy(self, gap: Array) -> Array:
-        """Energy stored in the contact per area."""
+        """Energy stored in the contact, per area."""
         return jnp.zeros_like(gap)
 
 
 class Rigid(NormalLaw):
-    """A rigid foundation that does not hold: gap >= 0, R >= 0, gap R = 0.
+    """Rigid foundation that cannot pull: gap >= 0, R >= 0, gap R = 0.
 
-    The residual is the smaller of R and (stiffness times) the gap.  Newton's method on it is the
-    primal-dual active-set iteration (Hintermueller, Ito & Kunisch 2002); a tie counts as contact,
-    so that it starts from full contact.  Where the lift is frozen only `reaction` is used, and the
-    strip is glued to the foundation.
+    The residual is the smaller of R* and ``stiffness`` times the gap.  Newton's method on it is
+    the primal-dual active-set iteration (Hintermueller, Ito & Kunisch 2002).  A tie counts as
+    contact, so the iteration starts from full contact.  If the lift w is not a field, only
+    `reaction` is used, and the strip is glued to the foundation.
 
     Attributes
     ----------
-    stiffness : weighs the gap against R, stress per length; it does not change the solution
+    stiffness : weight of the gap against R*, stress per length; it does not change the solution
     """
 
     stiffness: Array
 
     def reaction(self, balance: Array, gap: Array) -> Array:
-        """See `NormalLaw.reaction`."""
+        """Reaction R; see `NormalLaw.reaction`."""
         return balance
 
     def residual(self, balance: Array, gap: Array) -> Array:
-        """See `NormalLaw.residual`."""
+        """Residual; see `NormalLaw.residual`."""
         closing = self.stiffness * gap
         return jnp.where(balance < closing, balance, closing)
 
 
 class Compliance(NormalLaw):
-    """A layer of asperities: R = k_n times the approach -gap, rounded off around first touch.
+    """Layer of asperities: R is k_n times the approach -gap, rounded off around first touch.
 
-    The corner at gap = 0 is a parabola for abs(gap) <= rounding, so that the slope of R is
-    continuous and derivatives pass.
+    R is a parabola for abs(gap) <= rounding, so that its slope is continuous and R can be
+    differentiated.
 
     Attributes
     ----------
-    stiffness : k_n, stress per length
+    stiffness : contact stiffness k_n, stress per length
     rounding : half width of the parabola, length
     """
 
@@ -71,17 +85,17 @@ class Compliance(NormalLaw):
     rounding: Array
 
     def reaction(self, balance: Array, gap: Array) -> Array:
-        """See `NormalLaw.reaction`."""
+        """Reaction R; see `NormalLaw.reaction`."""
         touch = jnp.clip(self.rounding - gap, 0.0, 2.0 * self.rounding)
         deep = jnp.maximum(-gap - self.rounding, 0.0)
         return self.stiffness * (touch**2 / (4.0 * self.rounding) + deep)
 
     def residual(self, balance: Array, gap: Array) -> Array:
-        """See `NormalLaw.residual`."""
+        """Residual; see `NormalLaw.residual`."""
         return balance - self.reaction(balance, gap)
 
     def energy(self, gap: Array) -> Array:
-        """Integral of R over the approach."""
+        """Energy stored in the contact, the integral of R over the approach."""
         touch = jnp.clip(self.rounding - gap, 0.0, 2.0 * self.rounding)
         deep = jnp.maximum(-gap - self.rounding, 0.0)
         layer = touch**3 / (12.0 * self.rounding) + self.rounding * deep + 0.5 * deep**2
@@ -89,12 +103,12 @@ class Compliance(NormalLaw):
 
 
 class Absent(NormalLaw):
-    """No foundation: nothing reacts."""
+    """No foundation: R = 0."""
 
     def reaction(self, balance: Array, gap: Array) -> Array:
-        """See `NormalLaw.reaction`."""
+        """Reaction R; see `NormalLaw.reaction`."""
         return jnp.zeros_like(gap)
 
     def residual(self, balance: Array, gap: Array) -> Array:
-        """See `NormalLaw.residual`."""
+        """Residual; see `NormalLaw.residual`."""
         return balance

@@ -19,7 +19,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 FAR_WAVENUMBER = 45.0  # exp(-m) is below the rounding of 1 from here on
-_FAR_DISTANCE = 18.0  # the same of the decay of a step response
+_FAR_DISTANCE = 18.0  # a step response is constant to rounding from here on
 
 
 def filon_average(wavenumber: ArrayLike) -> Array:
@@ -133,14 +133,14 @@ def _mean_decay(x: Array) -> Array:
 
 
 def _near(distance: ArrayLike) -> Array:
-    """Floating-point distances, held where a step response is not yet constant."""
+    """Distances as floats, clipped to the range in which a step response changes."""
     t = jnp.asarray(distance)
     return jnp.clip(t.astype(jnp.result_type(t, float)), -_FAR_DISTANCE, _FAR_DISTANCE)
 
 
 @functools.cache
 def gauss_legendre(end: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights on [0, end]; panels, because numpy's own weights lose digits at 512."""
+    """Gauss nodes and weights on [0, end], in panels: 512 nodes of NumPy in one lose digits."""
     panels = 16
     nodes, weights = np.polynomial.legendre.leggauss(32)
     width = end / panels
@@ -149,7 +149,7 @@ def gauss_legendre(end: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _half_line(like: Array) -> tuple[Array, Array]:
-    """Wavenumbers and weights for what decays as exp(-m), in the precision of `like`."""
+    """Wavenumbers and weights to integrate a decay as exp(-m), in the precision of ``like``."""
     m, weights = gauss_legendre(FAR_WAVENUMBER)
     return jnp.asarray(m, like.dtype), jnp.asarray(weights, like.dtype)
 

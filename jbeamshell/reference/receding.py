@@ -60,8 +60,8 @@ def beam_contact_length(
 
     Notes
     -----
-    1.845 is how Brink 2015, eq. 2.50, quotes Gladwell 1976. It does not come back from the problem
-    as it is told there: an Euler-Bernoulli beam, ``E1' h^3 w'''' / 12 = P delta(x) - R``, smooth on
+    Brink 2015, eq. 2.50, quotes 1.845 from Gladwell 1976. The problem as stated there does not
+    give it: an Euler-Bernoulli beam, ``E1' h^3 w'''' / 12 = P delta(x) - R``, smooth on
     a half-plane of ``u' = -(2 / (pi E2')) pv int R(y) / (x - y) dy``. Two methods give 1.2245: the
     singular integral equation for R, with square roots at both ends, in Gauss-Chebyshev
     quadrature, whose C settles at 1.22452, and unilateral contact of small elements.
