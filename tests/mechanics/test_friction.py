@@ -1,4 +1,4 @@
-"""Friction of one point: memory, the cap, dissipation, and the traps."""
+"""Friction of one point: memory, cap, dissipation, and the two traps."""
 
 import itertools
 
@@ -28,7 +28,7 @@ laws = pytest.mark.parametrize("law", LAWS, ids=["sharp", "8", "16", "32"])
 smooth = pytest.mark.parametrize("law", LAWS[1:], ids=["8", "16", "32"])
 
 ratios = st.floats(-1, 1)
-moves = st.floats(-4, 4)  # of k_t dv over the cap
+moves = st.floats(-4, 4)  # k_t dv over the cap
 caps = st.floats(1e-3, 1e3)
 
 
@@ -45,7 +45,7 @@ def step(law, dv, t_n, cap, cap_n=None):
 
 @jax.jit
 def derivatives(law, dv, t_n, cap):
-    """Of traction and slip work in the law's parameters, dv, t_n and the cap."""
+    """Derivatives of traction and slip work by the law's parameters, dv, t_n and the cap."""
 
     def both(law, dv, t_n, cap):
         t = law.traction(dv, t_n, cap, K_T)
@@ -132,7 +132,7 @@ def test_gradients_are_slopes(law, ratio, dv):
 
     _, *gradients = derivatives(law, dv / K_T, ratio, 1.0)
     for argument, gradient in enumerate(gradients):
-        if (argument, dv) != (0, 0.0):  # reversal has a slope on either side
+        if (argument, dv) != (0, 0.0):  # at a reversal the two slopes differ
             np.testing.assert_allclose(gradient, slope(argument), atol=1e-5)
 
 
@@ -233,7 +233,7 @@ def test_trap_a_tanh_of_the_increment_depends_on_the_number_of_steps():
 
 
 class Doubled(FrictionLaw):
-    """A user's own law."""
+    """Law of a user's own."""
 
     def traction(self, dv, t_n, cap, k_t):
         return jnp.clip(t_n + 2.0 * k_t * dv, -cap, cap)

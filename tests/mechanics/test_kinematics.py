@@ -1,4 +1,4 @@
-"""Strains of a section: rigid motions store nothing, positions and strains agree."""
+"""Strains of a section: none in a rigid motion, and in agreement with the positions."""
 
 import jax
 import jax.numpy as jnp
@@ -25,7 +25,7 @@ def gradient(position, section, slope, height):
 
 
 def along_and_across(rotation, dx, dy):
-    """Stretch along T less one, and shear along B, of the line that X has become."""
+    """Extension along T and shear along B of the deformed line X."""
     cos, sin = jnp.cos(rotation), jnp.sin(rotation)
     return (1 + dx) * cos + dy * sin - 1, dy * cos - (1 + dx) * sin
 

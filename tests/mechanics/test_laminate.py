@@ -1,4 +1,4 @@
-"""The laminated section against plane elasticity, its homogeneous limit and the bi-metal strip."""
+"""Laminated section against plane elasticity, its homogeneous limit and the bimetal strip."""
 
 import equinox as eqx
 import jax
@@ -18,7 +18,7 @@ RATIOS = np.array([1e-6, 1e-3, 0.01, 0.3, 1.0, 1.7, 10.0, 100.0, 1e4, 1e6])
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
-# One compilation for both, and batches of one size throughout, keep the file quick.
+# Batches of one size share one compilation.
 @eqx.filter_jit
 @jax.vmap
 def _evaluate(energy, strains):
@@ -26,12 +26,12 @@ def _evaluate(energy, strains):
 
 
 def evaluate(energies, strains):
-    """Phi of a batch of sections."""
+    """Energies Phi of a batch of sections."""
     return _evaluate(energies, strains)[0]
 
 
 def evaluate_forces(energies, strains):
-    """The forces of a batch of sections."""
+    """Section forces of a batch of sections."""
     return _evaluate(energies, strains)[1]
 
 
@@ -39,7 +39,7 @@ squeeze_each = eqx.filter_jit(jax.vmap(Laminate.uniform_squeeze))
 
 
 def random_layers(layers, count=SAMPLES, seed=0):
-    """Thickness over two decades, E over four, nu nearly over its whole range."""
+    """Random layers: thickness over two decades, E over four, nu over nearly its whole range."""
     rng = np.random.default_rng(seed)
     shape = (count, layers)
     thickness, modulus = 10 ** rng.uniform(-1, 1, shape), 10 ** rng.uniform(-2, 2, shape)
@@ -51,20 +51,20 @@ def random_strains():
 
 
 def laminates(layers, deviation=0.0, **choices):
-    """A batch of laminates from (count, n, 3) layers."""
+    """Batch of laminates from (count, n, 3) layers."""
     deviation = np.broadcast_to(deviation, len(layers))
     make = jax.vmap(lambda layers, d: Laminate(layers, KAPPA_S, d, **choices))
     return make(jnp.asarray(layers), jnp.asarray(deviation))
 
 
 def in_plane(layers, plane):
-    """E, nu of one layer in plane stress; what takes their places in plane strain."""
+    """Modulus Eb and contraction nb of a layer: E and nu in plane stress."""
     modulus, nu = layers[:, 1], layers[:, 2]
     return (modulus, nu) if plane == "stress" else (modulus / (1 - nu**2), nu / (1 - nu))
 
 
 def points(layers):
-    """Gauss points over the height: which layer, s from mid-height, weight."""
+    """Gauss points over the height: index of the layer, s from mid-height, weight."""
     thickness = layers[:, 0]
     top = np.cumsum(thickness)
     s = (top - 0.5 * thickness - 0.5 * top[-1])[:, None] + 0.5 * thickness[:, None] * GAUSS
@@ -99,7 +99,7 @@ def test_one_layer_is_the_homogeneous_section(plane, squeeze):
 
 
 def test_one_layer_with_the_printed_constants():
-    """C11 in bending for want of relaxed sigma_y, and the squeeze-shear 24 times as stiff."""
+    """Bending with C11, as sigma_y is not relaxed, and a squeeze-shear 24 times as stiff."""
     layers, strains = random_layers(1), random_strains()
     printed = evaluate_forces(laminates(layers, constants="printed"), strains)
     consistent = evaluate_forces(laminates(layers), strains)
@@ -188,7 +188,7 @@ def test_uniform_squeeze_leaves_no_force_and_no_moment(plane):
 
 @pytest.mark.parametrize("plane", PLANES)
 def test_one_psi_for_all_layers_cannot_bend_a_laminate_of_equal_nu(plane):
-    """Documents what eqs. 4.79-4.86 leave out, and that they bend where nu differs."""
+    """With one psi for all layers, a laminate bends only where nu differs."""
     pressure = 1e-3
 
     def bent(layers):
@@ -268,7 +268,7 @@ def test_uniform_strains_of_one_layer_store_the_plane_stress_energy():
 
 
 def shear_points(layers):
-    """The G-weighted quadrature weights, s, and kappa at the G-weighted mean of nu."""
+    """Quadrature weights times G, their s, and kappa at the G-weighted mean of nu."""
     layer, s, weights = points(layers)
     rigidity = weights * (layers[:, 1] / (2 * (1 + layers[:, 2])))[layer]
     return rigidity, s, shear_coefficient(rigidity @ layers[layer, 2] / rigidity.sum())
@@ -291,7 +291,7 @@ def test_stretching_bending_and_squeeze_do_not_see_the_deviation(choices):
 
 
 def test_the_shear_is_split_at_the_deviation():
-    """The three terms by quadrature, with the section's g taken at the height d."""
+    """Shear energy in three terms by quadrature, with g taken at the height d."""
     batch, strains = random_layers(3), sheared(random_strains())
     heights = deviations(batch)
     consistent, printed, without = (
@@ -331,7 +331,7 @@ def test_positive_definite(plane, constants):
 @pytest.mark.parametrize("constants", ["consistent", "printed"])
 @pytest.mark.parametrize("plane", PLANES)
 def test_upside_down(plane, constants):
-    """Turned over, s and with it k, g and d change sign; e, psi and psi' do not."""
+    """In a laminate turned over, s, k, g and d change sign; e, psi and psi' do not."""
     batch, strains = random_layers(3), random_strains()
     heights, choices = deviations(batch), {"plane": plane, "constants": constants}
     upright = laminates(batch, heights, **choices)
@@ -378,7 +378,7 @@ def test_gradients_with_respect_to_every_number(plane, constants):
             np.testing.assert_allclose(got, expected, rtol=1e-5, atol=1e-9)
 
 
-# --- what is refused -----------------------------------------------------------------------------
+# --- layers that are refused ---------------------------------------------------------------------
 
 TABLE = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 

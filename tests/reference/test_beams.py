@@ -1,4 +1,4 @@
-"""The closed forms against their differential equations, each other and independent solvers."""
+"""Closed forms of beams against their differential equations, each other and other solvers."""
 
 import jax
 import jax.numpy as jnp
@@ -17,7 +17,7 @@ FIGURE_3_11 = np.array(
 
 
 def strip(eta):
-    """H, E', G, kappa of the standard strip."""
+    """Half height H, E', G and kappa of the standard strip."""
     half_height = eta * LENGTH / 2
     youngs = EA / (2 * half_height)
     return half_height, youngs, youngs * (1 - NU) / 2, float(reference.shear_coefficient(NU))
@@ -94,7 +94,7 @@ def test_bar_hysteresis_closes_and_encloses_the_cubic_law():
 
 
 def test_masing_loop_is_what_sliders_in_parallel_do():
-    """Jenkins elements stepped along the load path know nothing of Masing's rule."""
+    """Jenkins elements stepped along the load path give the loop of Masing's rule."""
     stiffness, cap, slip = np.array([3.0, 2.0, 1.0]), np.array([0.3, 0.9, 5.0]), np.zeros(3)
     first = np.linspace(0, 1.2, 25)
     path = np.concatenate([first, first[-2::-1], -first[1:], -first[-2::-1], first[1:]])
@@ -169,7 +169,7 @@ def test_stuck_rotation_solves_its_equation(bending_over_classical):
 
 
 def test_stuck_rotation_minimises_the_discretised_energy():
-    """Linear elements and the energy of section strains: no differential equation in it."""
+    """Linear elements minimise the energy of the section strains, without the equation."""
     half_height, youngs, shear, kappa = strip(0.2358)
     force, cells = 0.5, 400
     step = LENGTH / cells
@@ -215,7 +215,7 @@ def test_first_slip_force_fits_a_line(constants, slope, intercept):
 
 
 def test_printed_first_slip_is_the_printed_line():
-    """Brink 2015, eq. 3.65, within what the curve leaves its line."""
+    """Line of Brink 2015, eq. 3.65, within the deviation of the curve from it."""
     force = reference.first_slip_force(FIGURE_3_11, constants="printed")
     np.testing.assert_allclose(force, 1.767 * FIGURE_3_11 - 0.0013, atol=0.005)
 

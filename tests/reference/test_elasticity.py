@@ -10,7 +10,7 @@ from jbeamshell import reference
 from jbeamshell.measured.example import data_folder
 from jbeamshell.mechanics.homogeneous import Homogeneous, shear_coefficient
 
-# compiled whole: eager JAX compiles operation by operation for every new shape
+# compiled as a whole: eager JAX compiles operation by operation for every new shape
 SYMBOLS = {
     "average": jax.jit(reference.filon_average),
     "midplane": jax.jit(reference.filon_midplane),
@@ -41,7 +41,7 @@ def test_symbols_of_the_table(where):
 
 @pytest.mark.parametrize("m", [0.3, 1.7, 6.0])
 def test_symbols_solve_plane_elasticity(m):
-    """An Airy function that is biharmonic and meets the faces' pressure without shear."""
+    """A biharmonic Airy function gives the pressure on the faces, without shear there."""
     cosh, sinh = np.cosh(m), np.sinh(m)
     even = np.linalg.solve([[cosh, sinh], [m * sinh, m * cosh + sinh]], [1 / m**2, 0])
 
@@ -97,7 +97,7 @@ def test_symbols_have_their_gradients_everywhere(where):
 
 
 def test_steps_of_the_table():
-    """The table's own average is only good to 3e-4 at the edge, its mid-plane to 5e-8."""
+    """Step responses of the table, whose average is good to 3e-4 at the edge only."""
     rows = table("exact_step")
     t = rows["t"]
     np.testing.assert_allclose(STEPS["midplane"](t), rows["midplane"], atol=6e-8)
@@ -109,7 +109,7 @@ def test_steps_of_the_table():
 
 @pytest.mark.parametrize("where", STEPS)
 def test_steps_by_residues(where):
-    """Eigenfunctions of the strip, sinh 2m + 2m = 0 with complex m: no quadrature."""
+    """Sum over the eigenfunctions of the strip, sinh 2m + 2m = 0 with complex m."""
     order = 4 * np.arange(1, 4001) - 1
     m = np.log(order * np.pi) / 2 + 1j * order * np.pi / 4
     for _ in range(30):
@@ -127,7 +127,7 @@ def test_steps_by_residues(where):
 
 
 def test_midplane_step_by_a_fourier_series():
-    """A square wave of pressure whose edges are 40 H apart, too far to feel each other."""
+    """Square wave of pressure whose edges, 40 H apart, do not influence each other."""
     half_period, t = 40.0, np.linspace(-7, 7, 29)
     m = np.pi * np.arange(1, 601, 2) / half_period
     series = 2 / half_period * np.sin(np.outer(t, m)) @ (SYMBOLS["midplane"](m) / m)
@@ -174,7 +174,7 @@ def test_steps_are_what_finite_elements_find(where):
 
 @pytest.mark.parametrize("nu", [0.0, 0.3])
 def test_squeeze_decay_length_is_that_of_the_energy(nu):
-    """``lambda^2`` is Phi's stiffness against psi' over that against psi with e relaxed."""
+    """``lambda^2`` is the stiffness of Phi against psi' over that against psi at N = 0."""
     half_height, kappa_s = 0.7, 0.6
     energy = Homogeneous(half_height, 11.0, nu, kappa_s)
     hessian = jax.jit(jax.hessian(lambda strains: energy(*strains)))(jnp.zeros(5))
@@ -188,7 +188,7 @@ def test_squeeze_decay_length_is_that_of_the_energy(nu):
 
 
 def test_squeeze_symbol_and_step_solve_the_balance():
-    """``f - (lambda / H)^2 f'' = load``."""
+    """Balance ``f - (lambda / H)^2 f'' = load``."""
     ratio, m = 0.37, 2.3
     t = jnp.array([-2.0, -0.2, 0.3, 1.4])
 
@@ -210,7 +210,7 @@ def test_squeeze_symbol_and_step_solve_the_balance():
 
 
 def edge_layer():
-    """Distances from the edge, dense there, and weights: ``t = r^3`` tames the log slope."""
+    """Distances from the edge and weights; ``t = r^3`` removes the logarithmic slope there."""
     root, weights = np.polynomial.legendre.leggauss(200)
     root, weights = 1.3 * (root + 1), 1.3 * weights
     return root**3, 3 * root**2 * weights
@@ -252,7 +252,7 @@ def test_best_kappa_s_differentiates_and_compiles():
 
 @pytest.mark.parametrize("kappa_s", [0.44, 2.5641, 24.0])
 def test_reaction_jump_of_the_discretised_psi_model(kappa_s):
-    """Linear elements for psi and beta of a strip held down, energy as in Brink 2015."""
+    """Linear elements for psi and beta of a strip held down, with the energy of Brink 2015."""
     nu, half_height, cells, step = 0.3, 1.0, 600, 0.01
     section = Homogeneous(half_height, 1.0, nu, kappa_s)
     kappa = float(shear_coefficient(nu))
@@ -297,7 +297,7 @@ def test_bimetal_strip_is_what_finite_elements_find(plane, curvature):
 @pytest.mark.parametrize("plane", ["stress", "strain"])
 @pytest.mark.parametrize("ratio", [0.05, 1.0, 7.0])
 def test_bimetal_curvature_of_two_free_layers(plane, ratio):
-    """No axial force and no moment, layer by layer, with every layer squeezed by p."""
+    """Curvature at which layers squeezed by p carry neither axial force nor moment."""
     pressure, height, youngs, nu = 1.7, 0.6, 3.0, 0.2
     modulus = np.array([youngs, youngs * ratio])
     contraction = nu
@@ -319,15 +319,15 @@ def test_bimetal_curvature_names_an_unknown_plane():
 
 
 # --- receding contact ------------------------------------------------------------------------
-# Height and E' are 1, as is the load. Filon's strip by cosine integrals: under a pressure
-# cos(a x) on one face the strip bends (BEND) and is squeezed (SQUEEZE) by half of it each. BEND is
-# as singular as 1/a^4, and what a kernel may lose to make it integrable is a rigid motion.
+# Height, E' and load are 1. Filon's strip by cosine integrals: half of a pressure cos(a x) on one
+# face bends the strip (BEND), half squeezes it (SQUEEZE). BEND is as singular as 1/a^4; leaving out
+# a rigid motion makes its kernel integrable.
 
 A, WEIGHTS = np.polynomial.legendre.leggauss(400)
 A, WEIGHTS = 20 * (A + 1), 20 * WEIGHTS / np.pi
 BEND = 2 / A * (np.cosh(A) + 1) / (np.sinh(A) - A) / 2
 SQUEEZE = 2 / A * (np.cosh(A) - 1) / (np.sinh(A) + A) / 2
-LOCAL = 2 / A * -np.expm1(-A)  # the half-plane's 2 / a, so much of it that its integral is known
+LOCAL = 2 / A * -np.expm1(-A)  # like 2 / a of a half-plane at large a, with a known integral
 CUT = np.exp(-(A**4))
 
 
@@ -343,18 +343,18 @@ def pushed_down(r, face):
 
 
 def slope_down(r, face):
-    """Derivative of `pushed_down`, with what `LOCAL` has but not -2 / (pi r)."""
+    """Derivative of `pushed_down`, with the part of `LOCAL` that is not -2 / (pi r)."""
     z = np.multiply.outer(r, A)
     squeeze = SQUEEZE - LOCAL if face > 0 else -SQUEEZE
     smooth = (CUT * z - np.sin(z)) @ (WEIGHTS * A * BEND) - np.sin(z) @ (WEIGHTS * A * squeeze)
     return smooth + (2 / np.pi * r / (1 + r**2) if face > 0 else 0)
 
 
-CASES = {"beam": 1.2, "rigid": 0.9, "elastic": 1.3}  # what to expect, roughly
+CASES = {"beam": 1.2, "rigid": 0.9, "elastic": 1.3}  # approximate lengths
 
 
 def loads_of(case):
-    """How many half-planes a reaction sinks into: the strip's own face, the base."""
+    """Number of half-planes that the reaction indents: the face of the strip, the base."""
     return (case != "beam") + (case != "rigid")
 
 
@@ -387,7 +387,7 @@ def gauss_chebyshev(case, points, bracket, pressed=0.0):
 
 
 def small_elements(case, length, cells):
-    """Contact half-length by elements of even pressure, dropped from the end while they pull."""
+    """Contact half-length by elements of constant pressure; those that pull are left out."""
     width = length / cells
     x, r = width * (np.arange(cells) + 0.5), width * np.arange(2 * cells)
 
@@ -404,7 +404,7 @@ def small_elements(case, length, cells):
     i = np.arange(cells)
     matrix = width * (sinking[np.abs(i[:, None] - i)] + sinking[i[:, None] + i + 1])
     for n in range(cells, 0, -1):
-        system = np.ones((n + 1, n + 1))  # the reactions and a rigid motion
+        system = np.ones((n + 1, n + 1))  # for the reactions and a rigid motion
         system[:n, :n], system[n, :n], system[n, n] = matrix[:n, :n], 2 * width, 0
         *pressure, rigid = np.linalg.solve(system, np.append(load[:n], 1.0))
         if min(pressure) >= 0:
@@ -412,7 +412,7 @@ def small_elements(case, length, cells):
     gap = matrix[:, :n] @ pressure + rigid - load
     assert gap[n:].min() > 0
     before, last = np.square(pressure[-2:])
-    return x[n - 1] + width * last / (before - last)  # where a square root ends
+    return x[n - 1] + width * last / (before - last)  # end of a square root
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -430,7 +430,7 @@ def test_contact_length_by_two_methods(case):
 
 
 def test_series_for_the_contact_length_converge():
-    """Spectrally for the strip; for the beam the force's corner leaves the fourth order."""
+    """Convergence is spectral for the strip, of fourth order for the beam under a force."""
     strip = [gauss_chebyshev("elastic", n, (1.2, 1.45))[0] for n in (8, 12, 40)]
     errors = np.abs(np.array(strip[:2]) - strip[2])
     assert errors[0] < 2e-4
@@ -441,7 +441,7 @@ def test_series_for_the_contact_length_converge():
 
 
 def test_the_kernels_of_contact_hold_filons_mid_plane():
-    """Glued, a strip of height h on a rigid base is half of one of height 2 h."""
+    """A strip of height h bonded to a rigid base is half of one of height 2 h."""
     a = A[(A > 0.1) & (A < 15)]
     bend, squeeze = ((np.cosh(a) + s) / (np.sinh(a) - s * a) for s in (1, -1))
     np.testing.assert_allclose(
@@ -450,7 +450,7 @@ def test_the_kernels_of_contact_hold_filons_mid_plane():
 
 
 def test_contact_of_a_pressed_strip_is_what_finite_elements_find():
-    """b3: pressure over 25 h from the middle; here over 4 h, as far as its edge can feel."""
+    """Table b3 has pressure over 25 h from the middle; the edge sees no more than 4 h of it."""
     pressed = 4.0
     length, x, reaction = gauss_chebyshev("rigid", 80, (4.3, 4.5), pressed)
     assert (reaction > 0).all()
@@ -473,7 +473,7 @@ def test_beam_contact_length_of_two_materials():
 
 
 def test_bilateral_contact_ends_where_filons_mid_plane_pulls():
-    """Under a force the stress is the derivative of that at a load edge."""
+    """The stress under a force is the derivative of that at a load edge."""
     stress = jax.grad(reference.filon_midplane_step)
     zero = reference.strip_contact_length(1.0, "bilateral")
     assert abs(zero - 1.338) < 5e-4

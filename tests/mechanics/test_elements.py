@@ -1,6 +1,4 @@
-"""Element rules integrate to their order; nodes are graded, nested and smooth in the geometry;
-loads are exact wherever they step.
-"""
+"""Elements along X: exactness of their rules, graded nodes, and loads with steps."""
 
 import functools
 import itertools
@@ -15,7 +13,7 @@ from hypothesis import strategies as st
 from jbeamshell.mechanics import elements as grid
 from jbeamshell.mechanics.elements import element_rule
 
-# Exact degrees of: strain quadrature, nodal quadrature.
+# Degrees that are integrated exactly: by the strain points, by the nodes.
 DEGREES = {"finite-difference": (1, 1), "collocation": (3, 3)}
 rules = pytest.mark.parametrize("name", DEGREES)
 ETAS = [1e-4, 1e-2, 0.1126, 0.4, 2.0]
@@ -147,7 +145,7 @@ def in_geometry(length, half_height):
 def test_vertices_are_smooth_in_the_geometry(eta):
     slopes = in_geometry(2.0, eta)
     assert all(jnp.isfinite(s).all() for s in slopes)
-    if eta in ETAS:  # the other is the height from which the grid is uniform: a kink
+    if eta in ETAS:  # the last height is where the grid becomes uniform: a kink
         for slope, by in zip(slopes, 1e-6 * np.diag([2.0, eta]), strict=True):
             forth, back = (vertices(12, 2.0 + s * by[0], eta + s * by[1]) for s in (1, -1))
             np.testing.assert_allclose(slope, (forth - back) / (2 * by.sum()), atol=1e-6)
@@ -165,7 +163,7 @@ def vertices_at(elements, steps=None):
 
 @pytest.mark.parametrize("steps", STEPS)
 def test_every_element_takes_its_share_of_the_size_it_should_have(steps):
-    """The size goes linearly with the distance from the next step or the loaded end, up to L/60."""
+    """Sizes grow linearly with the distance from the next step or the loaded end, up to L/60."""
     steps = jnp.array(steps)
     x = np.asarray(vertices_at(120, steps))
     assert (x[0], x[-1], x.size) == (0.0, 2.0, 121)
@@ -223,7 +221,7 @@ def loads(name, ends, table):
 
 
 def integrals(name, ends, table):
-    """Loads by numpy: quadrature on every piece between vertices and rows of the table."""
+    """Nodal loads by NumPy: quadrature on every piece between vertices and rows of the table."""
     rule = element_rule(name)
     (x, value), ends = np.asarray(table).T, np.asarray(ends)
     cuts = np.unique(np.concatenate([ends, np.clip(x, ends[0], ends[-1])]))
@@ -234,7 +232,7 @@ def integrals(name, ends, table):
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         element = np.searchsorted(ends, middle) - 1
         begin, size = ends[element], ends[element + 1] - ends[element]
-        # The table's line on this piece, steps at its ends being no part of it.
+        # Line of the table on this piece, without steps at its ends.
         row = np.searchsorted(x, middle)
         left, right = max(row - 1, 0), min(row, x.size - 1)
         run = x[right] - x[left]
@@ -296,6 +294,6 @@ def test_loads_are_differentiable_in_where_they_step(name, at):
     slope = jax.jacrev(stepped)(at)
     forth, back = stepped(at + 1e-6), stepped(at - 1e-6)
     np.testing.assert_allclose(slope, (forth - back) / 2e-6, atol=5e-5)
-    # The step moves by a strip of the height of 3 - 1 at X = at.
+    # Moving the step adds load of the height 3 - 1 at X = at.
     x = grid.nodes(element_rule(name), jnp.asarray(NODES))
     np.testing.assert_allclose([slope.sum(), slope @ x], [2.0, 2.0 * at], rtol=1e-12)

@@ -1,4 +1,4 @@
-"""What converged and is wrong all the same says so; what cannot be had is refused or raises."""
+"""Reliability: a run that converged but is wrong says so; failed steps and requests raise."""
 
 import json
 import subprocess
@@ -33,7 +33,7 @@ KEYS = (
     "contact.stick_stiffness",
 )
 COARSE = {"model.nodes": 41, "model.kinematics": "linear", "load.steps_per_half_cycle": 4}
-LITTLE = {"strip.height_ratio": 0.2, "load.amplitude": 0.3}  # its corner alone slips
+LITTLE = {"strip.height_ratio": 0.2, "load.amplitude": 0.3}  # only the corner slips
 
 
 def random_values(count):
@@ -41,12 +41,12 @@ def random_values(count):
     part = np.random.default_rng(7).uniform(size=(2000, len(KEYS)))[:count]
     ratio = np.where(EVEN, 1.0, HIGH / np.where(EVEN, 1.0, LOW))
     values = np.where(EVEN, LOW + part * (HIGH - LOW), LOW * ratio**part)
-    values[:, 2] *= values[:, 1] * 20.0  # of gross slip
+    values[:, 2] *= values[:, 1] * 20.0  # from a part of gross slip to a force
     return values
 
 
 def check_random_scenes(count, settings, in_vain):
-    """No scene is wrong by more than 2 % without a doubt; few fail, or are doubted in vain."""
+    """Check that no scene is off by 2 % without a doubt, and few fail or are doubted in vain."""
 
     @jax.jit
     def run(values):
@@ -172,7 +172,7 @@ def test_a_thousand_cycles_neither_drift_nor_lose_energy():
     assert np.max(np.abs(np.diff(closed))) < 1e-8 * np.ptp(np.asarray(history.displacement))
     lost = np.diff(np.cumsum(np.asarray(history.slip_work))[ends[1:]])
     assert np.ptp(lost) < 1e-8 * lost[0]
-    # What the trapezoid of four steps misses of the work is the same in every cycle.
+    # The trapezoid of four steps misses the same part of the work in every cycle.
     missed = np.diff(np.asarray(history.energy_imbalance)[ends[1:]])
     assert np.ptp(missed) < 1e-8 * lost[0]
     assert float(history.dissipation_loop) == pytest.approx(float(history.dissipation), rel=0.02)

@@ -1,4 +1,4 @@
-"""The bound on what linear kinematics change, against the record it was fitted to and live runs."""
+"""Bound on the error of linear kinematics, against the record it was fitted to and live runs."""
 
 import json
 from pathlib import Path
@@ -16,14 +16,14 @@ LEAST = 1e-4  # smaller differences are not worth a sharp bound
 
 
 def cells(name):
-    """The cells of a set that found an answer: the strips' numbers and the differences."""
+    """Columns of the solved cells of a set: numbers of the strips and the differences."""
     rows = [row for row in RECORD[name] if row[-1] == "ok"]
     columns = dict(zip(RECORD["columns"], zip(*rows, strict=True), strict=True))
     return {key: np.array(column) for key, column in columns.items() if key != "state"}
 
 
 def scene_of(strain, eta, gross, mu, nu, **model):
-    stiffness, length = 5.0e3, 0.3  # the record knows ratios only
+    stiffness, length = 5.0e3, 0.3  # the record has ratios only
     return jb.Scene().replace(
         {
             "strip.length": length,

@@ -1,4 +1,4 @@
-"""Normal contact of one point: what each law asks for, and that its energy is its reaction's."""
+"""Normal contact of one point: residual of each law, and reaction as derivative of the energy."""
 
 import jax
 import jax.numpy as jnp
@@ -36,9 +36,9 @@ def test_the_stiffness_only_weighs_the_gap():
     assert residual(-3.0, 0.5) == -3.0
     assert residual(3.0, -0.5) == -5.0
     slopes = jax.grad(residual, (0, 1))
-    assert slopes(3.0, 0.0) == (0, 10)  # touching: gap = 0 is what to solve
-    assert slopes(0.0, 1.0) == (1, 0)  # lifted: R = 0 is
-    assert slopes(0.0, 0.0) == (0, 10)  # a tie touches, so that a search starts from full contact
+    assert slopes(3.0, 0.0) == (0, 10)  # touching: the residual is the gap
+    assert slopes(0.0, 1.0) == (1, 0)  # lifted: the residual is R
+    assert slopes(0.0, 0.0) == (0, 10)  # a tie counts as contact
 
 
 @given(gaps, gaps)
@@ -66,7 +66,7 @@ def test_compliant_contact_returns_what_presses(pressed, gap):
 @pytest.mark.parametrize("law", [rigid(), SOFT, Absent()])
 def test_the_energy_falls_as_the_gap_opens_by_the_reaction(law):
     gap = jnp.linspace(-4 * ROUND, 4 * ROUND, 65)
-    pressed = jnp.zeros_like(gap)  # a rigid foundation returns it and stores nothing
+    pressed = jnp.zeros_like(gap)  # a rigid foundation stores nothing
     slope = jax.vmap(jax.grad(law.energy))(gap)
     np.testing.assert_allclose(slope, -jax.vmap(law.reaction)(pressed, gap), atol=1e-12)
 

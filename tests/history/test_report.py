@@ -1,4 +1,4 @@
-"""What a run or a fit leaves behind: every number to the last bit, whole files, nothing stray."""
+"""Files of a run or a fit: every number to the last bit, whole files, no others."""
 
 import csv
 import io
@@ -38,7 +38,7 @@ def history():
 
 
 def pressed(history, steps, **values):
-    """The start of a history, as if nothing but pressing had been asked for."""
+    """First steps of a history, as of a scene that only presses."""
     scene = history.scene.replace({"load.cycles": 0, "load.pressure_steps": steps} | values)
     kept = {"x", "middles", "tributary", "load"}
     path = {k: v for k, v in vars(history).items() if k not in kept | {"scene", "cycles", "end"}}
@@ -48,7 +48,7 @@ def pressed(history, steps, **values):
 
 @pytest.fixture
 def result():
-    """A fit of two loops with numbers that decimals cannot hold, under awkward names."""
+    """Fit of two loops with awkward names and numbers that decimals cannot hold."""
     random = np.random.default_rng(3)
     data, model = (
         [Loop(*random.standard_normal((2, n)) * 1e-7, label) for n, label in sizes]

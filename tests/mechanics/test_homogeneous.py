@@ -1,4 +1,4 @@
-"""The strain energy against plane strain, and a user's own in its place."""
+"""Strain energy of a homogeneous section against plane strain, and a user's own energy."""
 
 import equinox as eqx
 import jax
@@ -85,7 +85,7 @@ def test_printed_constants():
 
 
 class Weighed(eqx.Module):
-    """A user's own Phi with a parameter: the shear term scaled."""
+    """Energy of a user's own with a parameter: the shear term scaled."""
 
     section: Homogeneous
     shear: jax.Array = eqx.field(converter=jnp.asarray)

@@ -1,4 +1,4 @@
-"""Sections of order p: the plane's energy, rigid motions, and the way to plane elasticity."""
+"""Sections of order p: energy, rigid motions, and convergence to plane elasticity."""
 
 import jax
 import jax.numpy as jnp
@@ -38,7 +38,7 @@ def test_further_fields_leave_the_faces_alone(order, kinematics):
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_the_first_order_is_the_beamshell_without_its_factors(plane):
-    """kappa = kappa_s = 1, and it bends with C11, as nothing takes the anticlastic strain."""
+    """Order 1 has kappa = kappa_s = 1, and bends with C11 as eps_y cannot vary."""
     values, slope = random_fields(1)
     shell = Homogeneous(H, E, NU, 1.0, plane=plane)
     strains = linear_strains(values, slope, H)
@@ -51,7 +51,7 @@ def test_the_first_order_is_the_beamshell_without_its_factors(plane):
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_bending_of_the_second_order_has_the_right_stiffness(plane):
-    """Pure bending: b_2 takes the anticlastic strain that one psi cannot, and D is E' 2H^3/3."""
+    """In pure bending b_2 takes the linear eps_y that one psi cannot, and D is E' 2H^3/3."""
     curvature = 0.01
 
     def energy(b2):
@@ -66,7 +66,7 @@ def test_bending_of_the_second_order_has_the_right_stiffness(plane):
 
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_a_rigid_motion_stores_nothing(order):
-    """Turned by 0.7 rad about any point, a strip has exact strains of round-off only."""
+    """A strip rotated by 0.7 rad about any point has no strains but round-off."""
     angle, zeros = 0.7, [0.0] * (2 * order - 2)
     values = [0.3, -0.2, angle, 0.0, *zeros]
     slope = [np.cos(angle) - 1.0, np.sin(angle), 0.0, 0.0, *zeros]
@@ -75,7 +75,7 @@ def test_a_rigid_motion_stores_nothing(order):
 
 
 def test_small_exact_strains_are_the_linear_ones():
-    """The difference of the energies is of third order."""
+    """Exact and linear energies differ at third order."""
     values, slope = random_fields(3)
     differences = []
     for size in (1e-3, 5e-4):
