@@ -11,6 +11,7 @@ Examples
 """
 
 from jbeamshell.mechanics.bar import bar_backbone as bar_backbone
+from jbeamshell.mechanics.bar import bar_force as bar_force
 from jbeamshell.mechanics.bar import bar_slip_length as bar_slip_length
 from jbeamshell.mechanics.bar import bar_slip_profile as bar_slip_profile
 from jbeamshell.mechanics.bar import cubic_law as cubic_law
