@@ -1,9 +1,9 @@
-"""Where every method works, is slow, wrong or fails, and whether it says so.
+"""Map of the domain in which every method works, is slow, is wrong or fails, and says so or not.
 
 Runs the standard strip with one or two of its numbers over their whole range, on every method, and
 2,000 strips drawn at random from the stated domain with the defaults; compares each dissipation
 with that of the same model on a fine grid whose end may lift, and writes failure_map.json beside
-this file, map by map, so that an interrupted run goes on from there.  An hour on a core:
+this file after every map, so that an interrupted run continues.  Takes an hour on one core:
 
     python calibration/failure_map.py [--only NAME ...] [--quick] [--draw]
 
@@ -99,18 +99,18 @@ END_SIZES = [2.0, 0.5, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 96.0]
 STEPS = [1, 2, 4, 10, 40, 160, 640]
 EXPONENTS = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0]
 TOLERANCES = [1e-3, 1e-4, 2e-5, 1e-5]  # tighter ones are refused
-# Random scenes, by seed and how many: the estimate was made on the first, the others test it.
+# Random scenes, by seed and count: the first made the estimate of the error, the others test it.
 SCENES = {"scenes": (7, 2000), "fresh scenes": (8, 400)}
 BLOCK = 100
 DOMAIN = ("eta", "mu", "load", "nu", "kappa_s", "alpha")  # of the random scenes
 
-# Of a row its label, the settings of the method and of its reference, and what is set.
+# Row of a map: label, settings of the method and of its reference, numbers that it sets.
 Row = tuple[Any, dict[str, Any], dict[str, Any], dict[str, float]]
 
 
 @functools.cache
 def runner(settings: tuple[tuple[str, Any], ...]) -> Callable[[jax.Array], jax.Array]:
-    """From the numbers of `STANDARD` to the figures, for some settings."""
+    """Compiled function from the numbers of `STANDARD` to the figures, for some settings."""
     given = {key: list(v) if isinstance(v, tuple) else v for key, v in settings}
     given.pop("single", None)
     tolerance = given.pop("tolerance", None)
@@ -128,7 +128,7 @@ def runner(settings: tuple[tuple[str, Any], ...]) -> Callable[[jax.Array], jax.A
 
 
 def scene_of(base: jb.Scene, numbers: jax.Array) -> jb.Scene:
-    """A scene with the numbers of `STANDARD`."""
+    """Scene with the numbers of `STANDARD`."""
     n = dict(zip(STANDARD, numbers, strict=True))
     amplitude = n["load"] * n["mu"] * PRESSURE * LENGTH
     if base.load.control == "displacement":  # the bar's
@@ -150,7 +150,7 @@ def scene_of(base: jb.Scene, numbers: jax.Array) -> jb.Scene:
 
 @functools.cache
 def figures(settings: tuple[tuple[str, Any], ...], numbers: tuple[float, ...]) -> list[Any]:
-    """The `FIGURES` of a run; None is what is not finite."""
+    """`FIGURES` of a run; None for those that are not finite."""
     found = np.asarray(runner(settings)(np.asarray(numbers)))
     return [float(f"{value:.6g}") if np.isfinite(value) else None for value in found]
 
@@ -158,7 +158,7 @@ def figures(settings: tuple[tuple[str, Any], ...], numbers: tuple[float, ...]) -
 def cell(
     settings: Mapping[str, Any], reference: Mapping[str, Any], point: Mapping[str, float]
 ) -> list[Any]:
-    """Figures of a run, the dissipation ratio of its reference, and doubts without running."""
+    """Figures of a run, dissipation ratio of its reference, number of doubts of the scene."""
     refused = point.get("load", 0.0) >= 1.0 and "load.control" not in settings
     if refused:  # by `solve`, where nothing is traced
         return [None] * (len(FIGURES) - 1) + [-1, None, 0]
@@ -170,12 +170,13 @@ def cell(
 
 
 def doubts_beforehand(settings: Mapping[str, Any], point: Mapping[str, float]) -> int:
-    """How many doubts the scene alone raises."""
+    """Number of doubts that the scene alone raises."""
     base = jb.Scene().replace({key: v for key, v in settings.items() if "." in key})
     return len(reliability.doubts_of_scene(scene_of(base, list((STANDARD | point).values()))))
 
 
 def _figures(settings: Mapping[str, Any], point: Mapping[str, float]) -> list[Any]:
+    """Figures of a run, in single precision if the settings ask for it."""
     fixed = tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in settings.items())
     given = fixed, tuple((STANDARD | point).values())
     return (
@@ -187,7 +188,7 @@ def _figures(settings: Mapping[str, Any], point: Mapping[str, float]) -> list[An
 
 @functools.cache
 def single_precision() -> ProcessPoolExecutor:
-    """A process that does not switch double precision on."""
+    """Process in single precision."""
     return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
 
 
@@ -195,27 +196,27 @@ def single_precision() -> ProcessPoolExecutor:
 
 
 def methods(kind: dict[str, tuple[dict[str, Any], dict[str, Any]]]) -> list[Row]:
-    """A row for every method."""
+    """Rows of a map, one for every method."""
     return [(name, *both, {}) for name, both in kind.items()]
 
 
 def settings(key: str, values: list[Any], **common: Any) -> list[Row]:
-    """A row for every value of a setting."""
+    """Rows of a map, one for every value of a setting."""
     law = {k: v for k, v in common.items() if k.startswith("contact")}
     return [(v, LINEAR | common | {key: v}, EXACT | law, {}) for v in values]
 
 
 def numbers(key: str, values: list[float], name: str = "default") -> list[Row]:
-    """A row for every value of a number."""
+    """Rows of a map, one for every value of a number."""
     return [(value, *(SOLVERS | MODELS)[name], {key: value}) for value in values]
 
 
 def exponents(key: str, values: list[Any]) -> list[Row]:
-    """A row for every value of a setting, with the smooth law."""
+    """Rows of a map, one for every value of a setting, with the smooth law."""
     return [(v, LINEAR | SMOOTH | {key: v}, EXACT | SMOOTH, {}) for v in values]
 
 
-# What is along X, and the rows.
+# Number along the columns with its values, name of the rows, and the rows.
 MAPS: dict[str, tuple[str, list[float], str, list[Row]]] = {
     **{f"methods over {x}": (x, v, "method", methods(SOLVERS)) for x, v in KNOBS.items()},
     **{f"models over {x}": (x, v, "method", methods(MODELS)) for x, v in KNOBS.items()},
@@ -277,7 +278,7 @@ MAPS: dict[str, tuple[str, list[float], str, list[Row]]] = {
 
 
 def chart(name: str, part: int = 1) -> dict[str, Any]:
-    """A map, or every so-manieth row and column of it."""
+    """Map of a name; with part = n, every n-th of its rows and columns."""
     x, values, y, rows = MAPS[name]
     values, rows = values[::part], rows[::part]
     cells = []
@@ -294,7 +295,7 @@ def chart(name: str, part: int = 1) -> dict[str, Any]:
 
 
 def random_points(seed: int, count: int) -> np.ndarray:
-    """Strips all over the stated domain, (count, 6) in the order of `DOMAIN`."""
+    """Random strips in the stated domain, (count, 6) in the order of `DOMAIN`."""
     part = np.random.default_rng(seed).uniform(size=(count, len(DOMAIN)))
     low = np.array([0.005, 0.02, 0.02, 0.0, 0.05, 2.0])
     high = np.array([0.5, 1.0, 0.98, 0.49, 3.0, 1e4])
@@ -304,13 +305,13 @@ def random_points(seed: int, count: int) -> np.ndarray:
 
 
 def walked_in_pieces(point: Mapping[str, float]) -> bool:
-    """Whether a run that failed finds its way in smaller steps."""
+    """True if a run that failed converges in smaller load steps."""
     history = jb.solve(scene_of(jb.Scene(), list((STANDARD | point).values())), throw=False)
     return history.converged
 
 
 def block(points: np.ndarray) -> list[list[Any]]:
-    """Cells of some random strips, each with whether it needed smaller steps to succeed."""
+    """Cells of some random strips; each tells if a failed run converges in smaller load steps."""
     found = []
     for values in points:
         point = dict(zip(DOMAIN, map(float, values), strict=True))
@@ -320,7 +321,7 @@ def block(points: np.ndarray) -> list[list[Any]]:
 
 
 def scattered(record: dict[str, Any], name: str, quick: bool, save: Callable[[], None]) -> None:
-    """Random strips, block by block."""
+    """Compute the random strips block by block, and save after each."""
     done = record.setdefault(name, [])
     points = random_points(*SCENES[name])
     count = BLOCK if quick else len(points)
@@ -330,7 +331,7 @@ def scattered(record: dict[str, Any], name: str, quick: bool, save: Callable[[],
 
 
 def main() -> None:
-    """Compute what is missing, write it map by map, and draw it."""
+    """Compute the maps that are missing, write each, and draw all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", metavar="NAME", help=", ".join([*SCENES, *MAPS]))
     parser.add_argument("--quick", action="store_true", help="every fourth value, 100 scenes")

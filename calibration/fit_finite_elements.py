@@ -1,7 +1,7 @@
 """Fit friction and height ratio (and the stick stiffness) to finite-element loops of five strips.
 
-The true values are mu = 0.1 and the eta of the file, so what is left is the model's bias.  Writes
-fitted_finite_elements.json and finite_elements.png beside this file:
+The true values are mu = 0.1 and the eta of the file, so the residual is the bias of the model.
+Writes fitted_finite_elements.json and finite_elements.png beside this file:
 
     python calibration/fit_finite_elements.py
 """
@@ -34,7 +34,7 @@ TRUE_FRICTION = 0.1
 
 
 def study(height_ratio: float, free: tuple[str, ...]) -> tuple[identify.Fit, dict]:
-    """Fit one strip from a start that is half as high again and half as rough again."""
+    """Fit one strip; height and friction start at 1.5 times their true values."""
     truth = {"contact.friction": TRUE_FRICTION, "strip.height_ratio": height_ratio}
     start = {key: 1.5 * value for key, value in truth.items()} | {"contact.stick_stiffness": 30.0}
     begin = time.perf_counter()
@@ -70,7 +70,7 @@ def main() -> None:
 
 
 def picture(fit: identify.Fit) -> plt.Figure:
-    """The fitted loops over the finite elements, and what sticks and slips at the peak."""
+    """Picture of the fitted loops over finite elements, and of friction at the peak load."""
     with plotting.style():
         figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2))
         fit.plot(left)
@@ -90,7 +90,7 @@ def picture(fit: identify.Fit) -> plt.Figure:
             )
         right.set(
             xlabel="$X$  [length]",
-            ylabel="friction traction  $t/\\mu F_N$",
+            ylabel="friction traction  $t/\\mu F_N$  [1]",
             title="unloading from $F$ = 1: slip comes back from the loaded end",
         )
         right.legend()

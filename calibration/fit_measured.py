@@ -1,16 +1,16 @@
-"""Friction and stiffness of a measured contact that is driven to and fro beyond gross slip.
+"""Friction and stiffness of a measured contact, cycled beyond gross slip.
 
 Takes any file with the columns time, displacement (imposed), force (driving) and normal force, with
 their units in the header:
 
     python calibration/fit_measured.py FILE [FOLDER]
 
-The steady cycles of the first half are fitted, by their mean; the model then answers the second
-half, raw as it is.  The contact is a strip of length 1 that is free at its far end and carries the
-mean normal force.  Which parameters the loop fixes is told by freeing them in turn: friction with
-the elasticity of the slider (alpha), of the strip (E' 2H), of both, and with the roundness of the
-shoulder (m).  A loop of force over displacement has no length in it, so none of this says that the
-specimen is a beamshell.  Writes measured.json and measured.png into the folder, if one is given.
+The mean of the steady cycles of the first half is fitted; the fitted model then predicts the second
+half as recorded. The contact is a strip of length 1 that is free at its far end and carries the
+mean normal force. Parameters are freed in turn, to see which of them the loop determines: friction
+with the elasticity of the slider (alpha), of the strip (E' 2H), of both, and with the roundness of
+the shoulder (m). A loop of force over displacement contains no length, so this does not show that
+the specimen is a beamshell. Writes measured.json and measured.png into the folder, if one is given.
 """
 
 import argparse
@@ -54,7 +54,7 @@ APPROACH = 9
 
 
 def part(recording: Recording, first: int, last: int) -> Recording:
-    """The points from one to another."""
+    """Part of a recording, from one point to another."""
     own = slice(first, last + 1)
     time_ = None if recording.time is None else recording.time[own]
     normal = None if recording.normal_force is None else recording.normal_force[own]
@@ -67,7 +67,7 @@ def part(recording: Recording, first: int, last: int) -> Recording:
 
 
 def start(loop: Loop, normal: float, free: tuple[str, ...]) -> jb.Scene:
-    """A scene that is roughly as rough and as stiff as the loop."""
+    """Scene whose friction and stiffness are estimated from the loop."""
     # A steady loop starts at its upper turn: how far back until the force is gone?
     gone = int(np.argmax(loop.force < 0.0))
     stiffness = float(loop.force[0] / (loop.displacement[0] - loop.displacement[gone]))
@@ -89,13 +89,13 @@ def start(loop: Loop, normal: float, free: tuple[str, ...]) -> jb.Scene:
 
 
 def answered(scene: jb.Scene, drive: np.ndarray) -> np.ndarray:
-    """The model's force along a path of displacements, (points,)."""
+    """Force of the model along a path of displacements, (points,)."""
     approach = np.linspace(0.0, drive[0], APPROACH)[1:-1]
     return np.asarray(jb.solve(scene, np.append(approach, drive)).force)[-drive.size :]
 
 
 def study(recording: Recording) -> tuple[dict, identify.Fit, tuple[Loop, np.ndarray]]:
-    """All cases: the record, the fit to show, and the cycles not fitted with its answer."""
+    """Fits of all cases: record, fit to draw, and the cycles not fitted with the model's force."""
     if recording.normal_force is None:
         raise InputError(f"{recording.label}: needs a column of the normal force")
     found = split_cycles(recording, "displacement")
@@ -154,7 +154,7 @@ def study(recording: Recording) -> tuple[dict, identify.Fit, tuple[Loop, np.ndar
 
 
 def picture(fit: identify.Fit, unseen: tuple[Loop, np.ndarray]) -> plt.Figure:
-    """The mean loop with its fit, and the cycles that were not fitted."""
+    """Picture of the mean loop with its fit, and of the cycles that were not fitted."""
     with plotting.style():
         figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2), sharey=True)
         fit.plot(left)
@@ -168,7 +168,7 @@ def picture(fit: identify.Fit, unseen: tuple[Loop, np.ndarray]) -> plt.Figure:
 
 
 def main() -> int:
-    """Fit a file, print what it tells, write the record and the picture."""
+    """Fit a file, print the results, write the record and the picture."""
     parser = argparse.ArgumentParser(description="mu and stiffness of a measured contact")
     parser.add_argument("file")
     parser.add_argument("folder", nargs="?")

@@ -1,10 +1,10 @@
-"""What fixes the squeeze-shear factor kappa_s: a squeezed strip, and how far loops of friction.
+"""Fits of the squeeze-shear factor kappa_s, to a squeezed strip and to loops of friction.
 
-First kappa_s alone, to the mean sigma_y of a strip squeezed over its middle (finite elements; Brink
-2015, section 4.7.2), for both sets of constants, several windows and several grids.  Then mu, eta
-and kappa_s together, to loops of friction: those of finite elements, where what is left is the
-model's bias, and the model's own with 1 % noise, where it is what the loops can tell.  Writes
-fitted_squeeze.json and squeeze.png beside this file; takes about ten minutes:
+First kappa_s alone is fitted to the mean sigma_y of a strip squeezed over its middle (finite
+elements; Brink 2015, section 4.7.2), for both sets of constants, several windows and several grids.
+Then mu, eta and kappa_s together, to loops of friction: those of finite elements, where the
+residual is the bias of the model, and the model's own with 1 % noise, to see what loops can
+determine. Writes fitted_squeeze.json and squeeze.png beside this file; takes about ten minutes:
 
     python calibration/fit_squeeze.py
 """
@@ -55,7 +55,7 @@ def squeezed_curve() -> SqueezeCurve:
 
 
 def fit_squeeze(half_window: float, nodes: int, constants: str) -> tuple[identify.Fit, dict]:
-    """Fit kappa_s in a window about the load's edge."""
+    """Fit kappa_s in a window around the edge of the load."""
     start = {"strip.kappa_s": START[constants], "model.constants": constants, "model.nodes": nodes}
     scene = library.squeezed().replace(start)
     curve = squeezed_curve().between(EDGE - half_window, EDGE + half_window)
@@ -81,7 +81,7 @@ def fit_squeeze(half_window: float, nodes: int, constants: str) -> tuple[identif
 
 
 def planted(loops: list[Loop], height_ratio: float, seed: int) -> list[Loop]:
-    """The model's own loops at the amplitudes of others, with noise."""
+    """Loops of the model itself at the amplitudes of others, with noise."""
     random, own = np.random.default_rng(seed), []
     for loop in loops:
         peak = {"load.amplitude": float(loop.force.max()), "strip.height_ratio": height_ratio}
@@ -92,7 +92,7 @@ def planted(loops: list[Loop], height_ratio: float, seed: int) -> list[Loop]:
 
 
 def fit_loops(loops: list[Loop], height_ratio: float, free: tuple[str, ...] = FREE) -> dict:
-    """Fit from a start that is half as high and half as rough again, kappa_s starting at 1."""
+    """Fit that starts at 1.5 times height and friction, and at kappa_s = 1."""
     start = dict(zip(FREE, (0.15, 1.5 * height_ratio, 1.0), strict=True))
     scene = jb.Scene().replace({key: start[key] for key in free})
     begin = time.perf_counter()
@@ -106,7 +106,7 @@ def fit_loops(loops: list[Loop], height_ratio: float, free: tuple[str, ...] = FR
 
 
 def verdict(height_ratio: float, record: dict) -> str:
-    """What the loops of one strip can tell, from the numbers."""
+    """Figures of the fits to the loops of one strip."""
     truth = dict(zip(FREE, (TRUE_FRICTION, height_ratio, TRUE_KAPPA_S), strict=True))
     noisy, free = record["planted"], record["finite_elements"]
     errors = {k: np.median([fit["values"][k]["error"] for fit in noisy]) for k in FREE}
@@ -133,7 +133,7 @@ def verdict(height_ratio: float, record: dict) -> str:
 
 
 def main() -> None:
-    """Run all fits, say what they tell, write the record and the picture."""
+    """Run all fits, print the results, write the record and the picture."""
     cases = [(WINDOW, nodes, constants) for constants in START for nodes in GRIDS]
     cases += [(window, GRIDS[-1], "consistent") for window in WINDOWS]
     squeeze, loops, fits = [], {}, {}
@@ -173,7 +173,7 @@ def main() -> None:
 
 
 def picture(best: dict[str, identify.Fit], squeeze: list[dict], loops: dict) -> plt.Figure:
-    """The squeezed strip above, what the loops tell below."""
+    """Picture of the squeezed strip above, and of the fits to loops below."""
     with plotting.style():
         figure = plt.figure(figsize=(11.0, 7.4))
         above, below = figure.subfigures(2, 1)
@@ -189,7 +189,7 @@ def picture(best: dict[str, identify.Fit], squeeze: list[dict], loops: dict) -> 
 
 
 def draw_edge(best: dict[str, identify.Fit], axes: plt.Axes) -> None:
-    """Squeeze stress over the edge of the pressure."""
+    """Draw the squeeze stress around the edge of the pressure."""
     curve = squeezed_curve().between(EDGE - 3.0, EDGE + 3.0)
     wide = jb.solve(best["consistent"].scene.replace({"strip.kappa_s": 1.0}))
     blue, _, green, _, yellow, _ = plotting.PALETTE
@@ -215,7 +215,7 @@ def draw_edge(best: dict[str, identify.Fit], axes: plt.Axes) -> None:
 
 
 def draw_windows_and_grids(squeeze: list[dict], axes: plt.Axes) -> None:
-    """kappa_s over the window, and over the grid, on either side of one scale."""
+    """Draw kappa_s by window and by grid, side by side."""
     same = [f for f in squeeze if f["constants"] == "consistent"]
     windows = sorted(
         (f for f in same if f["nodes"] == GRIDS[-1]), key=lambda f: f["half_window_mm"]
@@ -238,7 +238,7 @@ def draw_windows_and_grids(squeeze: list[dict], axes: plt.Axes) -> None:
 
 
 def draw_deviation(loops: dict, key: str, symbol: str, axes: plt.Axes) -> None:
-    """How far one parameter comes out from the truth, strip by strip."""
+    """Draw the error of one parameter, strip by strip."""
     series: dict[str, list] = {f"own loops, {100 * NOISE:g} % noise": [], "finite elements": []}
     own, measured = series.values()
     for place, (height_ratio, record) in enumerate(loops.items()):
@@ -256,11 +256,11 @@ def draw_deviation(loops: dict, key: str, symbol: str, axes: plt.Axes) -> None:
         axes.errorbar(place, value, error, label=label, **dots)
     axes.axhline(0.0, color=plotting.FAINT, linewidth=1.0)
     axes.set_xticks(range(len(loops)), [f"{float(ratio):.3g}" for ratio in loops])
-    axes.set(xlabel=r"$\eta$ of the strip", title=f"(b) ${symbol}$ from loops: off by  [%]")
+    axes.set(xlabel=r"$\eta$ of the strip  [1]", title=f"(b) ${symbol}$ from loops: off by  [%]")
 
 
 def draw_correlation(loops: dict, axes: plt.Axes) -> None:
-    """Correlations of the parameters under noise, a bar for every strip."""
+    """Draw correlations of the parameters under noise, a bar for every strip."""
     pairs = [(0, 1), (0, 2), (1, 2)]
     shades = plotting.colours(len(loops) + 2)[2:]
     for i, ((height_ratio, record), shade) in enumerate(zip(loops.items(), shades, strict=True)):
@@ -270,7 +270,7 @@ def draw_correlation(loops: dict, axes: plt.Axes) -> None:
         axes.bar(place, heights, 0.24, color=shade, label=rf"$\eta$ = {float(height_ratio):.3g}")
     names = [f"${SYMBOLS[a]},\\,{SYMBOLS[b]}$" for a, b in pairs]
     axes.set_xticks(range(len(pairs)), names)
-    axes.set(title="(c) correlation under noise", ylim=(0.0, 1.0))
+    axes.set(title="(c) correlation under noise  [1]", ylim=(0.0, 1.0))
     axes.legend(loc="upper left")
 
 

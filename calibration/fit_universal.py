@@ -1,9 +1,9 @@
-"""One pair (kappa_s, alpha) for strips of any height, from the work that friction does in them.
+"""One pair (kappa_s, alpha) for strips of any height, fitted to their dissipation.
 
-The friction is known.  The dissipation of finite elements in five strips, at the amplitudes from
-0.3 up, is fitted by its logarithm with the squeeze-shear factor and the stick stiffness that all
-strips share, for several smoothings m of Coulomb's law: a corner that slips a little at any load
-is what a smooth law imitates.  A sixth strip, which the fit has not seen, checks it.  Writes
+The friction is known.  The logarithm of the dissipation of five strips by finite elements, at
+amplitudes of 0.3 and more, is fitted with one squeeze-shear factor and one stick stiffness for all
+strips, for several smoothings m of Coulomb's law: a smooth law imitates a corner that slips a
+little at any load.  A sixth strip that is not fitted checks the result.  Writes
 fitted_universal.json and universal.png beside this file; takes some minutes:
 
     python calibration/fit_universal.py
@@ -51,7 +51,7 @@ def curve(height_ratio: float) -> tuple[DissipationCurve, np.ndarray]:
 
 
 def specimen(height_ratio: float, values: dict[str, float]) -> identify.Specimen:
-    """A strip with its curve; kinematics are linear, which moves the dissipation by 0.1 %."""
+    """Strip with its curve; linear kinematics change the dissipation by 0.1 %."""
     base = {"model.kinematics": "linear", "strip.height_ratio": height_ratio}
     return identify.Specimen(
         jb.Scene().replace(base | values), curve(height_ratio)[0], f"eta = {height_ratio:g}"
@@ -90,7 +90,7 @@ def study(smoothing: float) -> tuple[identify.Fit, dict]:
 
 
 def predicted(strip: identify.Specimen) -> np.ndarray:
-    """Logarithm of the model's dissipation over that of finite elements, nothing fitted."""
+    """Logarithm of the model's dissipation over that of finite elements, without a fit."""
     data = strip.data
     model = [
         float(jb.solve(strip.scene.replace({"load.amplitude": float(a)})).dissipation)
@@ -124,7 +124,7 @@ def main() -> None:
 
 
 def picture(fit: identify.Fit, record: list[dict]) -> plt.Figure:
-    """Dissipation over the cubic law with one pair for all strips, and the error by smoothing."""
+    """Picture of the dissipation with one pair for all strips, and of the error by smoothing."""
     with plotting.style():
         figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2))
         shades = plotting.colours(len(HEIGHT_RATIOS))
@@ -139,8 +139,8 @@ def picture(fit: identify.Fit, record: list[dict]) -> plt.Figure:
             )
         values = fit.values
         left.set(
-            xlabel=r"amplitude  $A\,/\,\mu F_N a$",
-            ylabel=r"$D\,/\,(2/3)A^3$",
+            xlabel=r"amplitude  $A\,/\,\mu F_N a$  [1]",
+            ylabel=r"$D\,/\,(2/3)A^3$  [1]",
             title=rf"one $\kappa_s$ = {values[FREE[0]]:.2f} and $\alpha$ = {values[FREE[1]]:.2f} "
             f"for all strips ($m$ = {CHOSEN:g})",
         )
@@ -155,7 +155,7 @@ def picture(fit: identify.Fit, record: list[dict]) -> plt.Figure:
         right.set_yticks((2, 5, 10, 20), ("2", "5", "10", "20"))
         right.minorticks_off()
         right.set(
-            xlabel="smoothing $m$ of Coulomb's law",
+            xlabel="smoothing $m$ of Coulomb's law  [1]",
             ylabel=r"rms error of $\log D$  [%]",
             title="what is left after the fit",
         )

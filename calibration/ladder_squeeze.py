@@ -1,11 +1,11 @@
-"""Which order of section a squeeze needs: Filon's tension, the reaction, the end of contact.
+"""Order of section that a squeeze needs, by Filon's tension, the reaction and the end of contact.
 
-A strip squeezed on both faces over its middle, and the same strip pressed onto a frictionless base
-(scenes ``squeezed`` and ``receding``; Brink 2015, section 4.7), by the beamshell, p = 0, and by
-sections of order p = 1 to 6, on grids of 101 to 801 nodes with linear kinematics, and some with
-exact ones; beside them finite elements and Filon's exact stress.  Where the pressure steps by [p],
-the reaction of order p steps by (-1)^p [p]/(p+1), and elasticity's does not (for the reason see
-tests/test_hierarchic_squeeze.py).
+A strip is squeezed on both faces over its middle, and pressed onto a frictionless base (scenes
+``squeezed`` and ``receding``; Brink 2015, section 4.7). It is solved by the beamshell, p = 0, and
+by sections of order p = 1 to 6, on grids of 101 to 801 nodes with linear kinematics, some with
+exact ones, and compared with finite elements and Filon's exact stress. Where the pressure steps by
+[p], the reaction of order p steps by (-1)^p [p]/(p+1), and that of elasticity does not (for the
+reason see tests/quasistatic/test_hierarchic_squeeze.py).
 
 Writes ladder_squeeze.json beside this file and draws ladder_squeeze.png from it; takes about a
 quarter of an hour on one core, most of it to compile:
@@ -58,12 +58,12 @@ UNSURE = 0.0025  # mm, of the end of contact
 
 
 def finite_elements(name: str) -> np.ndarray:
-    """A table of the finite elements, by column."""
+    """Table of the finite elements, by column."""
     return np.genfromtxt(data_folder() / "squeeze" / name, delimiter=",", names=True)
 
 
 def timed(scene: jb.Scene) -> tuple[jb.History, dict[str, float]]:
-    """A run, what its first time took, compilation included, and the median of the next ones."""
+    """Result of a run, seconds of its first time with compilation, median of the next ones."""
     seconds = []
     for _ in range(1 + ROUNDS):
         begin = time.perf_counter()
@@ -73,7 +73,7 @@ def timed(scene: jb.Scene) -> tuple[jb.History, dict[str, float]]:
 
 
 def peak(x: np.ndarray, values: np.ndarray) -> tuple[float, float]:
-    """The largest value and its place, by the parabola through three points."""
+    """Largest value and its place, by a parabola through three points."""
     middle = int(np.clip(np.argmax(values), 1, x.size - 2))
     three = slice(middle - 1, middle + 2)
     parabola = np.polyfit(x[three] - x[middle], values[three], 2)
@@ -87,7 +87,7 @@ def rms(x: np.ndarray, stress: np.ndarray, truth: np.ndarray) -> float:
 
 
 def window() -> np.ndarray:
-    """Where errors are sampled."""
+    """Positions at which errors are sampled."""
     return np.linspace(*WINDOW, 1001)
 
 
@@ -125,7 +125,7 @@ def contact_figures(history: jb.History) -> dict[str, Any]:
 
 
 def reaction_at_the_step(x: np.ndarray, reaction: np.ndarray) -> list[float]:
-    """R on either side of the load's edge, by the nearest three nodes that share nothing of it."""
+    """Reaction on either side of the load's edge, by the nearest three nodes fully on that side."""
     apart = 1.5 * np.min(np.diff(x))
     sides = (np.flatnonzero(x < -apart)[-3:], np.flatnonzero(x > apart)[:3])
     return [float(np.polyval(np.polyfit(x[near], reaction[near], 2), 0.0)) for near in sides]
@@ -148,7 +148,7 @@ def profile(x: Any, values: Any) -> list[list[float]]:
 
 
 def climb(order: int, nodes: int, kinematics: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Both problems on one grid: their figures, and their profiles."""
+    """Figures and profiles of both problems on one grid."""
     change = {"model.order": order, "model.nodes": nodes, "model.kinematics": kinematics}
     squeezed, squeeze_time = timed(library.squeezed().replace(change))
     receding, contact_time = timed(library.receding().replace(change))
@@ -169,7 +169,7 @@ def climb(order: int, nodes: int, kinematics: str) -> tuple[dict[str, Any], dict
 
 
 def measure() -> dict[str, Any]:
-    """Everything the record holds."""
+    """Record of all rungs and grids."""
     cases = [(order, nodes, "linear") for order in ORDERS for nodes in NODES]
     cases += [(*case, "exact") for case in EXACT]
     b2, b3 = finite_elements("b2.csv"), finite_elements("b3.csv")
@@ -196,13 +196,13 @@ def measure() -> dict[str, Any]:
 
 
 def as_text(record: dict[str, Any]) -> str:
-    """The record as JSON, every row of a profile on one line."""
+    """Record as JSON text, every row of a profile on one line."""
     text = json.dumps(record, indent=1, allow_nan=False)
     return re.sub(r"\[[^][{}]*\]", lambda row: " ".join(row[0].split()), text) + "\n"
 
 
 def report(record: dict[str, Any]) -> str:
-    """The rungs as a table."""
+    """Table of the rungs, as text."""
     lines = [
         "p  nodes  kinematics  tension MPa at mm   rms MPa  x_c - a mm  R max MPa at mm     "
         "R across the step  lift slope  run ms"
@@ -224,7 +224,7 @@ def report(record: dict[str, Any]) -> str:
 
 
 def picture(record: dict[str, Any]) -> plt.Figure:
-    """Profiles above, errors over run time below."""
+    """Picture with profiles above, errors over run time below."""
     with plotting.style():
         figure, ((stress, reaction), (squeeze, contact)) = plt.subplots(2, 2, figsize=(11.0, 8.0))
         draw_stress(record["profiles"], stress)
@@ -251,12 +251,12 @@ def picture(record: dict[str, Any]) -> plt.Figure:
 
 
 def name(order: int) -> str:
-    """What a rung is called."""
+    """Name of a rung."""
     return f"$p$ = {order}" if order else "beamshell"
 
 
 def draw_profiles(profiles: dict[str, Any], what: str, axes: plt.Axes, dots: slice) -> None:
-    """A profile of every rung over the finite elements."""
+    """Draw a profile of every rung over the finite elements."""
     for order, colour in zip(ORDERS, plotting.colours(len(ORDERS)), strict=True):
         x, value = profiles[str(order)][what]
         axes.plot(x, value, color=colour, label=name(order), linewidth=1.3)
@@ -265,7 +265,7 @@ def draw_profiles(profiles: dict[str, Any], what: str, axes: plt.Axes, dots: sli
 
 
 def draw_stress(profiles: dict[str, Any], axes: plt.Axes) -> None:
-    """Squeeze stress over the edge of the load, and its tension."""
+    """Draw the squeeze stress around the edge of the load, and its tension."""
     zoom = axes.inset_axes((0.42, 0.13, 0.56, 0.56), xlim=(0.4, 2.4), ylim=(-3.0, 2.2))
     for panel, dots in ((axes, slice(None, None, 2)), (zoom, slice(None))):
         draw_profiles(profiles, "stress", panel, dots)
@@ -280,7 +280,7 @@ def draw_stress(profiles: dict[str, Any], axes: plt.Axes) -> None:
 
 
 def draw_reaction(profiles: dict[str, Any], axes: plt.Axes) -> None:
-    """Reaction over the edge of the load."""
+    """Draw the reaction around the edge of the load."""
     draw_profiles(profiles, "reaction", axes, slice(None))
     axes.set(
         xlim=(-0.6, 1.0),
@@ -293,7 +293,7 @@ def draw_reaction(profiles: dict[str, Any], axes: plt.Axes) -> None:
 
 
 def draw_grids(rungs: list[dict], problem: str, key: str, axes: plt.Axes) -> None:
-    """A figure over run time, a line for every rung and a dot for every grid."""
+    """Draw a figure over run time, a line for every rung and a dot for every grid."""
     for order, colour in zip(ORDERS, plotting.colours(len(ORDERS)), strict=True):
         own = [r[problem] for r in rungs if r["order"] == order and r["kinematics"] == "linear"]
         milliseconds, values = [r["run_ms"] for r in own], [r[key] for r in own]
@@ -303,7 +303,7 @@ def draw_grids(rungs: list[dict], problem: str, key: str, axes: plt.Axes) -> Non
 
 
 def main() -> None:
-    """Measure, write the record, say what it holds, draw it."""
+    """Measure, write the record, print a table, draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draw", action="store_true", help="draw the record that is there")
     if not parser.parse_args().draw:

@@ -1,8 +1,8 @@
 """Dissipation of sections of order p over that of finite elements, on sixteen standard strips.
 
-Against the figures of an independent prototype of the same sections (linear kinematics, end element
-H/12, 40 load steps per half cycle, second cycle).  Writes ladder_table.json beside this file; two
-minutes:
+The figures are compared with those of an independent prototype of the same sections (linear
+kinematics, end element H/12, 40 load steps per half cycle, second cycle). Writes ladder_table.json
+beside this file; two minutes:
 
     python calibration/ladder_table.py
 """
@@ -70,7 +70,7 @@ def ratios(order: int) -> np.ndarray:
 
 
 def main() -> None:
-    """Measure, compare, write."""
+    """Measure, compare, and write the record."""
     known = truth()
     fe = np.array([known[eta, a] for eta in HEIGHTS for a in AMPLITUDES])
     counts = fe >= COUNTS - 1e-3

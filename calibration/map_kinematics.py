@@ -1,13 +1,13 @@
-"""Where exact rotations matter: exact against linear kinematics, over load and slenderness.
+"""Map of the difference between exact and linear kinematics, over load and slenderness.
 
-A strip is told by five numbers: the load strain A/(E' 2H), the height ratio eta = H/(L/2), the
+A strip is given by five numbers: the load strain A/(E' 2H), the height ratio eta = H/(L/2), the
 load over gross slip A/(mu F_N L), mu and nu.  For a grid of the first four at nu = 0.3, and for
 strips scattered over all five, this runs the rung ``squeeze`` with both kinematics and writes how
 much the dissipation of the settled second cycle, and the secant stiffness, differ; for some strips
 also the rung ``p3`` (St. Venant and Kirchhoff's material) and ``squeeze`` with the lift w.
 
-What is found goes with the strain F_N/E' of the pressure and, up to a tenth, is nearly blind to
-the load's own.  With linear kinematics the ratios of a loop depend on neither.
+The differences grow with the strain F_N/E' of the pressure and hardly depend on the strain of the
+load, up to a tenth.  With linear kinematics the ratios of a loop depend on neither.
 
 With w frozen a thin strip cannot buckle under a push.  Cells fail where Newton's method finds no
 equilibrium in the plain load steps (a batch does not retry in smaller ones), or where a section is
@@ -81,7 +81,7 @@ LEAST = 1e-4  # a smaller difference is none
 
 
 def scene_of(strip: Any, model: str, kinematics: str) -> jb.Scene:
-    """The strip of five numbers, with L = 2 and E' 2H = 1."""
+    """Strip of five numbers, with L = 2 and E' 2H = 1."""
     strain, eta, gross, mu, nu = strip
     return jb.Scene().replace(
         {
@@ -120,7 +120,7 @@ def answers(strips: np.ndarray, model: str, kinematics: str) -> np.ndarray:
 
 
 def compared(strips: np.ndarray, model: str) -> list[list[Any]]:
-    """What exact kinematics change in every strip: rows of `COLUMNS`."""
+    """Changes by exact kinematics in every strip, in rows of `COLUMNS`."""
     exact, linear = (answers(strips, model, kinematics) for kinematics in ("exact", "linear"))
     cells = []
     for strip, one, other in zip(strips, exact, linear, strict=True):
@@ -134,19 +134,19 @@ def compared(strips: np.ndarray, model: str) -> list[list[Any]]:
 
 
 def grid() -> np.ndarray:
-    """The strips of the map, (n, 5)."""
+    """Strips of the map, (n, 5)."""
     return np.array(list(itertools.product(STRAINS, HEIGHTS, GROSS, FRICTIONS, [NU])))
 
 
 def scattered() -> np.ndarray:
-    """Strips all over the five numbers, (n, 5)."""
+    """Random strips over all five numbers, (n, 5)."""
     low, high = (np.where(LOGARITHMIC, np.log(np.maximum(b, 1e-9)), b) for b in (LOWEST, HIGHEST))
     points = qmc.scale(qmc.Sobol(5, seed=0).random(SCATTERED["squeeze"]), low, high)
     return np.where(LOGARITHMIC, np.exp(points), points)
 
 
 def measure() -> dict[str, Any]:
-    """The whole record."""
+    """Record of the map and of the random strips."""
     strips = scattered()
     return {
         "provenance": provenance(),
@@ -159,7 +159,7 @@ def measure() -> dict[str, Any]:
 
 
 def as_text(record: dict[str, Any]) -> str:
-    """The record as JSON, every cell on one line."""
+    """Record as JSON text, every cell on one line."""
     parts = []
     for key, value in record.items():
         text = json.dumps(value, allow_nan=False)
@@ -173,7 +173,7 @@ def as_text(record: dict[str, Any]) -> str:
 
 
 def columns(cells: list[list[Any]]) -> dict[str, np.ndarray]:
-    """The cells by column; figures of those that failed are NaN."""
+    """Cells by column; figures of failed cells are NaN."""
     values = zip(*cells, strict=True)
     kinds = [*[float] * (len(COLUMNS) - 1), str]
     return {
@@ -183,23 +183,23 @@ def columns(cells: list[list[Any]]) -> dict[str, np.ndarray]:
 
 
 def groups(c: dict[str, np.ndarray]) -> tuple[np.ndarray, ...]:
-    """What the bound asks for: F_N/E', the slip length over H, mu, E'/(2G)."""
+    """Arguments of the bound: F_N/E', slip length over H, mu, E'/(2G)."""
     pressed = c["strain"] * c["eta"] / (c["gross"] * c["mu"])
     return pressed, 2.0 * c["gross"] / c["eta"], c["mu"], 1.0 / (1.0 - c["nu"])
 
 
 def larger(c: dict[str, np.ndarray]) -> np.ndarray:
-    """The larger of the two differences."""
+    """Larger of the two differences."""
     return np.maximum(np.abs(c["dissipation"]), np.abs(c["stiffness"]))
 
 
 def limit(name: str, c: dict[str, np.ndarray]) -> np.ndarray:
-    """The bound for a set of cells."""
+    """Bound for a set of cells."""
     return bound(*groups(c), SECTIONS if name == "p3" else BEAMSHELL)
 
 
 def fitted(cells: list[list[Any]], start: tuple[float, ...]) -> np.ndarray:
-    """Constants that cover the part `COVERED` of the cells as closely as they can."""
+    """Smallest constants whose bound covers the part `COVERED` of the cells."""
     c = columns(cells)
     fair = (c["state"] == "ok") & (c["strain"] <= HIGHEST[0])
     known, measured = [group[fair] for group in groups(c)], np.log(larger(c)[fair])
@@ -214,7 +214,7 @@ def fitted(cells: list[list[Any]], start: tuple[float, ...]) -> np.ndarray:
 
 
 def report(record: dict[str, Any]) -> str:
-    """How the bound does on every set of cells, and the constants that fit best."""
+    """Text on how the bound holds on every set of cells, with the constants that fit best."""
     lines = ["set        cells  failed  covered  over (median)  of D alone: covered  over (median)"]
     for name in SETS:
         c = columns(record[name])
@@ -236,7 +236,7 @@ def report(record: dict[str, Any]) -> str:
 
 
 def picture(record: dict[str, Any]) -> plt.Figure:
-    """The map, and the bound over what was measured."""
+    """Picture of the map, and of the bound over the measured differences."""
     with plotting.style():
         figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.8))
         draw_map(record["grid"], left)
@@ -245,7 +245,7 @@ def picture(record: dict[str, Any]) -> plt.Figure:
 
 
 def draw_map(cells: list[list[Any]], axes: plt.Axes) -> None:
-    """Difference of the dissipation over strain and height ratio, in per cent."""
+    """Draw the difference of the dissipation over strain and height ratio, in per cent."""
     gross, mu = SHOWN
     c = columns([cell for cell in cells if cell[2:4] == [gross, mu]])
     strain, eta = np.unique(c["strain"]), np.unique(c["eta"])
@@ -269,14 +269,14 @@ def draw_map(cells: list[list[Any]], axes: plt.Axes) -> None:
     axes.plot(*place, "*", color="w", markeredgecolor="k", markersize=14.0)
     axes.annotate("standard strip", place, (8, 6), textcoords="offset points")
     axes.set(
-        xlabel="strain of the load  $A\\,/\\,(E'\\,2H)$",
-        ylabel=r"$\eta = H\,/\,(L/2)$",
+        xlabel="strain of the load  $A\\,/\\,(E'\\,2H)$  [1]",
+        ylabel=r"$\eta = H\,/\,(L/2)$  [1]",
         title=rf"(a) $A = {gross:g}\,\mu F_N L$, $\mu = {mu:g}$, $\nu = {NU:g}$",
     )
 
 
 def draw_bound(record: dict[str, Any], axes: plt.Axes) -> None:
-    """The bound over the larger of the two differences."""
+    """Draw the bound over the larger of the two differences."""
     for name, colour in zip(SETS, plotting.colours(len(SETS)), strict=True):
         c = columns(record[name])
         size = 8.0 if name == "grid" else 16.0
@@ -289,15 +289,15 @@ def draw_bound(record: dict[str, Any], axes: plt.Axes) -> None:
         yscale="log",
         xlim=ends,
         ylim=ends,
-        xlabel="measured difference, the larger of $D$ and secant stiffness",
-        ylabel="bound",
+        xlabel="measured difference, the larger of $D$ and secant stiffness  [1]",
+        ylabel="bound  [1]",
         title="(b) the closed-form bound: equal (line), fivefold (dashes)",
     )
     axes.legend(loc="lower right")
 
 
 def main() -> None:
-    """Measure, write the record, say what it holds, draw it."""
+    """Measure, write the record, print a summary, draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draw", action="store_true", help="draw the record that is there")
     if not parser.parse_args().draw:

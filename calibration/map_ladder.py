@@ -1,13 +1,14 @@
-"""How wrong every rung of the ladder is, and what it costs: the map behind `jbeamshell.advise`.
+"""Errors and costs of every rung of the ladder: the map behind `jbeamshell.advise`.
 
 Runs every rung, on its grids and load paths, on the strips of data/random_strips.csv, whose
 dissipation and secant stiffness finite elements have computed, and writes the ratios of its answers
 to theirs, with the time of a single warm run, to ladder_map.json beside this file and, for the set
-that `advise` goes by, to the package.  Half an hour on a core:
+that `advise` uses, to the package.  Takes half an hour on one core:
 
     python calibration/map_ladder.py [RUNG@NODESxSTEPS ...] [--times]
 
-With names only these are measured anew, with --times none, and always the times of all.
+Given names are measured anew, and no others; --times measures none anew.  Times are always those
+of all.
 """
 
 import csv
@@ -46,7 +47,7 @@ STANDARD = ((0.0511, 1.0), (0.1126, 0.7855), (0.2358, 1.0))
 
 
 def strips() -> dict[str, np.ndarray]:
-    """Columns of the table of strips, and the secant stiffness from its displacement."""
+    """Columns of the table of strips, with the secant stiffness from the displacement."""
     with (HERE / "data" / "random_strips.csv").open(encoding="utf-8") as table:
         rows = list(csv.DictReader(table))
     columns = {key: np.array([float(row[key]) for row in rows]) for key in (*NUMBERS, "D", "u")}
@@ -55,7 +56,7 @@ def strips() -> dict[str, np.ndarray]:
 
 
 def scene_of(candidate: Candidate, eta, amplitude, mu, nu) -> jb.Scene:
-    """A strip with mu F_N = 1, as those of the table."""
+    """Strip with mu F_N = 1, as in the table."""
     return jb.Scene().replace(
         {
             "strip.axial_stiffness": STIFFNESS,
@@ -93,7 +94,7 @@ def answers(candidate: Candidate, points: np.ndarray) -> np.ndarray:
 
 
 def milliseconds(candidate: Candidate, kinematics: str) -> float:
-    """Median over strips of the fastest of some warm runs that leave a whole History."""
+    """Median over strips of the fastest of some warm runs that return a whole History."""
     times = []
     for eta, amplitude in STANDARD:
         scene = scene_of(candidate, eta, amplitude, 0.1, 0.3)
@@ -109,7 +110,7 @@ def milliseconds(candidate: Candidate, kinematics: str) -> float:
 
 
 def measure(candidate: Candidate, table: dict[str, np.ndarray]) -> dict:
-    """Ratios of a candidate's answers to finite elements', and its time."""
+    """Ratios of a candidate's figures to those of finite elements, and its time."""
     points = np.stack([table[key] for key in NUMBERS], axis=1)
     found = answers(candidate, points)
     truth = np.stack([table["D"], table["A"] / table["u"]], axis=1)
@@ -119,7 +120,7 @@ def measure(candidate: Candidate, table: dict[str, np.ndarray]) -> dict:
 
 
 def ship(record: dict, table: dict[str, np.ndarray]) -> None:
-    """Write what `advise` goes by: the strips of the map alone."""
+    """Write the table that `advise` uses: the strips of the map alone."""
     own = table["set"] == "map"
     ratios = {
         name: {quantity: np.array(values)[own].tolist() for quantity, values in found.items()}
@@ -130,7 +131,7 @@ def ship(record: dict, table: dict[str, np.ndarray]) -> None:
 
 
 def main() -> None:
-    """Measure, write after every candidate, and ship."""
+    """Measure, write the record after every candidate, and write the table of `advise`."""
     table, chosen = strips(), [name for name in sys.argv[1:] if name != "--times"]
     record = json.loads(RECORD.read_text()) if RECORD.exists() else {"ratios": {}}
     record["provenance"] = provenance()

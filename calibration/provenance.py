@@ -1,4 +1,4 @@
-"""Where recorded figures come from."""
+"""Provenance of recorded figures: machine and versions."""
 
 import platform
 

@@ -1,11 +1,11 @@
-"""How well planted parameters come back from noisy loops, and whether intervals keep their word.
+"""Bias of parameters fitted to noisy loops, and coverage of their confidence intervals.
 
 The model's own loops of one strip at three amplitudes get independent noise of 0.1, 1 and 5 % of
-their range, fifty times each, and mu, eta, kappa_s and alpha are fitted to each set, the noise
-being estimated from what is left.  What counts: the mean of the estimates against the planted
-values, in standard errors, on the scale on which parameters are sought; and how often the 68 % and
-95 % intervals hold the planted values, both those of `Fit.intervals_at` and those of the likelihood
-ratio, for which the planted value is held and all others are fitted again.  Writes
+their range, fifty times each.  To each set mu, eta, kappa_s and alpha are fitted, with the noise
+estimated from the residual.  Two figures count: the mean of the estimates less the true values, in
+standard errors on the scale of the search; and how often the 68 % and 95 % intervals hold the true
+values, both those of `Fit.intervals_at` and those of the likelihood
+ratio, for which the true value is held and all others are fitted again.  Writes
 recovered_under_noise.json and recovered_under_noise.png beside this file; takes a quarter
 of an hour on two cores, a process for each:
 
@@ -56,7 +56,7 @@ LEVELS = (0.68, 0.95)
 
 
 def clean_loops() -> list[Loop]:
-    """The strip's steady loops."""
+    """Steady loops of the strip."""
     loops = []
     for amplitude in AMPLITUDES:
         scene = jb.Scene().replace(MODEL | TRUTH | {"load.amplitude": amplitude})
@@ -65,7 +65,7 @@ def clean_loops() -> list[Loop]:
 
 
 def noisy(loops: list[Loop], noise: float, seed: int) -> list[Loop]:
-    """The loops with noise on the displacement, a part of its range."""
+    """Loops with noise on the displacement, given as a part of its range."""
     random = np.random.default_rng(seed)
     return [
         loop._replace(
@@ -77,7 +77,7 @@ def noisy(loops: list[Loop], noise: float, seed: int) -> list[Loop]:
 
 
 def recovered(noise: float, seed: int) -> dict:
-    """One fit: estimates, errors, and what the intervals and the likelihood say of the truth."""
+    """Estimates and errors of one fit, and if its intervals and likelihoods hold the truth."""
     loops = noisy(clean_loops(), noise, seed)
     scene = jb.Scene().replace(MODEL | START | {"load.amplitude": max(AMPLITUDES)})
     fit = identify.fit(loops, scene, tuple(TRUTH), throw=False)
@@ -98,7 +98,7 @@ def recovered(noise: float, seed: int) -> dict:
 
 
 def likelihood_root(fit: identify.Fit, loops: list[Loop], key: str) -> float:
-    """Root of the rise of the cost, in units of the noise, of a parameter held at the truth."""
+    """Root of the rise of the cost, in units of the noise, with a parameter held at the truth."""
     others = tuple(name for name in TRUTH if name != key)
     scene = fit.scene.replace({key: TRUTH[key]})
     held = identify.fit(loops, scene, others, throw=False)
@@ -108,7 +108,7 @@ def likelihood_root(fit: identify.Fit, loops: list[Loop], key: str) -> float:
 
 
 def summary(noise: float, fits: list[dict]) -> dict:
-    """Bias and coverage of one noise."""
+    """Bias and coverage at one level of noise."""
     record: dict = {"noise": noise, "repeats": len(fits)}
     record["settled"] = sum(fit["status"] == "converged" for fit in fits)
     record["model_runs"] = float(np.mean([fit["model_runs"] for fit in fits]))
@@ -174,7 +174,7 @@ def main() -> None:
 
 
 def picture(everything: dict[float, list[dict]]) -> plt.Figure:
-    """All estimates over the planted values, by noise."""
+    """Picture of all estimates over the true values, by noise."""
     with plotting.style():
         figure, panels = plt.subplots(1, len(TRUTH), figsize=(11.0, 3.6))
         for panel, (key, truth), symbol in zip(panels, TRUTH.items(), SYMBOLS, strict=True):
@@ -186,8 +186,8 @@ def picture(everything: dict[float, list[dict]]) -> plt.Figure:
                 panel.plot(across, np.sort(values), ".", color=shade, markersize=3.5)
             panel.axhline(1.0, color=plotting.DATA, linewidth=1.0)
             panel.set_xticks(range(len(NOISES)), [f"{100 * noise:g} %" for noise in NOISES])
-            panel.set(title=symbol, xlabel="noise", yscale="log")
-        panels[0].set_ylabel("fitted over planted, sorted")
+            panel.set(title=symbol, xlabel="noise over range  [1]", yscale="log")
+        panels[0].set_ylabel("fitted over true value, sorted  [1]")
     return figure
 
 

@@ -81,7 +81,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def differences(figures: dict[str, Any], beside: dict[str, Any]) -> dict[str, float]:
-    """How much larger the beamshell's figures are, per cent of the finite elements'."""
+    """Differences of the beamshell's figures, in per cent of those of the finite elements."""
     return {
         name: 100.0 * (beside[name] / value - 1.0)
         for name, value in figures.items()

@@ -23,7 +23,7 @@ LAST_WORDS = 6  # lines of CalculiX's output in an error
 
 
 class Outcome(NamedTuple):
-    """How a run of CalculiX ended.
+    """Outcome of a run of CalculiX.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ def run(
 
 
 def version(program: str) -> str:
-    """What CalculiX calls itself."""
+    """Name and version that CalculiX prints."""
     answer = subprocess.run([program, "-v"], capture_output=True, text=True, check=False)
     return " ".join(answer.stdout.split()).removeprefix("This is ")
 

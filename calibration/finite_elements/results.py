@@ -1,4 +1,4 @@
-"""What CalculiX printed, as arrays over load levels and nodes."""
+"""Results that CalculiX printed, as arrays over load levels and nodes."""
 
 from __future__ import annotations
 

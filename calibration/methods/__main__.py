@@ -149,7 +149,7 @@ def compared_steps(quick: bool) -> Section:
 
 
 def compared_shooting(quick: bool) -> Section:
-    """How far shooting reaches."""
+    """Errors of shooting over the growth of its solutions."""
     lengths = [float(x) for x in np.geomspace(1.0, 100.0, 8 if quick else 25)]
     squeeze = [shooting.shoot_squeeze(x)._asdict() for x in lengths]
     stuck = []

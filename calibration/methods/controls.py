@@ -1,4 +1,4 @@
-"""What is prescribed: the force, the displacement, or the way along their path."""
+"""Load control by force, by displacement, or by arc length along their path."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def scene_under(control: str, far_end: str = "held", **options: Any) -> jb.Scene
 
 
 def same_loop(steps: int = 20, nodes: int = 81) -> dict[str, float | None]:
-    """How far displacement control is from the loop of force control, at its displacements."""
+    """Difference between the loops of displacement and force control at equal displacements."""
     by_force = jb.solve(scene_of("standard", nodes, steps_per_half_cycle=steps))
     scene = scene_under("displacement", nodes=nodes, steps_per_half_cycle=steps)
     by_displacement = jb.solve(scene, by_force.displacement[1:])
@@ -82,7 +82,7 @@ def to_gross_slip(
 
 
 def refusal(part: float) -> str | None:
-    """What the library says to a force beyond gross slip."""
+    """Error message of the library for a force beyond gross slip."""
     try:
         jb.solve(scene_of("standard").replace({"load.amplitude": 2.0 * part}))
     except jb.InputError as error:

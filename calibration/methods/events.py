@@ -1,12 +1,12 @@
-r"""From one change of status to the next: the exact path of a strip with linear kinematics.
+r"""Exact path of a strip with linear kinematics, from one change of status to the next.
 
-With a sharp slider every node sticks or slips one way.  As long as none of them changes, all is
-linear in the load: with the rates dq/dF from one linear solve,
+With a sharp slider every node sticks or slips one way.  As long as no node changes, the response
+is linear in the load: with the rates dq/dF from one linear solve,
 
     sticking:  dt_i = k_t dv_i,      slipping:  dt_i = +-mu dR_i,
 
 the next event is the smallest load at which a sticking node meets its cap.  There, and where the
-load turns back, new rates decide who slips on: a slipping node whose rate has the wrong sign
+load reverses, new rates decide which nodes slip on: a slipping node whose rate has the wrong sign
 sticks, a sticking node at its cap whose traction would leave it slips.  Tractions and slips are
 linear between events, so the work of friction is exact too; nothing depends on load steps.
 """
@@ -50,12 +50,12 @@ class Matrices(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """What lies between two turns of the load.
+    """Branch of the load path between two reversals.
 
     Attributes
     ----------
     force, displacement : (events,) F and u(L), the start and every event
-    work : of friction
+    work : work of friction
     """
 
     force: np.ndarray
@@ -87,14 +87,14 @@ def matrices(scene: jb.Scene) -> Matrices:
 
 
 class March:
-    """The strip on its way along a load path.
+    """State of the strip along a load path.
 
     Attributes
     ----------
     force : F
     q : (3n,) since the pressing
     traction : (n,) t
-    status : (n,) 0 where a node sticks, else the direction in which it slips
+    status : (n,) 0 for a node that sticks, else the direction in which it slips
     events : changes of status so far
     """
 
@@ -134,7 +134,7 @@ class March:
         return Branch(*np.array(path).T, work)
 
     def _rate(self, along: float) -> np.ndarray:
-        """Change of q per load along a direction, (3n,), with statuses to which it keeps."""
+        """Change of q per load along a direction, (3n,), and statuses consistent with it."""
         for _ in range(10 * self.status.size):
             rate = self._solve(along)
             wrong = self._wrong(rate)
@@ -155,7 +155,7 @@ class March:
         return spsolve((strip.stiffness + into_v @ foundation).tocsc(), along * strip.pull)
 
     def _wrong(self, rate: np.ndarray) -> np.ndarray:
-        """The node whose status the rates contradict most; after a turn all that slip back."""
+        """Node whose status the rates contradict most; after a reversal, all that slip back."""
         strip, dv = self.strip, rate[::3]
         fastest = np.max(np.abs(dv))
         back = self.status * dv < -ROUNDING * fastest

@@ -1,4 +1,4 @@
-r"""Where an element takes its strains: one point, all points, and the library's mixture.
+r"""Quadrature of an element: one point, all points, and the mixture of the library.
 
 Linear elements of the four fields with linear kinematics, small enough to be dense matrices.  With
 full quadrature (two Gauss points are exact for all products) thin strips lock: beta is linear and
@@ -80,9 +80,9 @@ def cantilever(height_ratio: float, name: str, nodes: int = 21, **strip: Any) ->
 
 
 def squeezed(elements_per_height: float, name: str, kappa_s: float = 0.44) -> float:
-    """Largest squeeze beyond that under the load, where a strip is squeezed over its left half.
+    """Overshoot of the squeeze at the edge of a load over the left half of a strip.
 
-    Of an element over H; in parts of the load: 0 where nothing oscillates.
+    It is in parts of the squeeze under the load, 0 without oscillation; elements are over H.
     """
     scene = jb.Scene().replace({"strip.kappa_s": kappa_s, "strip.half_height": 1.0 / 8.0})
     half_height, length = float(scene.strip.half_height), float(scene.strip.length)

@@ -1,4 +1,4 @@
-"""What friction laws do with the number of load steps, and under one-sided cycling."""
+"""Friction laws: dependence on the number of load steps, and drift under one-sided cycles."""
 
 from __future__ import annotations
 

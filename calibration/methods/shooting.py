@@ -31,7 +31,7 @@ UNKNOWN = [2, 3, 4]  # psi, N and M at X = 0, where v = beta = 0 and xi = 0
 
 
 class Shot(NamedTuple):
-    """What shooting found.
+    """Result of shooting.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ def bounded(matrix: np.ndarray, length: float, load: np.ndarray) -> np.ndarray:
 
 
 class Squeeze(NamedTuple):
-    """The squeezed strip, shot at.
+    """Squeezed strip by shooting.
 
     Attributes
     ----------

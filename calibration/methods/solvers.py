@@ -2,9 +2,9 @@
 
 Newton's iteration from the last equilibrium, plain or with one help: a line search that demands a
 smaller residual, the friction law's limit on what a step may do to a node, smaller load steps after
-a failure, or a continuation that solves a milder friction first.  What is not found after `TRIES`
-iterations is passed over in silence, so that the count of wrong answers says what reading the flag
-is worth; the library's own solver stands beside them.
+a failure, or a continuation that solves a milder friction first. Steps that are not found after
+`TRIES` iterations are kept without notice, so that the count of wrong answers shows the worth of
+reading the flag; the library's own solver stands beside them.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ LIBRARY = "library"
 
 
 class Run(NamedTuple):
-    """What came of a path.
+    """Result of a load path.
 
     Attributes
     ----------
@@ -245,7 +245,7 @@ def runner(name: str) -> Callable[[dict[str, float]], Run]:
 
 
 class Tally(NamedTuple):
-    """How a method fared on some strips.
+    """Success and errors of a method on some strips.
 
     Attributes
     ----------
@@ -264,14 +264,14 @@ class Tally(NamedTuple):
 
 
 def bar_dissipation(values: Mapping[str, float]) -> float:
-    """What the one-dimensional bar would dissipate."""
+    """Dissipation of the one-dimensional bar."""
     scene = jb.Scene().replace(dict(values))
     rubs = scene.contact.friction * scene.contact.pressure
     return float(cubic_law(scene.load.amplitude, scene.strip.stretching_stiffness, rubs))
 
 
 def tally(runs: Sequence[Run], right: np.ndarray, nothing: np.ndarray) -> Tally:
-    """Count how a method fared.
+    """Count successes and errors of a method.
 
     Parameters
     ----------

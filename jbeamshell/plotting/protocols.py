@@ -17,7 +17,7 @@ from jbeamshell.scene.scene import Scene
 
 
 class LoadPath(Protocol):
-    """A load path that was solved, step by step, such as `jbeamshell.History`.
+    """Solved load path, step by step, such as a `jbeamshell.History`.
 
     Pictures along X also read the profiles ``gap``, ``beta``, ``psi``, ``squeeze_stress`` and
     ``squeeze_couple``, (steps+1, n) or (steps+1, elements), as far as the scene has them.
@@ -77,7 +77,7 @@ class LoadPath(Protocol):
 
 
 class Vibration(Protocol):
-    """A transient, such as `jbeamshell.dynamics.Motion`, (T,) each; energies are per width.
+    """Transient motion, such as a `jbeamshell.dynamics.Motion`, (T,) each; energies are per width.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class ModalProperties(Protocol):
 
 
 class RingDownComparison(Protocol):
-    """A ring-down beside its quasi-static prediction.
+    """Ring-down beside its quasi-static prediction.
 
     Attributes
     ----------

@@ -50,7 +50,7 @@ def clamped():
 
 @pytest.fixture(scope="module")
 def pressing(clamped):
-    """The same under the growing pressure alone."""
+    """The clamped strip under the growing pressure alone."""
     steps = clamped.force.size
     cut = jax.tree.map(lambda a: a[:4] if a.shape[:1] == (steps,) else a, clamped)
     return dataclasses.replace(cut, cycles=())
