@@ -168,7 +168,7 @@ def divided(pivot: Sequence[Sequence[Array]], known: Sequence[Sequence[Array]]) 
 def _by_quotients(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Array]]:
     """Inverse of a block times some columns for entries that are vectors.
 
-    The compiler keeps quotients, but computes all other terms anew for each use.
+    The compiler keeps quotients, but computes all other terms again for each use.
     """
     m = len(pivot)
     rows = [[*p, *k] for p, k in zip(pivot, known, strict=True)]

@@ -145,11 +145,11 @@ class ElasticStrip(eqx.Module):
     # --- energy and forces ----------------------------------------------------------------------
 
     def potential(self, q: Array, pressure: ArrayLike) -> Array:
-        """Potential Pi: strain energy plus the dead pressures' part ``pressure`` of their work."""
+        """Potential Pi: strain energy plus that of the pressures, whose part ``pressure`` acts."""
         return self.strain_energy(q) + pressure * self.sinking(q)
 
     def sinking(self, q: Array) -> Array:
-        """Conjugate of ``pressure`` in the potential: nodal loads times displacement down."""
+        """Nodal loads times displacements, the derivative of Pi by the ``pressure`` that acts."""
         top = self._displacement(q, self.x, self.half_height)[1]
         return jnp.sum(self.load * top) - jnp.sum(self.bottom_load * q[:, W])
 

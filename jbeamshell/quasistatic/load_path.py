@@ -15,7 +15,7 @@ from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.domain import bar_rule, gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
-NUMBERS_PER_NODE = 13  # numbers that a load step stores at a node, besides twice its fields
+NUMBERS_PER_NODE = 13  # numbers that a load step stores at a node, and twice its fields more
 LOADS = "give (steps,) loads, or (steps, 2) with pressures"
 
 
@@ -94,7 +94,7 @@ class LoadPath(NamedTuple):
 
     Attributes
     ----------
-    target : controlled load: F, u(L) or, for the arc length, the way gone (signed by its direction)
+    target : controlled load: F, u(L) or, for the arc length, the way along the path, signed
     pressure : part of the pressures that acts
     rough : 1 with friction, 0 while the strip is pressed down before it
     """

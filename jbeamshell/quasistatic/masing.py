@@ -72,15 +72,15 @@ def masing(
     """
     signs = (1.0, -1.0) if scene.model.solution == "masing" else (1.0,)
     if recovering:
-        ways = [walk(scene, start, _backbone_path(scene, path, s), solver) for s in signs]
+        pulls = [walk(scene, start, _backbone_path(scene, path, s), solver) for s in signs]
     else:
 
-        def way(sign: Array) -> StepResults:
+        def pull(sign: Array) -> StepResults:
             return march(scene, start, _backbone_path(scene, path, sign), solver, method)
 
-        both = lax.map(way, jnp.asarray(signs))  # compiled once
-        ways = [jax.tree.map(lambda a, i=i: a[i], both) for i in range(len(signs))]
-    found = [_since_pressed(scene, steps) for steps in ways]
+        both = lax.map(pull, jnp.asarray(signs))  # compiled once
+        pulls = [jax.tree.map(lambda a, i=i: a[i], both) for i in range(len(signs))]
+    found = [_since_pressed(scene, steps) for steps in pulls]
     return _doubled(scene, path, _mean(*found) if len(found) == 2 else found[0])
 
 
@@ -143,27 +143,29 @@ def _bar_backbone(scene: Scene, path: LoadPath) -> Backbone:
     """Backbone of Goodman's bar in closed form."""
     system, strip, load = System(scene), scene.strip, scene.load
     half = load.steps_per_half_cycle
-    rubs = scene.contact.friction * scene.contact.pressure
+    resistance = scene.contact.friction * scene.contact.pressure
     part = jnp.arange(half + 1) / half
     stiffness = strip.stretching_stiffness
     if load.control == "force":
         force = load.amplitude * part
-        displacement = bar_backbone(force, stiffness, rubs)
+        displacement = bar_backbone(force, stiffness, resistance)
     else:
         displacement = load.amplitude * part
         # The root of the part is taken alone, because its slope at zero is infinite.
-        force = bar_force(load.amplitude, stiffness, rubs) * jnp.sqrt(part)
-    reach = bar_slip_length(force, rubs)
-    slid = jax.vmap(lambda f: bar_slip_profile(system.x, f, strip.length, stiffness, rubs))(force)
+        force = bar_force(load.amplitude, stiffness, resistance) * jnp.sqrt(part)
+    reach = bar_slip_length(force, resistance)
+    slid = jax.vmap(lambda f: bar_slip_profile(system.x, f, strip.length, stiffness, resistance))(
+        force
+    )
     nothing = jnp.zeros_like(slid)
     level = LoadLevel(
         q=jnp.zeros((*slid.shape, scene.model.width)).at[..., V].set(slid),
-        traction=rubs * (system.x > strip.length - reach[:, None]),
+        traction=resistance * (system.x > strip.length - reach[:, None]),
         cap=nothing,
         reaction=nothing,
         force=force,
     )
-    work = force**3 / (6.0 * stiffness * rubs)  # q times the integral of the slip
+    work = force**3 / (6.0 * stiffness * resistance)  # q times the integral of the slip
     return Backbone(
         pressed=_pressed_bar(scene, system, path),
         level=level,
@@ -185,7 +187,9 @@ def _pressed_bar(scene: Scene, system: System, path: LoadPath) -> StepResults:
     part = path.pressure[:count]
     state: PathState = jax.tree.map(lambda a: jnp.broadcast_to(a, (count, *a.shape)), start)
     reaction = part[:, None] * (system.load / system.tributary)
-    level = state.level._replace(reaction=reaction, cap=scene.contact.friction * reaction)
+    level = state.level._replace(
+        reaction=reaction, cap=coulomb_cap(scene.contact.friction, reaction)
+    )
     return StepResults(
         state=state._replace(level=level, pressure=part),
         displacement=none,
@@ -206,11 +210,13 @@ def _doubled(scene: Scene, path: LoadPath, backbone: Backbone) -> StepResults:
     def joined(before: Array, first: Array, down: Array, up: Array) -> Array:
         return jnp.concatenate([before, first, *[down, up] * cycles])
 
-    def doubled(before: Array, gone: Array) -> Array:
-        up = 2.0 * gone[1:] - gone[-1]
-        return joined(before, *(before[-1] + part for part in (gone[2::2], -up, up)))
+    def doubled(before: Array, pull: Array) -> Array:
+        """Values of the branches from the increments of the backbone."""
+        up = 2.0 * pull[1:] - pull[-1]
+        return joined(before, *(before[-1] + part for part in (pull[2::2], -up, up)))
 
     def steps(before: Array, first: Array, branch: Array) -> Array:
+        """Values that are the same on both branches."""
         return joined(before, first, branch, branch)
 
     def reached(before: Array, each: Array) -> Array:

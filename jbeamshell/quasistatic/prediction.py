@@ -50,8 +50,8 @@ def last_reversal(system: System, before: Any, to: Any) -> Reversal:
     before : traction (n,), cap (n,), target and reversal before the step, see `BeforeStep`
     to : target, pressure and roughness of the step
     """
-    stride, rough = to.target - before.target, to.rough > 0.0
-    along = jnp.where(stride >= 0.0, 1.0, -1.0)
+    travel, rough = to.target - before.target, to.rough > 0.0
+    along = jnp.where(travel >= 0.0, 1.0, -1.0)
     # The end load's part of the cap changes sign with the load.
     mean = (
         system.foundation.friction
@@ -65,7 +65,7 @@ def last_reversal(system: System, before: Any, to: Any) -> Reversal:
     away = (system.x[-1] - system.x) / (REACH * system.half_height)
     corner = CORNER * system.half_height * (1.0 - jnp.exp(-away))
     now = Reversal(before.target, used + corner * left, left[-1])
-    back = rough & (stride * (before.target - before.reversal.target) <= 0.0)
+    back = rough & (travel * (before.target - before.reversal.target) <= 0.0)
     return jax.tree.map(lambda new, old: jnp.where(back, new, old), now, before.reversal)
 
 

@@ -55,16 +55,14 @@ def read_history(path: str | os.PathLike[str]) -> History:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except Exception as error:  # a broken file may raise anything in a parser
         reason = f"{type(error).__name__}: {error}"[:200]
-        raise InputError(
-            f"{path}: is no history that can be read ({reason}): save it anew"
-        ) from None
+        raise InputError(f"{path}: cannot be read as a history ({reason}): save it again") from None
     if blank is None:
         fix = "write jax.config.update('jax_enable_x64', True) first"
         raise InputError(f"{path}: is in double precision: {fix}")
     for name, wanted in named_arrays(blank):
         held = arrays.get(name)
         if held is None or (held.shape, held.dtype) != (wanted.shape, wanted.dtype):
-            raise InputError(f"{path}: {name} is missing or of another shape: save it anew")
+            raise InputError(f"{path}: {name} is missing or of another shape: save it again")
     leaves = [jnp.asarray(arrays[name]) for name, _ in named_arrays(blank)]
     read: History = jax.tree.unflatten(jax.tree.structure(without_scene(blank)), leaves)
     return dataclasses.replace(read, scene=blank.scene)

@@ -40,8 +40,8 @@ def recover(
     count = path.target.size
     while not _converged(steps):
         first = int(np.argmin(np.asarray(steps.state.converged)))
-        origin = jax.tree.map(lambda a: a[first - 1], steps.state) if first else start  # noqa: B023
-        pieces = _walk_in_pieces(scene, origin, jax.tree.map(lambda a: a[first], path), solver)  # noqa: B023
+        last = jax.tree.map(lambda a: a[first - 1], steps.state) if first else start  # noqa: B023
+        pieces = _walk_in_pieces(scene, last, jax.tree.map(lambda a: a[first], path), solver)  # noqa: B023
         if pieces is None:
             return steps
         joined = jax.tree.map(lambda a: a[-1], pieces)._replace(
@@ -49,7 +49,7 @@ def recover(
             iterations=steps.iterations[first] + jnp.sum(pieces.iterations),
             slipping=jnp.any(pieces.slipping, axis=0),
         )
-        # The path's end is repeated: with the shapes of the first march nothing compiles anew.
+        # The path's end is repeated: with the shapes of the first march nothing compiles again.
         further = jnp.minimum(jnp.arange(count) + first + 1, count - 1)
         onward = jax.tree.map(lambda a: a[further], path)  # noqa: B023
         tail = compiled_march(scene, joined.state, onward, solver, Method.NEWTON)

@@ -160,9 +160,9 @@ def memory_of(state: Any) -> Memory:
 
 def _parts(system: System) -> tuple[Array, Array, Array]:
     """Stiffness of the section, derivative of the end's displacement, forces of the pressure."""
-    rest = system.unloaded().q
-    pull = jax.grad(system.end_displacement)(rest)[-1]
-    return system.section_stiffness(), pull, jax.grad(system.sinking)(rest)
+    unloaded = system.unloaded().q
+    pull = jax.grad(system.end_displacement)(unloaded)[-1]
+    return system.section_stiffness(), pull, jax.grad(system.sinking)(unloaded)
 
 
 def _linear_strip(system: System, section: Array, pull: Array, press: Array) -> LinearStrip:
@@ -200,21 +200,21 @@ def step(strip: LinearStrip, memory: Memory, to: Any) -> StatusSteps:
     to : target, pressure and roughness of the step
     """
     system = strip.system
-    rubs, reversal = to.rough > 0.0, last_reversal(system, memory, to)
+    rough, reversal = to.rough > 0.0, last_reversal(system, memory, to)
     further = to.pressure - memory.pressure
     net = (system.load - system.bottom_load) / system.tributary
     given = memory.reaction + further * net
     load = [-further * each for each in strip.press]
     slips = first_to_slip(system, reversal, to.target)
     drawn = to.target - memory.target
-    found = _settle(strip, memory.traction, given, drawn, load, slips, rubs)
-    change = jnp.where(rubs, found.change, further * strip.pressed)
+    found = _settle(strip, memory.traction, given, drawn, load, slips, rough)
+    change = jnp.where(rough, found.change, further * strip.pressed)
     reaction = given + times(strip.band.normal, [*change])
     cap = system.foundation.cap(reaction)
     slid = system.foundation.friction_law.traction(
         change[V], memory.traction, cap, system.foundation.slip_stiffness
     )
-    traction = jnp.where(found.closed & rubs, slid, 0.0)
+    traction = jnp.where(found.closed & rough, slid, 0.0)
     work = system.tributary * system.foundation.friction_law.slip_work(
         change[V], memory.traction, traction, memory.cap, cap, system.foundation.slip_stiffness
     )
@@ -222,7 +222,7 @@ def step(strip: LinearStrip, memory: Memory, to: Any) -> StatusSteps:
     return StatusSteps(
         change,
         Memory(traction, cap, reaction, to.target, to.pressure, reversal),
-        jnp.where(rubs, jnp.sum(jnp.where(pressed, work, 0.0), axis=0), 0.0),
+        jnp.where(rough, jnp.sum(jnp.where(pressed, work, 0.0), axis=0), 0.0),
         found.error,
         found.solves,
         found.settled,

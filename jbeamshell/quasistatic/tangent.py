@@ -1,7 +1,7 @@
 """Tangent stiffness of a load step: a part that hardly changes, and the foundation's response.
 
 Elasticity, supports and loads make the first part.  It is constant where the strains are linear,
-and good for many iterations where they are not.  The second part is found anew at every iteration,
+and good for many iterations where they are not.  The second part is found again at every iteration,
 node by node, from the derivatives of the laws of friction and contact.
 """
 
@@ -105,7 +105,7 @@ def stiffness_at(
     probes = _probes(system, like)
     forces, elastic = jax.linearize(lambda q: system.elastic_forces(q, prescribed.pressure), q)
     along = block_tridiagonal.by_neighbour(jax.vmap(jax.vmap(elastic))(jnp.asarray(probes)), block)
-    with jax.ensure_compile_time_eval():  # the compiler would do it anew in every run
+    with jax.ensure_compile_time_eval():  # else the program would do it in every run
         fields = block_tridiagonal.by_neighbour(probes, block)
 
     _, residual = jax.linearize(

@@ -1,4 +1,4 @@
-"""Control of the arc length: over gross slip and back, on the same path as any other control."""
+"""Arc-length control: past gross slip and back, on the path of the other controls."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A scene or a history that is saved, read again and continued: the same answer to the last bit."""
+"""Scenes and histories that are saved, read and continued give equal results to the last bit."""
 
 import dataclasses
 import io
@@ -25,7 +25,7 @@ MORE = np.array([0.25, 1.0, 0.25, -0.5])
 
 
 def same(one, other):
-    """Equal words, cycles and bits."""
+    """Check that two histories have equal words, cycles and bits."""
     assert jax.tree.structure(one) == jax.tree.structure(other)
     for (place, a), b in zip(
         jax.tree_util.tree_leaves_with_path(one), jax.tree.leaves(other), strict=True
@@ -135,7 +135,7 @@ class Evil:
 
 
 def replaced(path, **arrays):
-    """The file with other arrays, None taking one out."""
+    """Contents of the file with other arrays; None removes one."""
     with np.load(path, allow_pickle=False) as file:
         held = dict(file) | arrays
     data = io.BytesIO()
@@ -150,7 +150,7 @@ def with_about(path, **values):
 
 
 def damaged(path, evil):
-    """Contents that are no history, by what was done to one."""
+    """Contents of damaged histories, by the damage."""
     good = path.read_bytes()
     with np.load(path) as file:
         displacement = file["displacement"]

@@ -163,7 +163,7 @@ def test_stuck_strip_rotates_as_the_closed_form():
     [pytest.param(["v", "w", "beta"], marks=pytest.mark.slow), ["v", "w", "beta", "psi"]],
 )
 def test_unilateral_lift_cures_the_tension_at_the_loaded_end(fields):
-    """Finite elements stay in contact there; a frozen shell would pull, worse on finer grids."""
+    """Finite elements stay in contact; a shell whose lift is frozen pulls, more on finer grids."""
     ratios = []
     for nodes in (81, 161, 321):  # end elements of about H/8, H/16 and H/32
         scene = jb.Scene().replace(
@@ -249,7 +249,7 @@ def test_exact_and_linear_kinematics_agree_at_small_strain():
 
 
 def test_residual_couples_neighbours_only():
-    """What the block-tridiagonal tangent relies on, for friction, contact and both controls."""
+    """Blocks couple to their neighbours only, for friction, contact and both controls."""
     scene = jb.Scene().replace({"model.nodes": 9, "model.fields": ["v", "w", "beta", "psi"]})
     for control in ("force", "displacement"):
         system = System(scene.replace({"load.control": control, "load.amplitude": 1e-6}))

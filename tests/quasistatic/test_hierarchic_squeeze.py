@@ -95,7 +95,7 @@ def test_the_contact_ends_nearer_to_elasticity(receding):
 
 
 def test_the_reaction_steps_at_the_edge_of_the_load(receding):
-    """The right way with even p, the wrong way with odd p; on this grid not yet all of it."""
+    """The step has the right sign for even p and the wrong one for odd p, on this coarse grid."""
     x, reaction = np.asarray(receding.x) - EDGE, np.asarray(receding.reaction[0])
     apart = 1.5 * np.min(np.diff(x))  # the nodes beyond share nothing of the step
     sides = (np.flatnonzero(x < -apart)[-3:], np.flatnonzero(x > apart)[:3])

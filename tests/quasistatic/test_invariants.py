@@ -1,4 +1,4 @@
-"""What holds whatever the strip: signs, balances, symmetries and scalings over random scenes."""
+"""Invariants of any strip: signs, balances, symmetries and scalings over random scenes."""
 
 import functools
 
@@ -49,7 +49,7 @@ def scene_of(values, **more):
 
 
 def path(scene, steps=FINE, first=1.0):
-    """To the amplitude, and two cycles from there, in equal steps that holds may follow."""
+    """Path to the amplitude and two cycles from there, in equal steps, with or without holds."""
     half = steps // 2
     there = np.arange(1, half + 1) / half
     back = 1.0 - 2.0 * np.arange(1, steps + 1) / steps
@@ -68,7 +68,7 @@ def run(values, steps=FINE, first=1.0):
 
 
 def size(history):
-    """Of energies that matter: all that a branch's work could be."""
+    """Scale of energies: the largest work of a branch."""
     return float(jnp.max(jnp.abs(history.force)) * jnp.ptp(history.displacement))
 
 
@@ -114,7 +114,7 @@ def test_the_number_of_load_steps_hardly_matters_and_holding_the_load_not_at_all
 @few
 @given(strips)
 def test_the_energy_of_every_step_balances(values):
-    """To round-off where nothing slips, else at second order in the load step."""
+    """The error is round-off where nothing slips, else of second order in the load step."""
 
     def left(history):
         return np.abs(np.diff(np.asarray(history.energy_imbalance))) / size(history)

@@ -1,4 +1,4 @@
-"""Steps that are foreseen by their patterns: Newton's answers, alone and side by side."""
+"""Status iteration: equal to Newton's method, for one strip and for lanes side by side."""
 
 import jax
 import jax.numpy as jnp
@@ -51,17 +51,17 @@ def marked(case):
 
 
 @pytest.mark.parametrize("case", [marked(case) for case in CASES])
-def test_what_is_foreseen_is_what_newton_finds(case, monkeypatch):
+def test_status_iteration_finds_what_newton_finds(case, monkeypatch):
     scene = SCENE.replace(CASES[case])
     assert slip_patterns.applies(scene)
-    foreseen = jb.solve(scene, throw=False)
-    assert foreseen.converged
-    assert int(np.max(np.asarray(foreseen.iterations))) < slip_patterns.MOST
+    found = jb.solve(scene, throw=False)
+    assert found.converged
+    assert int(np.max(np.asarray(found.iterations))) < slip_patterns.MOST
     monkeypatch.setattr(slip_patterns, "applies", lambda scene: False)
     newton = jb.solve(scene, throw=False, solver=jb.Newton(max_iterations=201))  # traced anew
     assert newton.converged
     assert int(np.sum(newton.iterations)) >= 4
-    same(newton, foreseen, 1e-8)
+    same(newton, found, 1e-8)
 
 
 def test_the_band_is_the_stiffness_that_derivatives_say():
@@ -85,7 +85,7 @@ def test_the_band_is_the_stiffness_that_derivatives_say():
 
 
 def test_lanes_side_by_side_answer_as_one_by_one():
-    """Also with what no lane varies, and where lanes need different numbers of guesses."""
+    """Also for numbers that no lane varies, and lanes that need different numbers of guesses."""
     keys = ("load.amplitude", "strip.height_ratio")
     values = jnp.geomspace(0.2, 1.9, 5), jnp.array([0.3, 0.02, 0.1, 0.05, 0.2])
     ask = jb.response(
@@ -104,8 +104,8 @@ def test_lanes_side_by_side_answer_as_one_by_one():
 
 
 @pytest.mark.parametrize("fault", ["no guesses", "a wrong answer"])
-def test_what_was_not_foreseen_is_walked_by_newton(fault, monkeypatch):
-    """Status says it, with either check, and `solve` goes on."""
+def test_steps_that_do_not_settle_are_walked_by_newton(fault, monkeypatch):
+    """The status says so with either check, and `solve` goes on."""
     scene = SCENE.replace({"load.pressure_steps": 2})
     right = jb.solve(scene, throw=False)
     if fault == "no guesses":

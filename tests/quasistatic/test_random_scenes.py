@@ -1,4 +1,4 @@
-"""Invariants over random strips: every step converges, friction stays in its cone, work is lost."""
+"""Invariants of random strips: steps converge, friction stays in its cone, work is lost."""
 
 import jax
 import jax.numpy as jnp
