@@ -1,9 +1,12 @@
-"""Dynamics: a strip that vibrates, and a strip as the joint inside a vibrating structure.
+"""Dynamics of strips, and of structures that have strips as joints.
 
-`simulate` follows a scene in time, `let_go` a mass on a strip; `ring_down` reads frequency and
-damping over amplitude from any decaying signal.  `Joint` makes a force element of a strip,
-`Structure` takes matrices of any finite-element code, `modal_curve` gives amplitude against
-frequency and damping without a transient, and `shake` gives the transient.
+Strips: `simulate` computes the transient of a scene, `modes` its natural modes, and `let_go` the
+ring-down of a mass on it; `ring_down` finds frequency and damping over amplitude from any decaying
+signal.
+
+Structures: `Joint` makes a force element of a strip, `Structure` takes the matrices of any
+finite-element code, `modal_curve` finds frequency and damping over amplitude without a transient,
+and `shake` computes the transient.
 """
 
 from jbeamshell.dynamics.let_go import RingDownStudy as RingDownStudy

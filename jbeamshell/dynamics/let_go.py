@@ -1,4 +1,4 @@
-"""A mass on a strip, pulled and let go: the ring-down beside its quasi-static prediction."""
+"""Ring-down of a mass on a strip, pulled and let go, beside its quasi-static prediction."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.dynamics.structure.modal import ModalCurve, modal_curve
 from jbeamshell.scene.scene import Scene
 
-HEAVY = 50.0  # strips that a payload weighs, where none is given
-LET_GO = 0.1  # of a period in which the force vanishes: the strip's own waves stay small
-PER_CYCLE = 50  # samples
-AMPLITUDES = 40
+HEAVY = 50.0  # default payload, over the mass of the strip
+RELEASE = 0.1  # duration of the release in periods, long enough to excite the strip's waves little
+SAMPLES_PER_CYCLE = 50
+AMPLITUDES = 40  # of the prediction
 
 
 class RingDownStudy(NamedTuple):
-    """A transient, what it says about frequency and damping, and what statics says.
+    """Ring-down of a payload on a strip, and its prediction by quasi-static modal analysis.
 
     Attributes
     ----------
-    motion : the transient
-    found : its frequency and damping over amplitude
-    predicted : quasi-static modal analysis of the payload on the strip as a joint; its amplitudes
-        are u(L) times the root of the payload
+    motion : transient
+    found : frequency and damping over amplitude, from the transient
+    predicted : frequency and damping over amplitude, with the strip as a joint; its amplitudes are
+        u(L) times the square root of the payload
     payload : mass per width
     """
 
@@ -44,20 +44,22 @@ class RingDownStudy(NamedTuple):
 
     @property
     def ratio(self) -> Any:
-        """Damping found over the predicted one at the same amplitude, (k,)."""
+        """Damping of the transient over the predicted damping at the same amplitude, (k,)."""
+        return self.found.damping / self._prediction(self.predicted.damping)
+
+    def _prediction(self, column: Any) -> Any:
+        """Predicted values (k,) at the amplitudes of the transient."""
         at = self.found.amplitude * np.sqrt(self.payload)
-        return self.found.damping / np.interp(at, self.predicted.amplitude, self.predicted.damping)
+        return np.interp(at, self.predicted.amplitude, column)
 
     def figures(self) -> dict[str, Any]:
-        """Figures by name, numbers and lists that JSON takes."""
-        at = self.found.amplitude * np.sqrt(self.payload)
+        """Summary and curves by name, in numbers and lists that JSON takes."""
         columns = {
             "amplitude": self.found.amplitude,
             "frequency": self.found.frequency,
             "damping": self.found.damping,
-            "predicted_frequency": np.interp(at, self.predicted.amplitude, self.predicted.frequency)
-            / (2.0 * np.pi),
-            "predicted_damping": np.interp(at, self.predicted.amplitude, self.predicted.damping),
+            "predicted_frequency": self._prediction(self.predicted.frequency) / (2.0 * np.pi),
+            "predicted_damping": self._prediction(self.predicted.damping),
         }
         lists = {name: np.asarray(column).tolist() for name, column in columns.items()}
         return self.motion.figures() | {"payload": self.payload} | lists
@@ -77,32 +79,48 @@ def let_go(
 
     Parameters
     ----------
-    scene : the strip
+    scene : scene of the strip
     force : end force per width; None is ``scene.load.amplitude``
-    payload : mass per width at the loaded end; None is `HEAVY` strips
-    inertia : density and what goes with it
-    cycles : of the stuck strip that are followed
-    per_cycle : time steps in each
-    progress : as of `simulate`
+    payload : mass per width at the loaded end; None is `HEAVY` times the mass of the strip
+    inertia : density and damping of the strip; None is density 1
+    cycles : span of the transient, in periods of the stuck strip
+    per_cycle : number of time steps in a period
+    progress : show a progress bar; None shows it on a terminal only
+
+    Returns
+    -------
+    RingDownStudy
+
+    Raises
+    ------
+    InputError
+        for a force beyond gross slip, or a number that is not positive
+    InterruptedMotionError
+        if the solver stops before the end; it carries the part that was computed
+
+    Examples
+    --------
+    >>> study = let_go(jb.Scene(), 1.0, cycles=30)
+    >>> study.found.damping  # damping ratios at study.found.amplitude
     """
     inertia = inertia or Inertia()
-    pull = float(scene.load.amplitude) if force is None else force
+    end_force = float(scene.load.amplitude) if force is None else force
     require_number("cycles", cycles, POSITIVE)
     strip = scene.strip
-    own = float(2.0 * strip.half_height * strip.length * inertia.mean_density(scene))
-    mass = HEAVY * own if payload is None else payload
+    strip_mass = float(2.0 * strip.half_height * strip.length * inertia.mean_density(scene))
+    mass = HEAVY * strip_mass if payload is None else payload
     require_number("payload", mass)
     attached = AttachedMasses(payload=mass)
-    joint = Joint.of(scene, pull)
+    joint = Joint.of(scene, end_force)
     period = first_period(scene, inertia, attached)
     motion = simulate(
         scene,
         cycles * period,
-        Recorded([0.0, LET_GO * period], [pull, 0.0]),
+        Recorded([0.0, RELEASE * period], [end_force, 0.0]),
         inertia=inertia,
         attached=attached,
-        released=pull,
-        samples=round(cycles * PER_CYCLE) + 1,
+        released=end_force,
+        samples=round(cycles * SAMPLES_PER_CYCLE) + 1,
         step=period / per_cycle,
         progress=progress,
     )

@@ -1,7 +1,7 @@
-"""Ring-down to frequency and damping that depend on amplitude.
+"""Frequency and damping over amplitude, from the signal of a decaying vibration.
 
-Friction leaves a strip off its zero, by more or less at every swing, so amplitudes are half the
-distance between one turning point and the next, and nothing is asked of the mean.
+Friction shifts the mean of the vibration from swing to swing, so the amplitude of a swing is half
+the distance between one extremum and the next, and the mean is not used.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from jbeamshell.measured.curves import DissipationCurve, StiffnessCurve
 
 METHODS = ("turning-points", "hilbert")
 SIGNAL = "give as many evenly spaced times as finite values, at least {} of both"
-EDGE = 0.05  # of the signal at both ends, where the Hilbert transform is not to be trusted
-RELIABLE = 0.2  # of a period is the least between two turning points that belong to one vibration
+EDGE = 0.05  # part of the signal left out at both ends, where the Hilbert transform is inaccurate
+SHORTEST = 0.2  # shortest time between two extrema, in periods
 
 
 class RingDown(NamedTuple):
-    """Frequency and damping at instants of a decaying vibration, (k,) each.
+    """Frequency and damping over the amplitude of a decaying vibration, (k,) each.
 
     Attributes
     ----------
-    time : instants
-    amplitude : half of the swing
+    time : times
+    amplitude : half of a swing
     frequency : cycles per time
-    damping : ratio zeta, of the logarithmic decrement 2 pi zeta per cycle
+    damping : damping ratio zeta; the logarithmic decrement is 2 pi zeta per cycle
     """
 
     time: NDArray[np.float64]
@@ -40,23 +40,33 @@ class RingDown(NamedTuple):
     def curves(
         self, mass: float, points: int = 12, width: float = 1.0
     ) -> tuple[DissipationCurve, StiffnessCurve]:
-        """What a mass on a strip tells of it, for `jbeamshell.identify.fit`.
+        """Dissipation and stiffness of a strip from the ring-down of a mass on it.
 
-        Inertia balances the strip, so the force's amplitude is F = m omega^2 u and, with the
-        decrement, the energy per cycle 2 pi zeta F u.
+        The mass balances the strip, so the amplitude of the force is F = m omega^2 u, and the
+        energy per cycle is 2 pi zeta F u.
 
         Parameters
         ----------
-        mass : at the loaded end, far heavier than the strip
-        points : of the curves, evenly spaced in the logarithm of the amplitude
-        width : of the strip, by which forces are divided
+        mass : mass at the loaded end, far heavier than the strip
+        points : number of points of a curve, evenly spaced in the logarithm of the amplitude
+        width : width of the strip, by which forces are divided
+
+        Returns
+        -------
+        DissipationCurve, StiffnessCurve
+            observations for `jbeamshell.identify.fit`
+
+        Raises
+        ------
+        InputError
+            for a signal that does not decay
         """
         rising = np.argsort(self.amplitude)
         known = rising[self.damping[rising] > 0.0]
-        fix = "nowhere decreases: there is no damping to fit"
+        fix = "is nowhere positive: give the signal of a vibration that decays"
         require("damping", float(self.damping.max()), known.size > 1, fix)
-        least, most = self.amplitude[known[[0, -1]]].tolist()
-        u = np.geomspace(least, most, points)
+        smallest, largest = self.amplitude[known[[0, -1]]].tolist()
+        u = np.geomspace(smallest, largest, points)
         frequency, damping = (
             np.interp(u, self.amplitude[known], column[known])
             for column in (self.frequency, self.damping)
@@ -77,19 +87,28 @@ class RingDown(NamedTuple):
 def ring_down(
     time: ArrayLike, values: ArrayLike, *, method: str = "turning-points", smoothing: float = 1.0
 ) -> RingDown:
-    """Instantaneous amplitude, frequency and damping of one decaying vibration.
+    """Amplitude, frequency and damping of one decaying vibration.
 
     Parameters
     ----------
-    time, values : (T,) evenly spaced instants and a displacement
-    method : "turning-points": every swing, its length and its decrease; or "hilbert": the analytic
-        signal, whose logarithm and phase are fitted by straight lines over a moving window
-    smoothing : window of the second, in periods
+    time : (T,) evenly spaced times
+    values : (T,) displacements
+    method : "turning-points" measures the length and the decrease of every swing; "hilbert" fits
+        straight lines to the logarithm and the phase of the analytic signal over a moving window
+        (Feldman 2011)
+    smoothing : length of that window, in periods
 
     Raises
     ------
     InputError
-        for a signal that is none, or has fewer than three turning points
+        for a signal that is not finite or evenly spaced, or has fewer than four extrema
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 30.0, 6001)
+    >>> found = ring_down(t, np.exp(-0.1 * t) * np.cos(10.0 * t))
+    >>> round(float(found.damping[10]), 3)
+    0.01
     """
     times, signal = np.asarray(time, float), np.asarray(values, float)
     require_choice("method", method, METHODS)
@@ -98,23 +117,23 @@ def ring_down(
     steps = np.diff(times)
     even = bool(np.all(np.isfinite(signal)) and np.allclose(steps, steps[0]) and steps[0] > 0.0)
     require("time", times[:3], even, SIGNAL.format(8))
-    at, turned = turning_points(times, signal)
-    fix = "turns fewer than four times: follow the motion for longer"
-    require("values", at.size, at.size >= 4, fix)
+    at, reached = extrema(times, signal)
+    fix = "must be at least 4: follow the motion for longer"
+    require("extrema of values", at.size, at.size >= 4, fix)
     if method == "turning-points":
-        return _of_swings(at, turned)
-    return _of_envelope(times, signal, 2.0 * float(np.mean(np.diff(at))), smoothing)
+        return _from_swings(at, reached)
+    return _from_envelope(times, signal, 2.0 * float(np.mean(np.diff(at))), smoothing)
 
 
-def turning_points(time: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
-    """Instants and values of the maxima and minima by turns, parabolas through three samples.
+def extrema(time: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
+    """Times and values of maxima and minima in alternation, by parabolas through three samples.
 
-    Ripples on the way from one to the other, shorter than a part of the period, do not count.
+    Ripples much shorter than the period are left out.
     """
     times, signal = np.asarray(time, float), np.asarray(values, float)
     spectrum = np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(signal.size)))
-    main = max(int(np.argmax(spectrum)), 1) / (signal.size * (times[1] - times[0]))
-    apart = max(1, int(RELIABLE / main / (times[1] - times[0])))
+    main_frequency = max(int(np.argmax(spectrum)), 1) / (signal.size * (times[1] - times[0]))
+    apart = max(1, int(SHORTEST / main_frequency / (times[1] - times[0])))
     picked = []
     for sign in (1.0, -1.0):
         peaks, _ = scipy.signal.find_peaks(sign * signal, distance=2 * apart)
@@ -122,7 +141,7 @@ def turning_points(time: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float
     picked.sort()
     kept: list[tuple[int, float]] = []
     for peak, sign in picked:
-        if kept and kept[-1][1] == sign:  # two of a kind: the further out
+        if kept and kept[-1][1] == sign:  # of two maxima in a row the larger
             if sign * signal[peak] > sign * signal[kept[-1][0]]:
                 kept[-1] = (peak, sign)
         else:
@@ -134,9 +153,10 @@ def turning_points(time: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float
     return times[index] + shift * (times[1] - times[0]), here - 0.25 * (before - after) * shift
 
 
-def _of_swings(at: NDArray[np.float64], turned: NDArray[np.float64]) -> RingDown:
-    swings = 0.5 * np.abs(np.diff(turned))
-    # The mean of two swings, there and back, so that what differs between them cancels.
+def _from_swings(at: NDArray[np.float64], reached: NDArray[np.float64]) -> RingDown:
+    """Ring-down from the times and values of the extrema."""
+    swings = 0.5 * np.abs(np.diff(reached))
+    # The mean over a swing forth and one back cancels the difference between the two.
     decrease = np.log(swings[:-2] / swings[2:]) / (2.0 * np.pi)
     return RingDown(
         time=0.5 * (at[1:-2] + at[2:-1]),
@@ -146,9 +166,10 @@ def _of_swings(at: NDArray[np.float64], turned: NDArray[np.float64]) -> RingDown
     )
 
 
-def _of_envelope(
+def _from_envelope(
     times: NDArray[np.float64], signal: NDArray[np.float64], period: float, smoothing: float
 ) -> RingDown:
+    """Ring-down from the analytic signal."""
     step = times[1] - times[0]
     window = 2 * (max(3, int(smoothing * period / step)) // 2) + 1
     slow = scipy.signal.savgol_filter(signal, min(_odd(4.0 * period / step), _odd(signal.size)), 1)
@@ -166,4 +187,5 @@ def _of_envelope(
 
 
 def _odd(count: float) -> int:
+    """Largest odd number not above a number."""
     return 2 * ((int(count) - 1) // 2) + 1

@@ -111,9 +111,9 @@ def test_the_first_thickness_stretch_is_ten_per_cent_off_unless_corrected():
     exact = 0.5 * np.pi * jnp.sqrt(c11 / RHO) / half
     for factor, off in ((1.0, np.sqrt(12.0) / np.pi), (dynamics.THICKNESS_STRETCH, 1.0)):
         inertia = dynamics.Inertia(RHO, squeeze_factor=factor)
-        masses = build(strip, inertia, dynamics.AttachedMasses(), dynamics.Excitation()).masses
+        mass = build(strip, inertia, dynamics.AttachedMasses(), dynamics.Excitation()).mass
         rates = jnp.array([0.0, -half, 0.0, 1.0])  # about mid-height
-        found = jnp.sqrt(half * c11 / masses.section(jnp.zeros(4), rates))
+        found = jnp.sqrt(half * c11 / mass.section_energy(jnp.zeros(4), rates))
         assert found / exact == pytest.approx(off, rel=1e-12)
 
 
@@ -122,9 +122,9 @@ def test_the_mass_of_layers_adds_up():
     layers = [[0.5 * half, 1e5, 0.3], [1.5 * half, 2e5, 0.3]]
     strip = scene(strip__layers=layers)
     inertia = dynamics.Inertia([8.0, 2.0])
-    masses = build(strip, inertia, dynamics.AttachedMasses(), dynamics.Excitation()).masses
-    along = masses.section(jnp.zeros(4), jnp.array([1.0, 0.0, 0.0, 0.0]))
-    turned = masses.section(jnp.zeros(4), jnp.array([0.0, 0.0, 1.0, 0.0]))
+    mass = build(strip, inertia, dynamics.AttachedMasses(), dynamics.Excitation()).mass
+    along = mass.section_energy(jnp.zeros(4), jnp.array([1.0, 0.0, 0.0, 0.0]))
+    turned = mass.section_energy(jnp.zeros(4), jnp.array([0.0, 0.0, 1.0, 0.0]))
     assert along == pytest.approx(0.5 * (8.0 * 0.5 + 2.0 * 1.5) * half, rel=1e-12)
     cube = (8.0 * 0.5**3 + 2.0 * (2.0**3 - 0.5**3)) * half**3 / 3.0
     assert turned == pytest.approx(0.5 * cube, rel=1e-12)
@@ -132,23 +132,21 @@ def test_the_mass_of_layers_adds_up():
 
 def test_exact_kinematics_keep_energy_and_momentum_of_a_turning_section():
     strip = jb.Scene().replace({"model.nodes": 11})
-    masses = build(
+    mass = build(
         strip, dynamics.Inertia(RHO), dynamics.AttachedMasses(3.0), dynamics.Excitation()
-    ).masses
+    ).mass
     rng = np.random.default_rng(1)
     q, p = 0.3 * rng.standard_normal((2, 11, 4))
-    blocks = jitted(masses.blocks, jnp.asarray(q))
+    blocks = jitted(mass.blocks, jnp.asarray(q))
     energy = 0.5 * np.einsum("ni,nij,nj", p, blocks, p)
-    assert jitted(masses.kinetic, jnp.asarray(q), jnp.asarray(p)) == pytest.approx(
-        energy, rel=1e-12
-    )
+    assert jitted(mass.energy, jnp.asarray(q), jnp.asarray(p)) == pytest.approx(energy, rel=1e-12)
     # Work of the inertia forces of free motion is the change of the kinetic energy: none, where
     # the accelerations balance them.
-    force = -jitted(masses.velocity_forces, jnp.asarray(q), jnp.asarray(p))
+    force = -jitted(mass.velocity_forces, jnp.asarray(q), jnp.asarray(p))
     speed = np.linalg.solve(blocks, np.asarray(force)[..., None])[..., 0]
     step = 1e-5
     ahead, behind = (
-        jitted(masses.kinetic, jnp.asarray(q + s * step * p), jnp.asarray(p + s * step * speed))
+        jitted(mass.energy, jnp.asarray(q + s * step * p), jnp.asarray(p + s * step * speed))
         for s in (1.0, -1.0)
     )
     assert abs(ahead - behind) / (2.0 * step) < 1e-6 * energy
@@ -165,10 +163,10 @@ def test_the_rate_law_walks_the_quasi_static_loop(m):
         walked.append(float(t))
 
     def rate(s, t):
-        slid = rate_friction.traction_rate(
+        found = rate_friction.traction_rate(
             jnp.asarray(t[0]), jnp.asarray(speed(s)), jnp.asarray(1.0), 1.0, jnp.asarray(m), 1e-9
         )
-        return [float(slid)]
+        return [float(found)]
 
     coarse = steps[::8]
     solved = scipy.integrate.solve_ivp(

@@ -38,7 +38,7 @@ def study():
 
 
 class TestRingDown:
-    def test_energy_is_where_the_ledger_says(self, study):
+    def test_energy_balances(self, study):
         motion = study.motion
         assert motion.complete
         assert motion.reached == pytest.approx(float(motion.time[-1]))
@@ -75,7 +75,7 @@ class TestRingDown:
         energy = np.interp(at, predicted.amplitude, predicted.dissipation)
         assert np.median(np.abs(loss.dissipation / energy - 1.0)) < 0.1
 
-    def test_its_picture_has_what_it_says(self, study):
+    def test_its_figure_has_four_charts(self, study):
         sheet = plotting.ring_down_sheet(study)
         assert len(sheet.axes) == 4
         assert plotting.spectrogram(study.motion).get_ylabel().startswith("frequency")
@@ -148,7 +148,7 @@ def test_fronts_run_at_the_speeds_of_waves(wave):
     assert left_over(motion) < 1e-2 * float(jnp.max(motion.energy - motion.energy[0]))
 
 
-class TestWhatRides:
+class TestAttachedMasses:
     def test_a_blow_gives_the_payload_its_velocity(self):
         strip = scene(model__nodes=11)
         attached = dynamics.AttachedMasses(heavy(strip), [1.0, 2.0], [500.0, 300.0], [0.0, 1.0])
@@ -165,7 +165,7 @@ class TestWhatRides:
             assert left_over(motion) < 0.02 * scale
 
     @pytest.mark.slow
-    def test_the_chain_is_moved_and_damped_as_it_should(self):
+    def test_the_chain_obeys_its_own_equations(self):
         """Against the chain's own equations under the motion found of the loaded end."""
         strip = scene(model__nodes=11)
         attached = dynamics.AttachedMasses(heavy(strip), [1.0, 2.0], [500.0, 300.0], [0.1, 1.0])
@@ -213,7 +213,7 @@ def test_other_solvers_find_the_same_motion(method, options):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mass", ["lumped", "consistent"])
-def test_exact_kinematics_damping_and_other_masses_keep_the_ledger(mass):
+def test_energy_balances_with_exact_kinematics_damping_and_consistent_mass(mass):
     kind = "exact" if mass == "lumped" else "linear"
     strip = scene(model__nodes=11, model__kinematics=kind, model__grid="collocation")
     inertia = dynamics.Inertia(1.0, mass=mass, damping_mass=1.0, damping_stiffness=1e-5)
@@ -339,7 +339,7 @@ def test_bad_input_is_one_clear_line(name):
     assert "\n" not in str(refusal.value)
 
 
-def test_a_motion_that_is_given_up_is_kept_as_far_as_it_came():
+def test_an_interrupted_motion_keeps_the_part_computed():
     strip = scene(model__nodes=11)
     common = {"released": 0.5, "samples": 101, "attached": dynamics.AttachedMasses(heavy(strip))}
     span = period(strip)

@@ -31,7 +31,7 @@ def chain(count=2, joint=JOINT, sparse=False):
 class TestJoint:
     def test_the_network_has_the_backbone_and_masings_loop(self):
         up, down = np.linspace(0.0, 1.7, 120), np.linspace(1.7, -1.7, 240)
-        forces = JOINT.along(np.concatenate([up, down, -down]))
+        forces = JOINT.path_forces(np.concatenate([up, down, -down]))
         assert np.allclose(forces[:120], JOINT.backbone(up), rtol=0.0, atol=1e-14)
         branch = float(JOINT.backbone(1.7)) - 2.0 * np.asarray(JOINT.backbone(0.5 * (1.7 - down)))
         assert np.allclose(forces[120:360], branch, rtol=0.0, atol=1e-13)
@@ -106,7 +106,7 @@ def shaken():
 
 
 class TestTransient:
-    def test_energy_is_where_the_ledger_says(self, shaken):
+    def test_energy_balances(self, shaken):
         _, motion = shaken
         assert float(jnp.max(jnp.abs(motion.imbalance))) < 1e-4 * float(motion.kinetic[0])
         assert float(motion.friction_work[-1]) > 0.1 * float(motion.kinetic[0])
@@ -122,7 +122,7 @@ class TestTransient:
         frequency = np.interp(found.amplitude, curve.amplitude, curve.frequency)
         assert np.allclose(2.0 * np.pi * found.frequency, frequency, rtol=0.01)
 
-    def test_what_is_given_up_is_kept(self):
+    def test_an_interrupted_motion_keeps_the_part_computed(self):
         with pytest.raises(dynamics.InterruptedShakingError, match="ends at t") as cut:
             dynamics.shake(
                 chain(), 50.0, velocity=[1.0, 0.0], samples=2001, method="tsit5", most_steps=200
@@ -167,7 +167,7 @@ REFUSED = {
     "amplitudes": (lambda: modal_curve(chain(), [0.2, 0.1]), "amplitudes"),
     "still": (lambda: dynamics.shake(chain(), 1.0), "nothing happens"),
     "start": (lambda: dynamics.shake(chain(), 1.0, velocity=[1.0]), "velocity"),
-    "silence": (lambda: dynamics.ring_down(np.arange(9.0), np.zeros(9)), "turns fewer"),
+    "silence": (lambda: dynamics.ring_down(np.arange(9.0), np.zeros(9)), "extrema of values"),
     "uneven": (lambda: dynamics.ring_down(np.arange(9.0) ** 2, np.ones(9)), "evenly"),
 }
 

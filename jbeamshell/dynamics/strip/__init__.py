@@ -1,1 +1,1 @@
-"""The strip in motion: inertia, excitation, time integration, natural modes."""
+"""Dynamics of one strip: inertia, excitation, natural modes, time integration."""

@@ -1,4 +1,4 @@
-"""What rides on the loaded end: a payload, and a chain of masses on springs behind it."""
+"""Masses attached to the loaded end: a payload, and a chain of masses on springs behind it."""
 
 from __future__ import annotations
 
@@ -15,14 +15,25 @@ CHAIN = "give as many positive numbers as there are masses in the chain"
 
 
 class AttachedMasses(eqx.Module):
-    """A linear structure at the loaded end, moving along X; per unit width.
+    """Linear masses and springs at the loaded end, which move along X; all per unit width.
 
     Attributes
     ----------
     payload : mass that moves with u(L); 0 is none
-    masses : (k,) of a chain: the first is held by a spring to u(L), the others to the one before
-    springs : (k,) stiffnesses of those springs
-    dampers : (k,) dashpots beside them; none are all 0
+    masses : (k,) masses of a chain.  A spring joins the first one to the loaded end, and each other
+        one to the mass before it
+    springs : (k,) stiffnesses of these springs
+    dampers : (k,) viscous damping coefficients of dashpots beside the springs; None is 0
+
+    Raises
+    ------
+    InputError
+        for a negative payload, or a chain whose arrays differ in length or are not positive
+
+    Examples
+    --------
+    >>> AttachedMasses(payload=20.0, masses=[1.0, 2.0], springs=[500.0, 300.0]).count
+    2
     """
 
     payload: Array
@@ -36,19 +47,19 @@ class AttachedMasses(eqx.Module):
         self.payload = as_leaf(payload, "attached.payload")
         self.masses = as_leaf(list(masses), "attached.masses", CHAIN)
         self.springs = as_leaf(list(springs), "attached.springs", CHAIN)
-        own = np.zeros(self.masses.shape) if dampers is None else list(dampers)
-        self.dampers = as_leaf(own, "attached.dampers", CHAIN)
+        given = np.zeros(self.masses.shape) if dampers is None else list(dampers)
+        self.dampers = as_leaf(given, "attached.dampers", CHAIN)
 
     def __check_init__(self) -> None:
         require_number("attached.payload", self.payload, NOT_NEGATIVE, low=-TINY)
         require("attached.masses", self.masses, self.masses.ndim == 1, CHAIN)
-        for name, least in (("masses", 0.0), ("springs", 0.0), ("dampers", -TINY)):
+        for name, low in (("masses", 0.0), ("springs", 0.0), ("dampers", -TINY)):
             values = getattr(self, name)
             require(f"attached.{name}", values, values.shape == self.masses.shape, CHAIN)
             if not isinstance(values, jax.core.Tracer):
                 known = np.asarray(values)
-                sound = bool(np.all(np.isfinite(known) & (known > least)))
-                require(f"attached.{name}", values, sound, CHAIN)
+                valid = bool(np.all(np.isfinite(known) & (known > low)))
+                require(f"attached.{name}", values, valid, CHAIN)
 
     @property
     def count(self) -> int:

@@ -1,7 +1,7 @@
-"""What shakes the strip: forces at the loaded end, motions of the foundation, an impact.
+"""Excitations: forces at the loaded end, accelerations of the foundation, impacts.
 
-An excitation is a frozen pytree with F(t) and the foundation's acceleration; subclass `Excitation`
-to bring your own.  Motions are counted from the foundation, which may itself move.
+An excitation is a frozen pytree with F(t) and the acceleration of the foundation.  Subclass
+`Excitation` for your own.  Displacements are relative to the foundation.
 """
 
 from __future__ import annotations
@@ -29,39 +29,40 @@ HISTORY = "give as many increasing times as finite values, at least two"
 
 
 class Excitation(eqx.Module):
-    """What acts from outside; this one is nothing: free vibration."""
+    """Free vibration, and the base class of all excitations."""
 
     def force(self, time: Array) -> Array:
-        """F at the loaded end, force per width."""
+        """Force F at the loaded end at a time, per width."""
         return jnp.zeros_like(time)
 
     def acceleration(self, time: Array) -> tuple[Array, Array]:
-        """Acceleration of the foundation along and across the strip, length per time squared."""
+        """Acceleration of the foundation along X and along Y, length per time squared."""
         return jnp.zeros_like(time), jnp.zeros_like(time)
 
     @property
-    def push(self) -> Array:
+    def initial_impulse(self) -> Array:
         """Impulse on the loaded end at t = 0, force per width times time."""
         return jnp.zeros(())
 
     def acts(self, span: float) -> bool:
-        """Whether anything happens between 0 and ``span``; a user's own is asked at some times."""
+        """True if the excitation is not zero at all of 1001 times from 0 to ``span``."""
         times = np.linspace(0.0, span, 1001)
         forces = jax.vmap(self.force)(jnp.asarray(times))
-        shaken = jax.vmap(self.acceleration)(jnp.asarray(times))
-        return bool(np.any(np.asarray(self.push))) or any(
-            bool(np.any(np.asarray(values))) for values in (forces, *shaken)
+        accelerations = jax.vmap(self.acceleration)(jnp.asarray(times))
+        return any(
+            bool(np.any(np.asarray(values)))
+            for values in (self.initial_impulse, forces, *accelerations)
         )
 
 
 class Harmonic(Excitation):
-    """A force A sin(2 pi f t), which grows to its full size within some cycles.
+    """Force A sin(2 pi f t) at the loaded end, with a smooth ramp.
 
     Attributes
     ----------
     amplitude : A, force per width
     frequency : f, cycles per time
-    ramp : cycles until it has its full size, with a smooth start; 0 is at once
+    ramp : number of cycles until the amplitude is A; 0 starts with A
     """
 
     amplitude: Array
@@ -83,19 +84,21 @@ class Harmonic(Excitation):
         return self.amplitude * self.wave(time)
 
     def wave(self, time: Array) -> Array:
-        """The force over its amplitude."""
+        """Ramped sine of unit amplitude."""
         cycles = self.frequency * time
         grown = jnp.where(self.ramp > 0.0, cycles / jnp.where(self.ramp > 0.0, self.ramp, 1.0), 1.0)
-        part = jnp.clip(grown, 0.0, 1.0)
-        return part**2 * (3.0 - 2.0 * part) * jnp.sin(2.0 * jnp.pi * cycles)
+        level = jnp.clip(grown, 0.0, 1.0)
+        return level**2 * (3.0 - 2.0 * level) * jnp.sin(2.0 * jnp.pi * cycles)
 
 
 class Shaker(Harmonic):
-    """A harmonic acceleration of the foundation; see `Harmonic` for the wave.
+    """Harmonic acceleration of the foundation.
 
     Attributes
     ----------
-    direction : "along" the strip or "across" it
+    amplitude : acceleration, length per time squared
+    frequency, ramp : see `Harmonic`
+    direction : "along" the strip (X) or "across" it (Y)
     """
 
     direction: str = eqx.field(static=True, default="along")
@@ -110,7 +113,7 @@ class Shaker(Harmonic):
         require_choice("excitation.direction", self.direction, DIRECTIONS)
 
     def force(self, time: Array) -> Array:
-        """Nothing but inertia acts."""
+        """Zero; the foundation alone excites the strip."""
         return jnp.zeros_like(time)
 
     def acceleration(self, time: Array) -> tuple[Array, Array]:
@@ -119,14 +122,21 @@ class Shaker(Harmonic):
 
 
 class Recorded(Excitation):
-    """A force or an acceleration of the foundation as a record, linear in between.
+    """Recorded force or acceleration of the foundation, interpolated linearly.
 
-    Before the first time the first value holds, after the last one the last.
+    The first value holds before the first time, and the last value after the last time.
 
     Attributes
     ----------
-    times, values : (k,) instants and values
-    what : "force", or the foundation's acceleration "along" or "across" the strip
+    times : (k,) rising times
+    values : (k,) forces per width, or accelerations
+    what : "force" at the loaded end, or acceleration "along" or "across" the strip
+
+    Examples
+    --------
+    A force of 1 that vanishes within a time of 0.1:
+
+    >>> release = Recorded([0.0, 0.1], [1.0, 0.0])
     """
 
     times: Array
@@ -170,12 +180,12 @@ class Recorded(Excitation):
 
 
 class Impact(Excitation):
-    """A blow on the loaded end: a half sine of force, or an impulse at t = 0.
+    """Impact on the loaded end: a half sine of force, or an impulse at t = 0.
 
     Attributes
     ----------
-    impulse : the force's integral over time
-    duration : of the blow; 0 is an impulse, which gives the end its velocity at once
+    impulse : integral of the force over time, per width
+    duration : duration of the half sine; 0 is an impulse, which sets the initial velocity
     """
 
     impulse: Array
@@ -191,14 +201,14 @@ class Impact(Excitation):
 
     def force(self, time: Array) -> Array:
         """See `Excitation.force`."""
-        long = jnp.where(self.duration > 0.0, self.duration, 1.0)
-        acting = (self.duration > 0.0) & (time < long)
-        wave = jnp.sin(jnp.pi * jnp.minimum(time / long, 1.0))
-        return jnp.where(acting, 0.5 * jnp.pi * self.impulse / long * wave, 0.0)
+        duration = jnp.where(self.duration > 0.0, self.duration, 1.0)
+        acts = (self.duration > 0.0) & (time < duration)
+        wave = jnp.sin(jnp.pi * jnp.minimum(time / duration, 1.0))
+        return jnp.where(acts, 0.5 * jnp.pi * self.impulse / duration * wave, 0.0)
 
     @property
-    def push(self) -> Array:
-        """See `Excitation.push`."""
+    def initial_impulse(self) -> Array:
+        """See `Excitation.initial_impulse`."""
         return jnp.where(self.duration > 0.0, 0.0, self.impulse)
 
     def acts(self, span: float) -> bool:
@@ -207,5 +217,6 @@ class Impact(Excitation):
 
 
 def _in_direction(direction: str, value: Array) -> tuple[Array, Array]:
-    nothing = jnp.zeros_like(value)
-    return (value, nothing) if direction == "along" else (nothing, value)
+    """Acceleration along X and along Y."""
+    zero = jnp.zeros_like(value)
+    return (value, zero) if direction == "along" else (zero, value)

@@ -1,4 +1,4 @@
-"""Natural frequencies of the strip at rest: stuck or free to slide, by the linear eigenproblem."""
+"""Natural frequencies and modes of a strip at rest, stuck or without friction."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
-from jbeamshell.dynamics.strip.equations import Equations, check
+from jbeamshell.dynamics.strip.equations import Equations, check_scene
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.mechanics.normal_contact import Compliance
@@ -22,13 +22,13 @@ from jbeamshell.scene.scene import Scene
 
 
 class Modes(NamedTuple):
-    """Natural vibrations.
+    """Natural vibrations of a strip.
 
     Attributes
     ----------
-    frequency : (k,) angular, rising
-    x : (n,) nodes
-    shapes : (k, n, m) fields, of unit modal mass
+    frequency : (k,) angular frequencies, rising
+    x : (n,) node positions
+    shapes : (k, n, m) nodal fields of unit modal mass
     """
 
     frequency: NDArray[np.float64]
@@ -43,23 +43,28 @@ def modes(
     *,
     stuck: bool = True,
 ) -> Modes:
-    """Natural vibrations about the strip before anything acts on it.
+    """Natural vibrations of the unloaded strip, by the linear eigenproblem.
 
     Parameters
     ----------
-    scene : the strip; a compliant contact counts as closed
-    inertia, attached : as of `simulate`; a chain is left out
-    stuck : whether friction holds everywhere, elastically, with k_t; else it is without
+    scene : scene of the strip; a compliant contact counts as closed
+    inertia : density and damping, without effect of the damping; None is density 1
+    attached : masses at the loaded end, of which the payload counts but not the chain
+    stuck : True if the elastic slip k_t acts at every node; False is without friction
 
     Raises
     ------
     InputError
-        for a scene that cannot be set in motion
+        for a scene that has no equations of motion, such as a curved strip
+
+    Examples
+    --------
+    >>> modes(jb.Scene(), attached=AttachedMasses(20.0)).frequency[0]
     """
     inertia, attached = inertia or Inertia(), attached or AttachedMasses()
-    check(scene, inertia)
-    given = _matrices(scene, inertia, AttachedMasses(attached.payload), stuck)
-    mass, stiffness, x, moves = map(np.asarray, given)
+    check_scene(scene, inertia)
+    matrices = _matrices(scene, inertia, AttachedMasses(attached.payload), stuck)
+    mass, stiffness, x, moves = map(np.asarray, matrices)
     free = np.flatnonzero(moves)
     pick = np.ix_(free, free)
     values, vectors = scipy.linalg.eigh(stiffness[pick], mass[pick])
@@ -74,47 +79,45 @@ def modes(
 def _matrices(
     scene: Scene, inertia: Inertia, attached: AttachedMasses, stuck: bool
 ) -> tuple[Array, ...]:
-    """Mass and stiffness of the active fields (n a, n a), the nodes, and what moves."""
+    """Mass and stiffness (n a, n a) of the active fields, nodes (n,), and free fields (n, a)."""
     equations = Equations(scene, inertia, attached, Excitation())
     system, columns = equations.system, list(scene.model.active)
-    held = stuck and equations.rubs
+    foundation = system.foundation
 
     def forces(active: Array) -> Array:
         q = system.embed(active)
-        pull = system.elastic_forces(q, 0.0)
-        if held:
-            rubbed = jnp.where(
-                system.foundation.friction > 0.0, system.foundation.slip_stiffness, 0.0
-            )
-            pull = pull.at[:, V].add(system.tributary * rubbed * q[:, V])
-        if isinstance(system.foundation.normal_law, Compliance):
-            pull = pull.at[:, W].add(
-                system.tributary * system.foundation.normal_law.stiffness * q[:, W]
-            )
-        return pull[:, columns]
+        internal = system.elastic_forces(q, 0.0)
+        if stuck and foundation.present:
+            slip_stiffness = jnp.where(foundation.friction > 0.0, foundation.slip_stiffness, 0.0)
+            internal = internal.at[:, V].add(system.tributary * slip_stiffness * q[:, V])
+        if isinstance(foundation.normal_law, Compliance):
+            stiffness = foundation.normal_law.stiffness
+            internal = internal.at[:, W].add(system.tributary * stiffness * q[:, W])
+        return internal[:, columns]
 
-    rest = system.unloaded().q[:, columns]
-    stiffness = jax.jacfwd(forces)(rest).reshape(rest.size, rest.size)
+    zero = system.unloaded().q[:, columns]
+    stiffness = jax.jacfwd(forces)(zero).reshape(zero.size, zero.size)
     symmetric = 0.5 * (stiffness + stiffness.T)
-    return equations.dense_mass(), symmetric, system.x, jnp.asarray(equations.moves)
+    return equations.mass.dense(), symmetric, system.x, jnp.asarray(equations.mass.free)
 
 
 def highest_frequency(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> float:
-    """Highest angular frequency of the stuck strip with what rides on it, or a bound of it."""
-    found = modes(scene, inertia, attached)
-    own = float(found.frequency[-1])
+    """Upper bound of the angular frequencies of the stuck strip with its attached masses."""
+    strip = modes(scene, inertia, attached)
+    highest = float(strip.frequency[-1])
     if not attached.count:
-        return own
-    # A spring can at most add its stiffness over the masses at its two ends (Gershgorin).
+        return highest
+    # A spring adds at most its stiffness over the masses at its two ends (Gershgorin).
     springs, masses = np.asarray(attached.springs), np.asarray(attached.masses)
     height = 2.0 * float(scene.strip.half_height)
-    light = float(inertia.mean_density(scene)) * height * (found.x[-1] - found.x[-2]) / 24.0
-    behind = np.append(springs[1:], 0.0)
-    chain = float(np.max(2.0 * (springs + behind) / masses))
-    return float(np.sqrt(own**2 + chain + springs[0] / (light + float(attached.payload))))
+    end_mass = float(inertia.mean_density(scene)) * height * (strip.x[-1] - strip.x[-2]) / 24.0
+    next_springs = np.append(springs[1:], 0.0)
+    chain = float(np.max(2.0 * (springs + next_springs) / masses))
+    end = springs[0] / (end_mass + float(attached.payload))
+    return float(np.sqrt(highest**2 + chain + end))
 
 
 def first_period(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> float:
-    """Period of the stuck strip's first vibration, its chain's masses as if they sat on its end."""
-    carried = AttachedMasses(attached.payload + attached.masses.sum())
-    return 2.0 * np.pi / float(modes(scene, inertia, carried).frequency[0])
+    """Period of the stuck strip's first mode, with the masses of the chain fixed to its end."""
+    fixed = AttachedMasses(attached.payload + attached.masses.sum())
+    return 2.0 * np.pi / float(modes(scene, inertia, fixed).frequency[0])

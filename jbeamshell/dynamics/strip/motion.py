@@ -1,4 +1,4 @@
-"""Motion: what a transient left behind, with its energies."""
+"""Motion: the result of a transient, with its energies."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jbeamshell.scene.scene import Scene
 
 
 class Ending(enum.IntEnum):
-    """How a transient ended."""
+    """Way in which a transient ended."""
 
     COMPLETE = 0
     TOO_MANY_STEPS = 1
@@ -26,24 +26,26 @@ class Ending(enum.IntEnum):
 
 
 class Motion(eqx.Module):
-    """Result of a transient, at evenly spaced instants; those not reached hold NaN.
+    """Result of a transient at T evenly spaced times; times that were not reached hold NaN.
 
-    Energies are per width, in the frame of the foundation.
+    Energies and work are per width, in the frame of the foundation.
 
     Attributes
     ----------
-    scene, inertia, attached, excitation : what was set in motion
-    x, tributary : (n,) nodes and their contact lengths
-    time : (T,) instants
-    fields, rates : (T, n, m) v, w, beta, psi (and those of a hierarchic section), and their rates
-    traction, reaction : (T, n) of friction, and normal
-    displacement, velocity : (T,) u(L) since the pressure, and its rate
+    scene, inertia, attached, excitation : input of `jbeamshell.dynamics.simulate`
+    x, tributary : (n,) node positions and tributary lengths
+    time : (T,) times
+    fields, rates : (T, n, m) nodal fields v, w, beta, psi (and those of a section of order p), and
+        their rates
+    traction, reaction : (T, n) friction traction and normal reaction
+    displacement, velocity : (T,) u(L), counted from the pressed strip, and its rate
     chain : (T, k) displacements of the chain's masses
     force : (T,) F at the loaded end
-    kinetic, stored : (T,) energies, the sliders', the contact's and the pressure's in the second
+    kinetic : (T,) kinetic energy
+    stored : (T,) potential energy of the strip, the contact, the pressures and the chain
     external_work : (T,) work done by forces and by the foundation since t = 0
     friction_work, damping_work : (T,) work lost by friction and by damping since t = 0
-    steps, rejected : time steps taken, and those of them that were taken back
+    steps, rejected : number of time steps, and of those that were rejected
     status : code of `Ending`
     """
 
@@ -73,24 +75,24 @@ class Motion(eqx.Module):
 
     @property
     def reached(self) -> float:
-        """Time of the last instant that was computed."""
+        """Last time that was computed."""
         known = np.isfinite(np.asarray(self.displacement))
         return float(np.asarray(self.time)[known].max(initial=0.0))
 
     @property
     def energy(self) -> Array:
-        """Kinetic and stored energy, from what the strip stores at rest under the last load."""
+        """Kinetic plus stored energy, (T,)."""
         return self.kinetic + self.stored
 
     @property
     def imbalance(self) -> Array:
-        """Energy that the ledger does not account for, (T,); zero but for errors of the steps."""
+        """Error of the energy balance, (T,); zero but for errors of the time steps."""
         change = self.energy - self.energy[0]
         return change - self.external_work + self.friction_work + self.damping_work
 
     @property
     def complete(self) -> bool:
-        """Whether the whole span was followed."""
+        """True if the whole span was computed."""
         return int(self.status) == Ending.COMPLETE
 
     def plot(self, axes: Any = None) -> Any:
@@ -100,35 +102,33 @@ class Motion(eqx.Module):
         return plotting.vibration(self, axes=axes)
 
     def figures(self) -> dict[str, Any]:
-        """Figures by name, numbers that JSON takes."""
+        """Summary by name, in numbers and words that JSON takes."""
         known = np.isfinite(np.asarray(self.displacement))
         last = int(np.flatnonzero(known)[-1])
-        scale = float(np.max(np.abs(np.asarray(self.kinetic)[known])))
-        figures = {
+        return {
             "reached": self.reached,
             "steps": int(self.steps),
             "rejected_steps": int(self.rejected),
             "largest_displacement": float(np.max(np.abs(np.asarray(self.displacement)[known]))),
-            "largest_kinetic_energy": scale,
+            "largest_kinetic_energy": float(np.max(np.abs(np.asarray(self.kinetic)[known]))),
             "external_work": float(self.external_work[last]),
             "friction_work": float(self.friction_work[last]),
             "damping_work": float(self.damping_work[last]),
             "energy_imbalance": float(jnp.max(jnp.abs(self.imbalance[: last + 1]))),
             "status": Ending(int(self.status)).name.lower(),
         }
-        return figures
 
     def __str__(self) -> str:
-        """Figures, one a line."""
+        """Summary, one quantity a line."""
         return "\n".join(f"{name:24s} {value}" for name, value in self.figures().items())
 
 
 class InterruptedMotionError(UnconvergedError):
-    """A transient that ended too early.
+    """Transient that ended before its span.
 
     Attributes
     ----------
-    motion : the part computed
+    motion : the part that was computed
     """
 
     def __init__(self, message: str, motion: Motion) -> None:

@@ -1,4 +1,4 @@
-r"""Elastic slip as a rate law: friction whose memory is a state of a differential equation.
+r"""Rate law of friction with elastic slip, for solvers of ordinary differential equations.
 
 The virgin curve S(z) = z/(1+z^m)^(1/m) of `jbeamshell.mechanics.friction.ElasticSlip` obeys
 S' = (1 - S^m)^(1+1/m), so at a constant cap the same loop is
@@ -6,9 +6,9 @@ S' = (1 - S^m)^(1+1/m), so at a constant cap the same loop is
     t_t = k_t v_t (1 - (abs(t)/cap)^m)^(1+1/m)    in loading, t v_t > 0,
     t_t = k_t v_t                                 in unloading,
 
-continuous in t and in v_t.  Where the cap falls below abs(t), the traction follows it down with a
-relaxation time that is short against everything else; what it does dissipates all the same.  The
-same law moves the sliders of a network: a slider's force is its traction.
+continuous in t and in v_t.  Where the cap falls below abs(t), the traction decays to the cap with
+a relaxation time that is short compared with the vibration; this decay dissipates energy too.  The
+same law holds for the sliders of a network, with a slider's force in place of the traction.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import require
 from jbeamshell.mechanics.friction import ElasticSlip, FrictionLaw, SharpSlip
 
-SHARPEST = 16.0  # m in place of a sharp slider's, whose rate jumps
+SHARPEST = 16.0  # exponent m that replaces a sharp slider, whose rate jumps
 
 
 def exponent(law: FrictionLaw) -> Array:
-    """The exponent m of a rate law that has the loops of a law.
+    """Exponent m of the rate law that has the loops of a friction law.
 
-    A sharp slider's rate jumps when it starts to slip, which no solver of differential equations
-    may be given; `SHARPEST` takes its place.
+    The rate of a sharp slider jumps when it starts to slip, which solvers of differential equations
+    do not accept; it is replaced by `SHARPEST`.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def exponent(law: FrictionLaw) -> Array:
         for a law that has no such rate
     """
     known = isinstance(law, SharpSlip | ElasticSlip)
-    fix = "has no rate that time steps of any size agree on: take contact.law = 'elastic-slip'"
+    fix = "depends on the size of the steps, so it has no rate: take 'elastic-slip'"
     require("contact.law", type(law).__name__, known, fix)
     return getattr(law, "smoothing", jnp.asarray(SHARPEST))
 
@@ -43,27 +43,27 @@ def exponent(law: FrictionLaw) -> Array:
 def traction_rate(
     t: Array, speed: Array, cap: Array, stiffness: ArrayLike, m: Array, floor: ArrayLike
 ) -> Array:
-    """Rate of the traction, without the relaxation.
+    """Rate of the traction at a constant cap; arrays of any one shape.
 
     Parameters
     ----------
     t : traction
-    speed : v_t
-    cap : mu R, or the force of a slider
-    stiffness : k_t
+    speed : rate v_t of the tangential displacement
+    cap : cap mu R, or the slip force of a slider
+    stiffness : slip stiffness k_t
     m : exponent
-    floor : least cap that a ratio is taken of
+    floor : smallest cap that the traction is divided by
     """
     loading = t * speed > 0.0
     ratio = jnp.abs(t) / jnp.maximum(cap, floor)
-    part = jnp.where(loading, jnp.minimum(ratio, 1.0), 0.0)
-    rest = jnp.maximum(1.0 - part**m, 0.0)
-    positive = jnp.where(rest > 0.0, rest, 1.0)  # its power has no slope at zero
-    slowing = jnp.where(rest > 0.0, positive ** (1.0 + 1.0 / m), 0.0)
-    return jnp.multiply(stiffness, speed) * slowing
+    used = jnp.where(loading, jnp.minimum(ratio, 1.0), 0.0)
+    reserve = jnp.maximum(1.0 - used**m, 0.0)
+    positive = jnp.where(reserve > 0.0, reserve, 1.0)  # the power has no derivative at zero
+    factor = jnp.where(reserve > 0.0, positive ** (1.0 + 1.0 / m), 0.0)
+    return jnp.multiply(stiffness, speed) * factor
 
 
 def relaxation_rate(t: Array, cap: Array, time: ArrayLike) -> Array:
-    """What brings a traction back that a falling cap has left behind, traction per time."""
-    room = jnp.maximum(cap, 0.0)
-    return (jnp.clip(t, -room, room) - t) / time
+    """Rate at which a traction beyond its cap decays to it, with a relaxation time."""
+    limit = jnp.maximum(cap, 0.0)
+    return (jnp.clip(t, -limit, limit) - t) / time

@@ -1,4 +1,4 @@
-"""Transients: a scene set in motion, by diffrax."""
+"""Transients of a scene, solved by diffrax."""
 
 from __future__ import annotations
 
@@ -19,21 +19,22 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import POSITIVE, is_traced, require, require_choice, require_number
 from jbeamshell.dynamics.strip import rate_friction
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
-from jbeamshell.dynamics.strip.block_solver import Banded
-from jbeamshell.dynamics.strip.equations import Equations, MotionState, check
+from jbeamshell.dynamics.strip.block_solver import BlockElimination
+from jbeamshell.dynamics.strip.equations import Equations, MotionState, check_scene
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
-from jbeamshell.dynamics.strip.midpoint import Midpoint, Prepared
+from jbeamshell.dynamics.strip.midpoint import Midpoint
 from jbeamshell.dynamics.strip.motion import Ending, InterruptedMotionError, Motion
+from jbeamshell.dynamics.strip.step_equations import StepMatrices
 from jbeamshell.dynamics.strip.stepsize import EXPLICIT, METHODS, STIFF, longest_step
 from jbeamshell.mechanics.friction import ElasticSlip
-from jbeamshell.mechanics.normal_contact import Absent
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.quasistatic.system import System
 from jbeamshell.scene.scene import Scene
 
 MOST_STEPS = 10_000_000
-HAPPENS = "nothing happens: give an excitation, or a force to let go of in released="
+RELEASE_STEPS = 8  # load steps to the force that is released, so that the reaction is followed
+NO_MOTION = "nothing happens: give an excitation, or a force to let go of in released="
 
 
 def simulate(
@@ -53,68 +54,75 @@ def simulate(
     progress: bool | None = None,
     throw: bool = True,
 ) -> Motion:
-    """Press the strip down, load it quasi-statically, let it go, and follow its motion.
+    """Transient of a strip that is pressed down, loaded quasi-statically and then released.
 
     Parameters
     ----------
-    scene : the strip, its contact and its model; of its load nothing is used
-    span : time that is followed
-    excitation : what shakes it; None is free vibration
-    inertia : density and what goes with it; None is density 1
-    attached : payload and chain at the loaded end
-    released : force F, or a path of forces, under which the strip rests before t = 0; None is the
-        pressed strip
-    samples : instants, evenly spaced from 0 to ``span``, that are kept
-    method : how it is followed.  "midpoint", the default, is implicit and without damping of its
-        own, with the friction law of load steps, see `jbeamshell.dynamics.strip.midpoint`.  The
-        others take friction as a rate law, with the exponent `rate_friction.SHARPEST` in place of a
-        sharp slider: "kvaerno3" and "kvaerno5" stiff, in steps chosen from the tolerance;
-        "tsit5" and "bosh3" explicit
-    tolerance : of a step's error (stiff), relative and to the sizes of a motion at gross slip
-    step : largest time step; by default a `PER_PERIOD`-th of the stuck strip's first period, and
-        for explicit methods `MARGIN` of the stable one
-    most_steps : after which it gives up
-    adjoint : diffrax's, such as `diffrax.ForwardMode()` to differentiate forwards
-    progress : whether to show how far it is; None is on a terminal only
-    throw : whether a motion that ends before ``span`` raises; if not, read ``motion.status``
+    scene : scene of the strip; its load is not used
+    span : end time
+    excitation : force at the end or acceleration of the foundation; None is free vibration
+    inertia : density and damping; None is density 1
+    attached : payload and chain of masses at the loaded end
+    released : force F, or path (k,) of forces, under which the strip rests before t = 0; None is
+        no force
+    samples : number of times in the result, evenly spaced from 0 to ``span``
+    method : "midpoint", implicit, with the friction law of load steps, see
+        `jbeamshell.dynamics.strip.midpoint`.  The other methods take friction as a rate law, see
+        `jbeamshell.dynamics.strip.rate_friction`: "kvaerno3" and "kvaerno5" are implicit and choose
+        their steps from the tolerance; "tsit5" and "bosh3" are explicit
+    tolerance : error of a step of kvaerno3 and kvaerno5, relative to the state and to a motion at
+        gross slip
+    step : largest time step; None is 1/200 of the first period of the stuck strip, or 0.9 of the
+        stable step for explicit methods
+    most_steps : largest number of time steps
+    adjoint : way in which diffrax differentiates, such as `diffrax.ForwardMode()` for forward mode
+    progress : show a progress bar; None shows it on a terminal only
+    throw : raise if the motion ends before ``span``; otherwise see ``motion.status``
 
     Returns
     -------
     Motion
-        instants that were not reached hold NaN.
+        times that were not reached hold NaN
 
     Raises
     ------
     InputError
-        for a scene that cannot be set in motion, a span in which nothing happens, or an explicit
-        step above the stable one
+        for a scene that has no equations of motion, neither an excitation nor a released force, or
+        an explicit step above the stable one
     InterruptedMotionError
-        if the solver gives up; it carries the part computed
+        if the solver stops before ``span``; it carries the part that was computed
+
+    Examples
+    --------
+    A mass on a strip under a harmonic force:
+
+    >>> load = Harmonic(0.8, frequency=2.0, ramp=3.0)
+    >>> motion = simulate(jb.Scene(), 5.0, load, attached=AttachedMasses(20.0))
+    >>> motion.plot()
     """
     inertia, attached = inertia or Inertia(), attached or AttachedMasses()
     excitation = excitation or Excitation()
-    check(scene, inertia)
+    check_scene(scene, inertia)
     require_number("span", span, POSITIVE + " (time)")
     whole = isinstance(samples, int | np.integer) and samples >= 2
-    require("samples", samples, whole, "must be a whole number of at least 2 instants")
+    require("samples", samples, whole, "must be a whole number of at least 2 times")
     require_number("tolerance", tolerance, POSITIVE)
     require_choice("method", method, METHODS)
     scene = scene if method == "midpoint" else smooth(scene)
-    acts = is_traced(excitation) or released is not None or excitation.acts(float(span))
-    require("excitation", type(excitation).__name__, acts, HAPPENS)
+    moves = is_traced(excitation) or released is not None or excitation.acts(float(span))
+    require("excitation", type(excitation).__name__, moves, NO_MOTION)
     longest = longest_step(scene, inertia, attached, method, step)
     start = _start(scene, released)
     if progress is None:
         progress = sys.stderr.isatty()
     times = np.linspace(0.0, float(span), samples)
     between = 1 if longest is None else max(1, math.ceil(times[1] / longest * (1.0 - 1e-9)))
-    instants = np.linspace(0.0, float(span), (samples - 1) * between + 1)
+    steps = np.linspace(0.0, float(span), (samples - 1) * between + 1)
     motion = _run(
         (scene, inertia, attached, excitation),
         start,
-        jnp.asarray(instants),
+        jnp.asarray(steps),
         None if longest is None else between,
-        samples,
         tolerance,
         method,
         most_steps,
@@ -122,28 +130,28 @@ def simulate(
         bool(progress) and not is_traced(scene, start),
     )
     if throw and not is_traced(motion):
-        _raise_if_cut(motion, float(span))
+        _raise_if_interrupted(motion, float(span))
     return motion
 
 
 def smooth(scene: Scene) -> Scene:
-    """The scene with a friction law that has a rate."""
+    """Scene with a friction law that has a rate."""
     m = rate_friction.exponent(scene.contact.law)
     return eqx.tree_at(lambda s: s.contact.law, scene, ElasticSlip(m))
 
 
 def _start(scene: Scene, released: ArrayLike | None) -> tuple[Array, Array, Array]:
-    """Fields, tractions and u(L) after the pressure, of the strip at rest before t = 0."""
+    """Fields and tractions at t = 0, and u(L) after the pressure."""
     path = np.zeros(1) if released is None else np.atleast_1d(np.asarray(released, float))
-    if path.size == 1:  # walked in some steps, so that friction sees where the reaction goes
-        path = float(path[0]) * np.arange(1, 9) / 8.0
+    if path.size == 1:
+        path = float(path[0]) * np.arange(1, RELEASE_STEPS + 1) / RELEASE_STEPS
     history = solve(scene, path)
-    rest = _end(scene, history.fields[history.pressed])
-    return history.fields[-1], history.traction[-1], rest
+    pressed = _end_displacement(scene, history.fields[history.pressed])
+    return history.fields[-1], history.traction[-1], pressed
 
 
 @eqx.filter_jit
-def _end(scene: Scene, q: Array) -> Array:
+def _end_displacement(scene: Scene, q: Array) -> Array:
     return System(scene).end_displacement(q)
 
 
@@ -151,60 +159,62 @@ def _end(scene: Scene, q: Array) -> Array:
 def _run(
     parts: tuple[Scene, Inertia, AttachedMasses, Excitation],
     start: tuple[Array, Array, Array],
-    instants: Array,
+    steps: Array,
     between: int | None,
-    samples: int,
     tolerance: Any,
     method: str,
     most_steps: int,
     adjoint: Any,
     progress: bool,
 ) -> Motion:
+    """Motion from the fields, tractions and u(L) of `_start`; ``steps`` are all step times."""
     equations = Equations(*parts)
-    units, unit = equations.units, equations.time_unit
-    times = instants[:: between or 1]
-    fields, traction, rest = start
-    state = equations.initial_state(fields, traction, parts[3].push)
-    args = None
+    scales, time_scale = equations.scales, equations.time_scale
+    times = steps[:: between or 1]
+    fields, traction, pressed = start
+    state = equations.initial_state(fields, traction, parts[3].initial_impulse)
+    matrices = None
     if method == "midpoint":
-        unit, units, args = (
-            jnp.ones_like(unit),
-            jax.tree.map(jnp.ones_like, units),
-            Prepared(equations),
-        )
+        time_scale, scales = jnp.ones_like(time_scale), jax.tree.map(jnp.ones_like, scales)
+        matrices = StepMatrices(equations)
 
     def rates(time: Any, scaled: MotionState, _: Any) -> MotionState:
-        inside = jax.tree.map(lambda a, u: a * u, scaled, units)
-        return jax.tree.map(lambda a, u: a * unit / u, equations(unit * time, inside), units)
+        state = jax.tree.map(lambda a, u: a * u, scaled, scales)
+        return jax.tree.map(
+            lambda a, u: a * time_scale / u, equations(time_scale * time, state), scales
+        )
 
-    stepping: Any = diffrax.StepTo(instants / unit)
+    controller: Any = diffrax.StepTo(steps / time_scale)
     if between is None:
-        stepping = diffrax.PIDController(rtol=tolerance, atol=tolerance)
+        controller = diffrax.PIDController(rtol=tolerance, atol=tolerance)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(rates),
         _solver(method, parts[1].mass, tolerance),
         0.0,
-        instants[-1] / unit,
+        steps[-1] / time_scale,
         None,
-        jax.tree.map(lambda a, u: a / u, state, units),
-        args,
-        saveat=diffrax.SaveAt(ts=times / unit),
-        stepsize_controller=stepping,
-        max_steps=min(most_steps, 10 * instants.size) if between else most_steps,
+        jax.tree.map(lambda a, u: a / u, state, scales),
+        matrices,
+        saveat=diffrax.SaveAt(ts=times / time_scale),
+        stepsize_controller=controller,
+        max_steps=min(most_steps, 10 * steps.size) if between else most_steps,
         adjoint=adjoint,
         progress_meter=diffrax.TqdmProgressMeter() if progress else diffrax.NoProgressMeter(),
         throw=False,
     )
-    states = jax.tree.map(lambda a, u: a * u, solution.ys, units)
-    return _motion(equations, parts, times, states, rest, solution)
+    states = jax.tree.map(lambda a, u: a * u, solution.ys, scales)
+    return _motion(equations, parts, times, states, pressed, solution)
 
 
 def _solver(method: str, mass: str, tolerance: Any) -> Any:
+    """Solver of diffrax."""
     if method == "midpoint":
         return Midpoint()
     if method in EXPLICIT:
         return EXPLICIT[method]()
-    linear: Any = lx.AutoLinearSolver(well_posed=None) if mass == "consistent" else Banded()
+    linear: Any = BlockElimination()
+    if mass == "consistent":
+        linear = lx.AutoLinearSolver(well_posed=None)
     finder = diffrax.VeryChord(
         rtol=10.0 * tolerance, atol=10.0 * tolerance, norm=optx.rms_norm, linear_solver=linear
     )
@@ -216,10 +226,10 @@ def _motion(
     parts: tuple[Scene, Inertia, AttachedMasses, Excitation],
     times: Array,
     states: MotionState,
-    rest: Array,
+    pressed: Array,
     solution: Any,
 ) -> Motion:
-    """What the states say, instants that were not reached as NaN."""
+    """Motion from its states; times that were not reached hold NaN."""
     reached = jnp.isfinite(states.work[:, 0])
 
     def masked(values: Array) -> Array:
@@ -227,17 +237,17 @@ def _motion(
 
     states = jax.tree.map(masked, states)
 
-    def seen(pair: tuple[Array, MotionState]) -> tuple[Array, ...]:
+    def quantities(pair: tuple[Array, MotionState]) -> tuple[Array, ...]:
         time, state = pair
-        answer = equations.response(time, state)
+        reaction = equations.response(time, state).reaction
         q, p = equations.nodal(state.q), equations.nodal(state.p)
-        speed = jnp.sum(equations.conjugate(q) * p[-1])
-        ends = (equations.system.end_displacement(q) - rest, speed)
-        return (q, p, answer.reaction, *ends, *equations.energies(state))
+        velocity = jnp.sum(equations.end_conjugate(q) * p[-1])
+        displacement = equations.system.end_displacement(q) - pressed
+        return (q, p, reaction, displacement, velocity, *equations.energies(state))
 
-    q, p, reaction, displacement, velocity, kinetic, stored = jax.lax.map(seen, (times, states))
-    rubs = 0.0 if isinstance(equations.system.foundation.normal_law, Absent) else 1.0
-    n = equations.n
+    found = jax.lax.map(quantities, (times, states))
+    q, p, reaction, displacement, velocity, kinetic, stored = found
+    n, has_contact = equations.n, float(equations.system.foundation.present)
     return Motion(
         scene=parts[0],
         inertia=parts[1],
@@ -248,7 +258,7 @@ def _motion(
         time=times,
         fields=q,
         rates=p,
-        traction=rubs * states.t[:, :n],
+        traction=has_contact * states.t[:, :n],
         reaction=masked(reaction),
         displacement=displacement,
         velocity=velocity,
@@ -266,14 +276,16 @@ def _motion(
 
 
 def _status(solution: Any, reached: Array) -> Array:
-    spent = solution.result == diffrax.RESULTS.max_steps_reached
-    cut = jnp.where(spent, Ending.TOO_MANY_STEPS, Ending.GAVE_UP)
-    whole = (solution.result == diffrax.RESULTS.successful) & jnp.all(reached)
-    return jnp.where(whole, Ending.COMPLETE, cut)
+    """Code of `Ending`."""
+    too_many = solution.result == diffrax.RESULTS.max_steps_reached
+    interrupted = jnp.where(too_many, Ending.TOO_MANY_STEPS, Ending.GAVE_UP)
+    complete = (solution.result == diffrax.RESULTS.successful) & jnp.all(reached)
+    return jnp.where(complete, Ending.COMPLETE, interrupted)
 
 
-def _raise_if_cut(motion: Motion, span: float) -> None:
-    if int(motion.status) == Ending.COMPLETE:
+def _raise_if_interrupted(motion: Motion, span: float) -> None:
+    """Raise `InterruptedMotionError` unless the motion is complete."""
+    if motion.complete:
         return
     reason = Ending(int(motion.status)).name.lower().replace("_", " ")
     raise InterruptedMotionError(

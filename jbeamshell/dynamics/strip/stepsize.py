@@ -1,4 +1,4 @@
-"""Methods of time integration, and the steps they may take."""
+"""Methods of time integration and their time steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jax import Array
 
 from jbeamshell.common.checks import POSITIVE, is_traced, require, require_choice, require_number
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
-from jbeamshell.dynamics.strip.equations import Equations, check
+from jbeamshell.dynamics.strip.equations import Equations, check_scene
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.modes import first_period, highest_frequency
@@ -27,8 +27,8 @@ EXPLICIT: dict[str, Callable[[], Any]] = {
     "bosh3": diffrax.Bosh3,
 }
 METHODS = ("midpoint", *STIFF, *EXPLICIT)
-PER_PERIOD = 200  # midpoint steps in the first period of the stuck strip, where no step is given
-MARGIN = 0.9  # of the stable step, taken where none is given
+PER_PERIOD = 200  # default number of midpoint steps in the first period of the stuck strip
+MARGIN = 0.9  # default step of explicit methods, over the stable one
 
 
 def stable_step(
@@ -37,21 +37,31 @@ def stable_step(
     attached: AttachedMasses | None = None,
     method: str = "tsit5",
 ) -> float:
-    """Largest time step with which an explicit method stays stable.
+    """Largest time step with which an explicit method is stable.
 
-    The method's stability limits along the imaginary axis (vibration, with the highest frequency of
-    the stuck strip) and along the real one (a traction's relaxation); without friction the second
-    does not count.  Points that slip fast have a faster decay of their own, k_t abs(v_t) m/cap,
-    which no step known beforehand allows for: look at the energy left over.
+    The method's stability limit along the imaginary axis bounds vibrations, by the highest
+    frequency of the stuck strip; its limit along the real axis bounds the relaxation of tractions,
+    if there is friction.  Tractions of nodes that slip fast decay still faster, with the rate
+    k_t abs(v_t) m/cap, which is not known beforehand: check `Motion.imbalance`.
+
+    Parameters
+    ----------
+    scene, inertia, attached : see `simulate`
+    method : "tsit5" or "bosh3"
+
+    Raises
+    ------
+    InputError
+        for another method, or a scene that has no equations of motion
     """
     inertia, attached = inertia or Inertia(), attached or AttachedMasses()
     require_choice("method", method, tuple(EXPLICIT))
-    check(scene, inertia)
+    check_scene(scene, inertia)
     vibration, decay = stability_limits(EXPLICIT[method]().tableau)
     limit = vibration / highest_frequency(scene, inertia, attached)
-    rubs = float(scene.contact.friction) > 0.0 and scene.contact.normal != "none"
-    if rubs:
-        limit = min(limit, decay * float(_relaxation(scene, inertia, attached)))
+    has_friction = float(scene.contact.friction) > 0.0 and scene.contact.normal != "none"
+    if has_friction:
+        limit = min(limit, decay * float(_relaxation_time(scene, inertia, attached)))
     return limit
 
 
@@ -68,28 +78,29 @@ def stability_limits(tableau: Any) -> tuple[float, float]:
     def limit(direction: complex) -> float:
         z = direction * grid
         growth = np.abs(1.0 + sum(c * z ** (k + 1) for k, c in enumerate(terms)))
-        beyond = np.flatnonzero(growth > 1.0 + 1e-6)
-        return float(grid[beyond[0] - 1]) if beyond.size and beyond[0] else float(grid[-1])
+        unstable = np.flatnonzero(growth > 1.0 + 1e-6)
+        return float(grid[unstable[0] - 1]) if unstable.size and unstable[0] else float(grid[-1])
 
     return limit(1j), limit(-1.0)
 
 
 @eqx.filter_jit
-def _relaxation(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> Array:
-    return Equations(scene, inertia, attached, Excitation()).relaxation
+def _relaxation_time(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> Array:
+    return Equations(scene, inertia, attached, Excitation()).relaxation_time
 
 
 def longest_step(
     scene: Scene, inertia: Inertia, attached: AttachedMasses, method: str, step: float | None
 ) -> float | None:
-    """The constant step to take; None where the solver chooses."""
+    """Largest time step to take; None if the solver chooses its steps."""
     if step is not None:
         require_number("step", step, POSITIVE + " (time)")
     if method in STIFF:
-        require("step", step, step is None, f"{method} chooses its own from the tolerance")
+        fix = f"{method} chooses its own steps from the tolerance: leave it out"
+        require("step", step, step is None, fix)
         return None
     if is_traced(scene, inertia, attached):
-        fix = "a traced scene's own cannot be known: give it"
+        fix = "has no default for a traced scene: give a number"
         require("step", step, step is not None, fix)
         return step
     if method == "midpoint":

@@ -1,4 +1,4 @@
-"""One step of the two-step family of `jbeamshell.dynamics.strip.midpoint`, and what it hands on."""
+"""Time step of the two-step family of `jbeamshell.dynamics.strip.midpoint`."""
 
 from __future__ import annotations
 
@@ -12,67 +12,52 @@ from jax import Array
 
 
 class StepMemory(NamedTuple):
-    """What a step hands on to the next.
+    """Quantities of a step that the next step needs.
 
     Attributes
     ----------
-    v, traction, cap : (n,) tangential displacement, friction and mu R at q*
-    change, gain : (b, a) increments of the fields and of their rates
-    begun : 0 before the first step
+    v, traction, cap : (n,) tangential displacement, friction traction and cap at q*
+    change, rate_change : (b, a) increments of the fields and of their rates
+    started : 0 before the first step, else 1
     """
 
     v: Array
     traction: Array
     cap: Array
     change: Array
-    gain: Array
-    begun: Array
+    rate_change: Array
+    started: Array
 
 
 class TimeStep(NamedTuple):
-    """A time step.
+    """Time step from z_0 to z_1, evaluated at z* = z_0 + c (z_1 - z_0) - g (z_0 - z_-1).
 
     Attributes
     ----------
-    time, h : its start and its size
-    part : c = g + 1/2, the increment's part in z*
+    time, h : start and size of the step
+    weight : c = g + 1/2
     """
 
     time: Array
     h: Array
-    part: Array
+    weight: Array
 
     @property
-    def before(self) -> Array:
-        """G, the last increment's part in z*, taken away."""
-        return self.part - 0.5
+    def last_weight(self) -> Array:
+        """Weight g of the last increment."""
+        return self.weight - 0.5
 
-    def mean(self, history: Callable[[Array], Any]) -> Any:
-        """Mean of what acts from outside, by Gauss's three points: short blows are not missed."""
+    def gauss_mean(self, history: Callable[[Array], Any]) -> Any:
+        """Mean of an excitation over the step, by three Gauss points, so that no blow is missed."""
         points, weights = np.polynomial.legendre.leggauss(3)
         times = self.time + 0.5 * (1.0 + points) * self.h
-        seen = jax.vmap(history)(times)
-        return jax.tree.map(lambda values: jnp.sum(0.5 * weights * values), seen)
+        values = jax.vmap(history)(times)
+        return jax.tree.map(lambda v: jnp.sum(0.5 * weights * v), values)
 
-    def reached(self, start: Array, change: Array, last: Array) -> Array:
-        """z* of a start and its increments."""
-        return start + self.part * change - self.before * last
+    def evaluated(self, start: Array, change: Array, last_change: Array) -> Array:
+        """Value z* from z_0, the increment and the last increment."""
+        return start + self.weight * change - self.last_weight * last_change
 
-    def gain(self, rate: Array, start: Array, last: Array) -> Array:
-        """Increment of the rates from their z*."""
-        return (rate - start + self.before * last) / self.part
-
-
-class ChainPull(NamedTuple):
-    """A chain of masses during a step: what it pulls with at the loaded end, linear in its motion.
-
-    Attributes
-    ----------
-    still, slope : force for no increment of u(L), and per increment
-    first, each : (k,) increments of the chain likewise
-    """
-
-    still: Array
-    slope: Array
-    first: Array
-    each: Array
+    def increment(self, value: Array, start: Array, last_change: Array) -> Array:
+        """Increment z_1 - z_0 that has a value z*; the inverse of `evaluated`."""
+        return (value - start + self.last_weight * last_change) / self.weight

@@ -1,1 +1,1 @@
-"""A structure with strips as joints: matrices, modal analysis, transients."""
+"""Structures with strips as joints: matrices, modal analysis, transients."""

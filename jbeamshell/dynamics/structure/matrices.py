@@ -1,4 +1,4 @@
-"""A user's structure with joints in it: mass, damping and stiffness matrices of any origin."""
+"""Structures with joints: mass, damping and stiffness matrices from any finite-element code."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from jbeamshell.common.checks import require
 from jbeamshell.dynamics.structure.joint import Joint
 
 SQUARE = "give a square matrix of numbers, dense or scipy sparse, as large as the mass matrix"
-SYMMETRIC = "must be symmetric; take (A + A.T)/2 if rounding is all that is wrong"
+SYMMETRIC = "must be symmetric; take (A + A.T)/2 if only rounding makes it unsymmetric"
 SYMMETRY_ROUNDING = 1e-8
-DENSE = 400  # degrees of freedom up to which everything is dense
+DENSE = 400  # largest number of degrees of freedom for dense linear algebra
 
 
 class Attachment(NamedTuple):
-    """A joint between two degrees of freedom.
+    """Joint between two degrees of freedom.
 
     Attributes
     ----------
-    joint : its law
-    first, second : the degrees of freedom; None is the ground
+    joint : force element
+    first, second : degrees of freedom, counted from 0; None is the ground
     """
 
     joint: Joint
@@ -35,12 +35,21 @@ class Attachment(NamedTuple):
 
 
 class Structure:
-    """M x_tt + C x_t + K x + joints = forces.
+    """Structure with joints, M x_tt + C x_t + K x + joint forces = f.
 
     Attributes
     ----------
-    mass, damping, stiffness : (n, n) dense or sparse, symmetric
-    attachments : the joints, whose stiffness the matrices do not contain
+    mass, damping, stiffness : (n, n) symmetric matrices, dense or scipy sparse
+    attachments : joints; the matrices do not contain their stiffness
+
+    Examples
+    --------
+    Two masses on a spring, the first one held by a joint:
+
+    >>> joint = Joint([1.0, 3.0], [1.0, 2.0])
+    >>> spring = [[2.0, -2.0], [-2.0, 2.0]]
+    >>> Structure(np.eye(2), spring, [Attachment(joint, 0)]).size
+    2
     """
 
     def __init__(
@@ -50,20 +59,20 @@ class Structure:
         attachments: Sequence[Attachment] = (),
         damping: Any = None,
     ) -> None:
-        """Check the matrices.
+        """Structure from its matrices and joints.
 
         Raises
         ------
         InputError
             for matrices that are not square, of one size, symmetric and finite; for a mass matrix
-            that is not positive; for a joint that is not between degrees of freedom; for a rigid
-            mode, which neither stiffness nor a joint that sticks resists
+            that is not positive definite; for a joint at a degree of freedom that does not exist;
+            for a rigid-body mode with all joints stuck
         """
         self.mass = _checked("mass", mass)
         size = self.mass.shape[0]
         self.stiffness = _checked("stiffness", stiffness, size)
-        none = 0.0 * self.mass
-        self.damping = none if damping is None else _checked("damping", damping, size)
+        undamped = 0.0 * self.mass
+        self.damping = undamped if damping is None else _checked("damping", damping, size)
         self.attachments = tuple(attachments)
         for place, attached in enumerate(self.attachments):
             ends = [attached.first, *([] if attached.second is None else [attached.second])]
@@ -75,12 +84,12 @@ class Structure:
 
     @property
     def size(self) -> int:
-        """Degrees of freedom."""
+        """Number of degrees of freedom."""
         return self.mass.shape[0]
 
     @property
     def directions(self) -> NDArray[np.float64]:
-        """What turns motions into the joints' displacements, transposed: (n, joints)."""
+        """Matrix B (n, joints): B.T x are the displacements of the joints, B r their forces."""
         directions = np.zeros((self.size, len(self.attachments)))
         for column, attached in enumerate(self.attachments):
             directions[attached.first, column] = 1.0
@@ -89,36 +98,37 @@ class Structure:
         return directions
 
     @property
-    def stuck(self) -> Any:
-        """Stiffness with all joints sticking."""
+    def stuck_stiffness(self) -> Any:
+        """Stiffness matrix (n, n) with all joints stuck."""
         own = np.array([float(a.joint.stiffness) for a in self.attachments])
-        along = self.directions
+        directions = self.directions
         if scipy.sparse.issparse(self.stiffness):
-            along = scipy.sparse.csr_array(along)
-            return self.stiffness + along @ scipy.sparse.diags_array(own) @ along.T
-        return self.stiffness + (along * own) @ along.T
+            directions = scipy.sparse.csr_array(directions)
+            return self.stiffness + directions @ scipy.sparse.diags_array(own) @ directions.T
+        return self.stiffness + (directions * own) @ directions.T
 
     def modes(self, count: int = 6) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Angular frequencies (k,) and shapes (n, k) of unit modal mass, all joints sticking."""
-        stuck, count = self.stuck, min(count, self.size)
+        """Angular frequencies (k,) and shapes (n, k) of unit modal mass, all joints stuck."""
+        stuck, count = self.stuck_stiffness, min(count, self.size)
         if self.size <= DENSE or count >= self.size - 1:
             values, shapes = scipy.linalg.eigh(dense(stuck), dense(self.mass))
         else:
-            stiff, heavy = (scipy.sparse.csc_array(a) for a in (stuck, self.mass))
-            # Below zero, so that a rigid mode is seen and not divided by.
+            stiffness, mass = (scipy.sparse.csc_array(a) for a in (stuck, self.mass))
+            # A shift below zero, because the matrix is singular at a rigid-body mode.
             shift = -SYMMETRY_ROUNDING * abs(stuck).max() / abs(self.mass).max()
-            values, shapes = scipy.sparse.linalg.eigsh(stiff, count, heavy, sigma=shift)
+            values, shapes = scipy.sparse.linalg.eigsh(stiffness, count, mass, sigma=shift)
         order = np.argsort(values)[:count]
         return np.sqrt(np.maximum(values[order], 0.0)), shapes[:, order]
 
-    def compliance(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Static displacements (n, k) under loads (n, k), all joints sticking."""
+    def static_displacements(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Static displacements (n, k) under loads (n, k), all joints stuck."""
         if self.size <= DENSE:
-            return scipy.linalg.solve(dense(self.stuck), loads, assume_a="pos")
-        solver = scipy.sparse.linalg.splu(scipy.sparse.csc_array(self.stuck))
+            return scipy.linalg.solve(dense(self.stuck_stiffness), loads, assume_a="pos")
+        solver = scipy.sparse.linalg.splu(scipy.sparse.csc_array(self.stuck_stiffness))
         return solver.solve(loads)
 
     def _check_modes(self) -> None:
+        """Raise `InputError` for a mass that is not positive definite, or a rigid-body mode."""
         try:
             if self.size <= DENSE:
                 scipy.linalg.cholesky(dense(self.mass))
@@ -127,13 +137,14 @@ class Structure:
             lightest = -1.0
         require("mass", self.mass.shape, lightest > 0.0, "must be positive definite")
         frequency, _ = self.modes(1)
-        scale = float(abs(self.stuck).max() / abs(self.mass).max())
+        scale = float(abs(self.stuck_stiffness).max() / abs(self.mass).max())
         held = frequency[0] ** 2 > SYMMETRY_ROUNDING * scale
-        fix = "leaves an undamped rigid mode: hold the structure, or attach a joint that does"
+        fix = "leaves a rigid mode: hold the structure by a spring or a joint"
         require("stiffness", self.stiffness.shape, held, fix)
 
 
 def _checked(name: str, matrix: Any, size: int | None = None) -> Any:
+    """Matrix of floats, dense or sparse; raises `InputError`."""
     if scipy.sparse.issparse(matrix):
         known, values = scipy.sparse.csr_array(matrix).astype(float), matrix.data
     else:
@@ -152,5 +163,5 @@ def _checked(name: str, matrix: Any, size: int | None = None) -> Any:
 
 
 def dense(matrix: Any) -> NDArray[np.float64]:
-    """The matrix with all its zeros."""
+    """Matrix as a dense array."""
     return matrix.toarray() if scipy.sparse.issparse(matrix) else matrix

@@ -1,13 +1,13 @@
 r"""Frequency and damping of a structure with joints over amplitude, without a transient.
 
-Quasi-static modal analysis (Festjens, Chevallier & Dion 2013; Allen, Lacayo & Brake 2016): forces
-alpha M phi of a mode's own distribution are applied statically, and the modal displacement
-q = phi^T M x is read off.  The backbone alpha(q) is that of the mode; by Masing's rule
+Quasi-static modal analysis (Festjens, Chevallier & Dion 2013; Allen, Lacayo & Brake 2016) applies
+the static forces alpha M phi of a mode phi and finds the modal displacement q = phi^T M x.  With
+the backbone alpha(q) of the mode, Masing's rule gives
 
     omega^2 = alpha/q,      zeta = D/(2 pi alpha q),      D = 8 int_0^q alpha dq - 4 alpha q.
 
-`harmonic_balance` is an independent check: every joint acts by the first harmonic of its loop
-(its describing function), and the complex eigenproblem is solved for the amplitude.
+`harmonic_balance` is an independent check: it replaces every joint by the first harmonic of its
+loop (its describing function) and solves the complex eigenproblem at every amplitude.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import UnconvergedError
 from jbeamshell.dynamics.structure.matrices import Structure, dense
 
-LOADS = "give rising positive modal displacements"
-MOST = 100  # Newton iterations
-SUBSTEPS = 8  # between two amplitudes
+AMPLITUDES = "give rising positive modal displacements"
+MAX_ITERATIONS = 100
+SUBSTEPS = 8  # load steps between two amplitudes
 
 
 class ModalCurve(NamedTuple):
-    """A mode over its amplitude, (k,) each.
+    """Frequency and damping of a mode over its amplitude, (k,) each.
 
     Attributes
     ----------
     amplitude : modal displacement q
-    frequency : angular
-    damping : ratio zeta, of the joints alone
-    dissipation : energy per cycle
+    frequency : angular frequency
+    damping : damping ratio zeta
+    dissipation : energy lost in the joints per cycle
     joints : (k, joints) amplitudes of the joints' displacements
     """
 
@@ -54,77 +54,98 @@ class ModalCurve(NamedTuple):
 
 
 def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> ModalCurve:
-    """Quasi-static modal analysis.
+    """Frequency and damping of a mode over its amplitude, by quasi-static modal analysis.
+
+    The damping is that of the joints alone.
 
     Parameters
     ----------
-    structure : with its joints
+    structure : structure with its joints
     amplitudes : (k,) rising modal displacements q
-    mode : which, counted from 0
+    mode : number of the mode, counted from 0
 
     Raises
     ------
     InputError
-        for amplitudes that do not rise from above zero
+        for amplitudes that are not positive and rising
     UnconvergedError
         if no static equilibrium is found
+
+    Examples
+    --------
+    >>> joint = Joint(displacement=[1.0, 3.0], force=[1.0, 2.0])
+    >>> structure = Structure([[1.0]], [[0.0]], [Attachment(joint, 0)])
+    >>> modal_curve(structure, [0.5, 2.0]).frequency.round(3).tolist()
+    [1.0, 0.866]
     """
     amplitude = _checked(amplitudes)
     _, shapes = structure.modes(mode + 1)
-    shape, along = shapes[:, mode], structure.directions
+    shape, directions = shapes[:, mode], structure.directions
     load = structure.mass @ shape
-    answers = structure.compliance(np.column_stack([load, along]))
-    # With what the joints hold less than when they stick, r: q = a alpha + b r, u = b alpha + S r.
-    a, b, flexible = load @ answers[:, 0], along.T @ answers[:, 0], along.T @ answers[:, 1:]
+    displacements = structure.static_displacements(np.column_stack([load, directions]))
+    # Let r be the forces that the joints lose by slip.  Then q = a alpha + b r, u = b alpha + S r.
+    a, b = load @ displacements[:, 0], directions.T @ displacements[:, 0]
+    compliance = directions.T @ displacements[:, 1:]
     levels = np.unique(np.concatenate([_refined(amplitude), amplitude]))
     u = np.zeros(b.size)
-    alphas, slips = [0.0], [u]
+    alphas, joints = [0.0], [u]
     for q in levels:
-        u, alpha = _equilibrium(structure, q, a, b, flexible, u)
+        u, alpha = _equilibrium(structure, q, a, b, compliance, u)
         alphas.append(alpha)
-        slips.append(u)
+        joints.append(u)
     forces = np.array(alphas)
-    lost: Any = sum(
-        np.asarray(attached.joint.dissipation(np.abs(np.array(slips)[:, place])))
+    losses: Any = sum(
+        np.asarray(attached.joint.dissipation(np.abs(np.array(joints)[:, place])))
         for place, attached in enumerate(structure.attachments)
     )
     pick = 1 + np.searchsorted(levels, amplitude)
-    force, loss = forces[pick], np.broadcast_to(lost, forces.shape)[pick]
+    force, loss = forces[pick], np.broadcast_to(losses, forces.shape)[pick]
     return ModalCurve(
         amplitude=amplitude,
         frequency=np.sqrt(force / amplitude),
         damping=loss / (2.0 * np.pi * force * amplitude),
         dissipation=loss,
-        joints=np.abs(np.array(slips)[pick]),
+        joints=np.abs(np.array(joints)[pick]),
     )
 
 
 def harmonic_balance(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> ModalCurve:
-    """One harmonic: the complex mode at an amplitude, every joint by its describing function.
+    """Frequency and damping of a mode over its amplitude, by harmonic balance with one harmonic.
 
-    See `modal_curve` for the parameters; the damping is the joints' and the structure's own.
+    The complex eigenproblem has the describing function of every joint at its amplitude.  The
+    damping is that of the joints and of the structure; see `modal_curve` for the parameters.
+
+    Raises
+    ------
+    InputError
+        for amplitudes that are not positive and rising
+    UnconvergedError
+        if the mode does not converge
     """
     amplitude = _checked(amplitudes)
     omega, shapes = structure.modes(mode + 1)
     matrices = (structure.mass, structure.stiffness, structure.damping)
     mass, stiffness, damping = map(dense, matrices)
-    along, shape = structure.directions, shapes[:, mode].astype(complex)
+    directions, shape = structure.directions, shapes[:, mode].astype(complex)
     value, rows = 1j * omega[mode], []
     for q in amplitude:
-        for _ in range(MOST):
-            u = np.maximum(np.abs(along.T @ shape) * q, 1e-30)
-            held = [
+        for _ in range(MAX_ITERATIONS):
+            u = np.maximum(np.abs(directions.T @ shape) * q, 1e-30)
+            harmonics = [
                 complex(attached.joint.first_harmonic(jnp.asarray(size)))
                 for attached, size in zip(structure.attachments, u, strict=True)
             ]
-            whole = stiffness + (along * np.array(held)) @ along.T
-            new, shape = _nearest(mass, damping, whole, value, shapes[:, mode])
-            settled, value = abs(new - value) <= 1e-9 * abs(new), new
-            if settled:
+            total = stiffness + (directions * np.array(harmonics)) @ directions.T
+            new, shape = _nearest(mass, damping, total, value, shapes[:, mode])
+            converged, value = abs(new - value) <= 1e-9 * abs(new), new
+            if converged:
                 break
         else:
-            raise UnconvergedError(f"harmonic balance at q = {q:.6g} settles at no mode")
-        loss = sum(np.pi * h.imag * size**2 for h, size in zip(held, u, strict=True))
+            raise UnconvergedError(
+                f"harmonic balance does not converge at the modal displacement {q:.6g}: give more "
+                "amplitudes below it, or none above"
+            )
+        loss = sum(np.pi * h.imag * size**2 for h, size in zip(harmonics, u, strict=True))
         rows.append((q, abs(value), -value.real / abs(value), loss, u))
     q, frequency, zeta, loss, joints = zip(*rows, strict=True)
     return ModalCurve(*map(np.array, (q, frequency, zeta, loss, joints)))
@@ -133,7 +154,7 @@ def harmonic_balance(structure: Structure, amplitudes: ArrayLike, mode: int = 0)
 def _nearest(
     mass: NDArray[Any], damping: NDArray[Any], stiffness: NDArray[Any], value: complex, like: Any
 ) -> tuple[complex, NDArray[np.complex128]]:
-    """The mode of lambda^2 M + lambda C + K next to an eigenvalue, of unit q."""
+    """Eigenvalue of lambda^2 M + lambda C + K nearest to a value, and its shape of unit q."""
     size = mass.shape[0]
     zero, one = np.zeros((size, size)), np.eye(size)
     left = np.block([[zero, one], [-stiffness, -damping]])
@@ -149,34 +170,39 @@ def _equilibrium(
     q: Any,
     a: Any,
     b: NDArray[np.float64],
-    flexible: NDArray[np.float64],
+    compliance: NDArray[np.float64],
     guess: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], float]:
-    """Joints' displacements and the modal force at a modal displacement, by Newton's method."""
+    """Displacements of the joints and modal force alpha at a modal displacement, by Newton."""
     joints, u = [attached.joint for attached in structure.attachments], guess.copy()
-    sticking = np.array([float(joint.stiffness) for joint in joints])
-    for _ in range(MOST):
-        held = np.array([float(j.backbone(x)) for j, x in zip(joints, u, strict=True)])
+    stuck = np.array([float(joint.stiffness) for joint in joints])
+    for _ in range(MAX_ITERATIONS):
+        force = np.array([float(j.backbone(x)) for j, x in zip(joints, u, strict=True)])
         slope = np.array([float(j.tangent(x)) for j, x in zip(joints, u, strict=True)])
-        less = sticking * u - held
-        alpha = (q - b @ less) / a
-        residual = u - b * alpha - flexible @ less
+        lost = stuck * u - force
+        alpha = (q - b @ lost) / a
+        residual = u - b * alpha - compliance @ lost
         if np.max(np.abs(residual), initial=0.0) <= 1e-12 * np.max(np.abs(b * q / a), initial=0.0):
             return u, float(alpha)
-        change = sticking - slope
-        tangent = np.eye(u.size) + np.outer(b, b * change) / a - flexible * change
+        change = stuck - slope
+        tangent = np.eye(u.size) + np.outer(b, b * change) / a - compliance * change
         u = u - np.linalg.solve(tangent, residual)
-    raise UnconvergedError(f"the joints find no equilibrium at the modal displacement {q:.6g}")
+    raise UnconvergedError(
+        f"no equilibrium of the joints at the modal displacement {q:.6g}: give more amplitudes "
+        "below it"
+    )
 
 
 def _refined(amplitude: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Amplitudes with equal load steps between them."""
     ends = np.append(0.0, amplitude)
     parts = np.arange(1, SUBSTEPS + 1) / SUBSTEPS
     return (ends[:-1, None] + np.diff(ends)[:, None] * parts).ravel()
 
 
 def _checked(amplitudes: ArrayLike) -> NDArray[np.float64]:
+    """Amplitudes as an array; raises `InputError`."""
     amplitude = np.atleast_1d(np.asarray(amplitudes, float))
     rising = amplitude.ndim == 1 and bool(np.all(np.diff(amplitude, prepend=0.0) > 0.0))
-    require("amplitudes", amplitude, rising and bool(np.all(np.isfinite(amplitude))), LOADS)
+    require("amplitudes", amplitude, rising and bool(np.all(np.isfinite(amplitude))), AMPLITUDES)
     return amplitude

@@ -1,4 +1,4 @@
-"""Transients of a structure with joints: their sliders move by the rate law of the contact."""
+"""Transients of a structure with joints, whose sliders follow the rate law of friction."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ SOLVERS: dict[str, Callable[[], Any]] = {
     "tsit5": diffrax.Tsit5,
     "dopri8": diffrax.Dopri8,
 }
-FLOOR = 1e-12  # of a slider's limit that is zero
-HAPPENS = "nothing happens: give a force, or an initial displacement or velocity"
+LIMIT_FLOOR = 1e-12  # smallest slip force of a slider, over the largest one
+NO_MOTION = "nothing happens: give a force, or an initial displacement or velocity"
 
 
 class StructureMotion(NamedTuple):
-    """Motion of a structure, at evenly spaced instants; those not reached hold NaN.
+    """Motion of a structure at T evenly spaced times; times that were not reached hold NaN.
 
     Attributes
     ----------
-    time : (T,)
-    displacement, velocity : (T, n)
-    kinetic, stored : (T,) energies, the sliders' in the second
+    time : (T,) times
+    displacement, velocity : (T, n) displacements and velocities of the degrees of freedom
+    kinetic, stored : (T,) kinetic energy; potential energy of structure and sliders
     external_work : (T,) work done by forces since t = 0
     friction_work, damping_work : (T,) work lost in joints and by C since t = 0
-    complete : whether the whole span was followed
+    complete : True if the whole span was computed
     """
 
     time: Array
@@ -54,41 +54,48 @@ class StructureMotion(NamedTuple):
 
     @property
     def reached(self) -> float:
-        """Time of the last instant that was computed."""
+        """Last time that was computed."""
         known = np.isfinite(np.asarray(self.kinetic))
         return float(np.asarray(self.time)[known].max(initial=0.0))
 
     @property
     def imbalance(self) -> Array:
-        """Energy that the ledger does not account for, (T,)."""
+        """Error of the energy balance, (T,); zero but for errors of the time steps."""
         change = self.kinetic + self.stored - self.kinetic[0] - self.stored[0]
         return change - self.external_work + self.friction_work + self.damping_work
 
 
 class InterruptedShakingError(UnconvergedError):
-    """A transient that ended too early; ``motion`` is the part computed."""
+    """Transient that ended before its span; ``motion`` is the part that was computed."""
 
     def __init__(self, message: str, motion: StructureMotion) -> None:
         super().__init__(message)
         self.motion = motion
 
 
-class _Moving(NamedTuple):
+class _State(NamedTuple):
+    """Displacements and velocities (n,), forces (s,) of the sliders, and work (3,)."""
+
     x: Array
     v: Array
-    held: Array
+    sliders: Array
     work: Array
 
 
-class _Parts(NamedTuple):
-    inverse: Array
+class _Model(NamedTuple):
+    """Matrices (n, n), directions (n, joints), and stiffness, limit and joint of s sliders.
+
+    The stiffness matrix has the springs that remain when all sliders slip.
+    """
+
+    inverse_mass: Array
     mass: Array
     damping: Array
     stiffness: Array
-    along: Array
+    directions: Array
     springs: Array
     limits: Array
-    owner: Array
+    joint: Array
 
 
 def shake(
@@ -106,73 +113,86 @@ def shake(
     progress: bool | None = None,
     throw: bool = True,
 ) -> StructureMotion:
-    """Follow a structure with joints in time.
+    """Transient of a structure with joints.
 
     Parameters
     ----------
-    structure : matrices and joints
-    span : time that is followed
-    force : from the time to forces (n,); None is none
-    displacement, velocity : (n,) at t = 0, reached from rest quasi-statically
-    samples : instants, evenly spaced from 0 to ``span``, that are kept
-    method : "kvaerno3" or "kvaerno5" for stiff structures, "tsit5" or "dopri8" explicit
-    tolerance : of a step's error, relative and to the initial state's or the force's response
-    smoothing : m of the sliders' rate law
-    most_steps : after which it gives up
-    progress : whether to show how far it is; None is on a terminal only
-    throw : whether a motion that ends before ``span`` raises
+    structure : structure with its joints
+    span : end time
+    force : function from the time to the forces (n,); None is no force
+    displacement : (n,) displacements at t = 0, reached quasi-statically; None is 0
+    velocity : (n,) velocities at t = 0; None is 0
+    samples : number of times in the result, evenly spaced from 0 to ``span``
+    method : "kvaerno3" or "kvaerno5", implicit, for stiff structures; "tsit5" or "dopri8", explicit
+    tolerance : error of a step, relative to the state and to the size of the response
+    smoothing : exponent m of the rate law, see `jbeamshell.dynamics.strip.rate_friction`
+    most_steps : largest number of time steps
+    progress : show a progress bar; None shows it on a terminal only
+    throw : raise if the motion ends before ``span``
+
+    Returns
+    -------
+    StructureMotion
+        times that were not reached hold NaN
 
     Raises
     ------
     InputError
-        for a span in which nothing happens
+        for a span that is not positive, displacements or velocities of another size than n, or
+        neither a force nor an initial motion
     InterruptedShakingError
-        if the solver gives up; it carries the part computed
+        if the solver stops before ``span``; it carries the part that was computed
+
+    Examples
+    --------
+    >>> motion = shake(structure, 50.0, velocity=[1.0, 0.0])
+    >>> ring_down(motion.time, motion.displacement[:, 0]).damping
     """
     require_number("span", span, POSITIVE + " (time)")
     require_choice("method", method, tuple(SOLVERS))
-    size, still = structure.size, np.zeros(structure.size)
-    begin = [still if v is None else np.asarray(v, float) for v in (displacement, velocity)]
-    for name, given in zip(("displacement", "velocity"), begin, strict=True):
-        require(name, given.shape, given.shape == (size,), f"give {size} numbers")
-    happens = force is not None or any(bool(np.any(values)) for values in begin)
-    require("force", force, happens, HAPPENS)
-    parts, held = _parts(structure, begin[0])
+    size, zero = structure.size, np.zeros(structure.size)
+    start = [zero if v is None else np.asarray(v, float) for v in (displacement, velocity)]
+    for name, values in zip(("displacement", "velocity"), start, strict=True):
+        require(name, values.shape, values.shape == (size,), f"give {size} numbers")
+    moves = force is not None or any(bool(np.any(values)) for values in start)
+    require("force", force, moves, NO_MOTION)
+    model, sliders = _model(structure, start[0])
     show = sys.stderr.isatty() if progress is None else progress
     times = jnp.linspace(0.0, span, samples)
     settings = (method, most_steps, bool(show))
-    x, v = map(jnp.asarray, begin)
-    shaken = _run(parts, (x, v, held), force, times, tolerance, smoothing, settings)
-    if throw and not bool(shaken.complete):
+    x, v = map(jnp.asarray, start)
+    motion = _run(model, (x, v, sliders), force, times, tolerance, smoothing, settings)
+    if throw and not bool(motion.complete):
         raise InterruptedShakingError(
-            f"the motion ends at t = {shaken.reached:.6g} of {span:.6g}: take a larger tolerance",
-            shaken,
+            f"the motion ends at t = {motion.reached:.6g} of {span:.6g}: take a larger tolerance "
+            "or more steps (most_steps)",
+            motion,
         )
-    return shaken
+    return motion
 
 
-def _parts(structure: Structure, displacement: np.ndarray) -> tuple[_Parts, Array]:
-    """Matrices and sliders as arrays, and what the sliders hold at first."""
+def _model(structure: Structure, displacement: np.ndarray) -> tuple[_Model, Array]:
+    """Matrices and sliders as arrays, and the forces of the sliders at t = 0."""
     mass, damping, stiffness = map(dense, (structure.mass, structure.damping, structure.stiffness))
-    along, springs, limits, owner = structure.directions, [], [], []
-    stretch = along.T @ displacement
+    directions, joint = structure.directions, []
+    springs: list[float] = []
+    limits: list[float] = []
     for place, attached in enumerate(structure.attachments):
-        own = np.asarray(attached.joint.springs)
-        springs.append(own[:-1])
-        limits.append(np.asarray(attached.joint.limits))
-        owner += [place] * (own.size - 1)
-        stiffness = stiffness + own[-1] * np.outer(along[:, place], along[:, place])
-    spring, limit = (np.concatenate([*parts, np.zeros(0)]) for parts in (springs, limits))
-    index = np.array(owner, int)
-    held = np.clip(spring * stretch[index], -limit, limit)
-    matrices = (np.linalg.inv(mass), mass, damping, stiffness, along, spring, limit, index)
-    return _Parts(*map(jnp.asarray, matrices)), jnp.asarray(held)
+        *own, remaining = np.asarray(attached.joint.springs).tolist()
+        springs += own
+        limits += np.asarray(attached.joint.limits).tolist()
+        joint += [place] * len(own)
+        stiffness = stiffness + remaining * np.outer(directions[:, place], directions[:, place])
+    spring, limit, index = np.array(springs), np.array(limits), np.array(joint, int)
+    sliders = np.clip(spring * (directions.T @ displacement)[index], -limit, limit)
+    arrays = (np.linalg.inv(mass), mass, damping, stiffness, directions, spring, limit, index)
+    return _Model(*map(jnp.asarray, arrays)), jnp.asarray(sliders)
 
 
 @eqx.filter_jit
 def _run(
-    parts: _Parts,
-    begin: tuple[Array, Array, Array],
+    model: _Model,
+    start: tuple[Array, Array, Array],
     force: Callable[[Array], Array] | None,
     times: Array,
     tolerance: Any,
@@ -180,65 +200,63 @@ def _run(
     settings: tuple[str, int, bool],
 ) -> StructureMotion:
     method, most_steps, progress = settings
-    least = FLOOR * jnp.max(parts.limits, initial=1e-30)
+    floor = LIMIT_FLOOR * jnp.max(model.limits, initial=1e-30)
+    count = model.directions.shape[1]
+    springs = jnp.where(model.springs > 0.0, model.springs, 1.0)  # a spring of 0 stores no energy
 
-    def rates(time: Any, y: _Moving, _: Any) -> _Moving:
-        speed = (parts.along.T @ y.v)[parts.owner]
-        slipping = rate_friction.traction_rate(
-            y.held, speed, parts.limits, parts.springs, jnp.asarray(smoothing), least
+    def rates(time: Any, y: _State) -> _State:
+        speed = (model.directions.T @ y.v)[model.joint]
+        slider_rates = rate_friction.traction_rate(
+            y.sliders, speed, model.limits, model.springs, jnp.asarray(smoothing), floor
         )
-        outside = jnp.zeros_like(y.x) if force is None else force(time)
-        pull = parts.along @ jax.ops.segment_sum(y.held, parts.owner, parts.along.shape[1])
-        worn = parts.damping @ y.v
-        gained = parts.inverse @ (outside - parts.stiffness @ y.x - worn - pull)
-        soft = jnp.where(parts.springs > 0.0, parts.springs, 1.0)
-        lost = jnp.sum(y.held * (speed - slipping / soft))
-        return _Moving(y.v, gained, slipping, jnp.stack([outside @ y.v, lost, worn @ y.v]))
+        external = jnp.zeros_like(y.x) if force is None else force(time)
+        joints = model.directions @ jax.ops.segment_sum(y.sliders, model.joint, count)
+        damping = model.damping @ y.v
+        acceleration = model.inverse_mass @ (external - model.stiffness @ y.x - damping - joints)
+        friction_power = jnp.sum(y.sliders * (speed - slider_rates / springs))
+        power = jnp.stack([external @ y.v, friction_power, damping @ y.v])
+        return _State(y.v, acceleration, slider_rates, power)
 
-    solver = SOLVERS[method]()
-    start = _Moving(*begin, jnp.zeros(3))
-    sizes = _sizes(parts, start, force, times)
+    initial = _State(*start, jnp.zeros(3))
+    scales = _scales(model, initial, force, times)
+
+    def scaled_rates(time: Any, y: _State, _: Any) -> _State:
+        found = rates(time, jax.tree.map(jnp.multiply, y, scales))
+        return jax.tree.map(jnp.divide, found, scales)
+
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(
-            lambda t, y, a: jax.tree.map(
-                jnp.divide, rates(t, jax.tree.map(jnp.multiply, y, sizes), a), sizes
-            )
-        ),
-        solver,
+        diffrax.ODETerm(scaled_rates),
+        SOLVERS[method](),
         times[0],
         times[-1],
         None,
-        jax.tree.map(jnp.divide, start, sizes),
+        jax.tree.map(jnp.divide, initial, scales),
         saveat=diffrax.SaveAt(ts=times),
         stepsize_controller=diffrax.PIDController(rtol=tolerance, atol=tolerance),
         max_steps=most_steps,
         progress_meter=diffrax.TqdmProgressMeter() if progress else diffrax.NoProgressMeter(),
         throw=False,
     )
-    y = jax.tree.map(jnp.multiply, solution.ys, sizes)
+    y = jax.tree.map(jnp.multiply, solution.ys, scales)
     y = jax.tree.map(lambda a: jnp.where(jnp.isfinite(a), a, jnp.nan), y)
-    kinetic = 0.5 * jnp.einsum("ti,ij,tj->t", y.v, parts.mass, y.v)
-    soft = jnp.where(parts.springs > 0.0, parts.springs, 1.0)
-    sliders = 0.5 * jnp.sum(y.held**2 / soft, axis=1)
-    stored = 0.5 * jnp.einsum("ti,ij,tj->t", y.x, parts.stiffness, y.x) + sliders
+    kinetic = 0.5 * jnp.einsum("ti,ij,tj->t", y.v, model.mass, y.v)
+    sliders = 0.5 * jnp.sum(y.sliders**2 / springs, axis=1)
+    stored = 0.5 * jnp.einsum("ti,ij,tj->t", y.x, model.stiffness, y.x) + sliders
     complete = (solution.result == diffrax.RESULTS.successful) & jnp.all(jnp.isfinite(kinetic))
     external, friction, damping = y.work.T
     return StructureMotion(times, y.x, y.v, kinetic, stored, external, friction, damping, complete)
 
 
-def _sizes(
-    parts: _Parts, start: _Moving, force: Callable[[Array], Array] | None, times: Array
-) -> _Moving:
-    """Sizes of the state's parts, so that one tolerance does for all."""
-    stuck = (
-        parts.stiffness
-        + (parts.along * jax.ops.segment_sum(parts.springs, parts.owner, parts.along.shape[1]))
-        @ parts.along.T
-    )
-    pulled = jnp.zeros(()) if force is None else jnp.max(jnp.abs(jax.vmap(force)(times)))
-    slowest = jnp.sqrt(jnp.max(jnp.diag(parts.mass)) / jnp.max(jnp.diag(stuck)))
-    x = jnp.maximum(jnp.max(jnp.abs(start.x)), jnp.max(jnp.abs(start.v)) * slowest)
-    x = jnp.maximum(x, pulled / jnp.max(jnp.diag(stuck)))
-    held = jnp.maximum(jnp.max(parts.limits, initial=0.0), 1e-30)
-    energy = jnp.max(jnp.diag(stuck)) * x**2
-    return jax.lax.stop_gradient(_Moving(x, x / slowest, held, energy))
+def _scales(
+    model: _Model, initial: _State, force: Callable[[Array], Array] | None, times: Array
+) -> _State:
+    """Scales of the state, by which one tolerance fits all its parts."""
+    springs = jax.ops.segment_sum(model.springs, model.joint, model.directions.shape[1])
+    stuck = model.stiffness + (model.directions * springs) @ model.directions.T
+    stiffness = jnp.max(jnp.diag(stuck))
+    largest_force = jnp.zeros(()) if force is None else jnp.max(jnp.abs(jax.vmap(force)(times)))
+    time = jnp.sqrt(jnp.max(jnp.diag(model.mass)) / stiffness)
+    x = jnp.maximum(jnp.max(jnp.abs(initial.x)), jnp.max(jnp.abs(initial.v)) * time)
+    x = jnp.maximum(x, largest_force / stiffness)
+    sliders = jnp.maximum(jnp.max(model.limits, initial=0.0), 1e-30)
+    return jax.lax.stop_gradient(_State(x, x / time, sliders, stiffness * x**2))
