@@ -1,10 +1,10 @@
-"""Dynamics measured: energy, the slow limit, Masing's prediction, solvers, real time.
+"""Benchmark of dynamics: energy balance, slow limit, Masing's prediction, solvers, real time.
 
     python tests/benchmarks/dynamics.py
 
-writes dynamics.json and dynamics.png beside this file; some minutes.  Names of parts (slow_limit,
-masing, solvers, ledger_of_100_cycles) measure these anew only.  Times are of warm runs, with the
-machine, the versions and the precision beside them.
+writes dynamics.json and dynamics.png beside this file and takes some minutes.  With names of parts
+(slow_limit, masing, solvers, ledger_of_100_cycles) it measures only these.  Times are those of a
+second call; the record has the machine, the versions and the precision.
 """
 
 import json
@@ -38,7 +38,7 @@ SMALLEST = 0.1126 / 12.0  # a dissertation-like mesh: H/12 at the loaded end, th
 
 
 def warm(run):
-    """A result and the seconds of its second run."""
+    """Result of a run, and the seconds of its second call."""
     jax.block_until_ready(run().time)
     begin = time.perf_counter()
     result = jax.block_until_ready(run())
@@ -50,7 +50,7 @@ def scene(**values):
 
 
 def ringing(strip, cycles, per_cycle, **options):
-    """A payload of 50 strips let go, in steps of a part of its period."""
+    """Ring-down of a payload of 50 strips, with a number of time steps in a period."""
     mass = HEAVY * 2.0 * float(strip.strip.half_height * strip.strip.length)
     attached = dynamics.AttachedMasses(mass)
     period = 2.0 * np.pi / float(dynamics.modes(strip, attached=attached).frequency[0])
@@ -68,7 +68,7 @@ def ringing(strip, cycles, per_cycle, **options):
 
 
 def ledger():
-    """What a hundred cycles leave unaccounted for, of the initial energy."""
+    """Error of the energy balance over a hundred cycles, relative to the initial energy."""
     rows = []
     for per_cycle in (200, 800, 3200):
         motion, seconds = warm(lambda n=per_cycle: ringing(scene(), 100, n))
@@ -125,7 +125,7 @@ def masing():
 
 
 def work_precision():
-    """Time and error of the solvers on one ring-down of four cycles, m = 16."""
+    """Time and error of the solvers in a ring-down of four cycles with m = 16."""
     strip = scene(**{"model.nodes": 21, "contact.smoothing": 16.0})
     reference = ringing(strip, 4, FINEST)
     size = float(np.abs(np.asarray(reference.displacement)).max())
@@ -153,7 +153,7 @@ def work_precision():
 
 
 def real_time(rows):
-    """Seconds per second of a steel strip of 100 mm, and steps of explicit finite elements."""
+    """Computing time per time of a steel strip of 100 mm, and steps of explicit elements."""
     length, speed = 0.1, 5400.0  # m, m/s: sqrt(E'/rho) of steel
     mine = rows[0]
     unit = float(np.sqrt(scene().strip.plane_modulus)) * mine["time"] / 2.0  # transits
@@ -199,7 +199,7 @@ PARTS = {
 
 
 def main() -> None:
-    """Measure the parts named, or all, and write the record."""
+    """Measure the named parts, or all, and write the record."""
     file = HERE / "dynamics.json"
     record = json.loads(file.read_text()) if file.exists() else {}
     record |= {

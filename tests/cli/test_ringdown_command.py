@@ -1,4 +1,4 @@
-"""`jbeamshell ringdown`: JSON on stdout, whole files, one line of complaint."""
+"""`jbeamshell ringdown`: JSON on stdout, whole files, errors of one line."""
 
 import json
 

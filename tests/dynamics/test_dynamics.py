@@ -28,7 +28,7 @@ def scene(**values):
 
 
 def stuck(scene, shear=True):
-    """Lowest frequency of a stuck strip: v and beta go like sin(pi X/2L) and rub elastically."""
+    """Lowest frequencies of a stuck strip, where v and beta are sin(pi X/2L) on springs k_t."""
     strip = scene.strip
     height, modulus = float(strip.half_height), float(strip.plane_modulus)
     rubs = float(scene.contact.stick_stiffness * strip.shear_modulus / strip.half_height)
@@ -53,7 +53,7 @@ def test_a_stuck_strip_vibrates_as_in_closed_form(mass):
 
 
 def cantilever(strip):
-    """Lowest frequency of Timoshenko's cantilever (Huang 1961), by its own determinant."""
+    """Lowest frequency of Timoshenko's cantilever (Huang 1961), from its determinant."""
     height, modulus, length = (float(a) for a in (strip.half_height, strip.plane_modulus, 2.0))
     kappa = float(shear_coefficient(strip.poisson_ratio) * strip.shear_modulus)
     area, inertia = 2.0 * height, 2.0 / 3.0 * height**3
@@ -140,8 +140,7 @@ def test_exact_kinematics_keep_energy_and_momentum_of_a_turning_section():
     blocks = jitted(mass.blocks, jnp.asarray(q))
     energy = 0.5 * np.einsum("ni,nij,nj", p, blocks, p)
     assert jitted(mass.energy, jnp.asarray(q), jnp.asarray(p)) == pytest.approx(energy, rel=1e-12)
-    # Work of the inertia forces of free motion is the change of the kinetic energy: none, where
-    # the accelerations balance them.
+    # In free motion the inertia forces balance, so the kinetic energy does not change.
     force = -jitted(mass.velocity_forces, jnp.asarray(q), jnp.asarray(p))
     speed = np.linalg.solve(blocks, np.asarray(force)[..., None])[..., 0]
     step = 1e-5
@@ -172,7 +171,7 @@ def test_the_rate_law_walks_the_quasi_static_loop(m):
     solved = scipy.integrate.solve_ivp(
         rate, coarse[[0, -1]], [0.0], t_eval=coarse, rtol=1e-7, atol=1e-9, max_step=0.05
     )
-    assert np.max(np.abs(solved.y[0, 1:] - walked[7::8])) < 2e-4  # the walk turns between its steps
+    assert np.max(np.abs(solved.y[0, 1:] - walked[7::8])) < 2e-4  # reversals between steps
 
 
 def test_a_falling_cap_takes_the_traction_along():
@@ -185,7 +184,7 @@ def test_a_falling_cap_takes_the_traction_along():
 
 def test_stability_limits_are_the_textbooks():
     vibration, decay = stability_limits(EXPLICIT["bosh3"]().tableau)
-    assert vibration == pytest.approx(np.sqrt(3.0), abs=2e-3)  # of every third-order method
+    assert vibration == pytest.approx(np.sqrt(3.0), abs=2e-3)  # as every third-order method
     assert decay == pytest.approx(2.5127, abs=2e-3)
 
 
@@ -197,7 +196,7 @@ def test_reaction_has_elasticity_and_inertia():
     state = jitted(equations.initial_state, history.fields[-1], history.traction[-1], jnp.zeros(()))
     still, shaken = (jitted(equations.response, jnp.asarray(t), state).reaction for t in (0.0, 1.0))
     assert np.allclose(still, 10.0, rtol=1e-9)
-    # The strip weighs more on a foundation that rises, but for what its squeezing gives way.
+    # The strip weighs more on a foundation that accelerates upwards; its squeeze reduces this.
     weight = 2.0 * float(strip.strip.half_height) * RHO * 3.0
     assert np.all(shaken > still)
     assert np.allclose((shaken - still) / weight, 0.25, atol=0.02)

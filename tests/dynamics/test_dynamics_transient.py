@@ -50,7 +50,7 @@ class TestRingDown:
         )
 
     def test_damping_is_what_masing_predicts(self, study):
-        """But for the first cycles, in which the loops are far from closed."""
+        """The first cycles are left out, because their loops are far from closed."""
         late = study.found.damping < 0.02
         assert np.sum(late) > 20
         assert np.median(np.abs(study.ratio[late] - 1.0)) < 0.05
@@ -102,7 +102,7 @@ def test_a_slow_load_walks_the_quasi_static_loop():
 
 
 def arrival(time, signal):
-    """Time at which a pulse is at its highest."""
+    """Time of the maximum of a pulse."""
     top = int(np.argmax(signal))
     before, here, after = signal[top - 1 : top + 2]
     return time[top] + 0.5 * (before - after) / (before - 2 * here + after) * (time[1] - time[0])
@@ -141,7 +141,7 @@ def test_fronts_run_at_the_speeds_of_waves(wave):
     places = (1.4, 0.7) if axial else (0.3, 0.9)
     nodes = [int(np.argmin(np.abs(x - place))) for place in places]
     rates = np.asarray(motion.rates)[:, nodes, field].T
-    if not axial:  # the shaken support sends its acceleration along the strip
+    if not axial:  # the wave is one of the absolute acceleration
         rates = np.gradient(rates, axis=1) / float(motion.time[1])
         rates = rates + np.asarray(jax.vmap(excitation.acceleration)(motion.time)[1])
     assert abs(speed_between(motion, rates, x[nodes])) == pytest.approx(speed, rel=0.01)
@@ -166,7 +166,7 @@ class TestAttachedMasses:
 
     @pytest.mark.slow
     def test_the_chain_obeys_its_own_equations(self):
-        """Against the chain's own equations under the motion found of the loaded end."""
+        """The equations are those of the chain under the motion of the loaded end."""
         strip = scene(model__nodes=11)
         attached = dynamics.AttachedMasses(heavy(strip), [1.0, 2.0], [500.0, 300.0], [0.1, 1.0])
         motion = dynamics.simulate(
@@ -235,7 +235,7 @@ def test_a_shaken_strip_lifts_off_where_the_foundation_falls_away():
     strip = scene(
         model__nodes=11, model__fields=["v", "w", "beta", "psi"], contact__normal="compliant"
     )
-    weight = 2.0 * float(strip.strip.half_height)  # of density 1, per length
+    weight = 2.0 * float(strip.strip.half_height)  # per length, of density 1
     for level, lifts in ((0.5, False), (1.6, True)):
         shaker = dynamics.Shaker(level * 10.0 / weight, 20.0, ramp=0.5, direction="across")
         motion = dynamics.simulate(strip, 0.1, shaker, samples=401, step=1e-5)

@@ -1,4 +1,4 @@
-"""A strip as the joint in a structure: Iwan's network, modes over amplitude, transients."""
+"""Structures with joints: Iwan's network, modes over amplitude, transients."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,7 +19,7 @@ BAR = Joint(FINE, np.sqrt(2.0 * FINE))
 
 
 def chain(count=2, joint=JOINT, sparse=False):
-    """Equal masses on equal springs, the first held by the joint alone."""
+    """Structure of equal masses on equal springs, of which the joint holds the first."""
     stiffness = 3.0 * (2.0 * np.eye(count) - np.eye(count, k=1) - np.eye(count, k=-1))
     stiffness[0, 0] = stiffness[-1, -1] = 3.0
     mass = np.eye(count)
@@ -76,7 +76,7 @@ class TestModes:
 
     @pytest.mark.parametrize(("mode", "largest"), [(0, 1.0), (1, 0.2)])
     def test_statics_and_one_harmonic_agree(self, mode, largest):
-        """A higher mode's static load moves the lower ones too, the more the further it slips."""
+        """They differ for large slip in a higher mode, whose static load moves the lower modes."""
         amplitude = np.geomspace(0.1, largest, 4)
         static = modal_curve(chain(), amplitude, mode)
         harmonic = harmonic_balance(chain(), amplitude, mode)
@@ -144,7 +144,7 @@ class TestRingDown:
         assert np.allclose(found.amplitude[inner], envelope[inner], rtol=0.02)
 
     def test_damping_that_grows_with_amplitude(self):
-        """A mean decrease of c A^2 per time is an amplitude of 1/(1 + c t)."""
+        """An amplitude of 1/(1 + c t) decreases by c A^2 per time, so zeta grows with A."""
         size = 1.0 / (1.0 + 0.1 * self.TIME)
         found = dynamics.ring_down(self.TIME, size * np.sin(2.0 * np.pi * self.TIME))
         expected = 0.1 * found.amplitude / (2.0 * np.pi)
