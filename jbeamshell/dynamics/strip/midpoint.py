@@ -32,7 +32,7 @@ from jbeamshell.dynamics.strip.chain import stretches
 from jbeamshell.dynamics.strip.equations import MotionState
 from jbeamshell.dynamics.strip.step_equations import StepEquations, StepForces, StepMatrices
 from jbeamshell.dynamics.strip.time_step import StepMemory, TimeStep
-from jbeamshell.numerics.newton import Newton
+from jbeamshell.numerics.newton import Newton, Problem
 from jbeamshell.quasistatic.system import V
 from jbeamshell.quasistatic.tangent import nodal
 
@@ -93,21 +93,17 @@ def take_step(
 ) -> tuple[MotionState, StepMemory, Array]:
     """State and memory after a step, and True if Newton's method has converged."""
     equations, system, n = matrices.equations, matrices.equations.system, matrices.equations.n
-    problem = StepEquations.of(equations, step, state, last)
+    of_step = StepEquations.of(equations, step, state, last)
     root, (_, error) = newton.solve(
-        problem.evaluate,
-        problem.limit,
-        problem.guess,
-        jnp.asarray(True),
-        problem.tangent,
-        matrices.stiffness(step, problem.chain.force_slope, problem.q),
-        None,
+        Problem(of_step.evaluate, of_step.limit, of_step.tangent),
+        of_step.guess,
+        matrices.stiffness(step, of_step.chain.force_slope, of_step.q),
     )
-    at = problem.forces(root)
-    response = system.contact_response(at.contact, problem.before, at.prescribed)
+    at = of_step.forces(root)
+    response = system.contact_response(at.contact, of_step.before, at.prescribed)
     nodal_change = system.embed(nodal(system, root))
-    end_change = problem.end_change(nodal_change)
-    chain_change = problem.chain.change + problem.chain.change_slope * end_change
+    end_change = of_step.end_change(nodal_change)
+    chain_change = of_step.chain.change + of_step.chain.change_slope * end_change
     change = equations.with_chain(nodal_change, chain_change)
     rate_change = step.increment(change / step.h, state.p, last.rate_change)
     memory = StepMemory(
@@ -119,10 +115,10 @@ def take_step(
         started=jnp.ones_like(last.started),
     )
     # The tractions at the end of the step follow from the motion between q* and the end.
-    middle = problem.before._replace(q=at.q, traction=response.traction)
-    end = at.contact._replace(v=(problem.q + nodal_change)[:, V])
+    middle = of_step.before._replace(q=at.q, traction=response.traction)
+    end = at.contact._replace(v=(of_step.q + nodal_change)[:, V])
     traction = system.contact_response(end, middle, at.prescribed).traction
-    work = _work(problem, at, state, change, (response.traction, traction))
+    work = _work(of_step, at, state, change, (response.traction, traction))
     after = MotionState(
         state.q + change,
         state.p + rate_change,
@@ -133,7 +129,7 @@ def take_step(
 
 
 def _work(
-    problem: StepEquations,
+    of_step: StepEquations,
     at: StepForces,
     state: MotionState,
     change: Array,
@@ -143,17 +139,17 @@ def _work(
 
     Parameters
     ----------
-    problem, at : equations of the step, and forces at its solution
+    of_step, at : equations of the step, and forces at its solution
     state : state at its start
     change : (b, a) increments of the active fields
     tractions : (n,) friction tractions at q* and at the end of the step
     """
-    equations, system, step = problem.equations, problem.equations.system, problem.step
+    equations, system, step = of_step.equations, of_step.equations.system, of_step.step
     attached, n = equations.attached, equations.n
     nodal_change, chain_change = equations.nodal(change), change[n:, 0]
-    end_change = problem.end_change(nodal_change)
-    external = problem.force * end_change - jnp.sum(problem.ground_forces * nodal_change)
-    external = external - problem.ground * jnp.sum(attached.masses * chain_change)
+    end_change = of_step.end_change(nodal_change)
+    external = of_step.force * end_change - jnp.sum(of_step.ground_forces * nodal_change)
+    external = external - of_step.ground * jnp.sum(attached.masses * chain_change)
     stored = (tractions[1] ** 2 - state.t[:n] ** 2) / (2.0 * system.foundation.slip_stiffness)
     friction = jnp.sum(system.tributary * (tractions[0] * nodal_change[:, V] - stored))
     dashpots = jnp.sum(attached.dampers * stretches(end_change, chain_change) ** 2) / step.h
