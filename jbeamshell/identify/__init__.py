@@ -1,7 +1,7 @@
 """Parameters of a scene from measurements: least squares on the response, with uncertainty.
 
-`fit` searches, its `Fit` holds the values and what the data leave open, and `profile` computes how
-far a parameter may go by running the model.  `read_plan` reads a whole study from a file.
+`fit` searches, and its `Fit` holds the values with their uncertainty.  `profile` computes the
+confidence interval of one parameter by running the model.  `read_plan` reads a study from a file.
 """
 
 from jbeamshell.identify.fitting import MAX_ITERATIONS as MAX_ITERATIONS

@@ -1,7 +1,6 @@
 """Bijections between an unbounded search space and the open interval of a parameter.
 
-The model knows nothing of them: it runs at plain values, and its derivatives are multiplied by the
-slopes of the bijections.
+The model runs at plain values; its derivatives are multiplied by the slopes of the bijections.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import expit, logit
 
-FARTHEST = 40.0  # largest coordinate in the search space; beyond it exp means nothing
+FARTHEST = 40.0  # largest coordinate in the search space; beyond it exp overflows or vanishes
 INSET = 1e-9  # distance of a box from its open bounds, over its width
 AT_BOUND = 1e-3  # distance from a bound, over the box's width, below which a fit ended at it
 

@@ -79,49 +79,53 @@ class Experiment:
             if a scene cannot reproduce a measurement, if only some measurements carry noise, or if
             the weights are not positive or not as many as the measurements
         """
+        weights = [specimen.checked_weights() for specimen in specimens]
         self.scenes = [specimen.scene for specimen in specimens]
         self.measurements: list[Any] = []
         self.owners: list[int] = []
-        observations: list[Observation] = []
-        weights = [specimen.checked_weights() for specimen in specimens]
         for owner, specimen in enumerate(specimens):
             specimen.check()
+            control = specimen.scene.load.control
             for given in specimen.measurements:
-                if isinstance(given, Loop):
-                    given = given.thinned(points, specimen.scene.load.control)
-                observations.append(observe(given, specimen.scene))
-                self.measurements.append(given)
+                thinned = given.thinned(points, control) if isinstance(given, Loop) else given
+                self.measurements.append(thinned)
                 self.owners.append(owner)
-        names = [
-            f"{specimens[owner].label}: {measurement.label}"
-            if len(specimens) > 1
-            else measurement.label
+        observations = [
+            observe(measurement, self.scenes[owner])
             for owner, measurement in zip(self.owners, self.measurements, strict=True)
         ]
-        self.labels = _distinct(names)
-        self.observations = observations = self._with_noise(observations, noise)
-        self._compared = [np.flatnonzero(np.asarray(o.weight)) for o in observations]
-        ends = np.cumsum([compared.size for compared in self._compared])
-        self.slices = [
-            slice(int(end - compared.size), int(end))
-            for end, compared in zip(ends, self._compared, strict=True)
-        ]
-        sizes = [compared.size for compared in self._compared]
-        own = [weight_of(measurement) for measurement in self.measurements]
-        self.emphasis = np.repeat(np.multiply(own, np.concatenate(weights)), sizes)
-        self.weight = np.concatenate(
-            [np.asarray(o.weight)[i] for o, i in zip(observations, self._compared, strict=True)]
+        prefixes = [f"{one.label}: " if len(specimens) > 1 else "" for one in specimens]
+        self.labels = _distinct(
+            [
+                prefixes[owner] + measurement.label
+                for owner, measurement in zip(self.owners, self.measurements, strict=True)
+            ]
         )
-        spans = np.repeat([o.span for o in observations], sizes)
-        known = np.repeat([noise_of(m) is not None for m in self.measurements], sizes)
-        self.relative = np.where(known, 1.0 / (self.weight * spans), noise or 1.0)
+        self.observations = self._with_noise(observations, noise)
+        self._compared = [np.flatnonzero(np.asarray(o.weight)) for o in self.observations]
+        self._set_rows(np.concatenate(weights), noise)
         self._runs = [
             (_filled(observation), self.scenes[owner])
-            for observation, owner in zip(observations, self.owners, strict=True)
+            for observation, owner in zip(self.observations, self.owners, strict=True)
         ]
         shapes = [_shape(run) for run in self._runs]
         self._firsts = [shapes.index(shape) for shape in dict.fromkeys(shapes)]
         self._compiled: set[Any] = set()
+
+    def _set_rows(self, weights: NDArray[np.float64], noise: float | None) -> None:
+        """Set the rows of each measurement, and their factors."""
+        sizes = [compared.size for compared in self._compared]
+        ends = np.cumsum(sizes)
+        self.slices = [
+            slice(int(end) - size, int(end)) for end, size in zip(ends, sizes, strict=True)
+        ]
+        own = [weight_of(measurement) for measurement in self.measurements]
+        self.emphasis = np.repeat(np.multiply(own, weights), sizes)
+        pairs = zip(self.observations, self._compared, strict=True)
+        self.weight = np.concatenate([np.asarray(o.weight)[compared] for o, compared in pairs])
+        spans = np.repeat([o.span for o in self.observations], sizes)
+        known = np.repeat([noise_of(m) is not None for m in self.measurements], sizes)
+        self.relative = np.where(known, 1.0 / (self.weight * spans), noise or 1.0)
 
     def __call__(
         self, keys: tuple[str, ...], table: NDArray[np.float64], solver: Newton
@@ -203,7 +207,7 @@ class Experiment:
             without = self.labels[known.index(False)]
             raise InputError(
                 f"{without}: carries no noise but {self.labels[known.index(True)]} does: give "
-                "the argument noise, such as 0.01 of the range, for those without"
+                "noise (--noise on the command line), such as 0.01 of the range, for the others"
             )
         return [
             observation

@@ -154,9 +154,11 @@ def fit(
     try:
         ends = _search(problem, space, method, starts, stopping, progress)
     except KeyboardInterrupt:
-        kept = "nothing was saved: give save=, a file, to go on from it another time"
+        kept = (
+            "nothing was saved: give save= (--save on the command line), a file, to continue later"
+        )
         if problem.saved_in:
-            kept = f"all are in {problem.saved_in}: call fit again as before to go on from there"
+            kept = f"all are in {problem.saved_in}: fit again with the same arguments to continue"
         raise KeyboardInterrupt(f"interrupted after {problem.runs} model runs; {kept}") from None
     minima = [(space.values(end.point), problem(space, end.point).cost) for end in ends]
     best, status = ends[0]
@@ -165,7 +167,7 @@ def fit(
         named = ", ".join(f"{name} = {value:.6g}" for name, value in space.named(values).items())
         raise UnconvergedError(
             f"the fit has not converged after {max_iterations} iterations, at {named}, cost "
-            f"{cost:.4g}: start closer, free fewer parameters, or allow more iterations"
+            f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations"
         )
     return fit_at(problem, space, best, list(scenes), status, minima)
 
@@ -197,7 +199,7 @@ def _require_positive(name: str, value: Any, what: str) -> None:
 
 
 class _Monitor:
-    """Count of the steps of a fit, which it tells with the time left."""
+    """Counter of the steps of a fit, which reports each with the time left."""
 
     def __init__(
         self,
@@ -210,7 +212,7 @@ class _Monitor:
         self._progress, self._steps, self._begin = progress, 0, time.perf_counter()
 
     def __call__(self, search: int, step: int, values: Vector, cost: float) -> None:
-        """Count one step and tell it."""
+        """Count one step and report it."""
         self._steps += 1
         elapsed = time.perf_counter() - self._begin
         left = elapsed / self._steps * max(self._most - self._steps, 0)

@@ -132,8 +132,8 @@ class LoopObservation(Observation):
         cls, measurement: Loop | Backbone, scene: Scene, run_in: NDArray[np.float64]
     ) -> LoopObservation:
         drive = getattr(measurement, scene.load.control)
-        answering = measurement.form.response(scene.load.control)
-        response = getattr(measurement, answering)
+        responding = measurement.form.response(scene.load.control)
+        response = getattr(measurement, responding)
         approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
         path = np.concatenate([approach, run_in, drive])
         check(scene, path)
@@ -149,7 +149,7 @@ class LoopObservation(Observation):
         if noise is not None and np.min(noise) >= np.ptp(response):
             raise InputError(
                 f"{measurement.label}: noise = {np.min(noise):.3g} is more than the range of "
-                f"{answering}, {np.ptp(response):.3g}: give the noise of that column, in its units"
+                f"{responding}, {np.ptp(response):.3g}: give the noise of that column, in its units"
             )
         weight = np.full(drive.size, 1.0 / np.ptp(response)) if noise is None else 1.0 / noise
         return cls(

@@ -19,7 +19,7 @@ SCALES = ("log", "linear")
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """A number of the scene that a fit may change.
+    """Number of the scene that a fit may change.
 
     Attributes
     ----------

@@ -80,7 +80,7 @@ class Problem:
             name, (_, mean, deviation) = space.names[self.priors[0][0]], self.priors[0]
             raise InputError(
                 f"free {name!r}: prior = {(mean, deviation)}: cannot be weighed against data of "
-                "unknown noise; give noise, such as 0.01 of the range"
+                "unknown noise; give noise (--noise on the command line), such as 0.01"
             )
         self._known: dict[bytes, Prediction] = {}
         self._saved = None

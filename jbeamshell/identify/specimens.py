@@ -53,7 +53,7 @@ class Specimen(NamedTuple):
         return weights
 
     def check(self) -> None:
-        """Raise `InputError` if there is nothing to compare, or no load that could drive it."""
+        """Raise `InputError` if there is no measurement, or if the load drives no column of one."""
         driver = self.scene.load.control
         fix = "does not drive a measurement: take " + " or ".join(map(repr, CONTROLS))
         require("load.control", driver, driver in CONTROLS, fix)

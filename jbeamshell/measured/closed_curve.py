@@ -74,7 +74,7 @@ def phases_of(found: Cycles, cycle: Cycle) -> tuple[np.ndarray, Floats]:
     start, middle, end = cycle.levels
     branches = (cycle.start, cycle.turn, start, middle), (cycle.turn, cycle.end, middle, end)
     for first, last, here, there in branches:
-        way = (found.path[first:last] - here) / (there - here)  # 0 to 1, whichever way it runs
+        way = (found.path[first:last] - here) / (there - here)  # from 0 to 1, rising or falling
         slack = 4.0 * found.noise / abs(there - here)
         ahead = way >= np.maximum.accumulate(way) - slack
         rising = there > here

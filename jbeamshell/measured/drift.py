@@ -20,7 +20,7 @@ def without_drift(found: Cycles, drift: str, smallest: float) -> Cycles:
     middles = np.array([0.5 * (clock[c.start] + clock[c.end]) for c in found.cycles])
     levels = {
         found.driver: np.array([0.5 * (c.low + c.high) for c in found.cycles]),
-        found.answer: np.array([_level(found, c) for c in found.cycles]),
+        found.responding: np.array([_level(found, c) for c in found.cycles]),
     }
     groups = np.array([c.group for c in found.cycles])
     straight, told = {}, []

@@ -80,14 +80,14 @@ class Cycles(NamedTuple):
     tail: tuple[int, int]
 
     @property
-    def answer(self) -> str:
+    def responding(self) -> str:
         """Name of the column that does not drive."""
         return "displacement" if self.driver == "force" else "force"
 
     @property
     def response(self) -> Floats:
         """Column (points,) that does not drive."""
-        return getattr(self.recording, self.answer)
+        return getattr(self.recording, self.responding)
 
     def group(self, number: int) -> list[Cycle]:
         """Cycles of one amplitude group."""

@@ -96,7 +96,7 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
     low = float(np.mean([cycles[i].low for i in own]))
     high = float(np.mean([cycles[i].high for i in own]))
     drive = low + (high - low) * np.abs(curve.knots - 1.0)
-    columns = {found.driver: drive, found.answer: np.append(mean, mean[0])}
+    columns = {found.driver: drive, found.responding: np.append(mean, mean[0])}
     recording = found.recording
     label = recording.label
     if found.groups > 1:
@@ -141,14 +141,14 @@ def _notes(
         (only,) = found.group(number)
         gap = abs(found.response[only.end] - found.response[only.start])
         return [
-            f"one {own} only, whose {found.answer} returns to within {gap:.2g}: its noise is "
+            f"one {own} only, whose {found.responding} returns to within {gap:.2g}: its noise is "
             "unknown, and so is whether it is steady"
         ]
     notes = [f"mean of {np.count_nonzero(repeats)} of {count} {own}s"]
     left = ", ".join(str(i + 1) for i in np.flatnonzero(~repeats))
     if left:
         notes[0] += (
-            f"; left out, as their {found.answer} is off by more than {limit:.2g}: {left[:60]}"
+            f"; left out, as their {found.responding} is off by more than {limit:.2g}: {left[:60]}"
         )
     levels = np.array([curve.parts(own).mean() for own in heights[repeats]])
     turn = np.arange(levels.size, dtype=float)
@@ -156,7 +156,7 @@ def _notes(
     drift, error = slope * levels.size, np.std(levels - slope * turn) * np.sqrt(12.0 / levels.size)
     if levels.size > 3 and abs(drift) > max(STEADY * float(np.ptp(heights)), 3.0 * error):
         notes.append(
-            f"the {found.answer} drifts by {drift:.2g} over these cycles: remove it by --drift "
+            f"the {found.responding} drifts by {drift:.2g} over these cycles: remove it by --drift "
             "linear (in Python drift='linear')"
         )
     return notes

@@ -1,4 +1,4 @@
-"""Tables: titled columns of numbers, whatever file they come from."""
+"""Tables: titled columns of numbers in a file of any kind."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ class Counted:
             raise Done
         self.runs += 1
         table = self.space.values(point)[self.space.table]
-        costs = self.experiment._walked(_cost, table, self.space.keys, jb.Newton())
+        costs = self.experiment._run(_cost, table, self.space.keys, jb.Newton())
         cost = float(np.sum(costs))
         self.best = min(self.best, cost)
         if cost <= self.target:
