@@ -1,1 +1,1 @@
-"""The scene: strip, contact, load and model, its keys, its TOML files and the scenes that ship."""
+"""Scene: strip, contact, load and model, with keys, TOML files and the scenes that ship."""

@@ -63,6 +63,9 @@ def support_rules(strip: Strip, contact: Contact, model: Model, numbers: Numbers
     rough = (friction > 0.0) | ("v" in held)
     fix = "nothing holds the strip along X (rigid-body motion): give strip.far_end or friction"
     rules = [Rule("contact.friction", friction, rough, fix)]
+    if model.solution == "closed-form":
+        fix = "the bar needs friction: give a positive number"
+        rules.append(Rule("contact.friction", friction, friction > 0.0, fix))
     for key, pressure in (("contact.pressure", top), ("contact.bottom_pressure", bottom)):
         if is_table(pressure):
             rules.append(_on_strip(key, pressure[:, 0], length))

@@ -1,8 +1,9 @@
 """Scenes that ship: the standard strip and the contact problems of Brink (2015), ready to run.
 
-Every scene is a TOML file of its name and a function here.  ``named("receding")`` is
-``receding()``; ``values_of("receding")`` are its dotted values, to be changed before a scene is
-made of them.  On the command line: ``jbeamshell scenes`` and ``jbeamshell run receding``.
+Every scene is a TOML file, and a function here with the same name.  ``named("receding")`` is the
+scene ``receding()``.  ``values_of("receding")`` are its values by dotted key, which may be changed
+before a scene is made of them.  On the command line: ``jbeamshell scenes`` and ``jbeamshell run
+receding``.
 
 References
 ----------
@@ -28,18 +29,18 @@ from jbeamshell.scene.toml import read_scene, read_values
 def standard() -> Scene:
     """The standard strip: a thin bar on a rough base, pulled to and fro at its end.
 
-    What ``Scene()`` is: fields v, beta and psi, held at X = 0, two cycles of the end force (after
-    chapter III).  Units are any consistent ones; gross slip begins at F = 2.
+    It is the same as ``Scene()``: fields v, beta and psi, held at X = 0, two cycles of the end
+    force (after chapter III).  Units are any consistent ones.  Gross slip begins at F = 2.
     """
     return named("standard")
 
 
 def calibrated() -> Scene:
-    """The standard strip with constants fitted once to finite elements, for thick strips too.
+    """The standard strip with constants fitted to finite elements, for thick strips too.
 
-    One kappa_s, one alpha and m = 8 for all heights: the dissipation is then within 11 % (rms) of
-    finite elements for eta = .03 to .4 and A from .3 up, and within 2 % where it exceeds .3 of the
-    cubic law, nu being .3 (`calibration/fit_universal.py`).  Set the height as you like.
+    One kappa_s, one alpha and m = 8 serve all heights, so the height may be set freely.  With
+    nu = .3 the dissipation is within 11 % (rms) of finite elements for eta = .03 to .4 and A from
+    .3 up, and within 2 % where it exceeds .3 of the cubic law (`calibration/fit_universal.py`).
     """
     return named("calibrated")
 
@@ -58,7 +59,7 @@ def squeezed() -> Scene:
     """A strip squeezed on both faces over its middle: the squeeze ends soon after the load.
 
     Steel of 200 x 2 mm under 100 MPa over 100 mm, half of it modelled, no foundation (section
-    4.7.2); beyond the load the squeeze decays over about 0.23 H.  Millimetres, newtons,
+    4.7.2).  Beyond the load the squeeze decays over about 0.23 H.  Millimetres, newtons,
     megapascals.
     """
     return named("squeezed")
@@ -68,7 +69,7 @@ def receding() -> Scene:
     """A strip pressed onto a frictionless base over its middle: beyond the load it lifts off.
 
     The strip of `squeezed` with a rigid base in place of the pressure from below (section 4.7.3).
-    However little it is pressed, ``contact_end`` is the same, just beyond X = 50.  Millimetres,
+    ``contact_end`` lies just beyond X = 50, and is the same under any pressure.  Millimetres,
     newtons, megapascals.
     """
     return named("receding")
@@ -77,8 +78,8 @@ def receding() -> Scene:
 def receding_rough() -> Scene:
     """The receding strip on a rough base, its free end pulled to and fro.
 
-    Clamped as if by a bolt over its middle half, it slips out from there, and what slips changes
-    where the contact ends.  Millimetres, newtons, megapascals.
+    The strip is clamped over its middle half, as if by a bolt.  It slips outside of the clamp, and
+    slip moves the end of the contact.  Millimetres, newtons, megapascals.
     """
     return named("receding-rough")
 
@@ -86,9 +87,9 @@ def receding_rough() -> Scene:
 def receding_421() -> Scene:
     """Receding contact by the earlier theory, whose squeeze strain is assumed.
 
-    psi = -(F_N + R)/(2E) in place of a balance of its own (section 4.2, example 4.2.1): a strip of
-    10 x 0.1 in, half of it modelled, its pressure falling to zero between X = 2.405 and 2.5 in.
-    Inches, pounds, pounds per square inch.
+    The squeeze strain is psi = -(F_N + R)/(2E) instead of a field with its own balance (section
+    4.2, example 4.2.1).  The strip is 10 x 0.1 in, half of it modelled; its pressure falls to zero
+    between X = 2.405 and 2.5 in.  Inches, pounds, pounds per square inch.
     """
     return named("receding-421")
 
@@ -115,8 +116,8 @@ def advancing() -> Scene:
 def block() -> Scene:
     """A block as long as it is high, pressed over its whole top face: the contact stays.
 
-    On a frictionless base (figure 2.5b); R is the pressure, uniformly.  Millimetres, newtons,
-    megapascals.
+    The base is frictionless (figure 2.5b), and R is uniform and equal to the pressure.
+    Millimetres, newtons, megapascals.
     """
     return named("block")
 
@@ -140,24 +141,24 @@ NAMES = tuple(_FUNCTIONS)
 
 
 def named(name: str) -> Scene:
-    """The scene of a name; `InputError` with the nearest one if there is none."""
+    """Scene of a name; raises `InputError` with the nearest name if there is none."""
     return read_scene(_file(name))
 
 
 def values_of(name: str) -> dict[str, Any]:
-    """Dotted values of the scene of a name; what they leave out is the standard strip's."""
+    """Values of the scene of a name by dotted key; other keys have their defaults."""
     return read_values(_file(name))
 
 
 def values_from(word: str, folder: Path = Path()) -> dict[str, Any]:
-    """Dotted values of a scene of a name, or of a file in a folder."""
+    """Values by dotted key of the scene of a name, or of a TOML file in a folder."""
     path = as_path(word)
     is_file = path.suffix == ".toml" or path.name != word or os.path.isfile(folder / path)
     return read_values(folder / path) if is_file else values_of(word)
 
 
 def summary(name: str) -> str:
-    """One line on the scene of a name."""
+    """One line that describes the scene of a name."""
     _file(name)
     return inspect.getdoc(_FUNCTIONS[name]).splitlines()[0]  # type: ignore[union-attr]
 

@@ -95,7 +95,7 @@ class Key:
         return inside & np.isfinite(values)
 
     def convert(self, value: Any) -> Any:
-        """The value as a scene holds it: a floating-point leaf, or plain Python."""
+        """Value as a scene holds it: a floating-point leaf, or plain Python."""
         if self.kind != "number":
             return as_words(value)
         return as_leaf(value, self.name, self.words if self.table else NUMBER)

@@ -1,17 +1,17 @@
-"""The ladder's rungs by name, from a bar to plane elasticity.
+"""Rungs of the ladder of models by name, from a bar to plane elasticity.
 
-| name | what it is |
+| name | model |
 |---|---|
 | ``bar`` | Goodman's one-dimensional bar, in closed form |
 | ``shell`` | fields v and beta |
 | ``squeeze`` | fields v, beta and psi |
 | ``p1``, ``p2``, ``p3``, ... | sections of order p, see `jbeamshell.mechanics.hierarchic` |
 | ``masing`` | Masing's rule from a pull and a push of ``squeeze`` |
-| ``masing-shell``, ``masing-p2``, ... | the same of another section |
-| ``masing-pull``, ``masing-pull-p2``, ... | from a pull alone |
-| ``stepwise-bar`` | field v by Newton's method: the bar where the closed form does not reach |
+| ``masing-shell``, ``masing-p2``, ... | the same with another section |
+| ``masing-pull``, ``masing-pull-p2``, ... | Masing's rule from a pull alone |
+| ``stepwise-bar`` | field v by Newton's method, for bars without a closed form |
 
-All but the bars take the lift w where the scene has it.
+All rungs but the bars have the field w if the scene has it.
 """
 
 from __future__ import annotations
@@ -24,17 +24,22 @@ from jbeamshell.common.errors import InputError
 
 LARGEST_ORDER = 12
 FIELDS_OF = {"bar": ("v",), "shell": ("v", "beta"), "squeeze": ("v", "beta", "psi")}
-SETS = ("model.fields", "model.order", "model.solution")  # what a rung's name stands for
+SETS = ("model.fields", "model.order", "model.solution")  # keys that a rung's name sets
 _NAME = re.compile(r"(?P<prefix>(masing-pull|masing|stepwise)-)?(?P<section>[a-z]+|p\d+)")
 
 
 def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
-    """Dotted values that make a model this rung.
+    """Values by dotted key that make a model a rung; raises `InputError` for an unknown name.
 
     Parameters
     ----------
-    rung : its name
-    lift : whether the strip may lift off
+    rung : name of the rung
+    lift : True if the strip may lift off
+
+    Examples
+    --------
+    >>> values_of("p2")["model.order"]
+    2
     """
     text = rung if isinstance(rung, str) else repr(rung)
     full = f"{text}-squeeze" if text in ("masing", "masing-pull") else text
@@ -43,7 +48,7 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     section = match["section"] if match else ""
     order = int(section[1:]) if re.fullmatch(r"p\d+", section) else 0
     ordered = section not in FIELDS_OF and 1 <= order <= LARGEST_ORDER
-    stepwise = prefix == "stepwise" and section != "bar"  # that is what no prefix means
+    stepwise = prefix == "stepwise" and section != "bar"  # the others are stepwise by no prefix
     if not match or stepwise or not (ordered or section in FIELDS_OF):
         raise InputError(
             f"model.rung = {rung!r}: choose 'bar', 'shell', 'squeeze', 'p1' to 'p{LARGEST_ORDER}', "
@@ -58,7 +63,7 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
 
 
 def name_of(fields: Sequence[str], order: int, solution: str) -> str:
-    """Name of the rung that a model is."""
+    """Name of a model's rung."""
     if order > 0:
         section = f"p{order}"
     else:
@@ -71,12 +76,17 @@ def name_of(fields: Sequence[str], order: int, solution: str) -> str:
 
 
 def spelled_out(values: dict[str, Any], fields: Sequence[str] = ()) -> dict[str, Any]:
-    """Dotted values with a rung's name replaced by what it stands for.
+    """Values by dotted key, with ``model.rung`` replaced by the keys that it sets.
 
     Parameters
     ----------
-    values : dotted values; where they give ``model.fields`` too, they must say the same
-    fields : of the model that is changed, for whether it may lift off
+    values : values by dotted key
+    fields : fields of the model that is changed; with w among them, the rung has w too
+
+    Raises
+    ------
+    InputError
+        if the rung is unknown, or if the values disagree with it
     """
     if "model.rung" not in values:
         return values

@@ -138,9 +138,6 @@ class Scene(eqx.Module):
         fix = "a backbone that is doubled needs an even number"
         enough = model.solution == "stepwise" or half % 2 == 0
         require("load.steps_per_half_cycle", half, enough, fix)
-        if not isinstance(contact.friction, jax.core.Tracer):
-            rubs = not closed or float(contact.friction) > 0.0
-            require("contact.friction", contact.friction, rubs, "the bar needs friction")
 
     def _check_contact(self) -> None:
         """Refuse a strip that nothing holds, and a load off the strip."""

@@ -1,4 +1,4 @@
-"""Sweeps over many strips."""
+"""Sweeps: figures of many strips that differ in some numbers; each strip is a lane."""
 
 from jbeamshell.sweeping.lanes import Lanes as Lanes
 from jbeamshell.sweeping.lanes import Outcome as Outcome

@@ -1,4 +1,4 @@
-"""A sweep as work: which lanes make which block, who runs it, and what became of all lanes."""
+"""Sweep as a job: lanes dealt into blocks, blocks run and stored, results collected."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from jbeamshell.sweeping.lanes import Lanes, Outcome
 from jbeamshell.sweeping.runner import BLOCK, Block, Runner, width_of_chunks
 from jbeamshell.sweeping.store import Store
 
-BLOCKS = 32  # at least, of a sweep with lanes enough, so that all hands get alike shares
-LEAST = 8  # lanes of a block: less is not worth a file
+BLOCKS = 32  # least number of blocks of a large sweep, for equal shares of all processes
+LEAST = 8  # least lanes of a block that is worth a file
 
 Tell = Callable[[int], None]
 
 
 @dataclasses.dataclass(frozen=True)
 class Job:
-    """A sweep to be done.
+    """Sweep to be done.
 
     Attributes
     ----------
-    lanes : what varies
-    figures : names of `jbeamshell.History`
-    solver : settings of Newton's method
+    lanes : lanes of the sweep
+    figures : attributes of `jbeamshell.History`
+    solver : settings of Newton's method; None is the default
     """
 
     lanes: Lanes
@@ -43,11 +43,12 @@ class Job:
 
     @property
     def dtype(self) -> np.dtype:
+        """Precision of the scene's numbers."""
         return np.dtype(self.lanes.scene.strip.length.dtype)
 
     @functools.cached_property
     def scene(self) -> str | None:
-        """TOML of what is not varied; None where a function of the user's own is part of it."""
+        """TOML of what is not varied; None if the scene has a function of the user's own."""
         try:
             return scene_to_toml(self.lanes.scene)
         except InputError:
@@ -55,15 +56,15 @@ class Job:
 
     @functools.cached_property
     def outside(self) -> np.ndarray:
-        """Which lanes lie outside the model's domain, an array of the lanes' shape."""
+        """True for lanes outside the model's domain, an array of the lanes' shape."""
         return self.lanes.outside()
 
     @functools.cached_property
     def blocks(self) -> list[np.ndarray]:
-        """Flat numbers of the lanes of every block, those outside the domain left out.
+        """Flat numbers of the lanes of every block, without those outside the domain.
 
-        Lanes are sorted by difficulty and cut into chunks; every block gets chunks of all
-        difficulties, so that all blocks cost alike.
+        Lanes are sorted by difficulty and cut into chunks.  Every block gets chunks of all
+        difficulties, so that all blocks cost the same.
         """
         inside = np.flatnonzero(~self.outside)
         hardness = self.lanes.difficulty.ravel()[inside]
@@ -80,12 +81,12 @@ class Job:
         return [order[n[n < order.size]] for n in numbers]
 
     def runner(self, devices: Sequence[Any] | None = None) -> Runner:
-        """The compiled model."""
+        """Runner with the model of this sweep, to be compiled."""
         lanes = self.lanes
         return Runner(lanes.scene, tuple(lanes.axes), self.figures, self.solver, devices)
 
     def size(self, share: Sequence[int]) -> int:
-        """How many lanes these blocks have."""
+        """Number of lanes of these blocks."""
         return sum(self.blocks[number].size for number in share)
 
     def run(
@@ -96,9 +97,20 @@ class Job:
         tell: Tell,
         known: Mapping[int, Block],
     ) -> dict[int, Block]:
-        """Answers of blocks, the known ones as they are; tells of the others how many lanes each.
+        """Run blocks and store each as it finishes.
 
-        Blocks are stored as they finish.
+        Parameters
+        ----------
+        share : numbers of the blocks
+        runner : compiled model
+        store : folder for finished blocks; None keeps them in memory only
+        tell : is called with the number of lanes of every block that is finished
+        known : blocks by number that are not run again
+
+        Returns
+        -------
+        dict
+            blocks by number, with the known ones.
         """
         found = dict(known)
         missing = [number for number in share if number not in found]
@@ -114,14 +126,14 @@ class Job:
         return found
 
     def stored(self, share: Sequence[int], store: Store) -> dict[int, Block]:
-        """Those of the blocks that are in the store."""
+        """Blocks of a share that are in the store, by number."""
         done = store.done()
         figures = len(self.figures)
         loaded = {n: store.load(n, figures, self.blocks[n].size) for n in share if n in done}
         return {number: block for number, block in loaded.items() if block is not None}
 
     def collected(self, blocks: Mapping[int, Block]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Figures and codes of `Outcome` of all lanes, arrays of the lanes' shape."""
+        """Figures by name and codes of `Outcome` of all lanes, arrays of the lanes' shape."""
         values = np.full((len(self.figures), self.lanes.size), np.nan, self.dtype)
         status = np.full(self.lanes.size, Outcome.OUTSIDE, np.int8)
         for number, block in blocks.items():
@@ -134,7 +146,7 @@ class Job:
     # --- on paper -------------------------------------------------------------------------------
 
     def description(self) -> str:
-        """Everything but the axes' values as text, the same for the same sweep only."""
+        """Text that identifies the sweep, without the axes' values."""
         if self.scene is None:
             raise InputError(
                 "out, processes: a scene with a function of your own cannot be put on disk: "
@@ -154,7 +166,7 @@ class Job:
 
 
 def read_job(store: Store) -> Job:
-    """The sweep that a store was opened for."""
+    """Job of the sweep for which a store was opened."""
     text, axes = store.read()
     about = json.loads(text)
     tables = tomllib.loads(about["scene"])

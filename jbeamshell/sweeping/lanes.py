@@ -157,8 +157,6 @@ class Lanes:
         if strip.layers is not None:
             thickness = np.sum(np.asarray(strip.layers)[:, 0])
             yield fill_height(thickness, 2.0 * self.value("strip.half_height"))
-        if model.solution == "closed-form":
-            yield self.value("contact.friction") > 0.0
         targets = self.value("load.amplitude") if load.cycles else 0.0
         for rule in (
             *support_rules(strip, contact, model, self.value),

@@ -1,4 +1,4 @@
-"""Many processes: workers on this machine, watched and replaced; or those of `jax.distributed`."""
+"""Processes of a sweep: workers on this machine, or the processes of `jax.distributed`."""
 
 from __future__ import annotations
 
@@ -20,24 +20,42 @@ from jbeamshell.sweeping.job import Job, Tell
 from jbeamshell.sweeping.runner import Block
 from jbeamshell.sweeping.store import Store
 
-POLL = 0.01  # seconds between looks at what the workers have done
-TRIES = 3  # deaths in a row, without a block in between, after which a worker is given up
+POLL = 0.01  # seconds between two looks at the workers and their blocks
+TRIES = 3  # deaths of a worker without a finished block in between, after which it is given up
 
 
 class Crew:
-    """Worker processes of a sweep, each with every so-many-th block; dead ones are replaced."""
+    """Worker processes of a sweep on this machine; one that dies is replaced.
+
+    Attributes
+    ----------
+    store : folder of the sweep
+    count : number of workers; worker k takes blocks k, k + count, ...
+    lost : number of workers that have died
+    """
 
     def __init__(self, store: Store, count: int, ready: Callable[[], None]) -> None:
         self.store, self.count = store, count
-        self.lost = 0  # how many have died
-        self._ready: Callable[[], None] | None = ready  # to be called when all have compiled
+        self.lost = 0
+        self._ready: Callable[[], None] | None = ready  # called once, when all have compiled
         self._environment: dict[str, str] = {}
         self._processes: list[subprocess.Popen[bytes]] = []
         self._deaths = [0] * count
         self._left = [-1] * count
 
     def finish(self, job: Job, tell: Tell) -> None:
-        """Have the blocks done that the store lacks; raises if workers keep dying."""
+        """Run the blocks that the store lacks.
+
+        Parameters
+        ----------
+        job : sweep to be done
+        tell : is called with the number of lanes of every block that is finished
+
+        Raises
+        ------
+        UnconvergedError
+            if a worker dies `TRIES` times without finishing a block
+        """
         self._environment = environment(self.store.cache)
         try:
             self._watch(job, tell)
@@ -70,7 +88,7 @@ class Crew:
             return subprocess.Popen(
                 [sys.executable, *words, str(self.count)],
                 env=self._environment,
-                stdin=subprocess.PIPE,  # whose end tells a worker that its parent is gone
+                stdin=subprocess.PIPE,  # closes with this process, and the worker ends
                 stdout=log,
                 stderr=log,
             )
@@ -82,7 +100,7 @@ class Crew:
         if self._deaths[number] >= TRIES:
             raise UnconvergedError(
                 f"worker process {number + 1} of {self.count} died {TRIES} times without "
-                f"finishing a block ({self._cause(number)}); what is done is kept"
+                f"finishing a block ({self._cause(number)}); finished blocks are kept"
             )
         _close(self._processes[number])
         self._processes[number] = self._start(number)
@@ -117,27 +135,27 @@ class Crew:
 
 
 def _close(process: subprocess.Popen[bytes]) -> None:
-    """Close our end of its standard input."""
+    """Close this process's end of a worker's standard input."""
     if process.stdin is not None:
         process.stdin.close()
 
 
 def mark(store: Store, number: int) -> Path:
-    """A file that says that a worker has compiled."""
+    """File whose presence tells that a worker has compiled."""
     return store.folder / f"worker-{number}.ready"
 
 
 def environment(cache: Path) -> dict[str, str]:
-    """Of a worker: this process's precision and devices, one thread, and what is compiled shared.
+    """Environment of a worker: precision and devices of this process, one thread, a shared cache.
 
     Parameters
     ----------
-    cache : folder for what is compiled, where this process has none
+    cache : folder for compiled programs, if this process has none
     """
     values, config = dict(os.environ), cast(Any, jax.config)
     values["JAX_ENABLE_X64"] = str(int(config.jax_enable_x64))
     values["JAX_PLATFORMS"] = jax.default_backend()
-    # One core each: threads of several processes would take turns on them.
+    # One thread each: those of several processes would take turns on the cores.
     values["PJRT_NPROC"] = values["OMP_NUM_THREADS"] = "1"
     folder = config.jax_compilation_cache_dir
     if folder is None:
@@ -150,7 +168,15 @@ def environment(cache: Path) -> dict[str, str]:
 
 
 def check_alike(job: Job) -> None:
-    """Refuse processes of `jax.distributed` whose sweeps differ: their lanes would be mixed up."""
+    """Refuse processes of `jax.distributed` with different sweeps, whose lanes would be mixed up.
+
+    Raises
+    ------
+    InputError
+        if a process has another sweep
+    UnconvergedError
+        if a process is lost
+    """
     from jax.experimental import multihost_utils
 
     lanes = job.lanes
@@ -173,7 +199,7 @@ def check_alike(job: Job) -> None:
 
 
 def wait_for_all() -> None:
-    """Until every process of `jax.distributed` is here, or one is lost."""
+    """Wait until every process of `jax.distributed` has come here, or one is lost."""
     from jax.experimental import multihost_utils
 
     with contextlib.suppress(jax.errors.JaxRuntimeError):
@@ -181,12 +207,12 @@ def wait_for_all() -> None:
 
 
 def share_of(job: Job) -> range:
-    """Blocks of this one of the processes of `jax.distributed`."""
+    """Numbers of the blocks of this process of `jax.distributed`."""
     return range(jax.process_index(), len(job.blocks), jax.process_count())
 
 
 def gathered(job: Job, own: dict[int, Block]) -> dict[int, Block]:
-    """Blocks of all processes of `jax.distributed`, on each of them."""
+    """Blocks of all processes of `jax.distributed`, the same on each of them."""
     from jax.experimental import multihost_utils
 
     hands = jax.process_count()
@@ -204,7 +230,7 @@ def gathered(job: Job, own: dict[int, Block]) -> dict[int, Block]:
 
 
 def _places(job: Job, share: range) -> Iterator[tuple[slice, int]]:
-    """Where the blocks of a share are in its row of lanes."""
+    """Places of the blocks of a share in its row of lanes, and their numbers."""
     begin = 0
     for number in share:
         end = begin + job.blocks[number].size

@@ -1,4 +1,4 @@
-"""What a sweep found: arrays with named axes, a table, CSV, pictures."""
+"""Results of a sweep: arrays with named axes, a table, CSV, pictures."""
 
 from __future__ import annotations
 
@@ -18,23 +18,33 @@ from jbeamshell.quasistatic.load_path import check
 from jbeamshell.scene.scene import Scene
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 
-ROWS = 4096  # of a table that are put into words at a time
+ROWS = 4096  # rows of a table that are turned into text at a time
 
 
 @dataclasses.dataclass(frozen=True)
 class Sweep:
-    """Figures of all lanes of a sweep.
+    """Figures of all lanes of a sweep; a lane is one of its strips.
 
     Attributes
     ----------
-    scene : what was not varied
-    axes : (n,) values of every key, in the order of the arrays' axes
-    paired : whether the keys went together, so that the arrays have one axis
+    scene : scene with all that was not varied
+    axes : values (n,) of every key, in the order of the arrays' axes
+    paired : True if the keys went together, so that the arrays have one axis
     values : figures by name, arrays of the lanes' ``shape``; NaN where there is none
-    status : codes of `jbeamshell.sweeping.Outcome`, of that shape: why
-    wall_s : seconds that it took, of which ``compile_s`` before the first lane
+    status : codes of `jbeamshell.sweeping.Outcome`, an array of that shape
+    wall_s : seconds that the sweep took
+    compile_s : part of them before the first lane
     computed : lanes that were run in that time; the others were on disk, or outside the domain
-    notes : what a reader should know
+    notes : remarks for the reader, such as workers that were replaced
+
+    Examples
+    --------
+    ::
+
+        over = {"load.amplitude": [0.4, 0.8], "contact.friction": [0.1, 0.2]}
+        result = jb.sweep(jb.Scene(), over)
+        result["dissipation"][0, 1]  # of amplitude 0.4 and friction 0.2
+        result.to_csv("sweep.csv")
     """
 
     scene: Scene
@@ -48,42 +58,43 @@ class Sweep:
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, figure: str) -> np.ndarray:
+        """Values of a figure, an array of the lanes' shape."""
         require_choice("figure", figure, tuple(self.values))
         return self.values[figure]
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """A length for every key; paired, one for all."""
+        """Shape of the arrays: a length for every key, or one length if the keys are paired."""
         return self.status.shape
 
     @property
     def lanes(self) -> Lanes:
-        """Quantities of the lanes, such as ``amplitude_over_height``."""
+        """Lanes with their quantities, such as ``amplitude_over_height``."""
         return Lanes(self.scene, self.axes, self.paired)
 
     @property
     def failed(self) -> int:
-        """Lanes that found no equilibrium, batched and alone."""
+        """Number of lanes without equilibrium, neither in their batch nor solved alone."""
         return int(np.sum((self.status > Outcome.CONVERGED) & (self.status <= Outcome.NOT_REACHED)))
 
     @property
     def outside(self) -> int:
-        """Lanes outside the model's domain, which were not run."""
+        """Number of lanes outside the model's domain, which were not run."""
         return int(np.sum(self.status == Outcome.OUTSIDE))
 
     @property
     def undefined(self) -> int:
-        """Lanes that were solved, but with a figure that means nothing there."""
+        """Number of lanes that were solved, but have a figure of 0/0."""
         return int(np.sum(self.status == Outcome.UNDEFINED))
 
     @property
     def lanes_per_s(self) -> float:
-        """Lanes computed in a second, compilation aside."""
+        """Lanes computed in a second, without the time to compile."""
         return self.computed / max(self.wall_s - self.compile_s, 1e-9)
 
     @functools.cached_property
     def why_outside(self) -> str:
-        """What is wrong with the first lane outside the domain; empty if there is none."""
+        """Reason why the first lane outside the domain is there; empty if there is none."""
         lanes = np.flatnonzero(self.status == Outcome.OUTSIDE)
         if not lanes.size:
             return ""
@@ -92,19 +103,19 @@ class Sweep:
             check(self.scene.replace(dict(zip(self.axes, values, strict=True))))
         except InputError as error:
             return str(error)
-        return "on its edge"  # round-off apart
+        return "on the edge of the domain"  # the scene alone is inside by round-off
 
     # --- tables ---------------------------------------------------------------------------------
 
     def table(self) -> dict[str, np.ndarray]:
-        """Columns (lanes,): the keys, the figures, and how the lanes ended in words."""
+        """Columns (lanes,) by name: the keys, the figures, and the outcome in words."""
         keys = dict(zip(self.axes, self.lanes.columns(np.arange(self.status.size)), strict=True))
         words = np.array([outcome.name.lower() for outcome in Outcome])
         figures = {name: values.ravel() for name, values in self.values.items()}
         return keys | figures | {"status": words[self.status.ravel()]}
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Write the table, whole or not at all; what is no number is left empty."""
+        """Write the table as CSV, whole or not at all; cells without a number stay empty."""
         with written_whole(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow([*self.axes, *self.values, "status"])
@@ -122,7 +133,7 @@ class Sweep:
             yield zip(*keys, *figures, [words[code] for code in status[some]], strict=True)
 
     def figures(self) -> dict[str, Any]:
-        """Everything as plain numbers, words and lists; None where there is no number."""
+        """Result as plain numbers, words and lists, for JSON; None where there is no number."""
         words = [outcome.name.lower() for outcome in Outcome]
         return {
             "lanes": self.status.size,
@@ -164,20 +175,20 @@ class Sweep:
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
     def plot(self, axes: Any = None, **options: Any) -> Any:
-        """Draw a figure along one key, a curve for each value of another; see `plotting.sweep`."""
+        """Draw a figure over one key, a curve for each value of another; see `plotting.sweep`."""
         from jbeamshell import plotting
 
         return plotting.sweep(self, axes, **options)
 
     def plot_master(self, axes: Any = None, **options: Any) -> Any:
-        """Draw the dissipation's ratio over A/eta; see `plotting.master_curve`."""
+        """Draw the dissipation ratio over A/eta; see `plotting.master_curve`."""
         from jbeamshell import plotting
 
         return plotting.master_curve(self, axes, **options)
 
 
 def _known(values: np.ndarray) -> list[float | None]:
-    """Plain numbers, None for what is none."""
+    """Plain numbers; None in place of NaN and infinity."""
     plain, finite = values.tolist(), np.isfinite(values)
     if finite.all():
         return plain
@@ -185,7 +196,7 @@ def _known(values: np.ndarray) -> list[float | None]:
 
 
 def _nested(flat: list[Any], shape: tuple[int, ...]) -> list[Any]:
-    """Lists in lists, as many as the shape has lengths."""
+    """Nested lists of a shape."""
     for length in shape[:0:-1]:
         flat = [flat[i : i + length] for i in range(0, len(flat), length)]
     return flat

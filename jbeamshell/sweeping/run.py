@@ -1,7 +1,7 @@
 """Sweeps: figures of many scenes at once, over any of a scene's numbers.
 
 `sweep` runs them on all local devices, in several processes of this machine, or as one of the
-processes of `jax.distributed`; finished blocks are kept on disk where a file is named.
+processes of `jax.distributed`.  Finished blocks are kept on disk if a file is named.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from jbeamshell.sweeping.store import Store
 
 FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "loss_factor")
 MOST_PROCESSES = 10_000
-PARTS = ".parts"  # what a sweep to FILE.csv keeps its finished blocks in, beside the file
+PARTS = ".parts"  # suffix of the folder of finished blocks, beside the file
 LOST = "a process was lost: its lanes that were not on disk were run by the others"
 
 Progress = Callable[[int, int], None]
@@ -50,28 +50,29 @@ def sweep(
     solver: Newton | None = None,
     progress: Progress | None = None,
 ) -> Sweep:
-    """Figures of the last cycle of many scenes that differ in some numbers.
+    """Figures of the last cycle of many strips that differ in some numbers; each is a lane.
 
-    Lanes are sorted by difficulty and dealt into blocks of equal cost; on a core they run one after
-    the other, in one compiled loop.  One that fails is solved again alone, its load steps walked in
-    pieces; one outside the model's domain is marked and not run.  Neither disturbs the others.
+    Lanes are sorted by their estimated cost and dealt into blocks of equal cost.  On a core they
+    run one after the other, in one compiled loop.  A lane that fails is solved again alone, with
+    its long load steps divided.  A lane outside the model's domain is marked and not run.  Neither
+    disturbs the others.
 
-    Where `jax.distributed` is initialised, every process makes this same call, takes its part of
-    the lanes, and gets the whole result.
+    If `jax.distributed` is initialised, every process makes this same call, runs its part of the
+    lanes, and gets the whole result.
 
     Parameters
     ----------
-    scene : what is not varied
-    over : by dotted key of a number, its values (n,)
-    figures : names of `jbeamshell.History`, numbers of the last cycle, or of every step: then of
-        the last
-    paired : whether the keys' values go together, row by row, instead of as a product
-    out : FILE.csv for the table; finished blocks are kept in FILE.csv.parts until it is written,
-        and the same sweep to the same file goes on from them
-    processes : of this machine that share the lanes; one that dies is replaced
-    devices : of this process on which blocks run side by side; None is all local ones
+    scene : scene with all that is not varied
+    over : values (n,) by the dotted key of a number
+    figures : attributes of `jbeamshell.History` that are numbers of a cycle or of every step; the
+        sweep takes the last
+    paired : True if the keys' values go together, row by row, instead of as a product
+    out : FILE.csv for the table.  Finished blocks are kept in FILE.csv.parts until it is written;
+        the same sweep to the same file goes on from them
+    processes : number of processes of this machine that share the lanes; one that dies is replaced
+    devices : devices of this process on which blocks run side by side; None is all local ones
     solver : settings of Newton's method
-    progress : is called with the lanes done so far and all that are to be run
+    progress : function that is called with the numbers of lanes done so far and to be run in all
 
     Returns
     -------
@@ -83,7 +84,15 @@ def sweep(
     InputError
         if the axes, figures or the file make no sweep, or one too large for memory
     UnconvergedError
-        if a worker process keeps dying; a failing lane does not raise, see ``Sweep.status``
+        if a worker process keeps dying; a lane that fails does not raise, see ``Sweep.status``
+
+    Examples
+    --------
+    ::
+
+        over = {"strip.height_ratio": np.geomspace(0.02, 0.4, 32), "load.amplitude": [0.5, 1.0]}
+        result = jb.sweep(jb.Scene(), over, processes=2, out="sweep.csv")
+        result["dissipation"]  # (32, 2)
     """
     watch = _Watch(progress)
     job = _job(scene, over, figures, paired, solver)
@@ -135,10 +144,12 @@ def _check_processes(processes: int, devices: Sequence[Any] | None) -> None:
     require("processes", processes, whole and 1 <= processes <= MOST_PROCESSES, fix)
     if processes > 1:
         on_cores = jax.default_backend() == "cpu"
-        require("processes", processes, on_cores, "are for cores: other devices work side by side")
-        fix = "is not for the processes of jax.distributed: leave it out"
+        fix = "is for cores only: other devices work side by side anyway; leave it out"
+        require("processes", processes, on_cores, fix)
+        fix = "does not go with jax.distributed, which has its own processes: leave it out"
         require("processes", processes, jax.process_count() == 1, fix)
-        require("devices", devices, devices is None, "are chosen by the processes: leave it out")
+        fix = "does not go with processes, which choose theirs: leave it out"
+        require("devices", devices, devices is None, fix)
     if devices is not None:
         known = isinstance(devices, list | tuple) and all(
             isinstance(d, jax.Device) for d in devices
@@ -157,7 +168,7 @@ def _check_out(out: str | os.PathLike[str]) -> Path:
 
 
 class _Watch:
-    """When it began, when it was compiled, how far it is."""
+    """Clock and progress of a sweep: its begin, the end of compilation, and lanes done."""
 
     def __init__(self, progress: Progress | None) -> None:
         self.begun = self.compiled_at = time.perf_counter()

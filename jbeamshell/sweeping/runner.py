@@ -1,4 +1,4 @@
-"""Blocks of lanes on the devices: one compiled shape, chunks, failures retried alone."""
+"""Blocks of lanes on the devices: one compiled shape, chunks, and lanes that fail solved alone."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_to_toml
 from jbeamshell.sweeping.lanes import Outcome
 
-ABREAST = 32  # strips of which a core finds the patterns side by side
-BLOCK = 1024  # lanes of the largest block, which is the compiled shape
-KEPT = 4  # compiled models of other scenes
+ABREAST = 32  # lanes of a chunk on a core, if slip patterns are iterated side by side
+BLOCK = 1024  # lanes of the largest block, for which the program is compiled
+KEPT = 4  # compiled models of scenes that are kept
 
 Answers = Callable[..., dict[str, Array]]
 _known: dict[str, Answers] = {}
 
 
 class Block(NamedTuple):
-    """Answers of some lanes.
+    """Figures of some lanes.
 
     Attributes
     ----------
-    values : (figures, lanes) NaN where there is none
-    status : (lanes,) codes of `Outcome`
+    values : figures, (figures, lanes); NaN where there is none
+    status : codes of `Outcome`, (lanes,)
     """
 
     values: np.ndarray
@@ -47,10 +47,11 @@ class Block(NamedTuple):
 
 
 def width_of_chunks(scene: Scene) -> int:
-    """Lanes that advance together: a GPU wants all that it can get.
+    """Number of lanes that advance together.
 
-    On a core those of which only patterns are to be found, for its vectors then run along them;
-    else each alone, because wide ones wait for their slowest, and vectors run along the nodes.
+    On a GPU it is a whole block.  On a core it is `ABREAST` if only slip patterns are iterated,
+    because vector instructions then run over the lanes.  Otherwise each lane runs alone: a wide
+    chunk would wait for its slowest lane, and vector instructions run over the nodes.
     """
     if jax.default_backend() != "cpu":
         return BLOCK
@@ -60,7 +61,7 @@ def width_of_chunks(scene: Scene) -> int:
 def check_figures(
     scene: Scene, keys: Sequence[str], figures: Sequence[str], solver: Newton | None
 ) -> None:
-    """Refuse figures that are no numbers; raises `InputError` where the scene takes no such key."""
+    """Raise `InputError` for figures that are no numbers, and for keys that the scene refuses."""
     require("figures", list(figures), len(figures) > 0, "name at least one")
     require("figures", list(figures), len(set(figures)) == len(figures), "names one twice")
     number = jax.ShapeDtypeStruct((), scene.strip.length.dtype)
@@ -80,11 +81,11 @@ def check_figures(
 
 
 class Runner:
-    """The compiled model: lanes in, figures out.
+    """Compiled model, from the numbers of lanes to their figures.
 
     Attributes
     ----------
-    devices : on which blocks run side by side
+    devices : devices on which blocks run side by side
     width : lanes of a chunk
     """
 
@@ -105,15 +106,15 @@ class Runner:
         self._about = ask, self.figures, self._shape, self.dtype, self._mesh
 
     def lower(self) -> None:
-        """Trace the model, which is the part of compiling that no cache saves."""
+        """Trace the model, the part of compilation that no cache on disk saves."""
         _lowered(*self._about)
 
     def compile(self) -> None:
-        """Compile without running a lane."""
+        """Compile the model without running a lane."""
         _compiled(*self._about)
 
     def __call__(self, batches: Sequence[np.ndarray]) -> Iterator[Block]:
-        """Answers of one batch of lanes, (keys, lanes) each, for every device at the most."""
+        """Blocks of batches of lanes, (keys, lanes) each; at most one batch for every device."""
         found = jax.device_get(self._answers(batches))
         for device, columns in enumerate(batches):
             lanes = columns.shape[1]
@@ -127,7 +128,7 @@ class Runner:
         return len(self.devices), len(self.keys), BLOCK // self.width, self.width
 
     def _answers(self, batches: Sequence[np.ndarray]) -> tuple[Array, Array]:
-        # What no lane fills is never computed, but for the rest of a chunk: its last lane again.
+        # Chunks without lanes are not computed; a part-filled chunk repeats its last lane.
         filled, counts = np.ones(self._shape, self.dtype), np.zeros(len(self.devices), np.int32)
         for device, columns in enumerate(batches):
             counts[device] = -(-columns.shape[1] // self.width)
@@ -137,7 +138,7 @@ class Runner:
         return _compiled(*self._about)(*jax.device_put((filled, counts), _spread(self._mesh)))
 
     def _mend(self, columns: np.ndarray, block: Block) -> None:
-        """Solve alone what failed, which walks its steps in pieces; mark what still fails."""
+        """Solve failed lanes alone, where long load steps are divided; mark what still fails."""
         values, status = block
         unclear = (status != Outcome.CONVERGED) | ~np.all(np.isfinite(values), axis=0)
         for lane in np.flatnonzero(unclear):
@@ -165,12 +166,12 @@ def _ask(
     solver: Newton | None,
     method: Method | None = None,
 ) -> Answers:
-    """The scene's response: the same function for the same scene, so that it compiles once."""
+    """Response of a scene; the same function for the same scene, so that it compiles once."""
     try:
         name = (
             f"{scene_to_toml(scene)} {scene.strip.length.dtype} {keys} {figures} {solver} {method}"
         )
-    except InputError:  # a user's own energy has no text
+    except InputError:  # a function of the user's own has no text
         return response(scene, keys, figures, solver=solver, method=method)
     if name not in _known:
         while len(_known) >= KEPT:
@@ -185,7 +186,7 @@ def _spread(mesh: Mesh) -> NamedSharding:
 
 @functools.lru_cache(KEPT)
 def _compiled(*about: Any) -> Any:
-    """What `_lowered` makes, compiled."""
+    """Compiled program of `_lowered`."""
     return _lowered(*about).compile()
 
 
@@ -193,10 +194,11 @@ def _compiled(*about: Any) -> Any:
 def _lowered(
     ask: Answers, figures: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype, mesh: Mesh
 ) -> Any:
-    """Runs one block on every device: (devices, keys, chunks, width) and how many chunks of each.
+    """Program, traced but not compiled, that runs one block on every device.
 
-    Chunks run one after the other, as many as there are, so that one compiled shape does for
-    sweeps of all sizes.
+    It takes the numbers (devices, keys, chunks, width) and the count of filled chunks of each
+    device.  Only filled chunks run, one after the other, so that one shape serves sweeps of all
+    sizes.
     """
 
     def chunk(lanes: Array) -> tuple[Array, Array]:
@@ -229,5 +231,5 @@ def _lowered(
 
 @eqx.filter_jit
 def _figures(history: History, figures: tuple[str, ...]) -> Array:
-    """Figures of the last cycle or, where there is one for every step, of the last step."""
+    """Figures of the last cycle; a figure of every step is that of the last step."""
     return jnp.stack([jnp.ravel(getattr(history, name))[-1] for name in figures])

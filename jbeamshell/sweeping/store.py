@@ -1,4 +1,4 @@
-"""Finished blocks on disk, so that nothing computed is lost: a sweep that was cut off goes on."""
+"""Finished blocks on disk, from which a sweep that was interrupted goes on."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 DESCRIPTION = "sweep.npz"
 FINISHED = re.compile(r"block-(\d+)\.npz$")
-OURS = re.compile(r"(sweep|block-\d+)\.npz$|table\.csv$|worker-\d+\.|\.")  # and their drafts
+OURS = re.compile(r"(sweep|block-\d+)\.npz$|table\.csv$|worker-\d+\.|\.")  # with their drafts
 
 
 class Store:
-    """A folder with a sweep's description and one file for every finished block.
+    """Folder with a sweep's description and one file for every finished block.
 
-    Files are written whole, by any number of processes; a block is there or it is not.
+    Files are written whole, by any number of processes: a block is there completely or not at all.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -35,11 +35,22 @@ class Store:
 
     @property
     def cache(self) -> Path:
-        """Where workers share what they compile."""
+        """Folder in which workers share compiled programs."""
         return self.folder / ".compiled"
 
     def open(self, description: str, axes: Mapping[str, np.ndarray]) -> None:
-        """Make the folder, or take up what it holds if it is of this very sweep."""
+        """Make the folder, or continue with the one that is there.
+
+        Parameters
+        ----------
+        description : text that identifies the sweep
+        axes : values by key
+
+        Raises
+        ------
+        InputError
+            if the folder cannot be made, or holds anything but this sweep
+        """
         place = self.folder / DESCRIPTION
         try:
             self.folder.mkdir(exist_ok=True)
@@ -47,7 +58,9 @@ class Store:
         except OSError as error:
             raise InputError(f"{self.folder}: cannot be made ({error.strerror})") from None
         if strange:
-            raise InputError(f"{self.folder}: is no unfinished sweep: rename it, or give another")
+            raise InputError(
+                f"{self.folder}: is no unfinished sweep: rename the folder, or give another name"
+            )
         if not place.exists() and not self.done():
             with written_whole(place) as draft:
                 numbers: dict[str, Any] = {f"axis_{i}": v for i, v in enumerate(axes.values())}
@@ -62,12 +75,12 @@ class Store:
             )
 
     def read(self) -> tuple[str, list[np.ndarray]]:
-        """The description and the axes' values."""
+        """Description and values of the axes."""
         try:
             held = _arrays(self.folder / DESCRIPTION)
             axes = [held[f"axis_{i}"] for i in range(len(held) - 1)]
             return str(held["description"]), axes
-        except Exception:  # whatever a parser stumbles over in a broken file
+        except Exception:  # a damaged file can raise anything
             raise InputError(
                 f"{self.folder}: holds no sweep that can be read: delete the folder"
             ) from None
@@ -80,12 +93,13 @@ class Store:
         return set()
 
     def save(self, number: int, block: Block) -> None:
+        """Write a finished block."""
         with written_whole(self._place(number)) as draft:
             np.savez(draft, values=block.values, status=block.status)
 
     def load(self, number: int, figures: int, lanes: int) -> Block | None:
-        """A block of so many figures and lanes; None, and no file any more, if it is damaged."""
-        with contextlib.suppress(Exception):  # whatever a parser stumbles over in a broken file
+        """Block with these numbers of figures and lanes; None if damaged, and its file removed."""
+        with contextlib.suppress(Exception):  # a damaged file can raise anything
             block = Block(**_arrays(self._place(number)))
             sizes = block.values.shape, block.status.shape
             kinds = block.values.dtype.kind, block.status.dtype
@@ -95,7 +109,7 @@ class Store:
         return None
 
     def publish(self, result: Sweep, table: Path) -> None:
-        """Write the table, so that what a kill leaves behind is in the folder."""
+        """Write the table: first into the folder, so that a kill leaves no draft beside it."""
         draft = self.folder / "table.csv"
         result.to_csv(draft)
         try:
@@ -104,11 +118,11 @@ class Store:
             raise InputError(f"{table}: cannot be written ({error.strerror})") from None
 
     def remove(self) -> None:
-        """Remove what a sweep leaves in the folder, and the folder if nothing else is in there."""
+        """Remove the sweep's files, and the folder if nothing else is in it."""
         shutil.rmtree(self.cache, ignore_errors=True)
         with contextlib.suppress(OSError):
             ours = [p for p in self.folder.iterdir() if OURS.match(p.name) and p.is_file()]
-            # The description last: without it, what is left after a kill could not be read.
+            # The description goes last: without it, the rest could not be read after a kill.
             for path in sorted(ours, key=lambda path: path.name == DESCRIPTION):
                 path.unlink(missing_ok=True)
             self.folder.rmdir()
@@ -118,6 +132,6 @@ class Store:
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
-    # A handle of our own: NumPy leaves its own open where the file is damaged.
+    # NumPy leaves a handle of its own open if the file is damaged.
     with path.open("rb") as handle, np.load(handle, allow_pickle=False) as file:
         return dict(file)
