@@ -143,7 +143,8 @@ def _bar_backbone(scene: Scene, path: LoadPath) -> Backbone:
     """Backbone of Goodman's bar in closed form."""
     system, strip, load = System(scene), scene.strip, scene.load
     half = load.steps_per_half_cycle
-    resistance = scene.contact.friction * scene.contact.pressure
+    contact = scene.contact
+    resistance = contact.friction * (contact.pressure - contact.bottom_pressure)
     part = jnp.arange(half + 1) / half
     stiffness = strip.stretching_stiffness
     if load.control == "force":
@@ -186,7 +187,7 @@ def _pressed_bar(scene: Scene, system: System, path: LoadPath) -> StepResults:
     start, none = initial_state(scene), jnp.zeros(count)
     part = path.pressure[:count]
     state: PathState = jax.tree.map(lambda a: jnp.broadcast_to(a, (count, *a.shape)), start)
-    reaction = part[:, None] * (system.load / system.tributary)
+    reaction = part[:, None] * ((system.load - system.bottom_load) / system.tributary)
     level = state.level._replace(
         reaction=reaction, cap=coulomb_cap(scene.contact.friction, reaction)
     )

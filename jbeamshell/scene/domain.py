@@ -117,7 +117,8 @@ def bar_rule(load: Load, model: Model, numbers: Numbers) -> Rule:
     key, amplitude = "load.amplitude", numbers("load.amplitude")
     if model.solution != "closed-form" or load.control == "force":
         return Rule(key, amplitude, True, "")
-    per_length = numbers("contact.friction") * numbers("contact.pressure")
+    net = numbers("contact.pressure") - numbers("contact.bottom_pressure")
+    per_length = numbers("contact.friction") * net
     with jax.ensure_compile_time_eval():
         slipping = per_length * numbers("strip.length")
         limit = np.asarray(bar_backbone(slipping, numbers("strip.axial_stiffness"), per_length))

@@ -127,15 +127,17 @@ class Scene(eqx.Module):
         uniform = contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0
         bar = plain and uniform and contact.normal == "rigid"
         closed = model.solution == "closed-form"
-        fix = "is the bar's, homogeneous, straight, under one pressure: take another model.rung"
-        require("model.solution", model.solution, bar or not closed, fix)
+        fix = "needs a straight homogeneous strip on a rigid foundation under uniform pressures: "
+        require(
+            "model.solution", model.solution, bar or not closed, f"{fix}take another model.rung"
+        )
         either = model.solution == "stepwise" or self.load.control in CONTROLS
         require("model.solution", model.solution, either, "knows no arc length: take 'stepwise'")
         cycling = model.solution == "stepwise" or self.load.cycles > 0
-        fix = "doubles a backbone for load.cycles, of which there are none: take 'stepwise'"
+        fix = "needs load.cycles of 1 or more: give them, or take 'stepwise'"
         require("model.solution", model.solution, cycling, fix)
         half = self.load.steps_per_half_cycle
-        fix = "a backbone that is doubled needs an even number"
+        fix = f"must be even if model.solution is {model.solution!r}"
         enough = model.solution == "stepwise" or half % 2 == 0
         require("load.steps_per_half_cycle", half, enough, fix)
 
