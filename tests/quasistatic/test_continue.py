@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from jbeamshell.quasistatic.continuation import PathEnd
 
 SCENE = jb.Scene().replace(
     {
@@ -103,7 +104,7 @@ def test_what_cannot_go_on_says_why(begun):
         dataclasses.replace(begun, scene=doubled).continued()
     with pytest.raises(jb.InputError, match="was made by hand"):
         dataclasses.replace(begun, end=None).continued(MORE)
-    lost = begun.end._replace(sound=np.array(False))
+    lost = PathEnd(begun.end.state._replace(converged=np.array(False)))
     with pytest.raises(jb.InputError, match="found no equilibrium: go on from one that did"):
         dataclasses.replace(begun, end=lost).continued(MORE)
 
@@ -194,7 +195,7 @@ def test_files_that_are_none_are_one_clear_line_and_execute_nothing(saved, tmp_p
             jb.read_history(path)
         assert len(str(caught.value).splitlines()) == 1, kind
         assert str(path) in str(caught.value), kind
-        assert "save it anew" in str(caught.value), kind
+        assert "save it again" in str(caught.value), kind
     assert not evil.exists()
     pickle.loads(kinds["pickle"]).close()
     assert evil.exists()  # it would have
@@ -206,7 +207,7 @@ def test_places_that_are_no_file(begun, tmp_path):
             jb.read_history(path)
     with (tmp_path / "giant.npz").open("wb") as file:
         os.truncate(file.fileno(), 10**9)
-    with pytest.raises(jb.InputError, match="is no history that can be read"):
+    with pytest.raises(jb.InputError, match="cannot be read as a history"):
         jb.read_history(tmp_path / "giant.npz")
     for path in (tmp_path / "none" / "a.npz", tmp_path / "a.csv", "a\0b.npz", 3, "/dev/full"):
         with pytest.raises(jb.InputError):
