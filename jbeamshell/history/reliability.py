@@ -123,7 +123,7 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
     model, strip, found = scene.model, scene.strip, []
     if model.kinematics == "linear" and (error := linear_error(scene)) > TOLERANCE:
-        found.append(f"{_off(error)} by linear kinematics; take model.kinematics = exact")
+        found.append(f"{_off(error)}: kinematics are linear; take model.kinematics = exact")
     beamshell = "psi" in model.fields and model.order == 0
     locks = beamshell and model.grid == "finite-difference" and strip.plane == "strain"
     if locks and strip.poisson_ratio is not None and strip.poisson_ratio > LOCKS:
@@ -167,7 +167,7 @@ def _resolution(history: Run) -> tuple[str, ...]:
 
 def _off(error: float) -> str:
     """Beginning of a doubt about the dissipation."""
-    by = f"about {100.0 * error:.2g} %" if error < 1.0 else "its own size"
+    by = f"about {100.0 * error:.2g} %" if error < 1.0 else "100 % or more"
     return f"the dissipation may be off by {by}"
 
 

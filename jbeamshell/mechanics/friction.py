@@ -103,14 +103,14 @@ def plastic_slip(dv: Array, t_n: Array, t: Array, k_t: Array) -> Array:
 
 
 def _virgin_curve(z: Array, m: Array) -> Array:
-    """S(z) = z/(1+z^m)^(1/m) for z >= 0, in two branches that cannot overflow."""
+    """Virgin curve S(z) = z/(1+z^m)^(1/m) for z >= 0, in two branches that cannot overflow."""
     small, large = jnp.where(z <= 1.0, z, 1.0), jnp.where(z <= 1.0, 1.0, z)
     below, above = small / (1.0 + small**m) ** (1.0 / m), (1.0 + large**-m) ** (-1.0 / m)
     return jnp.where(z <= 1.0, below, above)
 
 
 def _beta_series(x: Array, a: Array, b: Array) -> Array:
-    """B_x(a, b)/x^a, the incomplete beta function, for 0 <= x <= 1/2 and b < 1."""
+    """Incomplete beta function over x^a, B_x(a, b)/x^a, for 0 <= x <= 1/2 and b < 1."""
     k = jnp.arange(1, 16, dtype=jnp.result_type(x))
     return 1.0 / a + jnp.sum(jnp.cumprod((1.0 - b / k) * x) / (a + k))
 
