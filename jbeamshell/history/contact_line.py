@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array
 
-from jbeamshell.scene.scene import Scene
+from jbeamshell.history.record import Record
 
 
-class ContactLine(eqx.Module):
-    """Extent and reaction of the contact, from the arrays of a `jbeamshell.History`."""
-
-    scene: eqx.AbstractVar[Scene]
-    x: eqx.AbstractVar[Array]
-    tributary: eqx.AbstractVar[Array]
-    gap: eqx.AbstractVar[Array]
-    reaction: eqx.AbstractVar[Array]
+class ContactLine(Record):
+    """Extent and reaction of the contact."""
 
     @property
     def touching(self) -> Array:

@@ -2,38 +2,24 @@
 
 from __future__ import annotations
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.history.record import Record
 from jbeamshell.history.reliability import SlipCycle, dissipation_errors
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.numerics.cycles import branch_work
-from jbeamshell.scene.scene import Scene
 
 
-class CycleFigures(eqx.Module):
-    """Figures of the last cycle, from the arrays of a `jbeamshell.History`; scalars but for `loop`.
+class CycleFigures(Record):
+    """Figures of the last cycle; scalars but for `loop` and `slip_cycle`.
 
     Raises
     ------
     InputError
         if the path holds no closed cycle
     """
-
-    scene: eqx.AbstractVar[Scene]
-    x: eqx.AbstractVar[Array]
-    tributary: eqx.AbstractVar[Array]
-    load: eqx.AbstractVar[Array]
-    force: eqx.AbstractVar[Array]
-    displacement: eqx.AbstractVar[Array]
-    fields: eqx.AbstractVar[Array]
-    traction: eqx.AbstractVar[Array]
-    reaction: eqx.AbstractVar[Array]
-    slipping: eqx.AbstractVar[Array]
-    slip_work: eqx.AbstractVar[Array]
-    cycles: eqx.AbstractVar[tuple[tuple[int, int, int], ...]]
 
     @property
     def _last(self) -> tuple[int, int, int]:

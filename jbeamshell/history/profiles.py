@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from jbeamshell.mechanics.kinematics import Strains
-from jbeamshell.scene.scene import Scene
+from jbeamshell.history.record import Record
 
 
-class Profiles(eqx.Module):
-    """Fields by their names, from the arrays of a `jbeamshell.History`."""
-
-    scene: eqx.AbstractVar[Scene]
-    x: eqx.AbstractVar[Array]
-    fields: eqx.AbstractVar[Array]
-    gap: eqx.AbstractVar[Array]
-    sections: eqx.AbstractVar[Strains]
-
-    @property
-    def pressed(self) -> int:
-        """Step at which the whole pressure acts, before any load."""
-        return self.scene.load.pressure_steps - 1
+class Profiles(Record):
+    """Fields along X by their names."""
 
     @property
     def v(self) -> Array:

@@ -1,0 +1,75 @@
+"""Record of a load path: the arrays that a history keeps of every step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import equinox as eqx
+from jax import Array
+
+from jbeamshell.mechanics.kinematics import Strains
+from jbeamshell.scene.scene import Scene
+
+
+class Record(eqx.Module):
+    """Arrays of a load path; units are those of the scene, and forces are per unit width.
+
+    Step 0 is the first pressure step; with ``load.pressure_steps`` = 1 that is the strip under the
+    whole pressure, before any load.  A step that did not converge and all after it hold NaN.
+
+    Attributes
+    ----------
+    scene : scene that was solved
+    x : (n,) node positions X, from the far end to the loaded end
+    middles : (elements,) middle of every element, where the section forces are
+    tributary : (n,) contact length of each node
+    load : (n,) nodal forces of the whole pressure on the top face
+    force : (steps+1,) end force F
+    displacement : (steps+1,) mid-height displacement u(L) since the pressure, conjugate to F
+    fields : (steps+1, n, m) v, w, beta, psi, and those of a hierarchic section
+    gap : (steps+1, n) height of the strip's bottom face over the foundation
+    sections : (steps+1, elements) section forces N, Q, M, chi and xi in the places of e, g, k, psi
+        and psi'
+    traction : (steps+1, n) friction traction on the foundation (positive on a pull)
+    reaction : (steps+1, n) normal reaction R, positive in compression
+    slipping : (steps+1, n) True if the node slipped in the step
+    slip_work : (steps+1,) work dissipated by friction in each step
+    stored_energy : (steps+1,) strain energy, pressure potential and elastic energy of the contact
+    pressure : (steps+1,) part of the pressures that acts
+    sinking : (steps+1,) forces of the pressures times their displacement, conjugate to ``pressure``
+    iterations : (steps+1,) Newton iterations
+    error : (steps+1,) largest out-of-balance force over mu F_N L
+    status : (steps+1,) codes of `jbeamshell.Status`
+    cycles : steps at the start, the turn and the end of each closed cycle
+    target : (steps+1,) prescribed value of the controlled load
+    end : end of the path, for `continued`; None unless it was solved step by step
+    """
+
+    scene: Scene
+    x: Array
+    middles: Array
+    tributary: Array
+    load: Array
+    force: Array
+    displacement: Array
+    fields: Array
+    gap: Array
+    sections: Strains
+    traction: Array
+    reaction: Array
+    slipping: Array
+    slip_work: Array
+    stored_energy: Array
+    pressure: Array
+    sinking: Array
+    iterations: Array
+    error: Array
+    status: Array
+    cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
+    target: Array | None = None
+    end: Any = None
+
+    @property
+    def pressed(self) -> int:
+        """Step at which the whole pressure acts, before any load."""
+        return self.scene.load.pressure_steps - 1
