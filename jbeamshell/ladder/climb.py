@@ -62,49 +62,82 @@ def climb(
     options : rungs with their errors and times, the lowest rungs first
     note : rungs that were solved, and errors that are not included
     """
-    fine, coarse = _resolution(scene, 1), _resolution(scene, 2)
-    runs: dict[tuple[str, bool], tuple[dict[str, Any], float]] = {}
-
-    def run(rung: str, finely: bool) -> float:
-        if (rung, finely) not in runs:
-            tell(f"{rung} on {(fine if finely else coarse)['model.nodes']} nodes")
-            settings = {"model.rung": rung} | (fine if finely else coarse)
-            runs[rung, finely] = _solved(scene.replace(settings))
-        value = runs[rung, finely][0].get(quantity)
-        return np.nan if value is None else value
-
-    climbed: list[str] = []
-    change = np.inf
-    for rung in UPWARDS:
-        if not _has(scene, rung, coarse):
-            continue
-        climbed.append(rung)
-        value = run(rung, False)
-        if len(climbed) == 1:
-            _check_quantity(quantity, runs[rung, False][0])
-        else:
-            change = _off(run(climbed[-2], False), value)
-        if 2.0 * change <= 0.3 * tolerance:
-            break
-    best = run(climbed[-1], False)
-    alone = len(climbed) == 1
-    beyond = 0.0 if alone else change
+    runs = _Runs(scene, quantity, tell)
+    climbed, change = _climbed(runs, tolerance)
+    lowest, highest = climbed[0], climbed[-1]
     note = f"solved on {', '.join(climbed)}"
-    if alone:
+    if len(climbed) == 1:
+        change = 0.0
         note += "; the scene has no rung above, so the section's own error is not in the estimate"
+    best = runs.value(highest)
     # The error of grid and path is about the same on every rung: take that of the cheapest.
-    grid = _off(best if alone else run(climbed[0], False), run(climbed[0], True))
+    grid = _off(runs.value(lowest), runs.value(lowest, finely=True))
     options = []
     for rung in (*CHEAP, *climbed):
-        if rung not in climbed and not _has(scene, rung, coarse):
-            continue
-        own = _off(run(rung, False), best) + beyond
-        options.append(
-            Option(rung, {"model.rung": rung} | coarse, own + 2.0 * grid, runs[rung, False][1])
-        )
-        ms = runs[rung, True][1] if (rung, True) in runs else FINER * runs[rung, False][1]
-        options.append(Option(rung, {"model.rung": rung} | fine, own + grid, ms))
+        if rung in climbed or runs.has(rung):
+            own = _off(runs.value(rung), best) + change
+            for finely, grids in ((False, 2.0), (True, 1.0)):
+                error, ms = own + grids * grid, runs.ms(rung, finely)
+                options.append(Option(rung, runs.settings(rung, finely), error, ms))
     return options, note
+
+
+class _Runs:
+    """Runs of a scene on rungs with a coarse or a fine grid, each solved when it is first used."""
+
+    def __init__(self, scene: Scene, quantity: str, tell: Callable[[str], None]) -> None:
+        self._scene, self._quantity, self._tell = scene, quantity, tell
+        self._resolutions = _resolution(scene, 2), _resolution(scene, 1)
+        self._runs: dict[tuple[str, bool], tuple[dict[str, Any], float]] = {}
+
+    def settings(self, rung: str, finely: bool = False) -> dict[str, Any]:
+        """Dotted values of the model."""
+        return {"model.rung": rung} | self._resolutions[finely]
+
+    def has(self, rung: str) -> bool:
+        """True if the scene can be solved on a rung."""
+        try:
+            check(self._scene.replace(self.settings(rung)))
+        except InputError:
+            return False
+        return True
+
+    def value(self, rung: str, finely: bool = False) -> float:
+        """Figure of the scene; NaN if it has no equilibrium.
+
+        Raises
+        ------
+        InputError
+            if the first run has no such figure
+        """
+        if (rung, finely) not in self._runs:
+            settings = self.settings(rung, finely)
+            self._tell(f"{rung} on {settings['model.nodes']} nodes")
+            run = self._runs[rung, finely] = _solved(self._scene.replace(settings))
+            if len(self._runs) == 1:
+                _check_quantity(self._quantity, run[0])
+        value = self._runs[rung, finely][0].get(self._quantity)
+        return np.nan if value is None else value
+
+    def ms(self, rung: str, finely: bool) -> float:
+        """Time of a warm run [ms]; on a fine grid that was not solved, from that on the coarse."""
+        if finely and (rung, True) not in self._runs:
+            return FINER * self._runs[rung, False][1]
+        return self._runs[rung, finely][1]
+
+
+def _climbed(runs: _Runs, tolerance: float) -> tuple[list[str], float]:
+    """Rungs up to the first that changes little, and its relative change."""
+    climbed: list[str] = []
+    change = np.inf
+    for rung in filter(runs.has, UPWARDS):
+        value = runs.value(rung)
+        if climbed:
+            change = _off(runs.value(climbed[-1]), value)
+        climbed.append(rung)
+        if 2.0 * change <= 0.3 * tolerance:
+            break
+    return climbed, change
 
 
 def _resolution(scene: Scene, part: int) -> dict[str, Any]:
@@ -113,15 +146,6 @@ def _resolution(scene: Scene, part: int) -> dict[str, Any]:
     elements = max((scene.model.nodes - 1) // part // order, LEAST_NODES // order)
     half = max(scene.load.steps_per_half_cycle // part // 2, 1)
     return {"model.nodes": elements * order + 1, "load.steps_per_half_cycle": 2 * half}
-
-
-def _has(scene: Scene, rung: str, resolution: dict[str, Any]) -> bool:
-    """True if a scene can be solved on a rung."""
-    try:
-        check(scene.replace({"model.rung": rung} | resolution))
-    except InputError:
-        return False
-    return True
 
 
 def _solved(scene: Scene) -> tuple[dict[str, Any], float]:
