@@ -119,7 +119,8 @@ class StepEquations(NamedTuple):
     equations : equations of motion
     step : time step
     q, p : (n, m) fields and rates at the start of the step
-    last_change, last_rate_change : (n, m) their increments in the last step
+    end : u(L) at the start of the step
+    last_change, last_rate_change : (n, m) increments of fields and rates in the last step
     before : friction at q* of the last step
     force, ground : means of the end force and of the foundation's acceleration along X
     ground_forces : (n, m) inertia forces from the acceleration of the foundation
@@ -130,6 +131,7 @@ class StepEquations(NamedTuple):
     step: TimeStep
     q: Array
     p: Array
+    end: Array
     last_change: Array
     last_rate_change: Array
     before: LoadLevel
@@ -161,6 +163,7 @@ class StepEquations(NamedTuple):
             step=step,
             q=q,
             p=equations.nodal(state.p),
+            end=end,
             last_change=last_change,
             last_rate_change=equations.nodal(last.rate_change),
             before=LoadLevel(
@@ -181,8 +184,7 @@ class StepEquations(NamedTuple):
 
     def end_change(self, change: Array) -> Array:
         """Increment of u(L) from increments (n, m) of the fields."""
-        system = self.equations.system
-        return system.end_displacement(self.q + change) - system.end_displacement(self.q)
+        return self.equations.system.end_displacement(self.q + change) - self.end
 
     def forces(self, unknown: Array) -> StepForces:
         """Forces and contact of a step with unknowns (blocks, size)."""
