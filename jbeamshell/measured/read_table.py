@@ -16,7 +16,7 @@ def read_table(
     recognised: Callable[[Sequence[str]], bool],
     decimal: str | None = None,
 ) -> Table:
-    """Read the table in a file; all but .mat, .npz and .npy are read as text.
+    """Read the table in a file; one whose suffix is none of `READERS` is read as text.
 
     Parameters
     ----------

@@ -17,12 +17,14 @@ from jbeamshell.plotting.style import (
     FAINT,
     PALETTE,
     colours,
+    mark_decades,
     style,
 )
 
 PER_CENT = "(model - data) / range  [%]"
 LOG_PER_CENT = r"$\ln$(model / data)  [%]"
 BAND = 0.95
+FEW = 30  # points that are drawn as larger dots
 
 
 def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
@@ -47,13 +49,17 @@ def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
                 data, model = fit.data[place], fit.model[place]
                 panel.plot(*_xy(form, model), color=colour, label=f"model, {data.label}")
                 first = "data" if place == places[0] else "_nolegend_"
-                panel.plot(*_xy(form, data), label=first, **DOTS)
+                x, y = _xy(form, data)
+                size = {"markersize": 5.0} if x.size < FEW else {}
+                panel.plot(x, y, label=first, **DOTS | size)
                 if bands is not None:
                     low, high = (_xy(form, end) for end in bands[place])
                     x, y = (np.append(a, b[::-1]) for a, b in zip(low, high, strict=True))
                     panel.fill(x, y, color=colour, alpha=0.2, linewidth=0.0)
             panel.set(xlabel=form.columns[form.x].label, ylabel=form.columns[form.y].label)
             panel.set(xscale=form.scale, yscale=form.scale)
+            if form.scale == "log":
+                mark_decades(panel.xaxis, panel.yaxis)
             panel.legend(loc="best")
     return [panel for _, _, panel in panels]
 
@@ -84,6 +90,8 @@ def residuals(fit: ModelOverData, axes: Any = None) -> list[Axes]:
                 panel.plot(getattr(data, along), 100.0 * left[place], ".", **look)
             panel.axhline(0.0, color=FAINT, linewidth=1.0, zorder=1.0)
             panel.set(xlabel=form.columns[along].label, xscale=form.scale)
+            if form.scale == "log":
+                mark_decades(panel.xaxis)
             panel.set(ylabel=LOG_PER_CENT if form.scale == "log" else PER_CENT)
             panel.legend(loc="best")
     return [panel for _, _, panel in panels]

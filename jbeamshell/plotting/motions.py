@@ -10,10 +10,9 @@ import numpy as np
 import scipy.signal
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from jbeamshell.plotting.protocols import ModalProperties, RingDownComparison, Vibration
-from jbeamshell.plotting.style import DATA, DISPLACEMENT, PALETTE, single, style
+from jbeamshell.plotting.style import DATA, DISPLACEMENT, PALETTE, mark_decades, single, style
 
 TIME, AMPLITUDE = "$t$  [time]", "amplitude of $u(L)$  [length]"
 FREQUENCY, DAMPING = "frequency  [1/time]", r"damping ratio $\zeta$  [1]"
@@ -142,6 +141,7 @@ def ring_down_sheet(study: RingDownComparison) -> Figure:
             known = values[values > 0.0]
             room = (known.max() / known.min()) ** 0.1
             below.set_xlim(0.9 * reach.min(), 1.1 * reach.max())
+            mark_decades(below.xaxis)
             below.set_ylim(known.min() / room, known.max() * room)
     return figure
 
@@ -161,8 +161,5 @@ def _pair(
         pair[0].set(xlabel=AMPLITUDE, ylabel=FREQUENCY, xscale="log")
         pair[1].set(xlabel=AMPLITUDE, ylabel=DAMPING, xscale="log", yscale="log")
         pair[1].legend(loc="upper left")
-        for below in pair:  # often less than a decade: marks at 1, 2 and 5
-            below.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            below.xaxis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(99, 99)))
-            below.xaxis.set_minor_formatter(NullFormatter())
+        mark_decades(pair[0].xaxis, pair[1].xaxis)
     return pair

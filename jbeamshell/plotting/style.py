@@ -11,7 +11,9 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
@@ -117,6 +119,17 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
 def single(axes: Axes | None) -> Axes:
     """Axes as given, or new ones."""
     return plt.subplots(figsize=(5.6, 4.0))[1] if axes is None else axes
+
+
+def mark_decades(*axes_of_one: Axis) -> None:
+    """Mark 1, 2 and 5 of every decade on logarithmic axes of less than two decades."""
+    for axis in axes_of_one:
+        low, high = axis.get_view_interval()
+        if high >= 100.0 * low:
+            continue
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(99, 99)))
+        axis.set_minor_formatter(NullFormatter())
 
 
 def close(figure: Figure) -> None:

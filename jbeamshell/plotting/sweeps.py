@@ -16,15 +16,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.measured.form import DISSIPATION, SECANT_STIFFNESS
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.plotting.protocols import SweptFigures
-from jbeamshell.plotting.style import DATA, PALETTE, colours, single, style
+from jbeamshell.plotting.style import DATA, PALETTE, colours, mark_decades, single, style
 from jbeamshell.scene.keys import LENGTHS, TABLE
 
 FIGURES = {
-    "dissipation": "$D$  [force]",
+    "dissipation": DISSIPATION.label,
     "dissipation_ratio": "$D\\,/\\,D_{bar}$  [1]",
-    "secant_stiffness": "secant stiffness  [force/width/length]",
+    "secant_stiffness": SECANT_STIFFNESS.label,
     "loss_factor": "loss factor  [1]",
 }
 WIDE = 20.0  # ratio of largest to smallest value above which an axis is logarithmic
@@ -132,6 +133,7 @@ def master_curve(
             ylabel=FIGURES.get(figure, figure.replace("_", " ")),
             xscale="log",
         )
+        mark_decades(axes.xaxis)
     return axes
 
 
