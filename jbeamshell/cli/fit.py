@@ -25,7 +25,7 @@ REPEATED = {
     "unit": ("QUANTITY=UNIT", "unit of the force, the displacement, ..."),
 }
 WORDS = {
-    "kind": "kind of data: loop (default), backbone, dissipation, stiffness or squeeze",
+    "kind": "kind of data: loop (default), backbone, or a curve by its name, such as dissipation",
     "cycles": "cycles to use of a recording: steady (the mean of the steady ones), recorded (all, "
     "as they stand) or auto (default)",
     "drift": "drift to remove from a recording: keep (default; none), linear or cycle",
