@@ -236,11 +236,8 @@ for _part in (StripKeys, ContactKeys, LoadKeys, ModelKeys):
     TABLE |= {row.name: row for row in (*rows(_part).values(), *_others)}
 # Keys that set a field through another number, in the order in which they apply.
 DERIVED = {row.name: row.through for row in INDIRECT if row.through}
-NUMBERS, SETTINGS, WORDS = (
-    tuple(name for name, key in TABLE.items() if key.kind == kind)
-    for kind in ("number", "setting", "word")
-)
-KEYS = NUMBERS + SETTINGS + WORDS
+KEYS = tuple(TABLE)
+NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
 
 
 def key_table(section: str = "") -> str:

@@ -16,7 +16,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import require
 from jbeamshell.mechanics.elements import ORDER
@@ -34,7 +33,7 @@ from jbeamshell.scene.keys import (
     key_table,
 )
 from jbeamshell.scene.layers import check_layers
-from jbeamshell.scene.pressure import check_pressure, pressure_values, resultant
+from jbeamshell.scene.pressure import check_pressure, pressure_values
 from jbeamshell.scene.rungs import name_of
 
 MODELS = (
@@ -138,14 +137,6 @@ class Contact(ContactKeys):
     def smoothing(self) -> Array:
         """Exponent m of the friction law; infinite for the sharp slider."""
         return getattr(self.law, "smoothing", jnp.asarray(np.inf))
-
-    def resultant(self, length: ArrayLike) -> tuple[float, float]:
-        """Force of the pressures on a strip of that length, downwards, and its moment about X = 0.
-
-        Both are per unit width: stress times length, and stress times length squared.
-        """
-        force, moment = resultant(self.pressure, self.bottom_pressure, length)
-        return float(force), float(moment)
 
     @property
     def largest_pressure(self) -> Array:
