@@ -24,7 +24,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
-from numpy.polynomial import Polynomial, legendre
 
 ORDER = {"finite-difference": 1, "collocation": 2}
 
@@ -60,7 +59,7 @@ class Rule(NamedTuple):
 def element_rule(name: str) -> Rule:
     """Element rule of a name, ``finite-difference`` or ``collocation``."""
     order = ORDER[name]
-    inner = legendre.Legendre.basis(order).deriv().roots()
+    inner = np.polynomial.Legendre.basis(order).deriv().roots()
     nodes = 0.5 * (1.0 + np.concatenate([[-1.0], np.sort(inner), [1.0]]))
     points, weights = _gauss(order)
     shapes = _shapes(nodes)
@@ -76,13 +75,13 @@ def element_rule(name: str) -> Rule:
 
 def _gauss(order: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss points and weights on [0, 1]."""
-    points, weights = legendre.leggauss(order)
+    points, weights = np.polynomial.legendre.leggauss(order)
     return 0.5 * (1.0 + points), 0.5 * weights
 
 
-def _shapes(nodes: np.ndarray) -> list[Polynomial]:
+def _shapes(nodes: np.ndarray) -> list[np.polynomial.Polynomial]:
     """Lagrange polynomials of the nodes of an element."""
-    shapes = [Polynomial.fromroots(np.delete(nodes, i)) for i in range(nodes.size)]
+    shapes = [np.polynomial.Polynomial.fromroots(np.delete(nodes, i)) for i in range(nodes.size)]
     return [shape / shape(node) for shape, node in zip(shapes, nodes, strict=True)]
 
 

@@ -33,7 +33,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.polynomial import legendre
 
 from jbeamshell.mechanics.homogeneous import plane_stiffness, shear_modulus
 from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS, Section, Strains
@@ -69,7 +68,9 @@ class Hierarchic(eqx.Module):
         """
         # Exact for the product of two gradients of order p.  Exact strains have products of four,
         # whose quadrature error is as small as the strains.
-        points, weights = legendre.leggauss(self.order + (2 if self.kinematics == "exact" else 1))
+        points, weights = np.polynomial.legendre.leggauss(
+            self.order + (2 if self.kinematics == "exact" else 1)
+        )
         density = jax.vmap(lambda t: self._density(section, slope, t))(jnp.asarray(points))
         return self.half_height * jnp.sum(weights * density)
 
@@ -105,7 +106,7 @@ class Hierarchic(eqx.Module):
 
     def mean_displacement(self, section: Section) -> Array:
         """Mean displacement along X over the height, conjugate to a uniform traction."""
-        points, weights = legendre.leggauss(self.order + 1)
+        points, weights = np.polynomial.legendre.leggauss(self.order + 1)
         moved = jax.vmap(lambda t: self.displacement(section, t * self.half_height)[0])
         return 0.5 * jnp.sum(weights * moved(jnp.asarray(points)))
 
@@ -138,5 +139,5 @@ def _bubbles(order: int) -> list[np.ndarray]:
     for j in range(2, order + 1):
         series = np.zeros(j + 1)
         series[[j, j - 2]] = 1.0, -1.0
-        found.append(legendre.leg2poly(series)[::-1] / np.sqrt(2 * (2 * j - 1)))
+        found.append(np.polynomial.legendre.leg2poly(series)[::-1] / np.sqrt(2 * (2 * j - 1)))
     return found
