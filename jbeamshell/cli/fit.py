@@ -26,9 +26,10 @@ REPEATED = {
 }
 WORDS = {
     "kind": "kind of data: loop (default), backbone, or a curve by its name, such as dissipation",
-    "cycles": "cycles to use of a recording: steady (the mean of the steady ones), recorded (all, "
-    "as they stand) or auto (default)",
-    "drift": "drift to remove from a recording: keep (default; none), linear or cycle",
+    "cycles": "cycles of a recording to fit: steady (the mean of those that repeat), recorded "
+    "(all, as they stand) or auto (default: what suits the recording)",
+    "drift": "drift of a recording: keep (default), linear (remove a straight line) or cycle "
+    "(remove the mean of each cycle)",
     "method": "search: levenberg-marquardt (default), l-bfgs-b or adam",
     "decimal": "decimal sign, where the numbers alone do not show it",
 }
