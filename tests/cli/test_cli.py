@@ -537,7 +537,7 @@ def test_the_smooth_column_drives(asked, noisy, tmp_path):
         ("contact.pressure=[[0,1],[2.5,1]]", "contact.pressure = [2.5]: lies off the strip, whose"),
         ("contact.pressure=[[0,1],[1,1],[1,2],[1,3]]", "gives one X three times; two rows make a"),
         ("strip.curvature=.1", "strip.curvature = 0.1: needs w in model.fields"),
-        ("strip.layers=steel", "strip.layers = 'steel': give [thickness, E, nu] of every layer"),
+        ("strip.layers=steel", "strip.layers = 'steel': give rows [thickness, E, nu] of all"),
         ("strip.layers=[[1, 2, .3]]", "add up to 1, but the height 2H is 0.2252; make them equal"),
         ("strip.layers=[[1, 2, 0.3]]", "add up to 1, but the height 2H is 0.2252; make them equal"),
         ("strip.layers=[[0.2252, 2, 0.5]]", "nu = 0.5 is incompressible: C11 is infinite; give"),
@@ -591,7 +591,7 @@ TIPPING = {"contact.bottom_pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 19.0], [2.0
         ),
         (
             {"contact.friction": 0, "strip.far_end": "free"},
-            "contact.friction = 0.0: nothing holds the strip along X without friction",
+            "contact.friction = 0.0: nothing holds the strip along X (rigid-body mot",
         ),
         *[
             (LAYERS | {key: value}, f"{key} = {value}: strip.layers say it already; leave it out")
