@@ -1,5 +1,6 @@
 """Settings of the whole test run."""
 
+import gc
 import os
 import shutil
 import subprocess
@@ -17,7 +18,8 @@ OWNER = CACHE not in os.environ
 if OWNER:
     os.environ[CACHE] = tempfile.mkdtemp(prefix="jbeamshell-tests-")
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.5"
-# The tests compile more than they run: half the time for code that is a quarter slower.
+# The tests compile more than they run: a third of the time for code that is slower by half.
+os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = "true"  # for children; for this process below
 FLAGS = (
     "--xla_backend_optimization_level=1 --xla_cpu_use_fusion_emitters=false"
     " --xla_llvm_disable_expensive_passes=true"
@@ -30,17 +32,19 @@ if OWNER and "XLA_FLAGS" not in os.environ:
         os.environ["XLA_FLAGS"] = FLAGS
 jax.config.update("jax_compilation_cache_dir", os.environ[CACHE])
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+jax.config.update("jax_disable_most_optimizations", True)
 jax.config.update("jax_enable_x64", True)
+gc.set_threshold(100_000, 20, 20)  # tracing makes millions of objects that live on
 
 hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 hypothesis.settings.load_profile("repeatable")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _forget_compiled_code():
-    """A worker that kept every compiled program would take gigabytes."""
-    yield
-    jax.clear_caches()
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
+    """Forget compiled programs after a folder; its modules share them, all would take gigabytes."""
+    if nextitem is None or nextitem.path.parent != item.path.parent:
+        jax.clear_caches()
+        gc.collect()
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
