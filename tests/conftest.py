@@ -20,12 +20,9 @@ if OWNER:
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.5"
 # The tests compile more than they run: a third of the time for code that is slower by half.
 os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = "true"  # for children; for this process below
-FLAGS = (
-    "--xla_backend_optimization_level=1 --xla_cpu_use_fusion_emitters=false"
-    " --xla_llvm_disable_expensive_passes=true"
-)
+FLAGS = "--xla_cpu_use_fusion_emitters=false"
 if OWNER and "XLA_FLAGS" not in os.environ:
-    # A release that does not know a flag would abort.
+    # A release that does not know the flag would abort.
     trial = [sys.executable, "-c", "import jax; jax.devices()"]
     known = subprocess.run(trial, env=os.environ | {"XLA_FLAGS": FLAGS}, capture_output=True)
     if known.returncode == 0:

@@ -13,7 +13,8 @@ LINEAR = {"model.kinematics": "linear"}
 
 @pytest.fixture(scope="module")
 def receding():
-    return jb.solve(library.receding())
+    scene = library.receding()  # from all nodes, as if none were named
+    return jb.solve(scene, contact=np.full(scene.model.nodes, True))
 
 
 def test_receding_contact_against_the_prototype_and_finite_elements(receding):
@@ -59,7 +60,8 @@ def test_a_search_that_does_not_end_says_so():
 
 def test_the_contact_does_not_know_how_hard_it_is_pressed(receding):
     half = [[0, 50.0], [50, 50.0], [50, 0.0], [100, 0.0]]
-    gentle = jb.solve(library.receding().replace({"contact.pressure": half}))
+    contact = np.full(receding.x.size, True)
+    gentle = jb.solve(library.receding().replace({"contact.pressure": half}), contact=contact)
     assert bool(jnp.all(gentle.touching == receding.touching))
     for name in ("w", "beta", "psi", "squeeze_stress"):
         full, twice = getattr(receding, name), 2.0 * getattr(gentle, name)
