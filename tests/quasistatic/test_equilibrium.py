@@ -1,3 +1,4 @@
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -26,7 +27,7 @@ def test_rigid_motion_stores_no_energy(grid):
         axis=1,
     )
     bent = rigid.at[:, 2].multiply(1.0 + 0.1 * system.x)
-    energy = jax.jit(system.strain_energy)
+    energy = eqx.filter_jit(system.strain_energy)
     assert abs(float(energy(rigid))) < 1e-20 * float(energy(bent))
 
 
@@ -63,7 +64,7 @@ def test_turning_a_curved_strip_stores_no_energy_in_the_limit_of_fine_grids():
             jnp.zeros_like(x),
         ]
         bent = jnp.zeros((nodes, 4)).at[:, 2].set(0.1 * system.x)
-        energy = jax.jit(system.strain_energy)
+        energy = eqx.filter_jit(system.strain_energy)
         ratio = energy(jnp.stack(turned, axis=1)) / energy(bent)
         strains.append(float(jnp.sqrt(ratio)))
     assert strains[-1] < 1e-2
@@ -85,7 +86,7 @@ def test_a_curvature_that_vanishes_leaves_a_straight_strip(kinematics):
     assert straight.curvature is None
     q = 0.1 * jax.random.normal(jax.random.key(3), (41, 4))
     for name in ("strain_energy", "sinking", "end_displacement", "gap"):
-        one, other = (jax.jit(getattr(system, name))(q) for system in (slight, straight))
+        one, other = (eqx.filter_jit(getattr(system, name))(q) for system in (slight, straight))
         np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-11)
 
 
@@ -148,7 +149,7 @@ def frozen(nodes):
 def test_stuck_strip_rotates_as_the_closed_form():
     """{v, beta}, small strain: beta decays from the loaded end; second order in the grid."""
     errors = []
-    for nodes in (81, 321):
+    for nodes in (81, 161):
         stuck = {"contact.friction": 1e3, "contact.stick_stiffness": 1e6}
         history = jb.solve(frozen(nodes).replace(stuck), np.ones(50))
         scene = history.scene
@@ -164,7 +165,7 @@ def test_stuck_strip_rotates_as_the_closed_form():
         )
         errors.append(float(jnp.max(jnp.abs(history.beta[1] - exact)) / jnp.max(jnp.abs(exact))))
     assert errors[-1] < 1e-3
-    assert 0.5 * np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.15)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
 
 
 @pytest.mark.parametrize(
