@@ -91,6 +91,8 @@ def vertices(
     half_height: ArrayLike,
     end_size: float = END_SIZE,
     steps: Array | None = None,
+    growth: float = GROWTH,
+    far_size: float = FAR_SIZE,
 ) -> Array:
     """End points of the elements, graded towards X = L and towards steps of the pressure.
 
@@ -101,6 +103,8 @@ def vertices(
     half_height : half height H
     end_size : size of the smallest elements before scaling, over H
     steps : (k,) increasing positions X of the steps, in [0, L]; nodes need not lie on them
+    growth : growth of the element size with the distance from a focus, before scaling
+    far_size : size of the largest elements before scaling, over L
 
     Returns
     -------
@@ -111,8 +115,8 @@ def vertices(
     >>> vertices(4, length=2.0, half_height=0.1)
     """
     length = jnp.asarray(length)
-    far, end = FAR_SIZE * length, end_size * jnp.asarray(half_height)
-    rate = jnp.where(far >= end, GROWTH, -GROWTH)
+    far, end = far_size * length, end_size * jnp.asarray(half_height)
+    rate = jnp.where(far >= end, growth, -growth)
     # The size is h(d) = end + rate d at the distance d from a focus, up to the size far.  So the
     # number of elements within d, int dd/h(d), is a logarithm and then a straight line.
     turn = (far - end) / rate

@@ -1,0 +1,98 @@
+"""Strip of a scene on its contact line: its section's form, its stations, its condensed body."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from jbeamshell.condensed.body import Body, Elimination, eliminate
+from jbeamshell.mechanics import elements
+from jbeamshell.mechanics.homogeneous import plane_stiffness
+from jbeamshell.mechanics.layered import Material, layered_form
+from jbeamshell.mechanics.section_form import SectionForm
+from jbeamshell.scene.keys import FAR_ENDS
+from jbeamshell.scene.scene import Scene
+
+PLANE_END_SIZE = 1e-5  # of H, the element at the loaded end
+PLANE_GROWTH = 0.2  # of the element size over the distance from there
+PLANE_FAR_SIZE = 1.0 / 40.0  # of L, elements away from it
+RULE = elements.element_rule("finite-difference")
+
+
+class Strip(NamedTuple):
+    """Strip of a scene, condensed.
+
+    Attributes
+    ----------
+    body : contact line, numbered from the loaded end
+    form : energy of the section
+    elimination : what finds the fields above the contact again
+    hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
+    x, tributary, load : (n,) stations from the far end, contact lengths, forces of the top pressure
+    settled : (k,) tangential displacements under the pressures, without friction
+    """
+
+    body: Body
+    form: SectionForm
+    elimination: Elimination
+    hessian: Array
+    x: Array
+    tributary: Array
+    load: Array
+    settled: Array
+
+
+def condensed(scene: Scene, nodes: int) -> Strip:
+    """Strip of a scene as plane elasticity, condensed to its contact nodes."""
+    contact, far_end = scene.contact, scene.strip.far_end
+    form, x = plane_form(scene), plane_stations(scene, nodes)
+    down = elements.nodal_loads(RULE, x, contact.pressure)
+    up = elements.nodal_loads(RULE, x, contact.bottom_pressure)
+    tributary = elements.tributary_lengths(RULE, x)
+    elimination, hessian = eliminate(form, x, down, "beta" in FAR_ENDS[far_end])
+    hessian = hessian.at[1:-2:2, -1].add(-up).at[-1, 1:-2:2].add(-up)
+    last = 2 * x.size - 2
+    v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
+    w = slice(last + 1, None, -2)
+    k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
+    settled = jnp.linalg.solve(k_tt, -press[v])
+    uniform = contact.pressure.ndim == contact.bottom_pressure.ndim == 0
+    body = Body(
+        x=x[::-1],
+        tributary=tributary[::-1],
+        K_tt=k_tt,
+        K_tn=k_tn,
+        K_nn=hessian[w, w],
+        f_t=-hessian[v, -2],
+        f_n=-hessian[w, -2],
+        r_0=(down - up)[::-1] if uniform else press[w] + k_tn.T @ settled,
+        c=-hessian[-2, -2],
+    )
+    return Strip(body, form, elimination, hessian, x, tributary, down, settled)
+
+
+def plane_stations(scene: Scene, nodes: int) -> Array:
+    """Stations (nodes,) along X for plane elasticity, dense at the singular loaded corner."""
+    length, half_height = scene.strip.length, scene.strip.half_height
+    grading = (PLANE_END_SIZE, None, PLANE_GROWTH, PLANE_FAR_SIZE)
+    return elements.vertices(nodes - 1, length, half_height, *grading)
+
+
+def plane_form(scene: Scene) -> SectionForm:
+    """Section of plane elasticity, homogeneous or layered."""
+    strip = scene.strip
+    if strip.layers is None:
+        coupling, stiffness = plane_stiffness(strip.plane_modulus, strip.poisson_ratio, strip.plane)
+        thickness = 2.0 * strip.half_height
+        columns = thickness, stiffness, coupling * stiffness, strip.shear_modulus
+        return layered_form(Material(*(jnp.reshape(value, 1) for value in columns)))
+    thickness, modulus, nu = strip.layers.T
+    if strip.plane == "strain":
+        modulus, contraction = modulus / (1.0 - nu**2), nu / (1.0 - nu)
+    else:
+        contraction = nu
+    stiffness = modulus / (1.0 - contraction**2)
+    shear = strip.layers[:, 1] / (2.0 * (1.0 + nu))
+    return layered_form(Material(thickness, stiffness, contraction * stiffness, shear))
