@@ -17,7 +17,7 @@ from jbeamshell.scene.scene import Scene
 
 PLANE_END_SIZE = 1e-5  # of H, the element at the loaded end
 PLANE_GROWTH = 0.2  # of the element size over the distance from there
-PLANE_FAR_SIZE = 1.0 / 40.0  # of L, elements away from it
+PLANE_FAR_SIZE = 1.0 / 60.0  # of L, elements away from it
 RULE = elements.element_rule("finite-difference")
 
 
@@ -84,7 +84,8 @@ def plane_form(scene: Scene) -> SectionForm:
     """Section of plane elasticity, homogeneous or layered."""
     strip = scene.strip
     if strip.layers is None:
-        coupling, stiffness = plane_stiffness(strip.plane_modulus, strip.poisson_ratio, strip.plane)
+        nu = jnp.asarray(strip.poisson_ratio)
+        coupling, stiffness = plane_stiffness(strip.plane_modulus, nu, strip.plane)
         thickness = 2.0 * strip.half_height
         columns = thickness, stiffness, coupling * stiffness, strip.shear_modulus
         return layered_form(Material(*(jnp.reshape(value, 1) for value in columns)))

@@ -98,8 +98,12 @@ def layered_form(material: Material) -> SectionForm:
         (across(from_middle), still),
         (still, across(from_middle)),
     ]
+    # Exact integration along X, but for the shear of the mean rotation, which would lock bending.
+    values, turn = values[pick], along(from_middle)
+    sheared = values @ turn
+    spread = (values - jnp.outer(sheared, sheared) / (turn @ sheared)) / 12.0
     return SectionForm(
-        values=values[pick],
+        values=values,
         mixed=mixed_form[pick],
         slopes=slopes[pick],
         pull=along(mean),
@@ -107,7 +111,7 @@ def layered_form(material: Material) -> SectionForm:
         held=np.append(np.ones(size, bool), np.zeros(size, bool))[place],
         means=jnp.stack([along(turning), across(squeeze) / edges[-1]]),
         modes=jnp.asarray([jnp.stack(mode) for mode in modes]),
-        shapes=np.full((1, 2, 2 * size), 0.5),
+        spread=spread,
     )
 
 
