@@ -1,4 +1,5 @@
 from . import (
+    condensed as condensed,
     dynamics as dynamics,
     identify as identify,
     ladder as ladder,

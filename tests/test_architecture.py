@@ -22,6 +22,7 @@ ORDER = [
     "reference",
     "plotting",
     "history",
+    "condensed",
     "quasistatic",
     "ladder",
     "sweeping",
