@@ -103,6 +103,11 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
     -------
     (k,) work per cycle and unit width; NaN where slip zones are not nested, see `branches`
     """
+    return _dissipation(scene, jnp.asarray(amplitudes), nodes)
+
+
+@eqx.filter_jit
+def _dissipation(scene: Scene, amplitudes: Array, nodes: int) -> Array:
     strip = condensed(scene, nodes)
     friction, start = scene.contact.friction, pressed(strip.body)
     factors = factorise(strip.body, friction)
@@ -112,7 +117,7 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
         branches = path(strip.body, factors, friction, start, amplitude * turns)
         return jnp.where(jnp.all(branches.valid), jnp.sum(branches.slip_work[-2:]), jnp.nan)
 
-    return jax.vmap(one)(jnp.asarray(amplitudes))
+    return jax.vmap(one)(amplitudes)
 
 
 def _check(scene: Scene) -> None:

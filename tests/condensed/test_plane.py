@@ -140,7 +140,7 @@ class TestBranches:
     def test_what_is_not_nested_is_not_valid(self):
         body = STRIP(scene_of(0.1126, mu=0.5)).body
         assert not np.any(by_factors(body, 0.5, 1.0).valid)
-        assert np.isnan(condensed.dissipation(scene_of(0.1126, mu=0.5), [1.0])[0])
+        assert np.isnan(condensed.dissipation(scene_of(0.1126, mu=0.5), [1.0], nodes=33)[0])
 
     def test_the_gradient_has_taylor_slope_two(self):
         scene = scene_of(0.1126)
@@ -149,7 +149,7 @@ class TestBranches:
         @jax.jit
         def work(values):
             changed = scene.replace(dict(zip(keys, values, strict=True)))
-            return condensed.dissipation(changed, jnp.asarray([1.0]))[0]
+            return condensed.dissipation(changed, jnp.asarray([1.0]), nodes=33)[0]
 
         at, way = jnp.array([0.1, 0.1126, 0.3]), jnp.array([0.02, 0.01, -0.05])
         slope = jax.jit(jax.grad(work))(at) @ way
@@ -171,7 +171,7 @@ class TestEvents:
 
     def test_random_strips_that_lift_off(self):
         lifted = 0
-        for row in rows("random_strips.csv")[::19]:
+        for row in rows("random_strips.csv")[::58]:
             ratio = row["D"] / (2.0 / 3.0 * row["A"] ** 3)
             if ratio < 0.01:
                 continue
@@ -183,7 +183,7 @@ class TestEvents:
             assert work == pytest.approx(row["D"], rel=0.03), row
             reach = float(jnp.ptp(found.state.displacement[-3:])) / 2.0 * 3.4e4
             assert reach == pytest.approx(row["u"], rel=0.01), row
-        assert lifted >= 8
+        assert lifted >= 3
 
     def test_contact_conditions_hold(self):
         mu = 0.5
