@@ -53,7 +53,7 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def fault(capsys):
-    """What is wrong with how the command line refuses some words; empty if nothing is."""
+    """Fault in the way the command line refuses some words; empty if there is none."""
 
     def fault(*words, code=2):
         before = {place.name for place in pathlib.Path().iterdir()}
@@ -72,7 +72,7 @@ def fault(capsys):
 
 
 def refusal(ask, label):
-    """What is wrong with how the library refuses something; empty if nothing is."""
+    """Fault in the way the library refuses something; empty if there is none."""
     try:
         found = ask()
     except (jb.InputError, jb.UnconvergedError) as error:

@@ -39,7 +39,7 @@ def command(*words, folder):
 
 
 def finished(*words, folder):
-    """What a run that nobody disturbs says, and how long it takes."""
+    """Output of an undisturbed run, and its time."""
     begin = time.monotonic()
     process = command(*words, folder=folder)
     out, err = process.communicate(timeout=300)

@@ -62,6 +62,6 @@ class TestNotebook:
 
 
 def pictures(notebook):
-    """How many pictures the notebook shows."""
+    """Number of pictures in a notebook."""
     outputs = [output for cell in code_cells(notebook) for output in cell.outputs]
     return sum("image/png" in output.get("data", {}) for output in outputs)

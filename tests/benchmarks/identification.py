@@ -101,7 +101,7 @@ def planted(scene: jb.Scene) -> list[Loop]:
 
 
 def timed(function, *arguments, **options):
-    """What a function returns, and the seconds it takes."""
+    """Result of a function, and its seconds."""
     begin = time.perf_counter()
     return function(*arguments, **options), time.perf_counter() - begin
 

@@ -1,4 +1,4 @@
-"""What every rung of the ladder costs and how wrong it is, beside finite elements.
+"""Cost and error of every rung of the ladder, beside finite elements.
 
     python tests/benchmarks/ladder.py           # --draw: only the picture, from the record
 
@@ -165,7 +165,7 @@ def profile_error(case: Candidate, eta: float) -> float:
 
 
 def figures(history: jb.History, strip: tuple[float, float], case: Candidate) -> dict[str, Any]:
-    """What a row of the record says of a run, its times apart."""
+    """Row of the record for a run, without its times."""
     return {
         "eta": strip[0],
         "A": strip[1],
@@ -242,7 +242,7 @@ def measure_map(quick: bool) -> dict[str, Any]:
 
 
 def measure_advice(quick: bool) -> dict[str, Any]:
-    """What is picked in every cell, and how wrong that is."""
+    """Advised rung in every cell, and its error."""
     tolerances = TOLERANCES[1:2] if quick else TOLERANCES
     lanes = [(tolerance, cell) for tolerance in tolerances for cell in cells()]
     picks = []
@@ -269,7 +269,7 @@ def measure_advice(quick: bool) -> dict[str, Any]:
 
 
 def about() -> dict[str, Any]:
-    """Where the numbers of a part come from."""
+    """Source of the numbers of a part."""
     information = Path("/proc/cpuinfo")
     text = information.read_text(encoding="utf-8") if information.exists() else ""
     model = re.search(r"model name\s*:\s*(.*)", text)

@@ -1,4 +1,4 @@
-"""How fast a cycle is, at which error, beside what one would otherwise run.
+"""Time of a cycle at its error, beside other programs for it.
 
     python tests/benchmarks/speed.py            # --draw: only the picture, from the record
 
@@ -83,13 +83,13 @@ def parsed() -> argparse.Namespace:
 
 
 def plan_of(options: argparse.Namespace) -> Plan:
-    """How much is measured."""
+    """Sizes of the measurement."""
     plan = (QUICK if options.quick else Plan())._replace(peer=options.peer)
     return plan._replace(rounds=options.rounds) if options.rounds else plan
 
 
 def report(record: dict[str, Any]) -> str:
-    """What the record holds, in short."""
+    """Summary of the record."""
     lines = []
     for name, section in record.items():
         lines.append(f"{name}: {section['took_s']:.0f} s, commit {section['about']['commit']}")

@@ -299,7 +299,7 @@ def test_unknown_scenes_are_refused(refused, command, word, told):
 
 @pytest.fixture(scope="module")
 def planted(tmp_path_factory):
-    """What a run writes, as data: first loading and one cycle of a strip to be found again."""
+    """Files of a run, as data: first loading and one cycle of a strip with planted parameters."""
     folder = tmp_path_factory.mktemp("data")
     assert main.main(["run", *BASE, *options(TRUE), "--out", str(folder)]) == 0
     return folder / "loop.csv"

@@ -344,7 +344,7 @@ def test_loops_of_like_length_share_what_is_compiled(planted):
 
 @pytest.mark.slow
 def test_a_mixture_of_everything(tmp_path):
-    """Of one strip, clamped harder at its far part, measured under prescribed displacements."""
+    """Loops of one strip under prescribed displacements, clamped harder at its far part."""
     clamped = [[0.0, 10.0], [1.4, 10.0], [1.4, 6.0], [2.0, 6.0]]
     drive = {"load.control": "displacement", "load.amplitude": 1.5e-5}
     truth = jb.Scene().replace(MODEL | {"contact.pressure": clamped} | drive)

@@ -125,7 +125,7 @@ def test_profiles_of_little_noise_are_parabolas(quiet):
 
 
 def test_a_profile_ends_where_the_others_can_no_longer_follow():
-    """Of much noise it is skewed as the model is, which no covariance can say."""
+    """Parameters under much noise, whose distribution is skewed like the model."""
     fit = identify.fit(readings(0.01, 3, known=True), TWO, KEYS[:2])
     profile = identify.profile(fit, ETA)
     least = fit.problem(fit.uncertainty.space, fit.uncertainty.point).cost

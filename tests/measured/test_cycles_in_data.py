@@ -33,7 +33,7 @@ def driven(amplitudes, points, tail=0.0, level=0.0):
 
 
 def answered(drive, driver):
-    """What springs and sliders answer, (n,)."""
+    """Response of springs and sliders, (n,)."""
     reach = np.linspace(0.05, 0.9, 12)
     plays, position = np.empty((drive.size, 12)), np.zeros(12)
     for i, level in enumerate(drive):

@@ -1,4 +1,4 @@
-"""What decides between methods: every comparison's figure, and every trap seen to close."""
+"""Comparisons of methods: the figure of each, and each trap seen to close."""
 
 import functools
 import json

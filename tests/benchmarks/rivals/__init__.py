@@ -1,4 +1,4 @@
-"""What a skilled user would otherwise run on the standard strip, to be timed beside jbeamshell.
+"""Other programs for the standard strip, to be timed beside jbeamshell.
 
 Plane strain, length L, half height H = eta L/2, held at X = 0, pressed by F_N, loaded at X = L by
 an end force F that is spread evenly over the face; any consistent units, per unit width.

@@ -107,7 +107,7 @@ def _banded(count: int, rows: np.ndarray, shift: np.ndarray, parts: np.ndarray) 
 
 
 class Level(NamedTuple):
-    """Where a load step ends, (n,) each: v, its plastic part, and the sliders' force and cap."""
+    """End of a load step, (n,) each: v, its plastic part, and the sliders' force and cap."""
 
     v: np.ndarray
     plastic: np.ndarray

@@ -138,7 +138,7 @@ def devices(size: int, rounds: int) -> None:
 
 
 def unsettled(plan: Plan) -> dict[str, Any]:
-    """How many lanes of a wide field do not converge in the batch, and how many at the end."""
+    """Number of lanes of a wide field that do not converge in the batch, and at the end."""
     values = lanes(plan.unsettled, WIDE)
     hardness = values["load.amplitude"] / values["strip.height_ratio"]
     order = np.argsort(hardness, kind="stable")

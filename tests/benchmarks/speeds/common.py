@@ -34,7 +34,7 @@ Call = Callable[[], Any]
 
 
 class Plan(NamedTuple):
-    """How much is measured.
+    """Size of a measurement.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ def swept(values: Mapping[str, np.ndarray], change: Mapping[str, Any], **options
 def errors(
     values: Mapping[str, np.ndarray], found: np.ndarray, sample: int, change: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """How wrong the lanes are, by some of them on the fine grid."""
+    """Errors of the lanes, from some of them on the fine grid."""
     chosen = np.random.default_rng(2).choice(found.size, min(sample, found.size), replace=False)
     some = {key: column[chosen] for key, column in values.items()}
     right = swept(some, dict(change) | FINE)
@@ -134,7 +134,7 @@ def errors(
 
 
 def seconds_of(call: Call) -> float:
-    """Of one call, to the end of its work."""
+    """Seconds of one call, to the end of its work."""
     begin = time.perf_counter()
     jax.block_until_ready(call())
     return time.perf_counter() - begin
@@ -159,7 +159,7 @@ def interleaved(calls: Mapping[str, Call], plan: Plan, name: str) -> dict[str, l
 
 
 def summary(seconds: list[float]) -> dict[str, Any]:
-    """Of repeated calls."""
+    """Seconds of repeated calls."""
     return {
         "median_us": 1e6 * statistics.median(seconds),
         "best_us": 1e6 * min(seconds),

@@ -1,4 +1,4 @@
-"""What gradients cost beside a run, and how derivatives depend on the grid."""
+"""Cost of gradients beside a run, and derivatives over the grid."""
 
 from typing import Any
 

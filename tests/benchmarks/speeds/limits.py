@@ -88,7 +88,7 @@ def residual(here: jb.Scene) -> float:
 
 
 def solve_operations(count: int, m: int, *, lanes: bool) -> int:
-    """Of block elimination and substitution; blocks divide by cofactors, in lanes by quotients."""
+    """Operations of block elimination and substitution; cofactors in one strip, quotients in lanes."""
     dot = 2 * m - 1
     seen = m * (m + 1) * dot
     pivot = m * m + m

@@ -1,4 +1,4 @@
-"""Where numbers come from: the machine, its versions, its peak; and processes beside this one."""
+"""Machine of a measurement, its versions and its peak; and processes beside this one."""
 
 import json
 import os
@@ -54,7 +54,7 @@ def _git(*words: str) -> str:
 
 
 def peak_gflops() -> float:
-    """Of one core: the fastest product of two square matrices by NumPy."""
+    """Peak of one core: the fastest product of two square matrices by NumPy."""
     a = np.random.default_rng(0).normal(size=(PEAK_SIZE, PEAK_SIZE))
     seconds = []
     for _ in range(PEAK_TRIES):
@@ -81,7 +81,7 @@ def environment(**changes: str) -> dict[str, str]:
 
 
 def told(*words: object, **changes: str) -> Any:
-    """What a child of this script's prints as JSON."""
+    """JSON that a child process of this script prints."""
     command = [sys.executable, str(SCRIPT), "--child", *map(str, words)]
     answer = subprocess.run(
         command, stdout=subprocess.PIPE, text=True, check=True, env=environment(**changes)

@@ -1,4 +1,4 @@
-"""What a fresh process costs until its first answer."""
+"""Time of a fresh process until its first result."""
 
 import json
 import statistics
