@@ -88,7 +88,7 @@ def residual(here: jb.Scene) -> float:
 
 
 def solve_operations(count: int, m: int, *, lanes: bool) -> int:
-    """Operations of block elimination and substitution; cofactors in one strip, quotients in lanes."""
+    """Operations of block elimination: by cofactors in one strip, by quotients in lanes."""
     dot = 2 * m - 1
     seen = m * (m + 1) * dot
     pivot = m * m + m
