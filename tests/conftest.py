@@ -1,11 +1,13 @@
 """Settings of the whole test run."""
 
 import gc
+import math
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+from pathlib import Path
 
 import hypothesis
 import jax
@@ -31,6 +33,7 @@ jax.config.update("jax_compilation_cache_dir", os.environ[CACHE])
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
 jax.config.update("jax_disable_most_optimizations", True)
 jax.config.update("jax_enable_x64", True)
+MOST_MEMORY = 1.5e9  # bytes of a worker beyond which it forgets after every module
 gc.set_threshold(100_000, 20, 20)  # tracing makes millions of objects that live on
 
 hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
@@ -38,10 +41,24 @@ hypothesis.settings.load_profile("repeatable")
 
 
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
-    """Forget compiled programs after a folder; its modules share them, all would take gigabytes."""
-    if nextitem is None or nextitem.path.parent != item.path.parent:
+    """Forget compiled programs after a folder, or after a module if they take much memory.
+
+    The modules of a folder share programs; those of all folders would take many gigabytes.
+    """
+    if nextitem is not None and nextitem.path == item.path:
+        return
+    if nextitem is None or nextitem.path.parent != item.path.parent or memory_used() > MOST_MEMORY:
         jax.clear_caches()
         gc.collect()
+
+
+def memory_used() -> float:
+    """Bytes of memory that this process holds; infinite where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        return math.inf
+    return float(pages * os.sysconf("SC_PAGE_SIZE"))
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
