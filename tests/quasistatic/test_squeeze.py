@@ -14,7 +14,7 @@ DECAY = reference.squeeze_decay_length(1.0, 0.44, 0.3)
 EVEN = 1.0 / 0.6  # of H: makes the end elements of a strip of 100 H as large as the others
 
 
-def reference(name):
+def recorded(name):
     return np.genfromtxt(data_folder() / "squeeze" / name, delimiter=",", names=True)
 
 
@@ -26,7 +26,7 @@ def test_a_squeezed_laminate_bends_as_the_closed_form_and_the_finite_elements(pl
     np.testing.assert_allclose(curvature, closed, rtol=1e-8)
     tip = reference.tip_deflection(closed, 100.0)
     assert float(history.tip_deflection[0]) == pytest.approx(float(tip), rel=1e-8)
-    measured = reference(f"b1_{plane}.csv")
+    measured = recorded(f"b1_{plane}.csv")
     at = np.arange(10.0, 91.0, 10.0)  # nodes of both
     for name, field in (("deflection_fe", history.w), ("slope_fe", history.beta)):
         finite_elements = np.interp(at, measured["x_mm"], measured[name]) * PRESSURE / SOFT
@@ -52,7 +52,7 @@ def test_the_squeeze_reaches_beyond_the_load_as_exponentials(squeezed):
 
 
 def test_the_squeeze_against_finite_elements(squeezed):
-    measured = reference("b2.csv")
+    measured = recorded("b2.csv")
     x = np.linspace(45.0, 55.0, 1001)
     model = np.interp(x, squeezed.middles, squeezed.squeeze_stress[0])
     rms = np.sqrt(np.mean((model - np.interp(x, measured["x_mm"], measured["sy_avg"])) ** 2))
