@@ -17,12 +17,14 @@ from jbeamshell.condensed.branches import factorise, path, pressed
 from jbeamshell.condensed.events import Level, walk
 from jbeamshell.condensed.strip import Strip, condensed
 from jbeamshell.history.history import History
+from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.numerics.cycles import closed_cycles, turning_points
 from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
 NODES = 129
+LIFTING = ("v", "w", "beta", "psi")
 CYCLES = 2  # from the second cycle on the dissipation repeats
 
 
@@ -76,7 +78,9 @@ def solve(
     fix = "must press the strip down everywhere for the condensed contact"
     require("contact.pressure", scene.contact.pressure, pressing, fix)
     levels = _walk(strip, scene.contact.friction, jnp.asarray(targets), jnp.asarray(turns))
-    history = _history(scene, strip, levels, jnp.asarray(targets))
+    model = {"model.kinematics": "linear", "model.rung": "squeeze", "model.fields": LIFTING}
+    solved = scene.replace(model)
+    history = _history(solved, strip, levels, jnp.asarray(targets))
     first = scene.load.pressure_steps - 1
     cycles = closed_cycles(np.append(0.0, targets)) if targets.size else ()
     cycles = tuple((a + first, b + first, c + first) for a, b, c in cycles)
@@ -101,9 +105,26 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
 
     Returns
     -------
-    (k,) work per cycle and unit width; NaN where slip zones are not nested, see `branches`
+    (k,) work per cycle and unit width.  Amplitudes whose slip zones are not nested are walked event
+    by event; where anything is traced they cannot be, and hold NaN.
+
+    Raises
+    ------
+    InputError, UnconvergedError
+        as of `solve`, unless anything is traced
     """
-    return _dissipation(scene, jnp.asarray(amplitudes), nodes)
+    found = _dissipation(scene, jnp.asarray(amplitudes), nodes)
+    if is_traced(scene, amplitudes, found):
+        return found
+    _check(scene)
+    sizes, works = np.asarray(amplitudes, dtype=float), np.array(found)
+    fix = "give (k,) positive amplitudes"
+    require("amplitudes", sizes, sizes.ndim == 1 and bool(np.all(sizes > 0.0)), fix)
+    gross_slip_rule(scene.load, scene.number, sizes).demand()
+    for i in np.flatnonzero(np.isnan(works)):
+        steady = {"load.amplitude": sizes[i], "load.cycles": CYCLES, "load.steps_per_half_cycle": 1}
+        works[i] = solve(scene.replace(steady), nodes=nodes).dissipation
+    return jnp.asarray(works)
 
 
 @eqx.filter_jit
@@ -131,6 +152,8 @@ def _check(scene: Scene) -> None:
     require(
         "energy", scene.energy, scene.energy is None, "must be left out: elasticity has its own"
     )
+    sharp = isinstance(contact.law, SharpSlip)
+    require("contact.law", contact.law, sharp, "must be the sharp slider for the condensed contact")
     rigid = contact.normal == "rigid"
     require("contact.normal", contact.normal, rigid, "must be 'rigid' for the condensed contact")
     force = load.control == "force"

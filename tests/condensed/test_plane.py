@@ -140,7 +140,12 @@ class TestBranches:
     def test_what_is_not_nested_is_not_valid(self):
         body = STRIP(scene_of(0.1126, mu=0.5)).body
         assert not np.any(by_factors(body, 0.5, 1.0).valid)
-        assert np.isnan(condensed.dissipation(scene_of(0.1126, mu=0.5), [1.0], nodes=33)[0])
+
+    def test_what_is_not_nested_is_walked_event_by_event(self):
+        steady = {"load.steps_per_half_cycle": 1}
+        history = condensed.solve(scene_of(0.1126, mu=0.5).replace(steady), nodes=33)
+        found = condensed.dissipation(history.scene, [1.0], nodes=33)
+        np.testing.assert_allclose(found, [history.dissipation], rtol=1e-12)
 
     def test_the_gradient_has_taylor_slope_two(self):
         scene = scene_of(0.1126)
@@ -233,6 +238,7 @@ class TestHistory:
         ("values", "said"),
         [
             ({"load.control": "displacement", "load.amplitude": 1e-5}, "load.control = 'displ"),
+            ({"contact.smoothing": 16.0}, "contact.law"),
             ({"load.amplitude": 2.5}, "load.amplitude = 2.5: must stay below gross slip"),
             (
                 {"contact.pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 10.0], [2.0, 10.0]]},
