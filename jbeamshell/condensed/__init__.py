@@ -4,6 +4,6 @@
 steady cycle at many amplitudes from one factorisation.
 """
 
-from jbeamshell.condensed.solve import NODES as NODES
-from jbeamshell.condensed.solve import dissipation as dissipation
+from jbeamshell.condensed.dissipation import dissipation as dissipation
 from jbeamshell.condensed.solve import solve as solve
+from jbeamshell.condensed.strip import NODES as NODES

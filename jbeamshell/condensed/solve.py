@@ -13,9 +13,9 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require, require_count
 from jbeamshell.common.errors import Status, UnconvergedError
-from jbeamshell.condensed.branches import factorise, path, pressed
+from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.events import Level, walk
-from jbeamshell.condensed.strip import Strip, condensed
+from jbeamshell.condensed.strip import NODES, Strip, condensed
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.mechanics.kinematics import Strains
@@ -23,9 +23,7 @@ from jbeamshell.numerics.cycles import closed_cycles, turning_points
 from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
-NODES = 129
 LIFTING = ("v", "w", "beta", "psi")
-CYCLES = 2  # from the second cycle on the dissipation repeats
 
 
 def solve(
@@ -64,7 +62,7 @@ def solve(
     >>> history = jb.condensed.solve(jb.Scene().replace({"load.amplitude": 1.0}))
     >>> float(history.dissipation_ratio)
     """
-    _check(scene)
+    check(scene)
     require_count("nodes", nodes, 9)
     targets = np.asarray(scene.load.amplitude) * scene.load.unit_path() if loads is None else loads
     targets = np.asarray(targets, dtype=float)
@@ -94,54 +92,7 @@ def solve(
     return dataclasses.replace(history, cycles=cycles)
 
 
-def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> Array:
-    """Work of friction in a steady cycle of plane elasticity, at several amplitudes.
-
-    Parameters
-    ----------
-    scene : as of `solve`; may be traced
-    amplitudes : (k,) of the end force
-    nodes : as of `solve`
-
-    Returns
-    -------
-    (k,) work per cycle and unit width.  Amplitudes whose slip zones are not nested are walked event
-    by event; where anything is traced they cannot be, and hold NaN.
-
-    Raises
-    ------
-    InputError, UnconvergedError
-        as of `solve`, unless anything is traced
-    """
-    found = _dissipation(scene, jnp.asarray(amplitudes), nodes)
-    if is_traced(scene, amplitudes, found):
-        return found
-    _check(scene)
-    sizes, works = np.asarray(amplitudes, dtype=float), np.array(found)
-    fix = "give (k,) positive amplitudes"
-    require("amplitudes", sizes, sizes.ndim == 1 and bool(np.all(sizes > 0.0)), fix)
-    gross_slip_rule(scene.load, scene.number, sizes).demand()
-    for i in np.flatnonzero(np.isnan(works)):
-        steady = {"load.amplitude": sizes[i], "load.cycles": CYCLES, "load.steps_per_half_cycle": 1}
-        works[i] = solve(scene.replace(steady), nodes=nodes).dissipation
-    return jnp.asarray(works)
-
-
-@eqx.filter_jit
-def _dissipation(scene: Scene, amplitudes: Array, nodes: int) -> Array:
-    strip = condensed(scene, nodes)
-    friction, start = scene.contact.friction, pressed(strip.body)
-    factors = factorise(strip.body, friction)
-    turns = jnp.asarray([1.0, *[-1.0, 1.0] * CYCLES])
-
-    def one(amplitude: Array) -> Array:
-        branches = path(strip.body, factors, friction, start, amplitude * turns)
-        return jnp.where(jnp.all(branches.valid), jnp.sum(branches.slip_work[-2:]), jnp.nan)
-
-    return jax.vmap(one)(amplitudes)
-
-
-def _check(scene: Scene) -> None:
+def check(scene: Scene) -> None:
     """Raise `InputError` for a scene outside of what `solve` covers."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     strip, contact, load = scene.strip, scene.contact, scene.load
