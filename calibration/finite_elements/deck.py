@@ -24,7 +24,7 @@ import numpy as np
 
 from calibration.finite_elements.cards import card, equation, node_set, normal_behaviour
 from calibration.finite_elements.mesh import Mesh, nodal_loads
-from jbeamshell.quasistatic.load_path import LoadPath
+from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
 NORMAL_STIFFNESS = 1000.0  # of the contact, in units of E'/H

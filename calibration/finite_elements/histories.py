@@ -20,7 +20,7 @@ from calibration.finite_elements.sections import fitted, section_forces
 from jbeamshell.common.errors import Status
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
-from jbeamshell.quasistatic.load_path import LoadPath
+from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
 SLIDES = 0.99  # of the cap: a node with more traction slips

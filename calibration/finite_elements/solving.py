@@ -17,7 +17,7 @@ from calibration.finite_elements.results import read
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import Status, UnconvergedError
 from jbeamshell.history.history import History
-from jbeamshell.quasistatic import load_path
+from jbeamshell.scene import load_path
 from jbeamshell.scene.scene import Scene
 
 

@@ -44,7 +44,8 @@ def run(options: argparse.Namespace) -> int:
     from jbeamshell.history import report
     from jbeamshell.ladder import advice
     from jbeamshell.plotting.folder import check_folder
-    from jbeamshell.quasistatic import load_path, solver
+    from jbeamshell.quasistatic import solver
+    from jbeamshell.scene import load_path
 
     scene = scene_of(options)
     load_path.check(scene)

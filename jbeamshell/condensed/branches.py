@@ -193,7 +193,7 @@ def follow(
         compliances=compliances,
         slip_work=work - start.r_t @ slip - 0.5 * slip @ forces,
         slipping=slips,
-        valid=_valid(own, friction, start, thresholds, slips, sense, reach),
+        valid=holds(own, friction, start, thresholds, slips, sense, reach),
     )
 
 
@@ -209,7 +209,7 @@ def path(
     return lax.scan(go, start, turns)[1]
 
 
-def _valid(
+def holds(
     own: Factors,
     friction: Array,
     start: ContactState,

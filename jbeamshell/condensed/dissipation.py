@@ -10,23 +10,25 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.errors import UnconvergedError
 from jbeamshell.condensed.branches import factorise, path, pressed
-from jbeamshell.condensed.solve import check, solve
-from jbeamshell.condensed.strip import NODES, condensed
-from jbeamshell.scene.domain import gross_slip_rule
+from jbeamshell.condensed.solve import solve
+from jbeamshell.condensed.strip import condensed
+from jbeamshell.scene.load_path import check
+from jbeamshell.scene.rungs import PLANE_NODES
 from jbeamshell.scene.scene import Scene
 
 CYCLES = 2  # from the second cycle on the dissipation repeats
 
 
-def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> Array:
+def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = PLANE_NODES) -> Array:
     """Work of friction in a steady cycle of plane elasticity, at several amplitudes.
 
     Parameters
     ----------
-    scene : as of `solve`; may be traced
+    scene : strip and contact, see the rung ``plane``; may be traced
     amplitudes : (k,) of the end force
-    nodes : as of `solve`
+    nodes : contact nodes
 
     Returns
     -------
@@ -35,26 +37,35 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
 
     Raises
     ------
-    InputError, UnconvergedError
-        as of `solve`, unless anything is traced
+    InputError
+        if the scene has no such rung, or an amplitude exceeds gross slip, unless traced
+    UnconvergedError
+        if the events of a load step come to no end, unless traced
     """
-    found = _dissipation(scene, jnp.asarray(amplitudes), nodes)
+    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+    scene = scene.replace({"model.rung": "plane", "model.nodes": nodes})
+    force = scene.load.control == "force"
+    require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
+    found = _dissipation(scene, jnp.asarray(amplitudes))
     if is_traced(scene, amplitudes, found):
         return found
-    check(scene)
     sizes, works = np.asarray(amplitudes, dtype=float), np.array(found)
     fix = "give (k,) positive amplitudes"
     require("amplitudes", sizes, sizes.ndim == 1 and bool(np.all(sizes > 0.0)), fix)
-    gross_slip_rule(scene.load, scene.number, sizes).demand()
+    check(scene.replace({"load.amplitude": np.max(sizes, initial=0.0)}))
     for i in np.flatnonzero(np.isnan(works)):
         steady = {"load.amplitude": sizes[i], "load.cycles": CYCLES, "load.steps_per_half_cycle": 1}
-        works[i] = solve(scene.replace(steady), nodes=nodes).dissipation
+        lone = scene.replace(steady)
+        history = solve(lone, *check(lone))
+        if not history.converged:
+            raise UnconvergedError(f"amplitudes = {sizes[i]:.6g}: its events come to no end")
+        works[i] = history.dissipation
     return jnp.asarray(works)
 
 
 @eqx.filter_jit
-def _dissipation(scene: Scene, amplitudes: Array, nodes: int) -> Array:
-    strip = condensed(scene, nodes)
+def _dissipation(scene: Scene, amplitudes: Array) -> Array:
+    strip = condensed(scene, scene.model.nodes)
     friction, start = scene.contact.friction, pressed(strip.body)
     factors = factorise(strip.body, friction)
     turns = jnp.asarray([1.0, *[-1.0, 1.0] * CYCLES])

@@ -2,127 +2,97 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import is_traced, require, require_count
-from jbeamshell.common.errors import Status, UnconvergedError
+from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.errors import Status
 from jbeamshell.condensed.branches import pressed
-from jbeamshell.condensed.events import Level, walk
-from jbeamshell.condensed.strip import NODES, Strip, condensed
+from jbeamshell.condensed.events import Level
+from jbeamshell.condensed.levels import levels, nested_levels
+from jbeamshell.condensed.strip import Strip, condensed
 from jbeamshell.history.history import History
-from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.mechanics.kinematics import Strains
-from jbeamshell.numerics.cycles import closed_cycles, turning_points
-from jbeamshell.scene.domain import gross_slip_rule
+from jbeamshell.numerics.cycles import turning_points
+from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
-LIFTING = ("v", "w", "beta", "psi")
+Cycles = tuple[tuple[int, int, int], ...]
 
 
-def solve(
-    scene: Scene, loads: ArrayLike | None = None, *, nodes: int = NODES, throw: bool = True
-) -> History:
-    """Press a strip of plane elasticity down, walk a load path, and report what happened.
+def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False) -> History:
+    """Press a strip of plane elasticity down and walk a load path.
 
-    The strip, its contact and its loads are the scene's; its model, its grid and its elastic slip
-    are not used.  The strip is plane and linear, friction is Coulomb's without elastic slip, and
-    contact is unilateral.  Between the events at which a node starts to slip, sticks, opens or
-    closes everything is linear in the load, so that load steps only say where the path is looked
-    at.  Singular stresses at the loaded corner are resolved to 1e-5 H.
+    Between the events at which a node starts to slip, sticks, opens or closes everything is linear
+    in the load, so that load steps only say where the path is looked at.  Friction is Coulomb's
+    without elastic slip, contact is unilateral, and singular stresses at the loaded corner are
+    resolved to 1e-5 H.
 
     Parameters
     ----------
-    scene : strip on a rigid foundation under force control, straight, pressed everywhere
-    loads : (steps,) end loads after the pressing; None is the scene's own cycles
-    nodes : contact nodes; 129 are within 1 % of the dissipation of converged finite elements where
-        it exceeds a tenth of the bar's cubic law
-    throw : True to raise where a step finds no equilibrium
+    scene : scene with the rung ``plane``; may be traced
+    path, cycles : whole path of the scene and its closed cycles, see
+        `jbeamshell.scene.load_path.check`; its turns are not traced
+    nested : True to take factors alone, whose steps are marked unconverged where slip zones are not
+        nested; False walks such paths event by event
 
     Returns
     -------
     History
-        fields v, w, beta (mean rotation of the section) and psi (mean squeeze strain)
+        fields v, w, beta (mean rotation of the section) and psi (mean squeeze strain); NaN from the
+        first step on whose events come to no end
 
     Raises
     ------
     InputError
-        if the scene is outside of what is named above, or the loads exceed gross slip
-    UnconvergedError
-        if the events of a load step come to no end
-
-    Examples
-    --------
-    >>> history = jb.condensed.solve(jb.Scene().replace({"load.amplitude": 1.0}))
-    >>> float(history.dissipation_ratio)
+        if the pressures leave a gap, or change along the path, or if a path of loads is traced
     """
-    check(scene)
-    require_count("nodes", nodes, 9)
-    targets = np.asarray(scene.load.amplitude) * scene.load.unit_path() if loads is None else loads
-    targets = np.asarray(targets, dtype=float)
-    require("loads", targets.shape, targets.ndim == 1, "give (steps,) end loads")
-    require("loads", targets, bool(np.all(np.isfinite(targets))), "must be finite")
-    gross_slip_rule(scene.load, scene.number, targets).demand()
-    turns = np.zeros(targets.size, bool)
-    turns[turning_points(np.append(0.0, targets))[:-1]] = True
-    strip = _strip(scene, nodes)
-    pressing = bool(np.all(np.asarray(strip.body.r_0) > 0.0))
-    fix = "must press the strip down everywhere for the condensed contact"
-    require("contact.pressure", scene.contact.pressure, pressing, fix)
-    levels = _walk(strip, scene.contact.friction, jnp.asarray(targets), jnp.asarray(turns))
-    model = {"model.kinematics": "linear", "model.rung": "squeeze", "model.fields": LIFTING}
-    solved = scene.replace(model)
-    history = _history(solved, strip, levels, jnp.asarray(targets))
-    first = scene.load.pressure_steps - 1
-    cycles = closed_cycles(np.append(0.0, targets)) if targets.size else ()
-    cycles = tuple((a + first, b + first, c + first) for a, b, c in cycles)
-    settled = np.asarray(levels.settled)
-    if throw and not settled.all():
-        number = int(np.argmin(settled))
-        raise UnconvergedError(
-            f"load step {number + first + 1} (load {targets[number]:.6g}): its events come to no "
-            "end; take other nodes, or model.rung = p6 with the general solver"
-        )
-    return dataclasses.replace(history, cycles=cycles)
-
-
-def check(scene: Scene) -> None:
-    """Raise `InputError` for a scene outside of what `solve` covers."""
-    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
-    strip, contact, load = scene.strip, scene.contact, scene.load
-    plain = not is_traced(scene)
-    require("scene", "traced", plain, "give plain numbers, or take condensed.dissipation")
-    straight = strip.curvature is None
-    require("strip.curvature", strip.curvature, straight, "must be left out: plane strips are flat")
-    require(
-        "energy", scene.energy, scene.energy is None, "must be left out: elasticity has its own"
-    )
-    sharp = isinstance(contact.law, SharpSlip)
-    require("contact.law", contact.law, sharp, "must be the sharp slider for the condensed contact")
-    rigid = contact.normal == "rigid"
-    require("contact.normal", contact.normal, rigid, "must be 'rigid' for the condensed contact")
-    force = load.control == "force"
-    require("load.control", load.control, force, "must be 'force' for the condensed contact")
+    before = scene.load.pressure_steps
+    unit = scene.load.unit_path()
+    own = is_traced(path.target) and path.target.size == before + unit.size
+    fix = "give plain numbers for model.rung = plane"
+    require("path", "traced", own or not is_traced(path.target), fix)
+    known = unit if own else np.asarray(path.target)[before:]
+    whole = is_traced(path.pressure) or bool(np.all(np.asarray(path.pressure)[before:] == 1.0))
+    fix = "must act wholly for model.rung = plane: take squeeze or p6 for changing pressures"
+    require("path", "pressures", whole, fix)
+    turns = np.zeros(known.size, bool)
+    turns[turning_points(np.append(0.0, known))[:-1]] = True
+    strip = _strip(scene)
+    if not is_traced(strip):
+        down = bool(np.all(np.asarray(strip.body.r_0) > 0.0))
+        fix = "must press the strip down everywhere for model.rung = plane: take squeeze with w"
+        require("contact.pressure", scene.contact.pressure, down, fix)
+    targets = jnp.asarray(path.target[before:])
+    turned = tuple(turns.tolist())
+    found = _levels(strip, scene.contact.friction, targets, turned, nested)
+    return _history(scene, strip, found, targets, cycles)
 
 
 @eqx.filter_jit
-def _strip(scene: Scene, nodes: int) -> Strip:
-    return condensed(scene, nodes)
-
-
-@jax.jit
-def _walk(strip: Strip, friction: Array, targets: Array, turns: Array) -> Level:
-    return walk(strip.body, friction, pressed(strip.body), targets, turns)
+def _strip(scene: Scene) -> Strip:
+    return condensed(scene, scene.model.nodes)
 
 
 @eqx.filter_jit
-def _history(scene: Scene, strip: Strip, levels: Level, targets: Array) -> History:
+def _levels(
+    strip: Strip, friction: Array, targets: Array, turns: tuple[bool, ...], nested: bool
+) -> Level:
+    """Levels after the pressing, unsettled where the pressures leave nodes open."""
+    start = pressed(strip.body)
+    if nested or not turns:
+        found, sound = nested_levels(strip.body, friction, start, targets, turns)
+    else:
+        found = levels(strip.body, friction, start, targets, turns)
+        sound = jnp.asarray(True)
+    return found._replace(settled=found.settled & sound & jnp.all(strip.body.r_0 > 0.0))
+
+
+@eqx.filter_jit
+def _history(scene: Scene, strip: Strip, levels: Level, targets: Array, cycles: Cycles) -> History:
     """History of the levels after the pressing, whose steps come first."""
     body, state = strip.body, levels.state
     before = scene.load.pressure_steps
@@ -175,7 +145,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, targets: Array) -> Histo
         iterations=jnp.zeros(part.size, int),
         error=jnp.zeros(part.size),
         status=jnp.append(jnp.full(before, Status.CONVERGED), status),
-        cycles=(),
+        cycles=cycles,
         target=every(targets),
     )
 

@@ -15,7 +15,6 @@ from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.scene.keys import FAR_ENDS
 from jbeamshell.scene.scene import Scene
 
-NODES = 129
 PLANE_END_SIZE = 1e-5  # of H, the element at the loaded end
 PLANE_GROWTH = 0.2  # of the element size over the distance from there
 PLANE_FAR_SIZE = 1.0 / 60.0  # of L, elements away from it

@@ -74,5 +74,6 @@ def linear_error(scene: Scene) -> float:
         slip = min(slip, force / limit)
     softness = float(strip.plane_modulus / (2.0 * strip.shear_modulus))
     pressed = 2.0 * height * pressure / stiffness
-    constants = SECTIONS if scene.model.order > 0 else BEAMSHELL
+    elastic = scene.model.order > 0 or scene.model.solution == "plane"
+    constants = SECTIONS if elastic else BEAMSHELL
     return float(bound(pressed, slip / height, limit / pressure, softness, constants))

@@ -86,7 +86,7 @@ def dissipation_errors(cycle: SlipCycle) -> tuple[Array, ...]:
     cap = 0.5 * (cap[1:] + cap[:-1])
     elastic = numbers.diff(cycle.traction, axis=0) / cycle.slip_stiffness
     slip = numbers.abs(numbers.diff(cycle.v, axis=0) - elastic)
-    slip = numbers.where(cycle.slip_stiffness * slip > NEGLIGIBLE * cap, slip, 0.0)
+    slip = numbers.where(slip > NEGLIGIBLE * cap / cycle.slip_stiffness, slip, 0.0)
 
     work = numbers.sum(slip * cap, axis=0) * cycle.tributary
     total = numbers.sum(work)
@@ -124,7 +124,7 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     model, strip, found = scene.model, scene.strip, []
     if model.kinematics == "linear" and (error := linear_error(scene)) > TOLERANCE:
         found.append(f"{_off(error)}: kinematics are linear; take model.kinematics = exact")
-    beamshell = "psi" in model.fields and model.order == 0
+    beamshell = "psi" in model.fields and model.order == 0 and model.solution != "plane"
     locks = beamshell and model.grid == "finite-difference" and strip.plane == "strain"
     if locks and strip.poisson_ratio is not None and strip.poisson_ratio > LOCKS:
         found.append(

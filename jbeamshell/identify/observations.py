@@ -28,8 +28,8 @@ from jbeamshell.measured.curves import (
 )
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.load_path import check
 from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
 
 LENGTH_STEP = 32  # runs are filled up to multiples of this, where further points are cheap

@@ -19,7 +19,7 @@ from jbeamshell.history.linearisation import linear_error
 from jbeamshell.ladder import error_map
 from jbeamshell.ladder.candidates import CANDIDATES
 from jbeamshell.ladder.climb import Option, climb
-from jbeamshell.quasistatic.load_path import check
+from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
 
 NONE = "none of these: use finite elements"

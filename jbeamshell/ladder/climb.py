@@ -18,8 +18,8 @@ import numpy as np
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import DoubtfulWarning, InputError, UnconvergedError
 from jbeamshell.mechanics.elements import ORDER
-from jbeamshell.quasistatic.load_path import check
 from jbeamshell.quasistatic.solver import compile_for, solve
+from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
 
 UPWARDS = ("squeeze", "p2", "p3", "p4", "p6")

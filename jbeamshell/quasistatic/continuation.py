@@ -16,7 +16,6 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.history.history import History
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.load_path import LoadPath, check
 from jbeamshell.quasistatic.outcome import (
     check_solver,
     history_of,
@@ -26,6 +25,7 @@ from jbeamshell.quasistatic.outcome import (
 from jbeamshell.quasistatic.path_state import PathState, StepResults
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import Method, compiled_march
+from jbeamshell.scene.load_path import LoadPath, check
 
 
 class PathEnd(eqx.Module):

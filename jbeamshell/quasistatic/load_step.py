@@ -10,7 +10,6 @@ from jax import Array, lax
 
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
 from jbeamshell.numerics.newton import Newton, Problem
-from jbeamshell.quasistatic.load_path import LoadPath
 from jbeamshell.quasistatic.path_state import (
     EQUAL,
     PathState,
@@ -31,6 +30,7 @@ from jbeamshell.quasistatic.tangent import (
     with_v,
 )
 from jbeamshell.scene.keys import ARC_LENGTH
+from jbeamshell.scene.load_path import LoadPath
 
 
 class StepGuess(NamedTuple):

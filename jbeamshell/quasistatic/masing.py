@@ -22,11 +22,11 @@ from jbeamshell.common.errors import Status
 from jbeamshell.mechanics.bar import bar_backbone, bar_force, bar_slip_length, bar_slip_profile
 from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.load_path import LoadPath
 from jbeamshell.quasistatic.path_state import PathState, StepResults, initial_state
 from jbeamshell.quasistatic.recovery import walk
 from jbeamshell.quasistatic.stepping import Method, march
 from jbeamshell.quasistatic.system import LoadLevel, System, V
+from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
 

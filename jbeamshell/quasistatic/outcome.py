@@ -14,9 +14,9 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.load_path import LoadPath
 from jbeamshell.quasistatic.path_state import StepResults
 from jbeamshell.quasistatic.system import System
+from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
 ADVICE = (

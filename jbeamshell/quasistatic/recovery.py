@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.load_path import LoadPath
 from jbeamshell.quasistatic.path_state import PathState, StepResults
 from jbeamshell.quasistatic.stepping import Method, compiled_march
+from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
 PIECES = (8, 64)  # numbers of pieces of a failed load step, tried in this order

@@ -93,7 +93,8 @@ def response(
     compiled = jax.jit(solved_by(method or Method.NEWTON))
     if is_traced(scene):
         return compiled
-    again = method is None and slip_patterns.applies(scene)  # what does not settle, by Newton
+    staged = slip_patterns.applies(scene) or scene.model.solution == "plane"
+    again = method is None and staged  # what does not settle, by Newton or by events
     first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
     first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)
 

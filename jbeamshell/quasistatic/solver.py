@@ -10,11 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import is_traced
+from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.errors import Status, UnconvergedError
+from jbeamshell.condensed.solve import Cycles
+from jbeamshell.condensed.solve import solve as solve_plane
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.continuation import with_end
-from jbeamshell.quasistatic.load_path import LoadPath, check, check_contact, whole_path
 from jbeamshell.quasistatic.masing import bar_cycles, masing
 from jbeamshell.quasistatic.outcome import (
     ADVICE,
@@ -26,6 +28,7 @@ from jbeamshell.quasistatic.outcome import (
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import Method, march
+from jbeamshell.scene.load_path import LoadPath, check, check_contact, whole_path
 from jbeamshell.scene.scene import Scene
 
 STACK = 3  # frames from a warning to the caller of `jbeamshell.solve`
@@ -81,6 +84,10 @@ def solve(
     check_solver(solver)
     solver = solver or Newton()
     whole, cycles = check(scene, path)
+    if scene.model.solution == "plane":
+        found = "is found from the pressures for model.rung = plane: leave it out"
+        require("contact", "given", contact is None, found)
+        return _plane(scene, whole, cycles, throw, method)
     touching = None if contact is None else check_contact(scene, contact)
     method = method or _first_method(scene, whole)
     steps, history = _solve(scene, touching, whole, solver, method, np.asarray(True))
@@ -104,11 +111,38 @@ def solve(
     return history
 
 
+def _plane(
+    scene: Scene, path: LoadPath, cycles: Cycles, throw: bool, method: Method | None
+) -> History:
+    """History of plane elasticity, first from factors alone unless derivatives may be taken."""
+    traced = is_traced(scene, path, jnp.zeros(()))
+    events = method is Method.NEWTON or (traced and method is None)
+    history = solve_plane(scene, path, cycles, nested=not events)
+    if traced:
+        failed, fix = history.status[-1] != Status.CONVERGED, "take other model.nodes"
+        message = f"the events of a load step come to no end: {fix}"
+        return eqx.error_if(history, failed, message) if throw else history
+    if not history.converged:
+        history = solve_plane(scene, path, cycles)
+    if throw and not history.converged:
+        step = int(np.argmax(np.asarray(history.status)))
+        load = float(path.target[step])
+        raise UnconvergedError(
+            f"load step {step} (load {load:.6g}): its events come to no end; take other model.nodes"
+        )
+    if throw:
+        warn_of_doubts(history, stacklevel=STACK + 1)
+    return history
+
+
 def compile_for(
     scene: Scene, path: ArrayLike | None = None, *, solver: Newton | None = None
 ) -> None:
-    """Compile the programs that `solve` needs, without solving anything."""
-    whole, _ = whole_path(scene, path)
+    """Compile the programs that `solve` needs; only the cheap rung ``plane`` is solved for it."""
+    whole, cycles = whole_path(scene, path)
+    if scene.model.solution == "plane":
+        _plane(scene, whole, cycles, False, None)
+        return
     method = _first_method(scene, whole)
     compiled = _solve(scene, None, whole, solver or Newton(), method, np.asarray(False))
     jax.block_until_ready(compiled)

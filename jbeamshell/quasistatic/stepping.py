@@ -12,7 +12,6 @@ from jax import Array, lax
 
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
-from jbeamshell.quasistatic.load_path import LoadPath
 from jbeamshell.quasistatic.load_step import StepGuess, guess_from_bar, newton_step
 from jbeamshell.quasistatic.path_state import (
     PathState,
@@ -23,6 +22,7 @@ from jbeamshell.quasistatic.path_state import (
 from jbeamshell.quasistatic.slip_patterns import Memory
 from jbeamshell.quasistatic.system import ContactResponse, LoadLevel, Prescribed, System
 from jbeamshell.quasistatic.tangent import in_blocks, initial_stiffness
+from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
 

@@ -28,7 +28,7 @@ ARC_LENGTH = "arc-length"
 LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
 NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
-SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form")
+SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form", "plane")
 
 LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 PRESSURE = "give a number or a table of [X, pressure] rows"
@@ -183,7 +183,8 @@ class ModelKeys(Part):
     solution: str = word(
         "stepwise",
         SOLUTIONS,
-        "Solution: stepwise, masing or masing-pull (a loop from backbones), closed-form (the bar).",
+        "Solution: stepwise, masing or masing-pull (a loop from backbones), closed-form (the bar), "
+        "or plane (elasticity on its contact line).",
     )
     end_size: float = setting(
         END_SIZE, "Smallest elements, at the loaded end and at steps of the pressure.", unit="H"
@@ -225,7 +226,7 @@ INDIRECT = (
         "model.rung",
         "word",
         "squeeze",
-        "Fields, order and solution by one name: bar, shell, squeeze, p2, p3, ..., masing.",
+        "Fields, order and solution by one name: bar, shell, squeeze, p2, p3, ..., masing, plane.",
     ),
 )
 

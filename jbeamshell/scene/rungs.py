@@ -10,8 +10,9 @@
 | ``masing-shell``, ``masing-p2``, ... | the same with another section |
 | ``masing-pull``, ``masing-pull-p2``, ... | Masing's rule from a pull alone |
 | ``stepwise-bar`` | field v by Newton's method, for bars without a closed form |
+| ``plane`` | plane elasticity on its contact line, exact in time, see `jbeamshell.condensed` |
 
-All rungs but the bars have the field w if the scene has it.
+All rungs but the bars have the field w if the scene has it; ``plane`` always has it.
 """
 
 from __future__ import annotations
@@ -25,6 +26,13 @@ from jbeamshell.common.errors import InputError
 LARGEST_ORDER = 12
 FIELDS_OF = {"bar": ("v",), "shell": ("v", "beta"), "squeeze": ("v", "beta", "psi")}
 SETS = ("model.fields", "model.order", "model.solution")  # keys that a rung's name sets
+PLANE = {  # keys that the rung ``plane`` sets, with its number of nodes unless another is given
+    "model.fields": ("v", "w", "beta", "psi"),
+    "model.order": 0,
+    "model.solution": "plane",
+    "model.kinematics": "linear",
+}
+PLANE_NODES = 129
 _NAME = re.compile(r"(?P<prefix>(masing-pull|masing|stepwise)-)?(?P<section>[a-z]+|p\d+)")
 
 
@@ -41,6 +49,8 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     >>> values_of("p2")["model.order"]
     2
     """
+    if rung == "plane":
+        return dict(PLANE)
     text = rung if isinstance(rung, str) else repr(rung)
     full = f"{text}-squeeze" if text in ("masing", "masing-pull") else text
     match = _NAME.fullmatch(full)
@@ -52,7 +62,7 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     if not match or stepwise or not (ordered or section in FIELDS_OF):
         raise InputError(
             f"model.rung = {rung!r}: choose 'bar', 'shell', 'squeeze', 'p1' to 'p{LARGEST_ORDER}', "
-            "'masing' (of squeeze), or 'masing-' and one of these"
+            "'plane', 'masing' (of squeeze), or 'masing-' and one of these"
         )
     fields = FIELDS_OF.get(section, FIELDS_OF["squeeze"])
     if lift and section != "bar":
@@ -64,6 +74,8 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
 
 def name_of(fields: Sequence[str], order: int, solution: str) -> str:
     """Name of a model's rung."""
+    if solution == "plane":
+        return solution
     if order > 0:
         section = f"p{order}"
     else:
@@ -97,5 +109,8 @@ def spelled_out(values: dict[str, Any], fields: Sequence[str] = ()) -> dict[str,
         other = values.get(key, value)
         same = tuple(other) == value if isinstance(other, list | tuple) else other == value
         if not same:
-            raise InputError(f"model.rung = {rung!r} and {key} = {other!r} disagree: give one")
+            fix = "give one" + (", or take p6, which rotates" if key == "model.kinematics" else "")
+            raise InputError(f"model.rung = {rung!r} and {key} = {other!r} disagree: {fix}")
+    if rung == "plane":
+        meant["model.nodes"] = values.get("model.nodes", PLANE_NODES)
     return {key: value for key, value in values.items() if key != "model.rung"} | meant

@@ -22,6 +22,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.mechanics.friction import (
     LAWS,
     FrictionLaw,
+    SharpSlip,
     law_name,
     law_named,
     takes_smoothing,
@@ -31,7 +32,7 @@ from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, pla
 from jbeamshell.scene.domain import support_rules
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
 from jbeamshell.scene.parts import SECTIONS, Contact, Load, Model, Strip
-from jbeamshell.scene.rungs import spelled_out
+from jbeamshell.scene.rungs import PLANE, spelled_out
 
 
 class Scene(eqx.Module):
@@ -131,15 +132,37 @@ class Scene(eqx.Module):
         require(
             "model.solution", model.solution, bar or not closed, f"{fix}take another model.rung"
         )
+        if model.solution == "plane":
+            self._check_plane()
         either = model.solution == "stepwise" or self.load.control in CONTROLS
         require("model.solution", model.solution, either, "knows no arc length: take 'stepwise'")
-        cycling = model.solution == "stepwise" or self.load.cycles > 0
+        walks = model.solution in ("stepwise", "plane")
+        cycling = walks or self.load.cycles > 0
         fix = "needs load.cycles of 1 or more: give them, or take 'stepwise'"
         require("model.solution", model.solution, cycling, fix)
         half = self.load.steps_per_half_cycle
         fix = f"must be even if model.solution is {model.solution!r}"
-        enough = model.solution == "stepwise" or half % 2 == 0
+        enough = walks or half % 2 == 0
         require("load.steps_per_half_cycle", half, enough, fix)
+
+    def _check_plane(self) -> None:
+        """Refuse what plane elasticity on its contact line cannot represent."""
+        model, curvature, law = self.model, self.strip.curvature, self.contact.law
+        fix = "is for linear elasticity with rotations left out: take model.rung = p6 to have them"
+        require("model.kinematics", model.kinematics, model.kinematics == "linear", fix)
+        whole = model.fields == PLANE["model.fields"] and model.order == 0
+        fix = "and model.order do not suit 'plane': give model.rung = plane, which sets them"
+        require("model.fields", list(model.fields), whole and model.squeeze == "field", fix)
+        fix = "must be left out for model.rung = plane, whose strip is straight: take squeeze"
+        require("strip.curvature", curvature, curvature is None, fix)
+        fix = "must be left out for model.rung = plane, which is elasticity: take squeeze"
+        require("energy", self.energy, self.energy is None, fix)
+        fix = "must be the sharp slider for model.rung = plane: leave contact.smoothing out, or "
+        sharp = isinstance(law, SharpSlip)
+        require("contact.law", law_name(law), sharp, f"{fix}take model.rung = p6")
+        rigid = self.contact.normal == "rigid"
+        fix = "must be rigid for model.rung = plane: take model.rung = p6"
+        require("contact.normal", self.contact.normal, rigid, fix)
 
     def _check_contact(self) -> None:
         """Refuse a strip that nothing holds, and a load off the strip."""
@@ -161,8 +184,10 @@ class Scene(eqx.Module):
 
     @property
     def slip_stiffness(self) -> Array:
-        """Elastic stiffness k_t = alpha G/H of the sliders, traction per slip."""
+        """Elastic stiffness k_t = alpha G/H of the sliders, infinite for ``plane``."""
         strip = self.strip
+        if self.model.solution == "plane":
+            return jnp.full_like(strip.length, jnp.inf)
         return self.contact.stick_stiffness * strip.shear_modulus / strip.half_height
 
     def get(self, key: str) -> Any:

@@ -14,7 +14,7 @@ import numpy as np
 from jbeamshell.common.checks import require_choice
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
-from jbeamshell.quasistatic.load_path import check
+from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 

@@ -12,9 +12,10 @@ import jbeamshell as jb
 from jbeamshell import condensed
 from jbeamshell.condensed import branches, events, strip
 from jbeamshell.mechanics.layered import Material, layered_form
+from jbeamshell.scene.rungs import PLANE_NODES
 
 DATA = Path(__file__).parents[2] / "calibration" / "data"
-STRIP = jax.jit(lambda scene: strip.condensed(scene, condensed.NODES))
+STRIP = jax.jit(lambda scene: strip.condensed(scene, PLANE_NODES))
 TURNS = jnp.asarray([1.0, -1.0, 1.0, -1.0, 1.0])
 
 
@@ -37,6 +38,11 @@ def scene_of(eta, mu=0.1, nu=0.3, amplitude=1.0):
             "load.amplitude": amplitude,
         }
     )
+
+
+def plane(scene, **values):
+    """History of a scene on the rung of plane elasticity."""
+    return jb.solve(scene.replace({"model.rung": "plane"} | values))
 
 
 @jax.jit
@@ -110,7 +116,7 @@ class TestBody:
         np.testing.assert_allclose(inner, recovered.reshape(n, m, 3)[:, 2:], atol=1e-7)
 
     def test_a_uniform_pressure_squeezes_uniformly(self):
-        history = condensed.solve(scene_of(0.1126))
+        history = plane(scene_of(0.1126))
         scene = history.scene
         squeeze = -scene.contact.pressure / scene.strip.plane_modulus
         np.testing.assert_allclose(history.psi[0], squeeze, rtol=1e-6)
@@ -142,8 +148,8 @@ class TestBranches:
         assert not np.any(by_factors(body, 0.5, 1.0).valid)
 
     def test_what_is_not_nested_is_walked_event_by_event(self):
-        steady = {"load.steps_per_half_cycle": 1}
-        history = condensed.solve(scene_of(0.1126, mu=0.5).replace(steady), nodes=33)
+        steady = {"load.steps_per_half_cycle": 1, "model.nodes": 33}
+        history = plane(scene_of(0.1126, mu=0.5), **steady)
         found = condensed.dissipation(history.scene, [1.0], nodes=33)
         np.testing.assert_allclose(found, [history.dissipation], rtol=1e-12)
 
@@ -205,7 +211,7 @@ class TestEvents:
 
 class TestHistory:
     def test_energy_balances_and_the_loop_closes(self):
-        history = condensed.solve(scene_of(0.2358, 0.5, amplitude=1.3))
+        history = plane(scene_of(0.2358, 0.5, amplitude=1.3))
         assert history.converged
         assert abs(float(history.closure)) < 1e-9
         assert float(history.dissipation_loop / history.dissipation) == pytest.approx(1.0, abs=2e-3)
@@ -215,30 +221,32 @@ class TestHistory:
     def test_load_steps_only_say_where_the_path_is_looked_at(self):
         few, many = ({"load.steps_per_half_cycle": count} for count in (2, 40))
         scene = scene_of(0.1126, 0.3)
-        one, other = (condensed.solve(scene.replace(steps)) for steps in (few, many))
+        one, other = (plane(scene, **steps) for steps in (few, many))
         assert float(one.dissipation) == pytest.approx(float(other.dissipation), rel=1e-10)
         np.testing.assert_allclose(one.slip[-1], other.slip[-1], atol=1e-12 * one.slip.max())
 
     def test_it_stands_beside_the_beamshell(self):
         scene = scene_of(0.0511)
-        plane, shell = condensed.solve(scene), jb.solve(scene)
-        assert float(plane.dissipation / shell.dissipation) == pytest.approx(1.0, abs=0.01)
+        elastic, shell = plane(scene), jb.solve(scene)
+        assert float(elastic.dissipation / shell.dissipation) == pytest.approx(1.0, abs=0.01)
         at = np.linspace(0.2, 1.6, 8)
         for section, tolerance in (("e", 0.01), ("psi", 0.01)):
             one, other = (
                 np.interp(at, h.middles, np.asarray(getattr(h.sections, section))[-1])
-                for h in (plane, shell)
+                for h in (elastic, shell)
             )
             np.testing.assert_allclose(one, other, atol=tolerance * np.abs(other).max())
         # N is what friction has not yet taken up, whatever the model.
-        left = plane.force[-1] - np.cumsum((plane.traction[-1] * plane.tributary)[::-1])[::-1]
-        np.testing.assert_allclose(plane.sections.e[-1], left[1:], atol=1e-6)
+        left = elastic.force[-1] - np.cumsum((elastic.traction[-1] * elastic.tributary)[::-1])[::-1]
+        np.testing.assert_allclose(elastic.sections.e[-1], left[1:], atol=1e-6)
 
     @pytest.mark.parametrize(
         ("values", "said"),
         [
-            ({"load.control": "displacement", "load.amplitude": 1e-5}, "load.control = 'displ"),
             ({"contact.smoothing": 16.0}, "contact.law"),
+            ({"model.kinematics": "exact"}, "model.kinematics = 'exact' disagree: .* p6"),
+            ({"strip.curvature": 0.1}, "strip.curvature = 0.1: must be left out"),
+            ({"contact.normal": "compliant"}, "contact.normal = 'compliant': must be rigid"),
             ({"load.amplitude": 2.5}, "load.amplitude = 2.5: must stay below gross slip"),
             (
                 {"contact.pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 10.0], [2.0, 10.0]]},
@@ -248,4 +256,32 @@ class TestHistory:
     )
     def test_what_it_does_not_cover_is_refused(self, values, said):
         with pytest.raises(jb.InputError, match=said):
-            condensed.solve(jb.Scene().replace(values))
+            plane(jb.Scene(), **values)
+
+
+class TestRung:
+    def test_a_response_is_what_a_run_says(self):
+        scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 33})
+        one_step = scene.replace({"load.steps_per_half_cycle": 1})
+        ask = jb.response(one_step, ["contact.friction", "load.amplitude"], ["dissipation"])
+        for mu, amplitude in ((0.1, 1.0), (0.5, 3.0)):  # nested, and walked event by event
+            numbers = {"contact.friction": mu, "load.amplitude": amplitude}
+            run = jb.solve(one_step.replace(numbers))
+            found = ask(mu, amplitude)
+            assert int(found["status"]) == 0
+            np.testing.assert_allclose(found["dissipation"], run.dissipation, rtol=1e-10)
+
+    def test_a_history_is_read_as_it_was_written(self, tmp_path):
+        history = plane(scene_of(0.1126), **{"model.nodes": 33, "load.steps_per_half_cycle": 1})
+        history.save(tmp_path / "run.npz")
+        again = jb.read_history(tmp_path / "run.npz")
+        assert again.scene.model.rung == "plane"
+        np.testing.assert_array_equal(again.fields, history.fields)
+
+    def test_a_sweep_walks_what_is_not_nested_alone(self):
+        scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 33})
+        scene = scene.replace({"load.steps_per_half_cycle": 1})
+        table = jb.sweep(scene, {"contact.friction": [0.1, 0.5]})
+        assert np.all(table.status == 0)
+        alone = plane(scene, **{"model.nodes": 33, "contact.friction": 0.5}).dissipation
+        np.testing.assert_allclose(table["dissipation"][1], alone, rtol=1e-10)

@@ -11,8 +11,7 @@ import pytest
 import jbeamshell as jb
 from calibration.finite_elements import __main__ as command
 from calibration.finite_elements import deck, histories, mesh, program, results, solve
-from jbeamshell.quasistatic import load_path
-from jbeamshell.scene import library
+from jbeamshell.scene import library, load_path
 
 COARSE = {"load.cycles": 1, "load.steps_per_half_cycle": 4}
 STEPPED = [[0.0, 10.0], [1.5, 10.0], [1.5, 0.0], [2.0, 0.0]]

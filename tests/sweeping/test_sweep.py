@@ -9,7 +9,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.common.errors import InputError
-from jbeamshell.quasistatic.load_path import check
+from jbeamshell.scene.load_path import check
 from jbeamshell.sweeping import job, lanes, runner
 from jbeamshell.sweeping.lanes import Outcome, lanes_of
 

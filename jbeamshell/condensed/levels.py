@@ -1,0 +1,97 @@
+"""Load levels of a path: from factors where slip zones are nested, event by event elsewhere."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from jbeamshell.condensed.body import Body
+from jbeamshell.condensed.branches import ContactState, Factors, factorise, holds
+from jbeamshell.condensed.events import Level, walk
+
+
+def levels(
+    body: Body, friction: Array, start: ContactState, forces: Array, turns: tuple[bool, ...]
+) -> Level:
+    """Levels of a load path, stacked along the first axis.
+
+    Parameters
+    ----------
+    body : n contact nodes
+    friction : mu
+    start : contact without lift at the path's start
+    forces : (levels,) end loads
+    turns : True for each level before which the load has turned, the first one among them
+    """
+    nested, valid = nested_levels(body, friction, start, forces, turns)
+
+    def by_events() -> Level:
+        return walk(body, friction, start, forces, jnp.asarray(turns))
+
+    return lax.cond(valid, lambda: nested, by_events)
+
+
+def nested_levels(
+    body: Body, friction: Array, start: ContactState, forces: Array, turns: tuple[bool, ...]
+) -> tuple[Level, Array]:
+    """Levels of a load path whose slip zones are nested, and True if they are.
+
+    The arguments are those of `levels`.  All levels of a branch are one product of matrices.
+    """
+    if not turns:
+        none = Level(start, start.r_n, start.force, start.v > 0.0, start.force >= 0.0)
+        return jax.tree.map(lambda a: jnp.zeros((0, *a.shape), a.dtype), none), jnp.asarray(True)
+    factors = factorise(body, friction)
+    first = np.flatnonzero(turns)
+    sizes = np.diff(first, append=len(turns))
+    longest = int(sizes.max())
+    inside = np.minimum(np.arange(longest), sizes[:, None] - 1)  # the last level fills a branch up
+
+    def go(state: ContactState, targets: Array) -> tuple[ContactState, tuple[Level, Array]]:
+        found, valid = _branch(body, factors, friction, state, targets)
+        return jax.tree.map(lambda a: a[-1], found.state), (found, valid)
+
+    targets = forces[first[:, None] + inside]
+    found, valid = lax.scan(go, start, targets)[1]
+    real = np.flatnonzero((np.arange(longest) < sizes[:, None]).ravel())
+    flat = jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[real], found)
+    return flat, jnp.all(valid)
+
+
+def _branch(
+    body: Body, factors: Factors, friction: Array, start: ContactState, forces: Array
+) -> tuple[Level, Array]:
+    """Levels of one branch, and True if what it assumes holds."""
+    k = body.f_t.size
+    step = (forces - start.force)[:, None]
+    rises = step[-1, 0] >= 0.0
+    sense = jnp.where(rises, 1.0, -1.0)
+    reach = jnp.abs(step)
+    own: Factors = jax.tree.map(lambda a: a[jnp.where(rises, 0, 1)], factors)
+    y_c = own.lower @ -(start.r_t + sense * friction * start.r_n[:k])
+    thresholds = -sense * y_c / own.y_g
+    slips = jnp.cumsum(thresholds >= reach, axis=1) == 0
+    slip = jnp.where(slips, y_c + own.y_g * step, 0.0) @ own.upper.T
+    pushed = slip @ body.K_tt
+    beyond = jnp.where(slips, reach - thresholds, 0.0)
+    compliances = own.z * own.y_g
+    work = 0.5 * jnp.sum(compliances * beyond * (reach + thresholds), axis=1)
+    work = work - slip @ start.r_t - 0.5 * jnp.sum(slip * pushed, axis=1)
+    state = ContactState(
+        start.v + slip,
+        start.r_t + pushed - body.f_t * step,
+        start.r_n + slip @ body.K_tn - body.f_n * step,
+        forces,
+        start.displacement + body.c * step[:, 0] + sense * beyond @ compliances,
+    )
+    level = Level(
+        state,
+        jnp.zeros_like(state.r_n),
+        jnp.diff(work, prepend=0.0),
+        slips,
+        jnp.ones_like(slips[:, 0]),
+    )
+    valid = holds(own, friction, start, thresholds, slips[-1], sense, reach[-1, 0])
+    return level, valid
