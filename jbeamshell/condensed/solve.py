@@ -11,6 +11,7 @@ from jax import Array
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import Status
 from jbeamshell.condensed.branches import pressed
+from jbeamshell.condensed.drives import driven_by_displacement, exchanged, with_springs
 from jbeamshell.condensed.events import Level
 from jbeamshell.condensed.levels import levels, nested_levels
 from jbeamshell.condensed.strip import Strip, condensed
@@ -27,9 +28,9 @@ def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False)
     """Press a strip of plane elasticity down and walk a load path.
 
     Between the events at which a node starts to slip, sticks, opens or closes everything is linear
-    in the load, so that load steps only say where the path is looked at.  Friction is Coulomb's
-    without elastic slip, contact is unilateral, and singular stresses at the loaded corner are
-    resolved to 1e-5 H.
+    in the load, so that load steps only say where the path is looked at.  Friction is Coulomb's,
+    without elastic slip if contact.stick_stiffness is 1000 or more; contact is unilateral; singular
+    stresses at the loaded corner are resolved to 1e-5 H.
 
     Parameters
     ----------
@@ -67,9 +68,9 @@ def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False)
         fix = "must press the strip down everywhere for model.rung = plane: take squeeze with w"
         require("contact.pressure", scene.contact.pressure, down, fix)
     targets = jnp.asarray(path.target[before:])
-    turned = tuple(turns.tolist())
-    found = _levels(strip, scene.contact.friction, targets, turned, nested)
-    return _history(scene, strip, found, targets, cycles)
+    soft = not scene.ideal_friction
+    found = _levels(scene, strip, targets, tuple(turns.tolist()), nested, soft)
+    return _history(scene, strip, found, cycles, soft)
 
 
 @eqx.filter_jit
@@ -79,24 +80,40 @@ def _strip(scene: Scene) -> Strip:
 
 @eqx.filter_jit
 def _levels(
-    strip: Strip, friction: Array, targets: Array, turns: tuple[bool, ...], nested: bool
+    scene: Scene, strip: Strip, targets: Array, turns: tuple[bool, ...], nested: bool, soft: bool
 ) -> Level:
     """Levels after the pressing, unsettled where the pressures leave nodes open."""
-    start = pressed(strip.body)
+    body, friction = strip.body, scene.contact.friction
+    if soft:
+        body, springs = with_springs(body, _spring_stiffness(scene, strip))
+    if scene.load.control == "displacement":
+        body = driven_by_displacement(body)
     if nested or not turns:
-        found, sound = nested_levels(strip.body, friction, start, targets, turns)
+        found, sound = nested_levels(body, friction, pressed(body), targets, turns)
     else:
-        found = levels(strip.body, friction, start, targets, turns)
+        found = levels(body, friction, pressed(body), targets, turns)
         sound = jnp.asarray(True)
-    return found._replace(settled=found.settled & sound & jnp.all(strip.body.r_0 > 0.0))
+    state = found.state
+    if scene.load.control == "displacement":
+        state = jax.vmap(exchanged)(state)
+    if soft:
+        state = state._replace(v=jax.vmap(springs.slip)(state.v, found.lift, state.force))
+    settled = found.settled & sound & jnp.all(strip.body.r_0 > 0.0)
+    return found._replace(state=state, settled=settled)
+
+
+def _spring_stiffness(scene: Scene, strip: Strip) -> Array:
+    """Stiffness (k,) of the elastic slip of each node, k_t times its contact length."""
+    alpha, shear = scene.contact.stick_stiffness, scene.strip.shear_modulus
+    return (alpha * shear / scene.strip.half_height * strip.body.tributary)[: strip.body.f_t.size]
 
 
 @eqx.filter_jit
-def _history(scene: Scene, strip: Strip, levels: Level, targets: Array, cycles: Cycles) -> History:
+def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bool) -> History:
     """History of the levels after the pressing, whose steps come first."""
     body, state = strip.body, levels.state
     before = scene.load.pressure_steps
-    part = jnp.append(jnp.arange(1, before + 1) / before, jnp.ones_like(targets))
+    part = jnp.append(jnp.arange(1, before + 1) / before, jnp.ones_like(state.force))
     n, k = strip.x.size, body.f_t.size
 
     def along(values: Array) -> Array:  # (levels, n or k) to (steps, n) from the far end
@@ -106,6 +123,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, targets: Array, cycles: 
         return jnp.pad(values, (before, 0))
 
     settled = jnp.pad(strip.settled[::-1], (n - k, 0))
+    driven = state.displacement if scene.load.control == "displacement" else state.force
     slip, w, force = along(state.v), along(levels.lift), every(state.force)
     v = slip + part[:, None] * settled
     given = jnp.zeros((part.size, 2 * n + 2)).at[:, 0:-2:2].set(v).at[:, 1:-2:2].set(w)
@@ -118,6 +136,9 @@ def _history(scene: Scene, strip: Strip, levels: Level, targets: Array, cycles: 
     slipping = along(levels.slipping).astype(bool)
     forces = given @ strip.hessian  # conjugate to v, w, minus the end load and the pressure
     energy = 0.5 * jnp.sum(forces * given, axis=1) - forces[:, -2] * given[:, -2]
+    if soft:
+        springs = 0.5 * state.r_t**2 / _spring_stiffness(scene, strip)
+        energy = energy + every(jnp.sum(springs, axis=1))
     status = jnp.where(levels.settled, Status.CONVERGED, Status.MAX_ITERATIONS)
     sound = jnp.append(jnp.ones(before, bool), levels.settled)
 
@@ -146,7 +167,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, targets: Array, cycles: 
         error=jnp.zeros(part.size),
         status=jnp.append(jnp.full(before, Status.CONVERGED), status),
         cycles=cycles,
-        target=every(targets),
+        target=masked(every(driven)),
     )
 
 

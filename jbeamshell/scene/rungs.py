@@ -33,6 +33,7 @@ PLANE = {  # keys that the rung ``plane`` sets, with its number of nodes unless 
     "model.kinematics": "linear",
 }
 PLANE_NODES = 129
+PLANE_IDEAL = 1000.0  # contact.stick_stiffness from which on its friction is without elastic slip
 _NAME = re.compile(r"(?P<prefix>(masing-pull|masing|stepwise)-)?(?P<section>[a-z]+|p\d+)")
 
 

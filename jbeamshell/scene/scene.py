@@ -32,7 +32,7 @@ from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, pla
 from jbeamshell.scene.domain import support_rules
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
 from jbeamshell.scene.parts import SECTIONS, Contact, Load, Model, Strip
-from jbeamshell.scene.rungs import PLANE, spelled_out
+from jbeamshell.scene.rungs import PLANE, PLANE_IDEAL, spelled_out
 
 
 class Scene(eqx.Module):
@@ -183,12 +183,18 @@ class Scene(eqx.Module):
                 rule.demand()
 
     @property
+    def ideal_friction(self) -> bool:
+        """True if sliders are rigid until they slip; those of ``plane`` are if alpha is large."""
+        alpha = self.contact.stick_stiffness
+        known = self.model.solution == "plane" and not is_traced(alpha)
+        return known and float(alpha) >= PLANE_IDEAL
+
+    @property
     def slip_stiffness(self) -> Array:
-        """Elastic stiffness k_t = alpha G/H of the sliders, infinite for ``plane``."""
+        """Elastic stiffness k_t = alpha G/H of the sliders, traction per slip."""
         strip = self.strip
-        if self.model.solution == "plane":
-            return jnp.full_like(strip.length, jnp.inf)
-        return self.contact.stick_stiffness * strip.shear_modulus / strip.half_height
+        stiffness = self.contact.stick_stiffness * strip.shear_modulus / strip.half_height
+        return jnp.full_like(stiffness, jnp.inf) if self.ideal_friction else stiffness
 
     def get(self, key: str) -> Any:
         """Value of a dotted key, such as ``scene.get("strip.height_ratio")``."""

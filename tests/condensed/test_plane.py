@@ -285,3 +285,25 @@ class TestRung:
         assert np.all(table.status == 0)
         alone = plane(scene, **{"model.nodes": 33, "contact.friction": 0.5}).dissipation
         np.testing.assert_allclose(table["dissipation"][1], alone, rtol=1e-10)
+
+    def test_displacement_control_walks_the_loop_of_the_force_and_goes_beyond(self):
+        few = {"model.nodes": 33, "load.steps_per_half_cycle": 2}
+        force = plane(scene_of(0.1126), **few)
+        control = {"load.control": "displacement", "load.amplitude": force.displacement[1]}
+        driven = scene_of(0.1126).replace({"model.rung": "plane"} | few | control)
+        moved = jb.solve(driven, force.displacement[1:])
+        np.testing.assert_allclose(moved.force, force.force, atol=1e-9)
+        np.testing.assert_allclose(moved.target, moved.displacement, rtol=1e-12)
+        beyond = plane(scene_of(0.1126), **few, **control | {"load.amplitude": 1e-3})
+        np.testing.assert_allclose(beyond.force[1], 2.0, rtol=1e-9)  # mu F_N L
+
+    def test_soft_sliders_make_the_strip_softer_and_keep_its_energy(self):
+        few = {"model.nodes": 33, "load.steps_per_half_cycle": 8}
+        ideal, soft = (
+            plane(scene_of(0.1126), **few, **{"contact.stick_stiffness": alpha})
+            for alpha in (1e3, 0.3)
+        )
+        assert float(soft.secant_stiffness) < 0.95 * float(ideal.secant_stiffness)
+        for history in (ideal, soft):
+            imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
+            assert imbalance < 0.05  # trapezoids of the work over 8 steps a branch
