@@ -49,6 +49,13 @@ def add_to(commands: Any) -> None:
         metavar="N",
         help="duration, in periods of the stuck strip (default 20)",
     )
+    parser.add_argument(
+        "--strip",
+        choices=("auto", "whole", "sliders"),
+        default="auto",
+        help="follow the whole strip in time steps, or plane elasticity's sliders without inertia, "
+        "exact in time; auto takes the sliders where inertia matters little (default)",
+    )
     add_settings(parser)
     add_folder(parser)
     add_json(parser)
@@ -60,10 +67,12 @@ def run(options: argparse.Namespace) -> int:
     from jbeamshell.common import files
     from jbeamshell.dynamics.let_go import let_go
     from jbeamshell.dynamics.strip.inertia import Inertia
-    from jbeamshell.plotting.folder import check_folder
 
-    scene = scene_of(options)
-    folder = None if options.out is None else check_folder(options.out)
+    scene, folder = scene_of(options), None
+    if options.out is not None:
+        from jbeamshell.plotting.folder import check_folder
+
+        folder = check_folder(options.out)
     say("compiling ...")
     study = let_go(
         scene,
@@ -71,7 +80,13 @@ def run(options: argparse.Namespace) -> int:
         payload=options.payload,
         inertia=Inertia(options.density),
         cycles=options.cycles,
+        whole={"auto": None, "whole": True, "sliders": False}[options.strip],
     )
+    if study.light:
+        say(
+            "the strip is plane elasticity's network of sliders: its own mass, which adds "
+            f"{study.share:.2g} of the payload, is left out (--strip whole follows it)"
+        )
     figures = study.figures()
     put(files.as_json(figures) if options.json else f"{_table(figures)}\n")
     if folder is not None:

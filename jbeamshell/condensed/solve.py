@@ -14,7 +14,7 @@ from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import driven_by_displacement, exchanged, with_springs
 from jbeamshell.condensed.events import Level
 from jbeamshell.condensed.levels import levels, nested_levels
-from jbeamshell.condensed.strip import Strip, condensed
+from jbeamshell.condensed.strip import Strip, condensed, spring_stiffness
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.numerics.cycles import turning_points
@@ -85,7 +85,7 @@ def _levels(
     """Levels after the pressing, unsettled where the pressures leave nodes open."""
     body, friction = strip.body, scene.contact.friction
     if soft:
-        body, springs = with_springs(body, _spring_stiffness(scene, strip))
+        body, springs = with_springs(body, spring_stiffness(scene, strip))
     if scene.load.control == "displacement":
         body = driven_by_displacement(body)
     if nested or not turns:
@@ -100,12 +100,6 @@ def _levels(
         state = state._replace(v=jax.vmap(springs.slip)(state.v, found.lift, state.force))
     settled = found.settled & sound & jnp.all(strip.body.r_0 > 0.0)
     return found._replace(state=state, settled=settled)
-
-
-def _spring_stiffness(scene: Scene, strip: Strip) -> Array:
-    """Stiffness (k,) of the elastic slip of each node, k_t times its contact length."""
-    alpha, shear = scene.contact.stick_stiffness, scene.strip.shear_modulus
-    return (alpha * shear / scene.strip.half_height * strip.body.tributary)[: strip.body.f_t.size]
 
 
 @eqx.filter_jit
@@ -137,7 +131,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     forces = given @ strip.hessian  # conjugate to v, w, minus the end load and the pressure
     energy = 0.5 * jnp.sum(forces * given, axis=1) - forces[:, -2] * given[:, -2]
     if soft:
-        springs = 0.5 * state.r_t**2 / _spring_stiffness(scene, strip)
+        springs = 0.5 * state.r_t**2 / spring_stiffness(scene, strip)
         energy = energy + every(jnp.sum(springs, axis=1))
     status = jnp.where(levels.settled, Status.CONVERGED, Status.MAX_ITERATIONS)
     sound = jnp.append(jnp.ones(before, bool), levels.settled)

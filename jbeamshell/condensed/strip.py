@@ -80,6 +80,27 @@ def plane_stations(scene: Scene, nodes: int) -> Array:
     return elements.vertices(nodes - 1, length, half_height, *grading)
 
 
+def spring_stiffness(scene: Scene, strip: Strip) -> Array:
+    """Stiffness (k,) of the elastic slip of each node, k_t times its contact length."""
+    alpha, shear = scene.contact.stick_stiffness, scene.strip.shear_modulus
+    return (alpha * shear / scene.strip.half_height * strip.body.tributary)[: strip.body.f_t.size]
+
+
+def moving_volume(scene: Scene, strip: Strip) -> Array:
+    """Integral of |u|^2/u(L)^2 over each layer, (layers,), under an end load, all nodes stuck."""
+    n = strip.x.size
+    given = jnp.zeros((2 * n + 2, 1)).at[-2, 0].set(1.0 / strip.body.c)
+    fields = jnp.pad(strip.elimination.recovered(given)[..., 0], ((0, 0), (2, 0)))
+    layers = scene.strip.layers
+    thickness = jnp.reshape(2.0 * scene.strip.half_height, 1) if layers is None else layers[:, 0]
+
+    def one(layer: Array) -> Array:
+        squares = layered_form(Material(thickness, layer, 0.0 * layer, layer)).slopes
+        return jnp.einsum("i,ij,ik,jk", strip.tributary, fields, fields, squares)
+
+    return jnp.stack([one(layer) for layer in jnp.eye(thickness.size)])
+
+
 def plane_form(scene: Scene) -> SectionForm:
     """Section of plane elasticity, homogeneous or layered."""
     strip = scene.strip

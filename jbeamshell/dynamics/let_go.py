@@ -1,12 +1,27 @@
-"""Ring-down of a mass on a strip, pulled and let go, beside its quasi-static prediction."""
+"""Ring-down of a mass on a strip, pulled and let go, beside what its steady cycles predict.
+
+The mass m feels the strip as a spring of compliance c, whose own mass moves with the end in part:
+m_1, the integral of rho |u|^2/u(L)^2 over the stuck strip under an end load.  Rayleigh's quotient
+with this shape gives (omega/omega_1)^2 = m_1/m, where omega = 1/sqrt(m c) and
+omega_1 = 1/sqrt(m_1 c) are the lowest frequencies of the mass on the strip and of the strip alone.
+Where this ratio is small, the strip is its network of sliders (`jbeamshell.condensed.network`)
+under the mass.  Compared with the motion of whole strips, eta .1126 and .3, pulled with .25 and .8
+of gross slip, frequencies without the strip's inertia are too high by m_1/2m and damping ratios by
+2 m_1/m, and by up to 10 m_1/m in the first swings from .8 of gross slip.
+"""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
+from jax import Array, lax
 
-from jbeamshell.common.checks import POSITIVE, require_number
+from jbeamshell.common.checks import POSITIVE, require, require_number
+from jbeamshell.common.errors import InputError
+from jbeamshell.condensed.network import Network
+from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.ringdown import RingDown, ring_down
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
 from jbeamshell.dynamics.strip.excitation import Recorded
@@ -14,11 +29,14 @@ from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.modes import first_period
 from jbeamshell.dynamics.strip.motion import Motion
 from jbeamshell.dynamics.strip.simulate import simulate
-from jbeamshell.dynamics.structure.joint import Joint
-from jbeamshell.dynamics.structure.matrices import Attachment, Structure
-from jbeamshell.dynamics.structure.modal import ModalCurve, modal_curve
+from jbeamshell.dynamics.structure.joint import Joint, largest_force
+from jbeamshell.dynamics.structure.modal import ModalCurve
 from jbeamshell.scene.scene import Scene
 
+LIGHT = 0.005  # largest m_1/m at which the strip's inertia is left out by itself
+NO_NETWORK = "the rung plane does not cover this scene, so that it has no network: take True"
+NOT_NESTED = "slip zones are not nested, so that the strip is no network of sliders: take True"
+NO_INERTIA = "has no inertia here: take whole=False, a heavier payload, or another rung"
 HEAVY = 50.0  # default payload, over the mass of the strip
 RELEASE = 0.1  # duration of the release in periods, long enough to excite the strip's waves little
 SAMPLES_PER_CYCLE = 50
@@ -35,12 +53,20 @@ class RingDownStudy(NamedTuple):
     predicted : frequency and damping over amplitude, with the strip as a joint; its amplitudes are
         u(L) times the square root of the payload
     payload : mass per width
+    share : mass of the strip that moves with its stuck end, over the payload; None if the strip has
+        no network of sliders
     """
 
-    motion: Motion
+    motion: Motion | LightMotion
     found: RingDown
     predicted: ModalCurve
     payload: float
+    share: float | None
+
+    @property
+    def light(self) -> bool:
+        """True if the strip was its network of sliders, False if its inertia was followed."""
+        return isinstance(self.motion, LightMotion)
 
     @property
     def ratio(self) -> Any:
@@ -62,7 +88,12 @@ class RingDownStudy(NamedTuple):
             "predicted_damping": self._prediction(self.predicted.damping),
         }
         lists = {name: np.asarray(column).tolist() for name, column in columns.items()}
-        return self.motion.figures() | {"payload": self.payload} | lists
+        own = {
+            "payload": self.payload,
+            "strip": "network of sliders" if self.light else "whole",
+            "strip_mass_over_payload": self.share,
+        }
+        return self.motion.figures() | own | lists
 
 
 def let_go(
@@ -73,6 +104,7 @@ def let_go(
     inertia: Inertia | None = None,
     cycles: float = 20.0,
     per_cycle: int = 200,
+    whole: bool | None = None,
     progress: bool | None = None,
 ) -> RingDownStudy:
     """Pull a mass on a strip, let it go, and compare its ring-down with the prediction.
@@ -84,8 +116,12 @@ def let_go(
     payload : mass per width at the loaded end; None is `HEAVY` times the mass of the strip
     inertia : density and damping of the strip; None is density 1
     cycles : span of the transient, in periods of the stuck strip
-    per_cycle : number of time steps in a period
-    progress : show a progress bar; None shows it on a terminal only
+    per_cycle : number of time steps in a period, of the whole strip
+    whole : True to follow the whole strip in time steps; False to follow the network of sliders of
+        plane elasticity, exact in time, without the strip's inertia; None to take the network where
+        the strip's inertia matters little (`LIGHT`), it is not damped, its slip zones are nested,
+        and the scene is not a bar or a shell without squeeze strain
+    progress : show a progress bar of the time steps; None shows it on a terminal only
 
     Returns
     -------
@@ -94,7 +130,8 @@ def let_go(
     Raises
     ------
     InputError
-        for a force beyond gross slip, or a number that is not positive
+        for a force beyond gross slip, a number that is not positive, or a strip that has no network
+        where one is asked for
     InterruptedMotionError
         if the solver stops before the end; it carries the part that was computed
 
@@ -104,30 +141,100 @@ def let_go(
     >>> study.found.damping  # damping ratios at study.found.amplitude
     """
     inertia = inertia or Inertia()
-    end_force = float(scene.load.amplitude) if force is None else force
+    end_force = float(largest_force(scene, force))
     require_number("cycles", cycles, POSITIVE)
+    inertia.check(scene)
     strip = scene.strip
     strip_mass = float(2.0 * strip.half_height * strip.length * inertia.mean_density(scene))
     mass = HEAVY * strip_mass if payload is None else payload
     require_number("payload", mass)
+    samples = round(cycles * SAMPLES_PER_CYCLE) + 1
+    plane = None if whole else as_plane(scene)
+    require("whole", whole, plane is not None or whole is not False, NO_NETWORK)
+    motion: LightMotion | Motion | None = None
+    share, nested = None, False
+    if plane is not None and (whole is False or not inertia.damped):
+        joint = Joint.of(plane, end_force)
+        if joint.network is not None:
+            share = _share(joint.network, inertia, mass)
+            if whole is False or share <= LIGHT:
+                motion = ring(plane, joint.network, mass, end_force, cycles, samples)
+                nested = bool(motion.nested)
+    if motion is None or not nested:
+        require("whole", whole, whole is not False, NOT_NESTED)
+        rung = scene.model.solution
+        require("model.rung", rung, rung != "plane", NO_INERTIA)
+        joint = Joint.of(scene, end_force)
+        motion = _whole(scene, end_force, mass, inertia, cycles, per_cycle, samples, progress)
+    found = ring_down(motion.time, motion.displacement)
+    smallest = 0.5 * float(found.amplitude.min())
+    return RingDownStudy(motion, found, _prediction(joint, mass, smallest), mass, share)
+
+
+def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
+    """Frequency and damping of the mass on steady cycles, from a displacement to the largest."""
+    if joint.network is None:
+        reach = np.geomspace(smallest, float(joint.displacement[-1]), AMPLITUDES)
+        force, loss = np.asarray(joint.backbone(reach)), np.asarray(joint.dissipation(reach))
+    else:
+        low = np.interp(smallest, np.asarray(joint.displacement), np.asarray(joint.force))
+        force = np.geomspace(low, float(joint.force[-1]), AMPLITUDES)
+        reach, loss = jax.device_get(_cycles(joint.network, force))
+        nested = np.isfinite(loss)
+        force, reach, loss = force[nested], reach[nested], loss[nested]
+    return ModalCurve(
+        amplitude=reach * np.sqrt(mass),
+        frequency=np.sqrt(force / (mass * reach)),
+        damping=loss / (2.0 * np.pi * force * reach),
+        dissipation=loss,
+        joints=reach[:, None],
+    )
+
+
+@jax.jit
+def _cycles(network: Network, forces: Array) -> tuple[Array, Array]:
+    """Displacements and work of steady cycles at the amplitudes (k,) of the force."""
+    return lax.map(network.cycle, forces)
+
+
+def as_plane(scene: Scene) -> Scene | None:
+    """Scene as plane elasticity; None if it cannot be, or is a bar or shell by its fields."""
+    if scene.model.solution == "plane":
+        return scene
+    if scene.model.order == 0 and "psi" not in scene.model.fields:
+        return None
+    try:
+        return scene.replace({"model.rung": "plane"})
+    except InputError:
+        return None
+
+
+def _share(network: Network, inertia: Inertia, mass: float) -> float:
+    """Mass of the strip that moves with the stuck end, over the payload."""
+    return float(np.sum(np.asarray(inertia.density) * np.asarray(network.volume))) / mass
+
+
+def _whole(
+    scene: Scene,
+    force: float,
+    mass: float,
+    inertia: Inertia,
+    cycles: float,
+    per_cycle: int,
+    samples: int,
+    progress: bool | None,
+) -> Motion:
+    """Motion of the whole strip, whose end force falls to zero within `RELEASE` periods."""
     attached = AttachedMasses(payload=mass)
-    joint = Joint.of(scene, end_force)
     period = first_period(scene, inertia, attached)
-    motion = simulate(
+    return simulate(
         scene,
         cycles * period,
-        Recorded([0.0, RELEASE * period], [end_force, 0.0]),
+        Recorded([0.0, RELEASE * period], [force, 0.0]),
         inertia=inertia,
         attached=attached,
-        released=end_force,
-        samples=round(cycles * SAMPLES_PER_CYCLE) + 1,
+        released=force,
+        samples=samples,
         step=period / per_cycle,
         progress=progress,
     )
-    found = ring_down(motion.time, motion.displacement)
-    structure = Structure([[mass]], [[0.0]], [Attachment(joint, 0)])
-    levels = np.geomspace(
-        0.5 * found.amplitude.min(), 1.02 * float(joint.displacement[-1]), AMPLITUDES
-    )
-    predicted = modal_curve(structure, levels * np.sqrt(mass))
-    return RingDownStudy(motion, found, predicted, mass)

@@ -8,14 +8,18 @@ import pytest
 from jbeamshell.cli import main
 
 COARSE = ["--set", "model.nodes=11", "--set", "model.kinematics=linear", "--cycles", "8"]
+WHOLE = [*COARSE, "--strip", "whole"]
+PLANE = ["--set", "model.rung=plane", "--set", "model.nodes=33", "--cycles", "8"]
 
 
-def test_it_reports_and_writes_what_it_says(capsys, tmp_path):
+@pytest.mark.parametrize("words", [WHOLE, PLANE], ids=["whole", "sliders"])
+def test_it_reports_and_writes_what_it_says(capsys, tmp_path, words):
     folder = tmp_path / "out"
-    code = main.main(["ringdown", *COARSE, "--json", "--out", str(folder), "--force", "1.2"])
+    code = main.main(["ringdown", *words, "--json", "--out", str(folder), "--force", "1.2"])
     out, err = capsys.readouterr()
     assert code == 0
     figures = json.loads(out)
+    assert figures["strip"] == ("network of sliders" if words is PLANE else "whole")
     assert figures["status"] == "complete"
     assert len(figures["amplitude"]) == len(figures["predicted_damping"]) > 8
     assert figures["frequency"][-1] == pytest.approx(figures["predicted_frequency"][-1], rel=0.02)
@@ -34,7 +38,8 @@ def test_it_reports_and_writes_what_it_says(capsys, tmp_path):
         (["--force", "5"], "gross slip"),
         (["--payload", "0"], "payload = 0.0"),
         (["--cycles", "0"], "cycles = 0.0"),
-        (["--set", "model.fields=v,w,beta,psi"], "compliant"),
+        (["--strip", "whole", "--set", "model.fields=v,w,beta,psi"], "compliant"),
+        (["--strip", "sliders", "--set", "contact.smoothing=8"], "no network"),
     ],
 )
 def test_bad_input_is_one_line(capsys, tmp_path, words, complaint):

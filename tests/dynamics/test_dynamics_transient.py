@@ -34,7 +34,7 @@ def left_over(motion):
 @pytest.fixture(scope="module")
 def study():
     fine = {"model__nodes": 41, "model__end_size": 0.0278}
-    return let_go(scene(**fine), 1.0, cycles=20.0, per_cycle=400)
+    return let_go(scene(**fine), 1.0, cycles=20.0, per_cycle=400, whole=True)
 
 
 class TestRingDown:

@@ -1,5 +1,6 @@
 """Structures with joints: Iwan's network, modes over amplitude, transients."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -16,6 +17,9 @@ JOINT = Joint(U, np.tanh(U))
 # The cubic law: F = sqrt(2 u), D = (2/3) F^3 for unit stiffness and friction.
 FINE = np.linspace(0.0, 1.0, 401)[1:] ** 2 / 2.0
 BAR = Joint(FINE, np.sqrt(2.0 * FINE))
+
+PLANE = jb.Scene().replace({"model.rung": "plane", "model.nodes": 33})
+LOADS = [0.5, 1.0, 0.6, -0.2, -0.6, -0.2, 0.2, -0.3, -0.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.1]
 
 
 def chain(count=2, joint=JOINT, sparse=False):
@@ -51,10 +55,51 @@ class TestJoint:
             float(JOINT.stiffness), rel=1e-6
         )
 
+    def test_a_strips_loops_are_its_own(self):
+        """The path of the displacement gives back any path of nested reversals of the force."""
+        joint = Joint.of(PLANE, 1.2, width=3.0)
+        history = jb.solve(PLANE, LOADS)
+        u = np.asarray(history.displacement - history.displacement[history.pressed])[-len(LOADS) :]
+        np.testing.assert_allclose(joint.path_forces(u), 3.0 * np.array(LOADS), atol=1e-9)
+
+    def test_a_strips_points_are_the_means_of_pull_and_push(self):
+        joint = Joint.of(PLANE, 1.2, width=3.0)
+        assert float(joint.force[-1]) == pytest.approx(3.6)
+        rest = joint.network.rest
+        pull, push = (joint.network.sliders(rest, jnp.asarray(way)) for way in (1.0, -1.0))
+        force = joint.force / 3.0
+        mean = 0.5 * (pull.displacement_after(force) + push.displacement_after(force))
+        np.testing.assert_allclose(joint.displacement, mean, rtol=1e-12)
+        np.testing.assert_allclose(joint.stiffness * joint.network.body.c, 3.0, rtol=1e-6)
+
+    def test_its_dissipation_has_derivatives_to_the_scene(self):
+        keys = ("contact.friction", "strip.height_ratio")
+
+        @jax.jit
+        def loss(values):
+            scene = PLANE.replace(dict(zip(keys, values, strict=True)))
+            return 1e5 * Joint.of(scene, 1.2).dissipation(1.5e-5)
+
+        at, way = jnp.array([0.1, 0.1126]), jnp.array([0.02, 0.01])
+        value, slope = loss(at), jax.jit(jax.grad(loss))(at) @ way
+        plain = Joint.of(PLANE, 1.2).dissipation(1.5e-5)
+        assert float(value) == pytest.approx(1e5 * float(plain), rel=1e-10)
+        steps = 0.02 * 0.5 ** np.arange(4)
+        left = [abs(float(loss(at + h * way) - value - h * slope)) for h in steps]
+        assert np.allclose(np.diff(np.log2(left)), -2.0, atol=0.1)
+
+    def test_a_bar_keeps_its_walked_backbone(self):
+        bar = jb.Scene().replace({"model.rung": "stepwise-bar", "model.nodes": 101})
+        joint = Joint.of(bar, 1.2)
+        assert joint.network is None
+        u = 0.5 * float(joint.displacement[-1])
+        force = float(joint.backbone(u))
+        assert float(joint.dissipation(u)) == pytest.approx(2.0 / 3.0 * force**3 / 3.4e4, rel=0.01)
+
     @pytest.mark.slow
     def test_a_strip_gives_its_mean_backbone(self):
         strip = jb.Scene().replace({"model.kinematics": "linear", "model.nodes": 21})
-        joint = Joint.of(strip, 1.0, points=24, width=2.0)
+        joint = Joint.of(strip, 1.0, width=2.0)
         loop = jb.solve(strip.replace({"load.amplitude": 1.0}))
         u = float(loop.peak_displacement)
         assert float(joint.force[-1]) == 2.0
@@ -164,6 +209,23 @@ REFUSED = {
     "to itself": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 0, 0)]), "attachm"),
     "stiffening": (lambda: Joint([1.0, 2.0], [1.0, 3.0]), "softening"),
     "falling": (lambda: Joint([2.0, 1.0], [1.0, 3.0]), "rising"),
+    "beyond gross slip": (lambda: Joint.of(PLANE, 2.5), "force = 2.5.*gross slip"),
+    "no force": (
+        lambda: Joint.of(PLANE.replace({"load.control": "displacement", "load.amplitude": 1e-5})),
+        "load.amplitude.*force",
+    ),
+    "traced bar": (
+        lambda: jax.jit(
+            lambda mu: Joint.of(
+                jb.Scene().replace({"model.rung": "bar", "contact.friction": mu}), 0.1
+            )
+        )(0.2),
+        "scene = 'traced'.*plane",
+    ),
+    "path beyond gross slip": (
+        lambda: Joint.of(PLANE, 1.0).path_forces([1e-2]),
+        "path.*gross slip",
+    ),
     "amplitudes": (lambda: modal_curve(chain(), [0.2, 0.1]), "amplitudes"),
     "still": (lambda: dynamics.shake(chain(), 1.0), "nothing happens"),
     "start": (lambda: dynamics.shake(chain(), 1.0, velocity=[1.0]), "velocity"),

@@ -6,7 +6,6 @@ import enum
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
@@ -25,53 +24,29 @@ class Ending(enum.IntEnum):
     GAVE_UP = 2
 
 
-class Motion(eqx.Module):
-    """Result of a transient at T evenly spaced times; times that were not reached hold NaN.
-
-    Energies and work are per width, in the frame of the foundation.
+class Ledger(eqx.Module):
+    """Motion of a loaded end at T evenly spaced times, with its energies and work per width.
 
     Attributes
     ----------
-    scene, inertia, attached, excitation : input of `jbeamshell.dynamics.simulate`
-    x, tributary : (n,) node positions and tributary lengths
     time : (T,) times
-    fields, rates : (T, n, m) nodal fields v, w, beta, psi (and those of a section of order p), and
-        their rates
-    traction, reaction : (T, n) friction traction and normal reaction
     displacement, velocity : (T,) u(L), counted from the pressed strip, and its rate
-    chain : (T, k) displacements of the chain's masses
     force : (T,) F at the loaded end
     kinetic : (T,) kinetic energy
     stored : (T,) potential energy of the strip, the contact, the pressures and the chain
     external_work : (T,) work done by forces and by the foundation since t = 0
     friction_work, damping_work : (T,) work lost by friction and by damping since t = 0
-    steps, rejected : number of time steps, and of those that were rejected
-    status : code of `Ending`
     """
 
-    scene: Scene
-    inertia: Inertia
-    attached: AttachedMasses
-    excitation: Excitation
-    x: Array
-    tributary: Array
     time: Array
-    fields: Array
-    rates: Array
-    traction: Array
-    reaction: Array
     displacement: Array
     velocity: Array
-    chain: Array
     force: Array
     kinetic: Array
     stored: Array
     external_work: Array
     friction_work: Array
     damping_work: Array
-    steps: Array
-    rejected: Array
-    status: Array
 
     @property
     def reached(self) -> float:
@@ -90,11 +65,6 @@ class Motion(eqx.Module):
         change = self.energy - self.energy[0]
         return change - self.external_work + self.friction_work + self.damping_work
 
-    @property
-    def complete(self) -> bool:
-        """True if the whole span was computed."""
-        return int(self.status) == Ending.COMPLETE
-
     def plot(self, axes: Any = None) -> Any:
         """Draw u(L) over time; see `jbeamshell.plotting.vibration`."""
         from jbeamshell import plotting
@@ -107,20 +77,63 @@ class Motion(eqx.Module):
         last = int(np.flatnonzero(known)[-1])
         return {
             "reached": self.reached,
-            "steps": int(self.steps),
-            "rejected_steps": int(self.rejected),
             "largest_displacement": float(np.max(np.abs(np.asarray(self.displacement)[known]))),
             "largest_kinetic_energy": float(np.max(np.abs(np.asarray(self.kinetic)[known]))),
             "external_work": float(self.external_work[last]),
             "friction_work": float(self.friction_work[last]),
             "damping_work": float(self.damping_work[last]),
-            "energy_imbalance": float(jnp.max(jnp.abs(self.imbalance[: last + 1]))),
-            "status": Ending(int(self.status)).name.lower(),
+            "energy_imbalance": float(np.max(np.abs(np.asarray(self.imbalance)[: last + 1]))),
         }
 
     def __str__(self) -> str:
         """Summary, one quantity a line."""
         return "\n".join(f"{name:24s} {value}" for name, value in self.figures().items())
+
+
+class Motion(Ledger):
+    """Result of a transient at T evenly spaced times; times that were not reached hold NaN.
+
+    Energies are in the frame of the foundation.
+
+    Attributes
+    ----------
+    scene, inertia, attached, excitation : input of `jbeamshell.dynamics.simulate`
+    x, tributary : (n,) node positions and tributary lengths
+    fields, rates : (T, n, m) nodal fields v, w, beta, psi (and those of a section of order p), and
+        their rates
+    traction, reaction : (T, n) friction traction and normal reaction
+    chain : (T, k) displacements of the chain's masses
+    steps, rejected : number of time steps, and of those that were rejected
+    status : code of `Ending`
+    """
+
+    scene: Scene
+    inertia: Inertia
+    attached: AttachedMasses
+    excitation: Excitation
+    x: Array
+    tributary: Array
+    fields: Array
+    rates: Array
+    traction: Array
+    reaction: Array
+    chain: Array
+    steps: Array
+    rejected: Array
+    status: Array
+
+    @property
+    def complete(self) -> bool:
+        """True if the whole span was computed."""
+        return int(self.status) == Ending.COMPLETE
+
+    def figures(self) -> dict[str, Any]:
+        """Summary by name, in numbers and words that JSON takes."""
+        return super().figures() | {
+            "steps": int(self.steps),
+            "rejected_steps": int(self.rejected),
+            "status": Ending(int(self.status)).name.lower(),
+        }
 
 
 class InterruptedMotionError(UnconvergedError):

@@ -3,28 +3,40 @@ r"""Joint as a force element: a network of Jenkins sliders with the backbone of 
 Parallel sliders have a backbone F(u) that is linear between points: where its slope falls by s at
 u, a spring of stiffness s starts to slip at the force s u; a spring with the last slope remains
 (Iwan 1966).  Their loops follow Masing's rule exactly: the branch from U is F(U) - 2 F((U-u)/2).
-A strip becomes one such element by the mean of its pull and its push.
+A strip becomes one such element by the mean of its pull and its push, whose sliders are the nodes
+of its contact; `jbeamshell.condensed.network` has both, and every branch between them, exactly.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import as_leaf, require, require_number
+from jbeamshell.common.checks import (
+    as_leaf,
+    is_traced,
+    require,
+    require_number,
+)
+from jbeamshell.condensed.network import Network, Response
 from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
 BACKBONE = "give as many displacements as forces, both rising from above zero, softening throughout"
-POINTS = 48
-SMALLEST_FORCE = 1e-2  # first point of a strip's backbone, over the largest force
+POINTS = 48  # of a backbone that is walked
+SMALLEST_FORCE = 1e-2  # its first point, over the largest force
 ANGLES = 512  # quadrature points of half a cycle, for the first harmonic
+BELOW = 1.0 - 1e-6  # thresholds nearer to the largest force are left out
+TRACED = "is differentiated on the rung plane only: take model.rung = plane, or give plain numbers"
 
 
 class Joint(eqx.Module):
@@ -33,6 +45,8 @@ class Joint(eqx.Module):
     Attributes
     ----------
     displacement, force : (k,) points of the backbone; the last slope continues beyond them
+    network : sliders of the strip behind it, per width; None for a backbone alone
+    width : of the strip
 
     Raises
     ------
@@ -48,12 +62,19 @@ class Joint(eqx.Module):
 
     displacement: Array
     force: Array
+    network: Network | None
+    width: Array
 
-    def __init__(self, displacement: Any, force: Any) -> None:
+    def __init__(
+        self, displacement: Any, force: Any, network: Network | None = None, width: Any = 1.0
+    ) -> None:
         self.displacement = as_leaf(displacement, "joint.displacement", BACKBONE)
         self.force = as_leaf(force, "joint.force", BACKBONE)
+        self.network, self.width = network, as_leaf(width, "joint.width")
 
     def __check_init__(self) -> None:
+        if is_traced(self.displacement, self.force):
+            return
         u, f = np.asarray(self.displacement), np.asarray(self.force)
         paired = u.ndim == 1 and u.shape == f.shape and u.size > 0
         require("joint.force", f.shape, paired, BACKBONE)
@@ -63,32 +84,43 @@ class Joint(eqx.Module):
         require("joint.force", f, rising and softening and slopes[0] > 0.0, BACKBONE)
 
     @classmethod
-    def of(cls, scene: Scene, force: float, *, points: int = POINTS, width: float = 1.0) -> Joint:
+    def of(cls, scene: Scene, force: Any = None, *, width: Any = 1.0) -> Joint:
         """Joint with the mean backbone of a strip's pull and push.
+
+        Scenes on the rung ``plane`` give the sliders of their contact where slip zones are nested;
+        the backbones of others are walked and fitted.
 
         Parameters
         ----------
-        scene : scene of the strip; its load is not used
-        force : largest end force per width, below gross slip
-        points : number of points of the backbone, evenly spaced in the logarithm of the force
+        scene : scene of the strip, whose load path is not used.  On the rung ``plane`` it may be
+            traced; slip zones that are not nested then give NaN
+        force : largest end force per width, below gross slip; None is ``scene.load.amplitude``
         width : width of the strip, by which forces are multiplied
 
         Raises
         ------
         InputError
-            for a force or a width that is not positive, or a force beyond gross slip
+            for a force or a width that is not positive, a force beyond gross slip, or traced
+            numbers in a scene whose backbone is walked
 
         Examples
         --------
         >>> joint = Joint.of(jb.Scene(), 1.2)
         >>> joint.dissipation(joint.displacement[-1])  # energy per cycle
         """
-        require_number("force", force)
+        force = largest_force(scene, force)
         require_number("width", width)
-        levels = np.geomspace(SMALLEST_FORCE * force, force, points)
-        pull, push = (np.asarray(solve(scene, sign * levels).displacement) for sign in (1.0, -1.0))
-        u = 0.5 * (pull - push)[-points:]
-        return cls(*_softening(u, width * levels))
+        if scene.model.solution == "plane":
+            soft = not scene.ideal_friction
+            network, u, f, count = _sliders(scene, as_leaf(force, "force"), soft)
+            if is_traced(u):
+                return cls(u, width * f, network, width)
+            if np.all(np.isfinite(u)):
+                kept = np.append(np.arange(u.size - 1) < count, True)
+                u, f = np.asarray(u)[kept], width * np.asarray(f)[kept]
+                return cls(u, f, network, width)
+        require("scene", "traced", not is_traced(scene, force), TRACED)
+        return cls(*_walked(scene, float(force), width), width=width)
 
     @property
     def springs(self) -> Array:
@@ -152,10 +184,21 @@ class Joint(eqx.Module):
         return elastic + 1j * self.dissipation(size) / (jnp.pi * size**2)
 
     def path_forces(self, path: ArrayLike) -> NDArray[np.float64]:
-        """Forces (T,) on a path (T,) of displacements, which starts with unloaded sliders."""
+        """Forces (T,) on a path (T,) of displacements, which starts with unloaded sliders.
+
+        A strip's are exact, pull and push apart, and not those of the mean backbone.
+
+        Raises
+        ------
+        InputError
+            for a path of a strip beyond gross slip, or on which its slip zones are not nested
+        """
+        points = np.atleast_1d(np.asarray(path, float))
+        if self.network is not None:
+            return np.asarray(self.width * _exact(self.network, points))
         springs, limits = np.asarray(self.springs), np.asarray(self.limits)
         sliders, last, forces = np.zeros(limits.size), 0.0, []
-        for u in np.atleast_1d(np.asarray(path, float)):
+        for u in points:
             sliders = np.clip(sliders + springs[:-1] * (u - last), -limits, limits)
             last = u
             forces.append(sliders.sum() + springs[-1] * u)
@@ -166,6 +209,70 @@ class Joint(eqx.Module):
         """Points of the backbone, with the origin."""
         zero = jnp.zeros(1)
         return jnp.append(zero, self.displacement), jnp.append(zero, self.force)
+
+
+def largest_force(scene: Scene, force: Any = None) -> Any:
+    """Force up to which a joint is wanted, checked; None is the scene's amplitude."""
+    if force is None:
+        control = scene.load.control
+        fix = "is no force: give force=, or take load.control = 'force'"
+        require("load.amplitude", scene.load.amplitude, control == "force", fix)
+        force = scene.load.amplitude
+    require_number("force", force)
+    if not is_traced(scene, force):
+        by_force = dataclasses.replace(scene.load, control="force")
+        gross_slip_rule(by_force, scene.number, force)._replace(key="force").demand()
+    return force
+
+
+@eqx.filter_jit
+def _sliders(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array, Array, Array]:
+    """Network, mean backbone (k + 1,) of pull and push, and its count of points below the force.
+
+    The points are the means of the thresholds, and the force; those beyond are laid evenly between
+    the last one below it and the force, where the backbone is straight.  The displacements are NaN
+    where the slip zones are not nested.
+    """
+    network = Network.of(scene, soft)
+    pull, push = (network.sliders(network.rest, jnp.asarray(sense)) for sense in (1.0, -1.0))
+    levels = 0.5 * (pull.force + push.force)[1:]
+    below = levels < BELOW * force
+    count, last = jnp.sum(below), jnp.max(jnp.where(below, levels, 0.0), initial=0.0)
+    number = jnp.arange(levels.size)
+    part = (number + 1 - count) / (levels.size + 1 - count)
+    levels = jnp.append(jnp.where(number < count, levels, last + (force - last) * part), force)
+    u = 0.5 * (pull.displacement_after(levels) + push.displacement_after(levels))
+    nested = [network.branch(network.rest, way * force)[2] for way in (1.0, -1.0)]
+    rising = jnp.all(jnp.diff(levels, prepend=0.0) > 0.0)
+    return network, jnp.where(nested[0] & nested[1] & rising, u, jnp.nan), levels, count
+
+
+def _exact(network: Network, path: NDArray[np.float64]) -> Array:
+    """Forces (T,) per width of a network on a path (T,) of displacements."""
+    found = _along(network, jnp.asarray(path))
+    reached, limit = jnp.max(jnp.abs(found.state.force), initial=0.0), network.gross_slip
+    fix = f"must stay below gross slip, mu F_N L = {float(limit):.6g} per width"
+    require("force on the path", float(reached), bool(reached < limit), fix)
+    first = int(np.argmin(found.valid))
+    nested = bool(np.all(np.asarray(found.valid)))
+    fix = "slip zones are not nested from here on: take jbeamshell.condensed.solve"
+    require(f"path[{first}]", path[first], nested, fix)
+    return found.state.force
+
+
+@jax.jit
+def _along(network: Network, path: Array) -> Response:
+    return network.along(path)
+
+
+def _walked(
+    scene: Scene, force: float, width: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Backbone of load steps under pull and push."""
+    levels = np.geomspace(SMALLEST_FORCE * force, force, POINTS)
+    pull, push = (np.asarray(solve(scene, sign * levels).displacement) for sign in (1.0, -1.0))
+    u = 0.5 * (pull - push)[-POINTS:]
+    return _softening(u, width * levels)
 
 
 def _softening(

@@ -1,0 +1,102 @@
+"""A mass on a strip without inertia: exact swings, energy, damping, and the choice of the model."""
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import dynamics
+from jbeamshell.dynamics.let_go import LIGHT, let_go
+from jbeamshell.dynamics.light_strip import LightMotion, ring
+
+SCENE = jb.Scene().replace({"model.rung": "plane", "model.nodes": 33})
+CYCLES = 20.0
+
+
+@pytest.fixture(scope="module")
+def joint():
+    return dynamics.Joint.of(SCENE, 1.0)
+
+
+def swinging(joint, pull, mass=20.0):
+    return ring(SCENE, joint.network, mass, pull, CYCLES, 2001)
+
+
+class TestSwings:
+    def test_a_stuck_mass_is_a_harmonic_oscillator(self, joint):
+        motion = swinging(joint, 1e-7)
+        time = np.asarray(motion.time)
+        exact = np.cos(2.0 * np.pi * CYCLES * time / time[-1])
+        size = motion.displacement[0]
+        np.testing.assert_allclose(motion.displacement, size * exact, atol=1e-9 * size)
+        assert np.all(np.abs(motion.friction_work) < 1e-12 * motion.stored[0])
+
+    @pytest.mark.parametrize("pull", [0.3, 1.0, -1.0])
+    def test_energy_balances_to_round_off(self, joint, pull):
+        """Kinetic energy comes from the corners, stored energy and work from the matrices."""
+        motion = swinging(joint, pull)
+        assert motion.nested
+        assert np.abs(motion.imbalance).max() < 1e-12 * motion.stored[0]
+        assert np.all(np.diff(motion.friction_work) > -1e-12 * motion.stored[0])
+        assert motion.velocity[0] == 0.0
+
+    def test_the_velocity_is_the_rate_of_the_displacement(self, joint):
+        motion, errors = swinging(joint, 1.0), []
+        for apart in (2, 1):
+            u, time, velocity = (
+                np.asarray(column)[::apart]
+                for column in (motion.displacement, motion.time, motion.velocity)
+            )
+            rate = np.gradient(u, time)[1:-1]
+            errors.append(np.sqrt(np.mean((rate - velocity[1:-1]) ** 2)))
+        assert errors[1] < 1e-3 * np.abs(velocity).max()
+        # The acceleration has kinks, so that differences lose a part of their second order.
+        assert errors[0] / errors[1] > 3.0
+
+    def test_the_mass_only_scales_time(self, joint):
+        light, heavy = (swinging(joint, 1.0, mass) for mass in (5.0, 500.0))
+        np.testing.assert_allclose(heavy.time, 10.0 * light.time)
+        np.testing.assert_allclose(heavy.displacement, light.displacement, atol=1e-16)
+
+
+class TestLetGo:
+    def test_a_heavy_mass_takes_the_network_by_itself(self):
+        study = let_go(SCENE, 1.0, cycles=CYCLES)
+        assert isinstance(study.motion, LightMotion)
+        assert study.light
+        assert study.share < LIGHT
+        assert study.figures()["strip"] == "network of sliders"
+        late = study.found.damping < 0.02
+        assert late.sum() > 15
+        # What larger swings leave behind in the contact changes the loops of smaller ones a little.
+        assert np.median(np.abs(study.ratio[late] - 1.0)) < 0.1
+
+    def test_a_light_mass_needs_the_strips_inertia(self):
+        with pytest.raises(jb.InputError, match=r"plane.*inertia"):
+            let_go(SCENE, 1.0, payload=1.0, cycles=CYCLES)
+        assert let_go(SCENE, 1.0, payload=1.0, cycles=CYCLES, whole=False).light
+
+    def test_a_strip_without_a_network_is_refused_where_one_is_asked_for(self):
+        smooth = jb.Scene().replace({"contact.smoothing": 8.0, "model.nodes": 11})
+        with pytest.raises(jb.InputError, match=r"whole = False.*has no network"):
+            let_go(smooth, 1.0, whole=False)
+
+    @pytest.mark.slow
+    def test_the_strips_inertia_lowers_frequency_and_damping_as_said(self):
+        fine = {"model.kinematics": "linear", "model.nodes": 41, "model.end_size": 0.0278}
+        strip = jb.Scene().replace(fine)
+        strip_mass = 2.0 * float(strip.strip.half_height * strip.strip.length)
+        curves = {}
+        for times in (1000.0, 10.0):
+            study = let_go(strip, 0.5, payload=times * strip_mass, whole=True)
+            curves[times] = study.found
+        heavy, light = curves[1000.0], curves[10.0]
+        rising = np.argsort(heavy.amplitude)
+        inside = light.amplitude < heavy.amplitude.max()
+        at = light.amplitude[inside]
+        share = let_go(strip, 0.5, payload=10.0 * strip_mass, whole=False).share
+        frequency = np.interp(at, heavy.amplitude[rising], heavy.frequency[rising]) * 10.0
+        damping = np.interp(at, heavy.amplitude[rising], heavy.damping[rising])
+        lower = np.median(light.frequency[inside] / frequency) - 1.0
+        assert lower == pytest.approx(-0.5 * share, rel=0.2)
+        less = np.median(light.damping[inside] / damping) - 1.0
+        assert less == pytest.approx(-2.0 * share, rel=0.4)
