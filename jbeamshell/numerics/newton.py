@@ -108,7 +108,7 @@ class Newton(eqx.Module):
         def iterate(_: Callable[[Array], Array], start: Array) -> tuple[Array, tuple]:
             end = search.run(start, stiffness)
             # The count is a float because custom_root has no tangent for integers.
-            return end.x, (end.tried.astype(end.x.dtype), jnp.max(jnp.abs(end.residual)))
+            return end.x, (end.tried.astype(end.x.dtype), _largest(end.residual))
 
         root, (count, error) = lax.custom_root(
             lambda x: problem.evaluate(x)[0],
@@ -127,7 +127,7 @@ class _Iterate(NamedTuple):
     ----------
     x, residual, tangent_input : unknowns, their residual and the input of the tangent there
     scale : part of the next Newton step that is taken
-    was_close : True if the iterate before was within the tolerance
+    was_close : True if a step was tried from an iterate within the tolerance
     tried : number of steps tried so far
     """
 
@@ -148,7 +148,7 @@ class _Search(NamedTuple):
     problem : residual and tangent
     tolerance : largest residual of a root
     enabled : False skips the iteration
-    once_more : True if the iterate before must be within the tolerance too
+    once_more : True if a further step must be tried from an iterate within the tolerance
     """
 
     settings: Newton
@@ -197,15 +197,22 @@ class _Search(NamedTuple):
         most = jnp.linalg.norm(at.residual) + rise
         smallest = at.scale <= 0.5**self.settings.max_halvings
         accepted = (jnp.linalg.norm(residual) <= most) | smallest
+        # A close iterate is left for a closer one only: at a kink, round-off throws a step far off.
         close, whole = self._close(at), jnp.ones_like(at.scale)
+        accepted = jnp.where(close, _largest(residual) <= _largest(at.residual), accepted)
         new = _Iterate(x, residual, tangent_input, whole, close, at.tried)
-        old = at._replace(scale=0.5 * at.scale)
+        old = at._replace(scale=0.5 * at.scale, was_close=close)
         kept: _Iterate = jax.tree.map(lambda a, b: jnp.where(accepted, a, b), new, old)
         return kept._replace(tried=at.tried + 1)
 
     def _close(self, at: _Iterate) -> Array:
-        return jnp.max(jnp.abs(at.residual)) <= self.tolerance
+        return _largest(at.residual) <= self.tolerance
 
     def _unfinished(self, at: _Iterate) -> Array:
         done = self._close(at) & at.was_close if self.once_more else self._close(at)
         return self.enabled & ~done & (at.tried < self.settings.max_iterations)
+
+
+def _largest(residual: Array) -> Array:
+    """Largest magnitude of a residual."""
+    return jnp.max(jnp.abs(residual))
