@@ -13,24 +13,35 @@ from jbeamshell.condensed.events import Level, walk
 
 
 def levels(
-    body: Body, friction: Array, start: ContactState, forces: Array, turns: tuple[bool, ...]
+    body: Body,
+    friction: Array,
+    start: ContactState,
+    forces: Array,
+    turns: tuple[bool, ...],
+    lift: Array | None = None,
 ) -> Level:
-    """Levels of a load path, stacked along the first axis.
+    """Levels of a load path, stacked along the first axis; everything but the turns may be traced.
+
+    Factors are taken where they hold along the whole path, and events elsewhere.  First derivatives
+    are exact, forward and reverse.  In a batch (`jax.vmap`) lanes whose factors hold take no step
+    of the loop over the events; to differentiate many lanes, `jax.lax.map` is faster.
 
     Parameters
     ----------
-    body : n contact nodes
+    body : n contact nodes, or one of `drives`
     friction : mu
-    start : contact without lift at the path's start
-    forces : (levels,) end loads
+    start : contact at the path's start
+    forces : (levels,) end loads, or what drives the body
     turns : True for each level before which the load has turned, the first one among them
+    lift : (n,) lift at the start; None is none
     """
     nested, valid = nested_levels(body, friction, start, forces, turns)
+    needed = ~valid if lift is None else ~valid | jnp.any(lift > 0.0)
 
     def by_events() -> Level:
-        return walk(body, friction, start, forces, jnp.asarray(turns))
+        return walk(body, friction, start, forces, jnp.asarray(turns), lift, needed)
 
-    return lax.cond(valid, lambda: nested, by_events)
+    return lax.cond(needed, by_events, lambda: nested)
 
 
 def nested_levels(

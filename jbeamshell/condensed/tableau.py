@@ -1,0 +1,161 @@
+"""Tableau of a contact between two events, and its change at an event.
+
+Between two events all changes are linear in the load.  A tableau holds what answers, row by row,
+
+    answer = value + rate tau + sum over what is held (matrix . held),
+
+with tau the load since the last reversal.  A node that sticks holds its slip and answers with its
+tangential force r_t; one that slips holds r_t + sigma mu r_n at zero and answers with its slip.  A
+closed node holds its lift and answers with its reaction r_n; an open one the reverse.  At an event
+one row and one column are exchanged (a principal pivot, as in parametric complementarity: Cottle,
+Pang & Stone 1992, chapter 4), so that an event costs a product of two vectors.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array, lax
+
+from jbeamshell.condensed.branches import ContactState
+
+ALONG, AGAINST, STICK, OPEN, CLOSE = range(5)  # kinds of events
+
+
+class System(NamedTuple):
+    """Equations of a body with q = (v, w): r = reference + matrix q - pull F, u = c F + pull.q.
+
+    Attributes
+    ----------
+    matrix : (k + n, k + n) stiffness
+    pull : (k + n,) part of the load that each clamped contact field carries
+    c : displacement per load with a clamped contact
+    friction : mu
+    reference : (k + n,) forces of the base at q = 0 without a load
+    """
+
+    matrix: Array
+    pull: Array
+    c: Array
+    friction: Array
+    reference: Array
+
+
+class Tableau(NamedTuple):
+    """Contact between two events; k nodes may slip, n may lift.
+
+    Rows and columns are the k tangential and the n normal ones.  The last row is the displacement
+    of the loaded end; the last two columns are the value at tau = 0 and the rate.
+
+    Attributes
+    ----------
+    rows : (k + n + 1, k + n + 2)
+    sigma : (k,) 1 and -1 for nodes that slip along and against v, 0 for those that stick
+    opened : (n,) True for open nodes
+    held : (k,) slip at which sticking nodes are held, since the reversal
+    tau : load since the reversal, positive
+    work : work of friction since the reversal
+    events : count since the reversal
+    """
+
+    rows: Array
+    sigma: Array
+    opened: Array
+    held: Array
+    tau: Array
+    work: Array
+    events: Array
+
+    @property
+    def rate(self) -> Array:
+        """Rates of all answers over tau."""
+        return self.rows[:, -1]
+
+    def at(self, tau: Array) -> Array:
+        """All answers at a tau of this stretch."""
+        return self.rows[:, -2] + self.rows[:, -1] * tau
+
+    def fields(self, tau: Array, origin: Array) -> tuple[Array, Array]:
+        """Fields q = (v, w) and reactions r_n at a tau; ``origin`` is v at the reversal."""
+        k, n = self.sigma.size, self.opened.size
+        answer = self.at(tau)
+        slip = jnp.where(self.sigma == 0.0, self.held, answer[:k])
+        normal = answer[k : k + n]
+        lift = jnp.where(self.opened, normal, 0.0)
+        return jnp.concatenate([origin + slip, lift]), jnp.where(self.opened, 0.0, normal)
+
+
+def empty(k: int, n: int) -> Tableau:
+    """Tableau of no contact, to be filled at the first reversal."""
+    zero = jnp.zeros(())
+    return Tableau(
+        rows=jnp.zeros((k + n + 1, k + n + 2)),
+        sigma=jnp.zeros(k),
+        opened=jnp.zeros(n, bool),
+        held=jnp.zeros(k),
+        tau=zero,
+        work=zero,
+        events=jnp.asarray(0),
+    )
+
+
+def reversed_at(system: System, state: ContactState, lift: Array, sense: Array) -> Tableau:
+    """Tableau at a reversal: all closed nodes stick, open ones stay open."""
+    k, n = state.v.size, lift.size
+    value = jnp.concatenate([state.r_t, state.r_n, state.displacement[None]])
+    rate = sense * jnp.append(-system.pull, system.c)
+    rows = jnp.concatenate([system.matrix, system.pull[None]])
+    rows = jnp.concatenate([rows, value[:, None], rate[:, None]], axis=1)
+    start = empty(k, n)._replace(rows=rows)
+    wanted = lift > 0.0
+
+    def open_next(at: Tableau) -> Tableau:
+        i = jnp.argmax(wanted & ~at.opened)
+        at = lax.cond(i < k, lambda: changed(at, ALONG, i, system.friction), lambda: at)
+        return changed(at, OPEN, i, system.friction)
+
+    found = lax.while_loop(lambda at: jnp.any(wanted & ~at.opened), open_next, start)
+    rows = found.rows.at[k : k + n, -2].add(jnp.where(wanted, lift, 0.0))
+    return found._replace(rows=rows, events=jnp.asarray(0))
+
+
+def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tableau:
+    """Tableau after an event of a kind at a node."""
+    kind = jnp.asarray(kind)
+    k = at.sigma.size
+    tangential, normal = jnp.minimum(node, k - 1), k + node
+    slips, sticks = kind < STICK, kind == STICK
+    i = jnp.where(kind < OPEN, tangential, normal)
+    # A slipping node holds r_t + sigma mu r_n: before it slips its row becomes that sum, and after
+    # it sticks again the sum is taken apart.  Slip is counted from where the node was held.
+    sigma = jnp.where(kind == ALONG, 1.0, -1.0)
+    slip = at.rows[tangential, -2] + at.rows[tangential, -1] * at.tau
+    held = at.held[tangential]
+    row = at.rows[i] + jnp.where(slips, sigma * friction, 0.0) * at.rows[normal]
+    row = row.at[-2].add(jnp.where(sticks, -slip, 0.0))
+    rest = jnp.where(sticks, -at.sigma[tangential] * friction, 0.0)
+    rows = _exchanged(at.rows, i, row, rest, normal)
+    now = jnp.where(slips, sigma, jnp.where(sticks, 0.0, at.sigma[tangential]))
+    opened = jnp.where(kind < OPEN, at.opened[node], kind == OPEN)
+    return at._replace(
+        rows=rows.at[tangential, -2].add(jnp.where(slips, held, 0.0)),
+        sigma=at.sigma.at[tangential].set(now),
+        opened=at.opened.at[node].set(opened),
+        held=at.held.at[tangential].set(jnp.where(sticks, slip, jnp.where(slips, 0.0, held))),
+        events=at.events + 1,
+    )
+
+
+def _exchanged(rows: Array, i: Array, row: Array, rest: Array, other: Array) -> Array:
+    """Rows with row and column ``i`` exchanged.
+
+    ``row`` stands for row ``i``, and ``rest`` times the new row ``other`` is added to the new one.
+    """
+    pivot = row[i]
+    share = rows[:, i] / pivot
+    beside = (rows[other] - share[other] * row).at[i].set(share[other])
+    new = (-row / pivot).at[i].set(1.0 / pivot) + rest * beside
+    numbers = jnp.arange(rows.shape[1])
+    swept = jnp.where(numbers == i, share[:, None], rows - share[:, None] * row)
+    return jnp.where(numbers[: rows.shape[0], None] == i, new, swept)

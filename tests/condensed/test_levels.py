@@ -1,0 +1,98 @@
+"""Levels of load paths: factors or events by themselves, in batches, and their slopes."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.condensed import branches, events, levels, strip
+
+NODES = 21
+TURNS = jnp.asarray([1.0, 0.3, -1.0, -0.2, 1.0])
+TURNED = (True, True, False, True, False)  # -1 and the last 1 go on
+STRIP = jax.jit(lambda scene: strip.condensed(scene, NODES).body)
+LAYERS = np.array([[0.1, 2e5, 0.3], [0.1252, 4e5, 0.2]])
+
+
+def strip_body(eta, nu=0.3):
+    return STRIP(jb.Scene().replace({"strip.height_ratio": eta, "strip.poisson_ratio": nu}))
+
+
+def laminate_body(soft=1.0):
+    return STRIP(jb.Scene().replace({"strip.layers": LAYERS * [[1.0, soft, 1.0], [1.0, 1.0, 1.0]]}))
+
+
+def path(body, friction, amplitude):
+    start = branches.pressed(body)
+    # Gross slip of the standard pressure is at 20 mu.
+    return levels.levels(body, friction, start, 20.0 * amplitude * TURNS, TURNED)
+
+
+def figures(body, friction, amplitude):
+    """Works, displacements, a lift and a slip, in like sizes."""
+    found = path(body, friction, amplitude)
+    state = found.state
+    many = [1e4 * found.slip_work, 1e3 * state.displacement, 1e4 * state.v[:, 1]]
+    return jnp.concatenate([*many, 1e4 * found.lift[:, 0]])
+
+
+VALUE = jax.jit(figures)
+FORWARD = jax.jit(lambda at, way: jax.jvp(figures, at, way))
+WORK = jax.jit(jax.grad(lambda *at: figures(*at)[4], argnums=(0, 1, 2)))
+CASES = {
+    "nested": (lambda: (strip_body(0.1), strip_body(0.11)), 0.1, 0.05),
+    "lifting": (lambda: (strip_body(0.3), strip_body(0.31, 0.28)), 0.3, 0.2),
+    "lifting far": (lambda: (strip_body(0.2), strip_body(0.21, 0.32)), 0.5, 0.3),
+    "steep": (lambda: (strip_body(0.4), strip_body(0.38, 0.31)), 0.8, 0.35),
+    "laminate": (lambda: (laminate_body(), laminate_body(1.05)), 0.4, 0.3),
+}
+
+
+class TestSlopes:
+    @pytest.mark.parametrize("case", CASES)
+    def test_taylor_slope_is_two_and_reverse_is_forward(self, case):
+        bodies, friction, amplitude = CASES[case]
+        body, other = bodies()
+        change = jax.tree.map(lambda a, b: b - a, body, other)
+        at = (body, jnp.asarray(friction), jnp.asarray(amplitude))
+        way = (change, jnp.asarray(0.1 * friction), jnp.asarray(0.05 * amplitude))
+        value, slope = FORWARD(at, way)
+        np.testing.assert_array_equal(value, VALUE(*at))
+
+        def left(h):
+            moved = VALUE(*jax.tree.map(lambda a, b: a + h * b, at, way))
+            return np.linalg.norm(moved - value - h * slope)
+
+        order = np.log2(left(2e-3) / left(1e-3))
+        assert order == pytest.approx(2.0, abs=0.15)
+        found = WORK(*at)
+        pairs = zip(jax.tree.leaves(found), jax.tree.leaves(way), strict=True)
+        back = sum(float(jnp.vdot(a, b)) for a, b in pairs)
+        assert back == pytest.approx(float(slope[4]), rel=1e-9)
+
+    def test_lift_and_sticking_again_are_among_the_cases(self):
+        body = strip_body(0.2)
+        found = jax.jit(path)(body, 0.5, 0.3)
+        assert np.any(found.lift > 0.0)
+        assert np.any(found.slipping[2] & ~found.slipping[3])
+
+
+class TestLevels:
+    def test_factors_and_events_tell_the_same(self):
+        body = strip_body(0.1)
+        start, forces = branches.pressed(body), 1.2 * TURNS
+        fast = jax.jit(levels.levels, static_argnums=4)(body, 0.1, start, forces, TURNED)
+        slow = jax.jit(events.walk)(body, 0.1, start, forces, jnp.asarray(TURNED))
+        np.testing.assert_allclose(fast.slip_work, slow.slip_work, rtol=1e-9)
+        np.testing.assert_allclose(fast.state.v, slow.state.v, atol=1e-12 * fast.state.v.max())
+        np.testing.assert_array_equal(fast.slipping, slow.slipping)
+
+    def test_a_batch_is_its_lanes(self):
+        frictions = jnp.asarray([0.05, 0.1, 0.5, 0.8])
+        bodies = [strip_body(eta) for eta in (0.1, 0.4, 0.1, 0.3)]
+        stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *bodies)
+        batch = jax.jit(jax.vmap(figures, in_axes=(0, 0, None)))(stacked, frictions, 0.05)
+        for i, body in enumerate(bodies):
+            one = VALUE(body, frictions[i], jnp.asarray(0.05))
+            np.testing.assert_allclose(batch[i], one, rtol=1e-9, atol=1e-12)
