@@ -7,6 +7,7 @@ time: load levels only say where it is looked at.  Derivatives of the levels are
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import equinox as eqx
@@ -111,7 +112,8 @@ def _walk_jvp(
     primals: tuple[PyTree, ...], tangents: tuple[PyTree, ...], *, turns: Array, needed: Array
 ) -> tuple[Level, Level]:
     changes = tuple(jax.tree.map(_full, *both) for both in zip(primals, tangents, strict=True))
-    return jax.jvp(lambda *given: _differentiable(*given, turns, needed), primals, changes)
+    path = functools.partial(_differentiable, turns=turns, needed=needed)
+    return jax.jvp(path, primals, changes)
 
 
 @jax.custom_batching.sequential_vmap
@@ -259,8 +261,11 @@ def _next_level_jvp(
         at=at,
         trace=trace,
     )
-    nothing = jax.tree.map(lambda _: None, at)
-    return (at, level), (nothing, Level(found.state, found.lift, found.work, None, None))
+    nothing, change_of_level = jax.tree.map(lambda _: None, (at, level))
+    change_of_level = change_of_level._replace(
+        state=found.state, lift=found.lift, slip_work=found.work
+    )
+    return (at, level), (nothing, change_of_level)
 
 
 def _full(like: Array, change: Array | None) -> Array:

@@ -149,7 +149,9 @@ def at_event(
     )
 
 
-def _answer(trace: Trace, system: System, at: Tableau, number: Array | int, reactions: Array) -> Row:
+def _answer(
+    trace: Trace, system: System, at: Tableau, number: Array | int, reactions: Array
+) -> Row:
     """Row of an answer, without what a change of forces adds to it directly."""
     k, n = at.sigma.size, at.opened.size
     row = at.rows[number, : k + n]
