@@ -65,7 +65,7 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Simulate, report and write; returns the exit code."""
     from jbeamshell.common import files
-    from jbeamshell.dynamics.let_go import let_go
+    from jbeamshell.dynamics.release import let_go
     from jbeamshell.dynamics.strip.inertia import Inertia
 
     scene, folder = scene_of(options), None

@@ -21,6 +21,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
+from jax.typing import ArrayLike
 
 from jbeamshell.condensed.branches import ContactState
 from jbeamshell.condensed.network import Network, Sliders
@@ -162,11 +163,11 @@ def ring(
     cycles : span, in periods of the stuck strip
     samples : number of times
     """
-    numbers = jnp.asarray([payload, pull, cycles])
+    numbers = np.array([payload, pull, cycles])
     count = math.ceil(2.0 * cycles) + 1  # a swing lasts no less than that of the stuck strip
     columns, swung, nested = jax.device_get(_run(network, numbers, samples, count))
     time, displacement, velocity, kinetic, stored, friction_work = columns
-    none = jnp.asarray(np.zeros(samples))
+    none: Any = np.zeros(samples)
     return LightMotion(
         time=time,
         displacement=displacement,
@@ -186,10 +187,10 @@ def ring(
 
 @functools.partial(jax.jit, static_argnums=(2, 3))
 def _run(
-    network: Network, numbers: Array, samples: int, count: int
+    network: Network, numbers: ArrayLike, samples: int, count: int
 ) -> tuple[tuple[Array, ...], Array, Array]:
     """Columns (T,) of the motion, number of swings begun, and True if all zones were nested."""
-    mass, pull, cycles = numbers
+    mass, pull, cycles = jnp.asarray(numbers)
     period = 2.0 * jnp.pi * jnp.sqrt(mass * network.body.c)
     times = jnp.linspace(0.0, 1.0, samples) * (cycles * period)
     start, _, nested = network.branch(network.rest, pull)

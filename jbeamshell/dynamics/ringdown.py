@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import require, require_choice
@@ -136,8 +135,7 @@ def extrema(time: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], ..
     apart = max(1, int(SHORTEST / main_frequency / (times[1] - times[0])))
     picked = []
     for sign in (1.0, -1.0):
-        peaks, _ = scipy.signal.find_peaks(sign * signal, distance=2 * apart)
-        picked += [(int(peak), sign) for peak in peaks]
+        picked += [(peak, sign) for peak in _peaks(sign * signal, 2 * apart)]
     picked.sort()
     kept: list[tuple[int, float]] = []
     for peak, sign in picked:
@@ -151,6 +149,19 @@ def extrema(time: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], ..
     bend = before - 2.0 * here + after
     shift = np.where(bend != 0.0, 0.5 * (before - after) / np.where(bend != 0.0, bend, 1.0), 0.0)
     return times[index] + shift * (times[1] - times[0]), here - 0.25 * (before - after) * shift
+
+
+def _peaks(signal: NDArray[np.float64], apart: int) -> list[int]:
+    """Places of maxima; of those nearer to each other than some samples only the highest."""
+    inner = signal[1:-1]
+    tops = 1 + np.flatnonzero((inner > signal[:-2]) & (inner >= signal[2:]))
+    free = np.ones(signal.size, bool)
+    found = []
+    for top in tops[np.argsort(-signal[tops], kind="stable")].tolist():
+        if free[top]:
+            free[max(0, top - apart + 1) : top + apart] = False
+            found.append(top)
+    return found
 
 
 def _from_swings(at: NDArray[np.float64], reached: NDArray[np.float64]) -> RingDown:
@@ -170,6 +181,8 @@ def _from_envelope(
     times: NDArray[np.float64], signal: NDArray[np.float64], period: float, smoothing: float
 ) -> RingDown:
     """Ring-down from the analytic signal."""
+    import scipy.signal
+
     step = times[1] - times[0]
     window = 2 * (max(3, int(smoothing * period / step)) // 2) + 1
     slow = scipy.signal.savgol_filter(signal, min(_odd(4.0 * period / step), _odd(signal.size)), 1)

@@ -27,7 +27,7 @@ import jbeamshell as jb  # noqa: E402
 jb.configure()
 
 from jbeamshell import dynamics, plotting  # noqa: E402
-from jbeamshell.dynamics.let_go import HEAVY, let_go  # noqa: E402
+from jbeamshell.dynamics.release import HEAVY, let_go  # noqa: E402
 
 HERE = Path(__file__).parent
 STRIP = {"model.kinematics": "linear", "model.nodes": 41, "model.end_size": 0.0278}
@@ -103,7 +103,7 @@ def slow_limit():
 
 def masing():
     """Ring-down beside its prediction, and the log-slope of energy per cycle over force."""
-    study = let_go(scene(), 1.0, cycles=60.0, per_cycle=800)
+    study = let_go(scene(), 1.0, cycles=60.0, per_cycle=800, whole=True)
     late = study.found.damping < 0.02
     off = np.abs(study.ratio[late] - 1.0)
     fine = {"model.nodes": 161, "model.end_size": 1.0 / 6.0}

@@ -8,7 +8,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell import dynamics, identify, plotting
-from jbeamshell.dynamics.let_go import let_go
+from jbeamshell.dynamics.release import let_go
 
 LINEAR = {"model.kinematics": "linear", "model.nodes": 21}
 HEAVY = 20.0

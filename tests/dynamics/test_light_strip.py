@@ -5,8 +5,8 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell import dynamics
-from jbeamshell.dynamics.let_go import LIGHT, let_go
 from jbeamshell.dynamics.light_strip import LightMotion, ring
+from jbeamshell.dynamics.release import LIGHT, let_go
 
 SCENE = jb.Scene().replace({"model.rung": "plane", "model.nodes": 33})
 CYCLES = 20.0

@@ -116,7 +116,7 @@ class Joint(eqx.Module):
             if is_traced(u):
                 return cls(u, width * f, network, width)
             if np.all(np.isfinite(u)):
-                kept = np.append(np.arange(u.size - 1) < count, True)
+                kept = np.append(np.arange(u.size - 1) < int(count), True)
                 u, f = np.asarray(u)[kept], width * np.asarray(f)[kept]
                 return cls(u, f, network, width)
         require("scene", "traced", not is_traced(scene, force), TRACED)
@@ -234,17 +234,18 @@ def _sliders(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array, Ar
     where the slip zones are not nested.
     """
     network = Network.of(scene, soft)
-    pull, push = (network.sliders(network.rest, jnp.asarray(sense)) for sense in (1.0, -1.0))
-    levels = 0.5 * (pull.force + push.force)[1:]
+    ways = jnp.asarray([1.0, -1.0])
+    sides = jax.vmap(lambda way: network.sliders(network.rest, way))(ways)
+    levels = jnp.mean(sides.force, axis=0)[1:]
     below = levels < BELOW * force
     count, last = jnp.sum(below), jnp.max(jnp.where(below, levels, 0.0), initial=0.0)
     number = jnp.arange(levels.size)
     part = (number + 1 - count) / (levels.size + 1 - count)
     levels = jnp.append(jnp.where(number < count, levels, last + (force - last) * part), force)
-    u = 0.5 * (pull.displacement_after(levels) + push.displacement_after(levels))
-    nested = [network.branch(network.rest, way * force)[2] for way in (1.0, -1.0)]
+    u = jnp.mean(jax.vmap(lambda side: side.displacement_after(levels))(sides), axis=0)
+    nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
     rising = jnp.all(jnp.diff(levels, prepend=0.0) > 0.0)
-    return network, jnp.where(nested[0] & nested[1] & rising, u, jnp.nan), levels, count
+    return network, jnp.where(jnp.all(nested) & rising, u, jnp.nan), levels, count
 
 
 def _exact(network: Network, path: NDArray[np.float64]) -> Array:

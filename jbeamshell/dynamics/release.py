@@ -23,12 +23,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.ringdown import RingDown, ring_down
-from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
-from jbeamshell.dynamics.strip.excitation import Recorded
 from jbeamshell.dynamics.strip.inertia import Inertia
-from jbeamshell.dynamics.strip.modes import first_period
 from jbeamshell.dynamics.strip.motion import Motion
-from jbeamshell.dynamics.strip.simulate import simulate
 from jbeamshell.dynamics.structure.joint import Joint, largest_force
 from jbeamshell.dynamics.structure.modal import ModalCurve
 from jbeamshell.scene.scene import Scene
@@ -144,9 +140,7 @@ def let_go(
     end_force = float(largest_force(scene, force))
     require_number("cycles", cycles, POSITIVE)
     inertia.check(scene)
-    strip = scene.strip
-    strip_mass = float(2.0 * strip.half_height * strip.length * inertia.mean_density(scene))
-    mass = HEAVY * strip_mass if payload is None else payload
+    mass = HEAVY * _strip_mass(scene, inertia) if payload is None else payload
     require_number("payload", mass)
     samples = round(cycles * SAMPLES_PER_CYCLE) + 1
     plane = None if whole else as_plane(scene)
@@ -174,11 +168,12 @@ def let_go(
 def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
     """Frequency and damping of the mass on steady cycles, from a displacement to the largest."""
     if joint.network is None:
-        reach = np.geomspace(smallest, float(joint.displacement[-1]), AMPLITUDES)
+        reach = np.geomspace(smallest, np.asarray(joint.displacement)[-1], AMPLITUDES)
         force, loss = np.asarray(joint.backbone(reach)), np.asarray(joint.dissipation(reach))
     else:
-        low = np.interp(smallest, np.asarray(joint.displacement), np.asarray(joint.force))
-        force = np.geomspace(low, float(joint.force[-1]), AMPLITUDES)
+        known = np.asarray(joint.force)
+        low = np.interp(smallest, np.asarray(joint.displacement), known)
+        force = np.geomspace(low, known[-1], AMPLITUDES)
         reach, loss = jax.device_get(_cycles(joint.network, force))
         nested = np.isfinite(loss)
         force, reach, loss = force[nested], reach[nested], loss[nested]
@@ -209,6 +204,14 @@ def as_plane(scene: Scene) -> Scene | None:
         return None
 
 
+def _strip_mass(scene: Scene, inertia: Inertia) -> float:
+    """Mass of the strip per width."""
+    layers, length = scene.strip.layers, float(scene.strip.length)
+    whole = [length * float(scene.strip.height_ratio)]
+    thickness = whole if layers is None else np.asarray(layers)[:, 0]
+    return length * float(np.sum(np.asarray(inertia.density) * thickness))
+
+
 def _share(network: Network, inertia: Inertia, mass: float) -> float:
     """Mass of the strip that moves with the stuck end, over the payload."""
     return float(np.sum(np.asarray(inertia.density) * np.asarray(network.volume))) / mass
@@ -225,6 +228,11 @@ def _whole(
     progress: bool | None,
 ) -> Motion:
     """Motion of the whole strip, whose end force falls to zero within `RELEASE` periods."""
+    from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
+    from jbeamshell.dynamics.strip.excitation import Recorded
+    from jbeamshell.dynamics.strip.modes import first_period
+    from jbeamshell.dynamics.strip.simulate import simulate
+
     attached = AttachedMasses(payload=mass)
     period = first_period(scene, inertia, attached)
     return simulate(

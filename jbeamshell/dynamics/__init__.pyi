@@ -1,0 +1,31 @@
+from .release import RingDownStudy as RingDownStudy, let_go as let_go
+from .ringdown import RingDown as RingDown, ring_down as ring_down
+from .strip.attached_masses import AttachedMasses as AttachedMasses
+from .strip.excitation import (
+    Excitation as Excitation,
+    Harmonic as Harmonic,
+    Impact as Impact,
+    Recorded as Recorded,
+    Shaker as Shaker,
+)
+from .strip.inertia import THICKNESS_STRETCH as THICKNESS_STRETCH, Inertia as Inertia
+from .strip.modes import Modes as Modes, modes as modes
+from .strip.motion import (
+    Ending as Ending,
+    InterruptedMotionError as InterruptedMotionError,
+    Motion as Motion,
+)
+from .strip.simulate import simulate as simulate
+from .strip.stepsize import METHODS as METHODS, stable_step as stable_step
+from .structure.joint import Joint as Joint
+from .structure.matrices import Attachment as Attachment, Structure as Structure
+from .structure.modal import (
+    ModalCurve as ModalCurve,
+    harmonic_balance as harmonic_balance,
+    modal_curve as modal_curve,
+)
+from .structure.shaking import (
+    InterruptedShakingError as InterruptedShakingError,
+    StructureMotion as StructureMotion,
+    shake as shake,
+)
