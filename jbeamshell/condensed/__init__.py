@@ -1,8 +1,11 @@
 """Condensed contact: a linear elastic strip on its contact line, solved exactly in time.
 
 `solve` walks the load path of a scene on the rung ``plane``, which `jbeamshell.solve` does for such
-scenes; `dissipation` gives the work of a steady cycle at many amplitudes from one factorisation.
+scenes; `dissipation` gives the work of a steady cycle at many amplitudes from one factorisation,
+which `factors` keeps.
 """
 
+from jbeamshell.condensed.cycles import SteadyCycles as SteadyCycles
 from jbeamshell.condensed.dissipation import dissipation as dissipation
+from jbeamshell.condensed.dissipation import factors as factors
 from jbeamshell.condensed.solve import solve as solve

@@ -18,7 +18,7 @@ from jax import Array, lax
 
 from jbeamshell.mechanics.section_form import SectionForm
 
-CHUNKS = 6  # parts of the strip whose products are taken over the nodes that they know
+PARTS = 3  # of the strip, eliminated one after the other with as many contact nodes as they know
 
 
 class Body(eqx.Module):
@@ -58,12 +58,12 @@ class Elimination(NamedTuple):
 
     Attributes
     ----------
-    lower : (n, m-2, m-2) Cholesky factors
+    inverse : (n, m-2, m-2) inverses of the Cholesky factors
     known : (n, m-2, 2n+2) right-hand sides, reduced
     onwards : (n-1, m-2, m-2) coupling to the next station, reduced
     """
 
-    lower: Array
+    inverse: Array
     known: Array
     onwards: Array
 
@@ -71,16 +71,13 @@ class Elimination(NamedTuple):
         """Fields (n, m-2, levels) from the right-hand sides' factors (2n+2, levels)."""
 
         def back(after: Array, station: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            lower, known, onwards = station
-            right = -(known @ given + onwards @ after)
-            here = lax.linalg.triangular_solve(
-                lower, right, left_side=True, lower=True, transpose_a=True
-            )
+            inverse, known, onwards = station
+            here = -(inverse.T @ (known @ given + onwards @ after))
             return here, here
 
-        none = jnp.zeros((self.lower.shape[1], given.shape[1]), given.dtype)
+        none = jnp.zeros((self.inverse.shape[1], given.shape[1]), given.dtype)
         onwards = jnp.pad(self.onwards, ((0, 1), (0, 0), (0, 0)))
-        return lax.scan(back, none, (self.lower, self.known, onwards), reverse=True)[1]
+        return lax.scan(back, none, (self.inverse, self.known, onwards), reverse=True)[1]
 
 
 def eliminate(form: SectionForm, x: Array, loads: Array, held: bool) -> tuple[Elimination, Array]:
@@ -99,48 +96,58 @@ def eliminate(form: SectionForm, x: Array, loads: Array, held: bool) -> tuple[El
     left : (2n+2, 2n+2) energy's second derivatives in v and w of all stations, end load, pressure
     """
     n, m = x.size, form.pull.size
-    start, end, across = form.element(jnp.diff(x))
     columns = 2 * n + 2
-    free = jnp.asarray(~form.held[2:] if held else np.ones(m - 2, bool), x.dtype)
+    inner = m - 2
+    free = jnp.asarray(~form.held[2:] if held else np.ones(inner, bool), x.dtype)
 
     def go(
         carry: tuple[Array, Array], station: tuple[Array, ...]
     ) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
         matrix, sides = carry
-        i, load, start, end, across = station
+        i, load, length = station
+        start, end, across = (part[0] for part in form.element(length[None]))
         mask = jnp.where(i == 0, free, 1.0)
         sides = _add(sides, start[2:, :2], 2 * i).at[:, -1].add(load * form.press[2:])
         sides = _add(sides, across[2:, :2], 2 * i + 2) * mask[:, None]
         matrix = (matrix + start[2:, 2:]) * mask[:, None] * mask + jnp.diag(1.0 - mask)
-        right = jnp.concatenate([sides, across[2:, 2:] * mask[:, None]], axis=1)
-        lower, solved = _halved(matrix, right)
-        known, onwards = solved[:, :columns], solved[:, columns:]
-        sides = _add(-onwards.T @ known, end[2:, :2], 2 * i + 2)
+        inverse = _inverse_factor(matrix)
+        onwards = inverse @ (across[2:, 2:] * mask[:, None])
+        known = inverse @ sides
+        sides = _add(-(onwards.T @ known), end[2:, :2], 2 * i + 2)
         sides = _add(sides, across[:2, 2:].T, 2 * i)
-        return (end[2:, 2:] - onwards.T @ onwards, sides), (lower, known, onwards)
+        return (end[2:, 2:] - onwards.T @ onwards, sides), (inverse, known, onwards)
 
-    stations = (jnp.arange(n - 1), loads[:-1], start, end, across)
-    nothing = (jnp.zeros((m - 2, m - 2), x.dtype), jnp.zeros((m - 2, columns), x.dtype))
-    (matrix, sides), (lower, known, onwards) = lax.scan(go, nothing, stations)
+    carry = (jnp.zeros((inner, inner), x.dtype), jnp.zeros((inner, 2), x.dtype))
+    parts, total = [], jnp.zeros((columns, columns), x.dtype)
+    stations = (jnp.arange(n - 1), loads[:-1], jnp.diff(x))
+    # No station knows a contact node beyond its next one: the right-hand sides grow part by part.
+    for begin, stop in itertools.pairwise(np.linspace(0, n - 1, PARTS + 1).astype(int)):
+        carry = carry[0], _wider(carry[1], 2 * stop + 4)
+        carry, part = lax.scan(go, carry, tuple(each[begin:stop] for each in stations))
+        parts.append(part)
+        total = _with_products(total, part[1])
+    matrix, sides = carry
     sides = sides.at[:, -2].add(-form.pull[2:]).at[:, -1].add(loads[-1] * form.press[2:])
-    last_lower, last = _halved(matrix, sides)
-    left = _among_contacts(start, end, across) - (last.T @ last + _products(known))
+    inverse = _inverse_factor(matrix)
+    last = inverse @ sides
+    left = _among_contacts(form, x) - _with_products(total, last[None])
     pull = jnp.zeros(2 * n).at[-2:].set(form.pull[:2])
     press = (loads[:, None] * form.press[:2]).ravel()
     left = left.at[:-2, -2].add(-pull).at[-2, :-2].add(-pull)
     left = left.at[:-2, -1].add(press).at[-1, :-2].add(press)
     found = Elimination(
-        jnp.concatenate([lower, last_lower[None]]),
-        jnp.concatenate([known, last[None]]),
-        onwards,
+        jnp.concatenate([*(part[0] for part in parts), inverse[None]]),
+        jnp.concatenate([*(_wider(part[1], columns) for part in parts), last[None]]),
+        jnp.concatenate([part[2] for part in parts]),
     )
     return found, left
 
 
-def _halved(matrix: Array, right: Array) -> tuple[Array, Array]:
-    """L and L^-1 right of a symmetric matrix L L'."""
-    lower = jnp.linalg.cholesky(matrix)
-    return lower, lax.linalg.triangular_solve(lower, right, left_side=True, lower=True)
+def _inverse_factor(matrix: Array) -> Array:
+    """L^-1 of a symmetric matrix L L'."""
+    lower = lax.linalg.cholesky(matrix, symmetrize_input=False)
+    one = jnp.eye(matrix.shape[0], dtype=matrix.dtype)
+    return lax.linalg.triangular_solve(lower, one, left_side=False, lower=True)
 
 
 def _add(sides: Array, block: Array, column: Array) -> Array:
@@ -149,27 +156,27 @@ def _add(sides: Array, block: Array, column: Array) -> Array:
     return lax.dynamic_update_slice(sides, old + block, (0, column))
 
 
-def _among_contacts(start: Array, end: Array, across: Array) -> Array:
+def _wider(sides: Array, columns: int) -> Array:
+    """Sides with empty columns before the last two, those of the loads."""
+    empty = [(0, 0)] * (sides.ndim - 1) + [(0, columns - sides.shape[-1])]
+    return jnp.concatenate([jnp.pad(sides[..., :-2], empty), sides[..., -2:]], axis=-1)
+
+
+def _among_contacts(form: SectionForm, x: Array) -> Array:
     """Stiffness (2n + 2, 2n + 2) of the elements among v and w, empty for the loads."""
-    n = start.shape[0] + 1
+    n = x.size
+    start, end, across = (part[:, :2, :2] for part in form.element(jnp.diff(x)))
     i = np.arange(n)
-    own = jnp.zeros((n, 2, 2), start.dtype).at[:-1].add(start[:, :2, :2]).at[1:].add(end[:, :2, :2])
-    blocks = jnp.zeros((n, n, 2, 2), start.dtype).at[i, i].set(own)
-    blocks = blocks.at[i[:-1], i[1:]].set(across[:, :2, :2])
-    blocks = blocks.at[i[1:], i[:-1]].set(jnp.swapaxes(across[:, :2, :2], 1, 2))
+    own = jnp.zeros((n, 2, 2), x.dtype).at[:-1].add(start).at[1:].add(end)
+    blocks = jnp.zeros((n, n, 2, 2), x.dtype).at[i, i].set(own)
+    blocks = blocks.at[i[:-1], i[1:]].set(across)
+    blocks = blocks.at[i[1:], i[:-1]].set(jnp.swapaxes(across, 1, 2))
     return jnp.pad(jnp.moveaxis(blocks, 2, 1).reshape(2 * n, 2 * n), (0, 2))
 
 
-def _products(known: Array) -> Array:
-    """Sum over the stations of known' known; no station knows a node beyond its next one."""
-    stations, _, columns = known.shape
-    cuts = np.linspace(0, stations, CHUNKS + 1).astype(int)
-    total = jnp.zeros((columns, columns), known.dtype)
-    for begin, stop in itertools.pairwise(cuts):
-        width = 2 * stop + 2
-        part = known[begin:stop]
-        part = jnp.concatenate([part[..., :width], part[..., -2:]], axis=-1)
-        part = part.reshape(-1, width + 2)
-        there = np.r_[:width, columns - 2 : columns]
-        total = total.at[np.ix_(there, there)].add(part.T @ part)
-    return total
+def _with_products(total: Array, known: Array) -> Array:
+    """Sum of total (columns, columns) and known' known over the stations and their fields."""
+    columns, width = total.shape[0], known.shape[-1]
+    part = known.reshape(-1, width)
+    there = np.r_[: width - 2, columns - 2 : columns]
+    return total.at[np.ix_(there, there)].add(part.T @ part)

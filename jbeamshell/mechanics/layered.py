@@ -98,12 +98,11 @@ def layered_form(material: Material) -> SectionForm:
         (across(from_middle), still),
         (still, across(from_middle)),
     ]
-    # Exact integration along X, but for the shear of the mean rotation, which would lock bending.
-    values, turn = values[pick], along(from_middle)
-    sheared = values @ turn
-    spread = (values - jnp.outer(sheared, sheared) / (turn @ sheared)) / 12.0
+    # What differs between an element's ends bends it: as if bubbles along X relieved the strains
+    # that linear fields cannot (Wilson's incompatible modes; Taylor, Beresford & Wilson 1976).
+    spread = jnp.block([[none, none], [none, summed((c - lam**2 / c) / h, slope)]]) / 12.0
     return SectionForm(
-        values=values,
+        values=values[pick],
         mixed=mixed_form[pick],
         slopes=slopes[pick],
         pull=along(mean),
@@ -111,7 +110,7 @@ def layered_form(material: Material) -> SectionForm:
         held=np.append(np.ones(size, bool), np.zeros(size, bool))[place],
         means=jnp.stack([along(turning), across(squeeze) / edges[-1]]),
         modes=jnp.asarray([jnp.stack(mode) for mode in modes]),
-        spread=spread,
+        spread=spread[pick],
     )
 
 
