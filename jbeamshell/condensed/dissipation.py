@@ -16,8 +16,8 @@ from jbeamshell.condensed.strip import condensed
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
 
-NODES = 57  # 1 % of elasticity where D exceeds a tenth of the bar's cubic law, 3 % down to 1e-4
-REFINED = 97  # a third of that
+NODES = 49  # 1 % of elasticity where D exceeds a tenth of the bar's cubic law, 3 % down to 1e-4
+REFINED = 89  # a third of that
 CYCLES = 2  # from the second cycle on the dissipation repeats
 
 
@@ -28,8 +28,8 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
     ----------
     scene : strip and contact, see the rung ``plane``; may be traced
     amplitudes : (k,) of the end force
-    nodes : contact nodes; 57 are within 1 % of elasticity where the dissipation exceeds a tenth of
-        the bar's cubic law, and 3 % down to a ten-thousandth; 97 within .5 and 1 %
+    nodes : contact nodes; 49 are within 1 % of elasticity where the dissipation exceeds a tenth of
+        the bar's cubic law, and 3 % down to a ten-thousandth; 89 within .3 and 1 %
 
     Returns
     -------

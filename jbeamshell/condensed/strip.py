@@ -17,7 +17,7 @@ from jbeamshell.scene.scene import Scene
 
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
 PLANE_GROWTH = 0.3  # of the element size over the distance from there
-PLANE_FAR_SIZE = 0.2  # of L, elements away from it
+PLANE_FAR_SIZE = 0.15  # of L, elements away from it
 RULE = elements.element_rule("finite-difference")
 
 
