@@ -229,9 +229,9 @@ def largest_force(scene: Scene, force: Any = None) -> Any:
 def _sliders(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array, Array, Array]:
     """Network, mean backbone (k + 1,) of pull and push, and its count of points below the force.
 
-    The points are the means of the thresholds, and the force; those beyond are laid evenly between
-    the last one below it and the force, where the backbone is straight.  The displacements are NaN
-    where the slip zones are not nested.
+    The points are the means of the thresholds, and the force; those beyond are laid evenly on the
+    straight line from the last one below it.  The displacements are NaN where the slip zones are
+    not nested.
     """
     network = Network.of(scene, soft)
     ways = jnp.asarray([1.0, -1.0])
@@ -241,11 +241,18 @@ def _sliders(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array, Ar
     count, last = jnp.sum(below), jnp.max(jnp.where(below, levels, 0.0), initial=0.0)
     number = jnp.arange(levels.size)
     part = (number + 1 - count) / (levels.size + 1 - count)
-    levels = jnp.append(jnp.where(number < count, levels, last + (force - last) * part), force)
-    u = jnp.mean(jax.vmap(lambda side: side.displacement_after(levels))(sides), axis=0)
+
+    def mean(forces: Array) -> Array:
+        return jnp.mean(jax.vmap(lambda side: side.displacement_after(forces))(sides), axis=0)
+
+    def points(inside: Array, begin: Array, end: Array) -> Array:
+        return jnp.append(jnp.where(number < count, inside, begin + (end - begin) * part), end)
+
+    f = points(levels, last, force)
+    u = points(mean(levels), mean(last), mean(force))
     nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
-    rising = jnp.all(jnp.diff(levels, prepend=0.0) > 0.0)
-    return network, jnp.where(jnp.all(nested) & rising, u, jnp.nan), levels, count
+    rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
+    return network, jnp.where(jnp.all(nested) & rising, u, jnp.nan), f, count
 
 
 def _exact(network: Network, path: NDArray[np.float64]) -> Array:
