@@ -2,10 +2,11 @@
 
 `solve` walks the load path of a scene on the rung ``plane``, which `jbeamshell.solve` does for such
 scenes; `dissipation` gives the work of a steady cycle at many amplitudes from one factorisation,
-which `factors` keeps.
+which `factors` keeps; `Bodies` does so for many strips at once.
 """
 
 from jbeamshell.condensed.cycles import SteadyCycles as SteadyCycles
 from jbeamshell.condensed.dissipation import dissipation as dissipation
 from jbeamshell.condensed.dissipation import factors as factors
+from jbeamshell.condensed.interpolation import Bodies as Bodies
 from jbeamshell.condensed.solve import solve as solve

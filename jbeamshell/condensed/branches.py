@@ -115,7 +115,17 @@ def factorise(body: Body, friction: Array) -> Factors:
 
 
 def inverse_factors(matrix: Array) -> tuple[Array, Array]:
-    """Inverses of L (unit diagonal) and U of a matrix L U (n, n), without pivoting.
+    """Inverses of L (unit diagonal) and U of a matrix L U (n, n), without pivoting."""
+    lower, upper = lower_upper(matrix)
+    one = jnp.eye(matrix.shape[0], dtype=matrix.dtype)
+    return (
+        lax.linalg.triangular_solve(lower, one, left_side=False, lower=True, unit_diagonal=True),
+        lax.linalg.triangular_solve(upper, one, left_side=False),
+    )
+
+
+def lower_upper(matrix: Array) -> tuple[Array, Array]:
+    """L (unit diagonal) and U of a matrix L U (n, n), without pivoting.
 
     NaN where a pivot is so small that rows would have to be exchanged.
     """
@@ -123,11 +133,9 @@ def inverse_factors(matrix: Array) -> tuple[Array, Array]:
     # Rows that shrink by powers of two keep LAPACK from exchanging them, and cost no digits.
     scale = 2.0 ** (-min(SHRINK, 900 // n) * np.arange(n))
     both, _, order = lax.linalg.lu(matrix * scale[:, None])
-    one = jnp.eye(n, dtype=matrix.dtype)
-    lower = lax.linalg.triangular_solve(both, one, left_side=False, lower=True, unit_diagonal=True)
-    upper = lax.linalg.triangular_solve(both, one, left_side=False)
     exchanged = jnp.where(jnp.all(order == np.arange(n)), 0.0, jnp.nan)
-    return lower * (scale / scale[:, None]) + exchanged, upper * scale + exchanged
+    lower = jnp.tril(both * (scale / scale[:, None]), -1) + jnp.eye(n, dtype=matrix.dtype)
+    return lower + exchanged, jnp.triu(both / scale[:, None]) + exchanged
 
 
 def pressed(body: Body) -> ContactState:

@@ -25,11 +25,11 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jbeamshell.condensed.body import Body
-from jbeamshell.condensed.branches import inverse_factors
+from jbeamshell.condensed.branches import lower_upper
 
 GROUPS = 16  # of events, over which the least rate of a reaction stands for all
 LITTLE = 1e-6  # of the largest rate or load: less does not count as a wrong sign
@@ -165,12 +165,14 @@ def _first_loading(body: Body, friction: Array, sense: float) -> _FirstLoading:
     k_nt = body.K_tn.T
     earlier = jnp.triu(jnp.ones((k, k + 1)), 1)
     matrix, g = body.K_tt + sense * friction * k_nt[:k], body.f_t + sense * friction * body.f_n[:k]
-    lower, inverse = inverse_factors(matrix)
-    y_g = lower @ g
-    threshold = friction * (lower @ body.r_0[:k]) / y_g
+    lower, upper = lower_upper(matrix)
+    sides = jnp.stack([g, friction * body.r_0[:k]], axis=1)
+    y = lax.linalg.triangular_solve(lower, sides, left_side=True, lower=True, unit_diagonal=True)
+    inverse = lax.linalg.triangular_solve(upper, jnp.eye(k), left_side=False)
+    y_g, threshold = y[:, 0], y[:, 1] / y[:, 0]
     slips = (inverse * y_g) @ earlier
     rate = sense * (k_nt @ slips - body.f_n[:, None])
-    rooms = matrix @ slips - g[:, None]
+    rooms = (lower * y_g) @ earlier - g[:, None]
     steps = jnp.diff(threshold, prepend=0.0)
     reaction = body.r_0[:, None] + (rate[:, :k] * steps) @ earlier
     # Events rise, no node slips backwards or before its turn, and all stay closed.
@@ -180,7 +182,6 @@ def _first_loading(body: Body, friction: Array, sense: float) -> _FirstLoading:
     lifts = jnp.any(reaction < 0.0, axis=0)
     bad = jnp.any(early | backwards, axis=0) | lifts | jnp.append(lifts[1:], False)
     bad = bad.at[1:].set(bad[1:] | (steps <= 0.0) | (y_g <= 0.0))
-    upper = lower @ matrix
     return _FirstLoading(y_g, inverse.T @ body.f_t, threshold, reaction, rate, upper, inverse, bad)
 
 

@@ -11,8 +11,9 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import UnconvergedError
 from jbeamshell.condensed.cycles import SteadyCycles, steady_cycles
+from jbeamshell.condensed.drives import with_springs
 from jbeamshell.condensed.solve import solve
-from jbeamshell.condensed.strip import condensed
+from jbeamshell.condensed.strip import condensed, spring_stiffness
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
 
@@ -45,10 +46,11 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
 
     Notes
     -----
-    To ask one strip again and again, keep its `factors`.
+    To ask one strip again and again, keep its `factors`.  Elastic slip (contact.stick_stiffness
+    below 1000) leaves no nested zones at the corner; where it is traced, friction is without it.
     """
-    scene = _plane(scene, nodes)
-    found = _dissipation(scene, jnp.asarray(amplitudes))
+    scene = on_plane(scene, nodes)
+    found = _dissipation(scene, jnp.asarray(amplitudes), _is_soft(scene))
     if is_traced(scene, amplitudes, found):
         return found
     sizes, works = np.asarray(amplitudes, dtype=float), np.array(found)
@@ -86,10 +88,11 @@ def factors(scene: Scene, *, nodes: int = NODES) -> SteadyCycles:
     >>> kept = jb.condensed.factors(jb.Scene())
     >>> kept.dissipation(jnp.linspace(0.1, 1.9, 256))
     """
-    return _factors(_plane(scene, nodes))
+    scene = on_plane(scene, nodes)
+    return _factors(scene, _is_soft(scene))
 
 
-def _plane(scene: Scene, nodes: int) -> Scene:
+def on_plane(scene: Scene, nodes: int) -> Scene:
     """Scene on the rung ``plane`` with so many nodes."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     force = scene.load.control == "force"
@@ -97,11 +100,20 @@ def _plane(scene: Scene, nodes: int) -> Scene:
     return scene.replace({"model.rung": "plane", "model.nodes": nodes})
 
 
-@eqx.filter_jit
-def _factors(scene: Scene) -> SteadyCycles:
-    return steady_cycles(condensed(scene, scene.model.nodes).body, scene.contact.friction)
+def _is_soft(scene: Scene) -> bool:
+    """True if sliders are known to yield before they slip."""
+    return not is_traced(scene.contact.stick_stiffness) and not scene.ideal_friction
 
 
 @eqx.filter_jit
-def _dissipation(scene: Scene, amplitudes: Array) -> Array:
-    return _factors(scene).dissipation(amplitudes)
+def _factors(scene: Scene, soft: bool) -> SteadyCycles:
+    strip = condensed(scene, scene.model.nodes)
+    body = strip.body
+    if soft:
+        body, _ = with_springs(body, spring_stiffness(scene, strip))
+    return steady_cycles(body, scene.contact.friction)
+
+
+@eqx.filter_jit
+def _dissipation(scene: Scene, amplitudes: Array, soft: bool) -> Array:
+    return _factors(scene, soft).dissipation(amplitudes)

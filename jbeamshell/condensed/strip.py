@@ -46,10 +46,9 @@ class Strip(NamedTuple):
 
 def condensed(scene: Scene, nodes: int) -> Strip:
     """Strip of a scene as plane elasticity, condensed to its contact nodes."""
-    contact, far_end = scene.contact, scene.strip.far_end
+    far_end = scene.strip.far_end
     form, x = plane_form(scene), plane_stations(scene, nodes)
-    down = elements.nodal_loads(RULE, x, contact.pressure)
-    up = elements.nodal_loads(RULE, x, contact.bottom_pressure)
+    down, up = pressing(scene, x)
     tributary = elements.tributary_lengths(RULE, x)
     elimination, hessian = eliminate(form, x, down, "beta" in FAR_ENDS[far_end])
     hessian = hessian.at[1:-2:2, -1].add(-up).at[-1, 1:-2:2].add(-up)
@@ -58,7 +57,6 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     w = slice(last + 1, None, -2)
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
     settled = jnp.linalg.solve(k_tt, -press[v])
-    uniform = contact.pressure.ndim == contact.bottom_pressure.ndim == 0
     body = Body(
         x=x[::-1],
         tributary=tributary[::-1],
@@ -67,10 +65,21 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         K_nn=hessian[w, w],
         f_t=-hessian[v, -2],
         f_n=-hessian[w, -2],
-        r_0=(down - up)[::-1] if uniform else press[w] + k_tn.T @ settled,
+        r_0=(down - up)[::-1] if is_pressed_evenly(scene) else press[w] + k_tn.T @ settled,
         c=-hessian[-2, -2],
     )
     return Strip(body, form, elimination, hessian, x, tributary, down, settled)
+
+
+def pressing(scene: Scene, x: Array) -> tuple[Array, Array]:
+    """Forces (n,) of the pressures on the top face, downwards, and the bottom face, upwards."""
+    down = elements.nodal_loads(RULE, x, scene.contact.pressure)
+    return down, elements.nodal_loads(RULE, x, scene.contact.bottom_pressure)
+
+
+def is_pressed_evenly(scene: Scene) -> bool:
+    """True if neither pressure is a table."""
+    return scene.contact.pressure.ndim == scene.contact.bottom_pressure.ndim == 0
 
 
 def plane_stations(scene: Scene, nodes: int) -> Array:
