@@ -14,6 +14,7 @@ from jbeamshell.common.errors import InputError
 EXTRA = "--xla_backend_extra_options="
 FAST_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
 ASYNCHRONOUS = "jax_cpu_enable_async_dispatch"
+ONCE = {"xla_backend_optimization_level": 0}  # compiler options for a program that runs few times
 WORTH_KEEPING = 0.2  # seconds of compilation, from which on a program is kept in the cache
 
 

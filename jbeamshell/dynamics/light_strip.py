@@ -44,6 +44,7 @@ class Swing(NamedTuple):
     radii : (k + 1,) R after the corners
     last : number of the last corner that it passes
     duration : time until its end
+    reach : change of the force until then
     valid : True if all slip zones until its end were nested
     """
 
@@ -57,25 +58,29 @@ class Swing(NamedTuple):
     radii: Array
     last: Array
     duration: Array
+    reach: Array
     valid: Array
 
 
-def swings(network: Network, mass: Array, start: ContactState, count: int) -> Swing:
-    """Swings of a mass let go at a contact, stacked along the first axis."""
+def swings(network: Network, mass: Array, pull: Array, count: int) -> Swing:
+    """Swings of a mass that is pulled with a force and let go, stacked along the first axis."""
 
     def go(
-        carry: tuple[ContactState, Array, Array, Array], _: None
+        carry: tuple[ContactState, Array, Array, Array], pulled: Array
     ) -> tuple[tuple[ContactState, Array, Array, Array], Swing]:
         start, begin, lost, known = carry
-        sense = -jnp.sign(start.force)
+        sense = jnp.where(pulled, jnp.sign(pull), -jnp.sign(start.force))
         swing = _swing(network.sliders(start, sense), start, sense, mass)
-        reach = jnp.abs(start.force) + swing.radii[swing.last]
-        end, work, valid = network.branch(start, start.force + sense * reach)
+        turn = jnp.where(pulled, pull, start.force + sense * swing.reach)
+        end, work, valid = network.branch(start, turn)
         swing = swing._replace(begin=begin, work=lost, valid=known & valid)
-        return (end, begin + swing.duration, lost + work, swing.valid), swing
+        after = begin + swing.duration, lost + work
+        begin, lost = (jnp.where(pulled, 0.0, value) for value in after)
+        return (end, begin, lost, swing.valid), swing
 
-    zero = jnp.zeros_like(start.force)
-    return lax.scan(go, (start, zero, zero, jnp.asarray(True)), None, count)[1]
+    zero, pulled = jnp.zeros_like(pull), jnp.arange(count + 1) == 0
+    found = lax.scan(go, (network.rest, zero, zero, jnp.asarray(True)), pulled)[1]
+    return jax.tree.map(lambda each: each[1:], found)
 
 
 def _swing(sliders: Sliders, start: ContactState, sense: Array, mass: Array) -> Swing:
@@ -88,6 +93,7 @@ def _swing(sliders: Sliders, start: ContactState, sense: Array, mass: Array) -> 
     last = jnp.sum(passed) - 1
     kinetic = jnp.where(passed & (energy > 0.0), energy, 0.0)
     speed, arrival = _root(2.0 * kinetic / compliance), _root(2.0 * kinetic[1:] / compliance[:-1])
+    radii = _root(left**2 + 2.0 * kinetic / compliance)
     angles, ends = jnp.arctan2(speed, left), jnp.arctan2(arrival, left[1:])
     ends = jnp.where(jnp.arange(left.size) == last, jnp.pi, jnp.append(ends, jnp.pi))
     durations = jnp.where(passed, (ends - angles) * jnp.sqrt(mass * compliance), 0.0)
@@ -101,9 +107,10 @@ def _swing(sliders: Sliders, start: ContactState, sense: Array, mass: Array) -> 
         work=zero,
         times=times - durations,
         angles=angles,
-        radii=jnp.sqrt(left**2 + 2.0 * kinetic / compliance),
+        radii=radii,
         last=last,
         duration=times[-1],
+        reach=jnp.abs(start.force) + radii[last],
         valid=jnp.asarray(True),
     )
 
@@ -193,8 +200,7 @@ def _run(
     mass, pull, cycles = jnp.asarray(numbers)
     period = 2.0 * jnp.pi * jnp.sqrt(mass * network.body.c)
     times = jnp.linspace(0.0, 1.0, samples) * (cycles * period)
-    start, _, nested = network.branch(network.rest, pull)
-    passed = swings(network, mass, start, count)
+    passed = swings(network, mass, pull, count)
     u, rate, stored, work, valid = lax.map(lambda t: _moment(network, mass, passed, t), times)
     columns = times, u, rate, 0.5 * mass * rate**2, stored, work
-    return columns, jnp.sum(passed.begin < times[-1]), nested & jnp.all(valid)
+    return columns, jnp.sum(passed.begin < times[-1]), jnp.all(valid)

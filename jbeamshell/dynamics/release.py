@@ -12,6 +12,7 @@ of gross slip, frequencies without the strip's inertia are too high by m_1/2m an
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
 import jax
@@ -20,6 +21,7 @@ from jax import Array, lax
 
 from jbeamshell.common.checks import POSITIVE, require, require_number
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.jax_options import ONCE
 from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.ringdown import RingDown, ring_down
@@ -186,7 +188,7 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
     )
 
 
-@jax.jit
+@functools.partial(jax.jit, compiler_options=ONCE)
 def _cycles(network: Network, forces: Array) -> tuple[Array, Array]:
     """Displacements and work of steady cycles at the amplitudes (k,) of the force."""
     return lax.map(network.cycle, forces)

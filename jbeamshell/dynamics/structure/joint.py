@@ -26,6 +26,7 @@ from jbeamshell.common.checks import (
     require,
     require_number,
 )
+from jbeamshell.common.jax_options import ONCE
 from jbeamshell.condensed.network import Network, Response
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.scene.domain import gross_slip_rule
@@ -112,7 +113,9 @@ class Joint(eqx.Module):
         require_number("width", width)
         if scene.model.solution == "plane":
             soft = not scene.ideal_friction
-            network, u, f, count = _sliders(scene, as_leaf(force, "force"), soft)
+            inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
+            sliders = _sliders if inside else _sliders_once
+            network, u, f, count = sliders(scene, as_leaf(force, "force"), soft)
             if is_traced(u):
                 return cls(u, width * f, network, width)
             if np.all(np.isfinite(u)):
@@ -225,7 +228,6 @@ def largest_force(scene: Scene, force: Any = None) -> Any:
     return force
 
 
-@eqx.filter_jit
 def _sliders(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array, Array, Array]:
     """Network, mean backbone (k + 1,) of pull and push, and its count of points below the force.
 
@@ -253,6 +255,9 @@ def _sliders(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array, Ar
     nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
     rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
     return network, jnp.where(jnp.all(nested) & rising, u, jnp.nan), f, count
+
+
+_sliders_once = jax.jit(_sliders, static_argnums=2, compiler_options=ONCE)
 
 
 def _exact(network: Network, path: NDArray[np.float64]) -> Array:
