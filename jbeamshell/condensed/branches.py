@@ -218,7 +218,7 @@ def holds(
     between = jnp.maximum(jnp.diff(events, prepend=0.0, append=reach), 0.0)
     rising = jnp.all(jnp.diff(events, prepend=0.0) >= -tiny * reach)
     regular = jnp.all(own.regular | ~slips)
-    closed = jnp.all(start.r_n + own.falls @ between >= 0.0)
+    closed = jnp.all(start.r_n + own.falls @ between > 0.0)  # an open node has none
     cap = friction * start.r_n[:k]
     room = cap + sense * start.r_t + own.draws @ between
     sticks = jnp.all(slips | (room >= -tiny * jnp.max(cap)))

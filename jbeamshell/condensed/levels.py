@@ -36,12 +36,11 @@ def levels(
     lift : (n,) lift at the start; None is none
     """
     nested, valid = nested_levels(body, friction, start, forces, turns)
-    needed = ~valid if lift is None else ~valid | jnp.any(lift > 0.0)
 
     def by_events() -> Level:
-        return walk(body, friction, start, forces, jnp.asarray(turns), lift, needed)
+        return walk(body, friction, start, forces, jnp.asarray(turns), lift, ~valid)
 
-    return lax.cond(needed, by_events, lambda: nested)
+    return lax.cond(valid, lambda: nested, by_events)
 
 
 def nested_levels(

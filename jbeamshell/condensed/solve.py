@@ -14,7 +14,7 @@ from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import driven_by_displacement, exchanged, with_springs
 from jbeamshell.condensed.events import Level
 from jbeamshell.condensed.levels import levels, nested_levels
-from jbeamshell.condensed.strip import Strip, condensed, spring_stiffness
+from jbeamshell.condensed.strip import Strip, condensed, is_pressed_evenly, spring_stiffness
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.numerics.cycles import turning_points
@@ -49,7 +49,7 @@ def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False)
     Raises
     ------
     InputError
-        if the pressures leave a gap, or change along the path, or if a path of loads is traced
+        if the pressures lift the strip, or change along the path, or if a path of loads is traced
     """
     before = scene.load.pressure_steps
     unit = scene.load.unit_path()
@@ -61,11 +61,12 @@ def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False)
     fix = "must act wholly for model.rung = plane: take squeeze or p6 for changing pressures"
     require("path", "pressures", whole, fix)
     turns = np.zeros(known.size, bool)
-    turns[turning_points(np.append(0.0, known))[:-1]] = True
+    if known.size:
+        turns[turning_points(np.append(0.0, known))[:-1]] = True
     strip = _strip(scene)
     if not is_traced(strip):
-        down = bool(np.all(np.asarray(strip.body.r_0) > 0.0))
-        fix = "must press the strip down everywhere for model.rung = plane: take squeeze with w"
+        down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
+        fix = "must press the strip down for model.rung = plane"
         require("contact.pressure", scene.contact.pressure, down, fix)
     targets = jnp.asarray(path.target[before:])
     soft = not scene.ideal_friction
@@ -82,8 +83,9 @@ def _strip(scene: Scene) -> Strip:
 def _levels(
     scene: Scene, strip: Strip, targets: Array, turns: tuple[bool, ...], nested: bool, soft: bool
 ) -> Level:
-    """Levels after the pressing, unsettled where the pressures leave nodes open."""
+    """Levels after the pressing."""
     body, friction = strip.body, scene.contact.friction
+    lift = None if is_pressed_evenly(scene) else strip.lift
     if soft:
         body, springs = with_springs(body, spring_stiffness(scene, strip))
     if scene.load.control == "displacement":
@@ -91,15 +93,15 @@ def _levels(
     if nested or not turns:
         found, sound = nested_levels(body, friction, pressed(body), targets, turns)
     else:
-        found = levels(body, friction, pressed(body), targets, turns)
-        sound = jnp.asarray(True)
+        found = levels(body, friction, pressed(body), targets, turns, lift)
+        sound = jnp.all(jnp.isfinite(strip.lift))
     state = found.state
     if scene.load.control == "displacement":
         state = jax.vmap(exchanged)(state)
     if soft:
-        state = state._replace(v=jax.vmap(springs.slip)(state.v, found.lift, state.force))
-    settled = found.settled & sound & jnp.all(strip.body.r_0 > 0.0)
-    return found._replace(state=state, settled=settled)
+        risen = found.lift - strip.lift
+        state = state._replace(v=jax.vmap(springs.slip)(state.v, risen, state.force))
+    return found._replace(state=state, settled=found.settled & sound)
 
 
 @eqx.filter_jit
@@ -119,6 +121,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     settled = jnp.pad(strip.settled[::-1], (n - k, 0))
     driven = state.displacement if scene.load.control == "displacement" else state.force
     slip, w, force = along(state.v), along(levels.lift), every(state.force)
+    w = w.at[:before].set(part[:before, None] * strip.lift[::-1])
     v = slip + part[:, None] * settled
     given = jnp.zeros((part.size, 2 * n + 2)).at[:, 0:-2:2].set(v).at[:, 1:-2:2].set(w)
     given = given.at[:, -2].set(force).at[:, -1].set(part)

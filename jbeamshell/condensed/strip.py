@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jbeamshell.condensed.body import Body, Elimination, eliminate
+from jbeamshell.condensed.pressing import press as press_down
 from jbeamshell.mechanics import elements
 from jbeamshell.mechanics.homogeneous import plane_stiffness
 from jbeamshell.mechanics.layered import Material, layered_form
@@ -18,6 +19,7 @@ from jbeamshell.scene.scene import Scene
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
 PLANE_GROWTH = 0.3  # of the element size over the distance from there
 PLANE_FAR_SIZE = 0.15  # of L, elements away from it
+STEP_SIZE = 0.02  # of H, elements at a step of the pressure
 RULE = elements.element_rule("finite-difference")
 
 
@@ -31,7 +33,7 @@ class Strip(NamedTuple):
     elimination : what finds the fields above the contact again
     hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
     x, tributary, load : (n,) stations from the far end, contact lengths, forces of the top pressure
-    settled : (k,) tangential displacements under the pressures, without friction
+    settled, lift : (k,) tangential displacements and (n,) lifts under the pressures, frictionless
     """
 
     body: Body
@@ -42,6 +44,7 @@ class Strip(NamedTuple):
     tributary: Array
     load: Array
     settled: Array
+    lift: Array
 
 
 def condensed(scene: Scene, nodes: int) -> Strip:
@@ -56,7 +59,11 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
     w = slice(last + 1, None, -2)
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
-    settled = jnp.linalg.solve(k_tt, -press[v])
+    if is_pressed_evenly(scene):
+        lift, reaction = jnp.zeros_like(x), (down - up)[::-1]
+        settled = jnp.linalg.solve(k_tt, -press[v])
+    else:
+        lift, settled, reaction = press_down(k_tt, k_tn, hessian[w, w], press[v], press[w])
     body = Body(
         x=x[::-1],
         tributary=tributary[::-1],
@@ -65,10 +72,10 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         K_nn=hessian[w, w],
         f_t=-hessian[v, -2],
         f_n=-hessian[w, -2],
-        r_0=(down - up)[::-1] if is_pressed_evenly(scene) else press[w] + k_tn.T @ settled,
+        r_0=reaction,
         c=-hessian[-2, -2],
     )
-    return Strip(body, form, elimination, hessian, x, tributary, down, settled)
+    return Strip(body, form, elimination, hessian, x, tributary, down, settled, lift)
 
 
 def pressing(scene: Scene, x: Array) -> tuple[Array, Array]:
@@ -83,10 +90,17 @@ def is_pressed_evenly(scene: Scene) -> bool:
 
 
 def plane_stations(scene: Scene, nodes: int) -> Array:
-    """Stations (nodes,) along X for plane elasticity, dense at the singular loaded corner."""
+    """Stations (nodes,) along X, dense at the singular loaded corner and at steps of pressure."""
     length, half_height = scene.strip.length, scene.strip.half_height
-    grading = (PLANE_END_SIZE, None, PLANE_GROWTH, PLANE_FAR_SIZE)
-    return elements.vertices(nodes - 1, length, half_height, *grading)
+    if is_pressed_evenly(scene):
+        grading = (PLANE_END_SIZE, None, PLANE_GROWTH, PLANE_FAR_SIZE)
+        return elements.vertices(nodes - 1, length, half_height, *grading)
+    tables = [p for p in (scene.contact.pressure, scene.contact.bottom_pressure) if p.ndim]
+    steps = jnp.sort(jnp.concatenate([elements.table_steps(table, length) for table in tables]))
+    inside = jnp.append(steps < length, False)
+    sizes = jnp.where(inside, STEP_SIZE, PLANE_END_SIZE)
+    growths = jnp.where(inside, elements.GROWTH, PLANE_GROWTH)
+    return elements.vertices(nodes - 1, length, half_height, sizes, steps, growths, PLANE_FAR_SIZE)
 
 
 def spring_stiffness(scene: Scene, strip: Strip) -> Array:

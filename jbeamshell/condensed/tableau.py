@@ -135,7 +135,7 @@ def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tab
     row = at.rows[i] + jnp.where(slips, sigma * friction, 0.0) * at.rows[normal]
     row = row.at[-2].add(jnp.where(sticks, -slip, 0.0))
     rest = jnp.where(sticks, -at.sigma[tangential] * friction, 0.0)
-    rows = _exchanged(at.rows, i, row, rest, normal)
+    rows = exchanged_rows(at.rows, i, row, rest, normal)
     now = jnp.where(slips, sigma, jnp.where(sticks, 0.0, at.sigma[tangential]))
     opened = jnp.where(kind < OPEN, at.opened[node], kind == OPEN)
     return at._replace(
@@ -147,7 +147,7 @@ def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tab
     )
 
 
-def _exchanged(rows: Array, i: Array, row: Array, rest: Array, other: Array) -> Array:
+def exchanged_rows(rows: Array, i: Array, row: Array, rest: Array, other: Array) -> Array:
     """Rows with row and column ``i`` exchanged.
 
     ``row`` stands for row ``i``, and ``rest`` times the new row ``other`` is added to the new one.

@@ -89,9 +89,9 @@ def vertices(
     elements: int,
     length: ArrayLike,
     half_height: ArrayLike,
-    end_size: float = END_SIZE,
+    end_size: ArrayLike = END_SIZE,
     steps: Array | None = None,
-    growth: float = GROWTH,
+    growth: ArrayLike = GROWTH,
     far_size: float = FAR_SIZE,
 ) -> Array:
     """End points of the elements, graded towards X = L and towards steps of the pressure.
@@ -101,9 +101,10 @@ def vertices(
     elements : number of elements
     length : length L of the strip
     half_height : half height H
-    end_size : size of the smallest elements before scaling, over H
+    end_size : size of the smallest elements before scaling, over H; or (k + 1,) sizes at the steps
+        and at the loaded end
     steps : (k,) increasing positions X of the steps, in [0, L]; nodes need not lie on them
-    growth : growth of the element size with the distance from a focus, before scaling
+    growth : growth of the element size with the distance from a focus, before scaling; or (k + 1,)
     far_size : size of the largest elements before scaling, over L
 
     Returns
@@ -115,32 +116,34 @@ def vertices(
     >>> vertices(4, length=2.0, half_height=0.1)
     """
     length = jnp.asarray(length)
-    far, end = far_size * length, end_size * jnp.asarray(half_height)
-    rate = jnp.where(far >= end, growth, -growth)
+    foci = length[None] if steps is None else jnp.append(steps, length)
+    far = far_size * length
+    end = jnp.broadcast_to(jnp.asarray(end_size) * jnp.asarray(half_height), foci.shape)
+    rate = jnp.where(far >= end, jnp.asarray(growth), -jnp.asarray(growth))
     # The size is h(d) = end + rate d at the distance d from a focus, up to the size far.  So the
     # number of elements within d, int dd/h(d), is a logarithm and then a straight line.
     turn = (far - end) / rate
 
-    def count(distance: Array) -> Array:
-        near = jnp.minimum(distance, turn)
-        return jnp.log1p(rate * near / end) / rate + (distance - near) / far
+    def count(distance: Array, i: ArrayLike) -> Array:
+        near = jnp.minimum(distance, turn[i])
+        return jnp.log1p(rate[i] * near / end[i]) / rate[i] + (distance - near) / far
 
-    at_turn = count(turn)
+    at_turn = count(turn, np.arange(foci.size))
 
-    def reach(elements: Array) -> Array:
-        near = jnp.minimum(elements, at_turn)
-        return end * jnp.expm1(rate * near) / rate + far * (elements - near)
+    def reach(elements: Array, i: ArrayLike) -> Array:
+        near = jnp.minimum(elements, at_turn[i])
+        return end[i] * jnp.expm1(rate[i] * near) / rate[i] + far * (elements - near)
 
-    foci = length[None] if steps is None else jnp.append(steps, length)
     # Pieces run alternately towards a focus and away from one: from 0 to the first focus, from
     # there half way to the next focus, and so on.
     half_way = 0.5 * (foci[:-1] + foci[1:])
     edges = jnp.append(0.0, jnp.append(jnp.stack([foci[:-1], half_way], 1).ravel(), length))
-    counts = jnp.append(0.0, jnp.cumsum(count(jnp.diff(edges))))
+    pieces = np.arange(edges.size - 1)
+    counts = jnp.append(0.0, jnp.cumsum(count(jnp.diff(edges), pieces // 2)))
     target = counts[-1] * jnp.arange(elements + 1) / elements
     piece = jnp.clip(jnp.searchsorted(counts, target, side="right") - 1, 0, edges.size - 2)
-    away = edges[piece] + reach(target - counts[piece])
-    towards = edges[piece + 1] - reach(counts[piece + 1] - target)
+    away = edges[piece] + reach(target - counts[piece], piece // 2)
+    towards = edges[piece + 1] - reach(counts[piece + 1] - target, piece // 2)
     x = jnp.where(piece % 2 == 1, away, towards)
     return x.at[0].set(0.0).at[-1].set(length)
 

@@ -248,10 +248,6 @@ class TestHistory:
             ({"strip.curvature": 0.1}, "strip.curvature = 0.1: must be left out"),
             ({"contact.normal": "compliant"}, "contact.normal = 'compliant': must be rigid"),
             ({"load.amplitude": 2.5}, "load.amplitude = 2.5: must stay below gross slip"),
-            (
-                {"contact.pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 10.0], [2.0, 10.0]]},
-                "everywhere",
-            ),
         ],
     )
     def test_what_it_does_not_cover_is_refused(self, values, said):
