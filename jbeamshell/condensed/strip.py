@@ -19,7 +19,7 @@ from jbeamshell.scene.scene import Scene
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
 PLANE_GROWTH = 0.3  # of the element size over the distance from there
 PLANE_FAR_SIZE = 0.15  # of L, elements away from it
-STEP_SIZE = 0.02  # of H, elements at a step of the pressure
+STEP_SIZE = 0.05  # of H, elements at a step of the pressure
 RULE = elements.element_rule("finite-difference")
 
 
