@@ -292,7 +292,7 @@ class TestRung:
         np.testing.assert_allclose(moved.target, moved.displacement, rtol=1e-12)
         loose = {"load.amplitude": 1e-3, "strip.far_end": "free"}  # nothing but friction holds it
         beyond = plane(scene_of(0.1126), **few, **control | loose)
-        np.testing.assert_allclose(beyond.force[1], 2.0, rtol=1e-9)  # mu F_N L
+        np.testing.assert_allclose(beyond.force[1], 2.0, rtol=1e-8)  # mu F_N L
 
     def test_soft_sliders_make_the_strip_softer_and_keep_its_energy(self):
         few = {"model.nodes": 33, "load.steps_per_half_cycle": 8}
