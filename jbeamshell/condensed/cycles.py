@@ -182,6 +182,7 @@ def _first_loading(body: Body, friction: Array, sense: float) -> _FirstLoading:
     lifts = jnp.any(reaction < 0.0, axis=0)
     bad = jnp.any(early | backwards, axis=0) | lifts | jnp.append(lifts[1:], False)
     bad = bad.at[1:].set(bad[1:] | (steps <= 0.0) | (y_g <= 0.0))
+    bad = bad | jnp.any(body.r_0 <= 0.0)  # open under the pressures alone
     return _FirstLoading(y_g, inverse.T @ body.f_t, threshold, reaction, rate, upper, inverse, bad)
 
 

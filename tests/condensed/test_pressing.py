@@ -85,9 +85,9 @@ class TestReceding:
         assert float(history.tributary @ reaction) == pytest.approx(5000.0, rel=1e-9)
 
     def test_cycles_go_on_from_the_gap_and_energy_balances(self):
-        few = {"model.nodes": 65, "load.steps_per_half_cycle": 10}
+        few = {"model.nodes": 65, "load.steps_per_half_cycle": 40}
         history = jb.solve(library.receding_rough().replace(PLANE | few))
         assert history.converged
         assert np.ptp(history.contact_end[1:]) > 0.2  # friction moves the end of the contact
         assert abs(float(history.closure)) < 1e-9
-        assert float(history.dissipation_loop / history.dissipation) == pytest.approx(1.0, abs=2e-3)
+        assert float(history.dissipation_loop / history.dissipation) == pytest.approx(1.0, abs=1e-3)
