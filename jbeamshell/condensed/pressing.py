@@ -37,7 +37,14 @@ class Pressing(NamedTuple):
     reaction: Array
 
 
-def press(k_tt: Array, k_tn: Array, k_nn: Array, press_t: Array, press_n: Array) -> Pressing:
+def press(
+    k_tt: Array,
+    k_tn: Array,
+    k_nn: Array,
+    press_t: Array,
+    press_n: Array,
+    foundation: bool = True,
+) -> Pressing:
     """Pressing of a body without friction.
 
     First derivatives are exact: they are those of the contact that was found.
@@ -46,16 +53,20 @@ def press(k_tt: Array, k_tn: Array, k_nn: Array, press_t: Array, press_n: Array)
     ----------
     k_tt, k_tn, k_nn : (k, k), (k, n) and (n, n) stiffness
     press_t, press_n : (k,) and (n,) nodal forces of the base if nothing moved
+    foundation : False to leave the body without a base under pressures that balance; the last node
+        keeps its height
     """
     known = jnp.linalg.solve(k_tt, jnp.concatenate([k_tn, press_t[:, None]], axis=1))
     stiffness = k_nn - k_tn.T @ known[:, :-1]
     r_0 = press_n - k_tn.T @ known[:, -1]
-    opened, found = lax.stop_gradient(_open_nodes(stiffness, r_0))
+    opened, found = jnp.arange(r_0.size) < r_0.size - 1, jnp.asarray(True)
+    if foundation:
+        opened, found = lax.stop_gradient(_open_nodes(stiffness, r_0))
     both = opened[:, None] & opened
     matrix = jnp.where(both, stiffness, jnp.diag(jnp.diag(stiffness)))
     lift = jnp.where(opened, jnp.linalg.solve(matrix, jnp.where(opened, -r_0, 0.0)), 0.0)
     lift = jnp.where(found, lift, jnp.nan)
-    reaction = jnp.where(opened, 0.0, r_0 + stiffness @ lift)
+    reaction = jnp.where(opened | (not foundation), 0.0, r_0 + stiffness @ lift)
     return Pressing(lift, -known[:, -1] - known[:, :-1] @ lift, reaction)
 
 

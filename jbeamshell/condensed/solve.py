@@ -49,7 +49,8 @@ def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False)
     Raises
     ------
     InputError
-        if the pressures lift the strip, or change along the path, or if a path of loads is traced
+        if the pressures lift the strip or change along the path, if loads act on a strip without a
+        foundation, or if a path of loads is traced
     """
     before = scene.load.pressure_steps
     unit = scene.load.unit_path()
@@ -60,6 +61,9 @@ def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False)
     whole = is_traced(path.pressure) or bool(np.all(np.asarray(path.pressure)[before:] == 1.0))
     fix = "must act wholly for model.rung = plane: take squeeze or p6 for changing pressures"
     require("path", "pressures", whole, fix)
+    base = scene.contact.normal == "rigid" or not known.size
+    fix = "leaves model.rung = plane nothing but the pressures: set load.cycles = 0, or take p6"
+    require("contact.normal", scene.contact.normal, base, fix)
     turns = np.zeros(known.size, bool)
     if known.size:
         turns[turning_points(np.append(0.0, known))[:-1]] = True

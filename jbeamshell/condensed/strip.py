@@ -59,11 +59,13 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
     w = slice(last + 1, None, -2)
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
-    if is_pressed_evenly(scene):
+    based = scene.contact.normal == "rigid"
+    if is_pressed_evenly(scene) and based:
         lift, reaction = jnp.zeros_like(x), (down - up)[::-1]
         settled = jnp.linalg.solve(k_tt, -press[v])
     else:
-        lift, settled, reaction = press_down(k_tt, k_tn, hessian[w, w], press[v], press[w])
+        stiffness = k_tt, k_tn, hessian[w, w]
+        lift, settled, reaction = press_down(*stiffness, press[v], press[w], based)
     body = Body(
         x=x[::-1],
         tributary=tributary[::-1],

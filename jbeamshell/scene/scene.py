@@ -160,9 +160,9 @@ class Scene(eqx.Module):
         fix = "must be the sharp slider for model.rung = plane: leave contact.smoothing out, or "
         sharp = isinstance(law, SharpSlip)
         require("contact.law", law_name(law), sharp, f"{fix}take model.rung = p6")
-        rigid = self.contact.normal == "rigid"
+        known = self.contact.normal != "compliant"
         fix = "must be rigid for model.rung = plane: take model.rung = p6"
-        require("contact.normal", self.contact.normal, rigid, fix)
+        require("contact.normal", self.contact.normal, known, fix)
 
     def _check_contact(self) -> None:
         """Refuse a strip that nothing holds, and a load off the strip."""

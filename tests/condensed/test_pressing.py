@@ -67,6 +67,24 @@ class TestPress:
             np.testing.assert_allclose(getattr(slope, name), (up - down) / (2 * h), rtol=1e-5)
 
 
+class TestSqueezed:
+    def test_a_strip_squeezed_from_both_sides_is_in_tension_beyond(self):
+        """Filon's exact solution: 1.345 MPa at 1.285 H beyond the load."""
+        history = jb.solve(library.squeezed().replace(PLANE))
+        stress = np.asarray(history.squeeze_stress[0])
+        peak = int(np.argmax(stress))
+        assert stress[peak] == pytest.approx(1.345, rel=0.02)
+        assert float(history.middles[peak]) - 50.0 == pytest.approx(1.285, abs=0.1)
+        # Clapeyron: loads that do not change lose twice what the strip stores.
+        lost = -float(history.sinking[0])
+        assert float(history.stored_energy[0]) == pytest.approx(-0.5 * lost, rel=1e-9)
+
+    def test_loads_need_a_foundation(self):
+        moved = {"load.control": "displacement", "load.amplitude": 1e-3, "load.cycles": 1}
+        with pytest.raises(jb.InputError, match=r"contact\.normal = 'none'.*load\.cycles = 0"):
+            jb.solve(library.squeezed().replace(PLANE | moved))
+
+
 class TestReceding:
     def test_finite_elements_are_met(self):
         """Finite elements of the plane: .779, 103.12, 1.9858e-4; mean squeeze 101.78 and -.8901."""
