@@ -180,6 +180,20 @@ class TestEvents:
                 error = abs(float(jnp.sum(found.slip_work[-2:])) / row["D"] - 1.0)
                 assert error < (0.01 if row["ratio"] > 0.1 else 0.03), row
 
+    def test_dissipation_where_only_the_bottom_node_is_held(self):
+        """Converged finite elements on graded meshes: eta, A and 3.4e4 D of a steady cycle."""
+        cells = [
+            (0.1126, 0.3247, 0.0040246522),
+            (0.1126, 0.7855, 0.2450179),
+            (0.2358, 1.0, 0.29550153),
+            (0.4, 1.6, 1.4927397),
+        ]
+        for eta, amplitude, dissipated in cells:
+            body = STRIP(scene_of(eta).replace({"strip.far_end": "pinned"})).body
+            found = by_events(body, 0.1, amplitude)
+            work = 3.4e4 * float(jnp.sum(found.slip_work[-2:]))
+            assert work == pytest.approx(dissipated, rel=0.01), (eta, amplitude)
+
     def test_random_strips_that_lift_off(self):
         lifted = 0
         for row in rows("random_strips.csv")[::58]:
