@@ -149,16 +149,18 @@ def _unsteady(history: Run) -> tuple[str, ...]:
 def _resolution(history: Run) -> tuple[str, ...]:
     """Doubts about the slip zone's resolution by the grid."""
     grid, corner = map(float, dissipation_errors(jax.tree.map(np.asarray, history.slip_cycle)))
+    plane = history.scene.model.solution == "plane"  # it has a grid of its own
+    finer = "take more model.nodes" if plane else FINER
     if np.isinf(grid):
         return (
             "nothing slips in the last cycle: slip that is smaller than the elements would not be "
-            "seen; take a smaller model.end_size",
+            f"seen; {finer}",
         )
     found = []
     if grid > TOLERANCE:
-        found.append(f"{_off(grid)}: few nodes do the slipping; {FINER}")
+        found.append(f"{_off(grid)}: few nodes do the slipping; {finer}")
     if corner > TOLERANCE:
-        fix = "compare with a smaller model.end_size"
+        fix = "compare with more model.nodes" if plane else "compare with a smaller model.end_size"
         if "w" not in history.scene.model.fields:
             fix = "add w to model.fields and " + fix
         found.append(f"{_off(corner)}: the reaction gathers in the corner at the loaded end; {fix}")

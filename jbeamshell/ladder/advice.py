@@ -17,8 +17,8 @@ from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.history.linearisation import linear_error
 from jbeamshell.ladder import error_map
-from jbeamshell.ladder.candidates import CANDIDATES
-from jbeamshell.ladder.climb import Option, climb
+from jbeamshell.ladder.candidates import CANDIDATES, ORDERED
+from jbeamshell.ladder.climb import PLANE, Option, climb
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
 
@@ -85,7 +85,8 @@ def advise(
     Errors are relative to plane elasticity with ideal Coulomb friction.  For a homogeneous strip
     that is held at the far end, under one pressure and an end force, they come from a map of 512
     strips that were solved by finite elements and by every rung (eta .008 to .45, A .08 to 1.95
-    mu F_N a, mu .05 to .5, nu up to .45), within milliseconds.  Other scenes are solved on one rung
+    mu F_N a, mu .05 to .5, nu up to .45), within milliseconds.  Other scenes are solved as plane
+    elasticity and on the cheaper rungs, or, where plane elasticity has no such scene, on one rung
     after the other, which takes as long as compiling these does.
 
     Parameters
@@ -158,9 +159,11 @@ def _from_map(
     for name, error in errors.items():
         candidate = CANDIDATES[name]
         rotation_error = kinematic["p2" if candidate.section.startswith("p") else "squeeze"]
-        linear = rotation_error <= KINEMATIC_SHARE * tolerance
-        # A bar does not rotate, so it has linear kinematics only.
-        if not error_map.suits(candidate, scene) or (candidate.rung == "bar" and not linear):
+        linear = rotation_error <= KINEMATIC_SHARE * tolerance or candidate.rung == PLANE
+        # A bar does not rotate, so it has linear kinematics only, as plane elasticity has.
+        # Sections of order p are for rotations that matter: else plane elasticity is as cheap.
+        idle = candidate.rung == "bar" if not linear else candidate.section in ORDERED
+        if idle or not error_map.suits(candidate, scene):
             continue
         settings = candidate.settings | {"model.kinematics": "linear" if linear else "exact"}
         total = error + (rotation_error if linear else 0.0)

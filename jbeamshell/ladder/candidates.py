@@ -33,6 +33,8 @@ class Candidate(NamedTuple):
     @property
     def resolution(self) -> dict[str, Any]:
         """Dotted values of the grid and the load path."""
+        if self.rung == "plane":  # it has a grid of its own, and load steps make no error
+            return {"model.nodes": self.nodes, "load.steps_per_half_cycle": self.steps}
         # Coarse grids need their nodes at the loaded end.  On finer elements than these the
         # beamshell's point reaction there turns into tension.
         fine = self.nodes <= 41 or self.section.startswith("p")
@@ -48,18 +50,16 @@ class Candidate(NamedTuple):
         return {"model.rung": self.rung} | self.resolution
 
 
+ORDERED = ("p4", "p6")  # sections of order p
 _COARSE, _MIDDLE = [(41, 4), (41, 10)], [(81, 10)]
 _RESOLUTIONS = {
     "bar": [(41, 4)],
     "masing": _COARSE + _MIDDLE,
-    "masing-p2": _COARSE + _MIDDLE,
-    "masing-p3": _COARSE + _MIDDLE,
     "shell": _COARSE + _MIDDLE,
     "squeeze": [*_COARSE, *_MIDDLE, (161, 20)],
-    "p2": _COARSE + _MIDDLE,
-    "p3": _COARSE + _MIDDLE,
     "p4": _COARSE + _MIDDLE,
-    "p6": [*_COARSE, *_MIDDLE, (161, 10)],
+    "p6": [*_MIDDLE, (161, 10)],
+    "plane": [(65, 4), (129, 4), (257, 4)],
 }
 CANDIDATES = {
     candidate.name: candidate

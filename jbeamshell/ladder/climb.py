@@ -1,8 +1,8 @@
 """Climb of the ladder: errors of the rungs from solving a scene off the map on each of them.
 
-The error of a rung is its difference from the highest rung that was solved, plus the last change
-for the rungs beyond.  The error of a grid and a load path is the change when both are halved.  The
-errors of rungs that a scene does not have stay unknown: a laminate has no section of order p.
+Where a scene can be solved as plane elasticity, the error of a rung is its difference from that.
+Elsewhere it is the difference from the highest rung that was solved, plus the last change for the
+rungs beyond; the error of a grid and a load path is then the change when both are halved.
 """
 
 from __future__ import annotations
@@ -17,11 +17,14 @@ import numpy as np
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import DoubtfulWarning, InputError, UnconvergedError
+from jbeamshell.history.linearisation import linear_error
 from jbeamshell.mechanics.elements import ORDER
 from jbeamshell.quasistatic.solver import compile_for, solve
 from jbeamshell.scene.load_path import check
+from jbeamshell.scene.rungs import PLANE_NODES
 from jbeamshell.scene.scene import Scene
 
+PLANE = "plane"
 UPWARDS = ("squeeze", "p2", "p3", "p4", "p6")
 CHEAP = ("bar", "masing", "shell")
 LEAST_NODES = 11
@@ -63,6 +66,8 @@ def climb(
     note : rungs that were solved, and errors that are not included
     """
     runs = _Runs(scene, quantity, tell)
+    if runs.has(PLANE):
+        return _against_elasticity(runs), "solved as plane elasticity"
     climbed, change = _climbed(runs, tolerance)
     lowest, highest = climbed[0], climbed[-1]
     note = f"solved on {', '.join(climbed)}"
@@ -82,6 +87,21 @@ def climb(
     return options, note
 
 
+def _against_elasticity(runs: _Runs) -> list[Option]:
+    """Options of a scene that can be solved as plane elasticity."""
+    best = runs.value(PLANE, finely=True)
+    grid = _off(runs.value(PLANE), best)  # the error falls at least as the nodes double
+    linear = linear_error(runs.scene_on(PLANE))
+    options = []
+    for rung in filter(runs.has, ("bar", "shell", "squeeze")):
+        error = _off(runs.value(rung), best) + grid
+        options.append(Option(rung, runs.settings(rung), error, runs.ms(rung, False)))
+    for finely, grids in ((False, 2.0), (True, 1.0)):
+        error, ms = grids * grid + linear, runs.ms(PLANE, finely)
+        options.append(Option(PLANE, runs.settings(PLANE, finely), error, ms))
+    return options
+
+
 class _Runs:
     """Runs of a scene on rungs with a coarse or a fine grid, each solved when it is first used."""
 
@@ -92,12 +112,18 @@ class _Runs:
 
     def settings(self, rung: str, finely: bool = False) -> dict[str, Any]:
         """Dotted values of the model."""
+        if rung == PLANE:
+            return {"model.rung": rung, "model.nodes": PLANE_NODES * (2 if finely else 1)}
         return {"model.rung": rung} | self._resolutions[finely]
+
+    def scene_on(self, rung: str) -> Scene:
+        """Scene on a rung."""
+        return self._scene.replace(self.settings(rung))
 
     def has(self, rung: str) -> bool:
         """True if the scene can be solved on a rung."""
         try:
-            check(self._scene.replace(self.settings(rung)))
+            check(self.scene_on(rung))
         except InputError:
             return False
         return True

@@ -17,7 +17,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.toml import scene_from_values, scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
-from jbeamshell.sweeping.runner import BLOCK, Block, Runner, width_of_chunks
+from jbeamshell.sweeping.runner import BLOCK, Block, Runner, shared_keys, width_of_chunks
 from jbeamshell.sweeping.store import Store
 
 BLOCKS = 32  # least number of blocks of a large sweep, for equal shares of all processes
@@ -63,13 +63,12 @@ class Job:
     def blocks(self) -> list[np.ndarray]:
         """Flat numbers of the lanes of every block, without those outside the domain.
 
-        Lanes are sorted by difficulty and cut into chunks.  Every block gets chunks of all
-        difficulties, so that all blocks cost the same.
+        Lanes are sorted by difficulty, or by what those of a chunk must share, and cut into
+        chunks.  Every block gets chunks of all ranks, so that all blocks cost about the same.
         """
         inside = np.flatnonzero(~self.outside)
-        hardness = self.lanes.difficulty.ravel()[inside]
-        order = inside[np.argsort(hardness, kind="stable")]
-        width = width_of_chunks(self.lanes.scene)
+        order = inside[np.argsort(self._rank[inside], kind="stable")]
+        width = width_of_chunks(self.lanes.scene, tuple(self.lanes.axes))
         chunks = -(-order.size // width)
         least = -(-LEAST // width)
         largest = min(max(-(-chunks // BLOCKS), least), BLOCK // width)
@@ -79,6 +78,15 @@ class Job:
             (np.arange(b, chunks, count)[:, None] * width + rows).ravel() for b in range(count)
         )
         return [order[n[n < order.size]] for n in numbers]
+
+    @property
+    def _rank(self) -> np.ndarray:
+        """Rank of every lane in the order in which chunks are cut, (lanes,)."""
+        shared = shared_keys(self.lanes.scene, tuple(self.lanes.axes))
+        if not shared:
+            return self.lanes.difficulty.ravel()
+        columns = self.lanes.columns(np.arange(self.lanes.size))[shared]
+        return np.unique(columns, axis=1, return_inverse=True)[1].ravel()
 
     def runner(self, devices: Sequence[Any] | None = None) -> Runner:
         """Runner with the model of this sweep, to be compiled."""
@@ -152,6 +160,7 @@ class Job:
                 "out, processes: a scene with a function of your own cannot be put on disk: "
                 "sweep it without them and write the table with to_csv"
             )
+        width = width_of_chunks(self.lanes.scene, tuple(self.lanes.axes))
         about = {
             "version": version("jbeamshell"),
             "scene": self.scene,
@@ -160,7 +169,7 @@ class Job:
             "figures": list(self.figures),
             "dtype": self.dtype.name,
             "solver": None if self.solver is None else dataclasses.asdict(self.solver),
-            "layout": [BLOCKS, BLOCK, LEAST, width_of_chunks(self.lanes.scene)],
+            "layout": [BLOCKS, BLOCK, LEAST, width],
         }
         return json.dumps(about)
 

@@ -28,6 +28,9 @@ from jbeamshell.sweeping.lanes import Outcome
 ABREAST = 32  # lanes of a chunk on a core, if slip patterns are iterated side by side
 BLOCK = 1024  # lanes of the largest block, for which the program is compiled
 KEPT = 4  # compiled models of scenes that are kept
+PER_LANE = ("load.amplitude", "contact.friction", "contact.pressure")
+"""Numbers in which lanes of one chunk may differ on the rung ``plane``, whose condensed body is the
+same for all of them."""
 
 Answers = Callable[..., dict[str, Array]]
 _known: dict[str, Answers] = {}
@@ -46,16 +49,41 @@ class Block(NamedTuple):
     status: np.ndarray
 
 
-def width_of_chunks(scene: Scene) -> int:
+def width_of_chunks(scene: Scene, keys: Sequence[str]) -> int:
     """Number of lanes that advance together.
 
     On a GPU it is a whole block.  On a core it is `ABREAST` if only slip patterns are iterated,
-    because vector instructions then run over the lanes.  Otherwise each lane runs alone: a wide
-    chunk would wait for its slowest lane, and vector instructions run over the nodes.
+    because vector instructions then run over the lanes, and if lanes share a condensed body.
+    Otherwise each lane runs alone: a wide chunk would wait for its slowest lane, and vector
+    instructions run over the nodes.
     """
+    if scene.model.solution == "plane":
+        return ABREAST if any(key in PER_LANE for key in keys) else 1
     if jax.default_backend() != "cpu":
         return BLOCK
     return ABREAST if slip_patterns.applies(scene) else 1
+
+
+def shared_keys(scene: Scene, keys: Sequence[str]) -> list[int]:
+    """Places of the keys whose numbers all lanes of a chunk share."""
+    if scene.model.solution != "plane":
+        return []
+    return [place for place, key in enumerate(keys) if key not in PER_LANE]
+
+
+def places_in_chunks(shared: np.ndarray, width: int) -> np.ndarray:
+    """Place of every lane in chunks laid end to end, (lanes,); a chunk shares some numbers.
+
+    Parameters
+    ----------
+    shared : (keys, lanes) numbers that are the same in all lanes of a chunk
+    width : lanes of a chunk
+    """
+    lanes = np.arange(shared.shape[1])
+    begins = np.append(True, np.any(shared[:, 1:] != shared[:, :-1], axis=0))
+    inside = lanes - np.maximum.accumulate(np.where(begins, lanes, 0))
+    chunk = np.cumsum(inside % width == 0) - 1
+    return chunk * width + inside % width
 
 
 def check_figures(
@@ -100,10 +128,12 @@ class Runner:
         self.scene, self.keys, self.figures = scene, tuple(keys), tuple(figures)
         self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
         self.devices = list(devices or jax.local_devices())
-        self.width = width_of_chunks(scene)
+        self.width = width_of_chunks(scene, self.keys)
         self._mesh = Mesh(np.array(self.devices), "lanes")
         ask = _ask(scene, self.keys, self.figures, solver, Method.UNCHECKED_STATUS_ITERATION)
-        self._about = ask, self.figures, self._shape, self.dtype, self._mesh
+        self._shared = shared_keys(scene, self.keys)
+        axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
+        self._about = ask, axes, self.figures, self._shape, self.dtype, self._mesh
 
     def lower(self) -> None:
         """Trace the model, the part of compilation that no cache on disk saves."""
@@ -117,24 +147,26 @@ class Runner:
         """Blocks of batches of lanes, (keys, lanes) each; at most one batch for every device."""
         found = jax.device_get(self._answers(batches))
         for device, columns in enumerate(batches):
-            lanes = columns.shape[1]
-            values, status = (f[device].reshape(*f.shape[1:-2], -1)[..., :lanes] for f in found)
+            places = places_in_chunks(columns[self._shared], self.width)
+            values, status = (f[device].reshape(*f.shape[1:-2], -1)[..., places] for f in found)
             block = Block(np.array(values), status.astype(np.int8))
             self._mend(columns, block)
             yield block
 
     @property
     def _shape(self) -> tuple[int, int, int, int]:
-        return len(self.devices), len(self.keys), BLOCK // self.width, self.width
+        chunks = BLOCK if self._shared else BLOCK // self.width  # each lane may need its own
+        return len(self.devices), len(self.keys), chunks, self.width
 
     def _answers(self, batches: Sequence[np.ndarray]) -> tuple[Array, Array]:
         # Chunks without lanes are not computed; a part-filled chunk repeats its last lane.
         filled, counts = np.ones(self._shape, self.dtype), np.zeros(len(self.devices), np.int32)
         for device, columns in enumerate(batches):
-            counts[device] = -(-columns.shape[1] // self.width)
-            padding = counts[device] * self.width - columns.shape[1]
-            padded = np.pad(columns, ((0, 0), (0, padding)), mode="edge")
-            filled[device, :, : counts[device]] = padded.reshape(len(self.keys), -1, self.width)
+            places = places_in_chunks(columns[self._shared], self.width)
+            counts[device] = places[-1] // self.width + 1
+            last = np.searchsorted(places, np.arange(counts[device] * self.width), "right") - 1
+            repeated = columns[:, last].reshape(len(self.keys), -1, self.width)
+            filled[device, :, : counts[device]] = repeated
         return _compiled(*self._about)(*jax.device_put((filled, counts), _spread(self._mesh)))
 
     def _mend(self, columns: np.ndarray, block: Block) -> None:
@@ -192,7 +224,12 @@ def _compiled(*about: Any) -> Any:
 
 @functools.lru_cache(KEPT)
 def _lowered(
-    ask: Answers, figures: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype, mesh: Mesh
+    ask: Answers,
+    axes: tuple[int | None, ...],
+    figures: tuple[str, ...],
+    shape: tuple[int, ...],
+    dtype: np.dtype,
+    mesh: Mesh,
 ) -> Any:
     """Program, traced but not compiled, that runs one block on every device.
 
@@ -202,8 +239,10 @@ def _lowered(
     """
 
     def chunk(lanes: Array) -> tuple[Array, Array]:
-        answer = jax.vmap(ask)(*lanes) if lanes.shape[-1] > 1 else ask(*lanes[:, 0])
-        last = [answer[name].reshape(lanes.shape[-1], -1)[:, -1] for name in figures]
+        width = lanes.shape[-1]
+        numbers = [row if axis == 0 else row[0] for row, axis in zip(lanes, axes, strict=True)]
+        answer = jax.vmap(ask, axes)(*numbers) if width > 1 else ask(*lanes[:, 0])
+        last = [answer[name].reshape(width, -1)[:, -1] for name in figures]
         return jnp.stack(last), answer["status"].astype(jnp.int32)
 
     def block(lanes: Array, count: Array) -> tuple[Array, Array]:

@@ -53,7 +53,7 @@ def name_of(advice):
 def test_every_candidate_is_on_the_map():
     known = error_map.load()
     assert set(CANDIDATES) == set(known.ratios) == set(known.linear_ms)
-    assert {c.rung for c in CANDIDATES.values()} == set(known.exact_over_linear)
+    assert {c.rung for c in CANDIDATES.values()} - {"plane"} == set(known.exact_over_linear)
     for name, candidate in CANDIDATES.items():
         assert candidate.name == name
         assert STRIP.replace(candidate.settings).model.rung == candidate.rung
@@ -63,26 +63,21 @@ def test_every_candidate_is_on_the_map():
 def test_the_error_is_within_the_tolerance(others, tolerance):
     """On 300 strips, uniform and log-uniform over the map's domain, that it was not made from."""
     strips, record = others
-    errors, costs, refused = [], [], []
+    errors, costs = [], []
     for row, ratios in strips:
         advice = jb.advise(scene_of(row), tolerance)
-        if advice.rung == "none":
-            refused.append(min(abs(ratio - 1.0) for ratio in ratios.values()))
-            continue
+        assert advice.rung != "none"
         assert advice.estimated_error <= tolerance
         errors.append(abs(ratios[name_of(advice)] - 1.0))
-        costs.append(record["linear_ms"][MOST_ACCURATE] / record["linear_ms"][name_of(advice)])
+        costs.append(record["linear_ms"][name_of(advice)])
     within = np.mean(np.array(errors) <= tolerance)
     print(
-        f"tolerance {tolerance}: {len(errors)} advised, {100.0 * within:.1f} % within, worst "
-        f"{max(errors):.4f}; {np.median(costs):.0f} times cheaper in the median; {len(refused)} "
-        f"refused, of which {np.mean(np.array(refused) <= tolerance):.2f} needlessly"
+        f"tolerance {tolerance}: {100.0 * within:.1f} % within, worst {max(errors):.4f}; "
+        f"{np.median(costs):.1f} ms in the median"
     )
-    assert within >= 0.95
-    # Refusing all would be within any tolerance: few may be refused that a candidate would solve.
-    assert np.sum(np.array(refused) <= tolerance) < 0.2 * len(strips)
+    assert within >= 0.98
     if tolerance == 0.05:
-        assert np.median(costs) >= 20.0
+        assert np.median(costs) <= record["linear_ms"][MOST_ACCURATE] / 20.0
 
 
 def test_masing_is_not_advised_where_it_fails(others):
@@ -105,19 +100,13 @@ def test_a_coarser_tolerance_is_never_dearer():
     assert times[-1] < times[0]
 
 
-def test_thin_bars_need_no_more_than_the_bar_and_corners_need_finite_elements():
+def test_thin_bars_need_no_more_than_the_bar_and_corners_need_plane_elasticity():
     thin = STRIP.replace({"strip.height_ratio": 0.01, "load.amplitude": 1.5})
     assert jb.advise(thin, 0.01).rung == "bar"
     thick = STRIP.replace({"strip.height_ratio": 0.4, "load.amplitude": 0.3})
     advice = jb.advise(thick, 0.2)
-    assert advice.rung == "none"
-    assert advice.settings == {}
-    assert advice.estimated_error > 0.2
-    assert "none of these: use finite elements" in str(advice)
-    with pytest.raises(
-        jb.InputError, match=r"tolerance = 0\.2: none of these: use finite elements"
-    ):
-        jb.solve(thick, tolerance=0.2)
+    assert advice.rung == "plane"
+    assert jb.solve(thick, tolerance=0.2).scene.model.rung == "plane"
 
 
 def test_solve_takes_the_advice():
@@ -181,26 +170,24 @@ def test_traced_scenes_get_no_advice():
 
 
 @pytest.mark.slow
-def test_a_laminate_climbs_what_it_has(monkeypatch):
+def test_a_laminate_is_compared_with_plane_elasticity():
     """Two equal layers are a homogeneous strip, whose rungs' errors the map knows."""
     own = {"model.nodes": 41, "load.steps_per_half_cycle": 8, "load.cycles": 1}
     height = 0.1126
     modulus = 3.4e4 / (2.0 * height) * (1.0 - 0.3**2)
     layers = {"strip.layers": [[height, modulus, 0.3], [height, modulus, 0.3]]}
     told = []
-    module = import_module("jbeamshell.ladder.climb")
-    monkeypatch.setattr(module, "CHEAP", ("shell",))  # each of them compiles
     advice = jb.advise(STRIP.replace(own | layers), 0.2, tell=told.append)
-    assert "off the map for layers; solved on squeeze; the scene has no rung above" in advice.basis
-    assert {option.rung for option in advice.considered} == {"shell", "squeeze"}
+    assert "off the map for layers; solved as plane elasticity" in advice.basis
+    assert {option.rung for option in advice.considered} == {"shell", "squeeze", "plane"}
     shell = min(o.error for o in advice.considered if o.rung == "shell")
     assert 0.08 < shell < 0.14  # as by the map
-    assert told[0] == "squeeze on 21 nodes"
+    assert told[0] == "plane on 258 nodes"
 
 
 def test_a_figure_that_the_scene_lacks():
     scene = STRIP.replace({"model.nodes": 21, "load.steps_per_half_cycle": 4, "load.cycles": 1})
-    told = "quantity = 'damping': figures of this scene are closure, dissipation"
+    told = "quantity = 'damping': figures of this scene are closure, .*dissipation"
     with pytest.raises(jb.InputError, match=told):
         jb.advise(scene, 0.1, quantity="damping")
 

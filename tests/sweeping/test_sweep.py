@@ -364,3 +364,23 @@ def test_a_model_of_ones_own_is_not_kept_on_disk():
     with pytest.raises(InputError, match="without them and write the table with to_csv"):
         job.Job(lanes_of(scene, OVER), FIGURES).description()
     assert runner._ask(scene, tuple(OVER), FIGURES, None) not in runner._known.values()
+
+
+def test_chunks_hold_lanes_that_share_what_they_must():
+    shared = np.array([[1, 1, 1, 1, 1, 2, 2, 3]])
+    np.testing.assert_array_equal(runner.places_in_chunks(shared, 3), [0, 1, 2, 3, 4, 6, 7, 9])
+    np.testing.assert_array_equal(runner.places_in_chunks(shared[:0], 3), np.arange(8))
+
+
+def test_lanes_of_plane_elasticity_share_their_bodies():
+    """A grid whose heights share a body, beside the same strips paired at random."""
+    plane = {"model.rung": "plane", "model.nodes": 17, "load.steps_per_half_cycle": 1}
+    scene = jb.Scene().replace(plane)
+    over = {"load.amplitude": [0.4, 0.8, 1.2], "strip.height_ratio": [0.05, 0.1]}
+    grid = jb.sweep(scene, over, ["dissipation"])
+    order = np.random.default_rng(0).permutation(6)
+    pairs = np.array(np.meshgrid(*over.values(), indexing="ij")).reshape(2, -1)[:, order]
+    mixed = jb.sweep(scene, dict(zip(over, pairs, strict=True)), ["dissipation"], paired=True)
+    np.testing.assert_allclose(mixed["dissipation"], grid["dissipation"].ravel()[order], rtol=1e-12)
+    alone = jb.solve(scene.replace({"load.amplitude": 1.2, "strip.height_ratio": 0.05}))
+    np.testing.assert_allclose(grid["dissipation"][2, 0], alone.dissipation, rtol=1e-8)
