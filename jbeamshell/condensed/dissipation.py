@@ -15,6 +15,7 @@ from jbeamshell.condensed.drives import with_springs
 from jbeamshell.condensed.solve import solve
 from jbeamshell.condensed.strip import condensed, spring_stiffness
 from jbeamshell.scene.load_path import check
+from jbeamshell.scene.rungs import PLANE_NODES
 from jbeamshell.scene.scene import Scene
 
 NODES = 49  # 1 % of elasticity where D exceeds a tenth of the bar's cubic law, 3 % down to 1e-4
@@ -59,7 +60,8 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
     check(scene.replace({"load.amplitude": np.max(sizes, initial=0.0)}))
     for i in np.flatnonzero(np.isnan(works)):
         steady = {"load.amplitude": sizes[i], "load.cycles": CYCLES, "load.steps_per_half_cycle": 1}
-        lone = scene.replace(steady)
+        # Events leave steps of whole elements in D, which this many nodes make small.
+        lone = scene.replace(steady | {"model.nodes": max(nodes, PLANE_NODES)})
         history = solve(lone, *check(lone))
         if not history.converged:
             raise UnconvergedError(f"amplitudes = {sizes[i]:.6g}: its events come to no end")

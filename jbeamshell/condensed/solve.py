@@ -13,7 +13,7 @@ from jbeamshell.common.errors import Status
 from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import driven_by_displacement, exchanged, with_springs
 from jbeamshell.condensed.events import Level
-from jbeamshell.condensed.levels import levels, nested_levels
+from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
 from jbeamshell.condensed.strip import Strip, condensed, is_pressed_evenly, spring_stiffness
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
@@ -24,7 +24,9 @@ from jbeamshell.scene.scene import Scene
 Cycles = tuple[tuple[int, int, int], ...]
 
 
-def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False) -> History:
+def solve(
+    scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False, own: bool = True
+) -> History:
     """Press a strip of plane elasticity down and walk a load path.
 
     Between the events at which a node starts to slip, sticks, opens or closes everything is linear
@@ -36,9 +38,10 @@ def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False)
     ----------
     scene : scene with the rung ``plane``; may be traced
     path, cycles : whole path of the scene and its closed cycles, see
-        `jbeamshell.scene.load_path.check`; its turns are not traced
+        `jbeamshell.scene.load_path.check`
     nested : True to take factors alone, whose steps are marked unconverged where slip zones are not
         nested; False walks such paths event by event
+    own : True if the loads are the scene's own cycles, whose turns are always known
 
     Returns
     -------
@@ -53,29 +56,30 @@ def solve(scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False)
         foundation, or if a path of loads is traced
     """
     before = scene.load.pressure_steps
-    unit = scene.load.unit_path()
-    own = is_traced(path.target) and path.target.size == before + unit.size
-    fix = "give plain numbers for model.rung = plane"
-    require("path", "traced", own or not is_traced(path.target), fix)
-    known = unit if own else np.asarray(path.target)[before:]
     whole = is_traced(path.pressure) or bool(np.all(np.asarray(path.pressure)[before:] == 1.0))
     fix = "must act wholly for model.rung = plane: take squeeze or p6 for changing pressures"
     require("path", "pressures", whole, fix)
-    base = scene.contact.normal == "rigid" or not known.size
-    fix = "leaves model.rung = plane nothing but the pressures: set load.cycles = 0, or take p6"
-    require("contact.normal", scene.contact.normal, base, fix)
-    turns = np.zeros(known.size, bool)
-    if known.size:
-        turns[turning_points(np.append(0.0, known))[:-1]] = True
+    targets = jnp.asarray(path.target[before:])
+    turns = _turns(scene, targets, own)
     strip = _strip(scene)
     if not is_traced(strip):
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
         fix = "must press the strip down for model.rung = plane"
         require("contact.pressure", scene.contact.pressure, down, fix)
-    targets = jnp.asarray(path.target[before:])
     soft = not scene.ideal_friction
-    found = _levels(scene, strip, targets, tuple(turns.tolist()), nested, soft)
+    found = _levels(scene, strip, targets, turns, nested, soft)
     return _history(scene, strip, found, cycles, soft)
+
+
+def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
+    """True for each level before which the load has turned; an array if the loads are traced."""
+    known = scene.load.unit_path() if own else targets
+    if is_traced(known):
+        return turns_of(targets)
+    turns = np.zeros(known.size, bool)
+    if known.size:
+        turns[turning_points(np.append(0.0, known))[:-1]] = True
+    return tuple(turns.tolist())
 
 
 @eqx.filter_jit
@@ -85,7 +89,7 @@ def _strip(scene: Scene) -> Strip:
 
 @eqx.filter_jit
 def _levels(
-    scene: Scene, strip: Strip, targets: Array, turns: tuple[bool, ...], nested: bool, soft: bool
+    scene: Scene, strip: Strip, targets: Array, turns: Turns, nested: bool, soft: bool
 ) -> Level:
     """Levels after the pressing."""
     body, friction = strip.body, scene.contact.friction
@@ -94,7 +98,7 @@ def _levels(
         body, springs = with_springs(body, spring_stiffness(scene, strip))
     if scene.load.control == "displacement":
         body = driven_by_displacement(body)
-    if nested or not turns:
+    if nested or not targets.size:
         found, sound = nested_levels(body, friction, pressed(body), targets, turns)
     else:
         found = levels(body, friction, pressed(body), targets, turns, lift)

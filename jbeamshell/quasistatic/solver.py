@@ -87,7 +87,7 @@ def solve(
     if scene.model.solution == "plane":
         found = "is found from the pressures for model.rung = plane: leave it out"
         require("contact", "given", contact is None, found)
-        return _plane(scene, whole, cycles, throw, method)
+        return _plane(scene, whole, cycles, throw, method, path is None)
     touching = None if contact is None else check_contact(scene, contact)
     method = method or _first_method(scene, whole)
     steps, history = _solve(scene, touching, whole, solver, method, np.asarray(True))
@@ -112,18 +112,23 @@ def solve(
 
 
 def _plane(
-    scene: Scene, path: LoadPath, cycles: Cycles, throw: bool, method: Method | None
+    scene: Scene,
+    path: LoadPath,
+    cycles: Cycles,
+    throw: bool,
+    method: Method | None,
+    own: bool,
 ) -> History:
     """History of plane elasticity, first from factors alone unless derivatives may be taken."""
     traced = is_traced(scene, path, jnp.zeros(()))
     events = method is Method.NEWTON or (traced and method is None)
-    history = solve_plane(scene, path, cycles, nested=not events)
+    history = solve_plane(scene, path, cycles, nested=not events, own=own)
     if traced:
         failed, fix = history.status[-1] != Status.CONVERGED, "take other model.nodes"
         message = f"the events of a load step come to no end: {fix}"
         return eqx.error_if(history, failed, message) if throw else history
     if not history.converged:
-        history = solve_plane(scene, path, cycles)
+        history = solve_plane(scene, path, cycles, own=own)
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
         load = float(path.target[step])
@@ -141,7 +146,7 @@ def compile_for(
     """Compile the programs that `solve` needs; only the cheap rung ``plane`` is solved for it."""
     whole, cycles = whole_path(scene, path)
     if scene.model.solution == "plane":
-        _plane(scene, whole, cycles, False, None)
+        _plane(scene, whole, cycles, False, None, path is None)
         return
     method = _first_method(scene, whole)
     compiled = _solve(scene, None, whole, solver or Newton(), method, np.asarray(False))

@@ -148,7 +148,7 @@ class TestBranches:
         assert not np.any(by_factors(body, 0.5, 1.0).valid)
 
     def test_what_is_not_nested_is_walked_event_by_event(self):
-        steady = {"load.steps_per_half_cycle": 1, "model.nodes": 33}
+        steady = {"load.steps_per_half_cycle": 1}
         history = plane(scene_of(0.1126, mu=0.5), **steady)
         found = condensed.dissipation(history.scene, [1.0], nodes=33)
         np.testing.assert_allclose(found, [history.dissipation], rtol=1e-12)
@@ -318,3 +318,24 @@ class TestRung:
         for history in (ideal, soft):
             imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
             assert imbalance < 0.05  # trapezoids of the work over 8 steps a branch
+
+    def test_a_traced_path_is_the_path(self):
+        scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 17})
+        loads = np.array([0.5, 1.0, 0.4, -0.3, -0.8, -0.8, 0.1, 1.0])
+        run = jb.solve(scene, loads)
+        traced = jax.jit(lambda path: jb.solve(scene, path, throw=False))(loads)
+        assert not np.any(traced.status)
+        for name in ("displacement", "slip_work", "traction"):
+            known = getattr(run, name)
+            close = 1e-9 * np.abs(known).max()
+            np.testing.assert_allclose(getattr(traced, name), known, atol=close)
+
+    @pytest.mark.slow
+    def test_a_fit_finds_planted_parameters(self):
+        few = {"model.rung": "plane", "model.nodes": 49, "load.steps_per_half_cycle": 10}
+        scene = jb.Scene().replace(few)
+        planted = {"contact.friction": 0.12, "strip.height_ratio": 0.09}
+        loop = jb.measured.make_loop(*map(np.asarray, jb.solve(scene.replace(planted)).loop))
+        found = jb.identify.fit(loop, scene, list(planted))
+        for key, value in planted.items():
+            assert found.values[key] == pytest.approx(value, rel=2e-3)
