@@ -29,6 +29,7 @@ RUNG_LOOKS: dict[str, tuple[str, str]] = {
     "p3": ("#0072B2", "P"),
     "p4": ("#009E73", "X"),
     "p6": ("#332288", "*"),
+    "plane": ("#117733", "h"),
 }
 OTHER = (FAINT, "o")
 FINITE_ELEMENTS = {"CalculiX": "H", "condensed": ">"}
