@@ -34,14 +34,22 @@ def test_the_answer_in_words(cli):
     assert "model.rung = bar" in out
 
 
-def test_none_of_these(cli):
+def test_a_thick_corner_takes_plane_elasticity(cli):
     thick = ("--set", "strip.height_ratio=0.4", "--set", "load.amplitude=0.3")
     code, out, _ = cli("advise", "--json", *thick)
+    assert (code, json.loads(out)["rung"]) == (0, "plane")
+
+
+def test_none_of_these(cli):
+    """A strip so soft that it rotates, and so thick that no rung that rotates is good enough."""
+    soft = {"strip.height_ratio": 0.4, "load.amplitude": 0.3, "strip.axial_stiffness": 400}
+    values = [word for key, value in soft.items() for word in ("--set", f"{key}={value}")]
+    code, out, _ = cli("advise", "--json", *values)
     told = json.loads(out)
     assert code == 0
     assert told["rung"] == "none"
     assert told["advice"] == "none of these: use finite elements"
-    code, out, err = cli("run", "--tol", "0.05", *thick)
+    code, out, err = cli("run", "--tol", "0.05", *values)
     assert (code, out) == (2, "")
     assert err.startswith("jbeamshell: tolerance = 0.05: none of these: use finite elements")
 
