@@ -118,21 +118,25 @@ def vertices(
     length = jnp.asarray(length)
     foci = length[None] if steps is None else jnp.append(steps, length)
     far = far_size * length
-    end = jnp.broadcast_to(jnp.asarray(end_size) * jnp.asarray(half_height), foci.shape)
+    end = jnp.asarray(end_size) * jnp.asarray(half_height)
     rate = jnp.where(far >= end, jnp.asarray(growth), -jnp.asarray(growth))
     # The size is h(d) = end + rate d at the distance d from a focus, up to the size far.  So the
     # number of elements within d, int dd/h(d), is a logarithm and then a straight line.
     turn = (far - end) / rate
 
+    def at(values: Array, i: ArrayLike) -> Array:
+        # Where all foci are alike nothing is gathered: programs then agree on x to the last bit.
+        return values[i] if values.ndim else values
+
     def count(distance: Array, i: ArrayLike) -> Array:
-        near = jnp.minimum(distance, turn[i])
-        return jnp.log1p(rate[i] * near / end[i]) / rate[i] + (distance - near) / far
+        slope, near = at(rate, i), jnp.minimum(distance, at(turn, i))
+        return jnp.log1p(slope * near / at(end, i)) / slope + (distance - near) / far
 
     at_turn = count(turn, np.arange(foci.size))
 
     def reach(elements: Array, i: ArrayLike) -> Array:
-        near = jnp.minimum(elements, at_turn[i])
-        return end[i] * jnp.expm1(rate[i] * near) / rate[i] + far * (elements - near)
+        slope, near = at(rate, i), jnp.minimum(elements, at(at_turn, i))
+        return at(end, i) * jnp.expm1(slope * near) / slope + far * (elements - near)
 
     # Pieces run alternately towards a focus and away from one: from 0 to the first focus, from
     # there half way to the next focus, and so on.
