@@ -28,9 +28,10 @@ from jbeamshell.sweeping.lanes import Outcome
 ABREAST = 32  # lanes of a chunk on a core, if slip patterns are iterated side by side
 BLOCK = 1024  # lanes of the largest block, for which the program is compiled
 KEPT = 4  # compiled models of scenes that are kept
-PER_LANE = ("load.amplitude", "contact.friction", "contact.pressure")
-"""Numbers in which lanes of one chunk may differ on the rung ``plane``, whose condensed body is the
-same for all of them."""
+PER_LANE = ("load.amplitude", "contact.pressure")
+"""Numbers in which lanes of one chunk may differ on the rung ``plane``: its condensed body and its
+factors are the same for all of them.  Factors side by side, for a friction of each lane's own, have
+been seen to hang in XLA's thread pool."""
 
 Answers = Callable[..., dict[str, Array]]
 _known: dict[str, Answers] = {}
