@@ -72,8 +72,8 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
 def factors(scene: Scene, *, nodes: int = NODES) -> SteadyCycles:
     """Factors of a strip of plane elasticity, from which many amplitudes cost microseconds each.
 
-    They hold for all amplitudes, for one strip, contact and pressure.  Vectorised with `jax.vmap`
-    over a scene's numbers, a batch of strips is built and asked by one program.
+    They hold for all amplitudes, for one strip, contact and pressure.  Many strips are built by one
+    program with `jax.lax.map`; `jax.vmap` may hang in XLA's thread pool.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ def test_factors_are_kept_and_shared():
     def of(eta):
         return condensed.factors(scene.replace({"strip.height_ratio": eta}), nodes=33)
 
-    many = jax.vmap(lambda eta: of(eta).dissipation(amplitudes))(jnp.array([0.05, 0.1126]))
+    many = jax.lax.map(lambda eta: of(eta).dissipation(amplitudes), jnp.array([0.05, 0.1126]))
     np.testing.assert_allclose(many[1], kept.dissipation(amplitudes), rtol=1e-8)
 
 
