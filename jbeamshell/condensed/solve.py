@@ -52,14 +52,17 @@ def solve(
     Raises
     ------
     InputError
-        if the pressures lift the strip or change along the path, if loads act on a strip without a
-        foundation, or if a path of loads is traced
+        if the pressures lift the strip or change along the path, or if loads act on a strip without
+        a foundation
     """
     before = scene.load.pressure_steps
     whole = is_traced(path.pressure) or bool(np.all(np.asarray(path.pressure)[before:] == 1.0))
     fix = "must act wholly for model.rung = plane: take squeeze or p6 for changing pressures"
     require("path", "pressures", whole, fix)
     targets = jnp.asarray(path.target[before:])
+    base = scene.contact.normal == "rigid" or not targets.size
+    fix = "leaves model.rung = plane nothing but the pressures: set load.cycles = 0, or take p6"
+    require("contact.normal", scene.contact.normal, base, fix)
     turns = _turns(scene, targets, own)
     strip = _strip(scene)
     if not is_traced(strip):
