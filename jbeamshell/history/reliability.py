@@ -86,7 +86,10 @@ def dissipation_errors(cycle: SlipCycle) -> tuple[Array, ...]:
     cap = 0.5 * (cap[1:] + cap[:-1])
     elastic = numbers.diff(cycle.traction, axis=0) / cycle.slip_stiffness
     slip = numbers.abs(numbers.diff(cycle.v, axis=0) - elastic)
-    slip = numbers.where(slip > NEGLIGIBLE * cap / cycle.slip_stiffness, slip, 0.0)
+    elastic_slip = numbers.isfinite(cycle.slip_stiffness)
+    stiffness = numbers.where(elastic_slip, cycle.slip_stiffness, 1.0)
+    some = numbers.where(elastic_slip, stiffness * slip > NEGLIGIBLE * cap, slip > 0.0)
+    slip = numbers.where(some, slip, 0.0)
 
     work = numbers.sum(slip * cap, axis=0) * cycle.tributary
     total = numbers.sum(work)

@@ -48,7 +48,7 @@ def test_maps_show_the_cells_and_the_picks(record):
     np.testing.assert_allclose(sorted(drawn), off, rtol=1e-9)
     legend = charts.ladder.advice_map(record, 0.05).get_legend()
     told = {text.get_text() for text in legend.get_texts()}
-    assert {"bar", "finite elements"} <= told
+    assert {"bar", "plane"} <= told
 
 
 def test_what_the_record_lacks_is_said(record):
