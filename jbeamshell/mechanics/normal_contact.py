@@ -68,6 +68,27 @@ class Rigid(NormalLaw):
         closing = self.stiffness * gap
         return jnp.where(balance < closing, balance, closing)
 
+    def changes_status(self, balance: Array, gap: Array) -> Array:
+        """True if a point is not as a step of Newton's method took it to be, open or closed.
+
+        The step makes R* zero at an open point, and the gap at a closed one.  So the sum is
+        negative at an open point that overlaps, and at a closed one that pulls.
+        """
+        return balance + self.stiffness * gap < 0.0
+
+    def kept_status(self, balance: Array, gap: Array) -> tuple[Array, Array, Array]:
+        """R* and gap of a point with the status that it loses, and the residual with that status.
+
+        The point is one that `changes_status`.
+        """
+        far = jnp.abs(gap) + jnp.abs(balance) / self.stiffness
+        was_open = self.stiffness * gap < balance
+        return (
+            jnp.zeros_like(balance),
+            jnp.where(was_open, far, -far),
+            -self.residual(-balance, -gap),
+        )
+
 
 class Compliance(NormalLaw):
     """Layer of asperities: R is k_n times the approach -gap, rounded off around first touch.

@@ -15,7 +15,7 @@ from jbeamshell.common.checks import require, require_count
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
 
-PATIENCE = 100  # iterations after which the residual must fall; receding contact needs many
+PATIENCE = 100  # iterations before a search is careful; receding contact needs many
 CHORDS = 12  # iterations between two refreshes of the stiffness
 
 
@@ -32,12 +32,15 @@ class Problem(NamedTuple):
     limit : from an iterate and the next one to the one to go on with
     tangent : from its input and the stiffness to the matrix of the residual
     refresh : from the unknowns to the stiffness; None if the stiffness is constant and given
+    careful : from the residual, the tangent's input, the tolerance and the number of iterations to
+        residual and input for a step that changes less, and True if it must be taken whole
     """
 
     evaluate: Callable[[Array], tuple[Array, Any]]
     limit: Callable[[Array, Array], Array]
     tangent: Callable[[Any, Any], BlockTridiagonal]
     refresh: Callable[[Array], Any] | None = None
+    careful: Callable[[Array, Any, float, Array], tuple[Array, Any, Array]] | None = None
 
 
 class Newton(eqx.Module):
@@ -187,16 +190,17 @@ class _Search(NamedTuple):
     def _improved(self, at: _Iterate, stiffness: Any) -> _Iterate:
         """Iterate after a Newton step, or the same with half the scale if the step is rejected."""
         problem = self.problem
-        matrix = problem.tangent(at.tangent_input, stiffness)
-        step = block_tridiagonal.solve(matrix, -at.residual)
-        x = problem.limit(at.x, at.x + at.scale * step)
+        left, tangent_input, whole_step = self._linearised(at)
+        matrix = problem.tangent(tangent_input, stiffness)
+        step = block_tridiagonal.solve(matrix, -left)
+        x = problem.limit(at.x, at.x + jnp.where(whole_step, 1.0, at.scale) * step)
         residual, tangent_input = problem.evaluate(x)
         # Friction's kinks raise the residual, but by no more than the friction force itself.  A
         # search that goes round in circles must lower it.
         rise = jnp.where(at.tried < PATIENCE, 1.0, 0.0)
         most = jnp.linalg.norm(at.residual) + rise
         smallest = at.scale <= 0.5**self.settings.max_halvings
-        accepted = (jnp.linalg.norm(residual) <= most) | smallest
+        accepted = (jnp.linalg.norm(residual) <= most) | smallest | whole_step
         # A close iterate is left for a closer one only: at a kink, round-off throws a step far off.
         close, whole = self._close(at), jnp.ones_like(at.scale)
         accepted = jnp.where(close, _largest(residual) <= _largest(at.residual), accepted)
@@ -204,6 +208,15 @@ class _Search(NamedTuple):
         old = at._replace(scale=0.5 * at.scale, was_close=close)
         kept: _Iterate = jax.tree.map(lambda a, b: jnp.where(accepted, a, b), new, old)
         return kept._replace(tried=at.tried + 1)
+
+    def _linearised(self, at: _Iterate) -> tuple[Array, Any, Array]:
+        """Residual and tangent's input of the next step, and True if it must be taken whole."""
+        plain = at.residual, at.tangent_input, jnp.asarray(False)
+        if self.problem.careful is None:
+            return plain
+        careful = self.problem.careful(at.residual, at.tangent_input, self.tolerance, at.tried)
+        circles = at.tried >= PATIENCE
+        return jax.tree.map(lambda a, b: jnp.where(circles, a, b), careful, plain)
 
     def _close(self, at: _Iterate) -> Array:
         return _largest(at.residual) <= self.tolerance

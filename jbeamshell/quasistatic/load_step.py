@@ -10,6 +10,7 @@ from jax import Array, lax
 
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
 from jbeamshell.numerics.newton import Newton, Problem
+from jbeamshell.quasistatic import status_changes
 from jbeamshell.quasistatic.path_state import (
     EQUAL,
     PathState,
@@ -68,7 +69,9 @@ class StepEquations(NamedTuple):
     def problem(self, stiffness: Stiffness | None) -> Problem:
         """Problem for Newton's method, with the stiffness at the guess if that is known."""
         constant = stiffness is not None and self.system.linear
-        return Problem(self.residual, self.limit, self.tangent, None if constant else self.refresh)
+        refresh = None if constant else self.refresh
+        careful = self.careful if status_changes.applies(self.system) else None
+        return Problem(self.residual, self.limit, self.tangent, refresh, careful)
 
     def residual(self, unknown: Array) -> tuple[Array, ContactInput]:
         """Out-of-balance forces (blocks, size), and the input of the tangent."""
@@ -86,6 +89,12 @@ class StepEquations(NamedTuple):
         level, _, contact = self._advance(system, unknown)
         response = system.contact_response(contact, self.before, self.prescribed)
         return stiffness_at(system, level.q, response, self.prescribed)
+
+    def careful(
+        self, residual: Array, contact: ContactInput, tolerance: float, tried: Array
+    ) -> tuple[Array, ContactInput, Array]:
+        """Residual and tangent's input of a step that changes one contact; see `Problem`."""
+        return status_changes.one_change(self.system, residual, contact, tolerance, tried)
 
     def limit(self, old: Array, new: Array) -> Array:
         """Next iterate with its slips limited by the friction law."""

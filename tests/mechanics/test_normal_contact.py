@@ -41,6 +41,22 @@ def test_the_stiffness_only_weighs_the_gap():
     assert slopes(0.0, 0.0) == (0, 10)  # a tie counts as contact
 
 
+@given(numbers, numbers, st.floats(1e-3, 1e6))
+def test_a_point_at_rest_has_its_status_and_another_can_be_held_to_the_one_that_it_loses(
+    reaction, gap, stiffness
+):
+    law = rigid(stiffness)
+    if law.residual(reaction, gap) == 0:
+        assert not law.changes_status(reaction, gap)
+    if law.changes_status(reaction, gap):
+        held, far, residual = law.kept_status(reaction, gap)
+        assert residual == max(reaction, stiffness * gap)
+        assert held == 0.0  # a point without pressure, which has no friction
+        slopes = jax.grad(law.residual, (0, 1))
+        if reaction != stiffness * gap:
+            assert slopes(held, far) != slopes(reaction, gap)
+
+
 @given(gaps, gaps)
 def test_compliant_contact_has_no_kink(one, other):
     slope = jax.grad(SOFT.reaction, 1)

@@ -76,6 +76,28 @@ def random_clamp(random):
     }
 
 
+def test_a_contact_that_goes_round_in_circles_is_found_node_by_node():
+    # The overhang lies on the foundation almost without pressure, with a gap of 1e-9 H at most.
+    length, patch, pressure = 74.14693231686438, 28.683243705831167, 7.221957102710951
+    clamp = {
+        "strip.length": length,
+        "strip.half_height": 1.0,
+        "strip.poisson_ratio": 0.2008159601237034,
+        "strip.kappa_s": 1.386771473292275,
+        "contact.stick_stiffness": 2.3475173273096646,
+        "contact.friction": 0.7971740930774074,
+        "contact.pressure": [[0, pressure], [patch, pressure], [patch, 0.0], [length, 0.0]],
+        "model.nodes": 41,
+        "model.kinematics": "linear",
+    }
+    scene = library.receding_rough().replace(clamp)
+    history = jax.jit(lambda load: jb.solve(scene, load[None], throw=False))(7.090942609)
+    assert history.converged
+    assert int(history.iterations[-1]) > 100
+    assert float(jnp.min(history.gap)) > -1e-9
+    assert float(jnp.min(history.reaction)) > -1e-6 * float(jnp.max(history.reaction))
+
+
 @pytest.mark.slow
 def test_random_clamps_lift_and_touch_again_and_balance_their_energy():
     random = np.random.default_rng(1)
