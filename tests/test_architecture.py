@@ -41,6 +41,7 @@ HOMES = {
     "jaxopt": "identify/search.py",
     "optax": "identify/search.py",
     "pint": "measured/columns.py",
+    "distributed": "cli/sweep.py",
     "lazy_loader": ("__init__.py", "dynamics/__init__.py"),
 }
 

@@ -32,6 +32,7 @@ def command(*words, folder):
         [sys.executable, "-m", "jbeamshell", *map(str, words)],
         cwd=folder,
         env=environment,
+        start_new_session=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -47,12 +48,12 @@ def finished(*words, folder):
     return out, time.monotonic() - begin
 
 
-def children_in(folder):
-    """Processes that were told to work in a folder."""
+def alive_in(group):
+    """Processes of a group."""
     found = []
     for place in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
-            if str(folder).encode() in (place / "cmdline").read_bytes():
+            if os.getpgid(int(place.name)) == group:
                 found.append(int(place.name))
     return found
 
@@ -72,9 +73,9 @@ def killed_again_and_again(words, folder, kills, seed, whole_run, check):
             process.communicate()
             done += 1
             end = time.monotonic() + GONE
-            while children_in(folder) and time.monotonic() < end:
+            while alive_in(process.pid) and time.monotonic() < end:
                 time.sleep(0.05)
-            assert children_in(folder) == []
+            assert alive_in(process.pid) == []
         else:
             assert process.returncode == 0, err
             check(out)

@@ -8,10 +8,10 @@ import math
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
 from jbeamshell.cli.arguments import add_json, add_scene, add_settings, scene_of
@@ -20,6 +20,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path
 
 MOST = 2_000_000  # numbers in one JSON text
+WAIT = 10.0  # seconds in which a scheduler must answer
 RANGE = "write KEY=START:STOP:COUNT, KEY=START:STOP:COUNT:log or KEY=a,b,c"
 
 
@@ -29,7 +30,7 @@ def add_to(commands: Any) -> None:
         "sweep",
         help="run many scenes over ranges of their numbers",
         description="Compute the dissipation and other figures of the last cycle over ranges of "
-        "any of a scene's numbers, on all local devices or in several processes.  Each "
+        "any of a scene's numbers, on all cores or on many machines.  Each "
         "combination of values is one lane: one strip of the sweep.",
     )
     add_scene(parser)
@@ -59,19 +60,15 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--processes",
         type=int,
-        default=1,
         metavar="N",
-        help="number of processes on this machine (default 1)",
+        help="number of processes on this machine (default: as many as pay)",
     )
     parser.add_argument(
-        "--coordinator",
-        metavar="HOST:PORT",
-        help="address of the first process, for a sweep on several machines",
+        "--dask",
+        metavar="ADDRESS",
+        help="share the lanes among the workers of the dask scheduler at this address, such as "
+        "tcp://10.0.0.1:8786",
     )
-    parser.add_argument(
-        "--process", type=int, metavar="I", help="number of this process on them, from 0"
-    )
-    parser.add_argument("--of", type=int, metavar="N", help="number of processes on all machines")
     add_settings(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -81,11 +78,10 @@ def run(options: argparse.Namespace) -> int:
     """Sweep, report and write; returns the exit code."""
     from tqdm import tqdm
 
-    from jbeamshell.sweeping.run import FIGURES, LOST, sweep
+    from jbeamshell.sweeping.run import FIGURES, sweep
 
     over = ranges(options.over)
     figures = FIGURES if options.figures is None else _names(options.figures)
-    first = _join(options)  # before anything else asks JAX for its devices
     scene = scene_of(options)
     count = (max if options.paired else math.prod)([v.size for v in over.values()]) * len(figures)
     if options.json and count > MOST:
@@ -96,14 +92,14 @@ def run(options: argparse.Namespace) -> int:
     if options.plot is not None:
         _check_picture(options.plot)
     say("compiling ...")
-    with tqdm(disable=None if first else True, file=sys.stderr, unit="lane") as bar:
+    with tqdm(disable=None, file=sys.stderr, unit="lane") as bar:
 
         def progress(done: int, total: int) -> None:
             if bar.total is None:
                 bar.total, bar.initial, bar.n = total, done, done
             bar.update(done - bar.n)
 
-        with _clean_output(options.coordinator is not None):
+        with _workers(options.dask) as executor:
             result = sweep(
                 scene,
                 over,
@@ -111,22 +107,17 @@ def run(options: argparse.Namespace) -> int:
                 paired=options.paired,
                 out=options.out,
                 processes=options.processes,
+                executor=executor,
                 progress=progress,
             )
-    code = _report(options, result, first)
-    if LOST in result.notes:  # JAX would wait for the lost process at exit, and abort
-        sys.stdout.flush()
-        os._exit(code)
-    return code
+    return _report(options, result)
 
 
-def _report(options: argparse.Namespace, result: Any, first: bool) -> int:
-    """Print and draw the sweep, in the first of the processes; returns the exit code."""
+def _report(options: argparse.Namespace, result: Any) -> int:
+    """Print and draw the sweep; returns the exit code."""
     from jbeamshell import plotting
     from jbeamshell.common import files
 
-    if not first:
-        return UNCONVERGED if result.failed else 0
     put(files.as_json(result.figures()) if options.json else f"{result}\n")
     if result.outside:
         warn(f"{result.outside:,} lanes lie outside the model's domain: {result.why_outside}")
@@ -219,41 +210,18 @@ def _check_picture(path: str) -> None:
 
 
 @contextlib.contextmanager
-def _clean_output(joined: bool) -> Iterator[None]:
-    """Send what JAX prints among joined processes to standard error, away from the result."""
-    if not joined:
-        yield
+def _workers(address: str | None) -> Iterator[Executor | None]:
+    """Executor of the dask scheduler at an address; None without one."""
+    if address is None:
+        yield None
         return
-    sys.stdout.flush()
-    kept = os.dup(1)
-    os.dup2(2, 1)
     try:
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-
-
-def _join(options: argparse.Namespace) -> bool:
-    """Join the processes of other machines, if asked; True in the first of them."""
-    parts = {name: getattr(options, name) for name in ("coordinator", "process", "of")}
-    missing = [f"--{name}" for name, value in parts.items() if value is None]
-    if len(missing) == len(parts):
-        return True
-    if missing:
-        raise InputError(
-            f"{' and '.join(missing)}: is missing; several machines need --coordinator, --process "
-            "and --of"
-        )
-    host, _, port = options.coordinator.rpartition(":")
-    if not host or not port.isdigit():
-        raise InputError(
-            f"--coordinator {options.coordinator}: write HOST:PORT, such as 10.0.0.1:1234"
-        )
-    if not 0 <= options.process < options.of:
-        raise InputError(f"--process {options.process}: count from 0 to {options.of - 1}")
+        from distributed import Client
+    except ImportError:
+        raise InputError("--dask: needs dask: pip install 'jbeamshell[dask]'") from None
     try:
-        jax.distributed.initialize(options.coordinator, options.of, options.process)
-    except (RuntimeError, ValueError) as error:
-        raise InputError(f"--coordinator {options.coordinator}: {error}") from None
-    return options.process == 0
+        client = Client(address, timeout=WAIT)
+    except (OSError, ValueError, TypeError) as error:  # no scheduler there; no address
+        raise InputError(f"--dask {address}: finds no dask scheduler there ({error})") from None
+    with client:
+        yield client.get_executor()

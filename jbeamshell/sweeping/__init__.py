@@ -4,5 +4,4 @@ from jbeamshell.sweeping.lanes import Lanes as Lanes
 from jbeamshell.sweeping.lanes import Outcome as Outcome
 from jbeamshell.sweeping.results import Sweep as Sweep
 from jbeamshell.sweeping.run import FIGURES as FIGURES
-from jbeamshell.sweeping.run import LOST as LOST
 from jbeamshell.sweeping.run import sweep as sweep

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import json
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -22,8 +22,6 @@ from jbeamshell.sweeping.store import Store
 
 BLOCKS = 32  # least number of blocks of a large sweep, for equal shares of all processes
 LEAST = 8  # least lanes of a block that is worth a file
-
-Tell = Callable[[int], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,51 +91,19 @@ class Job:
         lanes = self.lanes
         return Runner(lanes.scene, tuple(lanes.axes), self.figures, self.solver, devices)
 
-    def size(self, share: Sequence[int]) -> int:
-        """Number of lanes of these blocks."""
-        return sum(self.blocks[number].size for number in share)
-
-    def run(
-        self,
-        share: Sequence[int],
-        runner: Runner,
-        store: Store | None,
-        tell: Tell,
-        known: Mapping[int, Block],
-    ) -> dict[int, Block]:
-        """Run blocks and store each as it finishes.
-
-        Parameters
-        ----------
-        share : numbers of the blocks
-        runner : compiled model
-        store : folder for finished blocks; None keeps them in memory only
-        tell : is called with the number of lanes of every block that is finished
-        known : blocks by number that are not run again
-
-        Returns
-        -------
-        dict
-            blocks by number, with the known ones.
-        """
-        found = dict(known)
-        missing = [number for number in share if number not in found]
+    def run(self, numbers: Sequence[int], runner: Runner) -> Iterator[tuple[int, Block]]:
+        """Blocks by number, run in this process, one on each device at a time."""
         abreast = len(runner.devices)
-        for first in range(0, len(missing), abreast):
-            numbers = missing[first : first + abreast]
-            batches = [self.lanes.columns(self.blocks[number]) for number in numbers]
-            for number, block in zip(numbers, runner(batches), strict=True):
-                if store is not None:
-                    store.save(number, block)
-                found[number] = block
-                tell(block.status.size)
-        return found
+        for first in range(0, len(numbers), abreast):
+            some = numbers[first : first + abreast]
+            batches = [self.lanes.columns(self.blocks[number]) for number in some]
+            yield from zip(some, runner(batches), strict=True)
 
-    def stored(self, share: Sequence[int], store: Store) -> dict[int, Block]:
-        """Blocks of a share that are in the store, by number."""
-        done = store.done()
-        figures = len(self.figures)
-        loaded = {n: store.load(n, figures, self.blocks[n].size) for n in share if n in done}
+    def stored(self, store: Store) -> dict[int, Block]:
+        """Blocks that are in the store, by number."""
+        done, figures = store.done(), len(self.figures)
+        sizes = {n: block.size for n, block in enumerate(self.blocks) if n in done}
+        loaded = {number: store.load(number, figures, size) for number, size in sizes.items()}
         return {number: block for number, block in loaded.items() if block is not None}
 
     def collected(self, blocks: Mapping[int, Block]) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -157,8 +123,8 @@ class Job:
         """Text that identifies the sweep, without the axes' values."""
         if self.scene is None:
             raise InputError(
-                "out, processes: a scene with a function of your own cannot be put on disk: "
-                "sweep it without them and write the table with to_csv"
+                "out, processes, executor: a scene with a function of your own cannot be written "
+                "down: sweep it without them and write the table with to_csv"
             )
         width = width_of_chunks(self.lanes.scene, tuple(self.lanes.axes))
         about = {
@@ -174,13 +140,17 @@ class Job:
         return json.dumps(about)
 
 
-def read_job(store: Store) -> Job:
-    """Job of the sweep for which a store was opened."""
-    text, axes = store.read()
+def runner_of(text: str, devices: Sequence[Any]) -> Runner:
+    """Runner of the sweep with this description; raises `InputError` for one of another version."""
     about = json.loads(text)
+    here = version("jbeamshell")
+    if about["version"] != here:
+        raise InputError(
+            f"executor: its workers have jbeamshell {here}, this process {about['version']}: "
+            "install the same version"
+        )
     tables = tomllib.loads(about["scene"])
     flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
     scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
     solver = None if about["solver"] is None else Newton(**about["solver"])
-    lanes = Lanes(scene, dict(zip(about["keys"], axes, strict=True)), about["paired"])
-    return Job(lanes, tuple(about["figures"]), solver)
+    return Runner(scene, about["keys"], about["figures"], solver, devices)

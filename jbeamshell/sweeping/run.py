@@ -1,39 +1,46 @@
 """Sweeps: figures of many scenes at once, over any of a scene's numbers.
 
-`sweep` runs them on all local devices, in several processes of this machine, or as one of the
-processes of `jax.distributed`.  Finished blocks are kept on disk if a file is named.
+`sweep` runs them in this process, in several of this machine, or on the workers of any executor.
+Finished blocks are kept on disk if a file is named.
 """
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import os
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-import jax
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.checks import check_words, require
-from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.files import as_path
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.scene import Scene
+from jbeamshell.sweeping.executors import (
+    Blocks,
+    Losses,
+    check_executor,
+    check_processes,
+    in_processes,
+    on_executor,
+    processes_that_pay,
+)
 from jbeamshell.sweeping.job import Job
 from jbeamshell.sweeping.lanes import Lanes as Lanes
 from jbeamshell.sweeping.lanes import Outcome as Outcome
 from jbeamshell.sweeping.lanes import check_size, lanes_of
-from jbeamshell.sweeping.processes import Crew, check_alike, gathered, share_of, wait_for_all
 from jbeamshell.sweeping.results import Sweep as Sweep
 from jbeamshell.sweeping.runner import Block, check_figures
 from jbeamshell.sweeping.store import Store
 
 FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "loss_factor")
-MOST_PROCESSES = 10_000
 PARTS = ".parts"  # suffix of the folder of finished blocks, beside the file
-LOST = "a process was lost: its lanes that were not on disk were run by the others"
 
 Progress = Callable[[int, int], None]
 
@@ -45,7 +52,8 @@ def sweep(
     *,
     paired: bool = False,
     out: str | os.PathLike[str] | None = None,
-    processes: int = 1,
+    processes: int | None = None,
+    executor: Executor | None = None,
     devices: Sequence[Any] | None = None,
     solver: Newton | None = None,
     progress: Progress | None = None,
@@ -57,8 +65,9 @@ def sweep(
     its long load steps divided.  A lane outside the model's domain is marked and not run.  Neither
     disturbs the others.
 
-    If `jax.distributed` is initialised, every process makes this same call, runs its part of the
-    lanes, and gets the whole result.
+    Blocks run in this process.  If the rest takes long enough, they go on in one process for each
+    core; or they run where ``processes`` or ``executor`` says.  The numbers are the same to the
+    last bit.  Only this process writes files, and blocks of a worker that dies are given out again.
 
     Parameters
     ----------
@@ -69,7 +78,11 @@ def sweep(
     paired : True if the keys' values go together, row by row, instead of as a product
     out : FILE.csv for the table.  Finished blocks are kept in FILE.csv.parts until it is written;
         the same sweep to the same file goes on from them
-    processes : number of processes of this machine that share the lanes; one that dies is replaced
+    processes : number of processes of this machine that share the lanes; 1 is this one, and None
+        as many as pay
+    executor : `concurrent.futures.Executor` whose workers share the lanes, on any machines that
+        have this version of the package, such as ``distributed.Client(address).get_executor()``
+        of dask or ``mpi4py.futures.MPIPoolExecutor()``
     devices : devices of this process on which blocks run side by side; None is all local ones
     solver : settings of Newton's method
     progress : function that is called with the numbers of lanes done so far and to be run in all
@@ -82,9 +95,10 @@ def sweep(
     Raises
     ------
     InputError
-        if the axes, figures or the file make no sweep, or one too large for memory
+        if the axes, figures or the file make no sweep, or one too large for memory; if the
+        executor is none or shut down, or its workers cannot import this package
     UnconvergedError
-        if a worker process keeps dying; a lane that fails does not raise, see ``Sweep.status``
+        if workers keep dying; a lane that fails does not raise, see ``Sweep.status``
 
     Examples
     --------
@@ -96,28 +110,17 @@ def sweep(
     """
     watch = _Watch(progress)
     job = _job(scene, over, figures, paired, solver)
-    _check_processes(processes, devices)
+    if executor is not None:
+        check_executor(executor, processes, devices)
+    check_processes(processes, devices)
     table = None if out is None else _check_out(out)
-    if table is not None:
-        store = Store(f"{table}{PARTS}")
-        try:
-            result = _run(job, store, processes, devices, watch)
-        except (KeyboardInterrupt, UnconvergedError) as error:
-            said = str(error) or "interrupted"
-            raise type(error)(
-                f"{said}; {store.folder} keeps what is done, and the same sweep goes on from there"
-            ) from None
-        if jax.process_index() == 0:
-            store.publish(result, table)
-        if jax.process_count() > 1 and LOST not in result.notes:
-            wait_for_all()
-        if jax.process_index() == 0 or LOST not in result.notes:
-            store.remove()
-        return result
-    if processes > 1:
-        with tempfile.TemporaryDirectory(prefix="jbeamshell-sweep-") as folder:
-            return _run(job, Store(folder), processes, devices, watch)
-    return _run(job, None, processes, devices, watch)
+    store = None if table is None else Store(f"{table}{PARTS}")
+    place = _Place(processes, executor, devices)
+    result = _run(job, store, place, watch)
+    if store is not None and table is not None:
+        store.publish(result, table)
+        store.remove()
+    return result
 
 
 def _job(
@@ -138,25 +141,6 @@ def _job(
     return Job(lanes, tuple(names), solver)
 
 
-def _check_processes(processes: int, devices: Sequence[Any] | None) -> None:
-    whole = isinstance(processes, int) and not isinstance(processes, bool)
-    fix = "must be a whole number, 1 or more"
-    require("processes", processes, whole and 1 <= processes <= MOST_PROCESSES, fix)
-    if processes > 1:
-        on_cores = jax.default_backend() == "cpu"
-        fix = "is for cores only: other devices work side by side anyway; leave it out"
-        require("processes", processes, on_cores, fix)
-        fix = "does not go with jax.distributed, which has its own processes: leave it out"
-        require("processes", processes, jax.process_count() == 1, fix)
-        fix = "does not go with processes, which choose theirs: leave it out"
-        require("devices", devices, devices is None, fix)
-    if devices is not None:
-        known = isinstance(devices, list | tuple) and all(
-            isinstance(d, jax.Device) for d in devices
-        )
-        require("devices", devices, known and len(devices) > 0, "give a list such as jax.devices()")
-
-
 def _check_out(out: str | os.PathLike[str]) -> Path:
     table = as_path(out)
     require("out", str(out), table.suffix.lower() == ".csv", "end the name in .csv")
@@ -171,16 +155,22 @@ class _Watch:
     """Clock and progress of a sweep: its begin, the end of compilation, and lanes done."""
 
     def __init__(self, progress: Progress | None) -> None:
-        self.begun = self.compiled_at = time.perf_counter()
+        self.begun = time.perf_counter()
+        self.compiled_at = 0.0
         self.done = self.total = 0
         self._progress = progress
+
+    @property
+    def compile_s(self) -> float:
+        """Seconds until the program was compiled; where others do that, until the first block."""
+        return max(self.compiled_at - self.begun, 0.0)
 
     def start(self, done: int, total: int) -> None:
         self.done, self.total = done, total
         self.tell(0)
 
     def compiled(self) -> None:
-        self.compiled_at = time.perf_counter()
+        self.compiled_at = self.compiled_at or time.perf_counter()
 
     def tell(self, lanes: int) -> None:
         self.done += lanes
@@ -188,40 +178,68 @@ class _Watch:
             self._progress(self.done, self.total)
 
 
-def _run(
-    job: Job, store: Store | None, processes: int, devices: Sequence[Any] | None, watch: _Watch
-) -> Sweep:
-    share, hands = range(len(job.blocks)), jax.process_count()
-    if hands > 1:
-        check_alike(job)
-        share = share_of(job)
+@dataclasses.dataclass(frozen=True)
+class _Place:
+    """Where the blocks of a sweep run; see `sweep`."""
+
+    processes: int | None
+    executor: Executor | None
+    devices: Sequence[Any] | None
+
+    def blocks(self, job: Job, numbers: list[int], watch: _Watch, losses: Losses) -> Blocks:
+        """Blocks by number, as they are finished."""
+        if not numbers:
+            return
+        if self.executor is not None:
+            yield from on_executor(job, numbers, self.executor, losses)
+        elif self.processes is not None and self.processes > 1:
+            yield from in_processes(job, numbers, self.processes, losses)
+        else:
+            yield from self._here(job, numbers, watch, losses)
+
+    def _here(self, job: Job, numbers: list[int], watch: _Watch, losses: Losses) -> Blocks:
+        """Blocks of this process, which leaves the rest to several as soon as that pays."""
+        runner = job.runner(self.devices)
+        runner.compile()
+        watch.compiled()
+        free = self.processes is None and self.devices is None
+        for done, (number, block) in enumerate(job.run(numbers, runner), 1):
+            yield number, block
+            left = numbers[done:]
+            rest_s = (time.perf_counter() - watch.compiled_at) / done * len(left)
+            count = processes_that_pay(job, rest_s, watch.compile_s, len(left)) if free else 1
+            if count > 1:
+                yield from in_processes(job, left, count, losses)
+                return
+
+
+def _run(job: Job, store: Store | None, place: _Place, watch: _Watch) -> Sweep:
     found: dict[int, Block] = {}
     if store is not None:
         store.open(job.description(), job.lanes.axes)
-        found = job.stored(share, store)
-    before = _lanes(found)
-    watch.start(before, job.size(share))
+        found = job.stored(store)
+    before, losses = _lanes(found), Losses()
+    watch.start(before, sum(block.size for block in job.blocks))
+    missing = [number for number in range(len(job.blocks)) if number not in found]
+    try:
+        with contextlib.closing(place.blocks(job, missing, watch, losses)) as blocks:
+            for number, block in blocks:
+                watch.compiled()
+                if store is not None:
+                    store.save(number, block)
+                found[number] = block
+                watch.tell(block.status.size)
+    except (KeyboardInterrupt, UnconvergedError, InputError) as error:
+        if store is None:
+            raise
+        raise type(error)(
+            f"{str(error) or 'interrupted'}; {store.folder} keeps what is done, and the same sweep "
+            "goes on from there"
+        ) from None
     notes = [f"{before:,} lanes were done before"] if before else []
-    if processes > 1 and store is not None and len(found) < len(share):
-        crew = Crew(store, min(processes, len(share)), watch.compiled)
-        crew.finish(job, watch.tell)
-        found = job.stored(share, store)
-        notes += [f"worker processes that died: {crew.lost}, replaced"] if crew.lost else []
-    if len(found) < len(share):
-        runner = job.runner(devices)
-        runner.compile()
-        watch.compiled()
-        found = job.run(share, runner, store, watch.tell, found)
-    if hands > 1:
-        try:
-            found = gathered(job, found)
-        except jax.errors.JaxRuntimeError:
-            notes.append(LOST)
-            everything = range(len(job.blocks))
-            if store is not None:
-                found |= job.stored(everything, store)
-            watch.start(_lanes(found), job.size(everything))
-            found = job.run(everything, job.runner(devices), store, watch.tell, found)
+    notes += [f"workers that were lost: {losses.total}, their blocks given out again"] * bool(
+        losses.total
+    )
     values, status = job.collected(found)
     lanes = job.lanes
     return Sweep(
@@ -231,7 +249,7 @@ def _run(
         values,
         status,
         wall_s=time.perf_counter() - watch.begun,
-        compile_s=watch.compiled_at - watch.begun,
+        compile_s=watch.compile_s,
         computed=_lanes(found) - before,
         notes=tuple(notes),
     )

@@ -136,10 +136,6 @@ class Runner:
         axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
         self._about = ask, axes, self.figures, self._shape, self.dtype, self._mesh
 
-    def lower(self) -> None:
-        """Trace the model, the part of compilation that no cache on disk saves."""
-        _lowered(*self._about)
-
     def compile(self) -> None:
         """Compile the model without running a lane."""
         _compiled(*self._about)
@@ -218,13 +214,7 @@ def _spread(mesh: Mesh) -> NamedSharding:
 
 
 @functools.lru_cache(KEPT)
-def _compiled(*about: Any) -> Any:
-    """Compiled program of `_lowered`."""
-    return _lowered(*about).compile()
-
-
-@functools.lru_cache(KEPT)
-def _lowered(
+def _compiled(
     ask: Answers,
     axes: tuple[int | None, ...],
     figures: tuple[str, ...],
@@ -232,7 +222,7 @@ def _lowered(
     dtype: np.dtype,
     mesh: Mesh,
 ) -> Any:
-    """Program, traced but not compiled, that runs one block on every device.
+    """Compiled program that runs one block on every device.
 
     It takes the numbers (devices, keys, chunks, width) and the count of filled chunks of each
     device.  Only filled chunks run, one after the other, so that one shape serves sweeps of all
@@ -266,7 +256,7 @@ def _lowered(
         run = jax.shard_map(each, mesh=mesh, in_specs=spread, out_specs=spread, check_vma=False)
     kinds = ((shape, dtype), (shape[:1], np.int32))
     given = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
-    return jax.jit(run).lower(*given)
+    return jax.jit(run).lower(*given).compile()
 
 
 @eqx.filter_jit

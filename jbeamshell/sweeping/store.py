@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,22 +20,17 @@ if TYPE_CHECKING:
 
 DESCRIPTION = "sweep.npz"
 FINISHED = re.compile(r"block-(\d+)\.npz$")
-OURS = re.compile(r"(sweep|block-\d+)\.npz$|table\.csv$|worker-\d+\.|\.")  # with their drafts
+OURS = re.compile(r"(sweep|block-\d+)\.npz$|table\.csv$|\.")  # with their drafts
 
 
 class Store:
     """Folder with a sweep's description and one file for every finished block.
 
-    Files are written whole, by any number of processes: a block is there completely or not at all.
+    Only the process that sweeps writes to it, and files whole: a block is there or it is not.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
-
-    @property
-    def cache(self) -> Path:
-        """Folder in which workers share compiled programs."""
-        return self.folder / ".compiled"
 
     def open(self, description: str, axes: Mapping[str, np.ndarray]) -> None:
         """Make the folder, or continue with the one that is there.
@@ -119,7 +113,6 @@ class Store:
 
     def remove(self) -> None:
         """Remove the sweep's files, and the folder if nothing else is in it."""
-        shutil.rmtree(self.cache, ignore_errors=True)
         with contextlib.suppress(OSError):
             ours = [p for p in self.folder.iterdir() if OURS.match(p.name) and p.is_file()]
             # The description goes last: without it, the rest could not be read after a kill.

@@ -125,12 +125,7 @@ def test_the_summary_counts_and_a_lane_that_fails_shows_in_the_exit_code(cli, mo
         ([*AMPLITUDES, "--out", "folder"], "end the name in .csv"),
         ([*AMPLITUDES, "--plot", "nowhere/sweep.png"], "there is no folder nowhere"),
         ([*AMPLITUDES, "--plot", "sweep.doc"], "end the name in .png"),
-        (
-            [*AMPLITUDES, "--coordinator", "here:1"],
-            "several machines need --coordinator, --process and --of",
-        ),
-        ([*AMPLITUDES, "--coordinator", "here", "--process", "0", "--of", "2"], "HOST:PORT"),
-        ([*AMPLITUDES, "--coordinator", "here:1", "--process", "2", "--of", "2"], "from 0 to 1"),
+        ([*AMPLITUDES, "--dask", "nowhere"], "--dask nowhere: finds no dask scheduler there"),
         (["no-such-scene", *AMPLITUDES], "no-such-scene"),
     ],
 )
