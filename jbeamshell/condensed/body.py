@@ -17,6 +17,7 @@ import numpy as np
 from jax import Array, lax
 
 from jbeamshell.mechanics.section_form import SectionForm
+from jbeamshell.numerics.factors import inverse_cholesky
 
 PARTS = 3  # of the strip, eliminated one after the other with as many contact nodes as they know
 
@@ -110,7 +111,7 @@ def eliminate(form: SectionForm, x: Array, loads: Array, held: bool) -> tuple[El
         sides = _add(sides, start[2:, :2], 2 * i).at[:, -1].add(load * form.press[2:])
         sides = _add(sides, across[2:, :2], 2 * i + 2) * mask[:, None]
         matrix = (matrix + start[2:, 2:]) * mask[:, None] * mask + jnp.diag(1.0 - mask)
-        inverse = _inverse_factor(matrix)
+        inverse = inverse_cholesky(matrix)
         onwards = inverse @ (across[2:, 2:] * mask[:, None])
         known = inverse @ sides
         sides = _add(-(onwards.T @ known), end[2:, :2], 2 * i + 2)
@@ -128,7 +129,7 @@ def eliminate(form: SectionForm, x: Array, loads: Array, held: bool) -> tuple[El
         total = _with_products(total, part[1])
     matrix, sides = carry
     sides = sides.at[:, -2].add(-form.pull[2:]).at[:, -1].add(loads[-1] * form.press[2:])
-    inverse = _inverse_factor(matrix)
+    inverse = inverse_cholesky(matrix)
     last = inverse @ sides
     left = _among_contacts(form, x) - _with_products(total, last[None])
     pull = jnp.zeros(2 * n).at[-2:].set(form.pull[:2])
@@ -141,13 +142,6 @@ def eliminate(form: SectionForm, x: Array, loads: Array, held: bool) -> tuple[El
         jnp.concatenate([part[2] for part in parts]),
     )
     return found, left
-
-
-def _inverse_factor(matrix: Array) -> Array:
-    """L^-1 of a symmetric matrix L L'."""
-    lower = lax.linalg.cholesky(matrix, symmetrize_input=False)
-    one = jnp.eye(matrix.shape[0], dtype=matrix.dtype)
-    return lax.linalg.triangular_solve(lower, one, left_side=False, lower=True)
 
 
 def _add(sides: Array, block: Array, column: Array) -> Array:

@@ -22,12 +22,10 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array, lax
 
 from jbeamshell.condensed.body import Body
-
-SHRINK = 8  # powers of two from row to row of a matrix that is factorised
+from jbeamshell.numerics.factors import lower_upper
 
 
 class Factors(NamedTuple):
@@ -64,19 +62,19 @@ class ContactState(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """One branch of load.
+    """One branch of load, seen at one load () or at several (levels,), which lead the axes.
 
     Attributes
     ----------
-    end : the contact at its end
-    thresholds : (n,) change of load, positive, at which each node starts to slip
-    compliances : (n,) compliance that its slip adds
-    slip_work : work of friction along the branch
-    slipping : (n,) True for nodes that slip at the end
+    at : the contact at each load
+    thresholds : (k,) change of load, positive, at which each node starts to slip
+    compliances : (k,) compliance that its slip adds
+    slip_work : work of friction from the branch's start to each load
+    slipping : (k,) True for nodes that slip, at each load
     valid : True if the zones are nested, all nodes stay closed and none slips backwards
     """
 
-    end: ContactState
+    at: ContactState
     thresholds: Array
     compliances: Array
     slip_work: Array
@@ -91,7 +89,8 @@ def factorise(body: Body, friction: Array) -> Factors:
 
     def one(sense: float) -> Factors:
         matrix = body.K_tt + sense * friction * k_nt[:k]
-        lower, upper = inverse_factors(matrix)
+        found = lower_upper(matrix)
+        lower, upper = found.inverse_lower, found.inverse_upper
         g = body.f_t + sense * friction * f_n[:k]
         y_g = lower @ g
         # Columns are the events; what has a leading column more starts before the first of them.
@@ -114,30 +113,6 @@ def factorise(body: Body, friction: Array) -> Factors:
     return jax.tree.map(lambda a, b: jnp.stack([a, b]), one(1.0), one(-1.0))
 
 
-def inverse_factors(matrix: Array) -> tuple[Array, Array]:
-    """Inverses of L (unit diagonal) and U of a matrix L U (n, n), without pivoting."""
-    lower, upper = lower_upper(matrix)
-    one = jnp.eye(matrix.shape[0], dtype=matrix.dtype)
-    return (
-        lax.linalg.triangular_solve(lower, one, left_side=False, lower=True, unit_diagonal=True),
-        lax.linalg.triangular_solve(upper, one, left_side=False),
-    )
-
-
-def lower_upper(matrix: Array) -> tuple[Array, Array]:
-    """L (unit diagonal) and U of a matrix L U (n, n), without pivoting.
-
-    NaN where a pivot is so small that rows would have to be exchanged.
-    """
-    n = matrix.shape[0]
-    # Rows that shrink by powers of two keep LAPACK from exchanging them, and cost no digits.
-    scale = 2.0 ** (-min(SHRINK, 900 // n) * np.arange(n))
-    both, _, order = lax.linalg.lu(matrix * scale[:, None])
-    exchanged = jnp.where(jnp.all(order == np.arange(n)), 0.0, jnp.nan)
-    lower = jnp.tril(both * (scale / scale[:, None]), -1) + jnp.eye(n, dtype=matrix.dtype)
-    return lower + exchanged, jnp.triu(both / scale[:, None]) + exchanged
-
-
 def pressed(body: Body) -> ContactState:
     """Contact under the pressures alone."""
     zero = jnp.zeros_like(body.f_t)
@@ -145,7 +120,7 @@ def pressed(body: Body) -> ContactState:
 
 
 def follow(
-    body: Body, factors: Factors, friction: Array, start: ContactState, force: Array
+    body: Body, factors: Factors, friction: Array, start: ContactState, forces: Array
 ) -> Branch:
     """One branch of load.
 
@@ -154,35 +129,37 @@ def follow(
     body, factors : see `factorise`
     friction : mu
     start : contact at the branch's start
-    force : end load at its end
+    forces : () or (levels,) end loads along it, the last one at its end
     """
     k = body.f_t.size
-    step = force - start.force
-    sense = jnp.where(step >= 0.0, 1.0, -1.0)
+    step = (forces - start.force)[..., None]
+    rises = jnp.ravel(step)[-1] >= 0.0
+    sense = jnp.where(rises, 1.0, -1.0)
     reach = jnp.abs(step)
-    own: Factors = jax.tree.map(lambda a: a[jnp.where(step >= 0.0, 0, 1)], factors)
+    own: Factors = jax.tree.map(lambda a: a[jnp.where(rises, 0, 1)], factors)
     y_c = own.lower @ -(start.r_t + sense * friction * start.r_n[:k])
     thresholds = -sense * y_c / own.y_g
-    slips = jnp.cumsum(thresholds >= reach) == 0
-    slip = own.upper @ jnp.where(slips, y_c + own.y_g * step, 0.0)
+    slips = jnp.cumsum(thresholds >= reach, axis=-1) == 0
+    slip = jnp.where(slips, y_c + own.y_g * step, 0.0) @ own.upper.T
     beyond = jnp.where(slips, reach - thresholds, 0.0)
     compliances = own.z * own.y_g
-    forces = body.K_tt @ slip
-    work = 0.5 * jnp.sum(compliances * beyond * (reach + thresholds))
-    end = ContactState(
+    pushed = slip @ body.K_tt
+    work = 0.5 * jnp.sum(compliances * beyond * (reach + thresholds), axis=-1)
+    at = ContactState(
         start.v + slip,
-        start.r_t + forces - body.f_t * step,
+        start.r_t + pushed - body.f_t * step,
         start.r_n + slip @ body.K_tn - body.f_n * step,
-        force,
-        start.displacement + body.c * step + sense * jnp.sum(compliances * beyond),
+        forces,
+        start.displacement + body.c * step[..., 0] + sense * (beyond @ compliances),
     )
+    last = slips.reshape(-1, k)[-1], jnp.ravel(reach)[-1]
     return Branch(
-        end=end,
+        at=at,
         thresholds=thresholds,
         compliances=compliances,
-        slip_work=work - start.r_t @ slip - 0.5 * slip @ forces,
+        slip_work=work - slip @ start.r_t - 0.5 * jnp.sum(slip * pushed, axis=-1),
         slipping=slips,
-        valid=holds(own, friction, start, thresholds, slips, sense, reach),
+        valid=_holds(own, friction, start, thresholds, last[0], sense, last[1]),
     )
 
 
@@ -193,12 +170,12 @@ def path(
 
     def go(state: ContactState, force: Array) -> tuple[ContactState, Branch]:
         branch = follow(body, factors, friction, state, force)
-        return branch.end, branch
+        return branch.at, branch
 
     return lax.scan(go, start, turns)[1]
 
 
-def holds(
+def _holds(
     own: Factors,
     friction: Array,
     start: ContactState,

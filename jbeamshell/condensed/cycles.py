@@ -25,11 +25,11 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
+from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.condensed.body import Body
-from jbeamshell.condensed.branches import lower_upper
+from jbeamshell.numerics.factors import lower_upper
 
 GROUPS = 16  # of events, over which the least rate of a reaction stands for all
 LITTLE = 1e-6  # of the largest rate or load: less does not count as a wrong sign
@@ -165,11 +165,9 @@ def _first_loading(body: Body, friction: Array, sense: float) -> _FirstLoading:
     k_nt = body.K_tn.T
     earlier = jnp.triu(jnp.ones((k, k + 1)), 1)
     matrix, g = body.K_tt + sense * friction * k_nt[:k], body.f_t + sense * friction * body.f_n[:k]
-    lower, upper = lower_upper(matrix)
-    sides = jnp.stack([g, friction * body.r_0[:k]], axis=1)
-    y = lax.linalg.triangular_solve(lower, sides, left_side=True, lower=True, unit_diagonal=True)
-    inverse = lax.linalg.triangular_solve(upper, jnp.eye(k), left_side=False)
-    y_g, threshold = y[:, 0], y[:, 1] / y[:, 0]
+    lower, upper, to_y, inverse = lower_upper(matrix)
+    y_g, y_r = to_y @ g, to_y @ (friction * body.r_0[:k])
+    threshold = y_r / y_g
     slips = (inverse * y_g) @ earlier
     rate = sense * (k_nt @ slips - body.f_n[:, None])
     rooms = (lower * y_g) @ earlier - g[:, None]

@@ -73,7 +73,7 @@ def factors(scene: Scene, *, nodes: int = NODES) -> SteadyCycles:
     """Factors of a strip of plane elasticity, from which many amplitudes cost microseconds each.
 
     They hold for all amplitudes, for one strip, contact and pressure.  Many strips are built by one
-    program with `jax.lax.map`; `jax.vmap` may hang in XLA's thread pool.
+    program with `jax.lax.map`.
 
     Parameters
     ----------

@@ -16,6 +16,7 @@ from jax import Array
 
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import ContactState
+from jbeamshell.numerics.factors import inverse_cholesky
 
 
 def driven_by_displacement(body: Body) -> Body:
@@ -92,8 +93,8 @@ def with_springs(body: Body, stiffness: Array) -> tuple[Body, Springs]:
     -------
     body, springs : with the plastic slip for v, and what finds v again
     """
-    flexibility = jnp.linalg.inv(body.K_tt + jnp.diag(stiffness))
-    flexibility = 0.5 * (flexibility + flexibility.T)
+    inverse = inverse_cholesky(body.K_tt + jnp.diag(stiffness))
+    flexibility = inverse.T @ inverse
     lifted, pulled = flexibility @ body.K_tn, flexibility @ body.f_t
     # D - D (K + D)^-1 D without the difference of two large matrices where the springs are stiff.
     k_tt = stiffness[:, None] * (flexibility @ body.K_tt)

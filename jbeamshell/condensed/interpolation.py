@@ -141,7 +141,7 @@ def _lanes(bodies: Bodies, values: dict[str, Array], amplitudes: Array) -> Array
         numbers, own = lane
         return bodies.factors(bodies.scene.replace(numbers)).dissipation(own)
 
-    # One lane after the other: triangular solves side by side hang in XLA's pool of two threads.
+    # Factors are found one after the other; so lanes side by side would save nothing.
     return lax.map(one, (values, amplitudes))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array, lax
 
 from jbeamshell.condensed.body import Body
-from jbeamshell.condensed.branches import ContactState, Factors, factorise, holds
+from jbeamshell.condensed.branches import ContactState, Factors, factorise, follow
 from jbeamshell.condensed.events import Level, walk
 
 Turns = tuple[bool, ...] | Array
@@ -114,34 +114,8 @@ def _branch(
     body: Body, factors: Factors, friction: Array, start: ContactState, forces: Array
 ) -> tuple[Level, Array]:
     """Levels of one branch, and True if what it assumes holds."""
-    k = body.f_t.size
-    step = (forces - start.force)[:, None]
-    rises = step[-1, 0] >= 0.0
-    sense = jnp.where(rises, 1.0, -1.0)
-    reach = jnp.abs(step)
-    own: Factors = jax.tree.map(lambda a: a[jnp.where(rises, 0, 1)], factors)
-    y_c = own.lower @ -(start.r_t + sense * friction * start.r_n[:k])
-    thresholds = -sense * y_c / own.y_g
-    slips = jnp.cumsum(thresholds >= reach, axis=1) == 0
-    slip = jnp.where(slips, y_c + own.y_g * step, 0.0) @ own.upper.T
-    pushed = slip @ body.K_tt
-    beyond = jnp.where(slips, reach - thresholds, 0.0)
-    compliances = own.z * own.y_g
-    work = 0.5 * jnp.sum(compliances * beyond * (reach + thresholds), axis=1)
-    work = work - slip @ start.r_t - 0.5 * jnp.sum(slip * pushed, axis=1)
-    state = ContactState(
-        start.v + slip,
-        start.r_t + pushed - body.f_t * step,
-        start.r_n + slip @ body.K_tn - body.f_n * step,
-        forces,
-        start.displacement + body.c * step[:, 0] + sense * beyond @ compliances,
-    )
-    level = Level(
-        state,
-        jnp.zeros_like(state.r_n),
-        jnp.diff(work, prepend=0.0),
-        slips,
-        jnp.ones_like(slips[:, 0]),
-    )
-    valid = holds(own, friction, start, thresholds, slips[-1], sense, reach[-1, 0])
-    return level, valid
+    branch = follow(body, factors, friction, start, forces)
+    lift = jnp.zeros_like(branch.at.r_n)
+    settled = jnp.ones_like(forces, bool)
+    work = jnp.diff(branch.slip_work, prepend=0.0)
+    return Level(branch.at, lift, work, branch.slipping, settled), branch.valid

@@ -112,7 +112,7 @@ class Network(eqx.Module):
     def branch(self, start: ContactState, force: Array) -> tuple[ContactState, Array, Array]:
         """Contact, work of friction and validity after a branch from a reversal to a force."""
         found = follow(self.body, self.factors, self.friction, start, force)
-        return found.end, found.slip_work, found.valid
+        return found.at, found.slip_work, found.valid
 
     def sliders(self, start: ContactState, sense: Array) -> Sliders:
         """Sliders of the branch of a sense (1 or -1) that starts with a contact."""
@@ -134,7 +134,7 @@ class Network(eqx.Module):
         """
         turns = amplitude * jnp.asarray([1.0, *[-1.0, 1.0] * CYCLES])
         found = path(self.body, self.factors, self.friction, self.rest, turns)
-        reach = 0.5 * jnp.abs(found.end.displacement[-1] - found.end.displacement[-2])
+        reach = 0.5 * jnp.abs(found.at.displacement[-1] - found.at.displacement[-2])
         nested = jnp.all(found.valid)
         work = jnp.sum(found.slip_work[-2:])
         return jnp.where(nested, reach, jnp.nan), jnp.where(nested, work, jnp.nan)

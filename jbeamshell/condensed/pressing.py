@@ -18,6 +18,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from jbeamshell.condensed.tableau import exchanged_rows
+from jbeamshell.numerics.factors import solve
 
 MOST_EVENTS = 8  # times the nodes
 
@@ -56,7 +57,7 @@ def press(
     foundation : False to leave the body without a base under pressures that balance; the last node
         keeps its height
     """
-    known = jnp.linalg.solve(k_tt, jnp.concatenate([k_tn, press_t[:, None]], axis=1))
+    known = solve(k_tt, jnp.concatenate([k_tn, press_t[:, None]], axis=1))
     stiffness = k_nn - k_tn.T @ known[:, :-1]
     r_0 = press_n - k_tn.T @ known[:, -1]
     opened, found = jnp.arange(r_0.size) < r_0.size - 1, jnp.asarray(True)
@@ -64,7 +65,7 @@ def press(
         opened, found = lax.stop_gradient(_open_nodes(stiffness, r_0))
     both = opened[:, None] & opened
     matrix = jnp.where(both, stiffness, jnp.diag(jnp.diag(stiffness)))
-    lift = jnp.where(opened, jnp.linalg.solve(matrix, jnp.where(opened, -r_0, 0.0)), 0.0)
+    lift = jnp.where(opened, solve(matrix, jnp.where(opened, -r_0, 0.0)), 0.0)
     lift = jnp.where(found, lift, jnp.nan)
     reaction = jnp.where(opened | (not foundation), 0.0, r_0 + stiffness @ lift)
     return Pressing(lift, -known[:, -1] - known[:, :-1] @ lift, reaction)

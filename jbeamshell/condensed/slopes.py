@@ -20,10 +20,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jax import Array, lax
+from jax import Array
 
 from jbeamshell.condensed.branches import ContactState
 from jbeamshell.condensed.tableau import AGAINST, ALONG, CLOSE, STICK, System, Tableau
+from jbeamshell.numerics.factors import inverse_unit_lower
 
 
 class Row(NamedTuple):
@@ -47,7 +48,7 @@ class Row(NamedTuple):
 
 
 class Trace(NamedTuple):
-    """What a level's slopes need of its events.
+    """Record of a level's events, from which its slopes follow.
 
     Attributes
     ----------
@@ -244,7 +245,4 @@ def _held_again(change: System, slip_change: Array, trace: Trace) -> Array:
     known = known + jnp.sum(trace.held.forces * given, axis=1)
     # Each depends on those of earlier events only.
     order = jnp.eye(k) - trace.held.held[:, k:]
-    found = lax.linalg.triangular_solve(
-        order, known[:, None], left_side=True, lower=True, unit_diagonal=True
-    )[:, 0]
-    return jnp.where(trace.sticks > k, jnp.nan, found)
+    return jnp.where(trace.sticks > k, jnp.nan, inverse_unit_lower(order) @ known)

@@ -13,6 +13,7 @@ from jbeamshell.mechanics import elements
 from jbeamshell.mechanics.homogeneous import plane_stiffness
 from jbeamshell.mechanics.layered import Material, layered_form
 from jbeamshell.mechanics.section_form import SectionForm
+from jbeamshell.numerics.factors import solve
 from jbeamshell.scene.keys import FAR_ENDS
 from jbeamshell.scene.scene import Scene
 
@@ -62,7 +63,7 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     based = scene.contact.normal == "rigid"
     if is_pressed_evenly(scene) and based:
         lift, reaction = jnp.zeros_like(x), (down - up)[::-1]
-        settled = jnp.linalg.solve(k_tt, -press[v])
+        settled = solve(k_tt, -press[v])
     else:
         stiffness = k_tt, k_tn, hessian[w, w]
         lift, settled, reaction = press_down(*stiffness, press[v], press[w], based)

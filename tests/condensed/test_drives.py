@@ -79,13 +79,13 @@ class TestDisplacementControl:
             start = branches.pressed(body)
             pushed = branches.path(body, branches.factorise(body, 0.1), 0.1, start, TURNS)
             other = drives.driven_by_displacement(body)
-            factors, turns = branches.factorise(other, 0.1), pushed.end.displacement
+            factors, turns = branches.factorise(other, 0.1), pushed.at.displacement
             return pushed, branches.path(other, factors, 0.1, start, turns)
 
         pushed, driven = both(body)
         assert np.all(pushed.valid)
         assert np.all(driven.valid)
-        np.testing.assert_allclose(drives.exchanged(driven.end).force, TURNS, atol=1e-10)
+        np.testing.assert_allclose(drives.exchanged(driven.at).force, TURNS, atol=1e-10)
         np.testing.assert_allclose(driven.slip_work, pushed.slip_work, rtol=1e-10)
 
     def test_gross_slip_stays_on_its_plateau_and_energy_balances(self, body):
