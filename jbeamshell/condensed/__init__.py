@@ -1,8 +1,9 @@
 """Condensed contact: a linear elastic strip on its contact line, solved exactly in time.
 
-`solve` walks the load path of a scene on the rung ``plane``, which `jbeamshell.solve` does for such
-scenes; `dissipation` gives the work of a steady cycle at many amplitudes from one factorisation,
-which `factors` keeps; `Bodies` does so for many strips at once.
+`solve` walks the load path of a scene on the rung ``plane``, or on one such as
+``condensed-squeeze``, which `jbeamshell.solve` does for such scenes; `dissipation` gives the work
+of a steady cycle at many amplitudes from one factorisation, which `factors` keeps; `Bodies` does so
+for many strips at once.
 """
 
 from jbeamshell.condensed.cycles import SteadyCycles as SteadyCycles

@@ -31,6 +31,7 @@ from jax.typing import ArrayLike
 from jbeamshell.condensed.body import Body
 from jbeamshell.numerics.factors import lower_upper
 
+STEADY = 2  # cycles after which the dissipation repeats
 GROUPS = 16  # of events, over which the least rate of a reaction stands for all
 LITTLE = 1e-6  # of the largest rate or load: less does not count as a wrong sign
 

@@ -1,4 +1,4 @@
-"""Dissipation of plane elasticity in steady cycles, from factors of the body."""
+"""Dissipation in steady cycles, from factors of the body; of plane elasticity by default."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import UnconvergedError
-from jbeamshell.condensed.cycles import SteadyCycles, steady_cycles
+from jbeamshell.condensed.cycles import STEADY, SteadyCycles, steady_cycles
 from jbeamshell.condensed.drives import with_springs
 from jbeamshell.condensed.solve import solve
 from jbeamshell.condensed.strip import condensed, spring_stiffness
@@ -20,18 +20,19 @@ from jbeamshell.scene.scene import Scene
 
 NODES = 49  # 1 % of elasticity where D exceeds a tenth of the bar's cubic law, 3 % down to 1e-4
 REFINED = 89  # a third of that
-CYCLES = 2  # from the second cycle on the dissipation repeats
 
 
-def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> Array:
-    """Work of friction in a steady cycle of plane elasticity, at several amplitudes.
+def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int | None = None) -> Array:
+    """Work of friction in a steady cycle at several amplitudes.
 
     Parameters
     ----------
-    scene : strip and contact, see the rung ``plane``; may be traced
+    scene : strip and contact; on a rung such as ``condensed-squeeze`` they are that model, else
+        plane elasticity; may be traced
     amplitudes : (k,) of the end force
-    nodes : contact nodes; 49 are within 1 % of elasticity where the dissipation exceeds a tenth of
-        the bar's cubic law, and 3 % down to a ten-thousandth; 89 within .3 and 1 %
+    nodes : contact nodes; None is 49 for plane elasticity, which are within 1 % of it where the
+        dissipation exceeds a tenth of the bar's cubic law, and 3 % down to a ten-thousandth (89
+        within .3 and 1 %), and the scene's own number for others
 
     Returns
     -------
@@ -41,7 +42,7 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
     Raises
     ------
     InputError
-        if the scene has no such rung, or an amplitude exceeds gross slip, unless traced
+        if the scene is none of plane elasticity, or an amplitude exceeds gross slip, unless traced
     UnconvergedError
         if the events of a load step come to no end, unless traced
 
@@ -50,7 +51,7 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
     To ask one strip again and again, keep its `factors`.  Elastic slip (contact.stick_stiffness
     below 1000) leaves no nested zones at the corner; where it is traced, friction is without it.
     """
-    scene = on_plane(scene, nodes)
+    scene = on_contact_line(scene, nodes)
     found = _dissipation(scene, jnp.asarray(amplitudes), _is_soft(scene))
     if is_traced(scene, amplitudes, found):
         return found
@@ -59,9 +60,9 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
     require("amplitudes", sizes, sizes.ndim == 1 and bool(np.all(sizes > 0.0)), fix)
     check(scene.replace({"load.amplitude": np.max(sizes, initial=0.0)}))
     for i in np.flatnonzero(np.isnan(works)):
-        steady = {"load.amplitude": sizes[i], "load.cycles": CYCLES, "load.steps_per_half_cycle": 1}
+        steady = {"load.amplitude": sizes[i], "load.cycles": STEADY, "load.steps_per_half_cycle": 1}
         # Events leave steps of whole elements in D, which this many nodes make small.
-        lone = scene.replace(steady | {"model.nodes": max(nodes, PLANE_NODES)})
+        lone = scene.replace(steady | {"model.nodes": max(scene.model.nodes, PLANE_NODES)})
         history = solve(lone, *check(lone))
         if not history.converged:
             raise UnconvergedError(f"amplitudes = {sizes[i]:.6g}: its events come to no end")
@@ -69,8 +70,8 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int = NODES) -> A
     return jnp.asarray(works)
 
 
-def factors(scene: Scene, *, nodes: int = NODES) -> SteadyCycles:
-    """Factors of a strip of plane elasticity, from which many amplitudes cost microseconds each.
+def factors(scene: Scene, *, nodes: int | None = None) -> SteadyCycles:
+    """Factors of a strip, from which many amplitudes cost microseconds each.
 
     They hold for all amplitudes, for one strip, contact and pressure.  Many strips are built by one
     program with `jax.lax.map`.
@@ -90,16 +91,18 @@ def factors(scene: Scene, *, nodes: int = NODES) -> SteadyCycles:
     >>> kept = jb.condensed.factors(jb.Scene())
     >>> kept.dissipation(jnp.linspace(0.1, 1.9, 256))
     """
-    scene = on_plane(scene, nodes)
+    scene = on_contact_line(scene, nodes)
     return _factors(scene, _is_soft(scene))
 
 
-def on_plane(scene: Scene, nodes: int) -> Scene:
-    """Scene on the rung ``plane`` with so many nodes."""
+def on_contact_line(scene: Scene, nodes: int | None) -> Scene:
+    """Scene on its condensed rung, or on ``plane``, with so many nodes; see `dissipation`."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     force = scene.load.control == "force"
     require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
-    return scene.replace({"model.rung": "plane", "model.nodes": nodes})
+    if scene.model.solution != "condensed":
+        scene = scene.replace({"model.rung": "plane", "model.nodes": NODES})
+    return scene if nodes is None else scene.replace({"model.nodes": nodes})
 
 
 def _is_soft(scene: Scene) -> bool:

@@ -69,10 +69,6 @@ class Springs(NamedTuple):
         pull = self.stiffness * plastic - body.K_tn @ lift + body.f_t * force
         return self.flexibility @ pull
 
-    def energy(self, r_t: Array) -> Array:
-        """Energy in the springs under the tangential forces (k,)."""
-        return 0.5 * jnp.sum(r_t**2 / self.stiffness)
-
 
 def with_springs(body: Body, stiffness: Array) -> tuple[Body, Springs]:
     """Body on its plastic slips p, with springs of finite stiffness between p and v.

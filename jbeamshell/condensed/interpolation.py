@@ -1,4 +1,4 @@
-"""Bodies of plane strips between built ones: Chebyshev polynomials of height and Poisson's ratio.
+"""Bodies of strips between built ones: Chebyshev polynomials of height and Poisson's ratio.
 
 In units of E' the stiffness of a strip on its contact line depends on L/H and nu alone, and
 smoothly so: a dozen heights and half a dozen Poisson's ratios stand for all.
@@ -18,8 +18,8 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import require
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.cycles import SteadyCycles, steady_cycles
-from jbeamshell.condensed.dissipation import NODES, factors, on_plane
-from jbeamshell.condensed.strip import RULE, condensed, is_pressed_evenly, plane_stations, pressing
+from jbeamshell.condensed.dissipation import factors, on_contact_line
+from jbeamshell.condensed.strip import RULE, condensed, is_pressed_evenly, pressing, stations
 from jbeamshell.mechanics import elements
 from jbeamshell.scene.scene import Scene
 
@@ -29,7 +29,7 @@ CHECKED = np.geomspace(0.05, 0.95, 8)  # amplitudes over gross slip, for the err
 
 
 class Bodies(eqx.Module):
-    """Plane strips of a range of heights and Poisson's ratios, interpolated; see `of`.
+    """Strips of a range of heights and Poisson's ratios, interpolated; see `of`.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class Bodies(eqx.Module):
         height_ratios: tuple[float, float],
         poisson_ratios: tuple[float, float],
         *,
-        nodes: int = NODES,
+        nodes: int | None = None,
         points: tuple[int, int] = (12, 6),
     ) -> Bodies:
         """Bodies between strips that are built at the Chebyshev points of both ranges.
@@ -62,14 +62,15 @@ class Bodies(eqx.Module):
         ----------
         scene : homogeneous strip under a uniform pressure
         height_ratios, poisson_ratios : (least, most); the same number twice for one point
-        nodes : contact nodes
+        nodes : contact nodes; see `jbeamshell.condensed.dissipation`
         points : numbers of height ratios and Poisson's ratios; 12 and 6 err by some 1e-5 from .03
             to .4 and from .15 to .45, 8 and 4 by 1e-3
 
         Raises
         ------
         InputError
-            if the strip has layers, its pressure is a table, or a range is none
+            if the strip has layers or an energy of its own, its pressure is a table, or a range is
+            none
 
         Examples
         --------
@@ -80,11 +81,13 @@ class Bodies(eqx.Module):
         """
         layers, pressure = scene.strip.layers, scene.contact.pressure
         require("strip.layers", layers, layers is None, "must be left out to interpolate bodies")
+        fix = "must be left out to interpolate bodies: it has no moduli to scale with"
+        require("energy", scene.energy, scene.energy is None, fix)
         fix = "must be one number to interpolate bodies"
         require("contact.pressure", pressure, is_pressed_evenly(scene), fix)
         for name, pair in (("height_ratios", height_ratios), ("poisson_ratios", poisson_ratios)):
             require(name, pair, len(pair) == 2 and pair[0] <= pair[1], "give (least, most)")
-        scene = on_plane(scene, nodes)
+        scene = on_contact_line(scene, nodes)
         require("contact.stick_stiffness", "soft", scene.ideal_friction, "must be 1000 or more")
         low = jnp.array([np.log(height_ratios[0]), poisson_ratios[0]])
         high = jnp.array([np.log(height_ratios[1]), poisson_ratios[1]])
@@ -101,7 +104,7 @@ class Bodies(eqx.Module):
         for x, count in zip(at, self.coefficients.c.shape, strict=True):
             weights = jnp.multiply.outer(weights, _polynomials(x, count))
         found = jax.tree.map(lambda c: jnp.tensordot(weights, c, 2), self.coefficients)
-        x, modulus = plane_stations(scene, scene.model.nodes), strip.plane_modulus
+        x, modulus = stations(scene, scene.model.nodes), strip.plane_modulus
         down, up = pressing(scene, x)
         return Body(
             x=x[::-1],

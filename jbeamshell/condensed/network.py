@@ -18,11 +18,10 @@ from jax import Array, lax
 
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import ContactState, Factors, factorise, follow, path, pressed
+from jbeamshell.condensed.cycles import STEADY
 from jbeamshell.condensed.drives import with_springs
 from jbeamshell.condensed.strip import condensed, moving_volume, spring_stiffness
 from jbeamshell.scene.scene import Scene
-
-CYCLES = 2  # from the second cycle on the dissipation repeats
 
 
 class Sliders(NamedTuple):
@@ -86,7 +85,7 @@ class Network(eqx.Module):
 
     @classmethod
     def of(cls, scene: Scene, soft: bool = False) -> Network:
-        """Network of a scene with the rung ``plane``; may be traced.
+        """Network of a scene on a condensed rung; may be traced.
 
         Parameters
         ----------
@@ -97,7 +96,7 @@ class Network(eqx.Module):
         body = strip.body
         if soft:
             body, _ = with_springs(body, spring_stiffness(scene, strip))
-        return cls(body, factorise(body, friction), friction, moving_volume(scene, strip))
+        return cls(body, factorise(body, friction), friction, moving_volume(strip))
 
     @property
     def rest(self) -> ContactState:
@@ -132,7 +131,7 @@ class Network(eqx.Module):
 
         Both are NaN where the slip zones are not nested.
         """
-        turns = amplitude * jnp.asarray([1.0, *[-1.0, 1.0] * CYCLES])
+        turns = amplitude * jnp.asarray([1.0, *[-1.0, 1.0] * STEADY])
         found = path(self.body, self.factors, self.friction, self.rest, turns)
         reach = 0.5 * jnp.abs(found.at.displacement[-1] - found.at.displacement[-2])
         nested = jnp.all(found.valid)

@@ -1,4 +1,4 @@
-"""Load paths of plane elasticity, exact in time: a scene in, a history out."""
+"""Load paths of a strip on its contact line, exact in time: a scene in, a history out."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import driven_by_displacement, exchanged, with_springs
 from jbeamshell.condensed.events import Level
 from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
-from jbeamshell.condensed.strip import Strip, condensed, is_pressed_evenly, spring_stiffness
+from jbeamshell.condensed.strip import Strip, condensed, spring_stiffness, stays_flat
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.numerics.cycles import turning_points
 from jbeamshell.scene.load_path import LoadPath
+from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 
 Cycles = tuple[tuple[int, int, int], ...]
@@ -27,16 +28,17 @@ Cycles = tuple[tuple[int, int, int], ...]
 def solve(
     scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False, own: bool = True
 ) -> History:
-    """Press a strip of plane elasticity down and walk a load path.
+    """Press a strip down and walk a load path.
 
     Between the events at which a node starts to slip, sticks, opens or closes everything is linear
     in the load, so that load steps only say where the path is looked at.  Friction is Coulomb's,
-    without elastic slip if contact.stick_stiffness is 1000 or more; contact is unilateral; singular
-    stresses at the loaded corner are resolved to 1e-5 H.
+    without elastic slip if contact.stick_stiffness is 1000 or more; contact is unilateral.
+    Nodes are those of the load steps of the same section; plane elasticity resolves singular
+    stresses at the loaded corner to 1e-4 H.
 
     Parameters
     ----------
-    scene : scene with the rung ``plane``; may be traced
+    scene : scene on a condensed rung; may be traced
     path, cycles : whole path of the scene and its closed cycles, see
         `jbeamshell.scene.load_path.check`
     nested : True to take factors alone, whose steps are marked unconverged where slip zones are not
@@ -46,8 +48,8 @@ def solve(
     Returns
     -------
     History
-        fields v, w, beta (mean rotation of the section) and psi (mean squeeze strain); NaN from the
-        first step on whose events come to no end
+        fields v, w, beta and psi, and those of a section of order p; of plane elasticity beta and
+        psi are means over the height; NaN from the first step on whose events come to no end
 
     Raises
     ------
@@ -57,17 +59,19 @@ def solve(
     """
     before = scene.load.pressure_steps
     whole = is_traced(path.pressure) or bool(np.all(np.asarray(path.pressure)[before:] == 1.0))
-    fix = "must act wholly for model.rung = plane: take squeeze or p6 for changing pressures"
+    rung = scene.model.rung
+    fix = f"must act wholly for model.rung = {rung}: take {general_rung(rung)} to change them"
     require("path", "pressures", whole, fix)
     targets = jnp.asarray(path.target[before:])
     base = scene.contact.normal == "rigid" or not targets.size
-    fix = "leaves model.rung = plane nothing but the pressures: set load.cycles = 0, or take p6"
+    fix = f"leaves {rung} nothing but the pressures: set load.cycles = 0, or take "
+    fix += general_rung(rung)
     require("contact.normal", scene.contact.normal, base, fix)
     turns = _turns(scene, targets, own)
     strip = _strip(scene)
     if not is_traced(strip):
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
-        fix = "must press the strip down for model.rung = plane"
+        fix = f"must press the strip down for model.rung = {rung}"
         require("contact.pressure", scene.contact.pressure, down, fix)
     soft = not scene.ideal_friction
     found = _levels(scene, strip, targets, turns, nested, soft)
@@ -96,7 +100,7 @@ def _levels(
 ) -> Level:
     """Levels after the pressing."""
     body, friction = strip.body, scene.contact.friction
-    lift = None if is_pressed_evenly(scene) else strip.lift
+    lift = None if stays_flat(scene) else strip.lift
     if soft:
         body, springs = with_springs(body, spring_stiffness(scene, strip))
     if scene.load.control == "displacement":
@@ -138,7 +142,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     given = given.at[:, -2].set(force).at[:, -1].set(part)
     inner = jnp.moveaxis(strip.elimination.recovered(given.T), 2, 0)  # (steps, n, m-2)
     fields = jnp.concatenate([v[..., None], w[..., None], inner], axis=-1)
-    means = fields @ strip.form.means.T
+    further = fields @ strip.form.further.T
     reaction = along(state.r_n) / strip.tributary
     reaction = reaction.at[:before].set(part[:before, None] * body.r_0[::-1] / strip.tributary)
     slipping = along(levels.slipping).astype(bool)
@@ -161,7 +165,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
         load=strip.load,
         force=masked(force),
         displacement=masked(every(state.displacement)),
-        fields=masked(jnp.concatenate([v[..., None], w[..., None], means], axis=-1)),
+        fields=masked(jnp.concatenate([v[..., None], w[..., None], further], axis=-1)),
         gap=masked(w),
         sections=jax.tree.map(masked, _section_forces(strip, fields)),
         traction=masked(-along(state.r_t) / strip.tributary),

@@ -1,4 +1,4 @@
-"""Strip of a scene on its contact line: its section's form, its stations, its condensed body."""
+"""Strip of a scene on its contact line: its stations, its pressing, its condensed body."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from jax import Array
 
 from jbeamshell.condensed.body import Body, Elimination, eliminate
 from jbeamshell.condensed.pressing import press as press_down
+from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements
-from jbeamshell.mechanics.homogeneous import plane_stiffness
-from jbeamshell.mechanics.layered import Material, layered_form
 from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.numerics.factors import solve
 from jbeamshell.scene.keys import FAR_ENDS
@@ -49,9 +48,9 @@ class Strip(NamedTuple):
 
 
 def condensed(scene: Scene, nodes: int) -> Strip:
-    """Strip of a scene as plane elasticity, condensed to its contact nodes."""
+    """Strip of a scene on a condensed rung, condensed to its contact nodes."""
     far_end = scene.strip.far_end
-    form, x = plane_form(scene), plane_stations(scene, nodes)
+    form, x = section_form(scene), stations(scene, nodes)
     down, up = pressing(scene, x)
     tributary = elements.tributary_lengths(RULE, x)
     elimination, hessian = eliminate(form, x, down, "beta" in FAR_ENDS[far_end])
@@ -60,13 +59,17 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
     w = slice(last + 1, None, -2)
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
-    based = scene.contact.normal == "rigid"
-    if is_pressed_evenly(scene) and based:
+    # Without friction the far end keeps its place, even if nothing else holds it.
+    some = x.size - 1
+    press_t = press[v][:some]
+    if stays_flat(scene):
         lift, reaction = jnp.zeros_like(x), (down - up)[::-1]
-        settled = solve(k_tt, -press[v])
+        settled = solve(k_tt[:some, :some], -press_t)
     else:
-        stiffness = k_tt, k_tn, hessian[w, w]
-        lift, settled, reaction = press_down(*stiffness, press[v], press[w], based)
+        stiffness = k_tt[:some, :some], k_tn[:some], hessian[w, w]
+        based = scene.contact.normal == "rigid"
+        lift, settled, reaction = press_down(*stiffness, press_t, press[w], based)
+    settled = jnp.pad(settled, (0, k_tt.shape[0] - some))
     body = Body(
         x=x[::-1],
         tributary=tributary[::-1],
@@ -92,14 +95,27 @@ def is_pressed_evenly(scene: Scene) -> bool:
     return scene.contact.pressure.ndim == scene.contact.bottom_pressure.ndim == 0
 
 
-def plane_stations(scene: Scene, nodes: int) -> Array:
-    """Stations (nodes,) along X, dense at the singular loaded corner and at steps of pressure."""
+def stays_flat(scene: Scene) -> bool:
+    """True if the pressures squeeze the strip evenly onto a foundation, so that it does not bend.
+
+    Layers and a Phi of the user's own may bend.
+    """
+    homogeneous = scene.strip.layers is None and scene.energy is None
+    return is_pressed_evenly(scene) and homogeneous and scene.contact.normal == "rigid"
+
+
+def stations(scene: Scene, nodes: int) -> Array:
+    """Stations (nodes,) along X: those of load steps, or of plane elasticity.
+
+    The latter are denser at the singular loaded corner and at steps of the pressure.
+    """
     length, half_height = scene.strip.length, scene.strip.half_height
-    if is_pressed_evenly(scene):
+    steps, model = scene.contact.steps(length), scene.model
+    if model.solution != "plane":
+        return elements.vertices(nodes - 1, length, half_height, model.end_size, steps)
+    if steps is None:
         grading = (PLANE_END_SIZE, None, PLANE_GROWTH, PLANE_FAR_SIZE)
         return elements.vertices(nodes - 1, length, half_height, *grading)
-    tables = [p for p in (scene.contact.pressure, scene.contact.bottom_pressure) if p.ndim]
-    steps = jnp.sort(jnp.concatenate([elements.table_steps(table, length) for table in tables]))
     inside = jnp.append(steps < length, False)
     sizes = jnp.where(inside, STEP_SIZE, PLANE_END_SIZE)
     growths = jnp.where(inside, elements.GROWTH, PLANE_GROWTH)
@@ -108,39 +124,12 @@ def plane_stations(scene: Scene, nodes: int) -> Array:
 
 def spring_stiffness(scene: Scene, strip: Strip) -> Array:
     """Stiffness (k,) of the elastic slip of each node, k_t times its contact length."""
-    alpha, shear = scene.contact.stick_stiffness, scene.strip.shear_modulus
-    return (alpha * shear / scene.strip.half_height * strip.body.tributary)[: strip.body.f_t.size]
+    return (scene.slip_stiffness * strip.body.tributary)[: strip.body.f_t.size]
 
 
-def moving_volume(scene: Scene, strip: Strip) -> Array:
+def moving_volume(strip: Strip) -> Array:
     """Integral of |u|^2/u(L)^2 over each layer, (layers,), under an end load, all nodes stuck."""
     n = strip.x.size
     given = jnp.zeros((2 * n + 2, 1)).at[-2, 0].set(1.0 / strip.body.c)
     fields = jnp.pad(strip.elimination.recovered(given)[..., 0], ((0, 0), (2, 0)))
-    layers = scene.strip.layers
-    thickness = jnp.reshape(2.0 * scene.strip.half_height, 1) if layers is None else layers[:, 0]
-
-    def one(layer: Array) -> Array:
-        squares = layered_form(Material(thickness, layer, 0.0 * layer, layer)).slopes
-        return jnp.einsum("i,ij,ik,jk", strip.tributary, fields, fields, squares)
-
-    return jnp.stack([one(layer) for layer in jnp.eye(thickness.size)])
-
-
-def plane_form(scene: Scene) -> SectionForm:
-    """Section of plane elasticity, homogeneous or layered."""
-    strip = scene.strip
-    if strip.layers is None:
-        nu = jnp.asarray(strip.poisson_ratio)
-        coupling, stiffness = plane_stiffness(strip.plane_modulus, nu, strip.plane)
-        thickness = 2.0 * strip.half_height
-        columns = thickness, stiffness, coupling * stiffness, strip.shear_modulus
-        return layered_form(Material(*(jnp.reshape(value, 1) for value in columns)))
-    thickness, modulus, nu = strip.layers.T
-    if strip.plane == "strain":
-        modulus, contraction = modulus / (1.0 - nu**2), nu / (1.0 - nu)
-    else:
-        contraction = nu
-    stiffness = modulus / (1.0 - contraction**2)
-    shear = strip.layers[:, 1] / (2.0 * (1.0 + nu))
-    return layered_form(Material(thickness, stiffness, contraction * stiffness, shear))
+    return jnp.einsum("i,ij,ljk,ik->l", strip.tributary, fields, strip.form.masses, fields)

@@ -116,9 +116,10 @@ def let_go(
     cycles : span of the transient, in periods of the stuck strip
     per_cycle : number of time steps in a period, of the whole strip
     whole : True to follow the whole strip in time steps; False to follow the network of sliders of
-        plane elasticity, exact in time, without the strip's inertia; None to take the network where
-        the strip's inertia matters little (`LIGHT`), it is not damped, its slip zones are nested,
-        and the scene is not a bar or a shell without squeeze strain
+        plane elasticity (or of the scene's own condensed rung), exact in time, without the strip's
+        inertia; None to take the network where the strip's inertia matters little (`LIGHT`), it is
+        not damped, its slip zones are nested, and the scene is not a bar or a shell without squeeze
+        strain
     progress : show a progress bar of the time steps; None shows it on a terminal only
 
     Returns
@@ -145,21 +146,20 @@ def let_go(
     mass = HEAVY * _strip_mass(scene, inertia) if payload is None else payload
     require_number("payload", mass)
     samples = round(cycles * SAMPLES_PER_CYCLE) + 1
-    plane = None if whole else as_plane(scene)
-    require("whole", whole, plane is not None or whole is not False, NO_NETWORK)
+    light = None if whole else on_contact_line(scene)
+    require("whole", whole, light is not None or whole is not False, NO_NETWORK)
     motion: LightMotion | Motion | None = None
     share, nested = None, False
-    if plane is not None and (whole is False or not inertia.damped):
-        joint = Joint.of(plane, end_force)
+    if light is not None and (whole is False or not inertia.damped):
+        joint = Joint.of(light, end_force)
         if joint.network is not None:
             share = _share(joint.network, inertia, mass)
             if whole is False or share <= LIGHT:
-                motion = ring(plane, joint.network, mass, end_force, cycles, samples)
+                motion = ring(light, joint.network, mass, end_force, cycles, samples)
                 nested = bool(motion.nested)
     if motion is None or not nested:
         require("whole", whole, whole is not False, NOT_NESTED)
-        rung = scene.model.solution
-        require("model.rung", rung, rung != "plane", NO_INERTIA)
+        require("model.rung", scene.model.rung, not scene.model.condensed, NO_INERTIA)
         joint = Joint.of(scene, end_force)
         motion = _whole(scene, end_force, mass, inertia, cycles, per_cycle, samples, progress)
     found = ring_down(motion.time, motion.displacement)
@@ -194,9 +194,9 @@ def _cycles(network: Network, forces: Array) -> tuple[Array, Array]:
     return lax.map(network.cycle, forces)
 
 
-def as_plane(scene: Scene) -> Scene | None:
-    """Scene as plane elasticity; None if it cannot be, or is a bar or shell by its fields."""
-    if scene.model.solution == "plane":
+def on_contact_line(scene: Scene) -> Scene | None:
+    """Scene as it is condensed, or as plane elasticity; None for bars, shells and the rest."""
+    if scene.model.condensed:
         return scene
     if scene.model.order == 0 and "psi" not in scene.model.fields:
         return None

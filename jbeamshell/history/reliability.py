@@ -18,6 +18,7 @@ from jax import Array
 
 from jbeamshell.history.linearisation import linear_error
 from jbeamshell.mechanics.friction import coulomb_cap
+from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 
 NEGLIGIBLE = 1e-9  # slip over the sticking range, or tension over the pressure, taken as zero
@@ -126,13 +127,16 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
     model, strip, found = scene.model, scene.strip, []
     if model.kinematics == "linear" and (error := linear_error(scene)) > TOLERANCE:
-        found.append(f"{_off(error)}: kinematics are linear; take model.kinematics = exact")
+        rung = f"model.rung = {general_rung(model.rung)} with " if model.condensed else ""
+        fix = f"take {rung}model.kinematics = exact"
+        found.append(f"{_off(error)}: kinematics are linear; {fix}")
     beamshell = "psi" in model.fields and model.order == 0 and model.solution != "plane"
     locks = beamshell and model.grid == "finite-difference" and strip.plane == "strain"
     if locks and strip.poisson_ratio is not None and strip.poisson_ratio > LOCKS:
+        other = "model.rung = plane" if model.condensed else "model.grid = collocation"
         found.append(
             f"nearly incompressible (nu = {strip.poisson_ratio:.4g}): finite differences may be "
-            "off by several per cent; take model.grid = collocation"
+            f"off by several per cent; take {other}"
         )
     return tuple(found)
 

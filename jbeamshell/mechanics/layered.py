@@ -90,6 +90,10 @@ def layered_form(material: Material) -> SectionForm:
     def across(part: Array | np.ndarray) -> Array:
         return jnp.append(jnp.zeros(size), part)[place]
 
+    def squares(layer: int) -> Array:
+        one = summed(jnp.where(kind == layer, h, 0.0), mass)
+        return jnp.block([[one, none], [none, one]])[pick]
+
     still = jnp.zeros(2 * size)
     modes = [
         (still, along(even)),
@@ -108,9 +112,10 @@ def layered_form(material: Material) -> SectionForm:
         pull=along(mean),
         press=across(top),
         held=np.append(np.ones(size, bool), np.zeros(size, bool))[place],
-        means=jnp.stack([along(turning), across(squeeze) / edges[-1]]),
+        further=jnp.stack([along(turning), across(squeeze) / edges[-1]]),
         modes=jnp.asarray([jnp.stack(mode) for mode in modes]),
         spread=spread[pick],
+        masses=jnp.stack([squares(i) for i in range(count)]),
     )
 
 

@@ -7,10 +7,15 @@ the slope between them, and of the difference of its ends' fields.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
+
+from jbeamshell.mechanics.kinematics import Section
 
 
 class SectionForm(NamedTuple):
@@ -22,10 +27,14 @@ class SectionForm(NamedTuple):
     pull : (m,) parts of the fields in the displacement along X that the end load moves through
     press : (m,) parts of the fields in the lift of the top face
     held : (m,) True for fields that are zero at a held far end
-    means : (2, m) parts of the fields in the section's mean rotation beta and squeeze strain psi
-    modes : (5, 2, m) fields and slopes that are a unit strain e, g, k, psi and psi'
+    further : (k, m) parts of the fields in those that a history has beside v and w: the rotation
+        beta and the squeeze strain psi (their means over the height, if the section bends), and the
+        displacements of a section of order p
+    modes : (5, 2, m) fields and slopes that are a unit strain e, g, k, psi and psi'; zero for a
+        strain that the section does not have
     spread : (m, m) second derivatives of the energy in how far the fields at an element's ends
         differ, per length
+    masses : (layers, m, m) integrals of the squared displacement over each layer of material
     """
 
     values: Array
@@ -34,9 +43,10 @@ class SectionForm(NamedTuple):
     pull: Array
     press: Array
     held: np.ndarray
-    means: Array
+    further: Array
     modes: Array
     spread: Array
+    masses: Array
 
     def element(self, lengths: Array) -> tuple[Array, Array, Array]:
         """Matrices (elements, m, m) of elements: start and start, end and end, start and end."""
@@ -46,3 +56,16 @@ class SectionForm(NamedTuple):
         even, odd = 0.5 * (self.mixed + self.mixed.T), 0.5 * (self.mixed - self.mixed.T)
         own = mean + slope + spread
         return own - even, own + even, mean - slope - spread + odd
+
+
+def section_stiffness(energy: Callable[[Section, Section], Array], like: Array) -> Array:
+    """Second derivatives (2, m, 2, m) of a section's energy in its fields and slopes, at zero.
+
+    Parameters
+    ----------
+    energy : strain energy per length and width from the fields (m,) and their slopes (m,)
+    like : (m,) fields, for their number and precision
+    """
+    return jax.hessian(lambda both: energy(both[0], both[1]))(
+        jnp.zeros((2, *like.shape), like.dtype)
+    )

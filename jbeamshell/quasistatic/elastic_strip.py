@@ -12,8 +12,16 @@ from jax.typing import ArrayLike
 from jbeamshell.mechanics import elements
 from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, forces
-from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS, Kinematics, Strains, rotated
-from jbeamshell.scene.parts import Contact, Model
+from jbeamshell.mechanics.kinematics import (
+    FIELDS,
+    KINEMATICS,
+    Kinematics,
+    Section,
+    Strains,
+    rotated,
+)
+from jbeamshell.mechanics.section_form import section_stiffness
+from jbeamshell.scene.parts import Model
 from jbeamshell.scene.scene import Scene
 
 V, W, BETA, PSI = range(len(FIELDS))
@@ -61,7 +69,7 @@ class ElasticStrip(eqx.Module):
             strip.length,
             strip.half_height,
             self.model.end_size,
-            _pressure_jumps(contact, strip.length),
+            contact.steps(strip.length),
         )
         rule = self.element_rule
         self.x, self.lengths = elements.nodes(rule, ends), jnp.diff(ends)
@@ -181,15 +189,14 @@ class ElasticStrip(eqx.Module):
     def section_stiffness(self) -> Array:
         """Hessian (2, m, 2, m) of a section's strain energy in its fields and slopes at zero."""
 
-        def energy(both: Array) -> Array:
-            section, slope = both
+        def energy(section: Section, slope: Section) -> Array:
             if self.section is not None:
                 return self.section.energy(section, slope)
             return self.energy(
                 *self._kinematics.strains(section, slope, self.half_height, self.curvature)
             )
 
-        return jax.hessian(energy)(jnp.zeros((2, self.model.width), self.x.dtype))
+        return section_stiffness(energy, jnp.zeros(self.model.width, self.x.dtype))
 
     def shapes(self, field: int) -> np.ndarray:
         """Interpolation (points, p+1) of a field from an element's nodes to its strain points."""
@@ -221,11 +228,3 @@ class ElasticStrip(eqx.Module):
         return self._kinematics.strains(
             section[straight], slope[straight], self.half_height, self.curvature
         )
-
-
-def _pressure_jumps(contact: Contact, length: Array) -> Array | None:
-    """Positions at which a pressure jumps; None if both pressures are uniform."""
-    tables = [p for p in (contact.pressure, contact.bottom_pressure) if p.ndim == 2]
-    if not tables:
-        return None
-    return jnp.sort(jnp.concatenate([elements.table_steps(table, length) for table in tables]))

@@ -45,7 +45,7 @@ def response(
     outside of a transformation runs as one native function on a CPU, if the compiler allows
     that: for some dozen nodes handing parts to threads takes longer than the arithmetic.
 
-    Many strips on the rung ``plane`` are faster with `jax.lax.map` than with `jax.vmap`.
+    Many strips on a condensed rung are faster with `jax.lax.map` than with `jax.vmap`.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def response(
     compiled = jax.jit(solved_by(method or Method.NEWTON))
     if is_traced(scene):
         return compiled
-    staged = slip_patterns.applies(scene) or scene.model.solution == "plane"
+    staged = slip_patterns.applies(scene) or scene.model.condensed
     again = method is None and staged  # what does not settle, by Newton or by events
     first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
     first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)

@@ -13,7 +13,7 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import Status, UnconvergedError
 from jbeamshell.condensed.solve import Cycles
-from jbeamshell.condensed.solve import solve as solve_plane
+from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.continuation import with_end
@@ -84,10 +84,10 @@ def solve(
     check_solver(solver)
     solver = solver or Newton()
     whole, cycles = check(scene, path)
-    if scene.model.solution == "plane":
-        found = "is found from the pressures for model.rung = plane: leave it out"
+    if scene.model.condensed:
+        found = f"is found from the pressures for model.rung = {scene.model.rung}: leave it out"
         require("contact", "given", contact is None, found)
-        return _plane(scene, whole, cycles, throw, method, path is None)
+        return _condensed(scene, whole, cycles, throw, method, path is None)
     touching = None if contact is None else check_contact(scene, contact)
     method = method or _first_method(scene, whole)
     steps, history = _solve(scene, touching, whole, solver, method, np.asarray(True))
@@ -111,7 +111,7 @@ def solve(
     return history
 
 
-def _plane(
+def _condensed(
     scene: Scene,
     path: LoadPath,
     cycles: Cycles,
@@ -119,16 +119,16 @@ def _plane(
     method: Method | None,
     own: bool,
 ) -> History:
-    """History of plane elasticity, first from factors alone unless derivatives may be taken."""
+    """History on the contact line, first from factors alone unless derivatives may be taken."""
     traced = is_traced(scene, path, jnp.zeros(()))
     events = method is Method.NEWTON or (traced and method is None)
-    history = solve_plane(scene, path, cycles, nested=not events, own=own)
+    history = solve_condensed(scene, path, cycles, nested=not events, own=own)
     if traced:
         failed, fix = history.status[-1] != Status.CONVERGED, "take other model.nodes"
         message = f"the events of a load step come to no end: {fix}"
         return eqx.error_if(history, failed, message) if throw else history
     if not history.converged:
-        history = solve_plane(scene, path, cycles, own=own)
+        history = solve_condensed(scene, path, cycles, own=own)
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
         load = float(path.target[step])
@@ -143,10 +143,10 @@ def _plane(
 def compile_for(
     scene: Scene, path: ArrayLike | None = None, *, solver: Newton | None = None
 ) -> None:
-    """Compile the programs that `solve` needs; only the cheap rung ``plane`` is solved for it."""
+    """Compile the programs that `solve` needs; only strips on their contact line are solved."""
     whole, cycles = whole_path(scene, path)
-    if scene.model.solution == "plane":
-        _plane(scene, whole, cycles, False, None, path is None)
+    if scene.model.condensed:
+        _condensed(scene, whole, cycles, False, None, path is None)
         return
     method = _first_method(scene, whole)
     compiled = _solve(scene, None, whole, solver or Newton(), method, np.asarray(False))

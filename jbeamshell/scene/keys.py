@@ -20,7 +20,7 @@ from jbeamshell.mechanics.friction import LAWS
 from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES
 from jbeamshell.mechanics.kinematics import KINEMATICS
 from jbeamshell.scene.rows import Key, Part, count, number, rows, setting, word
-from jbeamshell.scene.rungs import LARGEST_ORDER
+from jbeamshell.scene.rungs import CONDENSED, LARGEST_ORDER
 
 FAR_ENDS = {"held": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held at X = 0
 CONTROLS = ("force", "displacement")
@@ -28,7 +28,7 @@ ARC_LENGTH = "arc-length"
 LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
 NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
-SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form", "plane")
+SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form", *CONDENSED)
 
 LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 PRESSURE = "give a number or a table of [X, pressure] rows"
@@ -184,7 +184,7 @@ class ModelKeys(Part):
         "stepwise",
         SOLUTIONS,
         "Solution: stepwise, masing or masing-pull (a loop from backbones), closed-form (the bar), "
-        "or plane (elasticity on its contact line).",
+        "condensed (a linear section on its contact line) or plane (elasticity there).",
     )
     end_size: float = setting(
         END_SIZE, "Smallest elements, at the loaded end and at steps of the pressure.", unit="H"
@@ -226,7 +226,8 @@ INDIRECT = (
         "model.rung",
         "word",
         "squeeze",
-        "Fields, order and solution by one name: bar, shell, squeeze, p2, p3, ..., masing, plane.",
+        "Fields, order and solution by one name: bar, shell, squeeze, p2, p3, ..., masing, "
+        "condensed-squeeze, ..., plane.",
     ),
 )
 

@@ -38,7 +38,7 @@ def whole_path(
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     pressing, known = scene.load.pressure_steps, scene.load.unit_path()
     solution = scene.model.solution
-    any_path = path is None or solution in ("stepwise", "plane")
+    any_path = path is None or scene.model.walks
     fix = "knows the scene's own cycles only: leave the path out, or take 'stepwise'"
     require("model.solution", solution, any_path, fix)
     numbers: Any = jnp if is_traced(scene.load.amplitude, path) else np  # NumPy is faster

@@ -18,7 +18,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import require
-from jbeamshell.mechanics.elements import ORDER
+from jbeamshell.mechanics.elements import ORDER, table_steps
 from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
 from jbeamshell.mechanics.homogeneous import shear_modulus, youngs_modulus
 from jbeamshell.mechanics.kinematics import FIELDS
@@ -34,7 +34,7 @@ from jbeamshell.scene.keys import (
 )
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.pressure import check_pressure, pressure_values
-from jbeamshell.scene.rungs import name_of
+from jbeamshell.scene.rungs import CONDENSED, name_of
 
 MODELS = (
     ("v",),
@@ -143,6 +143,16 @@ class Contact(ContactKeys):
         """Largest pressure F_N on the top face."""
         return jnp.max(self.pressure[:, 1]) if self.pressure.ndim else self.pressure
 
+    def steps(self, length: Array) -> Array | None:
+        """Positions X at which a pressure jumps, rising; None if both pressures are uniform.
+
+        Rows of a table between which it does not jump give L.
+        """
+        tables = [p for p in (self.pressure, self.bottom_pressure) if p.ndim == 2]
+        if not tables:
+            return None
+        return jnp.sort(jnp.concatenate([table_steps(table, length) for table in tables]))
+
 
 class Load(LoadKeys):
     """Load on the end X = L after the pressure.
@@ -188,8 +198,9 @@ class Model(ModelKeys):
     earlier theory of Brink 2015, section 4.2, without Poisson's effect).  ``order`` p from 1 up is
     a section of order p, see `jbeamshell.mechanics.hierarchic`.  ``solution`` is "stepwise"
     (Newton's method at every load level), "masing" (the loop is the mean backbone of a pull and a
-    push, doubled), "masing-pull" (of a pull alone) or "closed-form" (Goodman's bar).  ``end_size``
-    is that before the node count scales all elements.
+    push, doubled), "masing-pull" (of a pull alone), "closed-form" (Goodman's bar), "condensed" or
+    "plane" (see `jbeamshell.condensed`).  ``end_size`` is that before the node count scales all
+    elements.
     """
 
     def __check_init__(self) -> None:
@@ -218,6 +229,16 @@ class Model(ModelKeys):
     def rung(self) -> str:
         """Name of the model on the ladder; see `jbeamshell.scene.rungs`."""
         return name_of(self.fields, self.order, self.solution)
+
+    @property
+    def condensed(self) -> bool:
+        """True if the strip is solved on its contact line, see `jbeamshell.condensed`."""
+        return self.solution in CONDENSED
+
+    @property
+    def walks(self) -> bool:
+        """True if the solution follows any path of loads."""
+        return self.solution == "stepwise" or self.condensed
 
     @property
     def width(self) -> int:

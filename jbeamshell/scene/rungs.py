@@ -10,9 +10,11 @@
 | ``masing-shell``, ``masing-p2``, ... | the same with another section |
 | ``masing-pull``, ``masing-pull-p2``, ... | Masing's rule from a pull alone |
 | ``stepwise-bar`` | field v by Newton's method, for bars without a closed form |
+| ``condensed-squeeze``, ``condensed-p2``, ... | linear section on its contact line, exact in time |
 | ``plane`` | plane elasticity on its contact line, exact in time, see `jbeamshell.condensed` |
 
-All rungs but the bars have the field w if the scene has it; ``plane`` always has it.
+All rungs but the bars have the field w if the scene has it; those on the contact line always have
+it, and have linear kinematics.
 """
 
 from __future__ import annotations
@@ -26,15 +28,10 @@ from jbeamshell.common.errors import InputError
 LARGEST_ORDER = 12
 FIELDS_OF = {"bar": ("v",), "shell": ("v", "beta"), "squeeze": ("v", "beta", "psi")}
 SETS = ("model.fields", "model.order", "model.solution")  # keys that a rung's name sets
-PLANE = {  # keys that the rung ``plane`` sets, with its number of nodes unless another is given
-    "model.fields": ("v", "w", "beta", "psi"),
-    "model.order": 0,
-    "model.solution": "plane",
-    "model.kinematics": "linear",
-}
-PLANE_NODES = 129
-PLANE_IDEAL = 1000.0  # contact.stick_stiffness from which on its friction is without elastic slip
-_NAME = re.compile(r"(?P<prefix>(masing-pull|masing|stepwise)-)?(?P<section>[a-z]+|p\d+)")
+CONDENSED = ("condensed", "plane")  # solutions on the contact line, exact in time
+PLANE_NODES = 129  # of the rung ``plane`` unless another number is given
+IDEAL = 1000.0  # contact.stick_stiffness from which on there friction is without elastic slip
+_NAME = re.compile(r"(?P<prefix>(masing-pull|masing|stepwise|condensed)-)?(?P<section>[a-z]+|p\d+)")
 
 
 def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
@@ -50,8 +47,6 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     >>> values_of("p2")["model.order"]
     2
     """
-    if rung == "plane":
-        return dict(PLANE)
     text = rung if isinstance(rung, str) else repr(rung)
     full = f"{text}-squeeze" if text in ("masing", "masing-pull") else text
     match = _NAME.fullmatch(full)
@@ -59,18 +54,26 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     section = match["section"] if match else ""
     order = int(section[1:]) if re.fullmatch(r"p\d+", section) else 0
     ordered = section not in FIELDS_OF and 1 <= order <= LARGEST_ORDER
-    stepwise = prefix == "stepwise" and section != "bar"  # the others are stepwise by no prefix
-    if not match or stepwise or not (ordered or section in FIELDS_OF):
+    plane = text == "plane"
+    bar = {"stepwise": section == "bar", "condensed": section != "bar"}  # the rest by no prefix
+    if not match or not bar.get(prefix, True) or not (ordered or plane or section in FIELDS_OF):
         raise InputError(
             f"model.rung = {rung!r}: choose 'bar', 'shell', 'squeeze', 'p1' to 'p{LARGEST_ORDER}', "
-            "'plane', 'masing' (of squeeze), or 'masing-' and one of these"
+            "'plane', 'masing' (of squeeze), or 'masing-' or 'condensed-' and one of these"
         )
     fields = FIELDS_OF.get(section, FIELDS_OF["squeeze"])
-    if lift and section != "bar":
-        fields = ("v", "w", *fields[1:])
     closed = section == "bar" and not prefix
-    solution = "closed-form" if closed else prefix or "stepwise"
-    return dict(zip(SETS, (fields, order, solution), strict=True))
+    solution = "closed-form" if closed else "plane" if plane else prefix or "stepwise"
+    condensed = solution in CONDENSED
+    if (lift or condensed) and section != "bar":
+        fields = ("v", "w", *fields[1:])
+    values = dict(zip(SETS, (fields, order, solution), strict=True))
+    return values | ({"model.kinematics": "linear"} if condensed else {})
+
+
+def general_rung(rung: str) -> str:
+    """Name of the rung that walks in load steps what a rung on the contact line cannot."""
+    return "p6" if rung == "plane" else rung.removeprefix("condensed-")
 
 
 def name_of(fields: Sequence[str], order: int, solution: str) -> str:
@@ -85,7 +88,8 @@ def name_of(fields: Sequence[str], order: int, solution: str) -> str:
         return section
     if solution == "stepwise":
         return "stepwise-bar" if section == "bar" else section
-    return solution if section == "squeeze" else f"{solution}-{section}"
+    masing = solution in ("masing", "masing-pull")
+    return solution if masing and section == "squeeze" else f"{solution}-{section}"
 
 
 def spelled_out(values: dict[str, Any], fields: Sequence[str] = ()) -> dict[str, Any]:
@@ -110,7 +114,8 @@ def spelled_out(values: dict[str, Any], fields: Sequence[str] = ()) -> dict[str,
         other = values.get(key, value)
         same = tuple(other) == value if isinstance(other, list | tuple) else other == value
         if not same:
-            fix = "give one" + (", or take p6, which rotates" if key == "model.kinematics" else "")
+            rotates = f", or take {general_rung(rung)}, which rotates"
+            fix = "give one" + (rotates if key == "model.kinematics" else "")
             raise InputError(f"model.rung = {rung!r} and {key} = {other!r} disagree: {fix}")
     if rung == "plane":
         meant["model.nodes"] = values.get("model.nodes", PLANE_NODES)

@@ -32,7 +32,8 @@ from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, pla
 from jbeamshell.scene.domain import support_rules
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
 from jbeamshell.scene.parts import SECTIONS, Contact, Load, Model, Strip
-from jbeamshell.scene.rungs import PLANE, PLANE_IDEAL, spelled_out
+from jbeamshell.scene.quadratic import check_quadratic
+from jbeamshell.scene.rungs import IDEAL, general_rung, spelled_out
 
 
 class Scene(eqx.Module):
@@ -69,21 +70,27 @@ class Scene(eqx.Module):
             require(name, part, isinstance(part, kind), f"give a jbeamshell.{kind.__name__}")
         self._check_rung()
         self._check_contact()
-        if self.energy is None:
-            return
+        if self.energy is not None:
+            self._check_energy(self.energy)
+
+    def _check_energy(self, energy: Energy) -> None:
+        """Refuse what is no strain energy, or on the contact line none of a linear section."""
         fix = "must be a function of (e, g, k, psi, psi')"
-        require("energy", self.energy, callable(self.energy), fix)
+        require("energy", energy, callable(energy), fix)
         probe = [jax.ShapeDtypeStruct((), self.strip.length.dtype)] * 5
         try:
-            shape = jax.eval_shape(self.energy, *probe)
+            shape = jax.eval_shape(energy, *probe)
         except TypeError as error:
             raise InputError(f"energy: {fix}; {error}") from None
         require(
             "energy",
-            self.energy,
+            energy,
             getattr(shape, "shape", None) == (),
             f"must return one number, not {shape}",
         )
+        if self.model.condensed and not is_traced(energy, self.strip.half_height):
+            fix = f"take model.rung = {general_rung(self.model.rung)}"
+            check_quadratic(energy, self.strip.half_height, "psi" in self.model.fields, fix)
 
     def strain_energy(self) -> Energy:
         """Strain energy Phi(e, g, k, psi, psi') of this scene's section."""
@@ -132,37 +139,55 @@ class Scene(eqx.Module):
         require(
             "model.solution", model.solution, bar or not closed, f"{fix}take another model.rung"
         )
-        if model.solution == "plane":
-            self._check_plane()
+        if model.condensed:
+            self._check_condensed(plain)
         either = model.solution == "stepwise" or self.load.control in CONTROLS
         require("model.solution", model.solution, either, "knows no arc length: take 'stepwise'")
-        walks = model.solution in ("stepwise", "plane")
-        cycling = walks or self.load.cycles > 0
+        cycling = model.walks or self.load.cycles > 0
         fix = "needs load.cycles of 1 or more: give them, or take 'stepwise'"
         require("model.solution", model.solution, cycling, fix)
         half = self.load.steps_per_half_cycle
         fix = f"must be even if model.solution is {model.solution!r}"
-        enough = walks or half % 2 == 0
+        enough = model.walks or half % 2 == 0
         require("load.steps_per_half_cycle", half, enough, fix)
 
-    def _check_plane(self) -> None:
-        """Refuse what plane elasticity on its contact line cannot represent."""
-        model, curvature, law = self.model, self.strip.curvature, self.contact.law
-        fix = "is for linear elasticity with rotations left out: take model.rung = p6 to have them"
-        require("model.kinematics", model.kinematics, model.kinematics == "linear", fix)
-        whole = model.fields == PLANE["model.fields"] and model.order == 0
-        fix = "and model.order do not suit 'plane': give model.rung = plane, which sets them"
-        require("model.fields", list(model.fields), whole and model.squeeze == "field", fix)
-        fix = "must be left out for model.rung = plane, whose strip is straight: take squeeze"
+    def _check_condensed(self, plain: bool) -> None:
+        """Refuse what no linear section on its contact line can represent.
+
+        Parameters
+        ----------
+        plain : True for a straight homogeneous strip without an energy of its own
+        """
+        model, curvature, contact = self.model, self.strip.curvature, self.contact
+        rung, plane = model.rung, model.solution == "plane"
+        take = f"take model.rung = {general_rung(rung) if plain or not plane else 'squeeze'}"
+        linear = model.kinematics == "linear"
+        fix = f"must be linear for model.rung = {rung}: {take} for rotations"
+        require("model.kinematics", model.kinematics, linear, fix)
+        fix = f"must be 'field' for model.rung = {rung}: {take}"
+        require("model.squeeze", model.squeeze, model.squeeze == "field", fix)
+        if plane:
+            fix = "must be 0 for plane elasticity: leave it out"
+            require("model.order", model.order, model.order == 0, fix)
+            whole = model.fields == ("v", "w", "beta", "psi")
+            fix = "must be ['v', 'w', 'beta', 'psi'] for plane elasticity: leave it out"
+        else:
+            whole = "w" in model.fields
+            known = f"condensed-{general_rung(rung)}" if "beta" in model.fields else "bar"
+            fix = f"must hold w for model.solution = condensed: give model.rung = {known} instead"
+            grid = model.grid == "finite-difference"
+            require("model.grid", model.grid, grid, f"must be finite-difference for {rung}: {take}")
+        require("model.fields", list(model.fields), whole, fix)
+        fix = f"must be left out for model.rung = {rung}, whose strip is straight: {take}"
         require("strip.curvature", curvature, curvature is None, fix)
-        fix = "must be left out for model.rung = plane, which is elasticity: take squeeze"
-        require("energy", self.energy, self.energy is None, fix)
-        fix = "must be the sharp slider for model.rung = plane: leave contact.smoothing out, or "
-        sharp = isinstance(law, SharpSlip)
-        require("contact.law", law_name(law), sharp, f"{fix}take model.rung = p6")
-        known = self.contact.normal != "compliant"
-        fix = "must be rigid for model.rung = plane: take model.rung = p6"
-        require("contact.normal", self.contact.normal, known, fix)
+        elastic = self.energy is None or not plane
+        fix = f"must be left out for model.rung = plane, which is elasticity: {take}"
+        require("energy", self.energy, elastic, fix)
+        sharp = isinstance(contact.law, SharpSlip)
+        fix = f"must be the sharp slider for model.rung = {rung}: leave contact.smoothing out, or "
+        require("contact.law", law_name(contact.law), sharp, f"{fix}{take}")
+        fix = f"must be rigid for model.rung = {rung}: {take}"
+        require("contact.normal", contact.normal, contact.normal != "compliant", fix)
 
     def _check_contact(self) -> None:
         """Refuse a strip that nothing holds, and a load off the strip."""
@@ -184,10 +209,9 @@ class Scene(eqx.Module):
 
     @property
     def ideal_friction(self) -> bool:
-        """True if sliders are rigid until they slip; those of ``plane`` are if alpha is large."""
+        """True if sliders are rigid until they slip, as on the contact line if alpha is large."""
         alpha = self.contact.stick_stiffness
-        known = self.model.solution == "plane" and not is_traced(alpha)
-        return known and float(alpha) >= PLANE_IDEAL
+        return self.model.condensed and not is_traced(alpha) and float(alpha) >= IDEAL
 
     @property
     def slip_stiffness(self) -> Array:

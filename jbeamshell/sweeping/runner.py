@@ -29,8 +29,8 @@ ABREAST = 32  # lanes of a chunk on a core, if slip patterns are iterated side b
 BLOCK = 1024  # lanes of the largest block, for which the program is compiled
 KEPT = 4  # compiled models of scenes that are kept
 PER_LANE = ("load.amplitude", "contact.pressure")
-"""Numbers in which lanes of one chunk may differ on the rung ``plane``: its condensed body and its
-factors are the same for all of them.  Factors side by side, for a friction of each lane's own, have
+"""Numbers in which lanes of one chunk may differ on a condensed rung: the body and its factors are
+the same for all of them.  Factors side by side, for a friction of each lane's own, have
 been seen to hang in XLA's thread pool."""
 
 Answers = Callable[..., dict[str, Array]]
@@ -58,7 +58,7 @@ def width_of_chunks(scene: Scene, keys: Sequence[str]) -> int:
     Otherwise each lane runs alone: a wide chunk would wait for its slowest lane, and vector
     instructions run over the nodes.
     """
-    if scene.model.solution == "plane":
+    if scene.model.condensed:
         return ABREAST if any(key in PER_LANE for key in keys) else 1
     if jax.default_backend() != "cpu":
         return BLOCK
@@ -67,7 +67,7 @@ def width_of_chunks(scene: Scene, keys: Sequence[str]) -> int:
 
 def shared_keys(scene: Scene, keys: Sequence[str]) -> list[int]:
     """Places of the keys whose numbers all lanes of a chunk share."""
-    if scene.model.solution != "plane":
+    if not scene.model.condensed:
         return []
     return [place for place, key in enumerate(keys) if key not in PER_LANE]
 

@@ -82,8 +82,8 @@ class TestSection:
 
     def test_means_find_rotation_and_squeeze(self):
         form = layered_form(two_layers())
-        np.testing.assert_allclose(form.means @ form.modes[2, 1], [1.0, 0.0], atol=1e-12)
-        np.testing.assert_allclose(form.means @ form.modes[3, 0], [0.0, 1.0], atol=1e-12)
+        np.testing.assert_allclose(form.further @ form.modes[2, 1], [1.0, 0.0], atol=1e-12)
+        np.testing.assert_allclose(form.further @ form.modes[3, 0], [0.0, 1.0], atol=1e-12)
         np.testing.assert_allclose(form.pull @ form.modes[0, 1], 1.0, rtol=1e-12)
 
 

@@ -37,7 +37,7 @@ POINTS = 48  # of a backbone that is walked
 SMALLEST_FORCE = 1e-2  # its first point, over the largest force
 ANGLES = 512  # quadrature points of half a cycle, for the first harmonic
 BELOW = 1.0 - 1e-6  # thresholds nearer to the largest force are left out
-TRACED = "is differentiated on the rung plane only: take model.rung = plane, or give plain numbers"
+TRACED = "is differentiated on the contact line only: take model.rung = plane, or plain numbers"
 
 
 class Joint(eqx.Module):
@@ -88,13 +88,13 @@ class Joint(eqx.Module):
     def of(cls, scene: Scene, force: Any = None, *, width: Any = 1.0) -> Joint:
         """Joint with the mean backbone of a strip's pull and push.
 
-        Scenes on the rung ``plane`` give the sliders of their contact where slip zones are nested;
-        the backbones of others are walked and fitted.
+        Scenes on the rung ``plane``, or one such as ``condensed-squeeze``, give the sliders of
+        their contact where slip zones are nested; the backbones of others are walked and fitted.
 
         Parameters
         ----------
-        scene : scene of the strip, whose load path is not used.  On the rung ``plane`` it may be
-            traced; slip zones that are not nested then give NaN
+        scene : scene of the strip, whose load path is not used.  On such a rung it may be traced;
+            slip zones that are not nested then give NaN
         force : largest end force per width, below gross slip; None is ``scene.load.amplitude``
         width : width of the strip, by which forces are multiplied
 
@@ -111,7 +111,7 @@ class Joint(eqx.Module):
         """
         force = largest_force(scene, force)
         require_number("width", width)
-        if scene.model.solution == "plane":
+        if scene.model.condensed:
             soft = not scene.ideal_friction
             inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
             sliders = _sliders if inside else _sliders_once

@@ -1,0 +1,106 @@
+"""Section of a scene as a quadratic form: plane elasticity, beamshell, or section of order p."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jbeamshell.mechanics.homogeneous import plane_stiffness
+from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS, Section, linear_strains
+from jbeamshell.mechanics.layered import Material, layered_form
+from jbeamshell.mechanics.section_form import SectionForm, section_stiffness
+from jbeamshell.scene.scene import Scene
+
+V, W, BETA, PSI = range(len(FIELDS))
+
+
+def section_form(scene: Scene) -> SectionForm:
+    """Form of the section of a scene on a condensed rung."""
+    return _plane(scene) if scene.model.solution == "plane" else _beam(scene)
+
+
+def thicknesses(scene: Scene) -> Array:
+    """Thickness of each layer from the bottom up; that of a homogeneous strip is its height."""
+    layers, height = scene.strip.layers, 2.0 * scene.strip.half_height
+    return jnp.reshape(height, 1) if layers is None else layers[:, 0]
+
+
+def _plane(scene: Scene) -> SectionForm:
+    """Section of plane elasticity, homogeneous or layered."""
+    strip, thickness = scene.strip, thicknesses(scene)
+    if strip.layers is None:
+        nu = jnp.asarray(strip.poisson_ratio)
+        coupling, stiffness = plane_stiffness(strip.plane_modulus, nu, strip.plane)
+        columns = stiffness, coupling * stiffness, strip.shear_modulus
+        return layered_form(Material(thickness, *(jnp.reshape(value, 1) for value in columns)))
+    _, modulus, nu = strip.layers.T
+    if strip.plane == "strain":
+        modulus, contraction = modulus / (1.0 - nu**2), nu / (1.0 - nu)
+    else:
+        contraction = nu
+    stiffness = modulus / (1.0 - contraction**2)
+    shear = strip.layers[:, 1] / (2.0 * (1.0 + nu))
+    return layered_form(Material(thickness, stiffness, contraction * stiffness, shear))
+
+
+def _beam(scene: Scene) -> SectionForm:
+    """Section of the beamshell (homogeneous, layered, or of a quadratic Phi), or of order p.
+
+    The elements are those of the finite differences of `jbeamshell.mechanics.elements`: strains in
+    the middle, but the squeeze strain of the beamshell at the nodes.
+    """
+    model, half_height = scene.model, scene.strip.half_height
+    section, phi = scene.hierarchic_section(), scene.strain_energy()
+    still = jnp.zeros(model.width, half_height.dtype)
+    active = np.array(model.active)
+
+    def energy(fields: Section, slopes: Section) -> Array:
+        if section is not None:
+            return section.energy(fields, slopes)
+        return phi(*linear_strains(fields[: len(FIELDS)], slopes[: len(FIELDS)], half_height))
+
+    def moved(fields: Array, height: Array) -> Array:
+        if section is not None:
+            return jnp.stack(section.displacement(fields, height))
+        position = KINEMATICS["linear"].position
+        return jnp.stack(position(fields[: len(FIELDS)], half_height, height))
+
+    def along(fields: Array) -> Array:  # conjugate to the end load
+        return (
+            moved(fields, 0.0 * half_height)[0]
+            if section is None
+            else section.mean_displacement(fields)
+        )
+
+    parts = jax.jacfwd(moved)  # (2, m) displacements of a material point per field
+    stiffness = section_stiffness(energy, still)
+    squeeze = stiffness[0, PSI, 0, PSI] if section is None else 0.0
+    # At the nodes psi^2 has the mean of its squares, beyond the square of its mean.
+    spread = jnp.zeros((still.size, still.size), still.dtype).at[PSI, PSI].set(0.25 * squeeze)
+    held = np.isin(np.arange(still.size), [V, BETA, *range(len(FIELDS), still.size, 2)])
+    modes = jnp.zeros((5, 2, still.size), still.dtype)
+    modes = modes.at[[0, 1, 2, 3, 4], [1, 1, 1, 0, 1], [V, W, BETA, PSI, PSI]].set(1.0)
+    modes = modes.at[2, 1, V].set(half_height).at[4, 1, W].set(-half_height)
+
+    thickness = thicknesses(scene)
+    points, weights = np.polynomial.legendre.leggauss(max(model.order, 1) + 1)
+    bottom = jnp.cumsum(thickness) - thickness - half_height
+    heights = bottom[:, None] + 0.5 * thickness[:, None] * (1.0 + points)
+    shapes = jax.vmap(jax.vmap(lambda height: parts(still, height)))(heights)
+    masses = jnp.einsum("l,p,lpai,lpaj->lij", 0.5 * thickness, weights, shapes, shapes)
+
+    pick = np.ix_(active, active)
+    return SectionForm(
+        values=stiffness[0, :, 0][pick],
+        mixed=stiffness[0, :, 1][pick],
+        slopes=stiffness[1, :, 1][pick],
+        pull=jax.grad(along)(still)[active],
+        press=parts(still, half_height)[1, active],
+        held=held[active],
+        further=jnp.eye(still.size, dtype=still.dtype)[2:, active],
+        modes=modes[..., active],
+        spread=spread[pick],
+        masses=masses[:, active][..., active],
+    )
