@@ -1,0 +1,248 @@
+"""Beamshells, laminates, sections of order p and a Phi of the user's own on their contact line."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.condensed import strip
+from jbeamshell.dynamics.structure.joint import Joint
+from jbeamshell.quasistatic.elastic_strip import ElasticStrip, V, W
+from jbeamshell.scene.rungs import name_of, values_of
+
+SCENE = jb.Scene().replace({"model.nodes": 17, "load.steps_per_half_cycle": 2})
+LAYERS = [[0.1, 2.0e4, 0.3], [0.1252, 1.5e5, 0.2]]
+AMPLITUDE = float(SCENE.load.amplitude)
+SOFT = {"contact.stick_stiffness": 50.0}  # load steps have no ideal friction
+condensed = jax.jit(lambda scene: strip.condensed(scene, scene.model.nodes))
+
+
+def built_in(e, g, k, psi, dpsi):
+    """Phi of the standard strip, written anew."""
+    half, modulus, nu = 0.1126, 3.4e4 / 0.2252, 0.3
+    shear, contraction = 0.5 * (1.0 - nu) * modulus, nu / (1.0 - nu)
+    c11, kappa = modulus / (1.0 - contraction**2), 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu)
+    kappa_s = jb.Scene().strip.kappa_s
+    stretch = half * c11 * (e + contraction * psi) ** 2 + half * modulus * psi**2
+    bend = half**3 / 3.0 * (modulus * k**2 + kappa_s * shear * dpsi**2)
+    return stretch + kappa * shear * half * g**2 + bend
+
+
+def of_phi(energy, rung="condensed-squeeze"):
+    """Standard strip with an energy of its own."""
+    start = SCENE.replace({"model.rung": "squeeze"})
+    own = jb.Scene(start.strip, start.contact, start.load, start.model, energy)
+    return own.replace({"model.rung": rung})
+
+
+def beside(scene, **values):
+    """Scene in load steps, with the fields and nodes of a condensed one."""
+    rung = scene.model.rung.removeprefix("condensed-")
+    return scene.replace({"model.rung": rung, "model.kinematics": "linear"} | values)
+
+
+BODIES = {
+    "shell": SCENE.replace({"model.rung": "condensed-shell"}),
+    "squeeze": SCENE.replace({"model.rung": "condensed-squeeze"}),
+    "p2": SCENE.replace({"model.rung": "condensed-p2"}),
+    "p4": SCENE.replace({"model.rung": "condensed-p4", "strip.plane": "stress"}),
+    "laminate": SCENE.replace({"model.rung": "condensed-squeeze", "strip.layers": LAYERS}),
+    "printed": SCENE.replace({"model.rung": "condensed-squeeze", "model.constants": "printed"}),
+    "coupled": of_phi(
+        lambda e, g, k, psi, dpsi: built_in(e + 0.02 * k, g + 0.1 * psi, k, psi, dpsi)
+    ),
+}
+
+
+class TestBody:
+    @pytest.mark.parametrize("name", BODIES)
+    def test_it_is_the_strip_of_the_load_steps_without_its_inner_fields(self, name):
+        """Elimination station by station is that of the whole potential's second derivatives."""
+        scene = BODIES[name].replace({"model.nodes": 5})
+        elastic = ElasticStrip(beside(scene))
+        zero = jnp.zeros((5, scene.model.width))
+        free = np.zeros(zero.shape, bool)
+        free[:, list(scene.model.active)] = True
+        free[0, [2, *range(4, scene.model.width, 2)]] = False  # held far end
+
+        @jax.jit
+        def derivatives(q):
+            conjugates = jax.grad(elastic.end_displacement)(q), jax.grad(elastic.sinking)(q)
+            return jax.hessian(elastic.strain_energy)(q), *conjugates
+
+        matrix, pull, press = map(np.asarray, derivatives(zero))
+        whole = np.zeros((zero.size + 2,) * 2)
+        whole[:-2, :-2] = matrix.reshape(zero.size, -1)
+        whole[:-2, -2] = whole[-2, :-2] = -pull.ravel()
+        whole[:-2, -1] = whole[-1, :-2] = press.ravel()
+        places = np.arange(zero.size).reshape(zero.shape)
+        kept = np.append(places[:, [V, W]].ravel(), [zero.size, zero.size + 1])
+        gone = np.setdiff1d(places[free], kept)
+        known = np.linalg.solve(whole[np.ix_(gone, gone)], whole[np.ix_(gone, kept)])
+        schur = whole[np.ix_(kept, kept)] - whole[np.ix_(kept, gone)] @ known
+        body = condensed(scene)
+        np.testing.assert_allclose(body.x, elastic.x, atol=1e-15)
+        size = np.sqrt(np.abs(np.diag(schur)))
+        size = np.where(size > 0.0, size, 1.0)  # a shell is not squeezed
+        np.testing.assert_allclose(
+            body.hessian / size / size[:, None], schur / size / size[:, None], atol=1e-12
+        )
+
+    def test_a_phi_written_anew_is_the_built_in_one(self):
+        one, other = condensed(of_phi(built_in)), condensed(BODIES["squeeze"])
+        for name in ("K_tt", "K_tn", "K_nn", "f_t", "r_0", "c"):
+            known = getattr(other.body, name)
+            close = 1e-12 * float(jnp.abs(known).max())
+            np.testing.assert_allclose(getattr(one.body, name), known, atol=close, err_msg=name)
+
+
+def check_against_load_steps(exact, steps, tolerance=1e-9):
+    """All that a history holds at its reversals, and the energy that it stores."""
+    assert exact.converged
+    every = (steps.force.size - 1) // (exact.force.size - 1)
+    at = slice(0, None, every)
+    for name in ("displacement", "force", "traction", "reaction", "stored_energy", "sinking"):
+        known = np.asarray(getattr(steps, name))[at]
+        close = tolerance * np.abs(known).max()
+        np.testing.assert_allclose(getattr(exact, name), known, atol=close, err_msg=name)
+    for one, other in zip(exact.fields.T, steps.fields[at].T, strict=True):
+        np.testing.assert_allclose(one, other, atol=tolerance * np.abs(steps.fields).max())
+    for one, other in zip(exact.sections, steps.sections, strict=True):
+        known = np.asarray(other)[at]
+        np.testing.assert_allclose(one, known, atol=1e-9 * np.abs(known).max() + 1e-12)
+    assert steps.dissipation == pytest.approx(float(exact.dissipation), rel=2e-5)
+
+
+class TestHistory:
+    """Many load steps of the same section on the same nodes come to the same states."""
+
+    def test_a_section_of_order_two(self, tmp_path):
+        scene = BODIES["p2"].replace(SOFT)
+        exact = jb.solve(scene)
+        steps = jb.solve(beside(scene, **{"load.steps_per_half_cycle": 160}))
+        check_against_load_steps(exact, steps)
+        exact.save(tmp_path / "run.npz")
+        again = jb.read_history(tmp_path / "run.npz")
+        assert again.scene.model.rung == "condensed-p2"
+        np.testing.assert_array_equal(again.fields, exact.fields)
+
+    def test_a_laminate_that_lifts_while_its_end_is_moved(self):
+        moved = {"load.control": "displacement", "load.amplitude": 4e-5}
+        rough = {"contact.friction": 0.4, "contact.pressure": 2.5}
+        scene = BODIES["laminate"].replace(SOFT | rough | moved)
+        exact = jb.solve(scene)
+        assert float(exact.gap.max()) > 1e-7
+        steps = jb.solve(beside(scene, **{"load.steps_per_half_cycle": 160}))
+        check_against_load_steps(exact, steps)
+
+
+class TestFigures:
+    def test_derivatives_of_the_dissipation_have_slope_two(self):
+        scene, keys = BODIES["shell"], ("strip.height_ratio", "contact.friction")
+        at = jnp.array([float(scene.get(key)) for key in keys])
+
+        def work(numbers):
+            varied = scene.replace(dict(zip(keys, numbers, strict=True)))
+            return jb.condensed.dissipation(varied, jnp.array([0.9]))[0]
+
+        ask = jax.jit(lambda x, way: (*jax.jvp(work, (x,), (way,)), jax.grad(work)(x)))
+        for way in at * jnp.eye(2):
+            value, forward, reverse = ask(at, way)
+            assert float(forward) == pytest.approx(float(reverse @ way), rel=1e-10)
+            sizes = (1e-3, 5e-4)
+            rest = [abs(float(ask(at + h * way, way)[0] - value - h * forward)) for h in sizes]
+            assert np.log2(rest[0] / rest[1]) == pytest.approx(2.0, abs=0.1)
+
+    def test_sweeps_and_joints_take_them(self):
+        scene = BODIES["shell"].replace({"load.steps_per_half_cycle": 1})
+        table = jb.sweep(scene, {"load.amplitude": [0.5, AMPLITUDE]})
+        assert np.all(table.status == 0)
+        works = jb.condensed.dissipation(scene, [0.5, AMPLITUDE])
+        # The steady cycles also follow the edge of the slip zone within an element.
+        np.testing.assert_allclose(table["dissipation"], works, rtol=0.04)
+        history = jb.solve(scene)
+        np.testing.assert_allclose(table["dissipation"][1], history.dissipation, rtol=1e-10)
+        joint = Joint.of(scene, 1.2)
+        assert joint.network is not None
+        moved = history.displacement - history.displacement[history.pressed]
+        steps = slice(history.pressed + 1, None)
+        np.testing.assert_allclose(joint.path_forces(moved[steps]), history.force[steps], atol=1e-9)
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("values", "said"),
+        [
+            ({"model.kinematics": "exact"}, "disagree: give one, or take p2, which rotates"),
+            ({"contact.smoothing": 16.0}, "contact.law = .*take model.rung = p2"),
+            (
+                {"contact.normal": "compliant"},
+                "contact.normal = 'compliant': must be rigid .* = p2",
+            ),
+            ({"strip.curvature": 0.1}, "model.order = 2"),
+            ({"model.grid": "collocation"}, "model.grid = 'collocation': must be .*rung = p2"),
+            ({"model.nodes": 2}, "model.nodes = 2"),
+            ({"load.control": "arc-length", "load.amplitude": 1e-5}, "model.solution"),
+        ],
+    )
+    def test_what_is_not_linear_names_the_general_rung(self, values, said):
+        with pytest.raises(jb.InputError, match=said):
+            SCENE.replace({"model.rung": "condensed-p2"} | values)
+
+    @pytest.mark.parametrize(
+        ("values", "said"),
+        [
+            ({"strip.curvature": 0.1}, "strip.curvature = 0.1: .* take model.rung = squeeze"),
+            ({"model.squeeze": "assumed"}, "model.squeeze = 'assumed': must be 'field'"),
+            ({"model.fields": ["v", "beta"]}, "give one"),
+        ],
+    )
+    def test_so_do_the_beamshells(self, values, said):
+        with pytest.raises(jb.InputError, match=said):
+            SCENE.replace({"model.rung": "condensed-squeeze"} | values)
+
+    @pytest.mark.parametrize(
+        ("fields", "said"), [(["v", "beta"], "= condensed-shell instead"), (["v"], "= bar instead")]
+    )
+    def test_the_solution_alone_needs_the_lift(self, fields, said):
+        alone = {"model.solution": "condensed", "model.kinematics": "linear"}
+        with pytest.raises(jb.InputError, match=f"must hold w .*{said}"):
+            SCENE.replace(alone | {"model.fields": fields})
+
+    @pytest.mark.parametrize(
+        ("energy", "said"),
+        [
+            (
+                lambda *s: built_in(*s) + 10.0 * s[0] ** 3,
+                "not quadratic .* take model.rung = squeeze",
+            ),
+            (lambda *s: built_in(*s) + jnp.abs(s[3]), "not quadratic"),
+            (lambda *s: built_in(*s) + 3.0 * s[2], "not quadratic"),
+            (lambda *s: built_in(*s) + 5e4 * jnp.maximum(s[0], 0.0) ** 2, "not quadratic"),
+            (lambda *s: built_in(*s) * jnp.nan, "not finite"),
+            (lambda e, g, k, psi, dpsi: e**2 + g**2 + psi**2, "without stiffness"),
+            (lambda *s: built_in(*s) - 1e9 * s[4] ** 2, "without stiffness"),
+            (lambda e, *s: -built_in(e, *s), "without stiffness"),
+        ],
+    )
+    def test_a_phi_that_is_no_positive_quadratic_form(self, energy, said):
+        with pytest.raises(jb.InputError, match=f"energy.*{said}"):
+            of_phi(energy)
+
+    def test_a_shell_needs_no_stiffness_against_the_squeeze(self):
+        of_phi(lambda e, g, k, psi, dpsi: e**2 + g**2 + k**2, "condensed-shell")
+
+
+@pytest.mark.parametrize("rung", ["condensed-shell", "condensed-squeeze", "condensed-p3", "plane"])
+def test_a_rung_has_its_name(rung):
+    values = values_of(rung)
+    parts = (values[f"model.{name}"] for name in ("fields", "order", "solution"))
+    assert name_of(*parts) == rung
+    assert values["model.kinematics"] == "linear"
+
+
+@pytest.mark.parametrize("rung", ["condensed", "condensed-bar", "condensed-plane", "masing-plane"])
+def test_a_rung_that_does_not_exist_is_refused(rung):
+    with pytest.raises(jb.InputError, match=f"model.rung = '{rung}': choose .*condensed-"):
+        values_of(rung)
