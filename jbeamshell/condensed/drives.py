@@ -70,6 +70,11 @@ class Springs(NamedTuple):
         return self.flexibility @ pull
 
 
+def spring_energy(stiffness: Array, r_t: Array) -> Array:
+    """Energy (...) in springs of a stiffness (k,) under the tangential forces (..., k)."""
+    return 0.5 * jnp.sum(r_t**2 / stiffness, axis=-1)
+
+
 def with_springs(body: Body, stiffness: Array) -> tuple[Body, Springs]:
     """Body on its plastic slips p, with springs of finite stiffness between p and v.
 

@@ -17,8 +17,8 @@ V, W, BETA, PSI = range(len(FIELDS))
 
 
 def section_form(scene: Scene) -> SectionForm:
-    """Form of the section of a scene on a condensed rung."""
-    return _plane(scene) if scene.model.solution == "plane" else _beam(scene)
+    """Form of the section of a scene: its own if it is condensed, else that of plane elasticity."""
+    return _beam(scene) if scene.model.solution == "condensed" else _plane(scene)
 
 
 def thicknesses(scene: Scene) -> Array:

@@ -11,7 +11,12 @@ from jax import Array
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import Status
 from jbeamshell.condensed.branches import pressed
-from jbeamshell.condensed.drives import driven_by_displacement, exchanged, with_springs
+from jbeamshell.condensed.drives import (
+    driven_by_displacement,
+    exchanged,
+    spring_energy,
+    with_springs,
+)
 from jbeamshell.condensed.events import Level
 from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
 from jbeamshell.condensed.strip import Strip, condensed, spring_stiffness, stays_flat
@@ -149,8 +154,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     forces = given @ strip.hessian  # conjugate to v, w, minus the end load and the pressure
     energy = 0.5 * jnp.sum(forces * given, axis=1) - forces[:, -2] * given[:, -2]
     if soft:
-        springs = 0.5 * state.r_t**2 / spring_stiffness(scene, strip)
-        energy = energy + every(jnp.sum(springs, axis=1))
+        energy = energy + every(spring_energy(spring_stiffness(scene, strip), state.r_t))
     status = jnp.where(levels.settled, Status.CONVERGED, Status.MAX_ITERATIONS)
     sound = jnp.append(jnp.ones(before, bool), levels.settled)
 

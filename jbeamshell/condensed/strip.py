@@ -48,7 +48,7 @@ class Strip(NamedTuple):
 
 
 def condensed(scene: Scene, nodes: int) -> Strip:
-    """Strip of a scene on a condensed rung, condensed to its contact nodes."""
+    """Strip of a scene as its condensed section, or as plane elasticity, on its contact nodes."""
     far_end = scene.strip.far_end
     form, x = section_form(scene), stations(scene, nodes)
     down, up = pressing(scene, x)
@@ -111,7 +111,7 @@ def stations(scene: Scene, nodes: int) -> Array:
     """
     length, half_height = scene.strip.length, scene.strip.half_height
     steps, model = scene.contact.steps(length), scene.model
-    if model.solution != "plane":
+    if model.solution == "condensed":
         return elements.vertices(nodes - 1, length, half_height, model.end_size, steps)
     if steps is None:
         grading = (PLANE_END_SIZE, None, PLANE_GROWTH, PLANE_FAR_SIZE)

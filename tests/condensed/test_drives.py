@@ -146,7 +146,7 @@ class TestSprings:
         v = jax.vmap(parts.slip)(state.v, levels.lift, state.force)
         energy = jax.vmap(stored, in_axes=(None, 0, 0))(
             body, state._replace(v=v), levels.lift
-        ) + jax.vmap(parts.energy)(state.r_t)
+        ) + drives.spring_energy(parts.stiffness, state.r_t)
         f, u = np.append(0.0, forces), np.append(0.0, state.displacement)
         done = np.cumsum(0.5 * (f[1:] + f[:-1]) * np.diff(u))  # trapezoids between 36 levels
         work = np.cumsum(levels.slip_work)
