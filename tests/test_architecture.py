@@ -42,6 +42,7 @@ HOMES = {
     "optax": "identify/search.py",
     "pint": "measured/columns.py",
     "distributed": "cli/sweep.py",
+    "tqdm": "common/progress.py",
     "lazy_loader": ("__init__.py", "dynamics/__init__.py"),
 }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -89,8 +88,6 @@ def add_to(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit, report and write; returns the exit code."""
-    from tqdm import tqdm
-
     from jbeamshell import identify
     from jbeamshell.common import files
     from jbeamshell.identify import report
@@ -105,20 +102,9 @@ def run(options: argparse.Namespace) -> int:
         say(note)
     folder = None if options.out is None else check_folder(options.out)
     begin = time.perf_counter()
-    with tqdm(disable=None, file=sys.stderr, unit="step") as bar:
-
-        def progress(now: object) -> None:
-            bar.set_postfix_str(str(now))
-            bar.update()
-
-        result = identify.fit(
-            plan.specimens, free=plan.free, save=options.save, progress=progress, **plan.options
-        )
+    result = identify.fit(plan.specimens, free=plan.free, save=options.save, **plan.options)
     names = [name for name in result.values if name.partition("[")[0] in options.profile]
-    profiles = [
-        identify.profile(result, name)
-        for name in tqdm(names, desc="profiles", disable=None if names else True)
-    ]
+    profiles = [identify.profile(result, name) for name in names]
     wall = time.perf_counter() - begin
     figures = result.figures() | {"notes": plan.notes, "wall_s": wall}
     if profiles:

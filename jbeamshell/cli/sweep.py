@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import math
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
@@ -76,8 +75,6 @@ def add_to(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Sweep, report and write; returns the exit code."""
-    from tqdm import tqdm
-
     from jbeamshell.sweeping.run import FIGURES, sweep
 
     over = ranges(options.over)
@@ -92,24 +89,16 @@ def run(options: argparse.Namespace) -> int:
     if options.plot is not None:
         _check_picture(options.plot)
     say("compiling ...")
-    with tqdm(disable=None, file=sys.stderr, unit="lane") as bar:
-
-        def progress(done: int, total: int) -> None:
-            if bar.total is None:
-                bar.total, bar.initial, bar.n = total, done, done
-            bar.update(done - bar.n)
-
-        with _workers(options.dask) as executor:
-            result = sweep(
-                scene,
-                over,
-                figures,
-                paired=options.paired,
-                out=options.out,
-                processes=options.processes,
-                executor=executor,
-                progress=progress,
-            )
+    with _workers(options.dask) as executor:
+        result = sweep(
+            scene,
+            over,
+            figures,
+            paired=options.paired,
+            out=options.out,
+            processes=options.processes,
+            executor=executor,
+        )
     return _report(options, result)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.progress import watched
 
 BAD_INPUT, UNCONVERGED, INTERRUPTED = 2, 3, 130
 
@@ -32,7 +33,7 @@ def _silence(stream: Any) -> None:
 
 def say(text: str) -> None:
     """Report progress, if a person watches."""
-    if sys.stderr.isatty():
+    if watched():
         print(text, file=sys.stderr)
 
 

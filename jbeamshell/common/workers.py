@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import signal
 import sys
 import threading
 import types
@@ -54,6 +55,7 @@ def without_main() -> Iterator[None]:
 def begin(end: Connection, environment: Mapping[str, str]) -> None:
     """Set the environment of this worker, and end it when the other end of its pipe is closed."""
     os.environ.update(environment)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that sweeps gets it too, and ends us
     threading.Thread(target=_wait_for, args=(end,), daemon=True).start()
 
 

@@ -120,7 +120,7 @@ def let_go(
         inertia; None to take the network where the strip's inertia matters little (`LIGHT`), it is
         not damped, its slip zones are nested, and the scene is not a bar or a shell without squeeze
         strain
-    progress : show a progress bar of the time steps; None shows it on a terminal only
+    progress : show a progress bar of the time steps; None shows it where a person watches
 
     Returns
     -------

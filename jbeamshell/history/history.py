@@ -11,6 +11,7 @@ from jax import Array
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
+from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
 from jbeamshell.history.figures import CycleFigures
 from jbeamshell.history.profiles import Profiles
@@ -95,24 +96,29 @@ class History(Profiles, ContactLine, CycleFigures):
             names += ("reaction_max", "reaction_max_at")
         return (*names, "squeeze_stress_max") if "psi" in fields else names
 
-    def __str__(self) -> str:
+    @property
+    def _summary(self) -> Summary:
         strip, control = self.scene.strip, self.scene.load.control
         driver = self.force if control == "force" else self.displacement
         what = f"{control} amplitude {float(jnp.max(jnp.abs(driver))):.4g}"
         if not self.cycles and not jnp.any(driver):
             what = f"pressed by {float(jnp.sum(self.load)):.4g}"
-        lines = [
+        title = (
             f"{self.force.size} levels of {' '.join(self.scene.model.fields)} on "
             f"{self.x.size} nodes, eta = {float(strip.height_ratio):.4g}, {what}"
-        ]
-        lines += [
-            f"  {name.replace('_', ' '):20s} {value:.6g}"
-            if isinstance(value, float)
-            else f"  {name.replace('_', ' '):20s} {'undefined' if value is None else value}"
-            for name, value in self.figures().items()
-            if name != "doubts"
-        ]
-        return "\n".join(lines + [f"  doubtful: {doubt}" for doubt in self.doubts])
+        )
+        figures = self.figures()
+        doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
+        rows = [(name.replace("_", " "), in_words(value)) for name, value in figures.items()]
+        return Summary(title, rows, doubts)
+
+    def __str__(self) -> str:
+        return self._summary.as_text()
+
+    def _repr_html_(self) -> str:
+        from jbeamshell import plotting
+
+        return self._summary.as_html(plotting.thumbnail(self.plot()))
 
     def continued(self, path: Any = None, **options: Any) -> History:
         """History with further load steps.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require, require_choice, require_count
 from jbeamshell.common.errors import InputError, UnconvergedError
+from jbeamshell.common.progress import bar
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
 from jbeamshell.identify.problem import Problem
@@ -106,7 +107,7 @@ def fit(
     points : number of points to which each loop is thinned, approximately
     max_iterations : largest number of iterations of each search
     tolerance : relative change of the parameters at which a search stops; a flat cost stops it too
-    progress : called after every step with a `FitProgress`
+    progress : called after every step with a `FitProgress`; None shows a bar where a person watches
     throw : True to raise if the fit did not converge; if False, read ``status``
 
     Returns
@@ -152,7 +153,13 @@ def fit(
     noise_cost = experiment.weight.size if experiment.noisy else 0
     stopping = StoppingRule(max_iterations, tolerance, noise_cost)
     try:
-        ends = _search(problem, space, method, starts, stopping, progress)
+        with bar("fit") as shown:
+
+            def show(now: FitProgress) -> None:
+                shown.set_postfix_str(str(now))
+                shown.update()
+
+            ends = _search(problem, space, method, starts, stopping, progress or show)
     except KeyboardInterrupt:
         kept = (
             "nothing was saved: give save= (--save on the command line), a file, to continue later"
@@ -206,7 +213,7 @@ class _Monitor:
         space: SearchSpace,
         searches: int,
         most_steps: int,
-        progress: Callable[[FitProgress], None] | None,
+        progress: Callable[[FitProgress], None],
     ) -> None:
         self._space, self._searches, self._most = space, searches, most_steps
         self._progress, self._steps, self._begin = progress, 0, time.perf_counter()
@@ -216,9 +223,8 @@ class _Monitor:
         self._steps += 1
         elapsed = time.perf_counter() - self._begin
         left = elapsed / self._steps * max(self._most - self._steps, 0)
-        if self._progress:
-            named = self._space.named(values)
-            self._progress(FitProgress(search, self._searches, step, cost, named, elapsed, left))
+        named = self._space.named(values)
+        self._progress(FitProgress(search, self._searches, step, cost, named, elapsed, left))
 
 
 def _search(
@@ -227,7 +233,7 @@ def _search(
     method: str,
     starts: int,
     stopping: StoppingRule,
-    progress: Callable[[FitProgress], None] | None,
+    progress: Callable[[FitProgress], None],
 ) -> list[SearchResult]:
     """Ends of the searches from all starts, the best first."""
     _check_start(problem, space)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.progress import bar
 from jbeamshell.identify.bijection import FARTHEST
 from jbeamshell.identify.problem import Evaluation
 from jbeamshell.identify.results import Fit
@@ -136,9 +137,15 @@ def profile(
 
     spread = float(np.sqrt(uncertainty.covariance[axis, axis]))
     first, ends = min(wanted * spread, LONGEST_FIRST_STEP), []
-    for side, bound in ((-1.0, bijection.low), (1.0, bijection.high)):
-        step = _crossing(root_at, side, wanted, first)
-        ends.append(bound if step is None else bijection.value(best[axis] + step))
+    with bar(f"profile of {name}", "fit") as shown:
+
+        def counted(step: float) -> float:
+            shown.update()
+            return root_at(step)
+
+        for side, bound in ((-1.0, bijection.low), (1.0, bijection.high)):
+            step = _crossing(counted, side, wanted, first)
+            ends.append(bound if step is None else bijection.value(best[axis] + step))
     pairs = sorted((bijection.value(best[axis] + step), root) for step, root in roots.items())
     values, heights = np.array(pairs).T
     return Profile(name, values, heights**2, (min(ends), max(ends)), level, settled)

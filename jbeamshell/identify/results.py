@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jbeamshell.common.summary import Summary
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
@@ -60,14 +61,20 @@ class Fit(NamedTuple):
     uncertainty: Uncertainty | None = None
     problem: Problem | None = None
 
+    @property
+    def _summary(self) -> Summary:
+        rows = [(k, f"{value:.6g} +- {self.errors[k]:.2g}") for k, value in self.values.items()]
+        misfit = f"misfit {100 * self.misfit:.3g} % of the range"
+        end = f"{self.status} after {self.model_runs} model runs"
+        return Summary("", rows, [misfit, end, *self.warnings])
+
     def __str__(self) -> str:
-        lines = [
-            f"  {key:28s} {value:.6g} +- {self.errors[key]:.2g}"
-            for key, value in self.values.items()
-        ]
-        lines.append(f"  misfit {100 * self.misfit:.3g} % of the range")
-        lines.append(f"  {self.status} after {self.model_runs} model runs")
-        return "\n".join([*lines, *(f"  {warning}" for warning in self.warnings)])
+        return self._summary.as_text(28)
+
+    def _repr_html_(self) -> str:
+        from jbeamshell import plotting
+
+        return self._summary.as_html(plotting.thumbnail(self.plot()))
 
     def figures(self) -> dict[str, Any]:
         """Result as plain numbers for JSON; an infinite end is None."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import require
+from jbeamshell.common.progress import patience
 from jbeamshell.history.history import History
 from jbeamshell.ladder.advice import advise
 from jbeamshell.numerics.newton import Newton
@@ -58,5 +59,7 @@ def solve(
     if tolerance is not None:
         fix = "a tolerance is for the scene's own cycles; leave the path out"
         require("path", "given", path is None, fix)
-        scene = advise(scene, tolerance).applied(scene)
-    return quasistatic.solve(scene, path, contact=contact, solver=solver, throw=throw)
+        with patience("choosing a model"):
+            scene = advise(scene, tolerance).applied(scene)
+    with patience("solving"):
+        return quasistatic.solve(scene, path, contact=contact, solver=solver, throw=throw)

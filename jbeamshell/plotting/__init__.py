@@ -35,6 +35,7 @@ from jbeamshell.plotting.style import close as close
 from jbeamshell.plotting.style import colours as colours
 from jbeamshell.plotting.style import save as save
 from jbeamshell.plotting.style import style as style
+from jbeamshell.plotting.style import thumbnail as thumbnail
 from jbeamshell.plotting.sweeps import master_curve as master_curve
 from jbeamshell.plotting.sweeps import sweep as sweep
 from jbeamshell.plotting.sweeps import sweep_sheet as sweep_sheet

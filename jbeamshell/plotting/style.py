@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
+import io
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -130,6 +132,19 @@ def mark_decades(*axes_of_one: Axis) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(99, 99)))
         axis.set_minor_formatter(NullFormatter())
+
+
+def thumbnail(drawn: Any) -> str:
+    """Small picture of axes as HTML, for a notebook; their figure is closed.
+
+    Parameters
+    ----------
+    drawn : axes, or an array or list of axes of one figure
+    """
+    figure, image = np.ravel(drawn)[0].figure, io.BytesIO()
+    figure.savefig(image, format="png", dpi=60)
+    close(figure)
+    return f'<img src="data:image/png;base64,{base64.b64encode(image.getvalue()).decode()}">'
 
 
 def close(figure: Figure) -> None:

@@ -20,7 +20,7 @@ from jbeamshell.measured.form import DISSIPATION, SECANT_STIFFNESS
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.plotting.protocols import SweptFigures
 from jbeamshell.plotting.style import DATA, PALETTE, colours, mark_decades, single, style
-from jbeamshell.scene.keys import LENGTHS, TABLE
+from jbeamshell.scene.keys import TABLE, unit_of
 
 FIGURES = {
     "dissipation": DISSIPATION.label,
@@ -244,5 +244,4 @@ def _symbol(key: str | None) -> str:
 
 def _label(key: str, result: SweptFigures) -> str:
     """Label of an axis: symbol and unit of a key."""
-    moved = key == "load.amplitude" and result.scene.load.control in LENGTHS
-    return f"{_symbol(key)}  [{'length' if moved else TABLE[key].unit}]"
+    return f"{_symbol(key)}  [{unit_of(key, result.scene.load.control)}]"

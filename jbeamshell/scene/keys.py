@@ -265,3 +265,8 @@ def check_key(key: str) -> None:
         near = difflib.get_close_matches(key, KEYS, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"keys are {', '.join(KEYS)}"
         raise InputError(f"unknown key {key!r}: {hint}")
+
+
+def unit_of(key: str, control: str) -> str:
+    """Unit of a number of the scene; that of the amplitude depends on what is controlled."""
+    return "length" if key == "load.amplitude" and control in LENGTHS else TABLE[key].unit

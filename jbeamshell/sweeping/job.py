@@ -109,7 +109,7 @@ class Job:
     def collected(self, blocks: Mapping[int, Block]) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Figures by name and codes of `Outcome` of all lanes, arrays of the lanes' shape."""
         values = np.full((len(self.figures), self.lanes.size), np.nan, self.dtype)
-        status = np.full(self.lanes.size, Outcome.OUTSIDE, np.int8)
+        status = np.where(self.outside, Outcome.OUTSIDE, Outcome.NOT_RUN).astype(np.int8).ravel()
         for number, block in blocks.items():
             lanes = self.blocks[number]
             values[:, lanes], status[lanes] = block

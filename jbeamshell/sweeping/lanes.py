@@ -33,6 +33,7 @@ class Outcome(enum.IntEnum):
     NOT_REACHED = 3
     OUTSIDE = 4  # the model's domain: not run
     UNDEFINED = 5  # solved, but a figure is 0/0, such as a ratio without friction
+    NOT_RUN = 6  # the sweep was interrupted before
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import functools
+import importlib
 import os
 from collections.abc import Iterator
 from typing import Any
@@ -14,10 +15,21 @@ import numpy as np
 from jbeamshell.common.checks import require_choice
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
+from jbeamshell.common.summary import Summary
+from jbeamshell.history.reliability import TOLERANCE
+from jbeamshell.scene.keys import unit_of
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.toml import scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 
+UNITS = {
+    "dissipation": "force",
+    "dissipation_ratio": "1",
+    "dissipation_error": "1",
+    "loss_factor": "1",
+    "secant_stiffness": "force/width/length",
+}
 ROWS = 4096  # rows of a table that are turned into text at a time
 
 
@@ -114,6 +126,58 @@ class Sweep:
         figures = {name: values.ravel() for name, values in self.values.items()}
         return keys | figures | {"status": words[self.status.ravel()]}
 
+    @property
+    def doubtful(self) -> np.ndarray:
+        """True for lanes not to rely on, an array of the lanes' shape.
+
+        They have no equilibrium, or were not run; or the dissipation's estimated error is above
+        `TOLERANCE`, which is known if ``"dissipation_error"`` is among the figures.
+        """
+        solved = np.isin(self.status, (Outcome.CONVERGED, Outcome.UNDEFINED))
+        errors = self.values.get("dissipation_error", np.zeros(self.shape))
+        return ~solved | (errors > TOLERANCE)
+
+    def to_dataframe(self) -> Any:
+        """Table as a `pandas.DataFrame`: a row for every lane, with the column ``doubtful``."""
+        return _library("pandas").DataFrame(self.table() | {"doubtful": self.doubtful.ravel()})
+
+    def to_xarray(self) -> Any:
+        """Sweep as an `xarray.Dataset`.
+
+        Its dimensions are the keys, or ``lane`` if they are paired.  Its variables are the figures,
+        ``status`` with its meanings in the attributes, and ``doubtful``.  Units are attributes of
+        the variables, and the scene in TOML one of the set.
+
+        Raises
+        ------
+        InputError
+            if xarray is not installed
+
+        Examples
+        --------
+        ::
+
+            result.to_xarray()["dissipation"].sel({"load.amplitude": 0.8}, method="nearest").plot()
+        """
+        xarray, control = _library("xarray"), self.scene.load.control
+        dims = ["lane"] if self.paired else list(self.axes)
+        variables: dict[str, Any] = {
+            name: (dims, values, {"units": UNITS[name]} if name in UNITS else {})
+            for name, values in self.values.items()
+        }
+        words = " ".join(outcome.name.lower() for outcome in Outcome)
+        flags = {"flag_values": np.array(Outcome, np.int8), "flag_meanings": words}
+        variables |= {"status": (dims, self.status, flags), "doubtful": (dims, self.doubtful)}
+        kept = {
+            key: ("lane" if self.paired else key, values, {"units": unit_of(key, control)})
+            for key, values in self.axes.items()
+        }
+        try:
+            scene = scene_to_toml(self.scene)
+        except InputError:  # a function of the user's own
+            scene = repr(self.scene)
+        return xarray.Dataset(variables, kept, {"scene": scene, "notes": list(self.notes)})
+
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the table as CSV, whole or not at all; cells without a number stay empty."""
         with written_whole(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
@@ -157,22 +221,28 @@ class Sweep:
 
     # --- for people -----------------------------------------------------------------------------
 
-    def __str__(self) -> str:
+    @property
+    def _summary(self) -> Summary:
         over = ", ".join(f"{key} ({values.size})" for key, values in self.axes.items())
         good = int(np.sum(self.status == Outcome.CONVERGED))
-        lines = [
+        title = (
             f"{self.status.size:,} lanes over {over}{', paired' if self.paired else ''}: "
             f"{good:,} converged, {self.failed:,} failed, {self.outside:,} outside the domain"
-        ]
+        )
         if self.undefined:
-            lines[0] += f", {self.undefined:,} with a figure undefined"
+            title += f", {self.undefined:,} with a figure undefined"
         rate = f", {self.lanes_per_s:,.0f} lanes/s" if self.computed else ""
-        lines.append(f"  {self.wall_s:.1f} s, of which {self.compile_s:.1f} s to compile{rate}")
-        for name, values in self.values.items():
-            known = values[np.isfinite(values)]
-            span = f"{known.min():.6g} to {known.max():.6g}" if known.size else "none"
-            lines.append(f"  {name.replace('_', ' '):20s} {span}")
-        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+        title += f"\n  {self.wall_s:.1f} s, of which {self.compile_s:.1f} s to compile{rate}"
+        spans = [(name.replace("_", " "), _span(values)) for name, values in self.values.items()]
+        return Summary(title, spans, self.notes)
+
+    def __str__(self) -> str:
+        return self._summary.as_text()
+
+    def _repr_html_(self) -> str:
+        from jbeamshell import plotting
+
+        return self._summary.as_html(plotting.thumbnail(self.plot(figure=next(iter(self.values)))))
 
     def plot(self, axes: Any = None, **options: Any) -> Any:
         """Draw a figure over one key, a curve for each value of another; see `plotting.sweep`."""
@@ -185,6 +255,20 @@ class Sweep:
         from jbeamshell import plotting
 
         return plotting.master_curve(self, axes, **options)
+
+
+def _span(values: np.ndarray) -> str:
+    """Smallest and largest number, in words."""
+    known = values[np.isfinite(values)]
+    return f"{known.min():.6g} to {known.max():.6g}" if known.size else "none"
+
+
+def _library(name: str) -> Any:
+    """Library of an extra."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise InputError(f"{name}: is not installed: pip install 'jbeamshell[tables]'") from None
 
 
 def _known(values: np.ndarray) -> list[float | None]:

@@ -10,6 +10,7 @@ import contextlib
 import dataclasses
 import os
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike
 from jbeamshell.common.checks import check_words, require
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.files import as_path
+from jbeamshell.common.progress import counting, in_notebook
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.scene import Scene
 from jbeamshell.sweeping.executors import (
@@ -85,7 +87,8 @@ def sweep(
         of dask or ``mpi4py.futures.MPIPoolExecutor()``
     devices : devices of this process on which blocks run side by side; None is all local ones
     solver : settings of Newton's method
-    progress : function that is called with the numbers of lanes done so far and to be run in all
+    progress : function that is called with the numbers of lanes done so far and to be run in all;
+        None shows a bar where a person watches
 
     Returns
     -------
@@ -108,7 +111,7 @@ def sweep(
         result = jb.sweep(jb.Scene(), over, processes=2, out="sweep.csv")
         result["dissipation"]  # (32, 2)
     """
-    watch = _Watch(progress)
+    begun = time.perf_counter()
     job = _job(scene, over, figures, paired, solver)
     if executor is not None:
         check_executor(executor, processes, devices)
@@ -116,7 +119,8 @@ def sweep(
     table = None if out is None else _check_out(out)
     store = None if table is None else Store(f"{table}{PARTS}")
     place = _Place(processes, executor, devices)
-    result = _run(job, store, place, watch)
+    with counting(progress, "sweep", "lane") as told:
+        result = _run(job, store, place, _Watch(begun, told))
     if store is not None and table is not None:
         store.publish(result, table)
         store.remove()
@@ -154,8 +158,8 @@ def _check_out(out: str | os.PathLike[str]) -> Path:
 class _Watch:
     """Clock and progress of a sweep: its begin, the end of compilation, and lanes done."""
 
-    def __init__(self, progress: Progress | None) -> None:
-        self.begun = time.perf_counter()
+    def __init__(self, begun: float, progress: Progress) -> None:
+        self.begun = begun
         self.compiled_at = 0.0
         self.done = self.total = 0
         self._progress = progress
@@ -174,8 +178,7 @@ class _Watch:
 
     def tell(self, lanes: int) -> None:
         self.done += lanes
-        if self._progress is not None:
-            self._progress(self.done, self.total)
+        self._progress(self.done, self.total)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -219,6 +222,7 @@ def _run(job: Job, store: Store | None, place: _Place, watch: _Watch) -> Sweep:
         store.open(job.description(), job.lanes.axes)
         found = job.stored(store)
     before, losses = _lanes(found), Losses()
+    notes = [f"{before:,} lanes were done before"] if before else []
     watch.start(before, sum(block.size for block in job.blocks))
     missing = [number for number in range(len(job.blocks)) if number not in found]
     try:
@@ -230,16 +234,18 @@ def _run(job: Job, store: Store | None, place: _Place, watch: _Watch) -> Sweep:
                 found[number] = block
                 watch.tell(block.status.size)
     except (KeyboardInterrupt, UnconvergedError, InputError) as error:
-        if store is None:
-            raise
-        raise type(error)(
-            f"{str(error) or 'interrupted'}; {store.folder} keeps what is done, and the same sweep "
-            "goes on from there"
-        ) from None
-    notes = [f"{before:,} lanes were done before"] if before else []
-    notes += [f"workers that were lost: {losses.total}, their blocks given out again"] * bool(
-        losses.total
-    )
+        said, interrupted = str(error) or "interrupted", isinstance(error, KeyboardInterrupt)
+        if not (interrupted and store is None and found and in_notebook()):
+            kept = "nothing is kept: give out= (--out on the command line), a file, to go on later"
+            if store is not None:
+                kept = f"{store.folder} keeps what is done, and the same sweep goes on from there"
+            raise type(error)(f"{said}; {kept}") from None
+        notes.append(
+            f"{said} after {watch.done:,} of {watch.total:,} lanes; the others are not_run"
+        )
+        warnings.warn(f"sweep {notes[-1]}", stacklevel=3)
+    if losses.total:
+        notes.append(f"workers that were lost: {losses.total}, their blocks given out again")
     values, status = job.collected(found)
     lanes = job.lanes
     return Sweep(

@@ -46,6 +46,9 @@ def test_figures_of_the_standard_strip():
     assert float(history.slip_length) == pytest.approx(0.7855 - 1.7 * 0.1126, abs=0.05)
     assert history.converged
     assert "dissipation ratio" in str(history)
+    shown = history._repr_html_()
+    assert "<td>dissipation ratio</td>" in shown
+    assert shown.count("data:image/png;base64") == 1
     assert set(history.figures()) >= {"dissipation", "reaction_min", "status", "newton_iterations"}
 
 

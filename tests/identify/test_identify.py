@@ -305,6 +305,9 @@ def test_planted_parameters_come_back(planted, tmp_path):
     np.testing.assert_allclose(values_of(fit), [0.1, 0.1126], rtol=1e-5)
     assert fit.misfit < 1e-6
     assert fit.model_runs < 12
+    shown = fit._repr_html_()
+    assert f"<td>{MU}</td><td>0.1 +- " in shown
+    assert shown.count("data:image/png;base64") == 1
     # What it leaves behind says the same, to the last bit.
     paths = fit.save(tmp_path / "out")
     names = {"overlay.csv", "scene.toml", "result.json", "overlay.png", "residuals.png"}

@@ -1,5 +1,6 @@
 """Sweeps on executors of all kinds: equal to the last bit, and no lane lost with a worker."""
 
+import contextlib
 import json
 import multiprocessing
 import os
@@ -200,6 +201,44 @@ def test_several_processes_take_over_where_they_pay(alone, monkeypatch):
     assert len(taken) == len(job.blocks) - 4
 
 
+def test_processes_are_started_anew_where_they_die(alone, monkeypatch):
+    """Two crews finish three blocks each before they are gone; the third ends the sweep."""
+    died, begun = BrokenExecutor("killed"), []
+    blocks = len(Job(lanes_of(SCENE, over(SMALL)), FIGURES).blocks)
+
+    class Mortal(Here):
+        def submit(self, function, *arguments):
+            if not self.faults:
+                raise died
+            return super().submit(function, *arguments)
+
+    @contextlib.contextmanager
+    def crew(count, environment):
+        done = 3 * len(begun)
+        begun.append(environment["JAX_PLATFORMS"])
+        yield Mortal(*[None] * 3, *[died] * (blocks - done - 3)) if len(begun) < 3 else Here()
+
+    monkeypatch.setattr(executors, "processes", crew)
+    found = jb.sweep(SCENE, over(SMALL), FIGURES, processes=2)
+    same(alone, found)
+    assert begun == ["cpu"] * 3
+    assert found.notes == ("workers that were lost: 2, their blocks given out again",)
+    monkeypatch.setattr(executors, "processes", lambda *_: contextlib.nullcontext(Mortal()))
+    with pytest.raises(UnconvergedError, match="lost 3 times without"):
+        jb.sweep(SCENE, over(SMALL), FIGURES, processes=2)
+
+
+def test_two_processes_say_what_one_says(alone):
+    two = jb.sweep(SCENE, over(SMALL), FIGURES, processes=2)
+    same(alone, two)
+    assert (two.notes, two.computed) == ((), alone.computed)
+    assert not multiprocessing.active_children()
+
+
+# --- minutes --------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
 def test_two_processes_say_what_one_says_even_if_one_is_killed(alone):
     killed = []
 
@@ -213,9 +252,6 @@ def test_two_processes_say_what_one_says_even_if_one_is_killed(alone):
     assert two.notes == ("workers that were lost: 1, their blocks given out again",)
     assert two.computed == alone.computed
     assert not multiprocessing.active_children()
-
-
-# --- minutes --------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from typing import Any
 
 import diffrax
@@ -17,6 +16,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import POSITIVE, is_traced, require, require_choice, require_number
+from jbeamshell.common.progress import watched
 from jbeamshell.dynamics.strip import rate_friction
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
 from jbeamshell.dynamics.strip.block_solver import BlockElimination
@@ -76,7 +76,7 @@ def simulate(
         stable step for explicit methods
     most_steps : largest number of time steps
     adjoint : way in which diffrax differentiates, such as `diffrax.ForwardMode()` for forward mode
-    progress : show a progress bar; None shows it on a terminal only
+    progress : show a progress bar; None shows it where a person watches
     throw : raise if the motion ends before ``span``; otherwise see ``motion.status``
 
     Returns
@@ -114,7 +114,7 @@ def simulate(
     longest = longest_step(scene, inertia, attached, method, step)
     start = _start(scene, released)
     if progress is None:
-        progress = sys.stderr.isatty()
+        progress = watched()
     times = np.linspace(0.0, float(span), samples)
     between = 1 if longest is None else max(1, math.ceil(times[1] / longest * (1.0 - 1e-9)))
     steps = np.linspace(0.0, float(span), (samples - 1) * between + 1)

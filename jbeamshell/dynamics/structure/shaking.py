@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -16,6 +15,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import POSITIVE, require, require_choice, require_number
 from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.progress import watched
 from jbeamshell.dynamics.strip import rate_friction
 from jbeamshell.dynamics.structure.matrices import Structure, dense
 
@@ -127,7 +127,7 @@ def shake(
     tolerance : error of a step, relative to the state and to the size of the response
     smoothing : exponent m of the rate law, see `jbeamshell.dynamics.strip.rate_friction`
     most_steps : largest number of time steps
-    progress : show a progress bar; None shows it on a terminal only
+    progress : show a progress bar; None shows it where a person watches
     throw : raise if the motion ends before ``span``
 
     Returns
@@ -157,7 +157,7 @@ def shake(
     moves = force is not None or any(bool(np.any(values)) for values in start)
     require("force", force, moves, NO_MOTION)
     model, sliders = _model(structure, start[0])
-    show = sys.stderr.isatty() if progress is None else progress
+    show = watched() if progress is None else progress
     times = jnp.linspace(0.0, span, samples)
     settings = (method, most_steps, bool(show))
     x, v = map(jnp.asarray, start)

@@ -1,0 +1,88 @@
+"""Progress for people who watch: bars on a terminal and in a notebook, and nothing elsewhere."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
+
+DELAY = 1.0  # seconds before anything is shown
+TICK = 1.0  # seconds between two signs of life
+
+
+def in_notebook() -> bool:
+    """True in a notebook's kernel."""
+    ipython = sys.modules.get("IPython")
+    shell = None if ipython is None else ipython.get_ipython()
+    return shell is not None and "IPKernelApp" in shell.config
+
+
+def watched() -> bool:
+    """True if a person watches: standard error is a terminal, or this is a notebook."""
+    return in_notebook() or sys.stderr.isatty()
+
+
+@contextlib.contextmanager
+def bar(what: str, unit: str = "step", **options: Any) -> Iterator[Any]:
+    """Progress bar of tqdm, which shows nothing unless a person watches.
+
+    Parameters
+    ----------
+    what : words before the bar
+    unit : name of what is counted
+    options : further arguments of ``tqdm``
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a notebook without widgets, where the bar is text
+        from tqdm.auto import tqdm
+    if not watched():
+        options["disable"] = True  # else as the environment says: TQDM_DISABLE=1
+    looks = {"desc": what, "unit": unit, "file": sys.stderr, "leave": False, "delay": DELAY}
+    with tqdm(**looks, **options) as shown:
+        yield shown
+
+
+@contextlib.contextmanager
+def counting(
+    told: Callable[[int, int], None] | None, what: str, unit: str
+) -> Iterator[Callable[[int, int], None]]:
+    """Function to call with the numbers done and to do: the one that is told, or a bar's."""
+    if told is not None:
+        yield told
+        return
+    with bar(what, unit) as shown:
+
+        def count(done: int, total: int) -> None:
+            if shown.total != total:
+                shown.reset(total)
+                shown.initial = done  # done before: no part of the rate
+            shown.update(done - shown.n)
+
+        yield count
+
+
+@contextlib.contextmanager
+def patience(what: str) -> Iterator[None]:
+    """Show the seconds that pass, for work that cannot tell how far it is."""
+    if not watched():
+        yield
+        return
+    over = threading.Event()
+    ticking = threading.Thread(target=_tick, args=(what, over), daemon=True)
+    ticking.start()
+    try:
+        yield
+    finally:
+        over.set()
+        ticking.join()
+
+
+def _tick(what: str, over: threading.Event) -> None:
+    if over.wait(DELAY):
+        return
+    with bar(what, bar_format="{desc} ... {elapsed}") as shown:
+        while not over.wait(TICK):
+            shown.refresh()
