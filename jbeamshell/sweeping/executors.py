@@ -13,7 +13,6 @@ from concurrent.futures import (
     CancelledError,
     Executor,
     Future,
-    ProcessPoolExecutor,
     wait,
 )
 from typing import Any, NamedTuple, cast
@@ -208,35 +207,27 @@ def _said(error: BaseException) -> str:
     return f"{type(error).__name__}: {first}" if first else type(error).__name__
 
 
-def check_executor(executor: Any, processes: int | None, devices: Any) -> None:
-    """Raise `InputError` for what is no executor, one that forks, or one beside other places."""
-    fix = (
-        "give a concurrent.futures.Executor, such as "
-        "distributed.Client(...).get_executor() or mpi4py.futures.MPIPoolExecutor()"
-    )
-    require("executor", executor, isinstance(executor, Executor), fix)
-    if isinstance(executor, ProcessPoolExecutor):
-        context = getattr(executor, "_mp_context", None)
+def check_place(processes: Any, executor: Any, devices: Any) -> None:
+    """Raise `InputError` for a place on which blocks cannot run, and for two of them."""
+    places = {"processes": processes, "executor": executor, "devices": devices}
+    given = [name for name, place in places.items() if place is not None]
+    if len(given) > 1:
+        raise InputError(f"{' and '.join(given)}: each says where blocks run: give one of them")
+    if processes is not None:
+        require_count("processes", processes, 1, MOST_PROCESSES)
+        possible = processes == 1 or (jax.default_backend() == "cpu" and not _is_worker())
+        fix = "are for cores, and cannot be started by a worker: leave them out"
+        require("processes", processes, possible, fix)
+    if executor is not None:
+        fix = (
+            "give a concurrent.futures.Executor, such as "
+            "distributed.Client(...).get_executor() or mpi4py.futures.MPIPoolExecutor()"
+        )
+        require("executor", executor, isinstance(executor, Executor), fix)
+        context = getattr(executor, "_mp_context", None)  # of a ProcessPoolExecutor
         forks = context is not None and context.get_start_method() == "fork"
         fix = "forks this process, which JAX does not survive: give processes=N instead"
         require("executor", executor, not forks, fix)
-    fix = "does not go with executor, which has its own workers: leave it out"
-    require("processes", processes, processes is None, fix)
-    require("devices", devices, devices is None, fix)
-
-
-def check_processes(processes: Any, devices: Any) -> None:
-    """Raise `InputError` for a number of processes, or devices, on which nothing can run."""
-    if processes is not None:
-        require_count("processes", processes, 1, MOST_PROCESSES)
-    if processes is not None and processes > 1:
-        on_cores = jax.default_backend() == "cpu"
-        fix = "is for cores only: other devices work side by side anyway; leave it out"
-        require("processes", processes, on_cores, fix)
-        fix = "this process is a worker itself, which cannot start others: leave it out"
-        require("processes", processes, not _is_worker(), fix)
-        fix = "does not go with processes, which choose theirs: leave it out"
-        require("devices", devices, devices is None, fix)
     if devices is not None:
         several = isinstance(devices, list | tuple) and len(devices) > 0
         known = several and all(isinstance(device, jax.Device) for device in devices)

@@ -27,8 +27,7 @@ from jbeamshell.scene.scene import Scene
 from jbeamshell.sweeping.executors import (
     Blocks,
     Losses,
-    check_executor,
-    check_processes,
+    check_place,
     in_processes,
     on_executor,
     processes_that_pay,
@@ -113,9 +112,7 @@ def sweep(
     """
     begun = time.perf_counter()
     job = _job(scene, over, figures, paired, solver)
-    if executor is not None:
-        check_executor(executor, processes, devices)
-    check_processes(processes, devices)
+    check_place(processes, executor, devices)
     table = None if out is None else _check_out(out)
     store = None if table is None else Store(f"{table}{PARTS}")
     place = _Place(processes, executor, devices)
@@ -234,11 +231,14 @@ def _run(job: Job, store: Store | None, place: _Place, watch: _Watch) -> Sweep:
                 found[number] = block
                 watch.tell(block.status.size)
     except (KeyboardInterrupt, UnconvergedError, InputError) as error:
-        said, interrupted = str(error) or "interrupted", isinstance(error, KeyboardInterrupt)
-        if not (interrupted and store is None and found and in_notebook()):
+        said = str(error) or "interrupted"
+        if store is not None:
+            kept = f"{store.folder} keeps what is done, and the same sweep goes on from there"
+            raise type(error)(f"{said}; {kept}") from None
+        if not found:
+            raise
+        if not (isinstance(error, KeyboardInterrupt) and in_notebook()):
             kept = "nothing is kept: give out= (--out on the command line), a file, to go on later"
-            if store is not None:
-                kept = f"{store.folder} keeps what is done, and the same sweep goes on from there"
             raise type(error)(f"{said}; {kept}") from None
         notes.append(
             f"{said} after {watch.done:,} of {watch.total:,} lanes; the others are not_run"

@@ -157,8 +157,9 @@ def test_an_executor_that_takes_no_blocks_is_told():
     [
         ({"executor": "tcp://here:8786"}, "give a concurrent.futures.Executor"),
         ({"executor": ThreadPoolExecutor}, "give a concurrent.futures.Executor"),
-        ({"executor": Here(), "processes": 2}, "does not go with executor"),
-        ({"executor": Here(), "devices": []}, "does not go with executor"),
+        ({"executor": Here(), "processes": 2}, "processes and executor: each says where"),
+        ({"executor": Here(), "devices": []}, "executor and devices: each says where"),
+        ({"devices": []}, "give a list such as"),
         (
             {"executor": ProcessPoolExecutor(1, multiprocessing.get_context("fork"))},
             "forks this process",

@@ -285,7 +285,7 @@ def test_axes_that_make_no_sweep_are_refused(over, says):
         ({"figures": ("loop",)}, "is no number"),
         ({"figures": ("converged",)}, "give numbers|is no number"),
         ({"processes": 0}, "whole number"),
-        ({"processes": 2, "devices": []}, "leave it out"),
+        ({"processes": 2, "devices": []}, "processes and devices: each says where"),
         ({"out": "sweep.txt"}, r"end the name in \.csv"),
         ({"out": "nowhere/sweep.csv"}, "there is no folder"),
     ],

@@ -111,7 +111,7 @@ def _alone_and_paired(
     swept(values, change)
     alone, pair = [], []
     for _ in tqdm(range(min(plan.rounds, STARTS)), disable=None, unit="round", desc="processes"):
-        alone.append(swept(values, change))
+        alone.append(swept(values, change, processes=1))
         pair.append(swept(values, change, processes=2))
     return alone, pair
 
