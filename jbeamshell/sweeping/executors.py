@@ -256,11 +256,13 @@ def processes_that_pay(job: Job, rest_s: float, compile_s: float, blocks: int) -
 
 
 def _cores() -> int:
-    """Number of cores that this process may use."""
+    """Number of cores that this process may use and that others leave free, at least its own."""
+    every = os.cpu_count() or 1
     try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
-        return os.cpu_count() or 1
+        others = os.getloadavg()[0] - 1.0
+        return max(1, min(len(os.sched_getaffinity(0)), int(every - others)))
+    except (AttributeError, OSError):  # not on every system
+        return every
 
 
 def _environment() -> dict[str, str]:

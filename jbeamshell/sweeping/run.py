@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import math
 import os
 import time
 import warnings
@@ -200,15 +201,18 @@ class _Place:
     def _here(self, job: Job, numbers: list[int], watch: _Watch, losses: Losses) -> Blocks:
         """Blocks of this process, which leaves the rest to several as soon as that pays."""
         runner = job.runner(self.devices)
-        runner.compile()
+        compile_s = runner.compile()
         watch.compiled()
         free = self.processes is None and self.devices is None
+        # Blocks cost about the same; the shortest holds least that is done once, such as compiling.
+        begun, shortest = time.perf_counter(), math.inf
         for done, (number, block) in enumerate(job.run(numbers, runner), 1):
+            shortest = min(shortest, time.perf_counter() - begun)
             yield number, block
-            left = numbers[done:]
-            rest_s = (time.perf_counter() - watch.compiled_at) / done * len(left)
-            count = processes_that_pay(job, rest_s, watch.compile_s, len(left)) if free else 1
-            if count > 1:
+            left, begun = numbers[done:], time.perf_counter()
+            rest_s = shortest * len(left)
+            count = processes_that_pay(job, rest_s, compile_s, len(left)) if free else 1
+            if count > 1 and done > 1:
                 yield from in_processes(job, left, count, losses)
                 return
 

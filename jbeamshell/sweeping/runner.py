@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -136,9 +137,9 @@ class Runner:
         axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
         self._about = ask, axes, self.figures, self._shape, self.dtype, self._mesh
 
-    def compile(self) -> None:
-        """Compile the model without running a lane."""
-        _compiled(*self._about)
+    def compile(self) -> float:
+        """Compile the model without running a lane; returns the seconds it took, now or before."""
+        return _compiled(*self._about)[1]
 
     def __call__(self, batches: Sequence[np.ndarray]) -> Iterator[Block]:
         """Blocks of batches of lanes, (keys, lanes) each; at most one batch for every device."""
@@ -164,7 +165,8 @@ class Runner:
             last = np.searchsorted(places, np.arange(counts[device] * self.width), "right") - 1
             repeated = columns[:, last].reshape(len(self.keys), -1, self.width)
             filled[device, :, : counts[device]] = repeated
-        return _compiled(*self._about)(*jax.device_put((filled, counts), _spread(self._mesh)))
+        program, _ = _compiled(*self._about)
+        return program(*jax.device_put((filled, counts), _spread(self._mesh)))
 
     def _mend(self, columns: np.ndarray, block: Block) -> None:
         """Solve failed lanes alone, where long load steps are divided; mark what still fails."""
@@ -221,13 +223,14 @@ def _compiled(
     shape: tuple[int, ...],
     dtype: np.dtype,
     mesh: Mesh,
-) -> Any:
-    """Compiled program that runs one block on every device.
+) -> tuple[Callable[..., tuple[Array, Array]], float]:
+    """Compiled program that runs one block on every device, and the seconds of its compilation.
 
     It takes the numbers (devices, keys, chunks, width) and the count of filled chunks of each
     device.  Only filled chunks run, one after the other, so that one shape serves sweeps of all
     sizes.
     """
+    begun = time.perf_counter()
 
     def chunk(lanes: Array) -> tuple[Array, Array]:
         width = lanes.shape[-1]
@@ -256,7 +259,8 @@ def _compiled(
         run = jax.shard_map(each, mesh=mesh, in_specs=spread, out_specs=spread, check_vma=False)
     kinds = ((shape, dtype), (shape[:1], np.int32))
     given = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
-    return jax.jit(run).lower(*given).compile()
+    program = jax.jit(run).lower(*given).compile()
+    return program, time.perf_counter() - begun
 
 
 @eqx.filter_jit

@@ -180,6 +180,11 @@ def test_workers_of_another_version_are_refused():
 
 def test_several_processes_take_over_where_they_pay(alone, monkeypatch):
     job = Job(lanes_of(SCENE, over(SMALL)), FIGURES)
+    monkeypatch.setattr(os, "cpu_count", lambda: 8)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(6), raising=False)
+    for load, cores in ((0.3, 6), (1.0, 6), (4.2, 4), (9.0, 1)):
+        monkeypatch.setattr(os, "getloadavg", lambda load=load: (load, 0.0, 0.0), raising=False)
+        assert executors._cores() == cores
     monkeypatch.setattr(executors, "_cores", lambda: 4)
     assert executors.processes_that_pay(job, rest_s=60.0, compile_s=10.0, blocks=9) == 4
     assert executors.processes_that_pay(job, rest_s=60.0, compile_s=10.0, blocks=3) == 3

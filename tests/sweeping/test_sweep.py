@@ -165,7 +165,7 @@ def test_steps_that_fail_in_the_batch_are_walked_in_pieces(monkeypatch):
     # Smooth sliders need Newton's method, whose iterations are limited here; sharp ones do not.
     scene, hasty = SCENE.replace({"contact.smoothing": 8.0}), jb.Newton(max_iterations=6)
     over = {"load.amplitude": np.linspace(0.2, 1.9, 6), **_eta([0.05, 0.1, 0.2])}
-    hurried = jb.sweep(scene, over, FIGURES, solver=hasty)
+    hurried = jb.sweep(scene, over, FIGURES, solver=hasty, processes=1)
     assert 0 < hurried.failed < len(alone) < hurried.status.size
     for at, numbers in lanes_in(hurried):
         one = scene.replace(dict(zip(over, numbers, strict=True)))
