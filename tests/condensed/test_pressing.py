@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from jbeamshell.condensed import strip
 from jbeamshell.condensed.pressing import press
 from jbeamshell.scene import library
 
 PRESS = jax.jit(press)
+STRIP = jax.jit(lambda scene: strip.condensed(scene, scene.model.nodes))
 PLANE = {"model.rung": "plane", "model.nodes": 129}
 
 
@@ -83,6 +85,23 @@ class TestSqueezed:
         moved = {"load.control": "displacement", "load.amplitude": 1e-3, "load.cycles": 1}
         with pytest.raises(jb.InputError, match=r"contact\.normal = 'none'.*load\.cycles = 0"):
             jb.solve(library.squeezed().replace(PLANE | moved))
+
+
+class TestLaminate:
+    def test_unlike_layers_press_as_those_of_the_beamshell_do(self):
+        """They would bend under an even pressure, so that the end leans less on the base."""
+        layers = [[0.1, 2.0e4, 0.3], [0.1252, 1.5e5, 0.2]]
+        found = {}
+        for rung in ("plane", "condensed-squeeze"):
+            given = {"strip.layers": layers, "model.rung": rung, "model.nodes": 33}
+            own = STRIP(jb.Scene().replace(given))
+            assert float(jnp.sum(own.body.r_0)) == pytest.approx(20.0, rel=1e-9)
+            reaction = np.asarray(own.body.r_0 / own.body.tributary)[::-1]
+            found[rung] = np.interp([1.0, 1.6, 1.7, 1.8, 1.9, 2.0], own.x, reaction)
+        plane, shell = found.values()
+        np.testing.assert_allclose(plane[:-1], shell[:-1], rtol=0.03)
+        assert plane[2] > 10.3
+        assert plane[-1] < 7.0
 
 
 class TestReceding:
