@@ -7,6 +7,8 @@ import csv
 import io
 import json
 import os
+import re
+import stat
 import tempfile
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,7 +17,9 @@ from typing import Any
 
 from jbeamshell.common.errors import InputError
 
-LARGEST_TOML = 10_000_000  # bytes; a pressure table of 100,000 rows takes a quarter of it
+LARGEST_TOML = 4_000_000  # bytes; a pressure table of 100,000 rows takes a half of it
+DEEPEST = 100  # levels of a key
+KEY = re.compile(r"""\s*\[{0,2}[\w.'" -]*""")
 
 
 def as_path(path: Any) -> Path:
@@ -25,6 +29,16 @@ def as_path(path: Any) -> Path:
         if isinstance(name, str) and "\0" not in name:
             return Path(name)
     raise InputError(f"{path!r}: is no file name: give text without NUL, or a pathlib.Path")
+
+
+def check_regular(path: str | os.PathLike[str]) -> None:
+    """Raise `InputError` for what is no regular file, such as a pipe, which may block for ever."""
+    try:
+        mode = as_path(path).stat().st_mode
+    except (OSError, UnicodeEncodeError):
+        return  # the reader says why
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+        raise InputError(f"{path}: is no regular file: write it to one first")
 
 
 @contextlib.contextmanager
@@ -70,6 +84,7 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Tables of a TOML file; raises `InputError` if it is none, or larger than `LARGEST_TOML`."""
+    check_regular(path)
     try:
         with as_path(path).open("rb") as file:
             data = file.read(LARGEST_TOML + 1)
@@ -88,6 +103,9 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def parsed_toml(text: str) -> dict[str, Any]:
     """Tables of TOML text; raises `ValueError` for any other text."""
+    keys = (KEY.match(line) for line in text.splitlines())
+    if any(key is not None and key[0].count(".") > DEEPEST for key in keys):
+        raise ValueError("its keys are nested too deeply")
     try:
         return tomllib.loads(text)
     except RecursionError:

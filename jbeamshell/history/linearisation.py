@@ -77,3 +77,33 @@ def linear_error(scene: Scene) -> float:
     elastic = scene.model.order > 0 or scene.model.solution == "plane"
     constants = SECTIONS if elastic else BEAMSHELL
     return float(bound(pressed, slip / height, limit / pressure, softness, constants))
+
+
+def buckling(scene: Scene) -> tuple[float, float]:
+    """Compression of the part of a strip beyond its pressure, and the compression that buckles it.
+
+    The latter is Euler's load of a column that the pressed part clamps and whose loaded end is
+    free, pi^2 E' (2H)^3/(48 l^2) over its length l (Timoshenko & Gere 1961, section 2.1).
+
+    Parameters
+    ----------
+    scene : scene without traced leaves
+
+    Returns
+    -------
+    compression : largest in the scene's cycles, force per unit width; under displacement control
+        that of a rigid clamp
+    limit : infinite if the pressure reaches the loaded end
+    """
+    strip, load = scene.strip, scene.load
+    table = np.asarray(scene.contact.pressure, dtype=float)
+    if table.ndim == 0 or table[-1, 1] > 0.0 or load.cycles == 0:
+        return 0.0, float("inf")
+    x, pressure = table.T
+    beyond = float(strip.length) - float(x[np.flatnonzero(pressure > 0.0)[-1] + 1])
+    if beyond <= 0.0:
+        return 0.0, float("inf")
+    stretching = float(strip.stretching_stiffness)
+    bending = stretching * (2.0 * float(strip.half_height)) ** 2 / 12.0
+    force = float(load.amplitude) * (1.0 if load.control == "force" else stretching / beyond)
+    return force, float(np.pi**2 * bending / (4.0 * beyond**2))

@@ -16,7 +16,7 @@ import jax
 import numpy as np
 from jax import Array
 
-from jbeamshell.history.linearisation import linear_error
+from jbeamshell.history.linearisation import buckling, linear_error
 from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
@@ -25,6 +25,7 @@ NEGLIGIBLE = 1e-9  # slip over the sticking range, or tension over the pressure,
 CLOSES = 1e-3  # distance between the ends of a steady loop, over its width
 SAFETY = 1.2  # factor on the estimated error of the corner
 TOLERANCE = 0.02  # relative error of the dissipation below which there is no doubt
+NEAR_BUCKLING = 0.5  # part of the Euler load from which deflections double
 LOCKS = 0.491  # nu beyond which the midpoint rule is off by more than 1 % of the dissipation
 FINER = "take a smaller model.end_size or more model.nodes"
 
@@ -130,15 +131,30 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
         rung = f"model.rung = {general_rung(model.rung)} with " if model.condensed else ""
         fix = f"take {rung}model.kinematics = exact"
         found.append(f"{_off(error)}: kinematics are linear; {fix}")
+    if model.kinematics == "linear" and "w" in model.fields:
+        found += _buckling(scene)
     beamshell = "psi" in model.fields and model.order == 0 and model.solution != "plane"
     locks = beamshell and model.grid == "finite-difference" and strip.plane == "strain"
-    if locks and strip.poisson_ratio is not None and strip.poisson_ratio > LOCKS:
+    ratio = strip.poisson_ratio if strip.layers is None else strip.layers[:, 2]
+    if locks and (largest := float(np.max(np.asarray(ratio)))) > LOCKS:
         other = "model.rung = plane" if model.condensed else "model.grid = collocation"
         found.append(
-            f"nearly incompressible (nu = {strip.poisson_ratio:.4g}): finite differences may be "
+            f"nearly incompressible (nu = {largest:.4g}): finite differences may be "
             f"off by several per cent; take {other}"
         )
     return tuple(found)
+
+
+def _buckling(scene: Scene) -> list[str]:
+    """Doubt about an overhang under compression, of which linear kinematics know nothing."""
+    force, limit = buckling(scene)
+    if force < NEAR_BUCKLING * limit:
+        return []
+    return [
+        f"the part beyond the pressure may buckle: its Euler load is {limit:.3g} and the "
+        f"compression reaches {force:.3g}, which linear kinematics do not see; take "
+        "model.kinematics = exact, or press further along the strip"
+    ]
 
 
 def _unsteady(history: Run) -> tuple[str, ...]:

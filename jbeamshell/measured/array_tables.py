@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 import os
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.measured import matlab
 from jbeamshell.measured.tables import LARGEST, Table, read_bytes
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -77,26 +77,7 @@ class ArrayTable(Table):
 
 
 def _matlab(data: bytes) -> Iterator[tuple[str, Any]]:
-    from scipy.io import loadmat, whosmat  # slow to import
-
-    if sum(8 * math.prod(shape) for _, shape, _ in whosmat(io.BytesIO(data))) > LARGEST:
-        raise ValueError(f"more than {LARGEST // 10**6} MB when unpacked")
-    for name, value in loadmat(io.BytesIO(data)).items():
-        if name.startswith("__"):
-            continue
-        yield from _fields(name, value)
-
-
-def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Variable with its name, or all fields of a struct, of a row of structs, of nested structs."""
-    if not (isinstance(value, np.ndarray) and value.dtype.names):
-        yield name, value
-        return
-    elements = value.ravel()
-    for i, element in enumerate(elements, 1):
-        own = name if elements.size == 1 else f"{name}({i})"
-        for field in value.dtype.names:
-            yield from _fields(f"{own}.{field}", element[field])
+    return matlab.variables(data, LARGEST)
 
 
 def _archive(data: bytes) -> Iterator[tuple[str, Any]]:

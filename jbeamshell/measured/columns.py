@@ -45,6 +45,9 @@ TAIL = re.compile(
 )
 
 
+LONGEST_TITLE = 1000  # characters; of a longer title only its beginning is read
+
+
 def find_columns(
     titles: Sequence[str], chosen: Mapping[str, str], name: str, place: str
 ) -> dict[str, int]:
@@ -178,6 +181,7 @@ def unit_factors(
 
 def unit_of(title: str) -> str | None:
     """Unit in a title, in brackets or at its end; None if there is none."""
+    title = title[:LONGEST_TITLE]
     bracket = re.findall(r"\[([^\]]*)\]", title) or re.findall(r"\(([^)]*)\)", title)
     if bracket:
         unit = bracket[-1].strip()
@@ -223,7 +227,7 @@ def _words(title: str) -> set[str]:
 
 def bare(title: str) -> str:
     """Title without its unit in brackets."""
-    return re.sub(r"\[[^\]]*\]?|\([^)]*\)?", " ", title)
+    return re.sub(r"\[[^\]]*\]?|\([^)]*\)?", " ", title[:LONGEST_TITLE])
 
 
 def _chosen(titles: Sequence[str], quantity: str, title: str, name: str, held: str) -> int:

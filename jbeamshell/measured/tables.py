@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import check_regular
 
 LARGEST = 200_000_000  # bytes
 
@@ -53,6 +54,7 @@ class Table(abc.ABC):
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
     """Content of a file; raises `InputError` if it cannot be read or has more than 200 MB."""
+    check_regular(path)
     try:
         with Path(path).open("rb") as file:
             size = os.fstat(file.fileno()).st_size

@@ -25,6 +25,7 @@ from jbeamshell.measured.tables import Table, read_bytes
 DELIMITERS = "\t;,"  # most trusted first: commas also are decimal marks
 PREAMBLE = 100  # most lines above the header
 SAMPLE = 50  # rows by which a delimiter is judged
+LONGEST_LINE = 1_000_000  # characters
 MISSING = {"", "-", "--", "na", "n/a", "#n/a", "null", "none"}
 MISSING |= {"1.#qnan", "-1.#ind", "-nan", "nan(ind)", "-nan(ind)"}
 
@@ -56,6 +57,12 @@ class TextTable(Table):
         self.name = Path(path).name
         text = decoded(read_bytes(path), self.name)
         self._lines = list(io.StringIO(text, newline=None))
+        longest = max(map(len, self._lines), default=0)
+        if longest > LONGEST_LINE:
+            raise InputError(
+                f"{self.name}: has a line of {longest:,} characters: keep the columns of "
+                "force, displacement and time only"
+            )
         self._decimal = decimal
         self._first = 0  # number of lines before those that may hold numbers
         content = list(islice(self._content(), PREAMBLE + SAMPLE))

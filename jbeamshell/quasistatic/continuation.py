@@ -90,7 +90,7 @@ class PathEnd(eqx.Module):
             steps = recover(scene, steps, walked, solver, self.state)
             if throw:
                 part = jax.tree.map(lambda a: a[:count], steps)
-                raise_if_failed(part, further, history.force.size)
+                raise_if_failed(scene, part, further, history.force.size)
         added = jax.tree.map(
             lambda a: a[:count], _steps_of(history_of(scene, steps, walked.pressure))
         )

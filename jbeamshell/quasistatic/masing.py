@@ -92,7 +92,7 @@ def bar_cycles(scene: Scene, path: LoadPath) -> StepResults:
 def _backbone_path(scene: Scene, path: LoadPath, sign: float | Array) -> LoadPath:
     """Load path of the pressing, and of a pull or a push to the amplitude after it."""
     pressing, half = scene.load.pressure_steps, scene.load.steps_per_half_cycle
-    levels = sign * scene.load.amplitude * jnp.arange(1, half + 1) / half
+    levels = sign * path.target[-1] * jnp.arange(1, half + 1) / half  # the path ends at A
     ones = jnp.ones_like(levels)
     after = LoadPath(levels, ones, ones)
     return jax.tree.map(lambda a, b: jnp.append(a[:pressing], b), path, after)
@@ -155,6 +155,7 @@ def _bar_backbone(scene: Scene, path: LoadPath) -> Backbone:
         # The root of the part is taken alone, because its slope at zero is infinite.
         force = bar_force(load.amplitude, stiffness, resistance) * jnp.sqrt(part)
     reach = bar_slip_length(force, resistance)
+    held = reach[-1] < strip.length  # the end that does not slip
     slid = jax.vmap(lambda f: bar_slip_profile(system.x, f, strip.length, stiffness, resistance))(
         force
     )
@@ -176,8 +177,8 @@ def _bar_backbone(scene: Scene, path: LoadPath) -> Backbone:
         slipping=level.traction[1:] > 0.0,
         iterations=jnp.zeros(half, int),
         error=jnp.zeros(half),
-        converged=jnp.ones(half, bool),
-        status=jnp.full(half, Status.CONVERGED),
+        converged=jnp.broadcast_to(held, half),
+        status=jnp.broadcast_to(jnp.where(held, Status.CONVERGED, Status.NOT_REACHED), half),
     )
 
 

@@ -13,6 +13,7 @@ from jax import Array
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.history.history import History
+from jbeamshell.history.linearisation import buckling
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.path_state import StepResults
 from jbeamshell.quasistatic.system import System
@@ -30,12 +31,12 @@ def check_solver(solver: Newton | None) -> None:
     require("solver", solver, solver is None or isinstance(solver, Newton), fix)
 
 
-def raise_if_failed(steps: StepResults, path: LoadPath, before: int = 0) -> None:
+def raise_if_failed(scene: Scene, steps: StepResults, path: LoadPath, before: int = 0) -> None:
     """Raise `UnconvergedError` with the first failed step.
 
     Parameters
     ----------
-    steps, path : results of a load path, and the path
+    scene, steps, path : scene, results of a load path, and the path
     before : number of steps of the history that the path continues
     """
     converged = np.asarray(steps.state.converged)
@@ -48,8 +49,11 @@ def raise_if_failed(steps: StepResults, path: LoadPath, before: int = 0) -> None
         where = f"pressing down (to {100.0 * float(path.pressure[first]):.3g} % of the pressure)"
     reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
     error = float(steps.error[first])
+    force, limit = buckling(scene)
+    buckles = force >= limit
+    advice = f"the part beyond the pressure buckles at {limit:.3g}" if buckles else ADVICE
     raise UnconvergedError(
-        f"{where} found no equilibrium ({reason}, out of balance {error:.2g} of mu F_N L): {ADVICE}"
+        f"{where} found no equilibrium ({reason}, out of balance {error:.2g} of mu F_N L): {advice}"
     )
 
 

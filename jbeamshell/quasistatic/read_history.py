@@ -14,8 +14,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jbeamshell.common.errors import InputError
-from jbeamshell.common.files import as_path
+from jbeamshell.common.errors import InputError, Status
+from jbeamshell.common.files import as_path, check_regular
 from jbeamshell.history.history import History
 from jbeamshell.history.saved import FORMAT, named_arrays, without_scene
 from jbeamshell.mechanics.kinematics import Strains
@@ -42,6 +42,7 @@ def read_history(path: str | os.PathLike[str]) -> History:
         if the file cannot be read, is damaged or of another format, or if it was written in double
         precision and JAX runs in single precision
     """
+    check_regular(path)
     try:
         # The file is opened here because NumPy leaves its own handle open if the file is damaged.
         with as_path(path).open("rb") as handle, np.load(handle, allow_pickle=False) as file:
@@ -63,6 +64,10 @@ def read_history(path: str | os.PathLike[str]) -> History:
         held = arrays.get(name)
         if held is None or (held.shape, held.dtype) != (wanted.shape, wanted.dtype):
             raise InputError(f"{path}: {name} is missing or of another shape: save it again")
+    converged = np.cumsum(arrays["status"] != Status.CONVERGED) == 0
+    for name in ("force", "displacement", "fields", *ALONG_BOTH):
+        if not np.all(np.isfinite(arrays[name][converged])):
+            raise InputError(f"{path}: {name} holds NaN in a converged step: save it again")
     leaves = [jnp.asarray(arrays[name]) for name, _ in named_arrays(blank)]
     read: History = jax.tree.unflatten(jax.tree.structure(without_scene(blank)), leaves)
     return dataclasses.replace(read, scene=blank.scene)

@@ -103,7 +103,7 @@ def solve(
         else:
             steps = masing(scene, start, whole, solver, recovering=True)
         if throw:
-            raise_if_failed(steps, whole)
+            raise_if_failed(scene, steps, whole)
         history = with_end(history_of(scene, steps, whole.pressure), steps)
     history = dataclasses.replace(history, cycles=cycles)
     if throw:

@@ -100,7 +100,7 @@ def gross_slip_rule(load: Load, numbers: Numbers, targets: Any, part: Any = 1.0)
         numbers("contact.pressure"), numbers("contact.bottom_pressure"), numbers("strip.length")
     )
     limit = friction * force
-    below = (size == 0.0) | (friction == 0.0) | (size < (1.0 - MARGIN) * (limit * np.asarray(part)))
+    below = stays_below(size, limit, np.asarray(part))
     worst = np.max(np.broadcast_to(size, np.shape(below)), where=~below, initial=0.0)
     return Rule(
         key,
@@ -109,6 +109,18 @@ def gross_slip_rule(load: Load, numbers: Numbers, targets: Any, part: Any = 1.0)
         f"must stay below gross slip, mu F_N L = {np.max(limit):.6g}; "
         "set load.control to 'displacement' or 'arc-length' to go beyond",
     )
+
+
+def stays_below(size: Any, limit: Any, part: Any) -> Any:
+    """True where forces stay below gross slip, or where nothing resists; any shape, traced or not.
+
+    Parameters
+    ----------
+    size : forces, positive
+    limit : mu F_N L
+    part : part of the pressures that acts
+    """
+    return (size == 0.0) | (limit == 0.0) | (size < (1.0 - MARGIN) * (limit * part))
 
 
 @np.errstate(over="ignore", invalid="ignore")

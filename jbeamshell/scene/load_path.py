@@ -12,7 +12,8 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.jax_options import memory
 from jbeamshell.numerics.cycles import closed_cycles
-from jbeamshell.scene.domain import bar_rule, gross_slip_rule
+from jbeamshell.scene.domain import bar_rule, gross_slip_rule, stays_below
+from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
 NUMBERS_PER_NODE = 13  # numbers that a load step stores at a node, and twice its fields more
@@ -59,6 +60,8 @@ def whole_path(
             require("path", np.asarray(pressures)[pulling], not np.any(pulling), fix)
         else:
             known = np.zeros(0)
+    if is_traced(scene, targets) and scene.load.control == "force":
+        targets, numbers = _below_gross_slip(scene, targets, pressures), jnp
     before = (np.arange(1, pressing + 1) / pressing).astype(amplitude.dtype)
     whole = LoadPath(
         numbers.append(np.zeros_like(before), targets),
@@ -68,6 +71,14 @@ def whole_path(
     last = pressing - 1
     cycles = closed_cycles(np.append(0.0, known)) if known.size else ()
     return whole, tuple((a + last, b + last, c + last) for a, b, c in cycles)
+
+
+def _below_gross_slip(scene: Scene, targets: Array, pressures: Array) -> Array:
+    """Forces of a traced path, NaN from gross slip on, where no step finds an equilibrium."""
+    contact = scene.contact
+    force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length)
+    below = stays_below(jnp.abs(targets), contact.friction * force, pressures)
+    return jnp.where(below, targets, jnp.nan)
 
 
 def check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:

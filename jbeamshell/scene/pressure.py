@@ -6,14 +6,17 @@ rows and the end values beyond them; two rows of the same X make a step.
 
 from __future__ import annotations
 
+from typing import Any
+
+import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import require
+from jbeamshell.common.checks import is_traced, require
 from jbeamshell.scene.keys import PRESSURE
 
 
-def is_table(pressure: np.ndarray) -> bool:
+def is_table(pressure: Any) -> bool:
     """True for a table of [X, pressure] rows.
 
     An array over the strips of a sweep is none: it has one axis of more than one entry at most.
@@ -22,7 +25,7 @@ def is_table(pressure: np.ndarray) -> bool:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # the caller checks for forces that are infinite
-def face_resultant(pressure: ArrayLike, length: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+def face_resultant(pressure: ArrayLike, length: ArrayLike) -> tuple[Any, Any]:
     """Force of a pressure on strips, per unit width, and its moment about X = 0.
 
     Parameters
@@ -32,26 +35,25 @@ def face_resultant(pressure: ArrayLike, length: ArrayLike) -> tuple[np.ndarray, 
 
     Returns
     -------
-    tuple of numpy.ndarray
-        force (stress times length) and moment (stress times length squared), in double precision.
+    force, moment
+        stress times length, and stress times length squared; in double precision unless traced
     """
-    load, length = np.asarray(pressure, float), np.asarray(length, float)
+    numbers: Any = jnp if is_traced(pressure, length) else np
+    load, along = numbers.asarray(pressure, float), numbers.asarray(length, float)
     if not is_table(load):
-        return load * length, 0.5 * load * length**2
-    end = length[..., None]
-    x, p = (np.broadcast_to(column, (*length.shape, column.size)) for column in load.T)
-    x = np.concatenate([np.zeros_like(end), x, end], axis=-1)
-    p = np.concatenate([p[..., :1], p, p[..., -1:]], axis=-1)
-    run, begin, stop = np.diff(x), p[..., :-1], p[..., 1:]
+        return load * along, 0.5 * load * along**2
+    end = along[..., None]
+    x, p = (numbers.broadcast_to(column, (*along.shape, column.size)) for column in load.T)
+    x = numbers.concatenate([numbers.zeros_like(end), x, end], axis=-1)
+    p = numbers.concatenate([p[..., :1], p, p[..., -1:]], axis=-1)
+    run, begin, stop = numbers.diff(x), p[..., :-1], p[..., 1:]
     force, middle = 0.5 * run * (begin + stop), 0.5 * (x[..., 1:] + x[..., :-1])
     moment = force * middle + run**2 * (stop - begin) / 12.0
-    return np.sum(force, axis=-1), np.sum(moment, axis=-1)
+    return numbers.sum(force, axis=-1), numbers.sum(moment, axis=-1)
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def resultant(
-    top: ArrayLike, bottom: ArrayLike, length: ArrayLike
-) -> tuple[np.ndarray, np.ndarray]:
+def resultant(top: ArrayLike, bottom: ArrayLike, length: ArrayLike) -> tuple[Any, Any]:
     """Force of both pressures on strips, downwards, and its moment about X = 0.
 
     Parameters and units are those of `face_resultant`.

@@ -196,6 +196,11 @@ class TestRingDown:
         assert np.allclose(found.damping, expected, rtol=0.02)
 
 
+def many(diagonal):
+    """Sparse diagonal matrix of 500 degrees of freedom, whose entry 7 is given."""
+    return scipy.sparse.diags_array([*[1e5] * 7, diagonal, *[1e5] * 492])
+
+
 REFUSED = {
     "shape": (lambda: Structure(np.eye(2), np.ones((2, 3))), "stiffness"),
     "sizes": (lambda: Structure(np.eye(2), np.eye(3)), "stiffness"),
@@ -205,6 +210,11 @@ REFUSED = {
     "massless": (lambda: Structure(np.diag([1.0, 0.0]), np.eye(2)), "mass.*positive definite"),
     "damping": (lambda: Structure(np.eye(2), np.eye(2), damping=[[1.0]]), "damping"),
     "rigid": (lambda: Structure(np.eye(2), [[1.0, -1.0], [-1.0, 1.0]]), "rigid mode"),
+    "unstable": (lambda: Structure(many(1.0), many(-7e5)), "stiffness.*negative mode"),
+    "heavy": (lambda: Structure(many(-1.0), many(1.0)), "mass.*positive definite"),
+    "complex": (lambda: Structure(many(1.0), many(1.0 + 1.0j)), "stiffness.*real"),
+    "complex dense": (lambda: Structure(np.eye(1), [[1.0 + 1.0j]]), "stiffness.*real"),
+    "feeding": (lambda: Structure(many(1.0), many(1.0), damping=many(-1.0)), "damping.*negative"),
     "nowhere": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 1)]), "attachments"),
     "to itself": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 0, 0)]), "attachm"),
     "stiffening": (lambda: Joint([1.0, 2.0], [1.0, 3.0]), "softening"),

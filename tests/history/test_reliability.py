@@ -36,6 +36,15 @@ COARSE = {"model.nodes": 41, "model.kinematics": "linear", "load.steps_per_half_
 LITTLE = {"strip.height_ratio": 0.2, "load.amplitude": 0.3}  # only the corner slips
 
 
+OVERHANG = {  # slender, and pressed over a third of its length
+    "strip.height_ratio": 0.01,
+    "contact.friction": 0.3,
+    "contact.pressure": [[0, 30], [0.6, 30], [0.6, 0], [2, 0]],
+    "model.fields": ["v", "w", "beta", "psi"],
+    "load.amplitude": 2.0,
+}
+
+
 def random_values(count):
     """Values of `KEYS`, (count, 6)."""
     part = np.random.default_rng(7).uniform(size=(2000, len(KEYS)))[:count]
@@ -134,6 +143,10 @@ def test_where_nothing_slips_the_dissipation_is_doubted():
         ({"strip.poisson_ratio": 0.499}, "take model.grid = collocation"),
         ({"strip.axial_stiffness": 10.0}, "take model.kinematics = exact"),
         ({"strip.poisson_ratio": 0.499, "model.grid": "collocation"}, None),
+        ({"strip.layers": [[0.1, 1e3, 0.3], [0.1252, 1e3, 0.4995]]}, "nu = 0.4995"),
+        (OVERHANG, "its Euler load is 1.43"),
+        (OVERHANG | {"load.amplitude": 0.5}, None),
+        (OVERHANG | {"contact.pressure": 30.0}, None),
         ({}, None),
     ],
 )

@@ -134,6 +134,16 @@ def test_bad_files_are_refused(tmp_path, name):
     assert told in str(caught.value)
 
 
+def test_a_byte_that_kills_scipys_reader_does_not_kill_the_process(tmp_path):
+    path = tmp_path / "damaged.mat"
+    savemat(path, BOTH)
+    content = bytearray(path.read_bytes())
+    content[184] = 0xD4  # a type that is none
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"damaged\.mat: .*it is damaged"):
+        read_recordings(path)
+
+
 @pytest.mark.parametrize(
     ("variables", "told"),
     [

@@ -3,6 +3,8 @@
 The loops here are ellipses of a few points, told apart by their ranges.
 """
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -395,6 +397,21 @@ def test_bad_options_are_refused(read, options, told):
 def test_files_that_cannot_be_read(tmp_path, name, reason):
     with pytest.raises(InputError, match=rf"{tmp_path}.*: cannot be read \({reason}"):
         read_loops(tmp_path / name)
+
+
+def test_a_pipe_is_refused_and_does_not_block(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(InputError, match="is no regular file"):
+        read_loops(tmp_path / "pipe.csv")
+
+
+@pytest.mark.parametrize(
+    "header", ["force" + "[" * 20_000 + ",displacement", ",".join(["force"] * 10**6)]
+)
+def test_endless_headers_are_refused_in_no_time(tmp_path, header):
+    (tmp_path / "endless.csv").write_text(f"{header}\n1,2\n2,1\n1,2\n")
+    with pytest.raises(InputError, match=r"endless\.csv: "):
+        read_loops(tmp_path / "endless.csv")
 
 
 # --- anything -----------------------------------------------------------------------------------

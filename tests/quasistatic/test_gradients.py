@@ -74,3 +74,12 @@ def test_gradient_reaches_every_number_of_a_scene():
     assert all(bool(jnp.all(jnp.isfinite(leaf))) for leaf in leaves)
     # A homogeneous strip on a rigid foundation has no use for these two.
     assert {path[-1].name for path, _ in names} - moved == {"deviation", "normal_stiffness"}
+
+
+@pytest.mark.parametrize("rung", ["bar", "squeeze"])
+def test_a_traced_force_beyond_gross_slip_has_no_result(rung):
+    few = {"model.nodes": 9, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
+    ask = jb.response(jb.Scene().replace({"model.rung": rung} | few), ["contact.friction"])
+    both = jax.jit(jax.vmap(ask))(jnp.array([0.04, 0.039]))  # mu F_N L = 0.8 and 0.78
+    assert both["status"].tolist() == [0, 3]
+    assert np.isnan(both["dissipation"]).tolist() == [False, True]

@@ -64,9 +64,10 @@ class Structure:
         Raises
         ------
         InputError
-            for matrices that are not square, of one size, symmetric and finite; for a mass matrix
-            that is not positive definite; for a joint at a degree of freedom that does not exist;
-            for a rigid-body mode with all joints stuck
+            for matrices that are not square, of one size, real, symmetric and finite; for a mass
+            that is not positive definite; for a damping with a negative mode; for a joint at a
+            degree of freedom that does not exist; for a rigid-body mode, or one of negative
+            stiffness, with all joints stuck
         """
         self.mass = _checked("mass", mass)
         size = self.mass.shape[0]
@@ -128,14 +129,14 @@ class Structure:
         return solver.solve(loads)
 
     def _check_modes(self) -> None:
-        """Raise `InputError` for a mass that is not positive definite, or a rigid-body mode."""
-        try:
-            if self.size <= DENSE:
-                scipy.linalg.cholesky(dense(self.mass))
-            lightest = float(np.min(self.mass.diagonal()))
-        except scipy.linalg.LinAlgError:
-            lightest = -1.0
-        require("mass", self.mass.shape, lightest > 0.0, "must be positive definite")
+        """Raise `InputError` for matrices with negative modes, or a rigid-body mode."""
+        require("mass", self.mass.shape, _is_positive(self.mass), "must be positive definite")
+        damped = _is_positive(self.damping, SYMMETRY_ROUNDING) or not abs(self.damping).max()
+        fix = "must have no negative mode: it would feed energy into the structure"
+        require("damping", self.damping.shape, damped, fix)
+        stable = _is_positive(self.stuck_stiffness, SYMMETRY_ROUNDING)
+        fix = "has a negative mode with all joints stuck: the structure is unstable"
+        require("stiffness", self.stiffness.shape, stable, fix)
         frequency, _ = self.modes(1)
         scale = float(abs(self.stuck_stiffness).max() / abs(self.mass).max())
         held = frequency[0] ** 2 > SYMMETRY_ROUNDING * scale
@@ -145,7 +146,10 @@ class Structure:
 
 def _checked(name: str, matrix: Any, size: int | None = None) -> Any:
     """Matrix of floats, dense or sparse; raises `InputError`."""
-    if scipy.sparse.issparse(matrix):
+    sparse = scipy.sparse.issparse(matrix)
+    real = not np.iscomplexobj(matrix.data if sparse else matrix)
+    require(name, np.shape(matrix), real, "must be real: give its real part if the rest is zero")
+    if sparse:
         known, values = scipy.sparse.csr_array(matrix).astype(float), matrix.data
     else:
         try:
@@ -160,6 +164,24 @@ def _checked(name: str, matrix: Any, size: int | None = None) -> Any:
     skew = abs(known - known.T).max()
     require(name, known.shape, bool(skew <= SYMMETRY_ROUNDING * abs(known).max()), SYMMETRIC)
     return known
+
+
+def _is_positive(matrix: Any, margin: float = 0.0) -> bool:
+    """True if a symmetric matrix is positive definite, a margin of its largest entry apart."""
+    raised = matrix + margin * abs(matrix).max() * scipy.sparse.eye_array(matrix.shape[0])
+    if matrix.shape[0] <= DENSE:
+        return bool(np.all(np.linalg.eigvalsh(np.asarray(dense(raised))) > 0.0))
+    # Without row exchanges the signs of the pivots are those of the eigenvalues (Sylvester).
+    symmetric = {"SymmetricMode": True, "Equil": False}
+    order = "MMD_AT_PLUS_A"
+    try:
+        factors = scipy.sparse.linalg.splu(
+            scipy.sparse.csc_array(raised), order, diag_pivot_thresh=0.0, options=symmetric
+        )
+    except RuntimeError:  # exactly singular
+        return False
+    kept = np.array_equal(factors.perm_r, factors.perm_c)
+    return kept and bool(np.all(factors.U.diagonal() > 0.0))
 
 
 def dense(matrix: Any) -> NDArray[np.float64]:
