@@ -40,6 +40,8 @@ class Factors(NamedTuple):
         and whose event makes no node slip backwards
     falls : (n, k + 1) rates of the reactions over the load between the events, where they fall
     draws : (k, k + 1) rates likewise of mu r_n + sigma r_t, which is zero where a node slips
+    backs : (k, k + 1) rates, falling or not, of mu r_n - sigma r_t, which is zero where a node
+        slips the other way, as long as the node sticks
     """
 
     lower: Array
@@ -49,6 +51,7 @@ class Factors(NamedTuple):
     regular: Array
     falls: Array
     draws: Array
+    backs: Array
 
 
 class ContactState(NamedTuple):
@@ -108,6 +111,7 @@ def factorise(body: Body, friction: Array) -> Factors:
             regular=~backwards & ~away,
             falls=jnp.minimum(lifts, 0.0),
             draws=jnp.minimum(rooms, 0.0),
+            backs=jnp.tril(2.0 * friction * lifts[:k] - rooms),
         )
 
     return jax.tree.map(lambda a, b: jnp.stack([a, b]), one(1.0), one(-1.0))
@@ -186,8 +190,8 @@ def _holds(
 ) -> Array:
     """True if what a branch assumes holds from its start to its end, seen from the safe side.
 
-    The events rise, no node slips before its turn or backwards, reactions stay positive, and nodes
-    beyond the slip zone stick.
+    The events rise, no node slips before its turn or backwards, none goes on slipping the way of
+    the branch before, reactions stay positive, and nodes beyond the slip zone stick.
     """
     k = thresholds.size
     tiny = 64.0 * jnp.finfo(thresholds.dtype).eps
@@ -198,5 +202,7 @@ def _holds(
     closed = jnp.all(start.r_n + own.falls @ between > 0.0)  # an open node has none
     cap = friction * start.r_n[:k]
     room = cap + sense * start.r_t + own.draws @ between
-    sticks = jnp.all(slips | (room >= -tiny * jnp.max(cap)))
-    return rising & regular & closed & sticks
+    least = -tiny * jnp.max(cap)
+    sticks = jnp.all(slips | (room >= least))
+    behind = cap - sense * start.r_t + jnp.cumsum(own.backs * between, axis=1).T
+    return rising & regular & closed & sticks & jnp.all(behind >= least)
