@@ -92,10 +92,9 @@ def factorise(body: Body, friction: Array) -> Factors:
 
     def one(sense: float) -> Factors:
         matrix = body.K_tt + sense * friction * k_nt[:k]
-        found = lower_upper(matrix)
-        lower, upper = found.inverse_lower, found.inverse_upper
         g = body.f_t + sense * friction * f_n[:k]
-        y_g = lower @ g
+        _, _, y, lower, upper = lower_upper(matrix, g[:, None])
+        y_g = y[:, 0]
         # Columns are the events; what has a leading column more starts before the first of them.
         slips = jnp.cumsum(upper * y_g, axis=1)
         before = ((0, 0), (1, 0))

@@ -166,9 +166,9 @@ def _first_loading(body: Body, friction: Array, sense: float) -> _FirstLoading:
     k_nt = body.K_tn.T
     earlier = jnp.triu(jnp.ones((k, k + 1)), 1)
     matrix, g = body.K_tt + sense * friction * k_nt[:k], body.f_t + sense * friction * body.f_n[:k]
-    lower, upper, to_y, inverse = lower_upper(matrix)
-    y_g, y_r = to_y @ g, to_y @ (friction * body.r_0[:k])
-    threshold = y_r / y_g
+    sides = jnp.stack([g, friction * body.r_0[:k]], axis=1)
+    lower, upper, y, _, inverse = lower_upper(matrix, sides)
+    y_g, threshold = y[:, 0], y[:, 1] / y[:, 0]
     slips = (inverse * y_g) @ earlier
     rate = sense * (k_nt @ slips - body.f_n[:, None])
     rooms = (lower * y_g) @ earlier - g[:, None]

@@ -23,10 +23,18 @@ SHRINK = 8  # powers of two from row to row of a matrix that is factorised witho
 
 
 class LowerUpper(NamedTuple):
-    """Factors L (unit diagonal) and U of a matrix L U, and their inverses, (n, n) each."""
+    """Factors L (unit diagonal) and U of a matrix L U, (n, n) each, and what is made of them.
+
+    Attributes
+    ----------
+    lower, upper : L and U
+    reduced : (n, sides) L^-1 of the right-hand sides
+    inverse_lower, inverse_upper : L^-1 and U^-1
+    """
 
     lower: Array
     upper: Array
+    reduced: Array
     inverse_lower: Array
     inverse_upper: Array
 
@@ -59,36 +67,40 @@ def solve(matrix: Array, sides: Array) -> Array:
 
 
 @jax.custom_jvp
-def lower_upper(matrix: Array) -> LowerUpper:
-    """Factors of a matrix (n, n) without pivoting.
+def lower_upper(matrix: Array, sides: Array) -> LowerUpper:
+    """Factors of a matrix (n, n) without pivoting, and right-hand sides (n, sides) reduced by them.
 
     NaN where a pivot is so small that rows would have to be exchanged.
     """
-    return _lower_upper(matrix)
+    return _lower_upper(matrix, sides)
 
 
 @sequential_vmap
-def _lower_upper(matrix: Array) -> LowerUpper:
+def _lower_upper(matrix: Array, sides: Array) -> LowerUpper:
     n = matrix.shape[0]
     # Rows that shrink by powers of two keep LAPACK from exchanging them, and cost no digits.
     scale = 2.0 ** (-min(SHRINK, 900 // n) * np.arange(n))
-    both, _, order = lax.linalg.lu(matrix * scale[:, None])
+    both, _, order = lax.linalg.lu(jnp.concatenate([matrix, sides], axis=1) * scale[:, None])
     exchanged = jnp.where(jnp.all(order == np.arange(n)), 0.0, jnp.nan)
     one = jnp.eye(n, dtype=matrix.dtype)
-    lower = jnp.tril(both * (scale / scale[:, None]), -1) + one + exchanged
-    upper = jnp.triu(both / scale[:, None]) + exchanged
+    lower = jnp.tril(both[:, :n] * (scale / scale[:, None]), -1) + one + exchanged
+    both = both / scale[:, None] + exchanged
+    upper, reduced = jnp.triu(both[:, :n]), both[:, n:]
     inverse_upper = lax.linalg.triangular_solve(upper, one, left_side=False)
-    return LowerUpper(lower, upper, _inverse_lower(lower, True), inverse_upper)
+    return LowerUpper(lower, upper, reduced, _inverse_lower(lower, True), inverse_upper)
 
 
 @lower_upper.defjvp
-def _lower_upper_slope(matrix: tuple[Array], change: tuple[Array]) -> tuple[LowerUpper, LowerUpper]:
-    found = lower_upper(*matrix)
+def _lower_upper_slope(
+    given: tuple[Array, Array], change: tuple[Array, Array]
+) -> tuple[LowerUpper, LowerUpper]:
+    found = lower_upper(*given)
     between = found.inverse_lower @ change[0] @ found.inverse_upper
     below, above = jnp.tril(between, -1), jnp.triu(between)
     return found, LowerUpper(
         found.lower @ below,
         above @ found.upper,
+        found.inverse_lower @ change[1] - below @ found.reduced,
         -below @ found.inverse_lower,
         -found.inverse_upper @ above,
     )

@@ -10,12 +10,19 @@ from jbeamshell.numerics import factors
 N = 40
 RANDOM = np.random.default_rng(1)
 MATRIX = jnp.asarray(np.eye(N) * 9.0 + RANDOM.uniform(-0.2, 0.2, (N, N)))
+SIDES = jnp.asarray(RANDOM.uniform(-1.0, 1.0, (N, 3)))
 CHANGE = jnp.asarray(RANDOM.uniform(-1.0, 1.0, (N, N)))
 SYMMETRIC = MATRIX + MATRIX.T, CHANGE + CHANGE.T
 
 
+def lower_upper(matrix):
+    """Factors with right-hand sides that depend on the matrix too."""
+    return factors.lower_upper(matrix, matrix[:, :3] @ SIDES[:3])
+
+
 def test_lower_and_upper_factors_are_those_of_the_matrix():
-    lower, upper, inverse_lower, inverse_upper = factors.lower_upper(MATRIX)
+    lower, upper, reduced, inverse_lower, inverse_upper = factors.lower_upper(MATRIX, SIDES)
+    np.testing.assert_allclose(lower @ reduced, SIDES, atol=1e-12)
     np.testing.assert_allclose(lower @ upper, MATRIX, atol=1e-12)
     np.testing.assert_allclose(lower @ inverse_lower, np.eye(N), atol=1e-12)
     np.testing.assert_allclose(inverse_upper @ upper, np.eye(N), atol=1e-12)
@@ -25,7 +32,7 @@ def test_lower_and_upper_factors_are_those_of_the_matrix():
 
 
 def test_a_matrix_whose_rows_must_be_exchanged_has_no_factors():
-    assert jnp.all(jnp.isnan(factors.lower_upper(MATRIX.at[0, 0].set(1e-9)).lower))
+    assert jnp.all(jnp.isnan(factors.lower_upper(MATRIX.at[0, 0].set(1e-9), SIDES).lower))
 
 
 def test_a_matrix_with_a_negative_mode_has_no_cholesky_factor():
@@ -33,15 +40,14 @@ def test_a_matrix_with_a_negative_mode_has_no_cholesky_factor():
 
 
 def test_a_symmetric_matrix_is_solved():
-    sides = CHANGE[:, :3]
     np.testing.assert_allclose(
-        factors.solve(SYMMETRIC[0], sides), np.linalg.solve(SYMMETRIC[0], sides), rtol=1e-11
+        factors.solve(SYMMETRIC[0], SIDES), np.linalg.solve(SYMMETRIC[0], SIDES), rtol=1e-11
     )
 
 
 @pytest.mark.parametrize(
     ("function", "matrix", "change"),
-    [(factors.lower_upper, MATRIX, CHANGE), (factors.inverse_cholesky, *SYMMETRIC)],
+    [(lower_upper, MATRIX, CHANGE), (factors.inverse_cholesky, *SYMMETRIC)],
 )
 def test_slopes_are_those_of_differences_and_the_same_in_reverse(function, matrix, change):
     def flat(step):
@@ -60,7 +66,7 @@ def test_a_batch_is_what_its_matrices_are():
     batch = jnp.stack([SYMMETRIC[0], 2.0 * SYMMETRIC[0]])
 
     def both(matrix):
-        return factors.inverse_cholesky(matrix), factors.lower_upper(matrix)
+        return factors.inverse_cholesky(matrix), lower_upper(matrix)
 
     together = jax.jit(jax.vmap(jax.grad(lambda m: sum(map(jnp.sum, jax.tree.leaves(both(m)))))))
     alone = [jax.grad(lambda m: sum(map(jnp.sum, jax.tree.leaves(both(m)))))(m) for m in batch]
