@@ -16,10 +16,8 @@ from matplotlib.axes import Axes
 from jbeamshell.plotting.style import DATA, PALETTE, close, save, single, style
 
 RECORDS = Path(__file__).parents[2] / "tests" / "benchmarks"
-SINGLE = {  # rows of the record of speeds that are drawn: label, colour and marker of each
+SINGLE = {  # rows of the record of speeds, of another machine: label, colour and marker of each
     "dissipation, 1 step": ("beamshell, 41 nodes", PALETTE[2], "^"),
-    "condensed elements 40 x 4, 1 step": ("small condensed elements", PALETTE[3], "v"),
-    "condensed elements 60 x 6, 1 step": ("", PALETTE[3], "v"),
     "CalculiX, 4 steps": ("CalculiX", DATA, "P"),
     "CalculiX, 20 steps": ("", DATA, "P"),
 }
@@ -43,7 +41,7 @@ def draw(axes: Axes, condensed: dict[str, Any], speeds: dict[str, Any]) -> None:
     axes.set(xscale="log", yscale="log", xlim=(1e-2, 1e5))
     axes.set_xlabel("time of a cycle on one core  [ms]")
     axes.set_ylabel("error of the dissipation to elasticity  [%]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8, handlelength=3.5)
 
 
 def main() -> None:
