@@ -11,6 +11,7 @@ SMALLEST = 0.05  # move back over the range, below which it is no reversal
 NESTED = 0.1  # move back over each of its neighbours, below which it is a back-slip
 GROSS_SLIP = 0.02  # tangent over secant stiffness, below which everything slides
 SLIDING = 0.1  # sliding part of the travel, above which the displacement drives
+PARTS = 25  # of a branch, over which force and displacement are compared
 CALM = 0.001  # excess travel over the travel from turn to turn of a column without noise
 
 Floats = NDArray[np.float64]
@@ -94,26 +95,41 @@ def extremes(path: Floats, band: float) -> list[int]:
 def find_driver(force: Floats, displacement: Floats) -> str:
     """Find the column, "force" or "displacement", that drove a test.
 
-    It is the column that travels from turn to turn with less movement to and fro.  If both are
-    smooth, it is the displacement if much of its travel happens at constant force, which force
-    control cannot do; else it is the force.
+    It is the displacement if much of its travel happens at constant force, which force control
+    cannot do.  Else it is the column that travels from turn to turn with less movement to and fro,
+    and the force if both are smooth.
 
     Parameters
     ----------
     force, displacement : (points,) columns of a recording
     """
+    if _sliding(force, displacement) > SLIDING:
+        return "displacement"
     excess = {}
     for name, column in (("force", force), ("displacement", displacement)):
         path = smoothed_path(column)
         ends = column[extremes(path.smooth, path.band)]
         net = float(np.sum(np.abs(np.diff(ends)))) or float(np.ptp(column))
         excess[name] = float(np.sum(np.abs(np.diff(column)))) / net - 1.0
-    if max(excess.values()) > CALM:
-        return "displacement" if excess["displacement"] < 0.5 * excess["force"] else "force"
-    rise = np.abs(np.diff(force)) / np.ptp(force)
-    way = np.abs(np.diff(displacement)) / np.ptp(displacement)
-    sliding = np.sum(way[rise < GROSS_SLIP * way]) / np.sum(way)
-    return "displacement" if sliding > SLIDING else "force"
+    noisy = max(excess.values()) > CALM
+    return "displacement" if noisy and excess["displacement"] < 0.5 * excess["force"] else "force"
+
+
+def _sliding(force: Floats, displacement: Floats) -> float:
+    """Part of the displacement's travel at constant force, over means of some points each."""
+    path = smoothed_path(displacement)
+    branch = np.diff(extremes(path.smooth, path.band) or [0, displacement.size])
+    size = max(int(np.median(branch)) // PARTS, 1)
+    whole = displacement.size // size * size
+    rise, way = (
+        np.abs(np.diff(column[:whole].reshape(-1, size).mean(axis=1))) / np.ptp(column)
+        for column in (force, displacement)
+    )
+    noise = 3.0 * np.sqrt(2.0 / size) * noise_of(force) / np.ptp(force)
+    if noise > 0.25 / PARTS:  # too much to tell a constant force
+        return 0.0
+    constant = rise < GROSS_SLIP * way + noise
+    return float(np.sum(way[constant]) / np.sum(way))
 
 
 def _corners(path: Floats) -> list[int]:
