@@ -149,6 +149,7 @@ def test_fronts_run_at_the_speeds_of_waves(wave):
 
 
 class TestAttachedMasses:
+    @pytest.mark.slow
     def test_a_blow_gives_the_payload_its_velocity(self):
         strip = scene(model__nodes=11)
         attached = dynamics.AttachedMasses(heavy(strip), [1.0, 2.0], [500.0, 300.0], [0.0, 1.0])

@@ -33,7 +33,7 @@ CASES = {
     "thick": {"strip.height_ratio": 0.4, "load.amplitude": 1.9, "model.end_size": 1.0 / 60.0},
     "gravel": {"contact.friction": 0.9, "load.amplitude": 5.0},
 }
-RARER = {"bar", "displacement", "free", "thick"}  # slow; others hold parts of them
+RARER = {"standard", "bar", "displacement", "free", "thick"}  # slow; others hold parts of them
 
 
 def same(one, other, rtol):
@@ -109,7 +109,7 @@ def test_lanes_side_by_side_answer_as_one_by_one():
 @pytest.mark.parametrize(
     ("fault", "method"),
     [
-        ("no guesses", Method.STATUS_ITERATION),
+        pytest.param("no guesses", Method.STATUS_ITERATION, marks=pytest.mark.slow),
         ("a wrong answer", Method.UNCHECKED_STATUS_ITERATION),
     ],
 )
