@@ -41,7 +41,9 @@ def draw(axes: Axes, condensed: dict[str, Any], speeds: dict[str, Any]) -> None:
     axes.set(xscale="log", yscale="log", xlim=(1e-2, 1e5))
     axes.set_xlabel("time of a cycle on one core  [ms]")
     axes.set_ylabel("error of the dissipation to elasticity  [%]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8, handlelength=3.5)
+    axes.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8, handlelength=3.5
+    )
 
 
 def main() -> None:

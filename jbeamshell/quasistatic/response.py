@@ -11,14 +11,14 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import check_words, is_traced, require, require_choice
-from jbeamshell.common.errors import Status
+from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.native import Native
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.quasistatic.stepping import Method
-from jbeamshell.scene.keys import NUMBERS, check_key
+from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
 from jbeamshell.scene.scene import Scene
 
 Response = Callable[..., dict[str, Array]]
@@ -66,7 +66,7 @@ def response(
     Raises
     ------
     InputError
-        if a key or a figure is unknown
+        if a key or a figure is unknown; on a call with other than one number for each key
 
     Examples
     --------
@@ -100,7 +100,15 @@ def response(
     first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
     first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)
 
+    tables = tuple(TABLE[key].table or np.ndim(scene.get(key)) > 0 for key in over)
+
     def ask(*values: Array) -> dict[str, Array]:
+        count = len(values) == len(over)
+        require("over", list(over), count, f"needs as many numbers, not {len(values)}")
+        for key, value, table in zip(over, values, tables, strict=True):
+            if np.ndim(value) and not table:
+                fix = "give one number, and many by jax.vmap or jbeamshell.sweep"
+                raise InputError(f"{key}: is an array of shape {np.shape(value)}: {fix}")
         found: dict[str, Array] | None = first.now(*values)
         if found is None or (again and np.asarray(found["status"]).item() != Status.CONVERGED):
             return compiled(*values)

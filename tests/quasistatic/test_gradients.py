@@ -83,3 +83,11 @@ def test_a_traced_force_beyond_gross_slip_has_no_result(rung):
     both = jax.jit(jax.vmap(ask))(jnp.array([0.04, 0.039]))  # mu F_N L = 0.8 and 0.78
     assert both["status"].tolist() == [0, 3]
     assert np.isnan(both["dissipation"]).tolist() == [False, True]
+
+
+def test_a_response_takes_one_number_of_each_key():
+    ask = jb.response(jb.Scene(), ["contact.friction", "load.amplitude"])
+    with pytest.raises(jb.InputError, match=r"contact.friction: is an array of shape \(2,\): give"):
+        ask(jnp.array([0.1, 0.2]), 1.0)
+    with pytest.raises(jb.InputError, match="needs as many numbers, not 1"):
+        ask(0.1)
