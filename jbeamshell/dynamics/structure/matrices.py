@@ -167,7 +167,13 @@ def _checked(name: str, matrix: Any, size: int | None = None) -> Any:
 
 
 def _is_positive(matrix: Any, margin: float = 0.0) -> bool:
-    """True if a symmetric matrix is positive definite, a margin of its largest entry apart."""
+    """True if a symmetric matrix is positive definite, with a margin for rounding.
+
+    Parameters
+    ----------
+    matrix : dense or sparse
+    margin : part of the largest entry that is added to the diagonal first
+    """
     raised = matrix + margin * abs(matrix).max() * scipy.sparse.eye_array(matrix.shape[0])
     if matrix.shape[0] <= DENSE:
         return bool(np.all(np.linalg.eigvalsh(np.asarray(dense(raised))) > 0.0))
