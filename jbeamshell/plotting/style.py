@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
@@ -55,6 +55,7 @@ DOTS: dict[str, Any] = {
     "markeredgewidth": 0.0,
     "zorder": 3.0,
 }
+FEW = 4  # marks of an axis, at most, whose labels are long
 FORCE = form.FORCE.label
 DISPLACEMENT = form.DISPLACEMENT.label
 POSITION = form.POSITION.label
@@ -124,12 +125,16 @@ def single(axes: Axes | None) -> Axes:
 
 
 def mark_decades(*axes_of_one: Axis) -> None:
-    """Mark 1, 2 and 5 of every decade on logarithmic axes of less than two decades."""
+    """Mark 1, 2 and 5 of every decade on logarithmic axes of less than two decades.
+
+    Axes of less than half a decade have a few even marks.
+    """
     for axis in axes_of_one:
         low, high = axis.get_view_interval()
         if high >= 100.0 * low:
             continue
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        wide = high >= 5.0 * low
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if wide else MaxNLocator(FEW))
         axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(99, 99)))
         axis.set_minor_formatter(NullFormatter())
 
