@@ -12,7 +12,10 @@ WHOLE = [*COARSE, "--strip", "whole"]
 PLANE = ["--set", "model.rung=plane", "--set", "model.nodes=33", "--cycles", "8"]
 
 
-@pytest.mark.parametrize("words", [WHOLE, PLANE], ids=["whole", "sliders"])
+@pytest.mark.parametrize(
+    "words",
+    [pytest.param(WHOLE, marks=pytest.mark.slow, id="whole"), pytest.param(PLANE, id="sliders")],
+)
 def test_it_reports_and_writes_what_it_says(capsys, tmp_path, words):
     folder = tmp_path / "out"
     code = main.main(["ringdown", *words, "--json", "--out", str(folder), "--force", "1.2"])
