@@ -19,6 +19,7 @@ from jbeamshell.common.errors import InputError
 
 LARGEST_TOML = 4_000_000  # bytes; a pressure table of 100,000 rows takes a half of it
 DEEPEST = 100  # levels of a key
+# Beginning of a line of TOML, up to what cannot be a key
 KEY = re.compile(r"""\s*\[{0,2}[\w.'" -]*""")
 
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.mechanics.homogeneous import plane_stiffness
+from jbeamshell.mechanics.homogeneous import plane_modulus, plane_stiffness, shear_modulus
 from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS, Section, linear_strains
 from jbeamshell.mechanics.layered import Material, layered_form
 from jbeamshell.mechanics.section_form import SectionForm, section_stiffness
@@ -29,20 +29,16 @@ def thicknesses(scene: Scene) -> Array:
 
 def _plane(scene: Scene) -> SectionForm:
     """Section of plane elasticity, homogeneous or layered."""
-    strip, thickness = scene.strip, thicknesses(scene)
+    strip = scene.strip
     if strip.layers is None:
-        nu = jnp.asarray(strip.poisson_ratio)
-        coupling, stiffness = plane_stiffness(strip.plane_modulus, nu, strip.plane)
-        columns = stiffness, coupling * stiffness, strip.shear_modulus
-        return layered_form(Material(thickness, *(jnp.reshape(value, 1) for value in columns)))
-    _, modulus, nu = strip.layers.T
-    if strip.plane == "strain":
-        modulus, contraction = modulus / (1.0 - nu**2), nu / (1.0 - nu)
+        modulus = jnp.reshape(strip.plane_modulus, 1)
+        nu = jnp.reshape(jnp.asarray(strip.poisson_ratio), 1)
     else:
-        contraction = nu
-    stiffness = modulus / (1.0 - contraction**2)
-    shear = strip.layers[:, 1] / (2.0 * (1.0 + nu))
-    return layered_form(Material(thickness, stiffness, contraction * stiffness, shear))
+        _, youngs, nu = strip.layers.T
+        modulus = plane_modulus(youngs, nu, strip.plane)
+    coupling, stiffness = plane_stiffness(modulus, nu, strip.plane)
+    shear = shear_modulus(modulus, nu, strip.plane)
+    return layered_form(Material(thicknesses(scene), stiffness, coupling * stiffness, shear))
 
 
 def _beam(scene: Scene) -> SectionForm:

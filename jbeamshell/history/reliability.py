@@ -128,9 +128,7 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
     model, strip, found = scene.model, scene.strip, []
     if model.kinematics == "linear" and (error := linear_error(scene)) > TOLERANCE:
-        rung = f"model.rung = {general_rung(model.rung)} with " if model.condensed else ""
-        fix = f"take {rung}model.kinematics = exact"
-        found.append(f"{_off(error)}: kinematics are linear; {fix}")
+        found.append(f"{_off(error)}: kinematics are linear; {_exact(scene)}")
     if model.kinematics == "linear" and "w" in model.fields:
         found += _buckling(scene)
     beamshell = "psi" in model.fields and model.order == 0 and model.solution != "plane"
@@ -145,6 +143,13 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     return tuple(found)
 
 
+def _exact(scene: Scene) -> str:
+    """Fix that makes a scene's kinematics exact."""
+    model = scene.model
+    rung = f"model.rung = {general_rung(model.rung)} with " if model.condensed else ""
+    return f"take {rung}model.kinematics = exact"
+
+
 def _buckling(scene: Scene) -> list[str]:
     """Doubt about an overhang under compression, of which linear kinematics know nothing."""
     force, limit = buckling(scene)
@@ -152,8 +157,8 @@ def _buckling(scene: Scene) -> list[str]:
         return []
     return [
         f"the part beyond the pressure may buckle: its Euler load is {limit:.3g} and the "
-        f"compression reaches {force:.3g}, which linear kinematics do not see; take "
-        "model.kinematics = exact, or press further along the strip"
+        f"compression reaches {force:.3g}, which linear kinematics do not see; {_exact(scene)}, or "
+        "press further along the strip"
     ]
 
 

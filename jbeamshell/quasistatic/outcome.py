@@ -50,8 +50,10 @@ def raise_if_failed(scene: Scene, steps: StepResults, path: LoadPath, before: in
     reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
     error = float(steps.error[first])
     force, limit = buckling(scene)
-    buckles = force >= limit
-    advice = f"the part beyond the pressure buckles at {limit:.3g}" if buckles else ADVICE
+    advice = ADVICE
+    if force >= limit:
+        advice = f"the part beyond the pressure buckles at {limit:.3g}: take a smaller "
+        advice += "load.amplitude, or press further along the strip"
     raise UnconvergedError(
         f"{where} found no equilibrium ({reason}, out of balance {error:.2g} of mu F_N L): {advice}"
     )

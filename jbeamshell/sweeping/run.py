@@ -181,7 +181,7 @@ class _Watch:
 
 @dataclasses.dataclass(frozen=True)
 class _Place:
-    """Where the blocks of a sweep run; see `sweep`."""
+    """Place where the blocks of a sweep run; see `sweep`."""
 
     processes: int | None
     executor: Executor | None
