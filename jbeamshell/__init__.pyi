@@ -17,6 +17,7 @@ from .common.jax_options import configure as configure
 from .history.history import History as History
 from .ladder.advice import Advice as Advice, advise as advise
 from .ladder.solving import solve as solve
+from .measured.inspection import Inspection as Inspection, inspect as inspect
 from .numerics.newton import Newton as Newton
 from .quasistatic.read_history import read_history as read_history
 from .quasistatic.response import response as response

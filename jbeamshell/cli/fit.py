@@ -29,6 +29,7 @@ WORDS = {
     "(all, as they stand) or auto (default: what suits the recording)",
     "drift": "drift of a recording: keep (default), linear (remove a straight line) or cycle "
     "(remove the mean of each cycle)",
+    "reverse": "column whose sign is turned: force or displacement",
     "method": "search: levenberg-marquardt (default), l-bfgs-b or adam",
     "decimal": "decimal sign, where the numbers alone do not show it",
 }
@@ -74,6 +75,12 @@ def add_to(commands: Any) -> None:
         default=None,
         help="shift closed loops so that their centres lie at the origin: removes the sensors' "
         "offsets",
+    )
+    parser.add_argument(
+        "--unchecked",
+        action="store_true",
+        default=None,
+        help="fit data that `jbeamshell inspect` refuses too",
     )
     parser.add_argument(
         "--save",
@@ -130,7 +137,7 @@ def _plan(options: argparse.Namespace) -> Any:
     if not options.data:
         return _example(values)
     specimen: dict[str, Any] = {"data": options.data}
-    for name in ("kind", "cycles", "drift", "centre", "width", "decimal"):
+    for name in ("kind", "cycles", "drift", "centre", "reverse", "width", "decimal"):
         if _given(options, name):
             specimen[name] = getattr(options, name)
     specimen["columns"] = pairs(options.column, "force=FT")
@@ -148,7 +155,7 @@ def _plan_of_file(options: argparse.Namespace) -> Any:
     for name in sorted(set(vars(options)) - set(ours)):
         if _given(options, name):
             raise InputError(f"--{name}: {options.data[0]} is a plan; write this into the plan")
-    read = plan.read_plan(options.data[0])
+    read = plan.read_plan(options.data[0], bool(options.unchecked))
     changed = {name: getattr(options, name) for name in plan.OPTIONS if _given(options, name)}
     return read._replace(options=read.options | changed)
 

@@ -9,13 +9,13 @@ from importlib.metadata import version
 
 import jax
 
-from jbeamshell.cli import advise, fit, keys, ringdown, run, scenes, sweep
+from jbeamshell.cli import advise, fit, inspect, keys, ringdown, run, scenes, sweep
 from jbeamshell.cli.terminal import BAD_INPUT, INTERRUPTED, UNCONVERGED, complain
 from jbeamshell.common import jax_options
 from jbeamshell.common.errors import InputError, UnconvergedError
 
 # Each module is one command and adds itself to the parser.
-COMMANDS = (run, scenes, keys, advise, fit, sweep, ringdown)
+COMMANDS = (run, scenes, keys, advise, inspect, fit, sweep, ringdown)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

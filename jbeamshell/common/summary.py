@@ -1,10 +1,12 @@
-"""Summary of a result: a title, a short table and remarks, as text and as HTML."""
+"""Summary of a result: a title, a short table and remarks, as text and as HTML; its numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
 from typing import NamedTuple
+
+import numpy as np
 
 
 class Summary(NamedTuple):
@@ -43,3 +45,26 @@ def in_words(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     return "undefined" if value is None else str(value)
+
+
+PREFIXES = {"M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "u": 1e-6, "n": 1e-9}
+
+
+def with_unit(value: float, unit: str = "", digits: int = 4) -> str:
+    """Number with its unit, such as "23 um" for 2.3e-5 m; a number alone if the unit is empty."""
+    return f"{value:.{digits}g}" if not unit else _prefixed([value], unit, digits)
+
+
+def ranged(values: np.ndarray, unit: str = "", digits: int = 4) -> str:
+    """Smallest and largest of some values with their unit, such as "-12 to 12 kN"."""
+    ends = [float(np.nanmin(values)), float(np.nanmax(values))]
+    if not unit:
+        return f"{ends[0]:.{digits}g} to {ends[1]:.{digits}g}"
+    return _prefixed(ends, unit, digits)
+
+
+def _prefixed(values: Sequence[float], unit: str, digits: int) -> str:
+    largest = max(map(abs, values))
+    fits = [(name, size) for name, size in PREFIXES.items() if largest >= size]
+    name, size = fits[0] if fits and unit != "s" else ("", 1.0)
+    return " to ".join(f"{value / size:.{digits}g}" for value in values) + f" {name}{unit}"

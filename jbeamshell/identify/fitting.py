@@ -19,7 +19,7 @@ from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit, fit_at
 from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, SearchResult, StoppingRule
 from jbeamshell.identify.search_space import SearchSpace, search_space
-from jbeamshell.identify.specimens import Specimen, as_specimens
+from jbeamshell.identify.specimens import Specimen, as_specimens, inspected
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.recordings import FEWEST_POINTS
 from jbeamshell.numerics.newton import Newton
@@ -79,6 +79,7 @@ def fit(
     tolerance: float = 1e-7,
     progress: Callable[[FitProgress], None] | None = None,
     throw: bool = True,
+    unchecked: bool = False,
 ) -> Fit:
     """Fit parameters of a scene to measured or computed curves by least squares.
 
@@ -109,6 +110,7 @@ def fit(
     tolerance : relative change of the parameters at which a search stops; a flat cost stops it too
     progress : called after every step with a `FitProgress`; None shows a bar where a person watches
     throw : True to raise if the fit did not converge; if False, read ``status``
+    unchecked : True to fit loops that an inspection refuses too; its findings are then warnings
 
     Returns
     -------
@@ -118,9 +120,9 @@ def fit(
     Raises
     ------
     InputError
-        if a parameter cannot be fitted, or the data do not depend on it; if the scene cannot
-        reproduce a measurement, such as a force beyond gross slip at the start values; if ``save``
-        belongs to another fit
+        if a parameter cannot be fitted, or the data do not depend on it; if an inspection refuses a
+        loop, see `jbeamshell.inspect`; if the scene cannot reproduce a measurement, such as a force
+        beyond gross slip at the start values; if ``save`` belongs to another fit
     UnconvergedError
         if the search does not converge, or the model finds no equilibrium at the start
     KeyboardInterrupt
@@ -142,7 +144,9 @@ def fit(
     _require_positive("tolerance", tolerance, "number, such as 1e-7")
     valid = solver is None or isinstance(solver, Newton)
     require("solver", solver, valid, "give a jbeamshell.Newton")
+    require_choice("unchecked", unchecked, (False, True))
     parameters, specimens = as_parameters(free), as_specimens(data, scene, weights)
+    doubts = inspected(specimens, [parameter.key for parameter in parameters], unchecked)
     space, scenes = search_space(parameters, {one.label: one.scene for one in specimens})
     specimens = [one._replace(scene=scenes[one.label]) for one in specimens]
     experiment = Experiment(specimens, points=points, noise=noise)
@@ -176,7 +180,8 @@ def fit(
             f"the fit has not converged after {max_iterations} iterations, at {named}, cost "
             f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations"
         )
-    return fit_at(problem, space, best, list(scenes), status, minima)
+    found = fit_at(problem, space, best, list(scenes), status, minima)
+    return found._replace(warnings=[*found.warnings, *doubts])
 
 
 def fit_kappa_s(curve: Measurement | Sequence[Measurement], scene: Scene, **options: Any) -> Fit:

@@ -42,7 +42,7 @@ from jbeamshell.scene import library
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.toml import overridden, scene_from_values
 
-OPTIONS = ("method", "starts", "noise", "points", "max_iterations", "tolerance")
+OPTIONS = ("method", "starts", "noise", "points", "max_iterations", "tolerance", "unchecked")
 
 
 class Plan(NamedTuple):
@@ -62,17 +62,19 @@ class Plan(NamedTuple):
     notes: list[str]
 
 
-def read_plan(path: str | Path) -> Plan:
+def read_plan(path: str | Path, unchecked: bool = False) -> Plan:
     """Read a plan from a TOML file; the files it names are looked for in its folder.
 
     Parameters
     ----------
     path : TOML file, see `jbeamshell.identify.plan`
+    unchecked : True to take data that an inspection refuses, see `jbeamshell.inspect`
 
     Raises
     ------
     InputError
-        if the file, an entry or a data file cannot be read, naming the entry and the fix
+        if the file, an entry or a data file cannot be read, naming the entry and the fix; if an
+        inspection refuses a recording
 
     Examples
     --------
@@ -81,7 +83,7 @@ def read_plan(path: str | Path) -> Plan:
         plan = jb.identify.read_plan("study.toml")
         fit = jb.identify.fit(plan.specimens, free=plan.free, **plan.options)
     """
-    values = read_toml(path)
+    values = read_toml(path) | ({"unchecked": True} if unchecked else {})
     try:
         return plan_from_values(values, as_path(path).parent)
     except InputError as error:
@@ -108,7 +110,7 @@ def plan_from_values(values: Mapping[str, Any], folder: Path) -> Plan:
     plan, common = _without_specimens(values, folder)
     for number, table in enumerate(given, 1):
         source = _source(table, table.get("label") or (f"{number}" if len(given) > 1 else ""))
-        read = list(source.measurements(folder))
+        read = list(source.measurements(folder, bool(values.get("unchecked", False))))
         plan.notes.extend(f"{item.label}: {note}" for item, notes in read for note in notes)
         own = overridden(common, source.set)
         plan = _with_specimen(plan, own, [item for item, _ in read], source.label)

@@ -12,10 +12,12 @@ import numpy as np
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.parameters import is_number
+from jbeamshell.measured.columns import QUANTITIES
 from jbeamshell.measured.curve_files import CURVES, read_curves
 from jbeamshell.measured.curves import Backbone, Measurement
 from jbeamshell.measured.drift import DRIFTS
-from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.inspection import inspect
+from jbeamshell.measured.loops import Loop, loop_of
 from jbeamshell.measured.recordings import Recording, read_recordings
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
@@ -39,6 +41,7 @@ class Source:
         driving column is noisy
     driver, drift : arguments of `steady_loops`
     centre : True to take the zeros of the sensors from closed loops, see `Loop.centred`
+    reverse : "force" or "displacement" to turn the sign of that column
     width : width of the specimen, by which forces are divided
     columns, units, decimal : arguments of `read_recordings`
     label : label of the specimen
@@ -56,6 +59,7 @@ class Source:
     driver: str | None = None
     drift: str = "keep"
     centre: bool = False
+    reverse: str | None = None
     width: float = 1.0
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -68,6 +72,7 @@ class Source:
         if not (files and self.data):
             raise InputError(f"specimen {self.label!r}: data = {self.data!r}: list its files")
         words = {"kind": KINDS, "cycles": CYCLES, "drift": DRIFTS, "driver": (None, *CONTROLS)}
+        words["reverse"] = (None, *QUANTITIES)
         for name, known in words.items():
             value = getattr(self, name)
             if not (value is None or isinstance(value, str)) or value not in known:
@@ -78,8 +83,13 @@ class Source:
         if not (is_number(self.width) and self.width > 0.0):
             raise InputError(f"width = {shown(self.width)}: give a positive number")
 
-    def measurements(self, folder: Path) -> Iterator[tuple[Measurement, Sequence[str]]]:
-        """Measurements in the files of a folder, each with notes on what was done to the data."""
+    def measurements(
+        self, folder: Path, unchecked: bool = False
+    ) -> Iterator[tuple[Measurement, Sequence[str]]]:
+        """Measurements in the files of a folder, each with notes on what was done to the data.
+
+        Raises `InputError` for a recording that an inspection refuses, unless it is unchecked.
+        """
         files = [folder / name for name in self.data]
         if self.kind not in ("loop", "backbone"):
             if self.width != 1.0:
@@ -92,7 +102,9 @@ class Source:
         for recording in read_recordings(
             files, columns=self.columns, units=self.units, decimal=self.decimal
         ):
-            per_width = recording._replace(force=recording.force / self.width)
+            per_width = self._turned(recording.per_width(self.width))
+            if not unchecked:
+                inspect(per_width).check()
             if self.kind == "backbone":
                 columns = per_width.force, per_width.displacement
                 yield Backbone(*columns, per_width.label), per_width.notes
@@ -101,14 +113,16 @@ class Source:
                 loops = [loop.centred() for loop in loops] if self.centre else loops
                 yield from ((loop, loop.notes) for loop in loops)
 
+    def _turned(self, recording: Recording) -> Recording:
+        """Recording with the sign of one column turned, if that was asked for."""
+        if self.reverse is None:
+            return recording
+        note = f"the sign of the {self.reverse} is turned"
+        column = {self.reverse: -getattr(recording, self.reverse)}
+        return recording._replace(**column, notes=(*recording.notes, note))
+
     def _loops(self, recording: Recording) -> list[Loop]:
-        whole = Loop(
-            recording.force,
-            recording.displacement,
-            recording.label,
-            dropped=recording.dropped,
-            notes=recording.notes,
-        )
+        whole = loop_of(recording)
         if self.cycles == "recorded" and self.drift == "keep":
             return [whole]
         if self.cycles == "auto" and self.drift == "keep":

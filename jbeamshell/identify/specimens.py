@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.curves import Measurement
+from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.recordings import as_column
-from jbeamshell.scene.keys import CONTROLS
+from jbeamshell.scene.keys import CONTROLS, FAR_ENDS
 from jbeamshell.scene.scene import Scene
+
+OF_SHEAR = ("strip.kappa_s", "strip.poisson_ratio", "strip.deviation", "strip.curvature")
 
 
 class Specimen(NamedTuple):
@@ -94,3 +97,53 @@ def as_specimens(data: Any, scene: Scene | None, weights: Sequence[float]) -> li
     if repeated:
         raise InputError(f"specimens: two have the label {repeated[0]!r}: give each its own")
     return labelled
+
+
+def inspected(
+    specimens: Sequence[Specimen], free: Sequence[str], unchecked: bool = False
+) -> list[str]:
+    """Doubts about the specimens' loops, see `jbeamshell.inspect`.
+
+    Parameters
+    ----------
+    specimens : strips and what was measured on them
+    free : keys to fit, which say nothing of the loops yet
+    unchecked : True to tell grave findings as doubts
+
+    Raises
+    ------
+    InputError
+        for a grave finding, such as negative work
+    """
+    doubts = []
+    for specimen in specimens:
+        loops = [item for item in specimen.measurements if isinstance(item, Loop)]
+        seen = (
+            inspect(loops, stiffness=plausible_stiffness(specimen.scene, free)) if loops else None
+        )
+        if seen is not None and not unchecked:
+            seen.check()
+        doubts += [] if seen is None else seen.doubts()
+    return doubts
+
+
+def plausible_stiffness(scene: Scene, free: Sequence[str]) -> tuple[float, float] | None:
+    """Least and largest force per width over displacement that a strip can have.
+
+    A strip that is held at its far end is at least as stiff as without friction, E'2H/L; a third of
+    that leaves room for the rig.  Ten times E' is more than a strip that sticks under its load.
+
+    Parameters
+    ----------
+    scene : strip with known dimensions
+    free : keys to fit; None is returned if they are of the strip's stiffness or dimensions
+    """
+    strip = scene.strip
+    unknown = any(key.startswith("strip.") and key not in OF_SHEAR for key in free)
+    if strip.axial_stiffness is None or unknown:
+        return None
+    stretching, length = float(strip.axial_stiffness), float(strip.length)
+    held = "v" in FAR_ENDS[strip.far_end]
+    return stretching / (3.0 * length) * held, 10.0 * stretching / (
+        length * float(strip.height_ratio)
+    )

@@ -1,5 +1,6 @@
 """Measured data: recordings of many cycles, steady loops, curves, and their readers.
 
+`inspect` tells what a file holds, and what speaks against a fit of it.
 `read_loops` reads the loops of a file unchanged.  `read_recordings` and `steady_loops` average the
 cycles of a noisy recording.  `jbeamshell.identify` compares a model with a `Loop`, `Backbone`,
 `DissipationCurve`, `StiffnessCurve` or `SqueezeCurve`.
@@ -11,6 +12,9 @@ from jbeamshell.measured.curves import DissipationCurve as DissipationCurve
 from jbeamshell.measured.curves import Measurement as Measurement
 from jbeamshell.measured.curves import SqueezeCurve as SqueezeCurve
 from jbeamshell.measured.curves import StiffnessCurve as StiffnessCurve
+from jbeamshell.measured.inspection import Finding as Finding
+from jbeamshell.measured.inspection import Inspection as Inspection
+from jbeamshell.measured.inspection import inspect as inspect
 from jbeamshell.measured.loops import Loop as Loop
 from jbeamshell.measured.loops import make_loop as make_loop
 from jbeamshell.measured.loops import read_loops as read_loops

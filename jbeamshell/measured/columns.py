@@ -9,7 +9,7 @@ import functools
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,6 +46,13 @@ TAIL = re.compile(
 
 
 LONGEST_TITLE = 1000  # characters; of a longer title only its beginning is read
+
+
+class Conversion(NamedTuple):
+    """Factor from the unit of a column to a base unit, which is empty for the Scene's own."""
+
+    factor: float = 1.0
+    unit: str = ""
 
 
 def find_columns(
@@ -121,13 +128,13 @@ def is_header(titles: Sequence[str], chosen: Mapping[str, str]) -> bool:
     return True
 
 
-def unit_factors(
+def conversions(
     titles: Mapping[str, str],
     below: Mapping[str, str | None],
     given: Mapping[str, str],
     name: str,
-) -> dict[str, float | None]:
-    """Factors that convert each column to N (or N/m), m and s.
+) -> dict[str, Conversion | None]:
+    """Conversions of each column to N (or N/m), m and s.
 
     Parameters
     ----------
@@ -138,7 +145,7 @@ def unit_factors(
 
     Returns
     -------
-    Factor by quantity; None for a time or normal force whose unit does not suit the others
+    Conversion by quantity; None for a time or normal force whose unit does not suit the others
 
     Raises
     ------
@@ -155,28 +162,28 @@ def unit_factors(
             )
         units[quantity] = given.get(quantity) or own or row
     named = [bool(units[q]) for q in QUANTITIES]
-    factors: dict[str, float | None] = {}
+    found: dict[str, Conversion | None] = {}
     for quantity, unit in units.items():
         title = titles[quantity][:60]
         bases = QUANTITIES.get(quantity) or FURTHER[quantity]
-        found = 1.0 if unit is None else factor_of(unit, bases)
+        converted = Conversion() if unit is None else conversion(unit, bases)
         if quantity in FURTHER:
             mixed = quantity == "normal_force" and bool(unit) != named[0]
-            factors[quantity] = None if mixed else found
+            found[quantity] = None if mixed else converted
         elif any(named) and unit is None:
             raise InputError(
                 f"{name}: column {title!r} names no unit but the other one does: write "
                 f"'{title} [{bases[0]}]'"
             )
-        elif found is None:
+        elif converted is None:
             raise InputError(
                 f"{name}: column {title!r}: {str(unit)[:40]!r} is no unit of {quantity}: write one "
                 f"in brackets, such as '{quantity} [{bases[0]}]', or give it by "
                 f"{choice(quantity, bases[0], 'unit')}"
             )
         else:
-            factors[quantity] = found
-    return factors
+            found[quantity] = converted
+    return found
 
 
 def unit_of(title: str) -> str | None:
@@ -255,8 +262,14 @@ def _listed(titles: Sequence[str]) -> str:
 
 def factor_of(unit: str, bases: Sequence[str]) -> float | None:
     """Factor that converts a unit to the first base unit that suits it; None if none does."""
+    found = conversion(unit, bases)
+    return None if found is None else found.factor
+
+
+def conversion(unit: str, bases: Sequence[str]) -> Conversion | None:
+    """Conversion of a unit to the first base unit that suits it; None if none does."""
     if unit in bases:
-        return 1.0
+        return Conversion(1.0, unit)
     if len(unit) > 32 or not UNIT.fullmatch(unit):
         return None
     registry = _registry()
@@ -266,7 +279,7 @@ def factor_of(unit: str, bases: Sequence[str]) -> float | None:
         except Exception:  # pint's parser may raise anything for what is no unit
             continue
         if np.isfinite(factor) and factor > 0.0:
-            return factor
+            return Conversion(factor, base)
     return None
 
 

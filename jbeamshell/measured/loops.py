@@ -9,11 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.summary import Summary, ranged, with_unit
 from jbeamshell.measured.form import LOOP, Form
 from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
-from jbeamshell.measured.recordings import FilePath, read_recordings, recording_from_arrays
+from jbeamshell.measured.recordings import (
+    NO_UNITS,
+    FilePath,
+    Recording,
+    read_recordings,
+    recording_from_arrays,
+)
 from jbeamshell.measured.reversals import find_driver, find_turns
 
+WORK: dict[str | None, str] = {"N": "J", "N/m": "J/m"}  # unit by that of the force
 CLOSED = 0.05  # part of the range within which the ends of a closed loop lie
 
 
@@ -34,6 +42,7 @@ class Loop(NamedTuple):
     notes : one line on each change made to the data
     driver : column that drove the test, "force" or "displacement"; None if unknown
     free_zero : True if the zero of the responding column is unknown, as after removing a drift
+    units : unit by quantity, "N", "N/m" or "m"; None if they are the Scene's own
     """
 
     force: NDArray[np.float64]
@@ -46,6 +55,30 @@ class Loop(NamedTuple):
     notes: tuple[str, ...] = ()
     driver: str | None = None
     free_zero: bool = False
+    units: Mapping[str, str] | None = None
+
+    def __repr__(self) -> str:
+        return self.summary().as_text()
+
+    def summary(self) -> Summary:
+        """Ranges of the columns, and work of a cycle, for texts and notebooks."""
+        units = self.units or {}
+        rows = [(name, ranged(getattr(self, name), units.get(name, ""))) for name in LOOP.columns]
+        if self.closed:
+            rows.append(("work of a cycle", with_unit(self.work, WORK.get(units.get("force"), ""))))
+        if self.noise is not None and self.driver is not None:
+            answer = LOOP.response(self.driver)
+            rows.append(("noise", with_unit(self.noise, units.get(answer, "")) + f" of {answer}"))
+        if self.driver is not None:
+            rows.append(("driven by", self.driver))
+        kind = "closed loop" if self.closed else "open path"
+        notes = self.notes if self.units else (*self.notes, NO_UNITS)
+        return Summary(f"{self.label}: {kind} of {self.force.size} points", rows, notes)
+
+    @property
+    def work(self) -> float:
+        """Work of the force along the displacement, positive where the strip dissipates."""
+        return float(np.sum(0.5 * (self.force[1:] + self.force[:-1]) * np.diff(self.displacement)))
 
     @property
     def form(self) -> Form:
@@ -137,14 +170,7 @@ def make_loop(force: ArrayLike, displacement: ArrayLike, label: str = "loop") ->
     >>> make_loop(np.cos(phase), 1e-5 * np.cos(phase - 0.2)).closed
     True
     """
-    recording = recording_from_arrays(force, displacement, label)
-    return Loop(
-        recording.force,
-        recording.displacement,
-        label,
-        dropped=recording.dropped,
-        notes=recording.notes,
-    )
+    return loop_of(recording_from_arrays(force, displacement, label))
 
 
 def read_loops(
@@ -172,9 +198,19 @@ def read_loops(
         naming the file, the line or column, and the fix
     """
     recordings = read_recordings(paths, columns=columns, units=units, decimal=decimal)
-    return [
-        Loop(r.force, r.displacement, r.label, dropped=r.dropped, notes=r.notes) for r in recordings
-    ]
+    return [loop_of(recording) for recording in recordings]
+
+
+def loop_of(recording: Recording) -> Loop:
+    """Loop of all points of a recording, as they stand."""
+    return Loop(
+        recording.force,
+        recording.displacement,
+        recording.label,
+        dropped=recording.dropped,
+        notes=recording.notes,
+        units=recording.units,
+    )
 
 
 def driver_of(loops: Sequence[Loop]) -> str:

@@ -11,10 +11,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path
-from jbeamshell.measured.columns import FURTHER, QUANTITIES, find_columns, is_header, unit_factors
+from jbeamshell.common.summary import Summary, ranged
+from jbeamshell.measured.columns import (
+    FURTHER,
+    QUANTITIES,
+    Conversion,
+    conversions,
+    find_columns,
+    is_header,
+)
 from jbeamshell.measured.read_table import read_table
 
 FEWEST_POINTS = 8
+NO_UNITS = "without units: the numbers are taken in the scene's own"
 HUGE = 1e100  # squares and quotients of smaller numbers are finite
 
 FilePath = str | os.PathLike[str]
@@ -32,6 +41,8 @@ class Recording(NamedTuple):
     normal_force : (points,) normal force [N or N/m], or None
     dropped : number of rows that were left out because a number was missing
     notes : sentences on what was done to the data
+    titles : title of the file's column by quantity; None without a file
+    units : unit by quantity, "N", "N/m", "m" or "s"; None if they are the Scene's own
     """
 
     force: NDArray[np.float64]
@@ -41,6 +52,42 @@ class Recording(NamedTuple):
     normal_force: NDArray[np.float64] | None = None
     dropped: int = 0
     notes: tuple[str, ...] = ()
+    titles: Mapping[str, str] | None = None
+    units: Mapping[str, str] | None = None
+
+    def __repr__(self) -> str:
+        return self.summary().as_text()
+
+    def unit(self, quantity: str) -> str:
+        """Unit of a quantity; empty if it is the Scene's own."""
+        return (self.units or {}).get(quantity, "")
+
+    def summary(self) -> Summary:
+        """Columns with their ranges and units, for texts and notebooks."""
+        rows = []
+        for name in (*QUANTITIES, *FURTHER):
+            column = getattr(self, name)
+            if column is not None:
+                told = ranged(column, self.unit(name))
+                if name == "time" and (rate := self.rate) is not None:
+                    told += f", {rate:.4g} {'Hz' if self.unit('time') else 'per unit of time'}"
+                title = (self.titles or {}).get(name, name)
+                rows.append((name, told if title == name else f"{told}, column {title!r}"))
+        notes = self.notes if self.units else (*self.notes, NO_UNITS)
+        return Summary(f"{self.label}: {self.force.size} points", rows, notes)
+
+    @property
+    def rate(self) -> float | None:
+        """Points per time; None if there is no time, or if it does not rise."""
+        step = 0.0 if self.time is None else float(np.median(np.diff(self.time)))
+        return 1.0 / step if step > 0.0 else None
+
+    def per_width(self, width: float) -> Recording:
+        """Recording of forces per unit width; a width of 1 changes nothing."""
+        if width == 1.0:
+            return self
+        units = None if self.units is None else {**self.units, "force": "N/m"}
+        return self._replace(force=self.force / width, units=units)
 
 
 def recording_from_arrays(
@@ -226,16 +273,21 @@ def _read(
     must = ["force", "displacement", *(["group"] if "group" in columns else [])]
     may = [q for q in columns if q not in must]
     rows = table.numbers([columns[q] for q in must], [columns[q] for q in may])
-    factors = unit_factors(titles, below, given, table.name)
+    found_units = conversions(titles, below, given, table.name)
     arrays: dict[str, NDArray[np.float64] | None] = {}
     for quantity, column in zip((*must, *may), rows.T, strict=True):
-        factor = factors.get(quantity, 1.0)
+        own_unit = found_units.get(quantity, Conversion())
         empty = quantity in may and bool(np.all(np.isnan(column)))
         with np.errstate(over="ignore"):  # infinite numbers are refused below, with their place
-            arrays[quantity] = None if factor is None or empty else column * factor
+            arrays[quantity] = None if own_unit is None or empty else column * own_unit.factor
+    named = {q: own_unit.unit for q, own_unit in found_units.items() if own_unit is not None}
+    told: dict[str, Any] = {
+        "titles": {q: title.strip() for q, title in titles.items()},
+        "units": named if named["force"] else None,
+    }
     if "group" not in columns:
         everything = np.full(rows.shape[0], True)
-        return [_recording(arrays, everything, label or table.name)]
+        return [_recording(arrays, everything, label or table.name)._replace(**told)]
     marks, title = rows[:, 2], table.titles[columns["group"]].strip()
     unmarked = np.flatnonzero(np.isnan(marks))
     if unmarked.size:
@@ -247,7 +299,8 @@ def _read(
     for mark in dict.fromkeys(marks.tolist()):
         own = f"{title} = {mark:g}"
         try:
-            found.append(_recording(arrays, marks == mark, f"{label}: {own}" if label else own))
+            one = _recording(arrays, marks == mark, f"{label}: {own}" if label else own)
+            found.append(one._replace(**told))
         except InputError as error:
             raise InputError(str(error) if label else f"{table.name}: {error}") from None
     return found

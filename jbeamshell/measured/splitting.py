@@ -138,7 +138,9 @@ def split_cycles(
         loop = recording
         recording = recording_from_arrays(loop.force, loop.displacement, loop.label)
         recording = recording._replace(
-            dropped=loop.dropped + recording.dropped, notes=(*loop.notes, *recording.notes)
+            dropped=loop.dropped + recording.dropped,
+            notes=(*loop.notes, *recording.notes),
+            units=loop.units,
         )
     driver = driver or _driver(recording, smallest)
     path = smoothed_path(getattr(recording, driver), smallest)

@@ -109,6 +109,7 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
         scatter=scatter,
         notes=(*recording.notes, *_notes(found, number, curve, heights, repeats, limit)),
         driver=found.driver,
+        units=recording.units,
         force=columns["force"],
         displacement=columns["displacement"],
     )

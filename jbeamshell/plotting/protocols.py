@@ -204,6 +204,36 @@ class ModelOverData(Protocol):
     def bands(self, level: float, /) -> Sequence[tuple[Any, Any]]: ...
 
 
+class InspectedRecording(Protocol):
+    """Recording with its cycles and what was found, such as a view of a `jbeamshell.Inspection`.
+
+    Attributes
+    ----------
+    recording : force, displacement and time with their units
+    levels : mean loop, number of cycles and shape of each amplitude
+    findings : what is wrong or doubtful: a name, and whether it is grave
+    """
+
+    @property
+    def recording(self) -> Any: ...
+    @property
+    def levels(self) -> Sequence[Any]: ...
+    @property
+    def findings(self) -> Sequence[Any]: ...
+
+
+class InspectedData(Protocol):
+    """Recordings that were looked at, such as a `jbeamshell.Inspection`.
+
+    Attributes
+    ----------
+    views : what each recording holds
+    """
+
+    @property
+    def views(self) -> Sequence[InspectedRecording]: ...
+
+
 class LikelihoodProfile(Protocol):
     """Profile likelihood of one parameter, such as `jbeamshell.identify.profile` gives.
 
