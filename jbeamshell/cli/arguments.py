@@ -49,6 +49,21 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
+def add_columns(parser: argparse.ArgumentParser) -> None:
+    """Add ``--column``, ``--unit`` and ``--decimal``, which tell how tables are read."""
+    column = "name of the column that holds the force, the displacement, ..."
+    unit = "unit of the force, the displacement, ..."
+    for option, word, text in (("column", "NAME", column), ("unit", "UNIT", unit)):
+        parser.add_argument(
+            f"--{option}", action="append", default=[], metavar=f"QUANTITY={word}", help=text
+        )
+    parser.add_argument(
+        "--decimal",
+        metavar="WORD",
+        help="decimal sign, where the numbers alone do not show it",
+    )
+
+
 def scene_of(options: argparse.Namespace) -> Scene:
     """Scene of the options: the one named, with ``--set`` on top."""
     from jbeamshell.scene import library

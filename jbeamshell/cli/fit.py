@@ -7,7 +7,15 @@ import time
 from pathlib import Path
 from typing import Any
 
-from jbeamshell.cli.arguments import add_folder, add_json, add_settings, assignments, pairs
+from jbeamshell.cli.arguments import (
+    add_columns,
+    add_folder,
+    add_json,
+    add_settings,
+    assignments,
+    pairs,
+)
+from jbeamshell.cli.dimensions import add_dimensions, dimensions
 from jbeamshell.cli.terminal import put, say, say_written
 from jbeamshell.common.errors import InputError
 
@@ -20,8 +28,6 @@ REPEATED = {
     "bounds": ("KEY=LOW:HIGH", "bounds of a free parameter; leave one side empty for none"),
     "prior": ("KEY=MEAN:DEVIATION", "prior knowledge of a free parameter: a normal distribution"),
     "profile": ("KEY", "also compute the profile likelihood of a free parameter"),
-    "column": ("QUANTITY=NAME", "name of the column that holds the force, the displacement, ..."),
-    "unit": ("QUANTITY=UNIT", "unit of the force, the displacement, ..."),
 }
 WORDS = {
     "kind": "kind of data: loop (default), backbone, or a curve by its name, such as dissipation",
@@ -31,11 +37,9 @@ WORDS = {
     "(remove the mean of each cycle)",
     "reverse": "column whose sign is turned: force or displacement",
     "method": "search: levenberg-marquardt (default), l-bfgs-b or adam",
-    "decimal": "decimal sign, where the numbers alone do not show it",
 }
 NUMBERS = {
     "noise": (float, "standard deviation of the data, as a fraction of their range"),
-    "width": (float, "width of the specimen, by which forces are divided"),
     "starts": (int, "number of searches from different starts"),
 }
 
@@ -76,6 +80,8 @@ def add_to(commands: Any) -> None:
         help="shift closed loops so that their centres lie at the origin: removes the sensors' "
         "offsets",
     )
+    add_columns(parser)
+    add_dimensions(parser)
     parser.add_argument(
         "--unchecked",
         action="store_true",
@@ -137,7 +143,8 @@ def _plan(options: argparse.Namespace) -> Any:
     if not options.data:
         return _example(values)
     specimen: dict[str, Any] = {"data": options.data}
-    for name in ("kind", "cycles", "drift", "centre", "reverse", "width", "decimal"):
+    specimen |= dimensions(options)
+    for name in ("kind", "cycles", "drift", "centre", "reverse", "decimal"):
         if _given(options, name):
             specimen[name] = getattr(options, name)
     specimen["columns"] = pairs(options.column, "force=FT")

@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from jbeamshell.cli.arguments import add_folder, add_json, pairs
+from jbeamshell.cli.arguments import add_columns, add_folder, add_json, pairs
+from jbeamshell.cli.dimensions import width
 from jbeamshell.cli.terminal import BAD_INPUT, put, say_written
+from jbeamshell.scene.dimension_table import DIMENSIONS
 
 
 def add_to(commands: Any) -> None:
@@ -20,26 +22,10 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("data", nargs="+", metavar="DATA", help="files (.csv, .mat, .npz)")
     add_columns(parser)
-    parser.add_argument(
-        "--width", metavar="WIDTH", type=float, default=1.0, help="width, which divides forces"
-    )
+    parser.add_argument("--width", metavar="50MM", help=DIMENSIONS["width"].text)
     add_folder(parser)
     add_json(parser)
     parser.set_defaults(run=run)
-
-
-def add_columns(parser: argparse.ArgumentParser) -> None:
-    """Add the options on how files are read."""
-    for option, metavar, text in (
-        (
-            "column",
-            "QUANTITY=NAME",
-            "name of the column that holds the force, the displacement, ...",
-        ),
-        ("unit", "QUANTITY=UNIT", "unit of the force, the displacement, ..."),
-    ):
-        parser.add_argument(f"--{option}", action="append", default=[], metavar=metavar, help=text)
-    parser.add_argument("--decimal", metavar="WORD", help="decimal sign")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -55,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
         columns=pairs(options.column, "force=FT"),
         units=pairs(options.unit, "force=kN"),
         decimal=options.decimal,
-        width=options.width,
+        width=1.0 if options.width is None else width(options.width),
     )
     figures = seen.figures()
     put(as_json(figures) if options.json else f"{seen}\n")

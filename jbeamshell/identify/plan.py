@@ -19,6 +19,9 @@ The command line makes a plan of its options; larger studies are written in a TO
     data = ["thin-1.csv", "thin-2.csv"]
     kind = "loop"                      # or backbone, dissipation, stiffness, squeeze
     set = { "strip.length" = 12.0 }
+    # or real dimensions, for data in units; a name is that of a TOML file with such entries
+    # dimensions = { length = "120mm", thickness = "12mm", width = "50mm", modulus = "210GPa",
+    #                bolts = "2x8kN@30mm,90mm" }
 """
 
 from __future__ import annotations
@@ -112,7 +115,9 @@ def plan_from_values(values: Mapping[str, Any], folder: Path) -> Plan:
         source = _source(table, table.get("label") or (f"{number}" if len(given) > 1 else ""))
         read = list(source.measurements(folder, bool(values.get("unchecked", False))))
         plan.notes.extend(f"{item.label}: {note}" for item, notes in read for note in notes)
-        own = overridden(common, source.set)
+        known = source.known(folder)
+        plan.notes.extend(known.notes)
+        own = overridden(overridden(common, known.values), source.set)
         plan = _with_specimen(plan, own, [item for item, _ in read], source.label)
     return plan
 
@@ -176,7 +181,10 @@ def _source(table: Mapping[str, Any], label: Any) -> Source:
     _check_names("specimen", table, fields)
     if "data" not in table:
         raise InputError(f"specimen {label!r}: data: list its files")
-    for name in ("columns", "units", "set"):
+    tables = ["columns", "units", "set"]
+    if not isinstance(table.get("dimensions"), str):
+        tables.append("dimensions")
+    for name in tables:
         _check_table(f"specimen {label!r}: {name}", table.get(name, {}))
     for name in ("columns", "units"):
         for quantity, word in table.get(name, {}).items():

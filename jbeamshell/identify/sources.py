@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from jbeamshell.common.checks import shown
+from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import read_toml
 from jbeamshell.identify.parameters import is_number
 from jbeamshell.measured.columns import QUANTITIES
 from jbeamshell.measured.curve_files import CURVES, read_curves
@@ -21,6 +22,7 @@ from jbeamshell.measured.loops import Loop, loop_of
 from jbeamshell.measured.recordings import Recording, read_recordings
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
+from jbeamshell.scene.dimensions import Dimensions, dimensions_of
 from jbeamshell.scene.keys import CONTROLS
 
 KINDS = ("loop", "backbone", *CURVES)
@@ -44,6 +46,8 @@ class Source:
     reverse : "force" or "displacement" to turn the sign of that column
     width : width of the specimen, by which forces are divided
     columns, units, decimal : arguments of `read_recordings`
+    dimensions : dimensions of the specimen with units, see `jbeamshell.scene.dimension_table`; or
+        the name of a TOML file that holds them
     label : label of the specimen
     set : values of its scene by dotted key
 
@@ -64,6 +68,7 @@ class Source:
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
     decimal: str | None = None
+    dimensions: Mapping[str, Any] | str = dataclasses.field(default_factory=dict)
     label: str = ""
     set: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
@@ -83,6 +88,20 @@ class Source:
         if not (is_number(self.width) and self.width > 0.0):
             raise InputError(f"width = {shown(self.width)}: give a positive number")
 
+    def known(self, folder: Path) -> Dimensions:
+        """Dimensions of the specimen in SI; a file is looked for in a folder."""
+        given = self.dimensions
+        read = read_toml(folder / given) if isinstance(given, str) else given
+        try:
+            known = dimensions_of(read)
+        except InputError as error:
+            raise InputError(
+                f"{given}: {error}" if isinstance(given, str) else str(error)
+            ) from None
+        fix = "is given twice, as one of the dimensions too: leave it out here"
+        require("width", self.width, known.width is None or self.width == 1.0, fix)
+        return known
+
     def measurements(
         self, folder: Path, unchecked: bool = False
     ) -> Iterator[tuple[Measurement, Sequence[str]]]:
@@ -90,11 +109,11 @@ class Source:
 
         Raises `InputError` for a recording that an inspection refuses, unless it is unchecked.
         """
-        files = [folder / name for name in self.data]
+        files, known = [folder / name for name in self.data], self.known(folder)
+        width = self.width if known.width is None else known.width
         if self.kind not in ("loop", "backbone"):
-            if self.width != 1.0:
-                fix = f"a {self.kind} curve is per unit width; leave width out"
-                raise InputError(f"width = {self.width:g}: {fix}")
+            fix = f"a {self.kind} curve is per unit width; leave width out"
+            require("width", width, width == 1.0, fix)
             yield from read_curves(
                 files, self.kind, columns=self.columns, units=self.units, decimal=self.decimal
             )
@@ -102,7 +121,12 @@ class Source:
         for recording in read_recordings(
             files, columns=self.columns, units=self.units, decimal=self.decimal
         ):
-            per_width = self._turned(recording.per_width(self.width))
+            if known.values and recording.units is None:
+                raise InputError(
+                    f"{recording.label}: its columns name no units, but the specimen's dimensions "
+                    "do: give --unit force=N --unit displacement=mm, or what they are"
+                )
+            per_width = self._turned(recording.per_width(width))
             if not unchecked:
                 inspect(per_width).check()
             if self.kind == "backbone":
