@@ -26,6 +26,7 @@ from jax import Array, lax
 
 from jbeamshell.condensed.body import Body
 from jbeamshell.numerics.factors import lower_upper
+from jbeamshell.numerics.running_sums import running_sums
 
 
 class Factors(NamedTuple):
@@ -90,20 +91,20 @@ def factorise(body: Body, friction: Array) -> Factors:
     k = body.f_t.size
     k_nt, f_n = body.K_tn.T, body.f_n
 
-    def one(sense: float) -> Factors:
+    def one(sense: Array) -> Factors:
         matrix = body.K_tt + sense * friction * k_nt[:k]
         g = body.f_t + sense * friction * f_n[:k]
-        _, _, y, lower, upper = lower_upper(matrix, g[:, None])
-        y_g = y[:, 0]
+        parts = lower_upper(matrix, g[:, None])
+        upper, y_g = parts.inverse_upper, parts.reduced[:, 0]
         # Columns are the events; what has a leading column more starts before the first of them.
-        slips = jnp.cumsum(upper * y_g, axis=1)
+        slips = running_sums(upper * y_g)
         before = ((0, 0), (1, 0))
         lifts = sense * (jnp.pad(k_nt @ slips, before) - f_n[:, None])
-        rooms = jnp.pad(matrix @ slips, before) - g[:, None]
+        rooms = jnp.pad(running_sums(parts.lower * y_g), before) - g[:, None]  # matrix slips - g
         backwards = jnp.any(jnp.triu(slips) < 0.0, axis=0)
         away = jnp.any(jnp.tril(rooms[:, :-1]) > 0.0, axis=1)
         return Factors(
-            lower,
+            parts.inverse_lower,
             upper,
             y_g,
             upper.T @ body.f_t,
@@ -113,7 +114,7 @@ def factorise(body: Body, friction: Array) -> Factors:
             backs=jnp.tril(2.0 * friction * lifts[:k] - rooms),
         )
 
-    return jax.tree.map(lambda a, b: jnp.stack([a, b]), one(1.0), one(-1.0))
+    return jax.vmap(one)(jnp.asarray([1.0, -1.0], body.f_t.dtype))
 
 
 def pressed(body: Body) -> ContactState:
@@ -142,7 +143,7 @@ def follow(
     own: Factors = jax.tree.map(lambda a: a[jnp.where(rises, 0, 1)], factors)
     y_c = own.lower @ -(start.r_t + sense * friction * start.r_n[:k])
     thresholds = -sense * y_c / own.y_g
-    slips = jnp.cumsum(thresholds >= reach, axis=-1) == 0
+    slips = running_sums((thresholds >= reach).astype(step.dtype)) == 0.0
     slip = jnp.where(slips, y_c + own.y_g * step, 0.0) @ own.upper.T
     beyond = jnp.where(slips, reach - thresholds, 0.0)
     compliances = own.z * own.y_g
@@ -203,5 +204,5 @@ def _holds(
     room = cap + sense * start.r_t + own.draws @ between
     least = -tiny * jnp.max(cap)
     sticks = jnp.all(slips | (room >= least))
-    behind = cap - sense * start.r_t + jnp.cumsum(own.backs * between, axis=1).T
+    behind = cap - sense * start.r_t + running_sums(own.backs * between).T
     return rising & regular & closed & sticks & jnp.all(behind >= least)

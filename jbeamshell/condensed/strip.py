@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from jbeamshell.condensed.body import Body, Elimination, eliminate
@@ -54,8 +55,10 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     down, up = pressing(scene, x)
     tributary = elements.tributary_lengths(RULE, x)
     elimination, hessian = eliminate(form, x, down, "beta" in FAR_ENDS[far_end])
-    hessian = hessian.at[1:-2:2, -1].add(-up).at[-1, 1:-2:2].add(-up)
     last = 2 * x.size - 2
+    lifted = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
+    from_below = lifted[:, None] * np.eye(last + 4)[-1]
+    hessian = hessian - from_below - from_below.T
     v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
     w = slice(last + 1, None, -2)
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
