@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import equinox as eqx
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +11,7 @@ from jax import Array
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import Status
+from jbeamshell.common.small import Small
 from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import (
     driven_by_displacement,
@@ -24,6 +26,7 @@ from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.numerics.cycles import turning_points
 from jbeamshell.scene.load_path import LoadPath
+from jbeamshell.scene.parts import Load
 from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 
@@ -67,39 +70,69 @@ def solve(
     rung = scene.model.rung
     fix = f"must act wholly for model.rung = {rung}: take {general_rung(rung)} to change them"
     require("path", "pressures", whole, fix)
-    targets = jnp.asarray(path.target[before:])
+    targets = path.target[before:]
     base = scene.contact.normal == "rigid" or not targets.size
     fix = f"leaves {rung} nothing but the pressures: set load.cycles = 0, or take "
     fix += general_rung(rung)
     require("contact.normal", scene.contact.normal, base, fix)
     turns = _turns(scene, targets, own)
     strip = _strip(scene)
-    if not is_traced(strip):
+    if not is_traced(strip.lift):
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
         fix = f"must press the strip down for model.rung = {rung}"
         require("contact.pressure", scene.contact.pressure, down, fix)
+    known, traced = (turns, None) if isinstance(turns, tuple) else (None, turns)
     soft = not scene.ideal_friction
-    found = _levels(scene, strip, targets, turns, nested, soft)
-    return _history(scene, strip, found, cycles, soft)
+    history: History = _walk((scene, strip, targets, traced), known, cycles, nested, soft)
+    return history
 
 
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
     """True for each level before which the load has turned; an array if the loads are traced."""
-    known = scene.load.unit_path() if own else targets
-    if is_traced(known):
-        return turns_of(targets)
-    turns = np.zeros(known.size, bool)
-    if known.size:
-        turns[turning_points(np.append(0.0, known))[:-1]] = True
+    if own:
+        return _turns_of_cycles(scene.load.cycles, scene.load.steps_per_half_cycle)
+    return turns_of(targets) if is_traced(targets) else _known_turns(np.asarray(targets))
+
+
+@functools.cache
+def _turns_of_cycles(cycles: int, steps: int) -> tuple[bool, ...]:
+    return _known_turns(Load(cycles=cycles, steps_per_half_cycle=steps).unit_path())
+
+
+def _known_turns(loads: np.ndarray) -> tuple[bool, ...]:
+    turns = np.zeros(loads.size, bool)
+    if loads.size:
+        turns[turning_points(np.append(0.0, loads))[:-1]] = True
     return tuple(turns.tolist())
 
 
-@eqx.filter_jit
+@Small
 def _strip(scene: Scene) -> Strip:
-    return condensed(scene, scene.model.nodes)
+    strip = condensed(scene, scene.model.nodes)
+    no_masses = strip.form.masses[:0]  # of no use without inertia, and slow to compile
+    return strip._replace(form=strip.form._replace(masses=no_masses))
 
 
-@eqx.filter_jit
+@Small
+def _walk(
+    given: tuple[Scene, Strip, Array, Array | None],
+    known: tuple[bool, ...] | None,
+    cycles: Cycles,
+    nested: bool,
+    soft: bool,
+) -> History:
+    """History of a strip pressed down and loaded along targets; see `solve`.
+
+    Parameters
+    ----------
+    given : scene, its strip, loads after the pressing, and the turns before them if traced
+    known : turns if they are known
+    """
+    scene, strip, targets, turns = given
+    found = _levels(scene, strip, targets, turns if known is None else known, nested, soft)
+    return _history(scene, strip, found, cycles, soft)
+
+
 def _levels(
     scene: Scene, strip: Strip, targets: Array, turns: Turns, nested: bool, soft: bool
 ) -> Level:
@@ -124,13 +157,13 @@ def _levels(
     return found._replace(state=state, settled=found.settled & sound)
 
 
-@eqx.filter_jit
 def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bool) -> History:
     """History of the levels after the pressing, whose steps come first."""
     body, state = strip.body, levels.state
     before = scene.load.pressure_steps
-    part = jnp.append(jnp.arange(1, before + 1) / before, jnp.ones_like(state.force))
-    n, k = strip.x.size, body.f_t.size
+    n, k, steps = strip.x.size, body.f_t.size, before + state.force.size
+    part = jnp.asarray(np.minimum(np.arange(1, steps + 1) / before, 1.0), state.force.dtype)
+    pressing = part[:, None] * (np.arange(steps) < before)[:, None]  # zero at the levels
 
     def along(values: Array) -> Array:  # (levels, n or k) to (steps, n) from the far end
         return jnp.pad(values[:, ::-1], ((before, 0), (n - values.shape[1], 0)))
@@ -140,16 +173,16 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
 
     settled = jnp.pad(strip.settled[::-1], (n - k, 0))
     driven = state.displacement if scene.load.control == "displacement" else state.force
-    slip, w, force = along(state.v), along(levels.lift), every(state.force)
-    w = w.at[:before].set(part[:before, None] * strip.lift[::-1])
-    v = slip + part[:, None] * settled
-    given = jnp.zeros((part.size, 2 * n + 2)).at[:, 0:-2:2].set(v).at[:, 1:-2:2].set(w)
-    given = given.at[:, -2].set(force).at[:, -1].set(part)
-    inner = jnp.moveaxis(strip.elimination.recovered(given.T), 2, 0)  # (steps, n, m-2)
-    fields = jnp.concatenate([v[..., None], w[..., None], inner], axis=-1)
-    further = fields @ strip.form.further.T
+    v = along(state.v) + part[:, None] * settled
+    w = along(levels.lift) + pressing * strip.lift[::-1]
+    force = every(state.force)
+    sides = jnp.stack([v, w], axis=2).reshape(steps, 2 * n)
+    given = jnp.concatenate([sides, force[:, None], part[:, None]], axis=1)
+    inner = strip.elimination.recovered(given.T)  # (n, m-2, steps)
+    fields = jnp.concatenate([v.T[None], w.T[None], jnp.moveaxis(inner, 1, 0)])  # (m, n, steps)
+    further, sections = _sections(strip, fields)
     reaction = along(state.r_n) / strip.tributary
-    reaction = reaction.at[:before].set(part[:before, None] * body.r_0[::-1] / strip.tributary)
+    reaction = reaction + pressing * body.r_0[::-1] / strip.tributary
     slipping = along(levels.slipping).astype(bool)
     forces = given @ strip.hessian  # conjugate to v, w, minus the end load and the pressure
     energy = 0.5 * jnp.sum(forces * given, axis=1) - forces[:, -2] * given[:, -2]
@@ -171,7 +204,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
         displacement=masked(every(state.displacement)),
         fields=masked(jnp.concatenate([v[..., None], w[..., None], further], axis=-1)),
         gap=masked(w),
-        sections=jax.tree.map(masked, _section_forces(strip, fields)),
+        sections=jax.tree.map(masked, sections),
         traction=masked(-along(state.r_t) / strip.tributary),
         reaction=masked(reaction),
         slipping=slipping,
@@ -187,11 +220,20 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     )
 
 
-def _section_forces(strip: Strip, fields: Array) -> Strains:
-    """N, Q, M, chi and xi of every element, (steps, elements) each."""
+def _sections(strip: Strip, fields: Array) -> tuple[Array, Strains]:
+    """Further fields (steps, n, k), and N, Q, M, chi and xi of every element, (steps, elements).
+
+    Parameters
+    ----------
+    fields : (m, n, steps) of the section's form
+    """
     form = strip.form
-    mean = 0.5 * (fields[:, 1:] + fields[:, :-1])
-    slope = jnp.diff(fields, axis=1) / jnp.diff(strip.x)[:, None]
-    on_values = mean @ form.values.T + slope @ form.mixed.T
-    on_slopes = mean @ form.mixed + slope @ form.slopes.T
-    return Strains(*(on_values @ mode[0] + on_slopes @ mode[1] for mode in form.modes))
+    values, slopes = form.modes[:, 0], form.modes[:, 1]
+    on_mean = values @ form.values + slopes @ form.mixed.T
+    on_slope = values @ form.mixed + slopes @ form.slopes
+    rows = jnp.concatenate([on_mean, on_slope, form.further])
+    found = jnp.moveaxis(jnp.tensordot(rows, fields, 1), 2, 1)  # (rows, steps, n)
+    mean, slope, further = jnp.split(found, [len(on_mean), 2 * len(on_mean)])
+    between = jnp.diff(slope, axis=2) / jnp.diff(strip.x)
+    forces = 0.5 * (mean[..., 1:] + mean[..., :-1]) + between
+    return jnp.moveaxis(further, 0, 2), Strains(*forces)

@@ -1,0 +1,61 @@
+"""Small programs: functions that take much longer to compile than to run."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Hashable
+from typing import Any
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from jbeamshell.common.checks import is_staged
+
+KNOWN = (0, 10)  # release of JAX from which on the options below are known to exist
+
+
+def quick_options() -> dict[str, Any] | None:
+    """Compiler options for a small program: half the time to compile, the same time to run.
+
+    None where the whole process compiles with fewer optimisations anyway.
+    """
+    config: Any = jax.config
+    if config.values["jax_disable_most_optimizations"] or jax.__version_info__ < KNOWN:
+        return None
+    return {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
+
+
+class Small:
+    """Function that is compiled as a small program where all its arrays are numbers.
+
+    Within a transformation it is an ordinary compiled function, because JAX takes compiler options
+    for whole programs only.
+
+    Parameters
+    ----------
+    function : function of a pytree of arrays and of further arguments, which are static
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._inside = eqx.filter_jit(function)
+
+    def __call__(self, given: Any, *static: Hashable) -> Any:
+        """Value of the function."""
+        leaves, tree = jax.tree.flatten(given)
+        if is_staged() or not all(map(_is_number, leaves)):
+            return self._inside(given, *static)
+        return self._quick(leaves, tree, static)
+
+    @functools.cached_property
+    def _quick(self) -> Any:
+        def flat(leaves: list[Any], tree: Any, static: tuple[Hashable, ...]) -> Any:
+            return self._function(jax.tree.unflatten(tree, leaves), *static)
+
+        flat.__name__ = self._function.__name__
+        return jax.jit(flat, static_argnums=(1, 2), compiler_options=quick_options())
+
+
+def _is_number(leaf: Any) -> bool:
+    return isinstance(leaf, np.ndarray | jax.Array) and not isinstance(leaf, jax.core.Tracer)
