@@ -66,7 +66,7 @@ class Job:
         """
         inside = np.flatnonzero(~self.outside)
         order = inside[np.argsort(self._rank[inside], kind="stable")]
-        width = width_of_chunks(self.lanes.scene, tuple(self.lanes.axes))
+        width = self.width
         chunks = -(-order.size // width)
         least = -(-LEAST // width)
         largest = min(max(-(-chunks // BLOCKS), least), BLOCK // width)
@@ -77,19 +77,30 @@ class Job:
         )
         return [order[n[n < order.size]] for n in numbers]
 
+    @functools.cached_property
+    def width(self) -> int:
+        """Number of lanes that advance together."""
+        inside = self._body[~self.outside.ravel()]
+        return width_of_chunks(self.lanes.scene, np.unique(inside, return_counts=True)[1])
+
     @property
     def _rank(self) -> np.ndarray:
         """Rank of every lane in the order in which chunks are cut, (lanes,)."""
+        shares = self.lanes.scene.model.condensed and self.width > 1
+        return self._body if shares else self.lanes.difficulty.ravel()
+
+    @functools.cached_property
+    def _body(self) -> np.ndarray:
+        """Number of the condensed body that each lane has, (lanes,)."""
         shared = shared_keys(self.lanes.scene, tuple(self.lanes.axes))
-        if not shared:
-            return self.lanes.difficulty.ravel()
         columns = self.lanes.columns(np.arange(self.lanes.size))[shared]
         return np.unique(columns, axis=1, return_inverse=True)[1].ravel()
 
     def runner(self, devices: Sequence[Any] | None = None) -> Runner:
         """Runner with the model of this sweep, to be compiled."""
         lanes = self.lanes
-        return Runner(lanes.scene, tuple(lanes.axes), self.figures, self.solver, devices)
+        keys = tuple(lanes.axes)
+        return Runner(lanes.scene, keys, self.figures, self.width, self.solver, devices)
 
     def run(self, numbers: Sequence[int], runner: Runner) -> Iterator[tuple[int, Block]]:
         """Blocks by number, run in this process, one on each device at a time."""
@@ -126,7 +137,6 @@ class Job:
                 "out, processes, executor: a scene with a function of your own cannot be written "
                 "down: sweep it without them and write the table with to_csv"
             )
-        width = width_of_chunks(self.lanes.scene, tuple(self.lanes.axes))
         about = {
             "version": version("jbeamshell"),
             "scene": self.scene,
@@ -135,7 +145,7 @@ class Job:
             "figures": list(self.figures),
             "dtype": self.dtype.name,
             "solver": None if self.solver is None else dataclasses.asdict(self.solver),
-            "layout": [BLOCKS, BLOCK, LEAST, width],
+            "layout": [BLOCKS, BLOCK, LEAST, self.width],
         }
         return json.dumps(about)
 
@@ -153,4 +163,5 @@ def runner_of(text: str, devices: Sequence[Any]) -> Runner:
     flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
     scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
     solver = None if about["solver"] is None else Newton(**about["solver"])
-    return Runner(scene, about["keys"], about["figures"], solver, devices)
+    width = about["layout"][-1]
+    return Runner(scene, about["keys"], about["figures"], width, solver, devices)

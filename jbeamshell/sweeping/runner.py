@@ -16,6 +16,7 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.small import quick_options
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
@@ -31,8 +32,8 @@ BLOCK = 1024  # lanes of the largest block, for which the program is compiled
 KEPT = 4  # compiled models of scenes that are kept
 PER_LANE = ("load.amplitude", "contact.pressure")
 """Numbers in which lanes of one chunk may differ on a condensed rung: the body and its factors are
-the same for all of them.  Factors side by side, for a friction of each lane's own, have
-been seen to hang in XLA's thread pool."""
+the same for all of them."""
+BODY = 8.0  # lanes that take as long as a condensed body and its factors
 
 Answers = Callable[..., dict[str, Array]]
 _known: dict[str, Answers] = {}
@@ -51,23 +52,30 @@ class Block(NamedTuple):
     status: np.ndarray
 
 
-def width_of_chunks(scene: Scene, keys: Sequence[str]) -> int:
+def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
     """Number of lanes that advance together.
 
-    On a GPU it is a whole block.  On a core it is `ABREAST` if only slip patterns are iterated,
-    because vector instructions then run over the lanes, and if lanes share a condensed body.
-    Otherwise each lane runs alone: a wide chunk would wait for its slowest lane, and vector
-    instructions run over the nodes.
+    On the contact line it is the one by which all lanes cost least, if a body costs as much as
+    `BODY` lanes: lanes that share no body run alone.  Elsewhere it is a whole block on a GPU.  On a
+    core it is `ABREAST` if only slip patterns are iterated, because vector instructions then run
+    over the lanes.  Otherwise each lane runs alone: a wide chunk would wait for its slowest lane,
+    and vector instructions run over the nodes.
+
+    Parameters
+    ----------
+    alike : (groups,) numbers of lanes that may share a body
     """
     if scene.model.condensed:
-        return ABREAST if any(key in PER_LANE for key in keys) else 1
+        widths = 2 ** np.arange(ABREAST.bit_length())
+        costs = [np.sum(-(-alike // width)) * (BODY + width) for width in widths]
+        return int(widths[np.argmin(costs)])
     if jax.default_backend() != "cpu":
         return BLOCK
     return ABREAST if slip_patterns.applies(scene) else 1
 
 
 def shared_keys(scene: Scene, keys: Sequence[str]) -> list[int]:
-    """Places of the keys whose numbers all lanes of a chunk share."""
+    """Places of the keys whose numbers lanes with one condensed body share."""
     if not scene.model.condensed:
         return []
     return [place for place, key in enumerate(keys) if key not in PER_LANE]
@@ -95,7 +103,7 @@ def check_figures(
     require("figures", list(figures), len(figures) > 0, "name at least one")
     require("figures", list(figures), len(set(figures)) == len(figures), "names one twice")
     number = jax.ShapeDtypeStruct((), scene.strip.length.dtype)
-    ask = _ask(scene, tuple(keys), tuple(figures), solver)
+    ask = _ask(scene, tuple(keys), tuple(figures), solver)  # that of the lanes: traced once
     try:
         shapes = jax.eval_shape(ask, *[number] * len(keys))
     except (jax.errors.ConcretizationTypeError, TypeError) as error:
@@ -115,8 +123,8 @@ class Runner:
 
     Attributes
     ----------
+    width : lanes of a chunk, see `width_of_chunks`
     devices : devices on which blocks run side by side
-    width : lanes of a chunk
     """
 
     def __init__(
@@ -124,18 +132,20 @@ class Runner:
         scene: Scene,
         keys: Sequence[str],
         figures: Sequence[str],
+        width: int,
         solver: Newton | None = None,
         devices: Sequence[Any] | None = None,
     ) -> None:
         self.scene, self.keys, self.figures = scene, tuple(keys), tuple(figures)
         self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
         self.devices = list(devices or jax.local_devices())
-        self.width = width_of_chunks(scene, self.keys)
+        self.width = width
         self._mesh = Mesh(np.array(self.devices), "lanes")
-        ask = _ask(scene, self.keys, self.figures, solver, Method.UNCHECKED_STATUS_ITERATION)
-        self._shared = shared_keys(scene, self.keys)
+        ask = _ask(scene, self.keys, self.figures, solver)
+        self._shared = shared_keys(scene, self.keys) if width > 1 else []
         axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
-        self._about = ask, axes, self.figures, self._shape, self.dtype, self._mesh
+        small = scene.model.condensed
+        self._about = ask, axes, self.figures, self._shape, self.dtype, self._mesh, small
 
     def compile(self) -> float:
         """Compile the model without running a lane; returns the seconds it took, now or before."""
@@ -195,13 +205,11 @@ def _ask(
     keys: tuple[str, ...],
     figures: tuple[str, ...],
     solver: Newton | None,
-    method: Method | None = None,
 ) -> Answers:
     """Response of a scene; the same function for the same scene, so that it compiles once."""
+    method = Method.UNCHECKED_STATUS_ITERATION
     try:
-        name = (
-            f"{scene_to_toml(scene)} {scene.strip.length.dtype} {keys} {figures} {solver} {method}"
-        )
+        name = f"{scene_to_toml(scene)} {scene.strip.length.dtype} {keys} {figures} {solver}"
     except InputError:  # a function of the user's own has no text
         return response(scene, keys, figures, solver=solver, method=method)
     if name not in _known:
@@ -223,6 +231,7 @@ def _compiled(
     shape: tuple[int, ...],
     dtype: np.dtype,
     mesh: Mesh,
+    small: bool,
 ) -> tuple[Callable[..., tuple[Array, Array]], float]:
     """Compiled program that runs one block on every device, and the seconds of its compilation.
 
@@ -259,7 +268,9 @@ def _compiled(
         run = jax.shard_map(each, mesh=mesh, in_specs=spread, out_specs=spread, check_vma=False)
     kinds = ((shape, dtype), (shape[:1], np.int32))
     given = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
-    program = jax.jit(run).lower(*given).compile()
+    program = (
+        jax.jit(run, compiler_options=quick_options() if small else None).lower(*given).compile()
+    )
     return program, time.perf_counter() - begun
 
 

@@ -372,6 +372,22 @@ def test_chunks_hold_lanes_that_share_what_they_must():
     np.testing.assert_array_equal(runner.places_in_chunks(shared[:0], 3), np.arange(8))
 
 
+def test_lanes_advance_together_as_far_as_they_share_a_body():
+    """Grids share one body for each height; pairs at random share none, and run alone."""
+    scene = jb.Scene().replace({"model.rung": "condensed-squeeze", "model.nodes": 17})
+    pressures, heights = np.linspace(5.0, 9.0, 64), np.linspace(0.05, 0.1, 64)
+    over = {"contact.pressure": pressures, "strip.height_ratio": heights}
+
+    def width(over, paired=False):
+        return job.Job(lanes_of(scene, over, paired), ("dissipation",)).width
+
+    assert width(over) == runner.ABREAST
+    assert width(over, paired=True) == 1
+    assert width(over | {"strip.height_ratio": np.repeat(heights[:32], 2)}, paired=True) == 2
+    assert width({"strip.height_ratio": heights}) == 1
+    assert width({"contact.pressure": pressures[:5]}) == 8
+
+
 def test_lanes_of_plane_elasticity_share_their_bodies():
     """A grid whose heights share a body, beside the same strips paired at random."""
     plane = {"model.rung": "plane", "model.nodes": 17, "load.steps_per_half_cycle": 1}
