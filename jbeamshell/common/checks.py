@@ -123,8 +123,13 @@ def is_traced(*trees: object) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(trees))
 
 
-def is_staged() -> bool:
-    """True inside a function that JAX traces now, even if none of its numbers is traced."""
-    from jax._src import core  # the public way is to make an array, which takes fifty times longer
+def in_transformation() -> bool:
+    """True inside any function that JAX transforms now, such as by jit, grad or vmap."""
+    from jax._src import core  # no public function tells
 
     return not core.trace_state_clean()
+
+
+def is_staged() -> bool:
+    """True inside a function that JAX traces now, even if none of its numbers is traced."""
+    return in_transformation() and is_traced(jnp.zeros(()))

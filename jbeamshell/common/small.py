@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jbeamshell.common.checks import is_staged
+from jbeamshell.common.checks import in_transformation
 
 KNOWN = (0, 10)  # release of JAX from which on the options below are known to exist
 
@@ -44,7 +44,7 @@ class Small:
     def __call__(self, given: Any, *static: Hashable) -> Any:
         """Value of the function."""
         leaves, tree = jax.tree.flatten(given)
-        if is_staged() or not all(map(_is_number, leaves)):
+        if in_transformation() or not all(map(_is_number, leaves)):
             return self._inside(given, *static)
         return self._quick(leaves, tree, static)
 

@@ -81,9 +81,10 @@ def solve(
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
         fix = f"must press the strip down for model.rung = {rung}"
         require("contact.pressure", scene.contact.pressure, down, fix)
-    known, traced = (turns, None) if isinstance(turns, tuple) else (None, turns)
     soft = not scene.ideal_friction
-    history: History = _walk((scene, strip, targets, traced), known, cycles, nested, soft)
+    known = isinstance(turns, tuple)
+    given = (scene, strip, targets, () if known else turns)
+    history: History = _walk(given, turns if known else (), cycles, nested, soft)
     return history
 
 
@@ -115,8 +116,8 @@ def _strip(scene: Scene) -> Strip:
 
 @Small
 def _walk(
-    given: tuple[Scene, Strip, Array, Array | None],
-    known: tuple[bool, ...] | None,
+    given: tuple[Scene, Strip, Array, Turns],
+    known: tuple[bool, ...],
     cycles: Cycles,
     nested: bool,
     soft: bool,
@@ -125,11 +126,12 @@ def _walk(
 
     Parameters
     ----------
-    given : scene, its strip, loads after the pressing, and the turns before them if traced
+    given : scene, its strip, loads after the pressing, and the turns before them if traced, else ()
     known : turns if they are known
     """
-    scene, strip, targets, turns = given
-    found = _levels(scene, strip, targets, turns if known is None else known, nested, soft)
+    scene, strip, targets, traced = given
+    turns = known if isinstance(traced, tuple) else traced
+    found = _levels(scene, strip, targets, turns, nested, soft)
     return _history(scene, strip, found, cycles, soft)
 
 

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.checks import is_staged, is_traced, require
 from jbeamshell.common.errors import Status, UnconvergedError
 from jbeamshell.condensed.solve import Cycles
 from jbeamshell.condensed.solve import solve as solve_condensed
@@ -82,12 +82,12 @@ def solve(
     >>> float(history.dissipation)
     """
     check_solver(solver)
-    solver = solver or Newton()
     whole, cycles = check(scene, path)
     if scene.model.condensed:
         found = f"is found from the pressures for model.rung = {scene.model.rung}: leave it out"
         require("contact", "given", contact is None, found)
         return _condensed(scene, whole, cycles, throw, method, path is None)
+    solver = solver or Newton()
     touching = None if contact is None else check_contact(scene, contact)
     method = method or _first_method(scene, whole)
     steps, history = _solve(scene, touching, whole, solver, method, np.asarray(True))
@@ -120,7 +120,7 @@ def _condensed(
     own: bool,
 ) -> History:
     """History on the contact line, first from factors alone unless derivatives may be taken."""
-    traced = is_traced(scene, path, jnp.zeros(()))
+    traced = is_traced(scene, path) or is_staged()
     events = method is Method.NEWTON or (traced and method is None)
     history = solve_condensed(scene, path, cycles, nested=not events, own=own)
     if traced:
@@ -155,7 +155,7 @@ def compile_for(
 
 def _first_method(scene: Scene, path: LoadPath) -> Method:
     """Method of a first attempt: Newton's where derivatives may be taken, else statuses."""
-    traced = is_traced(scene, path, jnp.zeros(()))  # the last by a caller's jit
+    traced = is_traced(scene, path) or is_staged()  # the latter by a caller's jit
     return Method.NEWTON if traced else Method.STATUS_ITERATION
 
 
