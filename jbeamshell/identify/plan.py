@@ -39,6 +39,7 @@ from jbeamshell.common.files import as_path, read_toml
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.sources import Source
 from jbeamshell.identify.specimens import Specimen
+from jbeamshell.identify.starts import estimate, started
 from jbeamshell.measured.curves import AmplitudeCurve, Measurement
 from jbeamshell.measured.loops import Loop, driver_of
 from jbeamshell.scene import library
@@ -144,7 +145,8 @@ def _with_specimen(
 ) -> Plan:
     """Plan with one more specimen.
 
-    If load.control is not given, it follows from the data; so does load.amplitude.
+    If load.control is not given, it follows from the data; so do load.amplitude, and the starts of
+    numbers that are not known where the standard strip cannot be meant, see `started`.
     """
     own, notes = dict(values), list(plan.notes)
     loops = [item for item in data if isinstance(item, Loop)]
@@ -154,6 +156,8 @@ def _with_specimen(
         notes.append(f"{which}the {driver} drives these loops (set load.control to change it)")
         if driver != "force":
             own.pop("load.amplitude", None)
+    own, told = _started(own, data, plan.free)
+    notes += [f"{label}: {note}" if label else note for note in told]
     control = own.get("load.control", "force")
     if "load.amplitude" not in own and control in CONTROLS:
         drives = [
@@ -165,6 +169,17 @@ def _with_specimen(
             own["load.amplitude"] = max(largest)
     specimen = Specimen(scene_from_values(own), data, label)
     return plan._replace(specimens=[*plan.specimens, specimen], notes=notes)
+
+
+def _started(
+    own: Mapping[str, Any], data: Sequence[Measurement], free: Sequence[Parameter]
+) -> tuple[dict[str, Any], list[str]]:
+    """Values with starts from the data for what neither the user nor the parameters give."""
+    found = estimate(data) if own.get("load.control", "force") in CONTROLS else None
+    if found is None:
+        return dict(own), []
+    given = {parameter.key: parameter.start for parameter in free if parameter.start is not None}
+    return started(overridden(own, given), found)
 
 
 def _base(scene: Any, folder: Path) -> dict[str, Any]:

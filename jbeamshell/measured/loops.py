@@ -43,6 +43,7 @@ class Loop(NamedTuple):
     driver : column that drove the test, "force" or "displacement"; None if unknown
     free_zero : True if the zero of the responding column is unknown, as after removing a drift
     units : unit by quantity, "N", "N/m" or "m"; None if they are the Scene's own
+    normal_force : mean normal force, if it was recorded
     """
 
     force: NDArray[np.float64]
@@ -56,6 +57,7 @@ class Loop(NamedTuple):
     driver: str | None = None
     free_zero: bool = False
     units: Mapping[str, str] | None = None
+    normal_force: float | None = None
 
     def __repr__(self) -> str:
         return self.summary().as_text()
@@ -210,6 +212,7 @@ def loop_of(recording: Recording) -> Loop:
         dropped=recording.dropped,
         notes=recording.notes,
         units=recording.units,
+        normal_force=recording.mean_normal_force(),
     )
 
 

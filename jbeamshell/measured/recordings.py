@@ -82,12 +82,23 @@ class Recording(NamedTuple):
         step = 0.0 if self.time is None else float(np.median(np.diff(self.time)))
         return 1.0 / step if step > 0.0 else None
 
+    def mean_normal_force(self, first: int = 0, last: int | None = None) -> float | None:
+        """Mean normal force between two points; None if it was not recorded there."""
+        if self.normal_force is None:
+            return None
+        mean = float(np.mean(self.normal_force[first:last]))
+        return mean if np.isfinite(mean) else None
+
     def per_width(self, width: float) -> Recording:
         """Recording of forces per unit width; a width of 1 changes nothing."""
         if width == 1.0:
             return self
-        units = None if self.units is None else {**self.units, "force": "N/m"}
-        return self._replace(force=self.force / width, units=units)
+        units = self.units
+        if units is not None:
+            forces = {name: "N/m" for name in ("force", "normal_force") if name in units}
+            units = {**units, **forces}
+        normal = None if self.normal_force is None else self.normal_force / width
+        return self._replace(force=self.force / width, normal_force=normal, units=units)
 
 
 def recording_from_arrays(

@@ -110,6 +110,7 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
         notes=(*recording.notes, *_notes(found, number, curve, heights, repeats, limit)),
         driver=found.driver,
         units=recording.units,
+        normal_force=recording.mean_normal_force(cycles[own[0]].start, cycles[own[-1]].end),
         force=columns["force"],
         displacement=columns["displacement"],
     )

@@ -31,6 +31,8 @@ COARSE = {
     "load.cycles": 1,
 }
 TRUE = {"contact.friction": 0.12, "strip.height_ratio": 0.2}
+# Of the standard strip, which data with units do not mean unless they are given.
+KNOWN = {"strip.length": 2.0, "strip.axial_stiffness": 3.4e4, "contact.pressure": 10.0}
 OFF = {"contact.friction": 0.084, "strip.height_ratio": 0.26}  # by 30 %
 FIGURES = {
     *("dissipation", "dissipation_loop", "dissipation_ratio", "secant_stiffness", "loss_factor"),
@@ -378,7 +380,7 @@ def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
 
 @pytest.mark.slow
 def test_fit_driven_by_the_displacement(cli, closed, tmp_path):
-    drive = options({"load.control": "displacement", "load.amplitude": 2e-5})
+    drive = options(KNOWN | {"load.control": "displacement", "load.amplitude": 2e-5})
     code, out, _ = cli("fit", closed, *FIT, *drive, "--json", "--out", tmp_path)
     assert code == 0
     values = json.loads(out)["values"]
@@ -390,7 +392,8 @@ def test_fit_driven_by_the_displacement(cli, closed, tmp_path):
 
 def test_a_plan_of_two_strips_is_fitted_profiled_saved_and_resumed(cli, closed, tmp_path):
     plan = tmp_path / "plan.toml"
-    settings = "".join(f'"{key}" = {json.dumps(value)}\n' for key, value in COARSE.items())
+    given = (COARSE | KNOWN).items()
+    settings = "".join(f'"{key}" = {json.dumps(value)}\n' for key, value in given)
     plan.write_text(
         f"[set]\n{settings}"
         f"""
@@ -659,7 +662,7 @@ def test_bad_scenes_are_refused(refused, tmp_path, command, content, told):
         (["a.csv", "--unit", "kN"], "'kN': write KEY=VALUE, such as force=kN"),
         (["--set", "load.control=stress"], "load.control = 'stress': choose 'force' or 'displ"),
         (["--set", "load.control=a,b"], "load.control = ['a', 'b']: must be a word"),
-        (["--set", "contact.pressure=1"], "must stay below gross slip, mu F_N L = 0.3; set load."),
+        (["--set", "contact.pressure=1"], "contact.friction = 0.15: slides at mu F_N L = 0.3"),
     ],
 )
 def test_bad_fits_are_refused(refused, words, told):

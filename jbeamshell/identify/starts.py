@@ -1,0 +1,247 @@
+"""Start values of a fit from the loops themselves, for what nobody gave.
+
+Below gross slip, a held strip of small height answers like Goodman's bar: u = A^2/(2 EA q), and the
+work of a cycle is a third of 4 A u, whatever A is.  With height both figures depend on
+x = (2A/G)/eta alone, where G = mu F_N L is the force of gross slip: the finite-element loops that
+ship with the library lie on one curve for eta = .03 to .4.  So the work tells x, and x with either
+G or eta the other one.  A loop with a plateau tells G, and its work the displacement over which
+the strip yields.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jbeamshell.common.errors import InputError
+from jbeamshell.identify.specimens import plausible_stiffness
+from jbeamshell.measured.curves import Backbone
+from jbeamshell.measured.inspection import inspect
+from jbeamshell.measured.loops import Loop
+from jbeamshell.scene.pressure import resultant
+from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.toml import overridden, scene_from_values
+
+# Loops of finite elements (calibration/data): x, work over 4 A u, and u over the bar's.
+X = (1.0, 1.78, 2.48, 3.3, 4.24, 5.2, 6.98, 8.88, 11.5, 14.3, 19.4, 31.0, 62.0)
+WORK = (0.0003, 0.0042, 0.020, 0.058, 0.115, 0.168, 0.232, 0.267, 0.293, 0.306, 0.318, 0.327, 0.332)
+BEYOND_BAR = (4.0, 2.46, 1.79, 1.44, 1.25, 1.16, 1.09, 1.055, 1.033, 1.021, 1.011, 1.004, 1.001)
+SLENDER = 0.15  # height ratio, where nothing tells it
+PARTS = (0.1, 0.85)  # parts of gross slip between which a force starts then
+MOST, LEAST = 0.9, 0.02  # parts of gross slip between which a force starts
+HEIGHTS = (0.01, 0.5)  # height ratios between which a fit starts
+BELOW = 1.0 - 1e-6  # part of gross slip that a force may reach
+STRAIGHT = 0.875  # halfway over the way that work is short of; 1 if straight, .75 if a root
+STIFF = 3.0  # stretching stiffness over that of soft sliders, at the start
+STEEP = 0.02  # way to a plateau over the amplitude, at least
+STRAIN = 1e-3  # displacement over a length that nobody gave, at most
+SIMILAR = 3.0  # factor of a force of gross slip within which the standard strip may be meant
+
+HEIGHT = ("strip.height_ratio", "strip.half_height")
+STIFFNESS = ("strip.axial_stiffness", "strip.youngs_modulus")
+
+
+class Estimate(NamedTuple):
+    """Figures of the largest loop or pull of some measurements.
+
+    Attributes
+    ----------
+    force, displacement : amplitudes
+    peak : largest force of all measurements, up or down
+    work : work of a cycle; None if there is no cycle, or if it cannot be told from noise
+    slides : True if the loop has a plateau
+    halfway : displacement from a turn until half of the range of the force is gone; None without
+        cycles
+    normal : mean normal force; None if it was not recorded
+    si : True if the numbers are in SI
+    """
+
+    force: float
+    displacement: float
+    peak: float
+    work: float | None
+    slides: bool
+    halfway: float | None
+    normal: float | None
+    si: bool
+
+    @property
+    def short(self) -> float:
+        """Displacement that the work of a cycle is short of a rectangle's."""
+        return self.displacement - (self.work or 0.0) / (4.0 * self.force)
+
+    @property
+    def soft(self) -> bool:
+        """True if the way to a plateau is straight, by soft sliders, and no root, by the strip."""
+        return self.slides and self.halfway is not None and self.halfway > STRAIGHT * self.short
+
+
+def estimate(measurements: Sequence[Any]) -> Estimate | None:
+    """Estimate from loops and backbones; None if there are neither."""
+    pulls = [item for item in measurements if isinstance(item, Loop | Backbone)]
+    if not pulls:
+        return None
+    largest = max(pulls, key=lambda item: float(np.ptp(item.force)))
+    peak = max(float(np.max(np.abs(item.force))) for item in pulls)
+    si = isinstance(largest, Loop) and largest.units is not None
+    normal = largest.normal_force if isinstance(largest, Loop) else None
+    if isinstance(largest, Loop) and (levels := inspect(largest).views[0].levels):
+        level = levels[-1]
+        force, displacement = (
+            0.5 * float(np.ptp(column)) for column in (level.loop.force, level.loop.displacement)
+        )
+        told = level.shape.kind in ("micro-slip", "gross slip", "viscous")
+        slides = level.shape.kind == "gross slip"
+        halfway = _halfway(level.loop)
+        work = level.work if told else None
+        return Estimate(force, displacement, peak, work, slides, halfway, normal, si)
+    force, displacement = (
+        float(np.max(np.abs(column))) for column in (largest.force, largest.displacement)
+    )
+    return Estimate(force, displacement, peak, None, False, None, normal, si)
+
+
+def _halfway(loop: Loop) -> float:
+    """Displacement from the first turn of a mean loop until half of the force's range is gone."""
+    middle = 0.5 * float(np.max(loop.force) + np.min(loop.force))
+    gone = int(np.argmax((loop.force - middle) * (loop.force[0] - middle) <= 0.0))
+    return abs(float(loop.displacement[0] - loop.displacement[gone]))
+
+
+def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], list[str]]:
+    """Values of a scene with start values for what is not known, and notes on them.
+
+    Parameters
+    ----------
+    known : values by dotted key; they stay as they are
+    found : figures of the measurements
+
+    Raises
+    ------
+    InputError
+        if the friction and the pressure that are known cannot resist the measured force
+    """
+    values = {key: value for key, value in known.items() if not key.startswith("load.")}
+    forced = known.get("load.control", "force") == "force"
+    scene = scene_from_values(values)
+    _check_known(scene, values, found, forced)
+    if _suits(scene, found, forced):
+        return dict(known), []
+    fresh: dict[str, Any] = {}
+
+    def take(key: str, value: float | str) -> None:
+        fresh[key] = values[key] = value
+
+    if "strip.length" not in values:
+        take("strip.length", _length(found))
+    if found.slides and "strip.far_end" not in values:
+        take("strip.far_end", "free")
+    length = float(scene_from_values(values).strip.length)
+    if found.normal is not None and found.normal > 0.0 and "contact.pressure" not in values:
+        take("contact.pressure", found.normal / length)
+    scene = scene_from_values(values)
+    _check_known(scene, values, found, forced)
+    tall = any(key in values for key in HEIGHT) or scene.strip.layers is not None
+    stiff = any(key in values for key in STIFFNESS) or scene.strip.layers is not None
+    gross = _gross_slip(found, scene, values, forced)
+    x = _x(found)
+    if not tall and x is not None:
+        take("strip.height_ratio", float(np.clip(2.0 * found.force / gross / x, *HEIGHTS)))
+    if not stiff:
+        take("strip.axial_stiffness", _stretching(found, gross, length))
+    if found.soft and "contact.stick_stiffness" not in values:
+        scene = scene_from_values(values)
+        sliders = gross / found.short / length / float(scene.slip_stiffness)
+        take("contact.stick_stiffness", sliders * float(scene.contact.stick_stiffness))
+    if "contact.pressure" not in values:
+        take("contact.pressure", gross / (float(scene.contact.friction) * length))
+    elif "contact.friction" not in values:
+        take("contact.friction", gross / _pressing(scene))
+    told = ", ".join(
+        f"{key} = {value:.4g}" if isinstance(value, float) else f"{key} = {value}"
+        for key, value in fresh.items()
+    )
+    notes = [f"not given, so estimated from the loops: {told}"] if fresh else []
+    if "contact.pressure" in fresh and found.normal is None:
+        notes.append("the pressure is not given: of friction, only mu F_N L is determined")
+    return overridden(dict(known), fresh), notes
+
+
+def _check_known(scene: Scene, values: Mapping[str, Any], found: Estimate, forced: bool) -> None:
+    """Raise `InputError` if the friction and the pressure that are known are too small."""
+    if not (forced and "contact.friction" in values and "contact.pressure" in values):
+        return
+    friction, pressing = float(scene.contact.friction), _pressing(scene)
+    if found.peak >= BELOW * friction * pressing:
+        raise InputError(
+            f"contact.friction = {friction:.6g}: slides at mu F_N L = {friction * pressing:.4g}, "
+            f"but the measured force reaches {found.peak:.4g}: start it above "
+            f"{found.peak / pressing:.3g}, press more, or set load.control to 'displacement'"
+        )
+
+
+def _suits(scene: Scene, found: Estimate, forced: bool) -> bool:
+    """True if data without units are such that the standard strip may be meant."""
+    gross = float(scene.contact.friction) * _pressing(scene)
+    most = BELOW if forced else SIMILAR
+    low, high = plausible_stiffness(scene, ()) or (0.0, np.inf)
+    stiffness = found.force / found.displacement
+    return not found.si and found.peak < most * gross and low <= stiffness <= high
+
+
+def _gross_slip(found: Estimate, scene: Scene, values: Mapping[str, Any], forced: bool) -> float:
+    """Force of gross slip, mu F_N L."""
+    if "contact.friction" in values and "contact.pressure" in values:
+        return float(scene.contact.friction) * _pressing(scene)
+    force, x = found.force, _x(found)
+    least = found.peak / MOST if forced else force
+    if found.slides:
+        return least
+    part = PARTS[1] if x is None else float(np.clip(0.5 * SLENDER * x, *PARTS))
+    guess = force / part
+    tall = any(key in values for key in HEIGHT)
+    stiff = "strip.axial_stiffness" in values or ("strip.youngs_modulus" in values and tall)
+    if x is not None and stiff and scene.strip.axial_stiffness is not None:
+        bar = force**2 * float(scene.strip.length) / (2.0 * found.displacement)
+        guess = _beyond_bar(x) * bar / float(scene.strip.axial_stiffness)
+    elif x is not None and tall:
+        guess = 2.0 * force / (x * float(scene.strip.height_ratio))
+    return float(np.clip(guess, least, force / LEAST))
+
+
+def _stretching(found: Estimate, gross: float, length: float) -> float:
+    """Stretching stiffness E'2H of a strip that answers as was found."""
+    if found.soft:
+        return STIFF * gross * length / found.short
+    if found.slides and found.work is not None:
+        # Of two branches F = -G + 2 G sqrt(du/way) each, 4 G way/3 are missing to a rectangle.
+        return gross * length / max(3.0 * found.short, STEEP * found.displacement)
+    bar = found.force**2 * length / (2.0 * found.displacement * gross)
+    return _beyond_bar(_x(found) or X[0]) * bar
+
+
+def _x(found: Estimate) -> float | None:
+    """Ratio x of the force of a loop below gross slip; None if its work is not known."""
+    if found.work is None or found.slides:
+        return None
+    share = found.work / (4.0 * found.force * found.displacement)
+    return float(np.exp(np.interp(np.log(share), np.log(WORK), np.log(X))))
+
+
+def _beyond_bar(x: float) -> float:
+    """Displacement over that of a bar."""
+    return float(np.interp(np.log(x), np.log(X), BEYOND_BAR))
+
+
+def _pressing(scene: Scene) -> float:
+    """Resultant of the pressures, F_N L."""
+    contact = scene.contact
+    force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length)
+    return float(force)
+
+
+def _length(found: Estimate) -> float:
+    """Length that nobody gave: a power of ten, so long that the strip is strained little."""
+    return float(10.0 ** np.ceil(np.log10(max(1.0, found.displacement / STRAIN))))

@@ -1,0 +1,158 @@
+"""Starts from the loops: near what made them, in any units, and never beyond gross slip."""
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.common.errors import InputError
+from jbeamshell.identify.observations import observe
+from jbeamshell.identify.plan import plan_for
+from jbeamshell.identify.starts import _beyond_bar, _x, estimate, started
+from jbeamshell.measured.example import HEIGHT_RATIOS, example_loops
+from jbeamshell.measured.loops import make_loop
+from jbeamshell.measured.recordings import recording_from_arrays
+from jbeamshell.measured.steady import steady_loops
+from tests import rig
+
+SI = {"force": "N/m", "displacement": "m"}
+STRETCHING, FRICTION, PRESSURE, LENGTH = 3.4e4, 0.1, 10.0, 2.0  # of the finite elements
+MU, ETA, STIFF, P, L = (
+    "contact.friction",
+    "strip.height_ratio",
+    "strip.axial_stiffness",
+    "contact.pressure",
+    "strip.length",
+)
+
+
+def in_units(loop, random, noise=0.0, seed=0):
+    """A loop of finite elements as a rig of another size would record it, and its true values."""
+    force, displacement, length = 10.0 ** random.uniform((0.0, -2.0, -2.3), (6.0, 2.0, 0.3))
+    columns = (
+        scale * np.tile(column[:-1], 3)
+        for scale, column in ((force, loop.force), (displacement, loop.displacement))
+    )
+    recording = rig.recorded(*columns, noise, "white", seed, "force")._replace(units=SI)
+    truth = {
+        MU: FRICTION,
+        P: PRESSURE * LENGTH * force / length,
+        STIFF: STRETCHING * force / displacement * length / LENGTH,
+        L: length,
+    }
+    return recording, truth
+
+
+def random_specimen(seed, noise=0.0):
+    """Mean loops, what is known of the specimen, and the truth."""
+    random = np.random.default_rng(seed)
+    ratio = random.choice(HEIGHT_RATIOS)
+    (loop,) = example_loops(ratio, (random.choice([0.5851, 0.7855, 1.0, 1.3, 1.6, 1.9]),))
+    recording, truth = in_units(loop, random, noise, seed)
+    truth[ETA] = ratio
+    known = {key: truth[key] for key in (L, ETA, STIFF, P)[: [0, 1, 3, 4][seed % 4]]}
+    return steady_loops(recording), known, truth
+
+
+def test_work_and_displacement_of_finite_elements_lie_on_one_curve():
+    for ratio in HEIGHT_RATIOS:
+        for loop in example_loops(ratio, None):
+            found = estimate([loop])
+            x = found.force / ratio
+            if found.work is None or x > 20.0:  # no work, or that of the bar
+                continue
+            assert _x(found) == pytest.approx(x, rel=0.15)
+            bar = found.force**2 * LENGTH / (2.0 * STRETCHING * FRICTION * PRESSURE * LENGTH)
+            assert found.displacement == pytest.approx(bar * _beyond_bar(x), rel=0.15)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_no_start_is_beyond_gross_slip_whatever_is_known(seed):
+    loops, known, truth = random_specimen(seed, 0.01)
+    plan = plan_for({"set": known, "free": {MU: {}}}, loops)
+    scene = plan.specimens[0].scene
+    for loop in loops:
+        observe(loop, scene)  # raises beyond gross slip
+    for key, value in known.items():
+        assert float(scene.get(key)) == pytest.approx(value)
+    if estimate(loops).work is None:  # a line tells no friction
+        return
+    if len(known) == 4:
+        assert float(scene.contact.friction) == pytest.approx(FRICTION, rel=0.15)
+    if len(known) < 3:  # of a bar, the loop tells this product and nothing else
+        started_at, planted = (
+            np.prod([float(value(key)) for key in (STIFF, MU, P)])
+            for value in (scene.get, truth.get)
+        )
+        assert started_at == pytest.approx(planted, rel=0.15)
+
+
+def test_a_plateau_tells_gross_slip_and_a_straight_way_to_it_soft_sliders():
+    u = rig.path()
+    force = 7.0 * rig.jenkins(u, 0.3) / 0.3
+    made = rig.recorded(force, 1e-4 * u, 0.002, driver="displacement")
+    made = made._replace(units=SI, normal_force=np.full(u.size, 20.0))
+    loops = steady_loops(made)
+    assert loops[0].normal_force == pytest.approx(20.0)
+    plan = plan_for({"free": {MU: {}}}, loops)
+    scene = plan.specimens[0].scene
+    length = float(scene.strip.length)
+    assert scene.load.control == "displacement"
+    assert scene.strip.far_end == "free"
+    assert float(scene.contact.pressure) * length == pytest.approx(20.0)
+    assert float(scene.contact.friction) == pytest.approx(7.0 / 20.0, rel=0.02)
+    assert float(scene.slip_stiffness) * length == pytest.approx(7.0 / 0.3e-4, rel=0.1)
+    assert any("not given, so estimated" in note for note in plan.notes)
+    # A bar that slides from its end: the force is a root of the displacement.
+    way = np.clip((1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, 201))) / 0.4, 0.0, None)
+    down = 7.0 - 14.0 * np.sqrt(np.minimum(way[0] - way[:101], 1.0))
+    bar = make_loop(np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0))._replace(units=SI)
+    root = plan_for({"free": {MU: {}}}, [bar]).specimens[0].scene
+    gross = float(root.contact.friction) * float(root.contact.pressure) * float(root.strip.length)
+    assert gross == pytest.approx(7.0, rel=0.02)
+    stretched = gross * float(root.strip.length) / float(root.strip.axial_stiffness)
+    assert stretched == pytest.approx(0.4e-4, rel=0.1)
+    assert float(root.contact.stick_stiffness) == 1000.0
+
+
+def test_the_standard_strip_stays_where_its_loops_are_fitted():
+    for ratio in HEIGHT_RATIOS:
+        plan = plan_for({"free": {MU: {}}}, example_loops(ratio))
+        scene, standard = plan.specimens[0].scene, jb.Scene()
+        for key in (MU, ETA, STIFF, P, L):
+            assert float(scene.get(key)) == float(standard.get(key))
+
+
+def test_friction_and_pressure_that_cannot_resist_are_refused_by_their_names():
+    (loop,) = example_loops(0.1126, (1.9,))
+    known = {MU: 0.05, P: 10.0}
+    with pytest.raises(InputError, match=r"contact.friction = 0.05: slides at mu F_N L = 1, but"):
+        plan_for({"set": known, "free": {ETA: {}}}, [loop])
+    with pytest.raises(InputError, match=r"start it above 0.095"):
+        plan_for({"set": {P: 10.0}, "free": {MU: {"start": 0.05}}}, [loop])
+    found = estimate([loop])
+    values, _ = started({P: 10.0}, found._replace(si=True))
+    assert values[MU] * 20.0 > 1.9
+
+
+def test_a_first_loading_has_a_start_too():
+    force = np.linspace(0.0, 4e3, 40)
+    pull = recording_from_arrays(force, 1e-13 * force**2, "pull")
+    scene = (
+        plan_for({"free": {MU: {}}}, [make_loop(pull.force, pull.displacement)]).specimens[0].scene
+    )
+    gross = (
+        float(scene.contact.friction) * float(scene.contact.pressure) * float(scene.strip.length)
+    )
+    assert gross > 4e3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_fits_of_random_specimens_converge_from_the_file_alone(seed):
+    loops, known, _ = random_specimen(seed, 0.01)
+    free = {MU: {}} if STIFF in known else {ETA: {}, STIFF: {}}
+    coarse = {"model.nodes": 41, "model.kinematics": "linear"}
+    plan = plan_for({"set": known | coarse, "free": free}, loops)
+    fit = jb.identify.fit(plan.specimens, free=plan.free, points=48)
+    assert fit.status == "converged"
+    assert fit.misfit < 0.02
