@@ -122,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
     figures = result.figures() | {"notes": plan.notes, "wall_s": wall}
     if profiles:
         figures["profiles"] = {profile.name: profile.figures() for profile in profiles}
-    parts = (result, *profiles)
+    parts = (result, *profiles, *(f"  {note}" for note in plan.notes))
     put(files.as_json(figures) if options.json else "".join(f"{part}\n" for part in parts))
     if folder is not None:
         say_written(report.write_fit(folder, result, figures, profiles))

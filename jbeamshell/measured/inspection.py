@@ -248,10 +248,11 @@ def _view(recording: Recording, stiffness: tuple[float, float] | None) -> View:
         for number, loop in enumerate(loops)
     )
     several = len(levels) > 1
-    for level in levels:
+    for level in reversed(levels):  # what the largest cycles tell is not said again
         where = f"cycles to {found.driver} = {_top(level, found, recording)}: " * several
+        said = {finding.name for finding in findings if finding}
         findings += [
-            finding and finding._replace(text=where + finding.text)
+            finding._replace(text=where + finding.text)
             for finding in (
                 _of_work(level, recording),
                 None if any(clipping) else _of_shape(level),  # a clipped turn looks like one
@@ -259,6 +260,7 @@ def _view(recording: Recording, stiffness: tuple[float, float] | None) -> View:
                 _of_drift(level, found, recording),
                 _of_centre(level, found, recording),
             )
+            if finding and finding.name not in said
         ]
     return View(recording, found.driver, levels, tuple(f for f in findings if f))
 

@@ -369,6 +369,7 @@ def test_fit_prints_text_to_read(cli, planted):
     assert re.fullmatch(r"  strip.height_ratio +0\.(2|19)\d* \+- \S+", lines[1])
     assert re.fullmatch(r"  misfit \S+ % of the range", lines[2])
     assert re.fullmatch(r"  converged after \d+ model runs", lines[3])
+    assert lines[-1] == "  the force drives these loops (set load.control to change it)"
 
 
 def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):

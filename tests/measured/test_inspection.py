@@ -268,6 +268,13 @@ def test_a_first_loading_has_no_cycles():
     plt.close(inspection(seen)[0].figure)
 
 
+def test_what_all_amplitudes_show_is_said_once():
+    u = rig.path(3, amplitudes=(0.4, 1.0))
+    seen = inspect(rig.recorded(-rig.iwan(u), u, 0.005, driver="displacement"))
+    (finding,) = seen.findings
+    assert finding.text.startswith("cycles to displacement = 1")
+
+
 def test_the_picture_shows_the_recording_and_its_mean_loops():
     u = rig.path(3, amplitudes=(0.4, 1.0))
     seen = inspect(rig.recorded(rig.iwan(u), u, 0.01, driver="displacement"))
