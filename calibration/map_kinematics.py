@@ -14,7 +14,7 @@ equilibrium in the plain load steps (a batch does not retry in smaller ones), or
 pressed through itself, psi <= -1.
 
 Writes map_kinematics.json beside this file, draws map_kinematics.png from it, and fits the
-constants of `jbeamshell.history.linearisation`; a quarter of an hour on one core:
+constants of `jbeamshell.scene.linearisation`; a quarter of an hour on one core:
 
     python calibration/map_kinematics.py           # --draw: only the picture, from the record
 """
@@ -42,7 +42,7 @@ from tqdm import tqdm  # noqa: E402
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import plotting  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.history.linearisation import BEAMSHELL, SECTIONS, bound  # noqa: E402
+from jbeamshell.scene.linearisation import BEAMSHELL, SECTIONS, bound  # noqa: E402
 
 HERE = Path(__file__).parent
 RECORD = HERE / "map_kinematics.json"

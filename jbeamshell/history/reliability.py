@@ -16,7 +16,7 @@ import jax
 import numpy as np
 from jax import Array
 
-from jbeamshell.history.linearisation import buckling, linear_error
+from jbeamshell.scene.linearisation import NEAR_BUCKLING, buckling, linear_error
 from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
@@ -25,7 +25,6 @@ NEGLIGIBLE = 1e-9  # slip over the sticking range, or tension over the pressure,
 CLOSES = 1e-3  # distance between the ends of a steady loop, over its width
 SAFETY = 1.2  # factor on the estimated error of the corner
 TOLERANCE = 0.02  # relative error of the dissipation below which there is no doubt
-NEAR_BUCKLING = 0.5  # part of the Euler load from which deflections double
 LOCKS = 0.491  # nu beyond which the midpoint rule is off by more than 1 % of the dissipation
 FINER = "take a smaller model.end_size or more model.nodes"
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import InputError, UnconvergedError
-from jbeamshell.history.linearisation import linear_error
+from jbeamshell.scene.linearisation import linear_error
 from jbeamshell.ladder import error_map
 from jbeamshell.ladder.candidates import CANDIDATES, ORDERED
 from jbeamshell.ladder.climb import PLANE, Option, climb

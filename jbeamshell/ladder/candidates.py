@@ -46,8 +46,10 @@ class Candidate(NamedTuple):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Dotted values of the model, except its kinematics."""
-        return {"model.rung": self.rung} | self.resolution
+        """Dotted values of the model, except its kinematics; measured in load steps."""
+        general = self.rung == self.section and self.rung not in ("bar", "plane")
+        stepwise = {"model.solution": "stepwise"} if general else {}
+        return {"model.rung": self.rung} | self.resolution | stepwise
 
 
 ORDERED = ("p4", "p6")  # sections of order p

@@ -17,7 +17,7 @@ import numpy as np
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import DoubtfulWarning, InputError, UnconvergedError
-from jbeamshell.history.linearisation import linear_error
+from jbeamshell.scene.linearisation import linear_error
 from jbeamshell.mechanics.elements import ORDER
 from jbeamshell.quasistatic.solver import compile_for, solve
 from jbeamshell.scene.load_path import check

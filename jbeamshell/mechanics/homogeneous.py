@@ -97,7 +97,7 @@ class Homogeneous(eqx.Module):
         return h * c11 * (e + coupling * psi) ** 2 + squeeze + shear + bending
 
 
-def shear_modulus(plane_modulus: Array, poisson_ratio: Array, plane: str) -> Array:
+def shear_modulus(plane_modulus: Any, poisson_ratio: Any, plane: str) -> Any:
     """Shear modulus G from E' and nu, stress."""
     if plane == "strain":
         return 0.5 * (1.0 - poisson_ratio) * plane_modulus

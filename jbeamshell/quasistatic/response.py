@@ -13,16 +13,21 @@ from jax import Array
 from jbeamshell.common.checks import check_words, is_traced, require, require_choice
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.native import Native
-from jbeamshell.history.history import History
+from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.quasistatic.stepping import Method
+from jbeamshell.scene.choice import FEW_STEPS
+from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
 from jbeamshell.scene.scene import Scene
 
 Response = Callable[..., dict[str, Array]]
 
+
+# Figures of a cycle that condensed strips know from its turning points alone.
+EXACT = {*FIGURES, "dissipation_error"} - {"dissipation_loop"}
 FEW = 200  # number of nodes beyond which the arithmetic takes longer than the calls
 RESPONSES = (
     "force",
@@ -83,6 +88,8 @@ def response(
     for name in figures:
         require_choice("figures", name, RESPONSES)
 
+    scene = pinned(scene, figures)
+
     def solved_by(method: Method) -> Response:
         def figures_of(*values: Array) -> dict[str, Array]:
             varied = scene.replace(dict(zip(over, values, strict=True)))
@@ -115,3 +122,19 @@ def response(
         return found
 
     return ask
+
+
+def pinned(scene: Scene, figures: Sequence[str], numbers: Numbers | None = None) -> Scene:
+    """Scene with its settings as they were chosen, and as few load steps as its figures need.
+
+    Parameters
+    ----------
+    scene : scene whose settings may be open
+    figures : names of `jbeamshell.History`
+    numbers : values by dotted key of the strips of a sweep, see `Scene.pinned`
+    """
+    found = scene.pinned(numbers)
+    few = found.model.condensed and "steps_per_half_cycle" in scene.load.open
+    if few and EXACT.issuperset(figures):
+        return found.replace({"load.steps_per_half_cycle": FEW_STEPS})
+    return found

@@ -82,6 +82,7 @@ def solve(
     >>> float(history.dissipation)
     """
     check_solver(solver)
+    scene = _able(scene, path, contact)
     whole, cycles = check(scene, path)
     if scene.model.condensed:
         found = f"is found from the pressures for model.rung = {scene.model.rung}: leave it out"
@@ -109,6 +110,12 @@ def solve(
     if throw:
         warn_of_doubts(history, stacklevel=STACK)
     return history
+
+
+def _able(scene: Scene, path: ArrayLike | None, contact: ArrayLike | None) -> Scene:
+    """Scene by load steps, if its solution was left open and what it is asked for needs them."""
+    by_steps = contact is not None or np.ndim(path) > 1  # pressures that change along the path
+    return scene.by_load_steps() if by_steps and isinstance(scene, Scene) else scene
 
 
 def _condensed(
@@ -144,6 +151,7 @@ def compile_for(
     scene: Scene, path: ArrayLike | None = None, *, solver: Newton | None = None
 ) -> None:
     """Compile the programs that `solve` needs; only strips on their contact line are solved."""
+    scene = _able(scene, path, None)
     whole, cycles = whole_path(scene, path)
     if scene.model.condensed:
         _condensed(scene, whole, cycles, False, None, path is None)

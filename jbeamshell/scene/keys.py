@@ -19,7 +19,7 @@ from jbeamshell.mechanics.elements import END_SIZE, ORDER
 from jbeamshell.mechanics.friction import LAWS
 from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES
 from jbeamshell.mechanics.kinematics import KINEMATICS
-from jbeamshell.scene.rows import Key, Part, count, number, rows, setting, word
+from jbeamshell.scene.rows import AUTO, Key, Part, count, number, rows, setting, word
 from jbeamshell.scene.rungs import CONDENSED, LARGEST_ORDER
 
 FAR_ENDS = {"held": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held at X = 0
@@ -30,6 +30,8 @@ NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
 SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form", *CONDENSED)
 
+TOLERANCE = 0.005
+FINEST = 1e-4  # tolerance below which the finest mesh may not reach
 LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 PRESSURE = "give a number or a table of [X, pressure] rows"
 WIDTH = 96  # characters of a line of the printed table
@@ -152,7 +154,7 @@ class LoadKeys(Part):
         unit="force/width",
     )
     cycles: int = count(2, 0, "Full cycles after the first loading; 0 is the pressure alone.")
-    steps_per_half_cycle: int = count(40, 1, "Equal load steps from A to -A; 1, or even.")
+    steps_per_half_cycle: int = count(AUTO, 1, "Equal load steps from A to -A; 1, or even.")
     pressure_steps: int = count(1, 1, "Equal steps in which the pressure is applied.")
 
 
@@ -164,13 +166,13 @@ class ModelKeys(Part):
     fields: tuple[str, ...] = word(
         ("v", "beta", "psi"), (), "Fields of a section: v, with beta, with psi; w lets it lift off."
     )
-    kinematics: str = word("exact", KINEMATICS, "Rotations: exact or linear.")
+    kinematics: str = word(AUTO, KINEMATICS, "Rotations: exact or linear.")
     grid: str = word(
         "finite-difference",
         ORDER,
         "Grid: finite-difference (second order) or collocation (fourth).",
     )
-    nodes: int = count(161, 3, "Nodes along X.")
+    nodes: int = count(AUTO, 3, "Nodes along X.")
     constants: str = word(
         "consistent", CONSTANTS, "Section constants: consistent, or printed (the dissertation's)."
     )
@@ -181,13 +183,21 @@ class ModelKeys(Part):
         0, 0, "Order p of the displacements through the height; 0 is the beamshell.", LARGEST_ORDER
     )
     solution: str = word(
-        "stepwise",
+        AUTO,
         SOLUTIONS,
         "Solution: stepwise, masing or masing-pull (a loop from backbones), closed-form (the bar), "
         "condensed (a linear section on its contact line) or plane (elasticity there).",
     )
     end_size: float = setting(
-        END_SIZE, "Smallest elements, at the loaded end and at steps of the pressure.", unit="H"
+        AUTO, "Smallest elements, at the loaded end and at steps of the pressure.", unit="H"
+    )
+    tolerance: float = setting(
+        TOLERANCE,
+        "Relative error of the dissipation and of the loop, to the same model on a fine mesh, for "
+        "which settings that are auto are chosen.",
+        low=FINEST,
+        high=0.1,
+        closed=True,
     )
 
 

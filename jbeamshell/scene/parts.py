@@ -174,6 +174,8 @@ class Load(LoadKeys):
 
     def __check_init__(self) -> None:
         half = self.steps_per_half_cycle
+        if "steps_per_half_cycle" in self.open:
+            return  # until a scene has chosen
         fix = "must be 1, or even, so that the path passes through zero"
         require("load.steps_per_half_cycle", half, half == 1 or half % 2 == 0, fix)
         few = 2 * self.cycles * half <= MOST_LEVELS
@@ -216,7 +218,7 @@ class Model(ModelKeys):
         require("model.order", self.order, self.order == 0 or straight, fix)
         bar = self.solution != "closed-form" or self.fields == ("v",)
         require("model.solution", self.solution, bar, "is the bar's: take ['v'] as model.fields")
-        odd = (self.nodes - 1) % ORDER[self.grid] == 0
+        odd = "nodes" in self.open or (self.nodes - 1) % ORDER[self.grid] == 0
         fix = "must be odd for the collocation grid (two elements' ends and their middle)"
         require("model.nodes", self.nodes, odd, fix)
 

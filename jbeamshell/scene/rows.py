@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import equinox as eqx
 import jax
@@ -23,6 +23,7 @@ from jbeamshell.common.checks import (
 )
 
 MOST_STEPS = 10**6  # largest count of nodes, steps or cycles
+AUTO = "auto"  # value of a setting that the scene chooses itself
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,6 +45,7 @@ class Key:
     whole : True if the setting is a whole number
     choices : words to choose from; empty if they are checked elsewhere
     table : True if rows of numbers are allowed as well
+    open : True if a scene chooses the value where it is `AUTO`, see `jbeamshell.scene.choice`
     through : key of the number that this one sets, if it is another form of it
     fix : fix in the message for a number outside its domain; None is made from the bounds
     """
@@ -61,6 +63,7 @@ class Key:
     whole: bool = False
     choices: tuple[str, ...] = ()
     table: bool = False
+    open: bool = False
     through: str = ""
     fix: str | None = None
 
@@ -102,6 +105,8 @@ class Key:
 
     def check(self, value: Any) -> None:
         """Raise `InputError` unless a value lies in the domain; traced values and tables pass."""
+        if self.open and isinstance(value, str) and value == AUTO:
+            return
         if self.kind == "word":
             if self.choices:
                 require_choice(self.name, value, self.choices)
@@ -142,19 +147,21 @@ def number(default: float | None, sentence: str, *, left_out: Any = (), **facts:
     return _field("number", default, sentence, default if left_out == () else left_out, facts)
 
 
-def setting(default: float, sentence: str, **facts: Any) -> Any:
+def setting(default: float | str, sentence: str, **facts: Any) -> Any:
     """Field and row of a number that is fixed when the model is compiled."""
+    facts["open"] = default == AUTO
     return _field("setting", default, sentence, default, facts, static=True)
 
 
-def count(default: int, low: int, sentence: str, high: int = MOST_STEPS) -> Any:
+def count(default: int | str, low: int, sentence: str, high: int = MOST_STEPS) -> Any:
     """Field and row of a whole number from low to high, both included."""
     return setting(default, sentence, low=low, high=high, closed=True, whole=True)
 
 
 def word(default: Any, choices: Any, sentence: str) -> Any:
     """Field and row of a word, one of some choices."""
-    return _field("word", default, sentence, default, {"choices": tuple(choices)}, static=True)
+    facts = {"choices": tuple(choices), "open": default == AUTO}
+    return _field("word", default, sentence, default, facts, static=True)
 
 
 def _field(
@@ -165,9 +172,15 @@ def _field(
 
 
 class Part(eqx.Module):
-    """Section of the table as a frozen pytree, which converts and checks its values when made."""
+    """Section of the table as a frozen pytree, which converts and checks its values when made.
+
+    Attributes
+    ----------
+    as_given : names of the fields that a scene has chosen, with the values that they were given
+    """
 
     heading: ClassVar[str]
+    as_given: tuple[tuple[str, Any], ...] = eqx.field(static=True, default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         for name, key in rows(type(self)).items():
@@ -177,6 +190,32 @@ class Part(eqx.Module):
             value = key.convert(value)
             key.check(value)
             setattr(self, name, value)
+
+    def given(self, name: str) -> Any:
+        """Value of a field as it was given, `AUTO` where the scene is to choose it."""
+        return dict(self.as_given).get(name, getattr(self, name))
+
+    @property
+    def open(self) -> list[str]:
+        """Names of the fields that the scene is to choose."""
+        settings = (name for name, key in rows(type(self)).items() if key.open)
+        return [name for name in settings if self.given(name) == AUTO]
+
+    def changed(self, **values: Any) -> Self:
+        """Copy with other given values."""
+        kept = tuple((name, value) for name, value in self.as_given if name not in values)
+        return dataclasses.replace(self, as_given=kept, **values)
+
+    def pinned(self) -> Self:
+        """Copy whose values are all given."""
+        return dataclasses.replace(self, as_given=())
+
+    def chosen(self, **values: Any) -> Self:
+        """Copy with chosen values, which keeps those that were given."""
+        given = dict(self.as_given)
+        given |= {name: self.given(name) for name in values}
+        kept = {name: value for name, value in given.items() if values.get(name) != value}
+        return dataclasses.replace(self, as_given=tuple(sorted(kept.items())), **values)
 
 
 @functools.cache

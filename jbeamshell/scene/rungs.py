@@ -14,7 +14,8 @@
 | ``plane`` | plane elasticity on its contact line, exact in time, see `jbeamshell.condensed` |
 
 All rungs but the bars have the field w if the scene has it; those on the contact line always have
-it, and have linear kinematics.
+it, and have linear kinematics.  A section's own name (``squeeze``, ``p2``) leaves open how it is
+solved, see `jbeamshell.scene.choice`.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.scene.rows import AUTO
 
 LARGEST_ORDER = 12
 FIELDS_OF = {"bar": ("v",), "shell": ("v", "beta"), "squeeze": ("v", "beta", "psi")}
@@ -63,7 +65,7 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
         )
     fields = FIELDS_OF.get(section, FIELDS_OF["squeeze"])
     closed = section == "bar" and not prefix
-    solution = "closed-form" if closed else "plane" if plane else prefix or "stepwise"
+    solution = "closed-form" if closed else "plane" if plane else prefix or AUTO
     condensed = solution in CONDENSED
     if (lift or condensed) and section != "bar":
         fields = ("v", "w", *fields[1:])
@@ -113,10 +115,12 @@ def spelled_out(values: dict[str, Any], fields: Sequence[str] = ()) -> dict[str,
     for key, value in meant.items():
         other = values.get(key, value)
         same = tuple(other) == value if isinstance(other, list | tuple) else other == value
-        if not same:
+        if value == AUTO:
+            meant[key] = other
+        elif not same:
             rotates = f", or take {general_rung(rung)}, which rotates"
             fix = "give one" + (rotates if key == "model.kinematics" else "")
             raise InputError(f"model.rung = {rung!r} and {key} = {other!r} disagree: {fix}")
     if rung == "plane":
-        meant["model.nodes"] = values.get("model.nodes", PLANE_NODES)
+        meant["model.nodes"] = values.get("model.nodes", AUTO)
     return {key: value for key, value in values.items() if key != "model.rung"} | meant

@@ -29,7 +29,8 @@ from jbeamshell.mechanics.friction import (
 )
 from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
-from jbeamshell.scene.domain import support_rules
+from jbeamshell.scene.choice import choose
+from jbeamshell.scene.domain import Numbers, support_rules
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
 from jbeamshell.scene.parts import SECTIONS, Contact, Load, Model, Strip
 from jbeamshell.scene.quadratic import check_quadratic
@@ -62,12 +63,20 @@ class Scene(eqx.Module):
     contact: Contact = eqx.field(default_factory=Contact)
     load: Load = eqx.field(default_factory=Load)
     model: Model = eqx.field(default_factory=Model)
-    energy: Energy | None = eqx.field(converter=as_energy, default=None)
+    energy: Energy | None = None
 
-    def __check_init__(self) -> None:
+    def __post_init__(self) -> None:
         for name, kind in SECTIONS.items():
             part = getattr(self, name)
             require(name, part, isinstance(part, kind), f"give a jbeamshell.{kind.__name__}")
+        self.energy = as_energy(self.energy)
+        of_load, of_model = choose(self)
+        if of_load:
+            self.load = self.load.chosen(**of_load)
+        if of_model:
+            self.model = self.model.chosen(**of_model)
+
+    def __check_init__(self) -> None:
         self._check_rung()
         self._check_contact()
         if self.energy is not None:
@@ -250,7 +259,7 @@ class Scene(eqx.Module):
             check_word(key, value)
             if DERIVED.get(key) in values:
                 raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")
-        values = spelled_out(dict(values), self.model.fields)
+        values = spelled_out(dict(values), self.model.given("fields"))
         parts: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
         for key, value in values.items():
             if key not in DERIVED:
@@ -271,7 +280,7 @@ class Scene(eqx.Module):
         if parts["load"].get("control", self.load.control) != self.load.control:
             parts["load"].setdefault("amplitude", None)
         fresh = {
-            section: dataclasses.replace(getattr(self, section), **changes) if changes else None
+            section: getattr(self, section).changed(**changes) if changes else None
             for section, changes in parts.items()
         }
         scene = dataclasses.replace(self, **{k: v for k, v in fresh.items() if v is not None})
@@ -279,6 +288,25 @@ class Scene(eqx.Module):
             strip = _with_youngs_modulus(scene.strip, values["strip.youngs_modulus"])
             scene = dataclasses.replace(scene, strip=strip)
         return scene
+
+
+    def pinned(self, numbers: Numbers | None = None) -> Scene:
+        """Copy whose settings are given as they were chosen, so that no change chooses others.
+
+        Parameters
+        ----------
+        numbers : values by dotted key of many scenes, all of which the settings are to serve; None
+            is those of this scene
+        """
+        of_load, of_model = choose(self, numbers)
+        load, model = self.load.chosen(**of_load), self.model.chosen(**of_model)
+        return dataclasses.replace(self, load=load.pinned(), model=model.pinned())
+
+    def by_load_steps(self) -> Scene:
+        """Copy that is solved in load steps, if how it is solved was left open."""
+        if "solution" not in self.model.open:
+            return self
+        return self.replace({"model.solution": "stepwise"})
 
 
 def _number(key: str, value: Any) -> Array:

@@ -24,6 +24,7 @@ from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.files import as_path
 from jbeamshell.common.progress import counting, in_notebook
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic.response import pinned
 from jbeamshell.scene.scene import Scene
 from jbeamshell.sweeping.executors import (
     Blocks,
@@ -139,7 +140,8 @@ def _job(
     require("solver", solver, solver is None or isinstance(solver, Newton), fix)
     lanes = lanes_of(scene, over, paired)
     check_size(lanes.size, len(names))
-    check_figures(scene, tuple(lanes.axes), tuple(names), solver)
+    lanes = dataclasses.replace(lanes, scene=pinned(scene, names, lanes.value))
+    check_figures(lanes.scene, tuple(lanes.axes), tuple(names), solver)
     return Job(lanes, tuple(names), solver)
 
 

@@ -252,8 +252,9 @@ def _scales(scene: Scene, system: System, time: Array) -> MotionState:
     return jax.tree.map(jax.lax.stop_gradient, scales)
 
 
-def check_scene(scene: Scene, inertia: Inertia) -> None:
-    """Raise `InputError` for a scene that has no equations of motion here."""
+def movable(scene: Scene, inertia: Inertia) -> Scene:
+    """Scene by load steps; raises `InputError` for one that has no equations of motion here."""
+    scene = scene.by_load_steps()
     contact, model, strip = scene.contact, scene.model, scene.strip
     rigid = contact.normal == "rigid" and "w" in model.fields
     fix = (
@@ -270,3 +271,4 @@ def check_scene(scene: Scene, inertia: Inertia) -> None:
     require("strip.curvature", strip.curvature, strip.curvature is None, fix)
     rate_friction.exponent(contact.law)
     inertia.check(scene)
+    return scene

@@ -13,7 +13,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
-from jbeamshell.dynamics.strip.equations import Equations, check_scene
+from jbeamshell.dynamics.strip.equations import Equations, movable
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.mechanics.normal_contact import Compliance
@@ -62,7 +62,7 @@ def modes(
     >>> modes(jb.Scene(), attached=AttachedMasses(20.0)).frequency[0]
     """
     inertia, attached = inertia or Inertia(), attached or AttachedMasses()
-    check_scene(scene, inertia)
+    scene = movable(scene, inertia)
     matrices = _matrices(scene, inertia, AttachedMasses(attached.payload), stuck)
     mass, stiffness, x, moves = map(np.asarray, matrices)
     free = np.flatnonzero(moves)

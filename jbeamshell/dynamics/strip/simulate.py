@@ -20,7 +20,7 @@ from jbeamshell.common.progress import watched
 from jbeamshell.dynamics.strip import rate_friction
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
 from jbeamshell.dynamics.strip.block_solver import BlockElimination
-from jbeamshell.dynamics.strip.equations import Equations, MotionState, check_scene
+from jbeamshell.dynamics.strip.equations import Equations, MotionState, movable
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.midpoint import Midpoint
@@ -102,7 +102,7 @@ def simulate(
     """
     inertia, attached = inertia or Inertia(), attached or AttachedMasses()
     excitation = excitation or Excitation()
-    check_scene(scene, inertia)
+    scene = movable(scene, inertia)
     require_number("span", span, POSITIVE + " (time)")
     whole = isinstance(samples, int | np.integer) and samples >= 2
     require("samples", samples, whole, "must be a whole number of at least 2 times")

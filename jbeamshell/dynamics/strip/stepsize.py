@@ -12,7 +12,7 @@ from jax import Array
 
 from jbeamshell.common.checks import POSITIVE, is_traced, require, require_choice, require_number
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
-from jbeamshell.dynamics.strip.equations import Equations, check_scene
+from jbeamshell.dynamics.strip.equations import Equations, movable
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.modes import first_period, highest_frequency
@@ -56,7 +56,7 @@ def stable_step(
     """
     inertia, attached = inertia or Inertia(), attached or AttachedMasses()
     require_choice("method", method, tuple(EXPLICIT))
-    check_scene(scene, inertia)
+    scene = movable(scene, inertia)
     vibration, decay = stability_limits(EXPLICIT[method]().tableau)
     limit = vibration / highest_frequency(scene, inertia, attached)
     has_friction = float(scene.contact.friction) > 0.0 and scene.contact.normal != "none"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.history.linearisation import linear_error
+from jbeamshell.scene.linearisation import linear_error
 
 RECORD = json.loads(
     (Path(__file__).parents[2] / "calibration" / "map_kinematics.json").read_text(encoding="utf-8")

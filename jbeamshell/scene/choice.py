@@ -1,0 +1,117 @@
+"""Choice of the settings that a scene leaves open: kinematics, solution, grid and load steps.
+
+A setting whose value is `AUTO` is chosen when a scene is made, for its ``model.tolerance``.  The
+rules were measured (calibration/default_settings.py).
+
+* Rotations are linear where the bound on what that leaves out is a small part of the tolerance,
+  see `jbeamshell.scene.linearisation`.
+* A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
+  in time and lets the strip lift off.  Any other strip is solved in load steps.
+
+In a JAX transformation numbers are unknown: settings stay as they were chosen for the scene that
+was changed.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jbeamshell.common.checks import is_traced
+from jbeamshell.mechanics.elements import END_SIZE
+from jbeamshell.mechanics.friction import SharpSlip
+from jbeamshell.scene.domain import Numbers
+from jbeamshell.scene.keys import CONTROLS
+from jbeamshell.scene.linearisation import NEAR_BUCKLING, Parts, buckling, linear_errors
+from jbeamshell.scene.rows import AUTO
+from jbeamshell.scene.rungs import CONDENSED
+
+LINEAR_PART = 0.2  # of the tolerance that linear rotations may take
+STEPS = 40  # load steps per half cycle
+FEW_STEPS = 2  # load steps per half cycle where only figures of a cycle are asked of exact events
+
+
+class Grid(NamedTuple):
+    """Grid of a kind of strip, and its error as it was measured.
+
+    Attributes
+    ----------
+    nodes : number of nodes for `KNOWN`
+    end_size : smallest elements before scaling, in units of H
+    order : order of the error in the number of nodes
+    """
+
+    nodes: int
+    end_size: float
+    order: float
+
+
+KNOWN = 0.005  # tolerance for which the grids were measured
+CONTACT_LINE = Grid(65, END_SIZE / 2.0, 1.5)
+PLANE = Grid(129, END_SIZE, 2.0)
+STEPWISE = Grid(161, END_SIZE, 1.5)
+
+
+def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Values of the settings that a scene leaves open, those of its load and of its model.
+
+    Parameters
+    ----------
+    scene : scene, some of whose settings may be `AUTO`
+    numbers : values by dotted key of many scenes, for settings that serve all of them; None is
+        those of the scene
+    """
+    load, model = scene.load, scene.model
+    open_load, open_model = load.open, model.open
+    if not open_load and not open_model:
+        return {}, {}
+    found: dict[str, Any] = {}
+    if "kinematics" in open_model:
+        found["kinematics"] = _kinematics(scene, numbers)
+    linear = found.get("kinematics", model.kinematics) == "linear"
+    if "solution" in open_model:
+        found["solution"] = "condensed" if linear and may_condense(scene) else "stepwise"
+        fields = model.given("fields")
+        if found["solution"] == "condensed" and "w" not in fields:
+            fields = ("v", "w", *fields[1:])
+        found["fields"] = fields
+    solution = found.get("solution", model.solution)
+    grid = PLANE if solution == "plane" else CONTACT_LINE if solution in CONDENSED else STEPWISE
+    if "end_size" in open_model:
+        found["end_size"] = grid.end_size
+    if "nodes" in open_model:
+        found["nodes"] = _nodes(grid, model.tolerance)
+    steps = {"steps_per_half_cycle": STEPS} if "steps_per_half_cycle" in open_load else {}
+    return steps, found
+
+
+def _nodes(grid: Grid, tolerance: float) -> int:
+    """Odd number of nodes of a grid for a tolerance."""
+    elements = (grid.nodes - 1) * (KNOWN / tolerance) ** (1.0 / grid.order)
+    return 2 * int(np.ceil(elements / 2.0)) + 1
+
+
+def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
+    """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown."""
+    strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
+    if is_traced(strip, contact, load):
+        before = model.kinematics
+        return "exact" if before == AUTO else before
+    bounded = strip.curvature is None and contact.normal == "rigid" and scene.energy is None
+    if not bounded or load.control not in CONTROLS:
+        return "exact"
+    elastic = model.order > 0 or model.solution == "plane"
+    error = linear_errors(strip, load, elastic, numbers or scene.number)
+    force, limit = buckling(scene, numbers)
+    small = np.nanmax(error) <= LINEAR_PART * model.tolerance
+    return "linear" if small and not np.any(force >= NEAR_BUCKLING * limit) else "exact"
+
+
+def may_condense(scene: Parts) -> bool:
+    """True if a strip with linear kinematics can be solved on its contact line."""
+    contact, load, model = scene.contact, scene.load, scene.model
+    section = "beta" in model.fields and model.squeeze == "field" and scene.energy is None
+    base = contact.normal == "rigid" and isinstance(contact.law, SharpSlip)
+    straight = scene.strip.curvature is None and model.grid == "finite-difference"
+    return section and base and straight and load.control in CONTROLS and load.cycles > 0

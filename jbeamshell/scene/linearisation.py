@@ -1,0 +1,152 @@
+"""Error of linear kinematics: a bound that needs no solution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from jbeamshell.mechanics.bar import bar_force
+from jbeamshell.mechanics.homogeneous import Energy, shear_modulus
+from jbeamshell.scene.domain import Numbers
+from jbeamshell.scene.parts import Contact, Load, Model, Strip
+from jbeamshell.scene.pressure import is_table
+
+# Constants of `bound`, fitted by calibration/map_kinematics.py to map_kinematics.json beside it.
+BEAMSHELL = (3.2, 3.6, 3.6, 0.5, 0.0, 3.0)
+SECTIONS = (14.0, 2.7, 3.5, 1.7, 1.7, 3.0)
+NEAR_BUCKLING = 0.5  # part of the Euler load from which deflections double
+
+
+def bound(
+    pressed: ArrayLike,
+    slip: ArrayLike,
+    friction: ArrayLike,
+    softness: ArrayLike,
+    constants: Sequence[float] | np.ndarray = BEAMSHELL,
+) -> np.ndarray:
+    """Bound of `linear_error` from ratios of the strip.
+
+    Parameters
+    ----------
+    pressed : F_N/E'
+    slip : slip length over H
+    friction : Coulomb friction coefficient mu
+    softness : E'/(2G)
+    constants : `BEAMSHELL` or `SECTIONS`
+
+    Returns
+    -------
+    relative error, of the shape that the ratios broadcast to
+    """
+    near, reach, power, far, stretch, growth = constants
+    p, x, soft = np.asarray(pressed), np.asarray(slip), np.asarray(softness)
+    corner = near / (1.0 + (x / (reach * soft)) ** power)
+    return p * (1.0 + growth * p) * (corner + far * np.asarray(friction) + stretch * (soft - 1.0))
+
+
+class Parts(Protocol):
+    """Parts of a `jbeamshell.Scene` that bounds are found from."""
+
+    strip: Strip
+    contact: Contact
+    load: Load
+    model: Model
+    energy: Energy | None
+
+    def number(self, key: str) -> np.ndarray: ...
+
+
+def linear_error(scene: Parts) -> float:
+    """Largest relative error of a strip's loop that linear kinematics make; see `linear_errors`.
+
+    Parameters
+    ----------
+    scene : scene with a foundation and without traced leaves
+    """
+    elastic = scene.model.order > 0 or scene.model.solution == "plane"
+    return float(linear_errors(scene.strip, scene.load, elastic, scene.number))
+
+
+@np.errstate(divide="ignore", invalid="ignore")
+def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> np.ndarray:
+    """Largest relative errors of loops that linear kinematics make, for one scene or for a sweep.
+
+    They bound the error of the dissipation per cycle and of the secant stiffness.  The error grows
+    with the strain p = F_N/E' of the pressure, not with that of the load, and is largest if the
+    slip length s of the bar is a few H.  With x = 2 s G/(H E'),
+
+        error <= p (1 + 3 p) (3.2/(1 + (x/3.6)^3.6) + 0.5 mu).
+
+    Sections of order p have other constants, because their exact material is St. Venant and
+    Kirchhoff's.  The bound was measured for loads up to E' 2H/10 and pressures up to E'/3
+    (calibration/map_kinematics.json).  Beyond, and for a strip that is curved or on a compliant
+    foundation, it is a guess.
+
+    Parameters
+    ----------
+    strip, load : parts of the scene, for their words
+    elastic : True for plane elasticity and sections of order p
+    numbers : values by dotted key
+
+    Returns
+    -------
+    relative error, 0.01 for 1 %, of the shape that the numbers broadcast to
+    """
+    stiffness = _stretching(strip, numbers)
+    length, height = numbers("strip.length"), numbers("strip.half_height")
+    amplitude, pressure = numbers("load.amplitude"), numbers("contact.pressure")
+    pressure = np.max(pressure[:, 1]) if is_table(pressure) else pressure
+    limit = numbers("contact.friction") * pressure
+    force = amplitude
+    if load.control == "displacement":
+        force = bar_force(amplitude, stiffness, limit)
+    slip = np.where(limit > 0.0, np.minimum(length, force / limit), length)  # else all of it slips
+    if strip.layers is not None:
+        softness = np.asarray(strip.plane_modulus / (2.0 * strip.shear_modulus))
+    else:
+        softness = 0.5 / shear_modulus(1.0, numbers("strip.poisson_ratio"), strip.plane)
+    pressed = 2.0 * height * pressure / stiffness
+    constants = SECTIONS if elastic else BEAMSHELL
+    return bound(pressed, slip / height, limit / pressure, softness, constants)
+
+
+def buckling(scene: Parts, numbers: Numbers | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Compression of the part of a strip beyond its pressure, and the compression that buckles it.
+
+    The latter is Euler's load of a column that the pressed part clamps and whose loaded end is
+    free, pi^2 E' (2H)^3/(48 l^2) over its length l (Timoshenko & Gere 1961, section 2.1).
+
+    Parameters
+    ----------
+    scene : scene without traced leaves
+    numbers : values by dotted key of the strips of a sweep; None is those of the scene
+
+    Returns
+    -------
+    compression : largest in the scene's cycles, force per unit width; under displacement control
+        that of a rigid clamp
+    limit : infinite if the pressure reaches the loaded end
+    """
+    numbers = numbers or scene.number
+    none = np.asarray(0.0), np.asarray(np.inf)
+    table, load = np.asarray(scene.contact.pressure, dtype=float), scene.load
+    if table.ndim == 0 or table[-1, 1] > 0.0 or load.cycles == 0:
+        return none
+    x, pressure = table.T
+    beyond = numbers("strip.length") - x[np.flatnonzero(pressure > 0.0)[-1] + 1]
+    if not np.all(beyond > 0.0):
+        return none
+    stretching = _stretching(scene.strip, numbers)
+    bending = stretching * (2.0 * numbers("strip.half_height")) ** 2 / 12.0
+    force = numbers("load.amplitude") * (1.0 if load.control == "force" else stretching / beyond)
+    return force, np.pi**2 * bending / (4.0 * beyond**2)
+
+
+def _stretching(strip: Strip, numbers: Numbers) -> np.ndarray:
+    """Stretching stiffness E' 2H, force per unit width."""
+    if strip.layers is not None:
+        return np.asarray(strip.stretching_stiffness)
+    return numbers("strip.axial_stiffness")
