@@ -23,6 +23,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from provenance import provenance
+from strip import in_load_steps
 from tqdm import tqdm
 
 import jbeamshell as jb
@@ -114,7 +115,7 @@ def runner(settings: tuple[tuple[str, Any], ...]) -> Callable[[jax.Array], jax.A
     given = {key: list(v) if isinstance(v, tuple) else v for key, v in settings}
     given.pop("single", None)
     tolerance = given.pop("tolerance", None)
-    base = jb.Scene().replace(given)
+    base = in_load_steps().replace(given)
 
     @jax.jit
     def run(numbers: jax.Array) -> jax.Array:
@@ -171,7 +172,7 @@ def cell(
 
 def doubts_beforehand(settings: Mapping[str, Any], point: Mapping[str, float]) -> int:
     """Number of doubts that the scene alone raises."""
-    base = jb.Scene().replace({key: v for key, v in settings.items() if "." in key})
+    base = in_load_steps().replace({key: v for key, v in settings.items() if "." in key})
     return len(reliability.doubts_of_scene(scene_of(base, list((STANDARD | point).values()))))
 
 
@@ -306,7 +307,7 @@ def random_points(seed: int, count: int) -> np.ndarray:
 
 def walked_in_pieces(point: Mapping[str, float]) -> bool:
     """True if a run that failed converges in smaller load steps."""
-    history = jb.solve(scene_of(jb.Scene(), list((STANDARD | point).values())), throw=False)
+    history = jb.solve(scene_of(in_load_steps(), list((STANDARD | point).values())), throw=False)
     return history.converged
 
 

@@ -17,6 +17,7 @@ jax.config.update("jax_enable_x64", True)
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from provenance import provenance  # noqa: E402
+from strip import in_load_steps  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify, plotting  # noqa: E402
@@ -38,7 +39,7 @@ def study(height_ratio: float, free: tuple[str, ...]) -> tuple[identify.Fit, dic
     truth = {"contact.friction": TRUE_FRICTION, "strip.height_ratio": height_ratio}
     start = {key: 1.5 * value for key, value in truth.items()} | {"contact.stick_stiffness": 30.0}
     begin = time.perf_counter()
-    scene = jb.Scene().replace(truth | {key: start[key] for key in free})
+    scene = in_load_steps().replace(truth | {key: start[key] for key in free})
     loops = example_loops(height_ratio)
     fit = identify.fit(loops, scene, free, throw=False)  # the record says how each ended
     bias = {key: fit.values[key] / truth[key] - 1.0 for key in truth if key in free}

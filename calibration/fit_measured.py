@@ -25,6 +25,7 @@ jax.config.update("jax_enable_x64", True)
 
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
+from strip import in_load_steps  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell import identify, plotting  # noqa: E402
@@ -71,7 +72,7 @@ def start(loop: Loop, normal: float, free: tuple[str, ...]) -> jb.Scene:
     # A steady loop starts at its upper turn: how far back until the force is gone?
     gone = int(np.argmax(loop.force < 0.0))
     stiffness = float(loop.force[0] / (loop.displacement[0] - loop.displacement[gone]))
-    scene = jb.Scene().replace(
+    scene = in_load_steps().replace(
         {
             "strip.length": 1.0,
             "strip.far_end": "free",

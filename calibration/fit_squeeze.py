@@ -20,6 +20,7 @@ jax.config.update("jax_enable_x64", True)
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from provenance import provenance  # noqa: E402
+from strip import in_load_steps  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -85,7 +86,7 @@ def planted(loops: list[Loop], height_ratio: float, seed: int) -> list[Loop]:
     random, own = np.random.default_rng(seed), []
     for loop in loops:
         peak = {"load.amplitude": float(loop.force.max()), "strip.height_ratio": height_ratio}
-        force, displacement = map(np.asarray, jb.solve(jb.Scene().replace(peak)).loop)
+        force, displacement = map(np.asarray, jb.solve(in_load_steps().replace(peak)).loop)
         noise = NOISE * np.ptp(displacement) * random.standard_normal(displacement.size)
         own.append(make_loop(force, displacement + noise, loop.label))
     return own
@@ -94,7 +95,7 @@ def planted(loops: list[Loop], height_ratio: float, seed: int) -> list[Loop]:
 def fit_loops(loops: list[Loop], height_ratio: float, free: tuple[str, ...] = FREE) -> dict:
     """Fit that starts at 1.5 times height and friction, and at kappa_s = 1."""
     start = dict(zip(FREE, (0.15, 1.5 * height_ratio, 1.0), strict=True))
-    scene = jb.Scene().replace({key: start[key] for key in free})
+    scene = in_load_steps().replace({key: start[key] for key in free})
     begin = time.perf_counter()
     fit = identify.fit(loops, scene, free, throw=False)  # the record says how each ended
     relative = np.array([fit.errors[key] / fit.values[key] for key in free])

@@ -21,6 +21,7 @@ jax.config.update("jax_enable_x64", True)
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from provenance import provenance  # noqa: E402
+from strip import in_load_steps  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -54,7 +55,7 @@ def specimen(height_ratio: float, values: dict[str, float]) -> identify.Specimen
     """Strip with its curve; linear kinematics change the dissipation by 0.1 %."""
     base = {"model.kinematics": "linear", "strip.height_ratio": height_ratio}
     return identify.Specimen(
-        jb.Scene().replace(base | values), curve(height_ratio)[0], f"eta = {height_ratio:g}"
+        in_load_steps().replace(base | values), curve(height_ratio)[0], f"eta = {height_ratio:g}"
     )
 
 

@@ -18,6 +18,7 @@ jax.config.update("jax_enable_x64", True)
 import equinox as eqx  # noqa: E402
 import numpy as np  # noqa: E402
 from provenance import provenance  # noqa: E402
+from strip import in_load_steps  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -59,7 +60,7 @@ def truth() -> dict[tuple[float, float], float]:
 def ratios(order: int) -> np.ndarray:
     """Dissipation over the cubic law on all cells, (16,)."""
     base = {"model.rung": f"p{order}", "model.nodes": 81, "model.end_size": 1.0 / 12.0}
-    scene = jb.Scene().replace(base | {"model.kinematics": "linear"})
+    scene = in_load_steps().replace(base | {"model.kinematics": "linear"})
 
     @eqx.filter_jit
     def one(eta, amplitude):

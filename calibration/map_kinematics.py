@@ -37,6 +37,7 @@ from matplotlib.colors import LogNorm  # noqa: E402
 from provenance import provenance  # noqa: E402
 from scipy.optimize import minimize  # noqa: E402
 from scipy.stats import qmc  # noqa: E402
+from strip import in_load_steps  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -83,7 +84,7 @@ LEAST = 1e-4  # a smaller difference is none
 def scene_of(strip: Any, model: str, kinematics: str) -> jb.Scene:
     """Strip of five numbers, with L = 2 and E' 2H = 1."""
     strain, eta, gross, mu, nu = strip
-    return jb.Scene().replace(
+    return in_load_steps().replace(
         {
             "strip.axial_stiffness": 1.0,
             "strip.height_ratio": eta,
@@ -263,7 +264,7 @@ def draw_map(cells: list[list[Any]], axes: plt.Axes) -> None:
     axes.clabel(lines, fmt=lambda level: f"{10.0**level:g} %", fontsize=9, manual=LABELS)
     failed = np.ma.masked_equal((c["state"] != "ok").reshape(shape).T, False)
     axes.pcolor(strain, eta, failed, hatch="////", facecolor="none", shading="nearest")
-    standard = jb.Scene()
+    standard = in_load_steps()
     load = standard.load.amplitude / standard.strip.stretching_stiffness
     place = float(load), float(standard.strip.height_ratio)
     axes.plot(*place, "*", color="w", markeredgecolor="k", markersize=14.0)

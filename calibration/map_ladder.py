@@ -24,6 +24,7 @@ jax.config.update("jax_enable_x64", True)
 
 import numpy as np  # noqa: E402
 from provenance import provenance  # noqa: E402
+from strip import in_load_steps  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -66,7 +67,7 @@ def strips() -> dict[str, np.ndarray]:
 
 def scene_of(candidate: Candidate, eta=0.1, amplitude=1.0, mu=0.1, nu=0.3) -> jb.Scene:
     """Strip with mu F_N = 1, as in the table."""
-    return jb.Scene().replace(
+    return in_load_steps().replace(
         {
             "strip.axial_stiffness": STIFFNESS,
             "model.kinematics": "linear",

@@ -27,6 +27,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 from provenance import provenance  # noqa: E402
 from scipy import stats  # noqa: E402
+from strip import in_load_steps  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -59,7 +60,7 @@ def clean_loops() -> list[Loop]:
     """Steady loops of the strip."""
     loops = []
     for amplitude in AMPLITUDES:
-        scene = jb.Scene().replace(MODEL | TRUTH | {"load.amplitude": amplitude})
+        scene = in_load_steps().replace(MODEL | TRUTH | {"load.amplitude": amplitude})
         loops.append(make_loop(*map(np.asarray, jb.solve(scene).loop), f"A = {amplitude:g}"))
     return loops
 
@@ -79,7 +80,7 @@ def noisy(loops: list[Loop], noise: float, seed: int) -> list[Loop]:
 def recovered(noise: float, seed: int) -> dict:
     """Estimates and errors of one fit, and if its intervals and likelihoods hold the truth."""
     loops = noisy(clean_loops(), noise, seed)
-    scene = jb.Scene().replace(MODEL | START | {"load.amplitude": max(AMPLITUDES)})
+    scene = in_load_steps().replace(MODEL | START | {"load.amplitude": max(AMPLITUDES)})
     fit = identify.fit(loops, scene, tuple(TRUTH), throw=False)
     figures = {
         "values": fit.values,

@@ -22,6 +22,7 @@ jax.config.update("jax_enable_x64", True)
 import jbeamshell as jb  # noqa: E402
 from calibration.finite_elements import program, solve  # noqa: E402
 from calibration.provenance import provenance  # noqa: E402
+from calibration.strip import in_load_steps  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.measured.example import data_folder  # noqa: E402
 from jbeamshell.scene import library  # noqa: E402
@@ -54,7 +55,7 @@ def timed(scene: jb.Scene, **options: Any) -> tuple[jb.History, dict[str, Any]]:
 def loop(height_ratio: float, amplitude: float, elements: str) -> dict[str, Any]:
     """One loop against the data."""
     change = {"strip.height_ratio": height_ratio, "load.amplitude": amplitude} | CYCLE
-    history, took = timed(jb.Scene().replace(change), elements=elements)
+    history, took = timed(in_load_steps().replace(change), elements=elements)
     dissipation, area = float(history.dissipation), float(history.dissipation_loop)
     there = reference()[height_ratio, amplitude]
     return {

@@ -16,6 +16,7 @@ import numpy as np
 
 import jbeamshell as jb
 from calibration.methods.strips import stiffness_of_section
+from calibration.strip import in_load_steps
 from jbeamshell.mechanics.kinematics import FIELDS, linear_strains
 
 GAUSS = 0.5 + 0.5 / np.sqrt(3.0) * np.array([-1.0, 1.0])
@@ -69,7 +70,7 @@ def cantilever(height_ratio: float, name: str, nodes: int = 21, **strip: Any) ->
     The exact one is L^3/(3D) + L/(2 kappa G H), with psi = -nu' e = 0 at mid-height.
     """
     values = {f"strip.{key}": value for key, value in strip.items()}
-    scene = jb.Scene().replace({"strip.height_ratio": height_ratio} | values)
+    scene = in_load_steps().replace({"strip.height_ratio": height_ratio} | values)
     length, section = float(scene.strip.length), stiffness_of_section(scene)
     x = np.linspace(0.0, length, nodes)
     load = np.zeros(len(FIELDS) * nodes)
@@ -84,7 +85,7 @@ def squeezed(elements_per_height: float, name: str, kappa_s: float = 0.44) -> fl
 
     It is in parts of the squeeze under the load, 0 without oscillation; elements are over H.
     """
-    scene = jb.Scene().replace({"strip.kappa_s": kappa_s, "strip.half_height": 1.0 / 8.0})
+    scene = in_load_steps().replace({"strip.kappa_s": kappa_s, "strip.half_height": 1.0 / 8.0})
     half_height, length = float(scene.strip.half_height), float(scene.strip.length)
     count = 2 * round(0.5 * length / half_height * elements_per_height)
     x = np.linspace(0.0, length, count + 1)

@@ -18,6 +18,7 @@ import numpy as np
 from jax import Array, lax
 
 import jbeamshell as jb
+from calibration.strip import in_load_steps
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.quasistatic.system import LoadLevel, Prescribed, System, V
@@ -232,7 +233,7 @@ def random_strips(count: int, seed: int = 5) -> list[dict[str, float]]:
 
 def runner(name: str) -> Callable[[dict[str, float]], Run]:
     """A compiled run of a method, from the values of a strip."""
-    base = jb.Scene().replace(SMALL)
+    base = in_load_steps().replace(SMALL)
 
     def library(values: dict[str, float]) -> Run:
         history = jb.solve(base.replace(values), throw=False)
@@ -265,7 +266,7 @@ class Tally(NamedTuple):
 
 def bar_dissipation(values: Mapping[str, float]) -> float:
     """Dissipation of the one-dimensional bar."""
-    scene = jb.Scene().replace(dict(values))
+    scene = in_load_steps().replace(dict(values))
     rubs = scene.contact.friction * scene.contact.pressure
     return float(cubic_law(scene.load.amplitude, scene.strip.stretching_stiffness, rubs))
 

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jbeamshell as jb
+from calibration.strip import in_load_steps
 from jbeamshell.scene import library
 
 LINEAR = {"model.kinematics": "linear"}
@@ -35,7 +36,7 @@ def scene_of(name: str, nodes: int = 81, **load: int) -> jb.Scene:
     counts = {f"load.{key}": value for key, value in load.items()}
     if name == CLAMP:
         return library.receding_rough().replace(LINEAR | {"model.nodes": 2 * nodes} | counts)
-    return jb.Scene().replace(STRIPS[name] | LINEAR | {"model.nodes": nodes} | counts)
+    return in_load_steps().replace(STRIPS[name] | LINEAR | {"model.nodes": nodes} | counts)
 
 
 @eqx.filter_jit

@@ -17,6 +17,7 @@ from jbeamshell.history.figures import CycleFigures
 from jbeamshell.history.profiles import Profiles
 from jbeamshell.history.reliability import doubts_of_run
 from jbeamshell.history.saved import write_history
+from jbeamshell.scene import choice
 
 FIGURES = (
     "dissipation",
@@ -107,10 +108,11 @@ class History(Profiles, ContactLine, CycleFigures):
             f"{self.force.size} levels of {' '.join(self.scene.model.fields)} on "
             f"{self.x.size} nodes, eta = {float(strip.height_ratio):.4g}, {what}"
         )
+        chosen = choice.in_words(self.scene)
         figures = self.figures()
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
         rows = [(name.replace("_", " "), in_words(value)) for name, value in figures.items()]
-        return Summary(title, rows, doubts)
+        return Summary("\n".join(filter(None, (title, chosen))), rows, doubts)
 
     def __str__(self) -> str:
         return self._summary.as_text()
@@ -135,7 +137,7 @@ class History(Profiles, ContactLine, CycleFigures):
         """
         solution = self.scene.model.solution
         fix = "keeps no state of the contact from which to go on: take 'stepwise'"
-        require("model.solution", solution, solution == "stepwise", fix)
+        require("model.solution", solution, self.scene.model.walks, fix)
         if self.end is None:
             raise InputError("history: was made by hand and has no end to continue: solve it")
         further: History = self.end.continued(self, path, **options)

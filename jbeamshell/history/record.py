@@ -42,7 +42,7 @@ class Record(eqx.Module):
     status : (steps+1,) codes of `jbeamshell.Status`
     cycles : steps at the start, the turn and the end of each closed cycle
     target : (steps+1,) prescribed value of the controlled load
-    end : end of the path, for `continued`; None unless it was solved step by step
+    end : end of the path, for `continued`; None for Masing's rule and the bar's closed form
     """
 
     scene: Scene

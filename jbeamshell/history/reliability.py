@@ -16,8 +16,8 @@ import jax
 import numpy as np
 from jax import Array
 
-from jbeamshell.scene.linearisation import NEAR_BUCKLING, buckling, linear_error
 from jbeamshell.mechanics.friction import coulomb_cap
+from jbeamshell.scene.linearisation import NEAR_BUCKLING, buckling, linear_error
 from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 

@@ -45,7 +45,7 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
         "result.json": as_json(figures),
     }
     with contextlib.suppress(InputError):
-        texts["scene.toml"] = scene_to_toml(history.scene)
+        texts["scene.toml"] = scene_to_toml(history.scene.pinned())
     scene, drawn = history.scene, {}
     if history.force.size > history.pressed + 1:
         drawn["loop.png"] = history.plot()

@@ -37,7 +37,7 @@ def write_history(history: Any, path: str | os.PathLike[str]) -> None:
     """
     about = {
         "format": FORMAT,
-        "scene": scene_to_toml(history.scene),
+        "scene": scene_to_toml(history.scene.pinned()),
         "dtype": history.x.dtype.name,
         "cycles": history.cycles,
     }

@@ -15,10 +15,10 @@ import numpy as np
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import InputError, UnconvergedError
-from jbeamshell.scene.linearisation import linear_error
 from jbeamshell.ladder import error_map
 from jbeamshell.ladder.candidates import CANDIDATES, ORDERED
 from jbeamshell.ladder.climb import PLANE, Option, climb
+from jbeamshell.scene.linearisation import linear_error
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
 

@@ -17,9 +17,9 @@ import numpy as np
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import DoubtfulWarning, InputError, UnconvergedError
-from jbeamshell.scene.linearisation import linear_error
 from jbeamshell.mechanics.elements import ORDER
 from jbeamshell.quasistatic.solver import compile_for, solve
+from jbeamshell.scene.linearisation import linear_error
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.rungs import PLANE_NODES
 from jbeamshell.scene.scene import Scene

@@ -68,18 +68,8 @@ class PathEnd(eqx.Module):
         if not bool(self.state.converged):
             raise InputError("history: its last step found no equilibrium: go on from one that did")
         scene, solver = history.scene, solver or Newton()
-        whole, _ = check(scene, path)
-        pressing, half = scene.load.pressure_steps, scene.load.steps_per_half_cycle
-        begun = pressing
-        if path is None:
-            last, amplitude = float(self.state.target), float(scene.load.amplitude)
-            require("path", None, scene.load.cycles > 0, "the scene has no cycles: give the loads")
-            fix = (
-                f"the last load is {last:.6g}, not load.amplitude = {amplitude:.6g}: give the loads"
-            )
-            require("path", None, last == amplitude, fix)
-            begun += max(half // 2, 1)
-        further: LoadPath = jax.tree.map(lambda column: np.asarray(column)[begun:], whole)
+        pressing = scene.load.pressure_steps
+        further = further_path(scene, float(self.state.target), path)
         # A single step would be compiled without a loop and rounded differently.
         count, least = further.target.size, max(further.target.size, 2)
         walked: LoadPath = jax.tree.map(
@@ -105,6 +95,20 @@ class PathEnd(eqx.Module):
         if throw:
             warn_of_doubts(result, stacklevel=3)
         return result
+
+
+def further_path(scene: Scene, last: float, path: ArrayLike | None) -> LoadPath:
+    """Loads that follow the last one; None is the scene's own cycles once more."""
+    whole, _ = check(scene, path)
+    begun, half = scene.load.pressure_steps, scene.load.steps_per_half_cycle
+    if path is None:
+        amplitude = float(scene.load.amplitude)
+        require("path", None, scene.load.cycles > 0, "the scene has no cycles: give the loads")
+        fix = f"the last load is {last:.6g}, not load.amplitude = {amplitude:.6g}: give the loads"
+        require("path", None, last == amplitude, fix)
+        begun += max(half // 2, 1)
+    further: LoadPath = jax.tree.map(lambda column: np.asarray(column)[begun:], whole)
+    return further
 
 
 def with_end(history: History, steps: StepResults) -> History:

@@ -13,10 +13,10 @@ from jax import Array
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.history.history import History
-from jbeamshell.scene.linearisation import buckling
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.path_state import StepResults
 from jbeamshell.quasistatic.system import System
+from jbeamshell.scene.linearisation import buckling
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 

@@ -21,6 +21,7 @@ from jbeamshell.history.saved import FORMAT, named_arrays, without_scene
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.quasistatic.continuation import PathEnd
 from jbeamshell.quasistatic.path_state import initial_state
+from jbeamshell.quasistatic.solver import WholePath
 from jbeamshell.scene.toml import scene_from_values
 
 # Names of a history's arrays, by what their axes run along.
@@ -95,5 +96,7 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     }
     cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])
     stepwise = scene.model.solution == "stepwise"
-    end = PathEnd(eqx.filter_eval_shape(initial_state, scene)) if stepwise else None
+    end: Any = PathEnd(eqx.filter_eval_shape(initial_state, scene)) if stepwise else None
+    if scene.model.condensed:
+        end = WholePath()
     return History(scene=scene, cycles=cycles, end=end, **shapes)

@@ -16,7 +16,7 @@ from jbeamshell.condensed.solve import Cycles
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.continuation import with_end
+from jbeamshell.quasistatic.continuation import further_path, with_end
 from jbeamshell.quasistatic.masing import bar_cycles, masing
 from jbeamshell.quasistatic.outcome import (
     ADVICE,
@@ -130,12 +130,14 @@ def _condensed(
     traced = is_traced(scene, path) or is_staged()
     events = method is Method.NEWTON or (traced and method is None)
     history = solve_condensed(scene, path, cycles, nested=not events, own=own)
+    history = dataclasses.replace(history, end=WholePath())
     if traced:
         failed, fix = history.status[-1] != Status.CONVERGED, "take other model.nodes"
         message = f"the events of a load step come to no end: {fix}"
         return eqx.error_if(history, failed, message) if throw else history
     if not history.converged:
-        history = solve_condensed(scene, path, cycles, own=own)
+        again = solve_condensed(scene, path, cycles, own=own)
+        history = dataclasses.replace(again, end=history.end)
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
         load = float(path.target[step])
@@ -145,6 +147,26 @@ def _condensed(
     if throw:
         warn_of_doubts(history, stacklevel=STACK + 1)
     return history
+
+
+class WholePath(eqx.Module):
+    """End of a path on the contact line: to go on, the whole path is walked anew."""
+
+    def continued(
+        self,
+        history: History,
+        path: ArrayLike | None = None,
+        *,
+        solver: Newton | None = None,
+        throw: bool = True,
+    ) -> History:
+        """History with further loads; see `PathEnd.continued`."""
+        scene, before = history.scene, np.asarray(history.target)[history.pressed + 1 :]
+        further = further_path(scene, float(before[-1]) if before.size else 0.0, path)
+        whole = bool(np.all(further.pressure == 1.0))
+        fix = f"must stay as they are for model.rung = {scene.model.rung}: take 'stepwise'"
+        require("path", "pressures", whole, fix)
+        return solve(scene, np.append(before, further.target), solver=solver, throw=throw)
 
 
 def compile_for(

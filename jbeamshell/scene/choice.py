@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from jbeamshell.common.checks import is_traced
@@ -47,9 +48,12 @@ class Grid(NamedTuple):
     order: float
 
 
+MOST_CONDENSED = 129  # nodes, beyond which events cost more than load steps
 KNOWN = 0.005  # tolerance for which the grids were measured
-CONTACT_LINE = Grid(65, END_SIZE / 2.0, 1.5)
+CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0)
 PLANE = Grid(129, END_SIZE, 2.0)
+MOST_JUMPS = 4  # of the pressure that add nodes
+PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
 STEPWISE = Grid(161, END_SIZE, 1.5)
 
 
@@ -81,14 +85,16 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     if "end_size" in open_model:
         found["end_size"] = grid.end_size
     if "nodes" in open_model:
-        found["nodes"] = _nodes(grid, model.tolerance)
+        found["nodes"] = _nodes(grid, model.tolerance, scene.contact.jumps)
     steps = {"steps_per_half_cycle": STEPS} if "steps_per_half_cycle" in open_load else {}
     return steps, found
 
 
-def _nodes(grid: Grid, tolerance: float) -> int:
+def _nodes(grid: Grid, tolerance: float, jumps: int) -> int:
     """Odd number of nodes of a grid for a tolerance."""
     elements = (grid.nodes - 1) * (KNOWN / tolerance) ** (1.0 / grid.order)
+    if grid is CONTACT_LINE:
+        elements *= 1.0 + PER_STEP * min(jumps, MOST_JUMPS)
     return 2 * int(np.ceil(elements / 2.0)) + 1
 
 
@@ -102,16 +108,33 @@ def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     if not bounded or load.control not in CONTROLS:
         return "exact"
     elastic = model.order > 0 or model.solution == "plane"
-    error = linear_errors(strip, load, elastic, numbers or scene.number)
-    force, limit = buckling(scene, numbers)
+    with jax.ensure_compile_time_eval():  # numbers stay numbers within a caller's jit
+        error = linear_errors(strip, load, elastic, numbers or scene.number)
+        force, limit = buckling(scene, numbers)
     small = np.nanmax(error) <= LINEAR_PART * model.tolerance
     return "linear" if small and not np.any(force >= NEAR_BUCKLING * limit) else "exact"
 
 
 def may_condense(scene: Parts) -> bool:
-    """True if a strip with linear kinematics can be solved on its contact line."""
+    """True if a strip with linear kinematics can be solved on its contact line, and soon."""
     contact, load, model = scene.contact, scene.load, scene.model
+    few = "nodes" in model.open or model.nodes <= MOST_CONDENSED
     section = "beta" in model.fields and model.squeeze == "field" and scene.energy is None
     base = contact.normal == "rigid" and isinstance(contact.law, SharpSlip)
     straight = scene.strip.curvature is None and model.grid == "finite-difference"
-    return section and base and straight and load.control in CONTROLS and load.cycles > 0
+    return few and section and base and straight and load.control in CONTROLS and load.cycles > 0
+
+
+def in_words(scene: Parts) -> str:
+    """What a scene has chosen, in one line; empty if it left nothing open."""
+    load, model = scene.load, scene.model
+    shown = {
+        "solution": f"rung {model.rung}",
+        "kinematics": f"{model.kinematics} kinematics",
+        "nodes": f"{model.nodes} nodes",
+        "steps_per_half_cycle": f"{load.steps_per_half_cycle} steps per half cycle",
+    }
+    found = [words for name, words in shown.items() if name in (*model.open, *load.open)]
+    if not found:
+        return ""
+    return f"chosen for a tolerance of {100.0 * model.tolerance:g} %: {', '.join(found)}"

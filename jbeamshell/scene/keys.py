@@ -15,7 +15,7 @@ from typing import ClassVar
 from jax import Array
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.mechanics.elements import END_SIZE, ORDER
+from jbeamshell.mechanics.elements import ORDER
 from jbeamshell.mechanics.friction import LAWS
 from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES
 from jbeamshell.mechanics.kinematics import KINEMATICS

@@ -143,6 +143,11 @@ class Contact(ContactKeys):
         """Largest pressure F_N on the top face."""
         return jnp.max(self.pressure[:, 1]) if self.pressure.ndim else self.pressure
 
+    @property
+    def jumps(self) -> int:
+        """Number of rows of the pressures' tables at which they may jump; 0 if they are uniform."""
+        return sum(p.shape[0] - 1 for p in (self.pressure, self.bottom_pressure) if p.ndim == 2)
+
     def steps(self, length: Array) -> Array | None:
         """Positions X at which a pressure jumps, rising; None if both pressures are uniform.
 

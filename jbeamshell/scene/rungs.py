@@ -94,13 +94,16 @@ def name_of(fields: Sequence[str], order: int, solution: str) -> str:
     return solution if masing and section == "squeeze" else f"{solution}-{section}"
 
 
-def spelled_out(values: dict[str, Any], fields: Sequence[str] = ()) -> dict[str, Any]:
+def spelled_out(
+    values: dict[str, Any], fields: Sequence[str] = (), solution: str = AUTO
+) -> dict[str, Any]:
     """Values by dotted key, with ``model.rung`` replaced by the keys that it sets.
 
     Parameters
     ----------
     values : values by dotted key
     fields : fields of the model that is changed; with w among them, the rung has w too
+    solution : its solution; if it is "stepwise", a section's own name keeps it
 
     Raises
     ------
@@ -116,7 +119,7 @@ def spelled_out(values: dict[str, Any], fields: Sequence[str] = ()) -> dict[str,
         other = values.get(key, value)
         same = tuple(other) == value if isinstance(other, list | tuple) else other == value
         if value == AUTO:
-            meant[key] = other
+            meant[key] = other if key in values or solution != "stepwise" else solution
         elif not same:
             rotates = f", or take {general_rung(rung)}, which rotates"
             fix = "give one" + (rotates if key == "model.kinematics" else "")

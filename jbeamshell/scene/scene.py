@@ -259,7 +259,8 @@ class Scene(eqx.Module):
             check_word(key, value)
             if DERIVED.get(key) in values:
                 raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")
-        values = spelled_out(dict(values), self.model.given("fields"))
+        given = self.model.given("fields"), self.model.given("solution")
+        values = spelled_out(dict(values), *given)
         parts: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
         for key, value in values.items():
             if key not in DERIVED:
@@ -288,7 +289,6 @@ class Scene(eqx.Module):
             strip = _with_youngs_modulus(scene.strip, values["strip.youngs_modulus"])
             scene = dataclasses.replace(scene, strip=strip)
         return scene
-
 
     def pinned(self, numbers: Numbers | None = None) -> Scene:
         """Copy whose settings are given as they were chosen, so that no change chooses others.

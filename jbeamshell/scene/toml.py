@@ -64,7 +64,11 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_to_toml(scene: Scene) -> str:
-    """TOML text of a scene; `read_scene` makes the same scene of it, to the last bit."""
+    """TOML text of a scene; `read_scene` makes the same scene of it, to the last bit.
+
+    Settings that the scene left open are written as such; write ``scene.pinned()`` to keep what
+    was chosen.
+    """
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     if scene.energy is not None or not isinstance(law_name(scene.contact.law), str):
         raise InputError(
@@ -75,7 +79,7 @@ def scene_to_toml(scene: Scene) -> str:
         if key in DERIVED or key == "model.rung":
             continue
         section, name = key.split(".")
-        value = scene.get(key)
+        value = dict(getattr(scene, section).as_given).get(name, scene.get(key))
         if value is None:  # such as no layers
             continue
         if key in NUMBERS:

@@ -7,6 +7,7 @@ import pytest
 import scipy.integrate
 import scipy.linalg
 import scipy.optimize
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import dynamics
@@ -24,7 +25,7 @@ RHO = 2.5
 
 
 def scene(**values):
-    return jb.Scene().replace(LINEAR | {k.replace("__", "."): v for k, v in values.items()})
+    return STRIP.replace(LINEAR | {k.replace("__", "."): v for k, v in values.items()})
 
 
 def stuck(scene, shear=True):
@@ -131,7 +132,7 @@ def test_the_mass_of_layers_adds_up():
 
 
 def test_exact_kinematics_keep_energy_and_momentum_of_a_turning_section():
-    strip = jb.Scene().replace({"model.nodes": 11})
+    strip = STRIP.replace({"model.nodes": 11})
     mass = build(
         strip, dynamics.Inertia(RHO), dynamics.AttachedMasses(3.0), dynamics.Excitation()
     ).mass

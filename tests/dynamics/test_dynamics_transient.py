@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import dynamics, identify, plotting
@@ -15,7 +16,7 @@ HEAVY = 20.0
 
 
 def scene(**values):
-    return jb.Scene().replace(LINEAR | {k.replace("__", "."): v for k, v in values.items()})
+    return STRIP.replace(LINEAR | {k.replace("__", "."): v for k, v in values.items()})
 
 
 def heavy(strip):
@@ -116,7 +117,7 @@ def speed_between(motion, signals, places):
 @pytest.mark.parametrize("wave", ["axial", pytest.param("shear", marks=pytest.mark.slow)])
 def test_fronts_run_at_the_speeds_of_waves(wave):
     axial = wave == "axial"
-    strip = jb.Scene().replace(
+    strip = STRIP.replace(
         LINEAR
         | {
             "model.nodes": 401,

@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import dynamics
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.release import LIGHT, let_go
 
-SCENE = jb.Scene().replace({"model.rung": "plane", "model.nodes": 33})
+SCENE = STRIP.replace({"model.rung": "plane", "model.nodes": 33})
 CYCLES = 20.0
 
 
@@ -76,14 +77,14 @@ class TestLetGo:
         assert let_go(SCENE, 1.0, payload=1.0, cycles=CYCLES, whole=False).light
 
     def test_a_strip_without_a_network_is_refused_where_one_is_asked_for(self):
-        smooth = jb.Scene().replace({"contact.smoothing": 8.0, "model.nodes": 11})
+        smooth = STRIP.replace({"contact.smoothing": 8.0, "model.nodes": 11})
         with pytest.raises(jb.InputError, match=r"whole = False.*has no network"):
             let_go(smooth, 1.0, whole=False)
 
     @pytest.mark.slow
     def test_the_strips_inertia_lowers_frequency_and_damping_as_said(self):
         fine = {"model.kinematics": "linear", "model.nodes": 41, "model.end_size": 0.0278}
-        strip = jb.Scene().replace(fine)
+        strip = STRIP.replace(fine)
         strip_mass = 2.0 * float(strip.strip.half_height * strip.strip.length)
         curves = {}
         for times in (1000.0, 10.0):

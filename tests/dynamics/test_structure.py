@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.sparse
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import dynamics
@@ -18,7 +19,7 @@ JOINT = Joint(U, np.tanh(U))
 FINE = np.linspace(0.0, 1.0, 401)[1:] ** 2 / 2.0
 BAR = Joint(FINE, np.sqrt(2.0 * FINE))
 
-PLANE = jb.Scene().replace({"model.rung": "plane", "model.nodes": 33})
+PLANE = STRIP.replace({"model.rung": "plane", "model.nodes": 33})
 LOADS = [0.5, 1.0, 0.6, -0.2, -0.6, -0.2, 0.2, -0.3, -0.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.1]
 
 
@@ -89,7 +90,7 @@ class TestJoint:
         assert np.allclose(np.diff(np.log2(left)), -2.0, atol=0.1)
 
     def test_a_bar_keeps_its_walked_backbone(self):
-        bar = jb.Scene().replace({"model.rung": "stepwise-bar", "model.nodes": 101})
+        bar = STRIP.replace({"model.rung": "stepwise-bar", "model.nodes": 101})
         joint = Joint.of(bar, 1.2)
         assert joint.network is None
         u = 0.5 * float(joint.displacement[-1])
@@ -98,7 +99,7 @@ class TestJoint:
 
     @pytest.mark.slow
     def test_a_strip_gives_its_mean_backbone(self):
-        strip = jb.Scene().replace({"model.kinematics": "linear", "model.nodes": 21})
+        strip = STRIP.replace({"model.kinematics": "linear", "model.nodes": 21})
         joint = Joint.of(strip, 1.0, width=2.0)
         loop = jb.solve(strip.replace({"load.amplitude": 1.0}))
         u = float(loop.peak_displacement)
@@ -226,9 +227,7 @@ REFUSED = {
     ),
     "traced bar": (
         lambda: jax.jit(
-            lambda mu: Joint.of(
-                jb.Scene().replace({"model.rung": "bar", "contact.friction": mu}), 0.1
-            )
+            lambda mu: Joint.of(STRIP.replace({"model.rung": "bar", "contact.friction": mu}), 0.1)
         )(0.2),
         "scene = 'traced'.*plane",
     ),

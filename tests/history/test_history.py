@@ -1,6 +1,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.numerics.cycles import branch_work, closed_cycles, turning_points
@@ -31,7 +32,7 @@ def test_cycles_are_found_in_any_path(path, turns, cycles):
 
 
 def test_figures_of_the_standard_strip():
-    history = jb.solve(jb.Scene())
+    history = jb.solve(STRIP)
     force, displacement = map(np.asarray, history.loop)
     assert force.size == 81
     assert float(history.dissipation) == pytest.approx(
@@ -54,7 +55,7 @@ def test_figures_of_the_standard_strip():
 
 def test_a_path_without_a_cycle_has_no_dissipation_per_cycle():
     coarse = {"model.nodes": 41, "model.kinematics": "linear", "load.steps_per_half_cycle": 4}
-    history = jb.solve(jb.Scene().replace(coarse), np.linspace(0.1, 0.6, 18))
+    history = jb.solve(STRIP.replace(coarse), np.linspace(0.1, 0.6, 18))
     with pytest.raises(jb.InputError, match="no closed cycle"):
         _ = history.dissipation
     assert float(jnp.sum(history.slip_work)) > 0.0
@@ -65,7 +66,7 @@ def test_energy_balances_at_every_step():
     """External work is stored or dissipated, up to the second order of the load step."""
     worst = []
     for steps in (40, 80):
-        scene = jb.Scene().replace({"model.nodes": 41, "load.steps_per_half_cycle": steps})
+        scene = STRIP.replace({"model.nodes": 41, "load.steps_per_half_cycle": steps})
         history = jb.solve(scene)
         worst.append(float(jnp.max(jnp.abs(history.energy_imbalance)) / history.dissipation))
     assert worst[1] < 1e-3

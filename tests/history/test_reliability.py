@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from calibration.charts.failures import outcome
@@ -59,7 +60,7 @@ def check_random_scenes(count, settings, in_vain):
 
     @jax.jit
     def run(values):
-        scene = jb.Scene().replace(settings | dict(zip(KEYS, values, strict=True)))
+        scene = STRIP.replace(settings | dict(zip(KEYS, values, strict=True)))
         history = jb.solve(scene, throw=False)
         found = (
             history.dissipation_ratio,
@@ -100,7 +101,7 @@ def test_the_recorded_scenes_hold_no_silent_failure(name, least):
 
 
 def test_a_doubtful_run_warns_with_the_fix():
-    scene = jb.Scene().replace(LITTLE | COARSE)
+    scene = STRIP.replace(LITTLE | COARSE)
     with pytest.warns(jb.DoubtfulWarning, match=r"off by about \d+ %: few nodes do .*end_size"):
         history = jb.solve(scene)
     assert history.figures()["doubts"] == list(history.doubts)
@@ -114,14 +115,14 @@ def test_a_doubtful_run_warns_with_the_fix():
 def test_the_standard_strip_is_beyond_doubt():
     with warnings.catch_warnings():
         warnings.simplefilter("error", jb.DoubtfulWarning)
-        history = jb.solve(jb.Scene())
+        history = jb.solve(STRIP)
     assert history.doubts == ()
     assert 1e-3 < float(history.dissipation_error) < TOLERANCE
 
 
 @pytest.mark.slow
 def test_the_estimate_falls_with_the_elements():
-    scene = jb.Scene().replace({"load.amplitude": 0.3} | COARSE)
+    scene = STRIP.replace({"load.amplitude": 0.3} | COARSE)
     sizes = (1.0 / 6.0, 1.0 / 24.0, 1.0 / 96.0)
     runs = [jb.solve(scene.replace({"model.end_size": size})) for size in sizes]
     grid = [float(reliability.dissipation_errors(run.slip_cycle)[0]) for run in runs]
@@ -130,10 +131,10 @@ def test_the_estimate_falls_with_the_elements():
 
 def test_where_nothing_slips_the_dissipation_is_doubted():
     tiny = {"load.amplitude": 1e-4, "contact.stick_stiffness": 2.0}
-    history = jb.solve(jb.Scene().replace(tiny | COARSE))
+    history = jb.solve(STRIP.replace(tiny | COARSE))
     assert np.isinf(history.dissipation_error)
     assert "nothing slips" in history.doubts[0]
-    frictionless = jb.Scene().replace({"contact.friction": 0.0} | COARSE)
+    frictionless = STRIP.replace({"contact.friction": 0.0} | COARSE)
     assert jb.solve(frictionless).doubts == ()
 
 
@@ -151,13 +152,13 @@ def test_where_nothing_slips_the_dissipation_is_doubted():
     ],
 )
 def test_what_a_scene_alone_makes_doubtful(changes, told):
-    doubts = reliability.doubts_of_scene(jb.Scene().replace(COARSE | changes))
+    doubts = reliability.doubts_of_scene(STRIP.replace(COARSE | changes))
     assert len(doubts) == (told is not None)
     assert all(told in doubt for doubt in doubts)
 
 
 def test_an_open_loop_and_a_failed_run_are_doubted():
-    history = jb.solve(jb.Scene().replace(COARSE))
+    history = jb.solve(STRIP.replace(COARSE))
     shifted = history.displacement.at[-1].add(0.01 * jnp.ptp(history.displacement))
     opened = jb.History(**(vars(history) | {"displacement": shifted}))
     assert any("does not close" in doubt for doubt in opened.doubts)
@@ -179,7 +180,7 @@ def test_the_command_line_passes_doubts_on(capsys):
 
 def test_a_thousand_cycles_neither_drift_nor_lose_energy():
     settings = {"model.nodes": 21, "load.cycles": 1000}
-    history = jb.solve(jb.Scene().replace(COARSE | settings))
+    history = jb.solve(STRIP.replace(COARSE | settings))
     ends = np.array([stop for _, _, stop in history.cycles])
     closed = np.asarray(history.displacement)[ends[1:]]
     assert np.max(np.abs(np.diff(closed))) < 1e-8 * np.ptp(np.asarray(history.displacement))
@@ -192,13 +193,14 @@ def test_a_thousand_cycles_neither_drift_nor_lose_energy():
 
 
 def test_single_precision_holds_what_it_can_and_refuses_the_rest():
-    shell = COARSE | {"model.fields": ["v", "beta"]}
+    shell = COARSE | {"model.fields": ["v", "beta"], "model.solution": "stepwise"}
     code = f"""
 import json, warnings
 import jbeamshell as jb
 from jbeamshell.quasistatic import recovery
 warnings.simplefilter("ignore", jb.DoubtfulWarning)
-found, scene = {{}}, jb.Scene().replace({shell!r})
+found = {{}}
+scene = jb.Scene().replace({shell!r})
 recovery.PIECES = (19,)  # as many as the path has steps: one shape to compile
 for tolerance in (1e-3, 1e-4, 1e-5, 1e-7):
     try:
@@ -210,7 +212,7 @@ print(json.dumps(list(found.values())))
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loose, usual, tight, beyond = json.loads(run.stdout)
-    exact = float(jb.solve(jb.Scene().replace(shell)).dissipation)
+    exact = float(jb.solve(STRIP.replace(shell)).dissipation)
     assert loose == ["float32", pytest.approx(exact, rel=2e-3)]
     assert usual == ["float32", pytest.approx(exact, rel=1e-3)]
     assert tight[0] == "UnconvergedError" or tight[1] == pytest.approx(exact, rel=5e-3)

@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.common import files
@@ -34,7 +35,7 @@ FIT_FILES = {"overlay.csv", "overlay.png", "residuals.png", "result.json", "scen
 
 @pytest.fixture(scope="module")
 def history():
-    return jb.solve(jb.Scene().replace(COARSE))
+    return jb.solve(STRIP.replace(COARSE))
 
 
 def pressed(history, steps, **values):
@@ -54,7 +55,7 @@ def result():
         [Loop(*random.standard_normal((2, n)) * 1e-7, label) for n, label in sizes]
         for sizes in [[(5, "A = 1, left"), (4, 'the "old" rig')]] * 2
     )
-    scene = jb.Scene().replace({"contact.friction": 1.0 / 3.0})
+    scene = STRIP.replace({"contact.friction": 1.0 / 3.0})
     values = {"contact.friction": 1.0 / 3.0}
     return Fit(
         scene, values, values, np.eye(1), 0.1, [0.1, 0.2], data, model, "converged", model_runs=5
@@ -171,7 +172,9 @@ def test_a_run_in_a_folder(history, tmp_path):
     assert (folder / "loop.csv").read_text() == report.loop_table(history)
     assert (folder / "profiles.csv").read_text().count("\n") == 1 + 4 * 21
     assert json.loads((folder / "result.json").read_text()) == history.figures()
-    assert jb.scene_to_toml(jb.read_scene(folder / "scene.toml")) == jb.scene_to_toml(history.scene)
+    assert jb.scene_to_toml(jb.read_scene(folder / "scene.toml")) == jb.scene_to_toml(
+        history.scene.pinned()
+    )
     assert (folder / "sections.csv").read_text().count("\n") == 1 + 4 * 20
     assert all(is_png(path) for path in folder.glob("*.png"))
 

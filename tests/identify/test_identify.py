@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import scipy.optimize
-from toy import KEYS, START, Formula, X, formula, readings, scene
+from toy import KEYS, START, STRIP, Formula, X, formula, readings, scene
 
 import jbeamshell as jb
 from jbeamshell import identify
@@ -239,7 +239,7 @@ def test_a_state_that_can_no_longer_be_written(tmp_path):
         ({"weights": (0.0,)}, r"weights = \[0.0\]: give one positive"),
         ({"scene": None}, "scene: give one"),
         ({"data": []}, "no measurement given"),
-        ({"data": [Specimen(jb.Scene(), [], "a")], "scene": None}, "data of specimen 'a': no meas"),
+        ({"data": [Specimen(STRIP, [], "a")], "scene": None}, "data of specimen 'a': no meas"),
         ({"data": np.arange(9.0)}, "a ndarray is no measurement: give a Loop, a Squeeze"),
         ({"data": [Specimen(scene(), readings())]}, "the specimens bring their own"),
         ({"data": [Specimen(scene(), readings()), readings()]}, "mixes specimens with measure"),
@@ -294,7 +294,7 @@ def test_filling_up_adds_nothing(monkeypatch):
 @pytest.fixture(scope="module")
 def planted():
     """The model's own steady loop, and where a fit of it starts."""
-    truth = jb.Scene().replace(MODEL)
+    truth = STRIP.replace(MODEL)
     history = jb.solve(truth)
     return history, truth.replace({MU: 0.13, ETA: 0.09})
 
@@ -350,7 +350,7 @@ def test_a_mixture_of_everything(tmp_path):
     """Loops of one strip under prescribed displacements, clamped harder at its far part."""
     clamped = [[0.0, 10.0], [1.4, 10.0], [1.4, 6.0], [2.0, 6.0]]
     drive = {"load.control": "displacement", "load.amplitude": 1.5e-5}
-    truth = jb.Scene().replace(MODEL | {"contact.pressure": clamped} | drive)
+    truth = STRIP.replace(MODEL | {"contact.pressure": clamped} | drive)
     history = jb.solve(truth)
     x = np.linspace(1.0, 1.9, 19)
     stress = np.interp(x, history.middles, history.squeeze_stress[history.pressed])
@@ -395,7 +395,7 @@ def test_a_mixture_of_everything(tmp_path):
 @pytest.mark.slow
 def test_finite_element_loops_are_recovered_with_small_bias():
     """True values mu = 0.1, eta = 0.1126; what remains is the model's error, not noise."""
-    start = jb.Scene().replace(
+    start = STRIP.replace(
         MODEL | {"model.nodes": 81, "contact.smoothing": "sharp", MU: 0.15, ETA: 0.2}
     )
     fit = identify.fit(example_loops(), start, FREE)

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import toy
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import identify
@@ -126,9 +127,9 @@ def test_curves_that_a_scene_cannot_answer():
 
 def test_what_is_no_measurement():
     with pytest.raises(jb.InputError, match="a ndarray is no measurement: give a Loop, a Squeeze"):
-        identify.fit(X, jb.Scene(), ("contact.friction",))
+        identify.fit(X, STRIP, ("contact.friction",))
     with pytest.raises(jb.InputError, match="no measurement given"):
-        identify.fit([], jb.Scene(), ("contact.friction",))
+        identify.fit([], STRIP, ("contact.friction",))
 
 
 @pytest.mark.parametrize(
@@ -185,11 +186,11 @@ def test_noise_belongs_to_the_column_that_answered():
     column = np.linspace(0.0, 1.0, 9)
     loop = Loop(column, column, "mean", noise=0.3, driver="displacement")
     with pytest.raises(jb.InputError, match=r"set load\.control to 'displacement'"):
-        observe(loop, jb.Scene())
+        observe(loop, STRIP)
 
 
 def test_a_free_zero_is_put_where_it_fits():
-    scene = jb.Scene().replace(
+    scene = STRIP.replace(
         FAST | {"model.nodes": 21, "load.steps_per_half_cycle": 8, "load.amplitude": 1.0}
     )
     loop = make_loop(*map(np.asarray, jb.solve(scene).loop))
@@ -211,11 +212,11 @@ def test_a_backbone_only_goes_on():
     with pytest.raises(
         jb.InputError, match=r"force = 0.2 turns back at point 3, but .*; give a Loop"
     ):
-        observe(up, jb.Scene())
-    down = observe(Backbone([-0.1, -0.2, -0.3], [-1.0, -2.0, -3.0]), jb.Scene())
+        observe(up, STRIP)
+    down = observe(Backbone([-0.1, -0.2, -0.3], [-1.0, -2.0, -3.0]), STRIP)
     assert np.all(np.diff(down.path) <= 0.0)
     with pytest.raises(jb.InputError, match="must stay below gross slip"):
-        observe(DissipationCurve([0.5, 5.0], [1.0, 1.0]), jb.Scene())
+        observe(DissipationCurve([0.5, 5.0], [1.0, 1.0]), STRIP)
 
 
 def test_a_trial_without_equilibrium_is_hopeless_where_it_is_compared():

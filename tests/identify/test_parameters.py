@@ -4,6 +4,7 @@ import hypothesis.strategies as st
 import numpy as np
 import pytest
 from hypothesis import given
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.identify.parameters import Parameter, as_parameters
@@ -116,7 +117,7 @@ def space_of(free, **scenes):
 
 
 def test_shared_and_own_values():
-    two = {label: jb.Scene().replace({"strip.kappa_s": k}) for label, k in (("a", 0.3), ("b", 0.6))}
+    two = {label: STRIP.replace({"strip.kappa_s": k}) for label, k in (("a", 0.3), ("b", 0.6))}
     free = (Parameter("strip.kappa_s", each=True), Parameter(MU, start=0.2))
     space, begun = space_of(free, **two)
     assert space.names == ("strip.kappa_s[a]", "strip.kappa_s[b]", MU)
@@ -125,7 +126,7 @@ def test_shared_and_own_values():
     assert float(begun["b"].contact.friction) == 0.2
     points = np.array([-1.0, 0.5, 2.0])
     np.testing.assert_allclose(space.point(space.values(points)), points)
-    assert space_of(free, alone=jb.Scene())[0].names == ("strip.kappa_s", MU)
+    assert space_of(free, alone=STRIP)[0].names == ("strip.kappa_s", MU)
 
 
 @pytest.mark.parametrize(
@@ -140,7 +141,7 @@ def test_shared_and_own_values():
     ],
 )
 def test_what_users_fit_starts_from_the_scene(key, expected):
-    space, _ = space_of(key, one=jb.Scene())
+    space, _ = space_of(key, one=STRIP)
     assert space.values([0.0])[0] == pytest.approx(expected, rel=1e-6)
 
 
@@ -156,16 +157,16 @@ def test_what_users_fit_starts_from_the_scene(key, expected):
 )
 def test_starts_that_make_no_sense(free, message):
     with pytest.raises(jb.InputError, match=message):
-        space_of(free, one=jb.Scene())
+        space_of(free, one=STRIP)
 
 
 def test_a_shared_parameter_needs_one_start():
-    other = jb.Scene().replace({MU: 0.3})
+    other = STRIP.replace({MU: 0.3})
     with pytest.raises(jb.InputError, match=r"shared, but the specimens start from 0.1 to 0.3"):
-        space_of(MU, a=jb.Scene(), b=other)
+        space_of(MU, a=STRIP, b=other)
 
 
 def test_a_table_is_no_number():
     rows = [[0.0, 10.0], [2.0, 5.0]]
     with pytest.raises(jb.InputError, match="is a table in this scene"):
-        space_of("contact.pressure", one=jb.Scene().replace({"contact.pressure": rows}))
+        space_of("contact.pressure", one=STRIP.replace({"contact.pressure": rows}))

@@ -8,6 +8,7 @@ from pathlib import Path
 import jax
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.ladder import error_map
@@ -15,7 +16,7 @@ from jbeamshell.ladder.candidates import CANDIDATES
 
 CALIBRATION = Path(__file__).parents[2] / "calibration"
 MOST_ACCURATE = "p6@161x10"
-STRIP = jb.Scene().replace({"model.kinematics": "linear"})
+STRIP = STRIP.replace({"model.kinematics": "linear"})
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def others():
 
 def scene_of(row):
     eta, amplitude, mu, nu = (float(row[key]) for key in ("eta", "A", "mu", "nu"))
-    return jb.Scene().replace(
+    return STRIP.replace(
         {
             "strip.height_ratio": eta,
             "strip.poisson_ratio": nu,
@@ -110,7 +111,7 @@ def test_thin_bars_need_no_more_than_the_bar_and_corners_need_plane_elasticity()
 
 
 def test_solve_takes_the_advice():
-    scene = jb.Scene().replace({"strip.height_ratio": 0.02, "load.amplitude": 1.0})
+    scene = STRIP.replace({"strip.height_ratio": 0.02, "load.amplitude": 1.0})
     advice = jb.advise(scene, 0.2)
     history = jb.solve(scene, tolerance=0.2)
     assert history.scene.model.rung == advice.rung
@@ -120,9 +121,9 @@ def test_solve_takes_the_advice():
 
 
 def test_exact_kinematics_where_they_matter():
-    soft = jb.Scene().replace({"strip.axial_stiffness": 40.0})
+    soft = STRIP.replace({"strip.axial_stiffness": 40.0})
     assert jb.advise(soft, 0.05).settings["model.kinematics"] == "exact"
-    assert jb.advise(jb.Scene(), 0.05).settings["model.kinematics"] == "linear"
+    assert jb.advise(STRIP, 0.05).settings["model.kinematics"] == "linear"
 
 
 def test_other_figures_of_the_loop():

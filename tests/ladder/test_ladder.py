@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import reference
@@ -11,7 +12,7 @@ from jbeamshell.scene import rungs
 from jbeamshell.scene.toml import overridden, scene_from_values
 
 SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 8, "model.kinematics": "linear"}
-STRIP = jb.Scene().replace(SMALL)
+STRIP = STRIP.replace(SMALL)
 
 
 def on(rung, **more):

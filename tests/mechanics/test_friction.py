@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import simpson
+from toy import STRIP
 
-from jbeamshell import Scene, read_scene, write_scene
+from jbeamshell import read_scene, write_scene
 from jbeamshell.mechanics import friction
 from jbeamshell.mechanics.friction import (
     CappedTrial,
@@ -248,10 +249,10 @@ class Doubled(FrictionLaw):
 
 
 def test_a_law_is_known_everywhere_once_it_has_a_name(monkeypatch, tmp_path):
-    own = Scene().replace({"contact.law": Doubled()})
+    own = STRIP.replace({"contact.law": Doubled()})
     assert isinstance(own.get("contact.law"), Doubled)
     monkeypatch.setitem(friction.LAWS, "doubled", Doubled)
-    scene = Scene().replace({"contact.smoothing": 8.0}).replace({"contact.law": "doubled"})
+    scene = STRIP.replace({"contact.smoothing": 8.0}).replace({"contact.law": "doubled"})
     assert isinstance(scene.contact.law, Doubled)
     write_scene(scene, tmp_path / "scene.toml")
     assert read_scene(tmp_path / "scene.toml").get("contact.law") == "doubled"

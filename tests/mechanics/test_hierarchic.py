@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.mechanics.hierarchic import Hierarchic
@@ -110,7 +111,7 @@ TRUTH = {
 
 def ratios(order, **more):
     base = {"model.order": order, "model.kinematics": "linear", "model.end_size": 1 / 12}
-    scene = jb.Scene().replace(base | {"model.nodes": 101} | more)
+    scene = STRIP.replace(base | {"model.nodes": 101} | more)
 
     def one(cell):
         to = {"strip.height_ratio": cell[0], "load.amplitude": cell[1]}
@@ -146,4 +147,4 @@ def test_the_ladder_climbs_to_elasticity(order):
 )
 def test_strips_that_it_cannot_be(change, told):
     with pytest.raises(jb.InputError, match=told):
-        jb.Scene().replace(change)
+        STRIP.replace(change)

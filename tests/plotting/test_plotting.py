@@ -6,6 +6,7 @@ import jax
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import plotting
@@ -22,7 +23,7 @@ COARSE = {
 
 @pytest.fixture(scope="module")
 def history():
-    return jb.solve(jb.Scene().replace(COARSE))
+    return jb.solve(STRIP.replace(COARSE))
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,7 @@ def clamped():
         "model.fields": ["v", "w", "beta", "psi"],
         "model.nodes": 61,
     }
-    return jb.solve(jb.Scene().replace(COARSE | values))
+    return jb.solve(STRIP.replace(COARSE | values))
 
 
 @pytest.fixture(scope="module")

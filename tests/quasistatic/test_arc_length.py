@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 
@@ -10,7 +11,7 @@ FREE = {"strip.far_end": "free", "load.control": "arc-length", "load.amplitude":
 
 
 def scene(values):
-    return jb.Scene().replace(SMALL | values)
+    return STRIP.replace(SMALL | values)
 
 
 def test_it_goes_over_gross_slip_as_the_displacement_does():

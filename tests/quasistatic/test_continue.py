@@ -9,11 +9,12 @@ import pickle
 import jax
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.quasistatic.continuation import PathEnd
 
-SCENE = jb.Scene().replace(
+SCENE = STRIP.replace(
     {
         "model.nodes": 9,
         "model.kinematics": "linear",

@@ -3,6 +3,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import reference
@@ -15,7 +16,7 @@ SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
 
 @pytest.mark.parametrize("grid", ["finite-difference", "collocation"])
 def test_rigid_motion_stores_no_energy(grid):
-    system = System(jb.Scene().replace({"model.nodes": 41, "model.grid": grid}))
+    system = System(STRIP.replace({"model.nodes": 41, "model.grid": grid}))
     angle = 1.0
     rigid = jnp.stack(
         [
@@ -33,7 +34,7 @@ def test_rigid_motion_stores_no_energy(grid):
 
 def curved(curvature, nodes=41, **values):
     return System(
-        jb.Scene().replace(
+        STRIP.replace(
             {
                 "model.nodes": nodes,
                 "model.fields": ["v", "w", "beta", "psi"],
@@ -91,7 +92,7 @@ def test_a_curvature_that_vanishes_leaves_a_straight_strip(kinematics):
 
 
 def test_pressure_alone_squeezes_uniformly():
-    history = jb.solve(jb.Scene().replace(SMALL))
+    history = jb.solve(STRIP.replace(SMALL))
     plane_modulus = history.scene.strip.plane_modulus
     np.testing.assert_allclose(history.reaction[0], 10.0, rtol=1e-9)
     np.testing.assert_allclose(history.psi[0], -10.0 / plane_modulus, rtol=1e-9)
@@ -101,7 +102,7 @@ def test_pressure_alone_squeezes_uniformly():
 
 @pytest.mark.parametrize("pressure", [10.0, [[0.0, 4.0], [1.0, 12.0], [2.0, 9.0]]])
 def test_reactions_carry_the_pressure_at_every_load(pressure):
-    history = jb.solve(jb.Scene().replace(SMALL | {"contact.pressure": pressure}))
+    history = jb.solve(STRIP.replace(SMALL | {"contact.pressure": pressure}))
     system = System(history.scene)
     carried = history.reaction @ history.tributary
     applied = jnp.sum(system.load)
@@ -109,14 +110,14 @@ def test_reactions_carry_the_pressure_at_every_load(pressure):
 
 
 def test_tractions_balance_the_end_force_away_from_the_held_end():
-    history = jb.solve(jb.Scene().replace(SMALL))
+    history = jb.solve(STRIP.replace(SMALL))
     inner = history.traction[:, 1:] @ history.tributary[1:]
     # What the held node takes is small: the slip front is far from it.
     assert float(jnp.max(jnp.abs(inner - history.force))) < 0.02 * 0.7855
 
 
 def test_pull_lowers_the_loaded_end_and_pull_and_push_differ():
-    history = jb.solve(jb.Scene().replace(SMALL))
+    history = jb.solve(STRIP.replace(SMALL))
     start, turn, _ = history.cycles[-1]
     assert float(history.beta[start, -1]) < 0.0 < float(history.beta[turn, -1])
     assert float(-history.displacement[turn]) > 1.02 * float(history.displacement[start])
@@ -126,7 +127,7 @@ def test_end_force_is_conjugate_to_the_mid_height():
     """In a stuck strip the work of F is the energy stored: only with the right conjugate."""
     stuck = SMALL | {"contact.friction": 100.0, "contact.stick_stiffness": 10.0}
     # The tolerance is a part of mu F_N L, which is huge here.
-    history = jb.solve(jb.Scene().replace(stuck), [0.5, 1.0], solver=jb.Newton(tolerance=1e-14))
+    history = jb.solve(STRIP.replace(stuck), [0.5, 1.0], solver=jb.Newton(tolerance=1e-14))
     work = 0.5 * float(history.force[-1] * history.displacement[-1])
     stored = float(history.stored_energy[-1] - history.stored_energy[0])
     assert work == pytest.approx(stored, rel=1e-5)
@@ -134,7 +135,7 @@ def test_end_force_is_conjugate_to_the_mid_height():
 
 def frozen(nodes):
     """A strip of {v, beta}, small strain; one program for each number of nodes."""
-    return jb.Scene().replace(
+    return STRIP.replace(
         {
             "model.fields": ["v", "beta"],
             "model.nodes": nodes,
@@ -174,7 +175,7 @@ def test_unilateral_lift_cures_the_tension_at_the_loaded_end(fields):
     """Finite elements stay in contact; a shell whose lift is frozen pulls, more on finer grids."""
     ratios = []
     for nodes in (81, 161, 321):  # end elements of about H/8, H/16 and H/32
-        scene = jb.Scene().replace(
+        scene = STRIP.replace(
             {
                 "model.fields": fields,
                 "model.nodes": nodes,
@@ -204,7 +205,7 @@ def test_frozen_lift_reports_tension_and_drifts_with_the_end_element():
 
 
 def test_displacement_control_finds_the_force_of_force_control():
-    by_force = jb.solve(jb.Scene().replace(SMALL))
+    by_force = jb.solve(STRIP.replace(SMALL))
     scene = by_force.scene.replace({"load.control": "displacement", "load.amplitude": 1.0})
     by_displacement = jb.solve(scene, by_force.displacement[1:])
     np.testing.assert_allclose(by_displacement.force, by_force.force, atol=1e-7)
@@ -212,7 +213,7 @@ def test_displacement_control_finds_the_force_of_force_control():
 
 
 def test_free_strip_slides_at_the_gross_slip_force():
-    scene = jb.Scene().replace(
+    scene = STRIP.replace(
         SMALL
         | {
             "strip.far_end": "free",
@@ -229,7 +230,7 @@ def test_free_strip_slides_at_the_gross_slip_force():
 
 def test_strip_held_at_the_contact_point_only_turns_there():
     held, pinned = (
-        jb.solve(jb.Scene().replace(SMALL | {"strip.far_end": end, "load.amplitude": 1.9}))
+        jb.solve(STRIP.replace(SMALL | {"strip.far_end": end, "load.amplitude": 1.9}))
         for end in ("held", "pinned")
     )
     assert float(jnp.max(jnp.abs(held.beta[:, 0]))) < 1e-18
@@ -239,7 +240,7 @@ def test_strip_held_at_the_contact_point_only_turns_there():
 
 def test_exact_and_linear_kinematics_agree_at_small_strain():
     exact, linear = (
-        jb.solve(jb.Scene().replace(SMALL | {"model.kinematics": name})).dissipation
+        jb.solve(STRIP.replace(SMALL | {"model.kinematics": name})).dissipation
         for name in ("exact", "linear")
     )
     assert float(exact) == pytest.approx(float(linear), rel=1e-3)
@@ -248,7 +249,7 @@ def test_exact_and_linear_kinematics_agree_at_small_strain():
 
 def test_residual_couples_neighbours_only():
     """Blocks couple to their neighbours only, for friction, contact and both controls."""
-    scene = jb.Scene().replace({"model.nodes": 9, "model.fields": ["v", "w", "beta", "psi"]})
+    scene = STRIP.replace({"model.nodes": 9, "model.fields": ["v", "w", "beta", "psi"]})
     for control in ("force", "displacement"):
         system = System(scene.replace({"load.control": control, "load.amplitude": 1e-6}))
         prescribed = Prescribed(*map(jnp.asarray, (1e-6, 1.0, 0.0, 1.0)))

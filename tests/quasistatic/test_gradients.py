@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.mechanics.friction import ElasticSlip
@@ -14,7 +15,7 @@ AT = jnp.array([0.1, 0.1126, 0.44, 1000.0])
 
 
 def dissipation(values, **more):
-    scene = jb.Scene().replace(SMALL | more | dict(zip(KEYS, values, strict=True)))
+    scene = STRIP.replace(SMALL | more | dict(zip(KEYS, values, strict=True)))
     return jb.solve(scene, throw=False).dissipation
 
 
@@ -79,14 +80,14 @@ def test_gradient_reaches_every_number_of_a_scene():
 @pytest.mark.parametrize("rung", ["bar", "squeeze"])
 def test_a_traced_force_beyond_gross_slip_has_no_result(rung):
     few = {"model.nodes": 9, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
-    ask = jb.response(jb.Scene().replace({"model.rung": rung} | few), ["contact.friction"])
+    ask = jb.response(STRIP.replace({"model.rung": rung} | few), ["contact.friction"])
     both = jax.jit(jax.vmap(ask))(jnp.array([0.04, 0.039]))  # mu F_N L = 0.8 and 0.78
     assert both["status"].tolist() == [0, 3]
     assert np.isnan(both["dissipation"]).tolist() == [False, True]
 
 
 def test_a_response_takes_one_number_of_each_key():
-    ask = jb.response(jb.Scene(), ["contact.friction", "load.amplitude"])
+    ask = jb.response(STRIP, ["contact.friction", "load.amplitude"])
     with pytest.raises(jb.InputError, match=r"contact.friction: is an array of shape \(2,\): give"):
         ask(jnp.array([0.1, 0.2]), 1.0)
     with pytest.raises(jb.InputError, match="needs as many numbers, not 1"):

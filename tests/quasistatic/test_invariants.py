@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.quasistatic.system import System
@@ -45,7 +46,7 @@ strips = st.fixed_dictionaries(
 def scene_of(values, **more):
     gross = values["contact.friction"] * PRESSURE * LENGTH
     loaded = values | {"load.amplitude": values["load.amplitude"] * gross}
-    return jb.Scene().replace(BASE | loaded | more)
+    return STRIP.replace(BASE | loaded | more)
 
 
 def path(scene, steps=FINE, first=1.0):
@@ -212,6 +213,6 @@ def _moved(scene, angle, along, up):
 @given(values=strips, angle=st.floats(-3.1, 3.1), along=st.floats(-5, 5), up=st.floats(-5, 5))
 def test_a_rigid_motion_stores_no_energy(model, values, angle, along, up):
     material = {key: values[key] for key in values if key.startswith("strip")}
-    scene = jb.Scene().replace({"model.nodes": 41} | model | material)
+    scene = STRIP.replace({"model.nodes": 41} | model | material)
     rigid, bent = _moved(scene, angle, along, up)
     assert abs(float(rigid)) < 1e-18 * float(bent)

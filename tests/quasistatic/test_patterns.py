@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.quasistatic import slip_patterns
@@ -12,7 +13,7 @@ from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.quasistatic.system import System
 from jbeamshell.quasistatic.tangent import initial_stiffness
 
-SCENE = jb.Scene().replace(
+SCENE = STRIP.replace(
     {
         "model.nodes": 21,
         "model.kinematics": "linear",

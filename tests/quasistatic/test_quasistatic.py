@@ -2,6 +2,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.mechanics import bar
@@ -12,7 +13,7 @@ LINEAR = SMALL | {"model.kinematics": "linear"}  # compiles in half the time
 
 
 def test_bar_limit_gives_backbone_and_cubic_law():
-    history = jb.solve(jb.Scene().replace({"strip.height_ratio": 0.001}))
+    history = jb.solve(STRIP.replace({"strip.height_ratio": 0.001}))
     start = history.cycles[0][0]
     loading = history.force[1 : start + 1]
     backbone = bar.bar_backbone(loading, 3.4e4, 1.0)
@@ -24,7 +25,7 @@ def test_bar_limit_gives_backbone_and_cubic_law():
 
 @pytest.mark.slow
 def test_steps_do_not_matter():
-    base = jb.Scene().replace({"model.nodes": 81, "model.kinematics": "linear", "load.cycles": 1})
+    base = STRIP.replace({"model.nodes": 81, "model.kinematics": "linear", "load.cycles": 1})
     dissipation = [
         float(jb.solve(base.replace({"load.steps_per_half_cycle": n})).dissipation)
         for n in (20, 40, 160)
@@ -36,7 +37,7 @@ def test_steps_do_not_matter():
 
 @pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-12), (16.0, 1e-4)])
 def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
-    scene = jb.Scene().replace({"model.nodes": 41, "contact.smoothing": smoothing})
+    scene = STRIP.replace({"model.nodes": 41, "contact.smoothing": smoothing})
     path = [*np.linspace(0.01, 0.1, 10), *[-0.1, 0.1] * 100]
     history = jb.solve(scene.replace({"strip.height_ratio": 0.4}), path)
     cap = history.scene.contact.friction * history.reaction
@@ -48,7 +49,7 @@ def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing,
 
 @pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-13), (16.0, 1e-4)])
 def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
-    scene = jb.Scene().replace({"model.nodes": 41, "contact.smoothing": smoothing})
+    scene = STRIP.replace({"model.nodes": 41, "contact.smoothing": smoothing})
     history = jb.solve(scene, [*np.linspace(0.07, 0.7, 10), *[0.6, 0.7] * 100])
     peaks = np.asarray(history.displacement[10::2])
     creep = abs(peaks[-1] - peaks[0]) / peaks[0] / 100
@@ -60,7 +61,7 @@ def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
 
 @pytest.mark.parametrize("smoothing", ["sharp", 8.0, 32.0])
 def test_smoothing_does_not_change_the_dissipation(smoothing):
-    scene = jb.Scene().replace(SMALL | {"contact.smoothing": smoothing})
+    scene = STRIP.replace(SMALL | {"contact.smoothing": smoothing})
     assert float(jb.solve(scene).dissipation_ratio) == pytest.approx(0.7695, abs=2e-3)
 
 
@@ -69,7 +70,7 @@ def test_order_of_convergence_in_the_grid(grid, order):
     """A stuck strip on its elastic foundation is smooth: no slip front spoils the order."""
 
     def end(nodes):
-        scene = jb.Scene().replace(
+        scene = STRIP.replace(
             {
                 "model.grid": grid,
                 "model.nodes": nodes,
@@ -91,7 +92,7 @@ def test_order_of_convergence_in_the_grid(grid, order):
 def test_an_unconverged_step_is_never_silent(monkeypatch):
     monkeypatch.setattr("jbeamshell.quasistatic.recovery.PIECES", (8,))
     lame = jb.Newton(max_iterations=1, tolerance=1e-12)
-    scene = jb.Scene().replace(SMALL)
+    scene = STRIP.replace(SMALL)
     with pytest.raises(jb.UnconvergedError, match=r"load step \d+ of 50 .* found no equilibrium"):
         jb.solve(scene, solver=lame)
     history = jb.solve(scene, solver=lame, throw=False)
@@ -108,7 +109,7 @@ def test_inside_a_transformation_the_failure_is_loud_too():
     lame = jb.Newton(max_iterations=1)
     run = jax.jit(
         lambda mu: (
-            jb.solve(jb.Scene().replace(SMALL | {"contact.friction": mu}), solver=lame).dissipation
+            jb.solve(STRIP.replace(SMALL | {"contact.friction": mu}), solver=lame).dissipation
         )
     )
     with pytest.raises(Exception, match="a load step found no equilibrium"):
@@ -118,7 +119,7 @@ def test_inside_a_transformation_the_failure_is_loud_too():
 def test_a_failed_step_is_walked_in_pieces():
     """The recovered path ends where a path with small steps ends."""
     # So smooth that large steps take more iterations than small ones.
-    scene = jb.Scene().replace(LINEAR | {"contact.smoothing": 4.0})
+    scene = STRIP.replace(LINEAR | {"contact.smoothing": 4.0})
     path = np.array([0.9, -0.9, *[0.9] * 22])  # held at its end, to be as long as the fine one
     eager = jb.Newton(max_iterations=100)
     fine = jb.solve(
@@ -145,18 +146,18 @@ def test_single_precision_says_what_it_cannot_do():
 @pytest.mark.parametrize("path", [[], [[0.1]], [0.1, np.nan], [0.1, np.inf]])
 def test_paths_that_are_none(path):
     with pytest.raises(jb.InputError, match="path"):
-        jb.solve(jb.Scene(), path)
+        jb.solve(STRIP, path)
 
 
 def test_beyond_gross_slip_force_control_is_refused():
     with pytest.raises(jb.InputError, match=r"load.amplitude = 2.5.*'displacement'"):
-        jb.solve(jb.Scene().replace({"load.amplitude": 2.5}))
+        jb.solve(STRIP.replace({"load.amplitude": 2.5}))
     with pytest.raises(jb.InputError, match="gross slip"):
-        jb.solve(jb.Scene(), [1.0, 2.0])
+        jb.solve(STRIP, [1.0, 2.0])
 
 
 def test_compiling_alone_solves_nothing():
-    scene = jb.Scene().replace(SMALL)
+    scene = STRIP.replace(SMALL)
     solver.compile_for(scene)
     size = solver._solve._cached._cache_size()
     jb.solve(scene)
@@ -164,7 +165,7 @@ def test_compiling_alone_solves_nothing():
 
 
 def test_plain_numbers_inside_a_callers_jit():
-    scene = jb.Scene().replace(SMALL)
+    scene = STRIP.replace(SMALL)
     inside = jax.jit(lambda: jb.solve(scene).dissipation)()
     assert float(inside) == pytest.approx(float(jb.solve(scene).dissipation), rel=1e-12)
     with pytest.raises(jb.InputError, match="gross slip"):

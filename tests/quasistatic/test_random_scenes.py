@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.scene import library
@@ -40,7 +41,7 @@ def check(history, steady=1e-6):
 @pytest.mark.parametrize("smoothing", ["sharp", pytest.param(16.0, marks=pytest.mark.slow)])
 def test_random_strips_converge_and_obey_friction(smoothing):
     random = np.random.default_rng(11)
-    base = jb.Scene().replace(SMALL | {"contact.smoothing": smoothing})
+    base = STRIP.replace(SMALL | {"contact.smoothing": smoothing})
     for _ in range(20):
         history = jb.solve(base.replace(random_values(random)))
         if smoothing == "sharp":
@@ -51,7 +52,7 @@ def test_random_strips_converge_and_obey_friction(smoothing):
 @pytest.mark.parametrize("smoothing", ["sharp", 16.0])
 def test_hundreds_of_random_strips_converge_without_recovery(smoothing):
     random = np.random.default_rng(3)
-    base = jb.Scene().replace({"contact.smoothing": smoothing})
+    base = STRIP.replace({"contact.smoothing": smoothing})
     run = jax.jit(lambda v: jnp.max(jb.solve(base.replace(v), throw=False).status))
     failed = sum(int(run(random_values(random))) > 0 for _ in range(400))
     assert failed == 0

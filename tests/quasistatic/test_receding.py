@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.scene import library
@@ -176,7 +177,7 @@ def test_a_unilateral_end_does_not_mind_how_fine_it_is():
     dissipation = []
     for parts, nodes in sizes.items():
         change = LINEAR | thick | {"model.end_size": 1.0 / parts, "model.nodes": nodes}
-        history = jb.solve(jb.Scene().replace(change | {"load.cycles": 1}))
+        history = jb.solve(STRIP.replace(change | {"load.cycles": 1}))
         assert float(history.reaction_min) > -1e-6
         dissipation.append(float(history.dissipation))
     assert abs(dissipation[0] / dissipation[1] - 1.0) < 6e-3

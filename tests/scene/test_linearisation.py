@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.scene.linearisation import linear_error
@@ -24,7 +25,7 @@ def cells(name):
 
 def scene_of(strain, eta, gross, mu, nu, **model):
     stiffness, length = 5.0e3, 0.3  # the record has ratios only
-    return jb.Scene().replace(
+    return STRIP.replace(
         {
             "strip.length": length,
             "strip.axial_stiffness": stiffness,
@@ -67,20 +68,20 @@ def test_bound_holds_for_a_run(strain, eta, gross):
 
 
 def test_standard_strip_may_be_linear():
-    assert linear_error(jb.Scene()) < 2e-4
+    assert linear_error(STRIP) < 2e-4
 
 
 def test_displacement_control_means_the_force_of_the_bar():
-    scene = jb.Scene()
+    scene = STRIP
     force, stiffness, rub = 0.7855, 3.4e4, 1.0
     bar = {"load.control": "displacement", "load.amplitude": force**2 / (2.0 * stiffness * rub)}
     assert linear_error(scene.replace(bar)) == pytest.approx(linear_error(scene))
 
 
 def test_beyond_gross_slip_the_whole_strip_slips():
-    scene = jb.Scene().replace({"load.control": "displacement", "load.amplitude": 1.0})
+    scene = STRIP.replace({"load.control": "displacement", "load.amplitude": 1.0})
     assert linear_error(scene) == pytest.approx(
-        linear_error(jb.Scene().replace({"load.amplitude": 2.0}))
+        linear_error(STRIP.replace({"load.amplitude": 2.0}))
     )
     smooth = scene.replace({"contact.friction": 0.0})
     assert 0.0 < linear_error(smooth) < linear_error(scene)
@@ -90,6 +91,6 @@ def test_layers_and_plane_stress_have_a_bound():
     half = 0.1126
     layers = [[half, 1e5, 0.3], [half, 1e5, 0.3]]
     alike = {"strip.youngs_modulus": 1e5, "strip.half_height": half}
-    layered, whole = (jb.Scene().replace(values) for values in ({"strip.layers": layers}, alike))
+    layered, whole = (STRIP.replace(values) for values in ({"strip.layers": layers}, alike))
     assert linear_error(layered) == pytest.approx(linear_error(whole))
     assert 0.0 < linear_error(whole.replace({"strip.plane": "stress"})) < linear_error(whole)

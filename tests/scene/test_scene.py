@@ -112,6 +112,7 @@ def values_of_all_keys(draw):
             "model.squeeze": squeeze,
             "model.order": order,
             "model.solution": draw(st.sampled_from(solutions)),
+            "model.tolerance": draw(st.floats(1e-4, 0.1)),
         }
     )
 

@@ -7,6 +7,7 @@ import stat
 import jax
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from calibration.finite_elements import __main__ as command
@@ -45,7 +46,7 @@ def cards(text):
 
 @pytest.mark.parametrize("elements", ["linear", "quadratic"])
 def test_elements_fill_the_strip_and_run_anticlockwise(elements):
-    made = mesh.make_mesh(jb.Scene(), elements)
+    made = mesh.make_mesh(STRIP, elements)
     points = np.zeros((made.number.max() + 1, 2))
     i, j = np.nonzero(made.number)
     points[made.number[i, j]] = np.column_stack([made.x[i], made.y[j]])
@@ -63,20 +64,20 @@ def test_elements_fill_the_strip_and_run_anticlockwise(elements):
 
 def test_elements_are_small_at_the_loaded_end_and_at_steps_of_the_pressure():
     half_height = 0.1126
-    even = np.diff(mesh.make_mesh(jb.Scene()).columns)
+    even = np.diff(mesh.make_mesh(STRIP).columns)
     assert even[-1] < half_height / 7.0
     assert np.all(even[1:] < even[:-1] * 1.001)
-    stepped = mesh.make_mesh(jb.Scene().replace({"contact.pressure": STEPPED}))
+    stepped = mesh.make_mesh(STRIP.replace({"contact.pressure": STEPPED}))
     at = np.searchsorted(stepped.columns, 1.5)
     sizes = np.diff(stepped.columns)
     assert max(sizes[at - 2 : at + 1]) < half_height / 5.0
     assert max(sizes) > half_height / 2.0
-    finer = mesh.make_mesh(jb.Scene(), refinement=2.0)
+    finer = mesh.make_mesh(STRIP, refinement=2.0)
     assert finer.columns.size == pytest.approx(2 * even.size, abs=2)
 
 
 def test_the_base_has_a_node_under_every_node_and_one_beyond_each_end():
-    made = mesh.make_mesh(jb.Scene())
+    made = mesh.make_mesh(STRIP)
     np.testing.assert_array_equal(made.base_x[1:-1], made.x)
     assert made.base_x[0] < 0.0
     assert made.base_x[-1] > 2.0
@@ -91,7 +92,7 @@ def test_the_base_has_a_node_under_every_node_and_one_beyond_each_end():
     ("elements", "pressure", "total"), [("linear", 10.0, 20.0), ("quadratic", STEPPED, 15.0)]
 )
 def test_nodal_forces_add_up_to_the_loads(elements, pressure, total):
-    scene = jb.Scene().replace(COARSE | {"contact.pressure": pressure})
+    scene = STRIP.replace(COARSE | {"contact.pressure": pressure})
     made, text = deck_of(scene, elements)
     forces = [rows for keyword, rows in cards(text) if keyword == "CLOAD"]
     pressing, end = forces[-2:]
@@ -104,7 +105,7 @@ def test_nodal_forces_add_up_to_the_loads(elements, pressure, total):
 
 
 def test_friction_comes_after_the_pressing():
-    text = deck_of(jb.Scene().replace(COARSE | {"load.pressure_steps": 2}))[1]
+    text = deck_of(STRIP.replace(COARSE | {"load.pressure_steps": 2}))[1]
     found = list(cards(text))
     keywords = [keyword for keyword, _ in found]
     steps = [k for k, keyword in enumerate(keywords) if keyword.startswith("STEP")]
@@ -119,22 +120,22 @@ def test_friction_comes_after_the_pressing():
 
 def test_what_a_scene_is_made_of_shows_in_its_deck():
     driven = {"load.control": "displacement", "load.amplitude": 1e-5, "strip.far_end": "free"}
-    text = deck_of(jb.Scene().replace(COARSE | driven | {"strip.plane": "stress"}))[1]
+    text = deck_of(STRIP.replace(COARSE | driven | {"strip.plane": "stress"}))[1]
     assert "TYPE=CPS8R" in text
     assert "*EQUATION" in text
     assert "*BOUNDARY, FIXED" in text
     assert "NLGEOM" in text
-    plain = deck_of(jb.Scene().replace({"model.kinematics": "linear"}), "linear")[1]
+    plain = deck_of(STRIP.replace({"model.kinematics": "linear"}), "linear")[1]
     assert "TYPE=CPE4, ELSET=STRIP" in plain
     assert "NLGEOM" not in plain
     assert "*EQUATION" not in plain
     lifted = {"contact.normal": "none", "model.fields": ["v", "w", "beta", "psi"]}
-    assert "*CONTACT PAIR" not in deck_of(jb.Scene().replace(lifted))[1]
+    assert "*CONTACT PAIR" not in deck_of(STRIP.replace(lifted))[1]
 
 
 def test_contact_stiffness_does_not_depend_on_the_units():
     metres, millimetres = (
-        jb.Scene(),
+        STRIP,
         {
             "strip.length": 2e3,
             "strip.axial_stiffness": 3.4e1,  # N/m to N/mm
@@ -200,7 +201,7 @@ def test_levels_begin_after_the_steps_before_them():
 
 
 def test_a_contact_that_pulls_is_no_equilibrium():
-    scene = jb.Scene().replace(COARSE)
+    scene = STRIP.replace(COARSE)
     made = mesh.make_mesh(scene, refinement=0.3)
     count, force = made.number.max(), np.ones((11, made.base_x.size, 3))
     force[4:, 3, 1] = -0.1
@@ -222,10 +223,10 @@ def test_a_contact_that_pulls_is_no_equilibrium():
 
 def test_without_calculix_one_line_says_how_to_get_it(monkeypatch):
     with pytest.raises(jb.InputError, match=r"no-such-ccx.*apt-get install calculix-ccx"):
-        solve(jb.Scene(), program="no-such-ccx")
+        solve(STRIP, program="no-such-ccx")
     monkeypatch.setenv("CCX", "nor-this")
     with pytest.raises(jb.InputError, match="nor-this"):
-        solve(jb.Scene())
+        solve(STRIP)
 
 
 @pytest.mark.parametrize(
@@ -234,7 +235,7 @@ def test_without_calculix_one_line_says_how_to_get_it(monkeypatch):
         (lambda: library.bimaterial(), "strip.layers"),
         (lambda: library.advancing(), "strip.curvature"),
         (
-            lambda: jb.Scene().replace(
+            lambda: STRIP.replace(
                 {"contact.normal": "compliant", "model.fields": ["v", "w", "beta", "psi"]}
             ),
             "contact.normal",
@@ -249,11 +250,11 @@ def test_a_scene_out_of_reach_is_refused(change, field):
 
 def test_options_are_checked():
     with pytest.raises(jb.InputError, match="elements = 'cubic': choose 'linear' or 'quadratic'"):
-        mesh.make_mesh(jb.Scene(), "cubic")
+        mesh.make_mesh(STRIP, "cubic")
     with pytest.raises(jb.InputError, match="refinement = 0: must be a positive number"):
-        mesh.make_mesh(jb.Scene(), refinement=0)
+        mesh.make_mesh(STRIP, refinement=0)
     with pytest.raises(jb.InputError, match="refinement = 1000: makes more than"):
-        mesh.make_mesh(jb.Scene(), refinement=1000)
+        mesh.make_mesh(STRIP, refinement=1000)
 
 
 @pytest.fixture
@@ -267,7 +268,7 @@ def giving_up(tmp_path):
 
 def test_an_early_end_says_where_why_and_keeps_the_files(giving_up, tmp_path):
     folder = tmp_path / "kept"
-    scene = jb.Scene().replace(COARSE)
+    scene = STRIP.replace(COARSE)
     with pytest.raises(jb.UnconvergedError, match="too many cutbacks") as caught:
         solve(scene, program=giving_up, folder=folder, refinement=0.3)
     assert "after level 0 of 11" in str(caught.value)
@@ -315,7 +316,7 @@ def test_the_command_line_says_what_is_wrong(capsys, monkeypatch):
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 def test_a_coarse_loop_dissipates_what_elasticity_says():
     """The data's D over the cubic law is .7583 (eta .1126, A .7855)."""
-    scene = jb.Scene().replace(COARSE | {"model.kinematics": "linear"})
+    scene = STRIP.replace(COARSE | {"model.kinematics": "linear"})
     history = solve(scene, elements="linear", refinement=0.35)
     assert float(history.dissipation_ratio) == pytest.approx(0.7583, rel=0.04)
     assert float(np.max(history.error)) < 1e-4  # the strip's resultants balance

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.measured.example import data_folder
@@ -38,7 +39,7 @@ def reference() -> dict[tuple[float, float], float]:
 
 def sweep(fields, cells):
     """Ratio to the cubic law, ratio by loop area, smallest reaction, and status of many strips."""
-    scene = jb.Scene().replace({"model.fields": fields, "model.kinematics": "linear"})
+    scene = STRIP.replace({"model.fields": fields, "model.kinematics": "linear"})
     keys = ("strip.height_ratio", "load.amplitude")
     names = ("dissipation", "dissipation_loop", "dissipation_ratio", "reaction_min", "closure")
     ask = jb.response(scene, keys, names, method=Method.STATUS_ITERATION)
@@ -97,7 +98,7 @@ def test_first_loading_follows_the_finite_element_backbone():
     displacement = np.array([float(r["displacement"]) for r in rows])
     path = np.linspace(0.05, 1.5, 30)
     for sign in (1.0, -1.0):
-        history = jb.solve(jb.Scene().replace({"model.kinematics": "linear"}), sign * path)
+        history = jb.solve(STRIP.replace({"model.kinematics": "linear"}), sign * path)
         there = sign * force > 0.0
         order = np.argsort(sign * force[there])
         truth = np.interp(path, sign * force[there][order], sign * displacement[there][order])

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from calibration import charts
@@ -155,7 +156,7 @@ def test_plain_newton_fails_where_the_limit_does_not():
 
 def test_full_quadrature_locks_by_the_square_of_the_element_over_the_height():
     for eta in (0.02, 0.005):
-        scene = jb.Scene().replace({"strip.height_ratio": eta})
+        scene = STRIP.replace({"strip.height_ratio": eta})
         kappa = 10.0 * 1.3 / (12.0 + 11.0 * 0.3)
         softening = float(scene.strip.shear_modulus / scene.strip.plane_modulus) * kappa / 4.0
         locked = 1.0 / (1.0 + (0.1 / eta) ** 2 * softening)

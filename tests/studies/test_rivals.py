@@ -7,6 +7,7 @@ import pytest
 from benchmarks.rivals import STIFFNESS, cubic_law, iwan
 from benchmarks.rivals import condensed_elements as elements
 from benchmarks.rivals import patterns_numpy as patterns
+from toy import STRIP
 
 import jbeamshell as jb
 
@@ -76,7 +77,7 @@ SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 8, "model.kinematics": 
 
 @pytest.mark.parametrize(("eta", "amplitude"), [(0.0511, 0.3247), (ETA, A), (0.4, 1.6)])
 def test_patterns_answer_as_jbeamshell_does(eta, amplitude):
-    scene = jb.Scene().replace(SMALL | {"strip.height_ratio": eta, "load.amplitude": amplitude})
+    scene = STRIP.replace(SMALL | {"strip.height_ratio": eta, "load.amplitude": amplitude})
     answer = patterns.cycle(patterns.Strip(eta), amplitude, 8, cycles=2)
     assert answer["unsettled"] == 0
     assert answer["dissipation"] == pytest.approx(float(jb.solve(scene).dissipation), rel=1e-9)

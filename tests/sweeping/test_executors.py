@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.common.errors import InputError, UnconvergedError
@@ -33,7 +34,7 @@ TINY = {
     "load.cycles": 1,
 }
 FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "reaction_max")  # of test_sweep
-SCENE = jb.Scene().replace(TINY)
+SCENE = STRIP.replace(TINY)
 SMALL, LARGE = (120, 80), (300, 200)  # lanes: of the large there is time to kill somebody
 SET = [word for key, value in TINY.items() for word in ("--set", f"{key}={value}")]
 SWEEP = [sys.executable, "-m", "jbeamshell", "sweep", *SET, "--figures", ",".join(FIGURES)]

@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.common import progress
@@ -20,7 +21,7 @@ STATUS = np.array([[0, 0], [0, Outcome.MAX_ITERATIONS], [Outcome.OUTSIDE, Outcom
 
 def made_up(paired=False, **replaced):
     """A sweep by a formula instead of a model."""
-    scene = jb.Scene().replace(replaced)
+    scene = STRIP.replace(replaced)
     axes = {key: values[:2] for key, values in AXES.items()} if paired else AXES
     lanes = Lanes(scene, axes, paired)
     status = (STATUS[0] if paired else STATUS).astype(np.int8)
@@ -112,7 +113,7 @@ TINY = {
     "load.steps_per_half_cycle": 2,
     "load.cycles": 1,
 }
-SCENE = jb.Scene().replace(TINY)
+SCENE = STRIP.replace(TINY)
 OVER = {"load.amplitude": np.linspace(0.2, 2.2, 12), "strip.height_ratio": [0.05, 0.1, 0.2, 0.4]}
 
 

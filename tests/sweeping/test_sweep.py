@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.common.errors import InputError
@@ -19,7 +20,7 @@ TINY = {
     "load.steps_per_half_cycle": 2,
     "load.cycles": 1,
 }
-SCENE = jb.Scene().replace(TINY)
+SCENE = STRIP.replace(TINY)
 OVER = {"load.amplitude": [0.3, 1.9, 1.1, 2.5, 0.7], "strip.height_ratio": [0.05, 0.4]}
 FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "reaction_max")
 PATCH = [[0.0, 12.0], [1.0, 12.0], [1.0, 5.0], [2.0, 8.0]]
@@ -391,7 +392,7 @@ def test_lanes_advance_together_as_far_as_they_share_a_body():
 def test_lanes_of_plane_elasticity_share_their_bodies():
     """A grid whose heights share a body, beside the same strips paired at random."""
     plane = {"model.rung": "plane", "model.nodes": 17, "load.steps_per_half_cycle": 1}
-    scene = jb.Scene().replace(plane)
+    scene = STRIP.replace(plane)
     over = {"load.amplitude": [0.4, 0.8, 1.2], "strip.height_ratio": [0.05, 0.1]}
     grid = jb.sweep(scene, over, ["dissipation"])
     order = np.random.default_rng(0).permutation(6)
