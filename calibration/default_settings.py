@@ -2,10 +2,11 @@
 
     python calibration/default_settings.py [--scenes 1000]
 
-solves every scene twice: as it is, and with the same model on a mesh two or three times as fine,
-and writes default_settings.json beside this file.  The errors are those of the dissipation, of the
-secant stiffness and of the loop (largest difference of the response over its range).  Beside them
-stand the estimate and the doubts of the run, and its time.  `jbeamshell.scene.choice` takes its
+solves every scene twice: as it is, and with the same model on a mesh two or three times as fine;
+then plain scenes for several tolerances.  It writes default_settings.json beside this file.  The
+errors are those of the dissipation, of the secant stiffness and of the loop (largest difference of
+the response over its range).  Beside them stand the estimate and the doubts of the run, and its
+time.  `jbeamshell.scene.choice` takes its
 numbers from here; calibration/charts/settings.py draws the record.
 """
 
@@ -32,6 +33,7 @@ from jbeamshell.mechanics.bar import bar_backbone  # noqa: E402
 HERE = Path(__file__).parent
 SEED = 20
 FINE_CONDENSED = 193  # nodes, or twice the scene's own
+TOLERANCES = (0.02, 0.01, 0.005, 0.0025)
 Values = dict[str, Any]
 Random = np.random.Generator
 
@@ -71,7 +73,9 @@ def displaced(random: Random) -> Values:
 def layered(random: Random) -> Values:
     """Two or three layers."""
     found = plain(random)
-    share = random.dirichlet(np.full(random.integers(2, 4), 4.0)) * 2.0 * found["strip.height_ratio"]
+    share = (
+        random.dirichlet(np.full(random.integers(2, 4), 4.0)) * 2.0 * found["strip.height_ratio"]
+    )
     layers = [[h, _log(random, 1e4, 1e6), random.uniform(0.0, 0.45)] for h in share]
     layers[-1][0] += 2.0 * found["strip.height_ratio"] - sum(row[0] for row in layers)
     del found["strip.poisson_ratio"]
@@ -167,21 +171,34 @@ def compared(values: Values) -> Values:
     }
 
 
-def study(scenes: int) -> list[Values]:
+def of_all_kinds(scenes: int) -> list[Values]:
     """Rows of random scenes, a share of each kind."""
     rows = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", jb.DoubtfulWarning)
-        for kind, (make, share) in KINDS.items():
-            random = np.random.default_rng([SEED, list(KINDS).index(kind)])
-            for _ in tqdm(range(round(share * scenes)), kind):
-                values = make(random)
-                rows.append({"kind": kind, "values": values} | compared(values))
+    for kind, (make, share) in KINDS.items():
+        random = np.random.default_rng([SEED, list(KINDS).index(kind)])
+        for _ in tqdm(range(round(share * scenes)), kind):
+            values = make(random)
+            rows.append({"kind": kind, "values": values} | compared(values))
+    return rows
+
+
+def of_all_tolerances(scenes: int) -> list[Values]:
+    """Rows of plain scenes, the same for each tolerance."""
+    rows = []
+    for tolerance in TOLERANCES:
+        random = np.random.default_rng(SEED)
+        for _ in tqdm(range(scenes), f"tolerance {tolerance:g}"):
+            values = plain(random) | {"model.tolerance": tolerance}
+            rows.append({"tolerance": tolerance} | compared(values))
     return rows
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", type=int, default=1000)
-    record = {"about": provenance(), "seed": SEED, "scenes": study(parser.parse_args().scenes)}
+    scenes = parser.parse_args().scenes
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jb.DoubtfulWarning)
+        record = {"about": provenance(), "seed": SEED}
+        record |= {"kinds": of_all_kinds(scenes), "tolerances": of_all_tolerances(scenes // 10)}
     write_text(HERE / "default_settings.json", json.dumps(record, indent=1))

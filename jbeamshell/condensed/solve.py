@@ -31,6 +31,7 @@ from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 
 Cycles = tuple[tuple[int, int, int], ...]
+NESTED_FROM = 6  # order of a section from which on no point reaction disturbs the corner's slip
 
 
 def solve(
@@ -86,6 +87,15 @@ def solve(
     given = (scene, strip, targets, () if known else turns)
     history: History = _walk(given, turns if known else (), cycles, nested, soft)
     return history
+
+
+def nests(scene: Scene) -> bool:
+    """True if the slip zones of a scene's cycles are most often nested, so that factors do.
+
+    Sections of low order hold a point reaction at the loaded corner, which slips and opens out of
+    turn.
+    """
+    return scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
 
 
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:

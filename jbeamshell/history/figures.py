@@ -7,7 +7,7 @@ from jax import Array
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.history.record import Record
-from jbeamshell.history.reliability import SlipCycle, dissipation_errors
+from jbeamshell.history.reliability import SlipCycle, estimates
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.numerics.cycles import branch_work
 
@@ -117,4 +117,4 @@ class CycleFigures(Record):
 
         Rather too large than too small; infinite if nothing slips.  See `History.doubts`.
         """
-        return jnp.maximum(*dissipation_errors(self.slip_cycle))
+        return jnp.fmax(*estimates(self.scene, self.slip_cycle))

@@ -109,6 +109,15 @@ def dissipation_errors(cycle: SlipCycle) -> tuple[Array, ...]:
     return tuple(numbers.where(slips, error, numbers.inf) for error in both)
 
 
+def estimates(scene: Scene, cycle: SlipCycle) -> tuple[Array, ...]:
+    """Estimated relative errors of a scene's dissipation, of the grid and of the loaded corner.
+
+    The corner has none on the contact line of a section, where the corner opens exactly.
+    """
+    grid, corner = dissipation_errors(cycle)
+    return (grid, 0.0 * corner) if scene.model.solution == "condensed" else (grid, corner)
+
+
 def doubts_of_run(history: Run) -> tuple[str, ...]:
     """Doubts about a run that was solved."""
     plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
@@ -175,7 +184,9 @@ def _unsteady(history: Run) -> tuple[str, ...]:
 
 def _resolution(history: Run) -> tuple[str, ...]:
     """Doubts about the slip zone's resolution by the grid."""
-    grid, corner = map(float, dissipation_errors(jax.tree.map(np.asarray, history.slip_cycle)))
+    cycle = jax.tree.map(np.asarray, history.slip_cycle)
+    with np.errstate(invalid="ignore"):  # infinite where nothing slips
+        grid, corner = map(float, estimates(history.scene, cycle))
     plane = history.scene.model.solution == "plane"  # it has a grid of its own
     finer = "take more model.nodes" if plane else FINER
     if np.isinf(grid):

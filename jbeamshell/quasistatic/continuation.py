@@ -26,6 +26,7 @@ from jbeamshell.quasistatic.path_state import PathState, StepResults
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import Method, compiled_march
 from jbeamshell.scene.load_path import LoadPath, check
+from jbeamshell.scene.scene import Scene
 
 
 class PathEnd(eqx.Module):

@@ -13,6 +13,7 @@ from jax import Array
 from jbeamshell.common.checks import check_words, is_traced, require, require_choice
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.native import Native
+from jbeamshell.condensed.solve import nests
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
@@ -102,7 +103,7 @@ def response(
     compiled = jax.jit(solved_by(method or Method.NEWTON))
     if is_traced(scene):
         return compiled
-    staged = slip_patterns.applies(scene) or scene.model.condensed
+    staged = slip_patterns.applies(scene) or (scene.model.condensed and nests(scene))
     again = method is None and staged  # what does not settle, by Newton or by events
     first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
     first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)

@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import is_staged, is_traced, require
+from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import Status, UnconvergedError
-from jbeamshell.condensed.solve import Cycles
+from jbeamshell.condensed.solve import Cycles, nests
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
@@ -28,7 +28,7 @@ from jbeamshell.quasistatic.outcome import (
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import Method, march
-from jbeamshell.scene.load_path import LoadPath, check, check_contact, whole_path
+from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
 from jbeamshell.scene.scene import Scene
 
 STACK = 3  # frames from a warning to the caller of `jbeamshell.solve`
@@ -114,8 +114,9 @@ def solve(
 
 def _able(scene: Scene, path: ArrayLike | None, contact: ArrayLike | None) -> Scene:
     """Scene by load steps, if its solution was left open and what it is asked for needs them."""
-    by_steps = contact is not None or np.ndim(path) > 1  # pressures that change along the path
-    return scene.by_load_steps() if by_steps and isinstance(scene, Scene) else scene
+    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+    pressures = path is not None and as_leaf(path, "path", LOADS).ndim > 1
+    return scene.by_load_steps() if pressures or contact is not None else scene
 
 
 def _condensed(
@@ -129,13 +130,14 @@ def _condensed(
     """History on the contact line, first from factors alone unless derivatives may be taken."""
     traced = is_traced(scene, path) or is_staged()
     events = method is Method.NEWTON or (traced and method is None)
-    history = solve_condensed(scene, path, cycles, nested=not events, own=own)
+    nested = nests(scene) and not events
+    history = solve_condensed(scene, path, cycles, nested=nested, own=own)
     history = dataclasses.replace(history, end=WholePath())
     if traced:
         failed, fix = history.status[-1] != Status.CONVERGED, "take other model.nodes"
         message = f"the events of a load step come to no end: {fix}"
         return eqx.error_if(history, failed, message) if throw else history
-    if not history.converged:
+    if nested and not history.converged:
         again = solve_condensed(scene, path, cycles, own=own)
         history = dataclasses.replace(again, end=history.end)
     if throw and not history.converged:

@@ -68,17 +68,18 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     """
     load, model = scene.load, scene.model
     open_load, open_model = load.open, model.open
-    if not open_load and not open_model:
+    if not load.as_given and not model.as_given and not open_load and not open_model:
         return {}, {}
     found: dict[str, Any] = {}
     if "kinematics" in open_model:
         found["kinematics"] = _kinematics(scene, numbers)
     linear = found.get("kinematics", model.kinematics) == "linear"
+    fields = model.given("fields")
     if "solution" in open_model:
         found["solution"] = "condensed" if linear and may_condense(scene) else "stepwise"
-        fields = model.given("fields")
         if found["solution"] == "condensed" and "w" not in fields:
             fields = ("v", "w", *fields[1:])
+    if fields != model.fields:
         found["fields"] = fields
     solution = found.get("solution", model.solution)
     grid = PLANE if solution == "plane" else CONTACT_LINE if solution in CONDENSED else STEPWISE

@@ -88,7 +88,7 @@ def name_of(fields: Sequence[str], order: int, solution: str) -> str:
         section = {1: "bar", 2: "shell", 3: "squeeze"}[len(set(fields) - {"w"})]
     if solution == "closed-form":
         return section
-    if solution == "stepwise":
+    if solution in ("stepwise", AUTO):
         return "stepwise-bar" if section == "bar" else section
     masing = solution in ("masing", "masing-pull")
     return solution if masing and section == "squeeze" else f"{solution}-{section}"
