@@ -100,7 +100,7 @@ def on_contact_line(scene: Scene, nodes: int | None) -> Scene:
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     force = scene.load.control == "force"
     require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
-    if scene.model.solution != "condensed":
+    if scene.model.given("solution") != "condensed":  # chosen or another: elasticity
         scene = scene.replace({"model.rung": "plane", "model.nodes": NODES})
     return scene if nodes is None else scene.replace({"model.nodes": nodes})
 

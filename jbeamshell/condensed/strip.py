@@ -17,7 +17,6 @@ from jbeamshell.numerics.factors import solve
 from jbeamshell.scene.keys import FAR_ENDS
 from jbeamshell.scene.scene import Scene
 
-FAR_SIZE = 1.0 / 15.0  # of L, elements of a section away from the loaded end and steps of pressure
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
 PLANE_GROWTH = 0.3  # of the element size over the distance from there
 PLANE_FAR_SIZE = 0.15  # of L, elements away from it
@@ -116,7 +115,7 @@ def stations(scene: Scene, nodes: int) -> Array:
     length, half_height = scene.strip.length, scene.strip.half_height
     steps, model = scene.contact.steps(length), scene.model
     if model.solution == "condensed":
-        grading = (model.end_size, steps, elements.GROWTH, FAR_SIZE)
+        grading = (model.end_size, steps, elements.GROWTH, model.far_size)
         return elements.vertices(nodes - 1, length, half_height, *grading)
     if steps is None:
         grading = (PLANE_END_SIZE, None, PLANE_GROWTH, PLANE_FAR_SIZE)

@@ -31,6 +31,7 @@ ORDER = {"finite-difference": 1, "collocation": 2}
 # If the strip may not lift, a smaller one would turn its point reaction there into tension.
 END_SIZE = 1.0 / 6.0  # of H, at the loaded end
 FAR_SIZE = 1.0 / 60.0  # of L, far from it
+CONTACT_LINE_FAR_SIZE = 1.0 / 15.0  # the same for sections on their contact line
 GROWTH = 0.08  # of the element size per distance
 
 

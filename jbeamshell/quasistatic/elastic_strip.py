@@ -70,6 +70,7 @@ class ElasticStrip(eqx.Module):
             strip.half_height,
             self.model.end_size,
             contact.steps(strip.length),
+            far_size=self.model.far_size,
         )
         rule = self.element_rule
         self.x, self.lengths = elements.nodes(rule, ends), jnp.diff(ends)

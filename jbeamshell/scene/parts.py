@@ -18,7 +18,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import require
-from jbeamshell.mechanics.elements import ORDER, table_steps
+from jbeamshell.mechanics.elements import CONTACT_LINE_FAR_SIZE, FAR_SIZE, ORDER, table_steps
 from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
 from jbeamshell.mechanics.homogeneous import shear_modulus, youngs_modulus
 from jbeamshell.mechanics.kinematics import FIELDS
@@ -241,6 +241,11 @@ class Model(ModelKeys):
     def condensed(self) -> bool:
         """True if the strip is solved on its contact line, see `jbeamshell.condensed`."""
         return self.solution in CONDENSED
+
+    @property
+    def far_size(self) -> float:
+        """Largest elements before the node count scales all, over L."""
+        return CONTACT_LINE_FAR_SIZE if self.solution == "condensed" else FAR_SIZE
 
     @property
     def walks(self) -> bool:

@@ -19,7 +19,12 @@ STRIP = jax.jit(lambda scene: strip.condensed(scene, NODES))
 
 @pytest.fixture(scope="module", params=["held", "free"])
 def body(request):
-    changed = {"contact.friction": MU, "contact.pressure": 1.0 / MU, "strip.far_end": request.param}
+    changed = {
+        "model.rung": "plane",
+        "contact.friction": MU,
+        "contact.pressure": 1.0 / MU,
+        "strip.far_end": request.param,
+    }
     scene = jb.Scene().replace(changed)
     return STRIP(scene).body
 
@@ -71,7 +76,7 @@ class TestDisplacementControl:
         np.testing.assert_allclose(driven.slip_work, pushed.slip_work, rtol=1e-10)
 
     def test_factors_serve_it_where_zones_are_nested(self):
-        changed = {"contact.friction": 0.1, "contact.pressure": 10.0}
+        changed = {"model.rung": "plane", "contact.friction": 0.1, "contact.pressure": 10.0}
         body = STRIP(jb.Scene().replace(changed)).body
 
         @jax.jit

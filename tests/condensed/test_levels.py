@@ -11,16 +11,17 @@ from jbeamshell.condensed import branches, events, levels, strip
 NODES = 21
 TURNS = jnp.asarray([1.0, 0.3, -1.0, -0.2, 1.0])
 TURNED = (True, True, False, True, False)  # -1 and the last 1 go on
+PLANE = jb.Scene().replace({"model.rung": "plane"})
 STRIP = jax.jit(lambda scene: strip.condensed(scene, NODES).body)
 LAYERS = np.array([[0.1, 2e5, 0.3], [0.1252, 4e5, 0.2]])
 
 
 def strip_body(eta, nu=0.3):
-    return STRIP(jb.Scene().replace({"strip.height_ratio": eta, "strip.poisson_ratio": nu}))
+    return STRIP(PLANE.replace({"strip.height_ratio": eta, "strip.poisson_ratio": nu}))
 
 
 def laminate_body(soft=1.0):
-    return STRIP(jb.Scene().replace({"strip.layers": LAYERS * [[1.0, soft, 1.0], [1.0, 1.0, 1.0]]}))
+    return STRIP(PLANE.replace({"strip.layers": LAYERS * [[1.0, soft, 1.0], [1.0, 1.0, 1.0]]}))
 
 
 def path(body, friction, amplitude):

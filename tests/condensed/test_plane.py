@@ -31,6 +31,7 @@ def scene_of(eta, mu=0.1, nu=0.3, amplitude=1.0):
     """Standard strip with mu F_N = 1."""
     return jb.Scene().replace(
         {
+            "model.rung": "plane",
             "strip.height_ratio": eta,
             "strip.poisson_ratio": nu,
             "contact.friction": mu,

@@ -21,7 +21,7 @@ SCENE = STRIP.replace(
         "load.steps_per_half_cycle": 2,
         "load.cycles": 1,
     }
-)
+).pinned()
 FIRST = np.array([0.5, 1.0, 0.25, -0.5, -0.25])  # as many as its own, so that less is compiled
 MORE = np.array([0.25, 1.0, 0.25, -0.5])
 
