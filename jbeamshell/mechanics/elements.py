@@ -146,8 +146,8 @@ def vertices(
     pieces = np.arange(edges.size - 1)
     counts = jnp.append(0.0, jnp.cumsum(count(jnp.diff(edges), pieces // 2)))
     target = counts[-1] * jnp.arange(elements + 1) / elements
-    piece = jnp.searchsorted(counts, target, side="right", method="compare_all") - 1
-    piece = jnp.clip(piece, 0, edges.size - 2)
+    # The search is a loop, which nothing is fused with: programs then agree on x to the last bit.
+    piece = jnp.clip(jnp.searchsorted(counts, target, side="right") - 1, 0, edges.size - 2)
     away = edges[piece] + reach(target - counts[piece], piece // 2)
     towards = edges[piece + 1] - reach(counts[piece + 1] - target, piece // 2)
     x = jnp.where(piece % 2 == 1, away, towards)

@@ -90,6 +90,7 @@ def test_a_contact_that_goes_round_in_circles_is_found_node_by_node():
         "contact.pressure": [[0, pressure], [patch, pressure], [patch, 0.0], [length, 0.0]],
         "model.nodes": 41,
         "model.kinematics": "linear",
+        "model.solution": "stepwise",
     }
     scene = library.receding_rough().replace(clamp)
     history = jax.jit(lambda load: jb.solve(scene, load[None], throw=False))(7.090942609)
