@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -13,6 +14,7 @@ from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.jax_options import memory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.domain import bar_rule, gross_slip_rule, stays_below
+from jbeamshell.scene.parts import Load
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
@@ -38,6 +40,7 @@ def whole_path(
     """Path of the pressing and of the given loads or the scene's own, and its closed cycles."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     pressing, known = scene.load.pressure_steps, scene.load.unit_path()
+    closed = functools.partial(_own_cycles, scene.load.cycles, scene.load.steps_per_half_cycle)
     solution = scene.model.solution
     any_path = path is None or scene.model.walks
     fix = "knows the scene's own cycles only: leave the path out, or take 'stepwise'"
@@ -60,6 +63,7 @@ def whole_path(
             require("path", np.asarray(pressures)[pulling], not np.any(pulling), fix)
         else:
             known = np.zeros(0)
+        closed = functools.partial(_cycles_of, known)
     if is_traced(scene, targets) and scene.load.control == "force":
         targets, numbers = _below_gross_slip(scene, targets, pressures), jnp
     before = (np.arange(1, pressing + 1) / pressing).astype(amplitude.dtype)
@@ -69,8 +73,18 @@ def whole_path(
         numbers.append(np.zeros_like(before), numbers.ones_like(targets)),
     )
     last = pressing - 1
-    cycles = closed_cycles(np.append(0.0, known)) if known.size else ()
-    return whole, tuple((a + last, b + last, c + last) for a, b, c in cycles)
+    return whole, tuple((a + last, b + last, c + last) for a, b, c in closed())
+
+
+def _cycles_of(loads: np.ndarray) -> tuple[tuple[int, int, int], ...]:
+    """Closed cycles of loads that start from zero; none of none."""
+    return tuple(closed_cycles(np.append(0.0, loads))) if loads.size else ()
+
+
+@functools.cache
+def _own_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
+    """Closed cycles of a scene's own path."""
+    return _cycles_of(Load(cycles=cycles, steps_per_half_cycle=steps).unit_path())
 
 
 def _below_gross_slip(scene: Scene, targets: Array, pressures: Array) -> Array:
