@@ -139,7 +139,7 @@ def let_go(
     >>> study = let_go(jb.Scene(), 1.0, cycles=30)
     >>> study.found.damping  # damping ratios at study.found.amplitude
     """
-    inertia = inertia or Inertia()
+    inertia, scene = inertia or Inertia(), scene.by_load_steps()
     end_force = float(largest_force(scene, force))
     require_number("cycles", cycles, POSITIVE)
     inertia.check(scene)

@@ -184,8 +184,8 @@ def _unsteady(history: Run) -> tuple[str, ...]:
 
 def _resolution(history: Run) -> tuple[str, ...]:
     """Doubts about the slip zone's resolution by the grid."""
-    cycle = jax.tree.map(np.asarray, history.slip_cycle)
-    with np.errstate(invalid="ignore"):  # infinite where nothing slips
+    with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
+        cycle = jax.tree.map(np.asarray, history.slip_cycle)
         grid, corner = map(float, estimates(history.scene, cycle))
     plane = history.scene.model.solution == "plane"  # it has a grid of its own
     finer = "take more model.nodes" if plane else FINER

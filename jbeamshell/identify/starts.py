@@ -153,8 +153,8 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
         take("strip.axial_stiffness", _stretching(found, gross, length))
     if found.soft and "contact.stick_stiffness" not in values:
         scene = scene_from_values(values)
-        sliders = gross / found.short / length / float(scene.slip_stiffness)
-        take("contact.stick_stiffness", sliders * float(scene.contact.stick_stiffness))
+        sliders = gross / found.short / length * float(scene.strip.half_height)
+        take("contact.stick_stiffness", sliders / float(scene.strip.shear_modulus))
     if "contact.pressure" not in values:
         take("contact.pressure", gross / (float(scene.contact.friction) * length))
     elif "contact.friction" not in values:

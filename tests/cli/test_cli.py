@@ -38,7 +38,7 @@ FIGURES = {
     *("dissipation", "dissipation_loop", "dissipation_ratio", "secant_stiffness", "loss_factor"),
     *("peak_displacement", "slip_length", "reaction_min", "closure", "newton_iterations"),
     *("reaction_max", "reaction_max_at", "squeeze_stress_max", "status", "wall_s", "compile_s"),
-    "doubts",
+    *("contact_end", "lift_slope", "tip_deflection", "doubts"),
 }
 TIMES = {"wall_s", "compile_s"}
 TABLES = {"loop.csv", "profiles.csv", "sections.csv", "result.json", "scene.toml"}
@@ -113,8 +113,9 @@ def test_run_prints_one_json_object(cli):
 def test_run_prints_text_to_read(cli):
     code, out, err = cli("run", *BASE, *options({"strip.height_ratio": 0.2, "load.amplitude": 0.5}))
     assert (code, err) == (0, "")
-    title, *lines = out.splitlines()
-    assert "v beta psi on 21 nodes" in title
+    title, chosen, *lines = out.splitlines()
+    assert "v w beta psi on 21 nodes" in title
+    assert chosen == "chosen for a tolerance of 0.5 %: rung condensed-squeeze"
     assert "eta = 0.2, force amplitude 0.5" in title
     figures = [line for line in lines if not line.startswith("  doubtful: ")]
     names = {line.split("  ")[1].replace(" ", "_") for line in figures}

@@ -73,7 +73,7 @@ def test_what_is_not_worth_it_is_not_tried():
 
 def test_a_response_is_native_and_falls_back(monkeypatch):
     numbers = {"model.nodes": 11, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
-    scene = jb.Scene().replace(numbers | {"load.cycles": 1})
+    scene = jb.Scene().replace(numbers | {"load.cycles": 1, "model.solution": "stepwise"})
     amplitude, made = float(scene.load.amplitude), []
 
     def native(*given, **more):

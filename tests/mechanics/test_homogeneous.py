@@ -20,6 +20,8 @@ C11 = LAM + 2 * G
 SECTION = Homogeneous(H, PLANE, NU, KAPPA_S)
 STRAINS = Strains(*jnp.array([1.1e-3, -0.7e-3, 2.3e-3, 0.9e-3, -1.7e-3]))
 
+BY_STEPS = {"solution": "stepwise", "kinematics": "exact"}
+
 
 def test_forces_are_the_closed_expressions():
     e, g, k, psi, dpsi = STRAINS
@@ -95,7 +97,7 @@ class Weighed(eqx.Module):
 
 
 def test_own_energy_takes_the_place_of_the_homogeneous_one():
-    standard = Scene(model=Model(nodes=9), load=Load(steps_per_half_cycle=2))
+    standard = Scene(model=Model(nodes=9, **BY_STEPS), load=Load(steps_per_half_cycle=2))
     path = [0.3, 0.7, 0.1]
     own = Scene(model=standard.model, energy=Weighed(standard.strain_energy(), 1.0))
     softer = Scene(model=standard.model, energy=Weighed(standard.strain_energy(), 0.5))
@@ -109,7 +111,7 @@ def test_own_energy_takes_the_place_of_the_homogeneous_one():
 
 
 def test_a_plain_function_is_an_energy_as_a_module_is():
-    standard = Scene(model=Model(nodes=9), load=Load(steps_per_half_cycle=2))
+    standard = Scene(model=Model(nodes=9, **BY_STEPS), load=Load(steps_per_half_cycle=2))
     section = standard.strain_energy()
     module = Scene(model=standard.model, energy=Weighed(section, 0.5))
 
