@@ -135,11 +135,11 @@ def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tab
     row = at.rows[i] + jnp.where(slips, sigma * friction, 0.0) * at.rows[normal]
     row = row.at[-2].add(jnp.where(sticks, -slip, 0.0))
     rest = jnp.where(sticks, -at.sigma[tangential] * friction, 0.0)
-    rows = exchanged_rows(at.rows, i, row, rest, normal)
+    rows = exchanged_rows(at.rows, i, row, rest, normal, jnp.where(slips, held, 0.0))
     now = jnp.where(slips, sigma, jnp.where(sticks, 0.0, at.sigma[tangential]))
     opened = jnp.where(kind < OPEN, at.opened[node], kind == OPEN)
     return at._replace(
-        rows=rows.at[tangential, -2].add(jnp.where(slips, held, 0.0)),
+        rows=rows,
         sigma=at.sigma.at[tangential].set(now),
         opened=at.opened.at[node].set(opened),
         held=at.held.at[tangential].set(jnp.where(sticks, slip, jnp.where(slips, 0.0, held))),
@@ -147,15 +147,18 @@ def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tab
     )
 
 
-def exchanged_rows(rows: Array, i: Array, row: Array, rest: Array, other: Array) -> Array:
+def exchanged_rows(
+    rows: Array, i: Array, row: Array, rest: Array, other: Array, more: Array | float = 0.0
+) -> Array:
     """Rows with row and column ``i`` exchanged.
 
-    ``row`` stands for row ``i``, and ``rest`` times the new row ``other`` is added to the new one.
+    ``row`` stands for row ``i``, and ``rest`` times the new row ``other`` is added to the new one,
+    whose value at tau = 0 rises by ``more``.
     """
     pivot = row[i]
     share = rows[:, i] / pivot
     beside = (rows[other] - share[other] * row).at[i].set(share[other])
-    new = (-row / pivot).at[i].set(1.0 / pivot) + rest * beside
+    new = ((-row / pivot).at[i].set(1.0 / pivot) + rest * beside).at[-2].add(more)
     numbers = jnp.arange(rows.shape[1])
     swept = jnp.where(numbers == i, share[:, None], rows - share[:, None] * row)
     return jnp.where(numbers[: rows.shape[0], None] == i, new, swept)
