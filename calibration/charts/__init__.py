@@ -9,4 +9,5 @@ They draw the JSON that a benchmark or a study leaves behind. A checkout that is
 from calibration.charts import failures as failures
 from calibration.charts import ladder as ladder
 from calibration.charts import methods as methods
+from calibration.charts import settings as settings
 from calibration.charts import speed as speed

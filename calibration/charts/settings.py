@@ -1,15 +1,22 @@
-"""Charts of the record of calibration/default_settings.py: what a scene chooses for itself."""
+"""Charts of the record of calibration/default_settings.py: what a scene chooses for itself.
+
+python -m calibration.charts.settings
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
 from calibration.charts.table import OFF, Chart, Curve, Record
 from calibration.charts.table import draw as draw_one
+from jbeamshell.plotting.style import close, save, style
 
 TOLERANCE = 0.005
 SMALLEST = 1e-5  # error that is drawn as the smallest
@@ -53,3 +60,19 @@ CHARTS = {
 def draw(record: Record, name: str, axes: Axes | None = None) -> Axes:
     """Draw one chart of `CHARTS`."""
     return draw_one(CHARTS, record, name, axes)
+
+
+def main() -> None:
+    """Draw the charts beside the other pictures of the studies."""
+    folder = Path(__file__).parents[1]
+    record = json.loads((folder / "default_settings.json").read_text(encoding="utf-8"))
+    with style():
+        figure, panels = plt.subplots(1, len(CHARTS), figsize=(9.0, 3.6), layout="constrained")
+        for name, axes in zip(CHARTS, panels, strict=True):
+            draw(record, name, axes)
+        save(figure, folder / "default_settings.png")
+        close(figure)
+
+
+if __name__ == "__main__":
+    main()
