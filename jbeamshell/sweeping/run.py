@@ -42,7 +42,10 @@ from jbeamshell.sweeping.results import Sweep as Sweep
 from jbeamshell.sweeping.runner import Block, check_figures
 from jbeamshell.sweeping.store import Store
 
-FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "loss_factor")
+FIGURES = (
+    *("dissipation", "dissipation_ratio", "secant_stiffness", "loss_factor"),
+    "dissipation_error",  # which says what lanes to rely on, see `Sweep.doubtful`
+)
 PARTS = ".parts"  # suffix of the folder of finished blocks, beside the file
 
 Progress = Callable[[int, int], None]

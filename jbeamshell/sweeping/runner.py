@@ -181,9 +181,14 @@ class Runner:
     def _mend(self, columns: np.ndarray, block: Block) -> None:
         """Solve failed lanes alone, where long load steps are divided; mark what still fails."""
         values, status = block
-        unclear = (status != Outcome.CONVERGED) | ~np.all(np.isfinite(values), axis=0)
+        unclear = (status != Outcome.CONVERGED) | ~np.all(self._known(values.T), axis=1)
         for lane in np.flatnonzero(unclear):
             values[:, lane], status[lane] = self._alone(columns[:, lane])
+
+    def _known(self, values: np.ndarray) -> np.ndarray:
+        """True for numbers (..., figures); an estimated error is infinite where nothing slips."""
+        errors = np.array([name == "dissipation_error" for name in self.figures])
+        return np.isfinite(values) | (errors & np.isposinf(values))
 
     def _alone(self, numbers: np.ndarray) -> tuple[np.ndarray, int]:
         given = (jnp.asarray(number, self.dtype) for number in numbers)
@@ -196,7 +201,7 @@ class Runner:
         values = np.asarray(_figures(history, self.figures))
         if status != Outcome.CONVERGED:
             return np.full_like(values, np.nan), status
-        values = np.where(np.isfinite(values), values, np.nan)
+        values = np.where(self._known(values), values, np.nan)
         return values, Outcome.UNDEFINED if np.any(np.isnan(values)) else status
 
 

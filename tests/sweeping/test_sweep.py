@@ -401,3 +401,12 @@ def test_lanes_of_plane_elasticity_share_their_bodies():
     np.testing.assert_allclose(mixed["dissipation"], grid["dissipation"].ravel()[order], rtol=1e-12)
     alone = jb.solve(scene.replace({"load.amplitude": 1.2, "strip.height_ratio": 0.05}))
     np.testing.assert_allclose(grid["dissipation"][2, 0], alone.dissipation, rtol=1e-8)
+
+
+def test_lanes_say_how_far_off_they_may_be():
+    found = jb.sweep(SCENE, {"load.amplitude": [1e-9, 1.2]})
+    assert np.all(found.status == Outcome.CONVERGED)
+    stuck, sliding = found["dissipation_error"]
+    assert stuck == np.inf  # nothing slips
+    assert 0.0 < sliding < 1.0
+    assert found.doubtful[0]
