@@ -57,8 +57,8 @@ PER_STEP = 0.5  # of the elements, for each step of the pressure inside the stri
 STEPWISE = Grid(161, END_SIZE, 1.5)
 
 
-def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Values of the settings that a scene leaves open, those of its load and of its model.
+def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any], ...]:
+    """Values for a scene's load and its model that differ from those it has.
 
     Parameters
     ----------
@@ -79,8 +79,7 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
         found["solution"] = "condensed" if linear and may_condense(scene) else "stepwise"
         if found["solution"] == "condensed" and "w" not in fields:
             fields = ("v", "w", *fields[1:])
-    if fields != model.fields:
-        found["fields"] = fields
+    found["fields"] = fields
     solution = found.get("solution", model.solution)
     grid = PLANE if solution == "plane" else CONTACT_LINE if solution in CONDENSED else STEPWISE
     if "end_size" in open_model:
@@ -88,7 +87,10 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     if "nodes" in open_model:
         found["nodes"] = _nodes(grid, model.tolerance, scene.contact.jumps)
     steps = {"steps_per_half_cycle": STEPS} if "steps_per_half_cycle" in open_load else {}
-    return steps, found
+    return tuple(
+        {name: value for name, value in values.items() if getattr(part, name) != value}
+        for part, values in ((load, steps), (model, found))
+    )
 
 
 def _nodes(grid: Grid, tolerance: float, jumps: int) -> int:

@@ -40,6 +40,10 @@ from jbeamshell.scene.rungs import IDEAL, general_rung, spelled_out
 class Scene(eqx.Module):
     """Strip, its contact, its load and the model of it.
 
+    Settings that are "auto" are chosen when the scene is made, see `jbeamshell.scene.choice`; its
+    load and its model hold what was chosen.  In a JAX transformation they stay as they were chosen
+    before.
+
     Attributes
     ----------
     strip, contact, load, model : parts of the scene, see `jbeamshell.scene.parts`
@@ -227,7 +231,11 @@ class Scene(eqx.Module):
         """Elastic stiffness k_t = alpha G/H of the sliders, traction per slip."""
         strip = self.strip
         stiffness = self.contact.stick_stiffness * strip.shear_modulus / strip.half_height
-        return jnp.full_like(stiffness, jnp.inf) if self.ideal_friction else stiffness
+        if not self.ideal_friction:
+            return stiffness
+        numbers: Any = np if isinstance(stiffness, np.ndarray | np.generic) else jnp  # much faster
+        rigid: Array = numbers.full_like(stiffness, np.inf)
+        return rigid
 
     def get(self, key: str) -> Any:
         """Value of a dotted key, such as ``scene.get("strip.height_ratio")``."""
