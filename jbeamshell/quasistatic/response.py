@@ -67,7 +67,7 @@ def response(
     Callable
         from the numbers to a dictionary of the figures and ``status``, the largest code of
         `jbeamshell.Status` of all steps.  Unless it is zero the figures are NaN or wrong.  Numbers
-        are not checked against the scene's domain.
+        are not checked against the scene's domain, and the settings stay those of the scene.
 
     Raises
     ------
