@@ -30,6 +30,7 @@ from jbeamshell.sweeping.lanes import lanes_of
 TINY = {
     "model.nodes": 9,
     "model.kinematics": "linear",
+    "model.solution": "stepwise",
     "load.steps_per_half_cycle": 2,
     "load.cycles": 1,
 }
