@@ -29,7 +29,6 @@ from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.rungs import CONDENSED
 
 LINEAR_PART = 0.2  # of the tolerance that linear rotations may take
-STEPS = 40  # load steps per half cycle
 FEW_STEPS = 2  # load steps per half cycle where only figures of a cycle are asked of exact events
 
 
@@ -41,20 +40,22 @@ class Grid(NamedTuple):
     nodes : number of nodes for `KNOWN`
     end_size : smallest elements before scaling, in units of H
     order : order of the error in the number of nodes
+    steps : load steps per half cycle, which draw a loop; exact events need none of them
     """
 
     nodes: int
     end_size: float
     order: float
+    steps: int
 
 
 MOST_CONDENSED = 129  # nodes, beyond which events cost more than load steps
 KNOWN = 0.005  # tolerance for which the grids were measured
-CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0)
-PLANE = Grid(129, END_SIZE, 2.0)
+CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20)
+PLANE = Grid(129, END_SIZE, 2.0, 20)
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
-STEPWISE = Grid(161, END_SIZE, 1.5)
+STEPWISE = Grid(161, END_SIZE, 1.5, 40)
 
 
 def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any], ...]:
@@ -86,7 +87,7 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
         found["end_size"] = grid.end_size
     if "nodes" in open_model:
         found["nodes"] = _nodes(grid, model.tolerance, scene.contact.jumps)
-    steps = {"steps_per_half_cycle": STEPS} if "steps_per_half_cycle" in open_load else {}
+    steps = {"steps_per_half_cycle": grid.steps} if "steps_per_half_cycle" in open_load else {}
     return tuple(
         {name: value for name, value in values.items() if getattr(part, name) != value}
         for part, values in ((load, steps), (model, found))

@@ -198,8 +198,10 @@ class Part(eqx.Module):
     @property
     def open(self) -> list[str]:
         """Names of the fields that the scene is to choose."""
-        settings = (name for name, key in rows(type(self)).items() if key.open)
-        return [name for name in settings if self.given(name) == AUTO]
+        given = dict(self.as_given)
+        return [
+            name for name in settings_of(type(self)) if given.get(name, getattr(self, name)) == AUTO
+        ]
 
     def changed(self, **values: Any) -> Self:
         """Copy with other given values."""
@@ -216,6 +218,12 @@ class Part(eqx.Module):
         given |= {name: self.given(name) for name in values}
         kept = {name: value for name, value in given.items() if values.get(name) != value}
         return dataclasses.replace(self, as_given=tuple(sorted(kept.items())), **values)
+
+
+@functools.cache
+def settings_of(part: type[Part]) -> tuple[str, ...]:
+    """Names of a part's fields that a scene may choose."""
+    return tuple(name for name, key in rows(part).items() if key.open)
 
 
 @functools.cache
