@@ -45,6 +45,8 @@ from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.ladder.candidates import Candidate  # noqa: E402
 from jbeamshell.measured.example import data_folder, example_loops  # noqa: E402
 
+IN_LOAD_STEPS = {"model.solution": "stepwise", "model.kinematics": "exact"}
+
 ROOT = Path(__file__).parents[2]
 RECORD = Path(__file__).with_suffix(".json")
 PICTURE = ROOT / "calibration" / "work_precision.png"
@@ -135,7 +137,7 @@ def scene_of(strip: tuple[float, float], values: dict[str, Any]) -> jb.Scene:
     """A standard strip, with what differs from the defaults."""
     eta, amplitude = strip
     own = {"strip.height_ratio": eta, "load.amplitude": amplitude, "load.cycles": CYCLES}
-    return jb.Scene().replace(own | values)
+    return jb.Scene().replace(IN_LOAD_STEPS).replace(own | values)
 
 
 def modelled(strip: tuple[float, float], case: Candidate) -> jb.Scene:

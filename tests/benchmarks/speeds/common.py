@@ -16,6 +16,8 @@ import jbeamshell as jb
 from jbeamshell.measured.example import data_folder
 
 ETA, AMPLITUDE = 0.1126, 0.7855
+
+IN_LOAD_STEPS = {"model.solution": "stepwise", "model.kinematics": "exact"}
 OVER = ("strip.height_ratio", "load.amplitude")
 STANDARD = {
     "strip.height_ratio": ETA,
@@ -84,7 +86,7 @@ QUICK = Plan(
 
 def scene(values: Mapping[str, Any] | None = None) -> jb.Scene:
     """The standard strip on the grid that is timed, with what differs."""
-    return jb.Scene().replace(STANDARD | dict(values or {}))
+    return jb.Scene().replace(IN_LOAD_STEPS).replace(STANDARD | dict(values or {}))
 
 
 @cache
