@@ -156,6 +156,7 @@ class TestFigures:
             rest = [abs(float(ask(at + h * way, way)[0] - value - h * forward)) for h in sizes]
             assert np.log2(rest[0] / rest[1]) == pytest.approx(2.0, abs=0.1)
 
+    @pytest.mark.slow
     def test_sweeps_and_joints_take_them(self):
         scene = BODIES["shell"].replace({"load.steps_per_half_cycle": 1})
         table = jb.sweep(scene, {"load.amplitude": [0.5, AMPLITUDE]})

@@ -232,6 +232,7 @@ class TestHistory:
         imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
         assert imbalance < 0.01  # trapezoids of the work over 40 steps a branch
 
+    @pytest.mark.slow
     def test_load_steps_only_say_where_the_path_is_looked_at(self):
         few, many = ({"load.steps_per_half_cycle": count} for count in (2, 40))
         scene = scene_of(0.1126, 0.3)
@@ -296,6 +297,7 @@ class TestRung:
         alone = plane(scene, **{"model.nodes": 33, "contact.friction": 0.5}).dissipation
         np.testing.assert_allclose(table["dissipation"][1], alone, rtol=1e-10)
 
+    @pytest.mark.slow
     def test_displacement_control_walks_the_loop_of_the_force_and_goes_beyond(self):
         few = {"model.nodes": 33, "load.steps_per_half_cycle": 2}
         force = plane(scene_of(0.1126), **few)
@@ -308,6 +310,7 @@ class TestRung:
         beyond = plane(scene_of(0.1126), **few, **control | loose)
         np.testing.assert_allclose(beyond.force[1], 2.0, rtol=1e-8)  # mu F_N L
 
+    @pytest.mark.slow
     def test_soft_sliders_make_the_strip_softer_and_keep_its_energy(self):
         few = {"model.nodes": 33, "load.steps_per_half_cycle": 8}
         ideal, soft = (

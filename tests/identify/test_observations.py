@@ -48,6 +48,7 @@ def test_kappa_s_of_the_finite_elements(measured, fitted):
     assert float(fitted.scene.strip.kappa_s) == fitted.values["strip.kappa_s"]
 
 
+@pytest.mark.slow
 def test_printed_constants_hide_a_factor_of_24(measured, fitted):
     printed = FAST | {"model.constants": "printed", "strip.kappa_s": 0.05}
     fit = identify.fit_kappa_s(measured, library.squeezed().replace(printed))
@@ -189,6 +190,7 @@ def test_noise_belongs_to_the_column_that_answered():
         observe(loop, STRIP)
 
 
+@pytest.mark.slow
 def test_a_free_zero_is_put_where_it_fits():
     scene = STRIP.replace(
         FAST | {"model.nodes": 21, "load.steps_per_half_cycle": 8, "load.amplitude": 1.0}

@@ -52,6 +52,7 @@ def test_bound_covers_the_record_closely(name, rung, every):
     assert np.median((bound / measured)[measured > LEAST]) < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("strain", "eta", "gross"), [(2e-3, 0.1126, 0.4), (1e-4, 0.3, 0.7), (1e-2, 0.05, 0.2)]
 )
