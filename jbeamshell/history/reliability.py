@@ -189,6 +189,8 @@ def _resolution(history: Run) -> tuple[str, ...]:
         grid, corner = map(float, estimates(history.scene, cycle))
     plane = history.scene.model.solution == "plane"  # it has a grid of its own
     finer = "take more model.nodes" if plane else FINER
+    if "nodes" in history.scene.model.open:  # given nodes may change how the scene is solved
+        finer = "take a smaller model.tolerance"
     if np.isinf(grid):
         return (
             "nothing slips in the last cycle: slip that is smaller than the elements would not be "

@@ -72,7 +72,7 @@ class Level(NamedTuple):
 
 
 class View(NamedTuple):
-    """What one recording holds.
+    """Content of one recording.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ class View(NamedTuple):
 
 
 class Inspection(NamedTuple):
-    """What some files or arrays hold, one view for each recording; print it."""
+    """Content of some files or arrays, one view for each recording; print it."""
 
     views: tuple[View, ...]
 

@@ -26,7 +26,6 @@ from jbeamshell.scene.scene import Scene
 
 Response = Callable[..., dict[str, Array]]
 
-
 # Figures of a cycle that condensed strips know from its turning points alone.
 EXACT = {*FIGURES, "dissipation_error"} - {"dissipation_loop"}
 FEW = 200  # number of nodes beyond which the arithmetic takes longer than the calls

@@ -53,7 +53,7 @@ def solve(
         scene's own cycles
     contact : (n,) True at the nodes in contact where the search for the contact starts; None starts
         with all of them
-    solver : settings of Newton's method
+    solver : settings of Newton's method, which strips on their contact line do not need
     throw : True raises for a step without equilibrium and warns of doubts; False leaves both to
         ``history.status`` and ``history.doubts``
     method : method of the load steps; None is the fastest that the run allows
@@ -166,7 +166,8 @@ class WholePath(eqx.Module):
         scene, before = history.scene, np.asarray(history.target)[history.pressed + 1 :]
         further = further_path(scene, float(before[-1]) if before.size else 0.0, path)
         whole = bool(np.all(further.pressure == 1.0))
-        fix = f"must stay as they are for model.rung = {scene.model.rung}: take 'stepwise'"
+        fix = f"must stay as they are for model.rung = {scene.model.rung}: take "
+        fix += "model.solution = stepwise"
         require("path", "pressures", whole, fix)
         return solve(scene, np.append(before, further.target), solver=solver, throw=throw)
 

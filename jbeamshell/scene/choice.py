@@ -26,7 +26,7 @@ from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.linearisation import NEAR_BUCKLING, Parts, buckling, linear_errors
 from jbeamshell.scene.rows import AUTO
-from jbeamshell.scene.rungs import CONDENSED
+from jbeamshell.scene.rungs import CONDENSED, PLANE_NODES
 
 LINEAR_PART = 0.2  # of the tolerance that linear rotations may take
 FEW_STEPS = 2  # load steps per half cycle where only figures of a cycle are asked of exact events
@@ -49,10 +49,10 @@ class Grid(NamedTuple):
     steps: int
 
 
-MOST_CONDENSED = 129  # nodes, beyond which events cost more than load steps
 KNOWN = 0.005  # tolerance for which the grids were measured
+MOST_CONDENSED = 129  # nodes that are given, beyond which events cost more than load steps
 CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20)
-PLANE = Grid(129, END_SIZE, 2.0, 20)
+PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
 STEPWISE = Grid(161, END_SIZE, 1.5, 40)
@@ -132,7 +132,7 @@ def may_condense(scene: Parts) -> bool:
 
 
 def in_words(scene: Parts) -> str:
-    """What a scene has chosen, in one line; empty if it left nothing open."""
+    """One line that says what a scene has chosen; empty if it left nothing open."""
     load, model = scene.load, scene.model
     shown = {
         "solution": f"rung {model.rung}",
