@@ -1,7 +1,5 @@
 """``python -m jbeamshell``, the command line."""
 
-import sys
+from jbeamshell.cli.main import program
 
-from jbeamshell.cli.main import main
-
-sys.exit(main())
+program()

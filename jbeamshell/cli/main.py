@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -36,6 +38,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return complain(str(error) or "interrupted; no file is left half-written", INTERRUPTED)
 
 
+def program() -> None:
+    """Run the command line as a program: ends this process with the exit code."""
+    code = main()
+    if code != INTERRUPTED:
+        sys.exit(code)
+    # Threads of JAX may be at work still; Python must not be taken down beneath them.
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError):
+            stream.flush()
+    os._exit(code)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="jbeamshell",
@@ -54,4 +68,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    program()

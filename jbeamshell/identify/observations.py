@@ -144,7 +144,8 @@ class LoopObservation(Observation):
             raise InputError(
                 f"{measurement.label}: its {driver} drives, so its noise is not that of the "
                 f"{driver}, which is the response under load.control = {scene.load.control!r}: "
-                f"set load.control to {driver!r}"
+                f"set load.control to {driver!r}, or average its cycles by "
+                f"steady_loops(recording, {scene.load.control!r})"
             )
         if noise is not None and np.min(noise) >= np.ptp(response):
             raise InputError(

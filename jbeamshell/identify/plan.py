@@ -114,11 +114,13 @@ def plan_from_values(values: Mapping[str, Any], folder: Path) -> Plan:
     plan, common = _without_specimens(values, folder)
     for number, table in enumerate(given, 1):
         source = _source(table, table.get("label") or (f"{number}" if len(given) > 1 else ""))
+        known = source.known(folder)
+        own = overridden(overridden(common, known.values), source.set)
+        if source.driver is None and own.get("load.control") in CONTROLS:
+            source = dataclasses.replace(source, driver=own["load.control"])
         read = list(source.measurements(folder, bool(values.get("unchecked", False))))
         plan.notes.extend(f"{item.label}: {note}" for item, notes in read for note in notes)
-        known = source.known(folder)
         plan.notes.extend(known.notes)
-        own = overridden(overridden(common, known.values), source.set)
         plan = _with_specimen(plan, own, [item for item, _ in read], source.label)
     return plan
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,8 @@ NESTED = 0.1  # move back over each of its neighbours, below which it is a back-
 GROSS_SLIP = 0.02  # tangent over secant stiffness, below which everything slides
 SLIDING = 0.1  # sliding part of the travel, above which the displacement drives
 PARTS = 25  # of a branch, over which force and displacement are compared
+SHUFFLED = 2.0  # scatter of displacement over force to its converse, above which it drives
+TOLD = 0.01  # part of the range that this scatter has at least
 CALM = 0.001  # excess travel over the travel from turn to turn of a column without noise
 
 Floats = NDArray[np.float64]
@@ -95,15 +98,14 @@ def extremes(path: Floats, band: float) -> list[int]:
 def find_driver(force: Floats, displacement: Floats) -> str:
     """Find the column, "force" or "displacement", that drove a test.
 
-    It is the displacement if much of its travel happens at constant force, which force control
-    cannot do.  Else it is the column that travels from turn to turn with less movement to and fro,
-    and the force if both are smooth.
+    It is the displacement if there is a plateau, see `has_plateau`.  Else it is the column that
+    travels from turn to turn with less movement to and fro, and the force if both are smooth.
 
     Parameters
     ----------
     force, displacement : (points,) columns of a recording
     """
-    if _sliding(force, displacement) > SLIDING:
+    if has_plateau(force, displacement):
         return "displacement"
     excess = {}
     for name, column in (("force", force), ("displacement", displacement)):
@@ -113,6 +115,19 @@ def find_driver(force: Floats, displacement: Floats) -> str:
         excess[name] = float(np.sum(np.abs(np.diff(column)))) / net - 1.0
     noisy = max(excess.values()) > CALM
     return "displacement" if noisy and excess["displacement"] < 0.5 * excess["force"] else "force"
+
+
+def has_plateau(force: Floats, displacement: Floats) -> bool:
+    """True if everything slides for a part of the time, which only displacement control can do.
+
+    Much of the displacement's travel happens at constant force then; or along a branch it scatters
+    over the force far more than the force over it, as on a noisy plateau.
+
+    Parameters
+    ----------
+    force, displacement : (points,) columns of a recording
+    """
+    return _sliding(force, displacement) > SLIDING or _shuffled(force, displacement)
 
 
 def _sliding(force: Floats, displacement: Floats) -> float:
@@ -130,6 +145,26 @@ def _sliding(force: Floats, displacement: Floats) -> float:
         return 0.0
     constant = rise < GROSS_SLIP * way + noise
     return float(np.sum(way[constant]) / np.sum(way))
+
+
+def _shuffled(force: Floats, displacement: Floats) -> bool:
+    """True if the order of the forces shuffles a branch, and that of its displacements does not.
+
+    The scatter of a column over another is that of neighbours in the other's order (von Neumann
+    1941). Noise of either column makes both scatters about equal where no plateau is.
+    """
+    path = smoothed_path(displacement)
+    ends = extremes(path.smooth, path.band) or [0, displacement.size - 1]
+    u, f = displacement / np.ptp(displacement), force / np.ptp(force)
+    squares, count = np.zeros(2), 0
+    for here, there in itertools.pairwise(ends):
+        branch = slice(here, there + 1)
+        for i, (x, y) in enumerate(((f, u), (u, f))):
+            neighbours = np.diff(y[branch][np.argsort(x[branch], kind="stable")])
+            squares[i] += 0.5 * float(neighbours @ neighbours)
+        count += there - here
+    scatter = np.sqrt(squares / max(count, 1))
+    return bool(scatter[0] > max(SHUFFLED * scatter[1], TOLD))
 
 
 def _corners(path: Floats) -> list[int]:

@@ -15,6 +15,7 @@ from jbeamshell.measured.reversals import (
     SmoothPath,
     extremes,
     find_driver,
+    has_plateau,
     noise_of,
     smoothed_path,
 )
@@ -113,8 +114,8 @@ def split_cycles(
     Parameters
     ----------
     recording : recording of one test
-    driver : "force" or "displacement"; None takes the column of `find_driver`, or the other if its
-        whole cycles cover at least 10 % more points
+    driver : "force" or "displacement"; None takes the column of `find_driver`; without a plateau
+        the other one if its whole cycles cover at least 10 % more points
     smallest : range of the smallest cycle to be found, over the whole range
 
     Returns
@@ -167,7 +168,10 @@ def split_cycles(
 
 
 def _driver(recording: Recording, smallest: float) -> str:
-    first = find_driver(recording.force, recording.displacement)
+    columns = recording.force, recording.displacement
+    if has_plateau(*columns):
+        return "displacement"
+    first = find_driver(*columns)
     second = "displacement" if first == "force" else "force"
     within = {}
     for name in (first, second):

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.loops import Loop, make_loop, read_loops
 from jbeamshell.measured.recordings import recording_from_arrays
-from jbeamshell.measured.reversals import find_driver, find_turns
+from jbeamshell.measured.reversals import find_driver, find_turns, has_plateau
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
+from tests import rig
 
 DRIVERS = ("force", "displacement")
 NOISES = (0.001, 0.01, 0.05)
@@ -126,6 +127,31 @@ def test_the_column_that_repeats_its_levels_drives(points):
 def test_a_displacement_drives_what_slides_without_noise():
     drive = driven([3.0] * 2, 200)
     assert find_driver(answered(drive, "displacement") - 0.05 * drive, drive) == "displacement"
+
+
+@pytest.mark.parametrize("noisy", rig.NOISES)
+@pytest.mark.parametrize("seed", range(8))
+def test_noise_on_a_plateau_does_not_hide_that_the_displacement_drives(noisy, seed):
+    random = np.random.default_rng(seed)
+    u = 0.28 * rig.path(3, int(random.choice([80, 200])), shape=random.choice(["sine", "ramp"]))
+    force = rig.stops(u, [random.uniform(0.005, 0.1)], [100.0])
+    noise = random.choice([0.001, 0.01, 0.02])
+    recording = rig.recorded(force, u, noise, noisy, seed, random.choice([None, "displacement"]))
+    for loop in steady_loops(recording):
+        assert loop.driver == "displacement"
+        assert np.min(loop.displacement) > 1.1 * np.min(recording.displacement)
+        assert np.max(loop.displacement) < 1.1 * np.max(recording.displacement)
+
+
+@pytest.mark.parametrize("noisy", rig.NOISES)
+@pytest.mark.parametrize("seed", range(8))
+def test_no_force_that_drives_shows_a_plateau(noisy, seed):
+    random = np.random.default_rng(seed)
+    force = rig.path(3, int(random.choice([40, 200])))
+    slid = rig.iwan_by_force(force, random.uniform(1.0, 4.0)) - random.choice([0.0, 0.5]) * force
+    noise = random.choice([0.001, 0.01, 0.05])
+    recording = rig.recorded(force, slid, noise, noisy, seed, random.choice([None, "force"]))
+    assert not has_plateau(recording.force, recording.displacement)
 
 
 @pytest.mark.parametrize("driver", DRIVERS)

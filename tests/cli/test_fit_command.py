@@ -1,0 +1,315 @@
+"""`jbeamshell fit`: what it finds, what it is asked, and the data and words that it refuses."""
+
+import csv
+import functools
+import json
+import re
+import tomllib
+
+import numpy as np
+import pytest
+
+from jbeamshell import identify
+from jbeamshell.cli import main
+from jbeamshell.measured.loops import read_loops
+from tests import rig
+from tests.command import BASE, COARSE, is_png, names, options
+
+TRUE = {"contact.friction": 0.12, "strip.height_ratio": 0.2}
+# Of the standard strip, which data with units do not mean unless they are given.
+KNOWN = {"strip.length": 2.0, "strip.axial_stiffness": 3.4e4, "contact.pressure": 10.0}
+OFF = {"contact.friction": 0.084, "strip.height_ratio": 0.26}  # by 30 %
+FIT_FILES = {"overlay.csv", "overlay.png", "residuals.png", "result.json", "scene.toml"}
+
+
+@pytest.fixture(scope="module")
+def planted(tmp_path_factory):
+    """Files of a run, as data: first loading and one cycle of a strip with planted parameters."""
+    folder = tmp_path_factory.mktemp("data")
+    assert main.main(["run", *BASE, *options(TRUE), "--out", str(folder)]) == 0
+    return folder / "loop.csv"
+
+
+@pytest.fixture(scope="module")
+def closed(planted):
+    """Its cycle alone, in kN and micrometres."""
+    loop = read_loops(planted)[0]
+    path = planted.with_name("closed.csv")
+    rows = zip(loop.force[4:] * 1e-3, loop.displacement[4:] * 1e6, strict=True)
+    lines = [
+        "displacement [um];force [kN]",
+        *(f"{u!r};{f!r}" for f, u in np.array([*rows]).tolist()),
+    ]
+    path.write_text("\n".join(lines))
+    return path
+
+
+FIT = (*BASE, *options(OFF, "--start"))
+
+
+def test_fit_finds_what_was_planted(cli, planted, tmp_path):
+    folder = tmp_path / "new" / "fit"
+    code, out, err = cli("fit", planted, *FIT, "--json", "--out", folder)
+    assert code == 0
+    figures = json.loads(out)
+    assert {"values", "misfit", "status", "model_runs", "wall_s"} <= set(figures)
+    assert list(figures["values"]) == list(TRUE)
+    for key, value in TRUE.items():
+        assert figures["values"][key]["value"] == pytest.approx(value, rel=1e-2)
+        assert 0.0 <= figures["values"][key]["error"] < 0.01 * value
+    assert figures["status"] == "converged"
+    assert figures["misfit"] < 1e-3
+    assert isinstance(figures["model_runs"], int)
+    assert 2 < figures["model_runs"] < 40
+    assert figures["wall_s"] > 0.0
+    # The unexplained rest is rounding here, and the correlation is a number all the same.
+    np.testing.assert_allclose(np.diag(figures["correlation"]), 1.0)
+
+    assert names(folder) == FIT_FILES
+    assert all(str(folder / name) in err for name in FIT_FILES)
+    assert json.loads((folder / "result.json").read_text()) == figures
+    assert is_png(folder / "overlay.png")
+    with (folder / "overlay.csv").open(newline="") as table:
+        rows = list(csv.DictReader(table))
+    data = read_loops(planted)[0]
+    for name in ("force", "displacement"):
+        np.testing.assert_array_equal([float(row[name]) for row in rows], getattr(data, name))
+    model = np.array([float(row["model_displacement"]) for row in rows])
+    assert np.max(np.abs(model - data.displacement)) < 1e-3 * np.ptp(data.displacement)
+
+    # The fitted scene runs as it is, at the amplitude of the data.
+    code, out, _ = cli("run", folder / "scene.toml", "--json")
+    assert code == 0
+    loop = json.loads((planted.parent / "result.json").read_text())
+    assert json.loads(out)["dissipation"] == pytest.approx(loop["dissipation"], rel=1e-2)
+
+
+def test_fit_prints_text_to_read(cli, planted):
+    code, out, err = cli("fit", planted, *FIT)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert re.fullmatch(r"  contact.friction +0\.1[12]\d* \+- \S+", lines[0])
+    assert re.fullmatch(r"  strip.height_ratio +0\.(2|19)\d* \+- \S+", lines[1])
+    assert re.fullmatch(r"  misfit \S+ % of the range", lines[2])
+    assert re.fullmatch(r"  converged after \d+ model runs", lines[3])
+    assert lines[-1] == "  the force drives these loops (set load.control to change it)"
+
+
+def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
+    hasty = functools.partial(identify.fit, max_iterations=1)
+    monkeypatch.setattr(identify, "fit", hasty)
+    line = refused("fit", planted, *FIT, "--json", code=3)
+    assert line.startswith("the fit has not converged after 1 iterations, at contact.friction = ")
+
+
+@pytest.mark.slow
+def test_fit_driven_by_the_displacement(cli, closed, tmp_path):
+    drive = options(KNOWN | {"load.control": "displacement", "load.amplitude": 2e-5})
+    code, out, _ = cli("fit", closed, *FIT, *drive, "--json", "--out", tmp_path)
+    assert code == 0
+    values = json.loads(out)["values"]
+    for key, value in TRUE.items():
+        assert values[key]["value"] == pytest.approx(value, rel=1e-2)
+    load = tomllib.loads((tmp_path / "scene.toml").read_text())["load"]
+    assert (load["control"], load["amplitude"]) == ("displacement", 2e-5)
+
+
+def test_a_plan_of_two_strips_is_fitted_profiled_saved_and_resumed(cli, closed, tmp_path):
+    plan = tmp_path / "plan.toml"
+    given = (COARSE | KNOWN).items()
+    settings = "".join(f'"{key}" = {json.dumps(value)}\n' for key, value in given)
+    plan.write_text(
+        f"[set]\n{settings}"
+        f"""
+        [free."contact.friction"]
+        start = 0.084
+        [free."strip.height_ratio"]
+        start = 0.26
+        each = true
+        [[specimen]]
+        label = "a"
+        data = ["{closed}"]
+        [[specimen]]
+        label = "b"
+        data = ["{closed}"]
+        """
+    )
+    words = ("fit", plan, "--json", "--save", tmp_path / "state", "--profile", "contact.friction")
+    code, out, _ = cli(*words, "--noise", 0.001, "--out", tmp_path / "out")
+    assert code == 0
+    figures = json.loads(out)
+    keys = ["contact.friction", "strip.height_ratio[a]", "strip.height_ratio[b]"]
+    assert list(figures["values"]) == keys
+    for key, value in zip(keys, (0.12, 0.2, 0.2), strict=True):
+        assert figures["values"][key]["value"] == pytest.approx(value, rel=1e-2)
+    low, high = figures["profiles"]["contact.friction"]["interval"]
+    assert low < figures["values"]["contact.friction"]["value"] < high
+    made = names(tmp_path / "out")
+    assert {"scene_1.toml", "scene_2.toml", "profiles.csv", "profiles.png"} < made
+    # The state holds every run: the same again asks the model nothing.
+    states = (tmp_path / "state").read_text()
+    code, out, _ = cli(*words, "--noise", 0.001)
+    assert code == 0
+    assert json.loads(out)["values"] == figures["values"]
+    assert (tmp_path / "state").read_text() == states
+
+
+# --- what a fit is asked to do --------------------------------------------------------------------
+
+
+class Asked(Exception):
+    """Carries what `identify.fit` was called with."""
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    def fit(specimens, *, free, **_):
+        (one,) = specimens
+        start = {p.key: p.start for p in free if p.start is not None}
+        raise Asked(one.data, one.scene.replace(start), [p.key for p in free])
+
+    monkeypatch.setattr(identify, "fit", fit)
+
+    def asked(*words):
+        with pytest.raises(Asked) as caught:
+            main.main(["fit", *map(str, words)])
+        return caught.value.args
+
+    return asked
+
+
+def numbers(scene):
+    return [float(scene.get(key)) for key in TRUE]
+
+
+def test_without_data_the_example_is_fitted(asked):
+    data, scene, free = asked()
+    assert [loop.label for loop in data] == ["A = 0.3247", "A = 0.5851", "A = 1", "A = 1.6"]
+    assert free == list(TRUE)
+    assert numbers(scene) == [0.15, 0.2]
+    assert scene.load.control == "force"
+    assert scene.load.amplitude == 1.6
+
+
+@pytest.mark.parametrize(
+    ("words", "start"),
+    [
+        (["--free", "contact.friction"], [0.15, 0.1126]),
+        (["--free", "strip.kappa_s"], [0.1, 0.1126]),
+        (["--set", "contact.friction=0.3"], [0.3, 0.2]),
+        (["--set", "contact.friction=0.3", "--start", "contact.friction=0.4"], [0.4, 0.2]),
+        (["--set", "strip.half_height=0.05"], [0.15, 0.05]),
+        (["--start", "strip.height_ratio=0.3", "--set", "strip.half_height=0.05"], [0.15, 0.3]),
+    ],
+)
+def test_starts_go_before_settings_before_the_example(asked, words, start):
+    assert numbers(asked(*words)[1]) == start
+
+
+def test_a_scene_file_goes_before_the_example(asked, tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text("[contact]\nfriction = 0.25\n[load]\namplitude = 0.5\n")
+    got = asked("--scene", scene)[1]
+    assert numbers(got) == [0.25, 0.2]
+    assert got.load.amplitude == 0.5
+
+
+@pytest.fixture(scope="module")
+def noisy(tmp_path_factory):
+    """A smooth displacement to 0.002 and a noisy force."""
+    phase = np.linspace(0.0, 2.0 * np.pi, 200)
+    noise = 0.02 * np.random.default_rng(5).standard_normal(phase.size)
+    table = np.column_stack([np.cos(phase + 0.3) + noise, 0.002 * np.cos(phase)])
+    path = tmp_path_factory.mktemp("noisy") / "rig.csv"
+    np.savetxt(path, table, delimiter=",", header="force,displacement", comments="")
+    return path
+
+
+def test_the_smooth_column_drives(asked, noisy, tmp_path):
+    free = ("--free", "contact.friction")
+    load = asked(noisy, *free)[1].load
+    assert (load.control, float(load.amplitude)) == ("displacement", 0.002)
+    load = asked(noisy, *free, "--set", "load.control=displacement")[1].load
+    assert (load.control, float(load.amplitude)) == ("displacement", 0.002)
+    load = asked(noisy, *free, "--set", "load.control=force")[1].load
+    assert load.control == "force"
+    assert float(load.amplitude) == pytest.approx(max(read_loops(noisy)[0].force), rel=0.1)
+    scene = tmp_path / "scene.toml"
+    scene.write_text("[load]\ncontrol = 'force'\namplitude = 0.5\n")
+    load = asked(noisy, *free, "--scene", scene)[1].load
+    assert (load.control, float(load.amplitude)) == ("force", 0.5)
+
+
+def test_the_control_that_is_set_decides_how_cycles_are_averaged(asked, tmp_path):
+    u = rig.path(3)
+    rows = np.column_stack([7.0 * rig.jenkins(u), 1e-4 * u])
+    head = "force [N/m],displacement [m]"
+    np.savetxt(tmp_path / "rig.csv", rows, delimiter=",", header=head, comments="")
+    words = (tmp_path / "rig.csv", "--free", "contact.friction")
+    for further, driver in (
+        ((), "displacement"),
+        (("--set", "load.control=displacement"), "displacement"),
+        (("--set", "load.control=force"), "force"),
+    ):
+        (loop,), scene, _ = asked(*words, *further)
+        assert (loop.driver, scene.load.control) == (driver, driver)
+
+
+# --- bad input ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--free", ""], "free: name at least one key, such as contact.friction"),
+        (["--free", "contact.mu"], "unknown key 'contact.mu': "),
+        (["--free", "contact.friction,contact.friction"], "names a key twice"),
+        (["--free", "load.amplitude"], "free 'load.amplitude': is not a parameter of the strip"),
+        (["--free", "model.nodes"], "free 'model.nodes': is not a parameter of the strip"),
+        (["--free", "contact.smoothing"], "is 'sharp' in this scene; give a number"),
+        (["--start", "strip.kappa_s=1"], "--start strip.kappa_s: is not among the free keys cont"),
+        (["--start", "contact.friction"], "'contact.friction': write KEY=VALUE, such as"),
+        (["--start", "contact.friction=high"], "start = 'high': give a finite number"),
+        (["--start", "contact.friction=-1"], "contact.friction = -1.0: must be a number, not"),
+        (["--bounds", "contact.friction=0.2"], "--bounds contact.friction=0.2: write two numbers"),
+        (["--bounds", "contact.friction=0.2:0.3"], "start = 0.15: must lie between low = 0.2"),
+        (["--prior", "contact.friction=0.1:a"], "write two numbers with a colon between"),
+        (["--profile", "strip.kappa_s"], "--profile strip.kappa_s: is not among the free keys"),
+        (["--noise", "-1"], "noise = -1.0: give a positive part of the range"),
+        (["--starts", "0"], "starts = 0: must be a whole number, 1 to"),
+        (["--method", "simplex"], "method = 'simplex': choose"),
+        (["plan.toml"], "plan.toml: cannot be read (No such file"),
+        (["plan.toml", "a.csv"], "plan.toml a.csv: give one plan, or files of data"),
+        (["plan.toml", "--kind", "loop"], "--kind: plan.toml is a plan; write this into the plan"),
+        (["a.csv", "--kind", "lop"], "kind = 'lop': choose among 'loop', 'backbone'"),
+        (["a.csv", "--unit", "kN"], "'kN': write KEY=VALUE, such as force=kN"),
+        (["--set", "load.control=stress"], "load.control = 'stress': choose 'force' or 'displ"),
+        (["--set", "load.control=a,b"], "load.control = ['a', 'b']: must be a word"),
+        (["--set", "contact.pressure=1"], "contact.friction = 0.15: slides at mu F_N L = 0.3"),
+    ],
+)
+def test_bad_fits_are_refused(refused, words, told):
+    assert told in refused("fit", *words)
+
+
+@pytest.mark.slow
+def test_free_keys_that_the_loops_do_not_depend_on(refused, planted):
+    bar = options({"model.fields": "v", "model.nodes": 5, "model.kinematics": "linear"})
+    line = refused("fit", planted, *bar, "--free", "strip.kappa_s")
+    assert line == "free 'strip.kappa_s': the data do not depend on it at its start; leave it out"
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("", "rig.csv: is empty: give a header and rows"),
+        ("force,displacement\n1,2\n1,x\n", "rig.csv: line 3, column 'displacement' holds 'x'"),
+        ("force,travel\n1,2\n", "rig.csv: needs one column named 'displacement' in line 1"),
+        (None, "rig.csv: cannot be read (No such file"),
+    ],
+)
+def test_bad_data_are_refused(refused, tmp_path, content, told):
+    path = tmp_path / "rig.csv"
+    if content is not None:
+        path.write_text(content)
+    assert told in refused("fit", path)

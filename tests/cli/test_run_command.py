@@ -1,0 +1,229 @@
+"""`jbeamshell run`, keys and scenes: JSON on stdout and nothing else, files when all went well."""
+
+import csv
+import json
+import os
+import re
+import sys
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.cli import arguments, main
+from jbeamshell.scene import library
+from jbeamshell.scene.keys import TABLE
+from tests.command import BASE, COARSE, is_png, names, options
+
+FIGURES = {
+    *("dissipation", "dissipation_loop", "dissipation_ratio", "secant_stiffness", "loss_factor"),
+    *("peak_displacement", "slip_length", "reaction_min", "closure", "newton_iterations"),
+    *("reaction_max", "reaction_max_at", "squeeze_stress_max", "status", "wall_s", "compile_s"),
+    *("contact_end", "lift_slope", "tip_deflection", "doubts"),
+}
+TIMES = {"wall_s", "compile_s"}
+TABLES = {"loop.csv", "profiles.csv", "sections.csv", "result.json", "scene.toml"}
+RUN_FILES = TABLES | {"loop.png", "profiles.png", "contact.png"}
+
+
+# --- run ----------------------------------------------------------------------------------------
+
+
+def test_run_prints_one_json_object(cli):
+    code, out, err = cli("run", *BASE, "--json")
+    assert (code, err) == (0, "")
+    figures = json.loads(out)
+    assert set(figures) == FIGURES
+    words = {"status", "newton_iterations", "doubts"}
+    assert all(isinstance(figures[key], float) for key in FIGURES - words)
+    assert isinstance(figures["newton_iterations"], int)
+    assert figures["status"] == "converged"
+    history = jb.solve(jb.Scene().replace(COARSE))
+    assert {k: v for k, v in figures.items() if k not in TIMES} == history.figures()
+
+
+def test_run_prints_text_to_read(cli):
+    code, out, err = cli("run", *BASE, *options({"strip.height_ratio": 0.2, "load.amplitude": 0.5}))
+    assert (code, err) == (0, "")
+    title, chosen, *lines = out.splitlines()
+    assert "v w beta psi on 21 nodes" in title
+    assert chosen == "chosen for a tolerance of 0.5 %: rung condensed-squeeze"
+    assert "eta = 0.2, force amplitude 0.5" in title
+    figures = [line for line in lines if not line.startswith("  doubtful: ")]
+    names = {line.split("  ")[1].replace(" ", "_") for line in figures}
+    assert names == FIGURES - TIMES - {"doubts"}
+    assert figures[-1].split() == ["status", "converged"]
+    assert len(figures) < len(lines)
+    with pytest.raises(json.JSONDecodeError):
+        json.loads(out)
+
+
+def test_run_leaves_what_runs_again_to_the_last_bit(cli, tmp_path):
+    folder = tmp_path / "new" / "run"
+    third = 1.0 / 30.0 + 0.1
+    words = (*BASE, "--set", f"contact.friction={third}")
+    code, out, err = cli("run", *words, "--json", "--out", folder)
+    assert code == 0
+    assert names(folder) == RUN_FILES
+    assert err.startswith("wrote ")
+    assert err.count("\n") == 1
+    assert all(str(folder / name) in err for name in RUN_FILES)
+    first = json.loads(out)
+    assert json.loads((folder / "result.json").read_text()) == first
+    assert all(is_png(path) for path in folder.glob("*.png"))
+    with (folder / "loop.csv").open(newline="") as table:
+        rows = list(csv.DictReader(table))
+    assert len(rows) == 21
+    assert max(float(row["force"]) for row in rows) == 0.7855
+
+    code, out, _ = cli("run", folder / "scene.toml", "--json")
+    assert code == 0
+    again = json.loads(out)
+    assert {k: again[k] for k in FIGURES - TIMES} == {k: first[k] for k in FIGURES - TIMES}
+    assert jb.read_scene(folder / "scene.toml").contact.friction == third
+
+
+def test_set_overrides_the_file_and_an_alias_its_twin(cli, tmp_path):
+    scene = tmp_path / "scene.toml"
+    sections = "[strip]\nheight_ratio = 0.1\nlength = 4.0\n[load]\namplitude = 0.5\ncycles = 1\n"
+    scene.write_text(sections + "steps_per_half_cycle = 8\n")
+    model = options({k: v for k, v in COARSE.items() if k.startswith("model")})
+    _, out, _ = cli("run", scene, *model)
+    assert "eta = 0.1, force amplitude 0.5\n" in out
+    _, out, _ = cli("run", scene, *model, *options({"load.amplitude": 0.625}))
+    assert "eta = 0.1, force amplitude 0.625\n" in out
+    _, out, _ = cli("run", scene, *model, *options({"strip.half_height": 0.3}))
+    assert "eta = 0.15, force amplitude 0.5\n" in out
+
+
+def test_words_numbers_and_lists_of_the_command_line():
+    texts = ["a = 3", "b=.5", "c=8.", "d=inf", "e=free", "f=v,beta", "g=[1, [.2, 3.]]", 'h="v"']
+    values = arguments.assignments([*texts, "i=a=b", "model.fields=v", "k=true"])
+    assert values == dict(
+        zip(
+            "abcdefghi",
+            [3, 0.5, 8.0, np.inf, "free", ["v", "beta"], [1, [0.2, 3.0]], "v", "a=b"],
+            strict=True,
+        ),
+        **{"model.fields": ["v"], "k": True},
+    )
+    assert isinstance(values["a"], int)
+
+
+def test_what_to_be_wary_of_is_told_on_stderr(cli, monkeypatch):
+    suspect = ("the last loop does not close", "tension at the contact")
+    monkeypatch.setattr(jb.History, "doubts", suspect)
+    code, out, err = cli("run", *BASE, "--json")
+    assert code == 0
+    assert set(json.loads(out)) == FIGURES
+    assert json.loads(out)["doubts"] == list(suspect)
+    assert err.splitlines() == [f"jbeamshell: warning: {doubt}" for doubt in suspect]
+
+
+def test_a_reader_that_leaves_early_costs_no_files(monkeypatch, tmp_path):
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w") as pipe:
+        monkeypatch.setattr(sys, "stdout", pipe)
+        assert main.main(["run", *BASE, "--out", str(tmp_path)]) == 0
+    assert names(tmp_path) == RUN_FILES
+
+
+# --- help -----------------------------------------------------------------------------------------
+
+
+def test_all_keys_are_listed_and_help_points_to_the_list(cli, capsys):
+    code, out, err = cli("keys")
+    assert (code, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines() if not line.startswith(" ")][1:] == [
+        *TABLE
+    ]
+    for command in ("run", "sweep", "fit", "advise", "ringdown"):
+        with pytest.raises(SystemExit, match="0"):
+            cli(command, "--help")
+        assert "`jbeamshell keys`" in " ".join(capsys.readouterr().out.split())
+
+
+# --- scenes that ship ---------------------------------------------------------------------------
+
+PRESSED = {"newton_iterations", "status", "doubts", *TIMES}
+
+
+def test_scenes_are_listed_with_a_line_each(cli):
+    code, out, err = cli("scenes")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert [line.split()[0] for line in lines] == list(library.NAMES)
+    assert all(len(line) < 110 and line.endswith(".") for line in lines)
+    code, out, err = cli("scenes", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == {name: library.summary(name) for name in library.NAMES}
+
+
+def test_a_bent_laminate_by_name(cli):
+    code, out, err = cli("run", "bimaterial", "--json", "--set", "model.nodes=41")
+    assert (code, err) == (0, "")
+    figures = json.loads(out)
+    assert set(figures) == {"curvature", "tip_deflection", "squeeze_stress_max"} | PRESSED
+    curvature = 0.0312604e-4  # per mm, at 1e-4 of the soft layer's modulus
+    assert figures["curvature"] == pytest.approx(curvature, rel=1e-5)
+    assert figures["tip_deflection"] == pytest.approx(0.5 * curvature * 100.0**2, rel=1e-5)
+    assert figures["squeeze_stress_max"] == pytest.approx(0.209)
+
+
+def test_a_scene_without_cycles_by_name(cli, tmp_path):
+    code, out, err = cli("run", "block", "--json", "--set", "model.nodes=41", "--out", tmp_path)
+    assert code == 0
+    assert "warning" not in err
+    figures = json.loads(out)
+    contact = {"contact_end", "tip_deflection", "lift_slope", "reaction_max", "reaction_max_at"}
+    assert set(figures) == contact | {"squeeze_stress_max"} | PRESSED
+    assert figures["contact_end"] == 1.0
+    assert figures["reaction_max"] == pytest.approx(100.0)
+    assert figures["squeeze_stress_max"] == pytest.approx(100.0)
+    assert names(tmp_path) == TABLES | {"contact.png"}
+    assert is_png(tmp_path / "contact.png")
+    with (tmp_path / "loop.csv").open(newline="") as table:
+        (row,) = csv.DictReader(table)
+    assert (row["force"], row["pressure"], row["contact_end"]) == ("0.0", "1.0", "1.0")
+
+
+def test_the_standard_strip_without_cycles(cli):
+    pressure = [[0.0, 10.0], [1.0, 10.0], [1.0, 0.0], [2.0, 0.0]]
+    settings = COARSE | {"load.cycles": 0, "contact.pressure": pressure}
+    code, out, err = cli("run", "standard", *options(settings), "--json")
+    assert code == 0
+    figures = json.loads(out)
+    assert set(figures) == {"reaction_max", "reaction_max_at", "squeeze_stress_max"} | PRESSED
+    # It cannot lift, so the part that nothing presses is pulled down.
+    assert re.fullmatch(r"jbeamshell: warning: tension at the contact \([^\n]*\n", err)
+    assert "add w to model.fields" in err
+
+
+def test_a_file_goes_before_a_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "receding").mkdir()
+    assert library.values_from("receding") == library.values_of("receding")
+    (tmp_path / "block").write_text("[strip]\nlength = 3.0\n")
+    assert library.values_from("block") == {"strip.length": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        ("recedng", "unknown scene 'recedng': did you mean 'receding'? (`jbeamshell scenes` lists"),
+        ("point_load", "unknown scene 'point_load': did you mean 'point-load'? (`jbeamshell scen"),
+        (
+            "block.tml",
+            "unknown scene 'block.tml': did you mean 'block'? (`jbeamshell scenes` lists",
+        ),
+        ("xyz", "unknown scene 'xyz': scenes are standard, calibrated, bimaterial, squeezed"),
+        ("receding.toml", "receding.toml: cannot be read (No such file"),
+        ("./receding", "receding: cannot be read (No such file"),
+        (".", ".: cannot be read (Is a directory)"),
+        ("long" * 100, "unknown scene 'long"),
+    ],
+)
+@pytest.mark.parametrize("command", [["run"], ["fit", "--scene"]])
+def test_unknown_scenes_are_refused(refused, command, word, told):
+    assert refused(*command, word).startswith(told)
