@@ -16,7 +16,7 @@ from jbeamshell.cli.arguments import (
     pairs,
 )
 from jbeamshell.cli.dimensions import add_dimensions, dimensions
-from jbeamshell.cli.terminal import put, say, say_written
+from jbeamshell.cli.terminal import NOT_DESCRIBED, put, say, say_written
 from jbeamshell.common.errors import InputError
 
 EXAMPLE_START = {"contact.friction": 0.15, "strip.height_ratio": 0.2}
@@ -100,7 +100,7 @@ def add_to(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit, report and write; returns the exit code."""
+    """Fit, report and write; returns the exit code, `NOT_DESCRIBED` if the model is not theirs."""
     from jbeamshell import identify
     from jbeamshell.common import files
     from jbeamshell.identify import report
@@ -126,7 +126,7 @@ def run(options: argparse.Namespace) -> int:
     put(files.as_json(figures) if options.json else "".join(f"{part}\n" for part in parts))
     if folder is not None:
         say_written(report.write_fit(folder, result, figures, profiles))
-    return 0
+    return 0 if result.describes else NOT_DESCRIBED
 
 
 def _plan(options: argparse.Namespace) -> Any:

@@ -56,7 +56,8 @@ def _parser() -> argparse.ArgumentParser:
         description="Micro-slip in bolted joints by a beamshell on a rough foundation: hysteresis "
         "loops, dissipation, fits to measured data, sweeps and ring-down.",
         epilog="Exit codes: 0 done; 2 bad input; 3 a load step, a fit or a lane of a sweep did not "
-        "converge; 130 interrupted.  Without a scene, a command takes the standard strip.",
+        "converge, or the model does not describe the data of a fit; 130 interrupted.  Without a "
+        "scene, a command takes the standard strip.",
     )
     parser.add_argument(
         "--version", action="version", version=f"jbeamshell {version('jbeamshell')}"

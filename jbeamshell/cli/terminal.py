@@ -10,7 +10,7 @@ from typing import Any
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import watched
 
-BAD_INPUT, UNCONVERGED, INTERRUPTED = 2, 3, 130
+BAD_INPUT, UNCONVERGED, NOT_DESCRIBED, INTERRUPTED = 2, 3, 3, 130
 
 
 def put(text: str) -> None:

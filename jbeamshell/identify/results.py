@@ -11,12 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.summary import Summary
+from jbeamshell.identify.experiment import Experiment
+from jbeamshell.identify.model_error import LIMITS, model_misfit
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
 from jbeamshell.scene.scene import Scene
 
 WRONG_MODEL = 2.0  # misfit over noise above which the model must be wrong
+WORTH_SAYING = 1e-3  # of the range, left by the model
 
 
 class Fit(NamedTuple):
@@ -26,11 +29,12 @@ class Fit(NamedTuple):
     ----------
     scene : scene with the fitted values, ready to run; of several specimens the first
     values, errors : fitted value and standard error (one sigma) by key, or by "key[specimen]" where
-        every specimen has its own.  If the noise was not measured, the errors treat the residual as
-        independent noise, so they are too small if the model is wrong
+        every specimen has its own.  They count what the model leaves as so many independent points
+        as its correlation along the curves allows
     correlation : (n, n) correlation of the fitted values, in the order of ``values``
     misfit : root mean square of the residual over the range of the response
     misfits : the same for every measurement
+    left : the same without the part that is white noise: what the model does not describe
     data, model : fitted measurements, loops thinned, and the model's at the same points
     status : "converged" or "max_iterations"
     model_runs : number of model runs through all measurements, derivatives included
@@ -38,6 +42,8 @@ class Fit(NamedTuple):
     scenes : scene of every specimen by its label, with the fitted values
     intervals : 95 % confidence interval by key
     warnings : sentences on what to know before using the values
+    describes : False if the model leaves more of a measurement than `LIMITS` say; its values then
+        mean little
     minima : values and cost at the end of each search, the best first
     uncertainty : what the data do not determine, for other levels and noise
     problem : least-squares problem, for `bands` and `identify.profile`
@@ -57,6 +63,8 @@ class Fit(NamedTuple):
     scenes: dict[str, Scene] = {}  # noqa: RUF012 - never changed
     intervals: dict[str, tuple[float, float]] = {}  # noqa: RUF012
     warnings: Sequence[str] = ()
+    left: Sequence[float] = ()
+    describes: bool = True
     minima: Sequence[tuple[dict[str, float], float]] = ()
     uncertainty: Uncertainty | None = None
     problem: Problem | None = None
@@ -91,6 +99,7 @@ class Fit(NamedTuple):
             "correlation": self.correlation.tolist(),
             "misfit": self.misfit,
             "misfits": dict(zip(labels, self.misfits, strict=True)),
+            "describes": self.describes,
             "status": self.status,
             "model_runs": self.model_runs,
             "warnings": list(self.warnings),
@@ -98,6 +107,8 @@ class Fit(NamedTuple):
         if self.uncertainty is not None:
             u = self.uncertainty
             figures["noise"] = {"of_the_range": u.noise, "measured": u.freedom is None}
+            figures["independent_points"] = u.independent
+            figures["left_by_the_model"] = dict(zip(labels, self.left, strict=True))
             figures["fisher"] = [
                 {
                     "eigenvalue": direction.eigenvalue,
@@ -130,7 +141,7 @@ class Fit(NamedTuple):
         per_noise = 1.0 / experiment.weight
         rows = experiment.weight.size
         plain = best.jacobian[:rows] * (per_noise / experiment.emphasis)[:, None]
-        own = uncertainty.sigma * per_noise if noise else None
+        own = uncertainty.scatter * per_noise if noise else None
         width = band_widths(uncertainty, plain, level, own)
         sides = (best.prediction + side * width for side in (-1.0, 1.0))
         return list(zip(*map(experiment.as_measurements, sides), strict=True))
@@ -203,6 +214,8 @@ def fit_at(
     point : (n,) end of the best search
     labels : labels of the specimens
     status : status of the best search
+    describes : False if the model leaves more of a measurement than `LIMITS` say; its values then
+        mean little
     minima : values and cost at the end of each search
     """
     experiment = problem.experiment
@@ -215,10 +228,13 @@ def fit_at(
         best.jacobian,
         emphasis=experiment.emphasis,
         relative=experiment.relative,
+        slices=experiment.slices,
         noisy=experiment.noisy,
     )
     plain = best.residual[:rows] / experiment.emphasis
     relative = plain * experiment.relative
+    left = [model_misfit(relative[own]) for own in experiment.slices]
+    undescribed = _undescribed(experiment, left)
     scenes = {
         label: scene.replace(space.of(values, specimen))
         for specimen, (label, scene) in enumerate(zip(labels, experiment.scenes, strict=True))
@@ -238,18 +254,33 @@ def fit_at(
         labels=experiment.labels,
         scenes=scenes,
         intervals={k: (low, high) for k, (low, high) in zip(space.names, ends, strict=True)},
-        warnings=_warnings(problem, uncertainty, values, plain, minima),
+        warnings=[*undescribed, *_warnings(problem, uncertainty, values, left, minima)],
+        left=left,
+        describes=not undescribed,
         minima=[(space.named(own), cost) for own, cost in minima],
         uncertainty=uncertainty,
         problem=problem,
     )
 
 
+def _undescribed(experiment: Experiment, left: Sequence[float]) -> list[str]:
+    """Sentence on the measurement that the model describes worst; none if it describes all."""
+    limits = [LIMITS[measurement.form.scale] for measurement in experiment.measurements]
+    worst = int(np.argmax(np.divide(left, limits)))
+    if left[worst] <= limits[worst]:
+        return []
+    of = "of the range" if experiment.measurements[worst].form.scale == "linear" else "of the value"
+    return [
+        f"this model does not describe these data: it leaves {100.0 * left[worst]:.3g} % {of} of "
+        f"{experiment.labels[worst]} that is no white noise, more than {100.0 * limits[worst]:g} %"
+    ]
+
+
 def _warnings(
     problem: Problem,
     uncertainty: Uncertainty,
     values: NDArray[np.float64],
-    plain: NDArray[np.float64],
+    left: Sequence[float],
     minima: Sequence[tuple[NDArray[np.float64], float]],
 ) -> list[str]:
     space, warnings = uncertainty.space, []
@@ -260,11 +291,16 @@ def _warnings(
                 f"{name} = {value:.6g} ends at its bound {bound:g}: it has no error, and the "
                 "errors of the others take it as fixed"
             )
-    excess = float(np.sqrt(np.sum(plain**2) / max(plain.size - values.size, 1)))
-    if problem.experiment.noisy and excess > WRONG_MODEL:
+    rows = problem.experiment.weight.size
+    if problem.experiment.noisy and uncertainty.scatter > WRONG_MODEL:
         warnings.append(
-            f"the model leaves {excess:.2g} times the measured noise unexplained: it is wrong in "
-            "some way, and the errors are too small by this factor or more"
+            f"the model leaves {uncertainty.scatter:.2g} times the measured noise "
+            "unexplained: it is wrong in some way, and the errors include what it leaves"
+        )
+    if uncertainty.independent < rows and max(left) > WORTH_SAYING:
+        warnings.append(
+            f"what the model leaves is correlated along the curve: the errors count {rows} points "
+            f"as {uncertainty.independent:.2g} independent ones"
         )
     costs = [cost for _, cost in minima]
     others = [cost for cost in costs if cost > 1.01 * costs[0]]

@@ -1,11 +1,14 @@
 """Uncertainty of a fit: covariance, intervals, directions that the data do not fix, and bands.
 
 All follow from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where
-most parameters are logarithms.  The parameters' bijections map them to values.
+most parameters are logarithms.  The parameters' bijections map them to values.  Where the residuals
+are correlated, or more than measured noise, the model is wrong in some way: their variance is then
+that of the few independent points they are worth, see `jbeamshell.identify.model_error`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,11 +16,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.identify.model_error import independent_points
 from jbeamshell.identify.search_space import SearchSpace
 
 LEVELS = (0.68, 0.95)
 LEAST = 1e-14  # eigenvalue of J'J over the largest one, below which it is rounding
 HARDLY, NOT = 0.1, 0.5  # relative standard errors above which a parameter is hardly or not known
+ALARM = 0.99  # part of fits whose residuals measured noise explains, if the model is right
+FEWEST = 3.0  # degrees of freedom: with fewer, Student's distribution has no variance
 TAKES_PART = 0.3  # component of a direction over its largest one, above which it is named
 STEP = 0.1  # relative change by which a direction is described
 
@@ -44,10 +50,13 @@ class Uncertainty(NamedTuple):
     point : (n,) minimum
     inverse : (n, n) covariance in the search space for residuals of unit noise
     at_bound : (n,) True where the value ended at a bound; it then counts as fixed without error
-    sigma : noise of the residuals: 1 if it was measured, else estimated from the residuals
-    freedom : degrees of freedom, rows less parameters, of an estimated noise; None if it was
-        measured
-    noise : noise over the range of the responses, in the mean
+    sigma : noise of independent residuals that leaves parameters as uncertain as they are: 1 if the
+        noise was measured and explains the residuals, else estimated from them
+    scatter : size of a residual; less than sigma where neighbours are correlated
+    freedom : degrees of freedom, independent points less parameters but at least `FEWEST`, of an
+        estimated sigma; None if the noise was measured and explains the residuals
+    noise : scatter over the range of the responses, in the mean
+    independent : number of independent points that the residuals are worth
     """
 
     space: SearchSpace
@@ -55,8 +64,10 @@ class Uncertainty(NamedTuple):
     inverse: NDArray[np.float64]
     at_bound: NDArray[np.bool_]
     sigma: float
-    freedom: int | None
+    scatter: float
+    freedom: float | None
     noise: float
+    independent: float
 
     @property
     def covariance(self) -> NDArray[np.float64]:
@@ -96,8 +107,8 @@ class Uncertainty(NamedTuple):
         """Uncertainty under noise of another size, given over the range of the responses."""
         if not (np.isfinite(noise) and noise > 0.0):
             raise InputError(f"noise = {noise}: give a positive part of the range, such as 0.01")
-        per_sigma = self.noise / self.sigma
-        return self._replace(sigma=noise / per_sigma, noise=noise, freedom=None)
+        size = noise * self.scatter / self.noise
+        return self._replace(sigma=size, scatter=size, noise=noise, freedom=None)
 
     def directions(self) -> list[FisherDirection]:
         """Eigenvectors of the Fisher information of parameters inside their bounds, worst first."""
@@ -169,6 +180,7 @@ def uncertainty_of(
     *,
     emphasis: NDArray[np.float64],
     relative: NDArray[np.float64],
+    slices: Sequence[slice],
     noisy: bool,
 ) -> Uncertainty:
     """Uncertainty from the residuals at a minimum.
@@ -180,6 +192,7 @@ def uncertainty_of(
     residual, jacobian : (rows,) and (rows, n), priors in the last rows
     emphasis : factors that the user gave to the rows without priors, whatever their noise
     relative : factors of the same rows from residuals to parts of the range
+    slices : rows of each measurement
     noisy : True if the residuals are in units of measured noise
     """
     values = space.values(point)
@@ -191,17 +204,32 @@ def uncertainty_of(
     safe = np.maximum(eigenvalues, LEAST * np.max(eigenvalues, initial=0.0))
     inverse = np.zeros((point.size, point.size))
     inverse[free] = (vectors / safe) @ vectors.T
-    factors = np.append(emphasis, np.ones(residual.size - emphasis.size))
+    priors = np.ones(residual.size - emphasis.size)
+    factors = np.append(emphasis, priors)
+    left = (residual / factors)[: relative.size]
+    independent = independent_points([left[own] for own in slices])
+    total = float(np.sum((residual / factors) ** 2))
+    rows = max(residual.size - point.size, 1)
+    scatter = float(np.sqrt(total / rows))
+    freedom: float | None = max(rows - (left.size - independent), min(rows, FEWEST))
+    sigma = scatter * float(np.sqrt(left.size / independent))
+    if noisy:
+        explained = scatter**2 <= stats.chi2.ppf(ALARM, rows) / rows
+        scatter = 1.0 if explained else scatter
+        sigma = max(sigma, 1.0)
+        if explained and independent == left.size:
+            sigma, freedom = 1.0, None
+    factors = np.append(emphasis, priors / sigma)
     if np.any(factors != 1.0):
-        # Sandwich estimator: the factors change the minimum, not the noise.
+        # Sandwich estimator: the factors change the minimum, not the noise; priors keep theirs.
         inner = jacobian.T @ (factors[:, None] ** 2 * jacobian)
         inverse = inverse @ inner @ inverse
-    freedom = max(residual.size - point.size, 1)
-    sigma = 1.0 if noisy else float(np.sqrt(np.sum((residual / factors) ** 2) / freedom))
-    noise = sigma * float(np.sqrt(np.mean(relative**2)))
+    noise = scatter * float(np.sqrt(np.mean(relative**2)))
     # A model fitted to its own data leaves no noise to divide by.
-    sigma, noise = (max(size, np.finfo(float).tiny ** 0.25) for size in (sigma, noise))
-    return Uncertainty(space, point, inverse, at_bound, sigma, None if noisy else freedom, noise)
+    sigma, scatter, noise = (
+        max(size, np.finfo(float).tiny ** 0.25) for size in (sigma, scatter, noise)
+    )
+    return Uncertainty(space, point, inverse, at_bound, sigma, scatter, freedom, noise, independent)
 
 
 def check_level(level: float) -> None:

@@ -95,6 +95,14 @@ def test_fit_prints_text_to_read(cli, planted):
     assert lines[-1] == "  the force drives these loops (set load.control to change it)"
 
 
+def test_data_of_another_law_end_with_code_3(cli, planted, monkeypatch):
+    whole = identify.fit
+    monkeypatch.setattr(identify, "fit", lambda *a, **b: whole(*a, **b)._replace(describes=False))
+    code, out, _ = cli("fit", planted, *FIT, "--json")
+    assert code == 3
+    assert json.loads(out)["describes"] is False
+
+
 def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
     hasty = functools.partial(identify.fit, max_iterations=1)
     monkeypatch.setattr(identify, "fit", hasty)
