@@ -1,4 +1,4 @@
-"""Tables in MATLAB and NumPy files; nothing in a file is ever executed."""
+"""Tables in binary files: MATLAB, NumPy, HDF5, TDMS, UFF; nothing in a file is ever executed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured import matlab
+from jbeamshell.measured import laboratory, matlab
 from jbeamshell.measured.tables import LARGEST, Table, read_bytes
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -21,11 +21,11 @@ FEW = 8  # a matrix of more columns than rows, and at most so many rows, holds r
 
 
 class ArrayTable(Table):
-    """Table in a MATLAB or NumPy file.
+    """Table in a binary file.
 
     Parameters
     ----------
-    path : file whose name ends in .mat, .npz or .npy
+    path : file whose name ends in one of `READERS`
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -33,11 +33,11 @@ class ArrayTable(Table):
         self.place = "in its variables"
         data, suffix = read_bytes(path), Path(path).suffix.lower()
         if suffix == ".mat" and HDF5 in data[:1024]:
-            raise InputError(
-                f"{self.name}: is a MATLAB file of version 7.3: save it with save(..., '-v7')"
-            )
+            suffix = ".h5"  # MATLAB 7.3
         try:
             columns = [column for item in READERS[suffix](data) for column in _columns(*item)]
+        except InputError as error:  # a library is missing
+            raise InputError(f"{self.name}: {error}") from None
         except Exception as error:  # a parser may raise anything for a broken file
             reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
             raise InputError(
@@ -123,4 +123,9 @@ READERS: dict[str, Callable[[bytes], Iterator[tuple[str, Any]]]] = {
     ".mat": _matlab,
     ".npz": _archive,
     ".npy": _array,
+    ".h5": laboratory.hdf5,
+    ".hdf5": laboratory.hdf5,
+    ".tdms": laboratory.tdms,
+    ".uff": laboratory.universal,
+    ".unv": laboratory.universal,
 }

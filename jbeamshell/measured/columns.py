@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import re
 import shlex
+import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -20,19 +21,33 @@ QUANTITIES = {"force": ("N", "N/m"), "displacement": ("m",)}
 FURTHER = {"time": ("s",), "normal_force": ("N", "N/m")}
 GROUPS = ("loop", "a", "amplitude")
 
-# Names that count only where no column has the quantity's own.
+# Words that count only where no column has the quantity's own: English, German, French, Italian;
+# accents are left out.  A German compound counts by its last part: "Kolbenweg".
 SYNONYMS = {
-    "force": {"load"},
-    "displacement": {"disp", "displ", "slip", "position", "stroke", "extension", "deflection"},
+    "force": {"load", "kraft", "last", "effort", "charge", "forza", "carico"},
+    "displacement": {
+        *("disp", "displ", "slip", "position", "stroke", "extension", "deflection"),
+        *("weg", "verschiebung", "auslenkung", "schlupf", "hub"),
+        *("deplacement", "course", "glissement", "allongement"),
+        *("spostamento", "corsa", "scorrimento", "allungamento"),
+    },
+    "time": {"zeit", "temps", "tempo"},
 }
+COMPOUNDS = {"force": ("kraft",), "displacement": ("weg", "verschiebung"), "time": ("zeit",)}
 SHORT = {
     "force": {"f", "ft", "fx", "f_t", "f_x"},
     "displacement": {"u", "ux", "u_x"},
     "time": {"t"},
     "normal_force": {"fn", "normal"},
 }
-NORMAL = ("normal", "clamp", "preload", "pretension")
-COUNTERS = {"step", "number", "no", "case", "cycle", "rate", "time"}  # a load step is no force
+NORMAL = (
+    *("normal", "clamp", "preload", "pretension"),
+    *("vorspann", "klemm", "schraubenkraft", "serrage", "precharge", "serraggio", "precarico"),
+)
+# A load step is no force, and a rate no displacement.
+COUNTERS = {"step", "number", "no", "case", "cycle", "cycles", "rate", "time", "speed", "velocity"}
+COUNTERS |= {"nr", "nummer", "schritt", "zyklus", "zyklen", "numero", "ciclo", "cicli"}
+COUNTERS |= {"rapporto", "vitesse", "velocita", "geschwindigkeit"}
 
 # A unit: letters, powers of one digit, products and quotients; no sums, no nested powers.
 TERM = r"[^\W\d_]+(?:(?:\^|\*\*)?-?[1-4]|[²³])?|[%°]"
@@ -104,7 +119,8 @@ def find_columns(
     if columns["force"] == columns["displacement"]:
         whole = titles[columns["force"]].strip()[:60]
         raise InputError(
-            f"{name}: has one column only {place}: separate columns by commas, semicolons or tabs"
+            f"{name}: has one column only {place}: separate columns by commas, semicolons, tabs "
+            "or blanks"
             if len(titles) == 1
             else f"{name}: {whole!r} cannot be both force and displacement: name one of them"
         )
@@ -205,31 +221,49 @@ def _candidates(titles: Sequence[str], quantity: str) -> list[int]:
 
 
 def _named(title: str, quantity: str) -> bool:
-    lower = title.lower()
-    normal = any(word in lower for word in NORMAL)
+    lower = _plain(title)
     if quantity == "time":
         return "time" in _words(title)
     if quantity == "normal_force":
-        return normal and "force" in lower
-    return quantity in lower and not (quantity == "force" and normal)
+        return _is_normal(title) and "force" in lower
+    return quantity in lower and not (quantity == "force" and _is_normal(title))
 
 
 def _meant(title: str, quantity: str) -> bool:
-    words, lower = _words(title), title.lower()
+    words = _words(title)
     if bare(title).strip().lower() in SHORT[quantity]:
         return True
-    normal = any(word in lower for word in NORMAL)
+    if quantity == "time":
+        return _has_word(words, "time") and len(words) == 1
     if quantity == "normal_force":
-        return normal and "load" in words
+        return _is_normal(title) and _has_word(words, "force")
     others = [q for q in QUANTITIES if q != quantity]
-    if any(_named(title, other) for other in others) or normal or COUNTERS & words:
+    if any(_named(title, other) for other in others) or _is_normal(title) or COUNTERS & words:
         return False
-    return bool(SYNONYMS.get(quantity, set()) & words)
+    return _has_word(words, quantity)
+
+
+def _has_word(words: set[str], quantity: str) -> bool:
+    """True if a word for the quantity is among some words, by itself or as a compound's end."""
+    return bool(SYNONYMS[quantity] & words) or any(
+        word.endswith(COMPOUNDS[quantity]) for word in words
+    )
+
+
+def _is_normal(title: str) -> bool:
+    """True if a title names a force that presses the surfaces together."""
+    return any(word in _plain(title) for word in NORMAL)
 
 
 def _words(title: str) -> set[str]:
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare(title))
-    return set(re.findall(r"[a-z]+", spaced.lower()))
+    return set(re.findall(r"[a-z]+", _plain(spaced)))
+
+
+def _plain(title: str) -> str:
+    """Small letters without accents."""
+    apart = unicodedata.normalize("NFKD", title[:LONGEST_TITLE].lower())
+    return "".join(letter for letter in apart if not unicodedata.combining(letter))
 
 
 def bare(title: str) -> str:

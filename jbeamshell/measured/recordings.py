@@ -193,13 +193,15 @@ def read_recordings(
 ) -> list[Recording]:
     """Read recordings from one file or several.
 
-    Text files: columns separated by commas, semicolons or tabs, numbers with decimal points or
-    commas, and a header, which other lines may precede.  Lines that start with "#" or "%" are
-    comments; the row below the header may hold units.  MATLAB files (.mat, up to version 7.2):
-    vectors, columns of matrices and fields of structs.  NumPy files: .npz and .npy.
+    Text files: columns separated by commas, semicolons, tabs or blanks, numbers with decimal points
+    or commas, and a header, which other lines may precede.  Lines that start with "#" or "%" are
+    comments; the row below the header may hold units.  MATLAB files (.mat): vectors, columns of
+    matrices and fields of structs.  NumPy files: .npz and .npy.  With the extra ``formats`` also
+    MATLAB 7.3, HDF5 (.h5, .hdf5), TDMS (.tdms) and universal files 58 and 58b (.uff, .unv).
 
     The name of one column contains "force" (a normal force does not count) and that of another
-    "displacement"; otherwise "load", "slip", "stroke", "position" and similar words count.  A unit
+    "displacement"; otherwise "load", "slip", "stroke", "position" and similar words count, also in
+    German, French and Italian ("Kraft", "Weg", "déplacement", "forza", "spostamento").  A unit
     in brackets or after an underscore ("force [kN]", "displacement_mm") converts the column to N
     and m; without units the numbers are in the Scene's own.  A column "loop", "A" or "amplitude" of
     numbers separates several recordings.  Rows without force or displacement are left out and

@@ -26,7 +26,7 @@ COMPLETE = 0.02  # distance of an end from a turn over the branch, below which i
 
 
 class Cycle(NamedTuple):
-    """Cycle from a turn to the second next turn, which is at the same level.
+    """Cycle from a turn to the second next turn, which is at the same level or passes it.
 
     Attributes
     ----------
@@ -204,9 +204,26 @@ def _cycles(path: Floats, turns: list[int], noise: float) -> list[Cycle]:
             end = outer if c == path.size - 1 else end
             cycles.append(Cycle(a, b, c, (start, middle, end)))
             i += 2
+        elif (passed := _passed(path, a, b, c)) is not None:
+            cycles.append(Cycle(a, b, passed, (start, middle, start)))
+            i += 2
         else:
             i += 1
     return cycles
+
+
+def _passed(path: Floats, start: int, turn: int, end: int) -> int | None:
+    """Point at which the way to the end passes the level of the start; None if it is no cycle.
+
+    Start and turn must enclose the path before, whose memory they have wiped out then.
+    """
+    up = float(np.sign(path[start] - path[turn]))
+    level, slack = up * path[start], ALIKE * abs(path[start] - path[turn])
+    before = up * path[: turn + 1]
+    if np.max(before) > level + slack or np.min(before) < up * path[turn] - slack:
+        return None
+    beyond = up * path[turn:end] >= level
+    return turn + int(np.argmax(beyond)) if np.any(beyond) else None
 
 
 def _grouped(cycles: list[Cycle], noise: float) -> list[Cycle]:

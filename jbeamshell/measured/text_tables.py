@@ -1,12 +1,13 @@
 """Tables of text in any common dialect.
 
-The delimiter is a comma, a semicolon or a tab, the decimal mark a point or a comma, the encoding
-UTF-8 or Latin-1.  Comments, lines above the header and a row of units are understood.  Content with
-two possible meanings is refused, never guessed.
+The delimiter is a comma, a semicolon, a tab or blanks, the decimal mark a point or a comma, the
+encoding UTF-8, UTF-16 or Latin-1.  Comments, lines above the header and a row of units are
+understood.  Content with two possible meanings is refused, never guessed.
 """
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import os
@@ -22,10 +23,11 @@ from numpy.typing import NDArray
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.tables import Table, read_bytes
 
-DELIMITERS = "\t;,"  # most trusted first: commas also are decimal marks
+DELIMITERS = "\t;, "  # most trusted first: commas also are decimal marks
 PREAMBLE = 100  # most lines above the header
 SAMPLE = 50  # rows by which a delimiter is judged
 LONGEST_LINE = 1_000_000  # characters
+BLANKS = re.compile(r"\s+(?![\[(])")  # a unit in brackets belongs to its title
 MISSING = {"", "-", "--", "na", "n/a", "#n/a", "null", "none"}
 MISSING |= {"1.#qnan", "-1.#ind", "-nan", "nan(ind)", "-nan(ind)"}
 
@@ -92,9 +94,9 @@ class TextTable(Table):
                     titles = _split(line, delimiter) or []
                     if recognised(titles):
                         rows = [_split(row, delimiter) or [] for n, row in content if n > number]
-                        alike = sum(len(row) == len(titles) for row in rows)
-                        found.append((alike, delimiter, number, line))
-                        break
+                        alike = sum(_alike(row, titles, delimiter) for row in rows)
+                        if alike or delimiter != " ":
+                            found.append((alike, delimiter, number, line))
             alike, delimiter, number, line = max(found, key=lambda f: f[0], default=(-1, "", 0, ""))
             if alike >= fewest:
                 self._delimiter = delimiter
@@ -230,9 +232,10 @@ class _Reader:
 
 
 def decoded(data: bytes, name: str) -> str:
-    """Text in UTF-8 or Windows-1252; raises `InputError` if it is neither."""
+    """Text in UTF-8, UTF-16 or Windows-1252; raises `InputError` if it is none of them."""
     text = "\0"
-    for encoding in ("utf-8-sig", "cp1252"):
+    marked = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
         try:
             text = data.decode(encoding)
             break
@@ -245,8 +248,16 @@ def decoded(data: bytes, name: str) -> str:
     return text
 
 
+def _alike(row: Sequence[str], titles: Sequence[str], delimiter: str) -> bool:
+    """True if a row has as many cells as there are titles; between blanks, cells of numbers."""
+    numbers = delimiter != " " or all(DIGITS.fullmatch(cell) for cell in row)
+    return numbers and len(row) == len(titles)
+
+
 def _split(line: str, delimiter: str) -> list[str] | None:
     """Cells of a line; None if its quotes do not pair."""
+    if delimiter == " ":
+        return BLANKS.split(line.strip())
     if '"' not in line:
         return line.rstrip("\n").split(delimiter)
     try:

@@ -405,3 +405,37 @@ def test_anything_gives_closed_finite_loops_or_one_clear_line(
         assert (loop.force[0], loop.displacement[0]) == (loop.force[-1], loop.displacement[-1])
         assert 1 <= loop.cycles <= size // 2
         assert loop.scatter is None or loop.scatter.shape == loop.force.shape
+
+
+@pytest.mark.parametrize("driver", DRIVERS)
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("repeats", [1, 3])
+def test_rising_amplitudes_close_on_the_way_to_the_next(driver, noise, repeats):
+    amplitudes = (0.25, 0.5, 0.75, 1.0)
+    drive = driven([a for a in amplitudes for _ in range(repeats)], 200)
+    found = split_cycles(recorded(drive, driver, noise, 5, 0.1 * noise), driver)
+    assert found.groups == 4
+    for amplitude, loop in zip(amplitudes, steady_loops(found.recording, driver), strict=False):
+        assert np.ptp(getattr(loop, driver)) == pytest.approx(2.0 * amplitude, rel=0.02)
+        close = 0.03 + 5.0 * noise * range_of(driver) / range_of(driver, amplitude)
+        np.testing.assert_allclose(area(loop), planted_area(driver, amplitude), rtol=close)
+        assert loop.cycles == repeats
+
+
+def test_rising_amplitudes_that_end_at_rest_lose_the_last_and_falling_ones_all():
+    rising, falling = driven([0.25, 0.5, 1.0], 200), driven([1.0, 0.75, 0.5], 200)
+    assert split_cycles(recorded(rising[:-70], "displacement"), "displacement").groups == 2
+    with pytest.raises(InputError, match="no three turns make a cycle"):
+        split_cycles(recorded(falling[:-70], "displacement"), "displacement")
+
+
+@pytest.mark.parametrize("driver", DRIVERS)
+@pytest.mark.parametrize("centre", [0.5, 2.0])
+def test_offset_and_one_sided_cycles_are_found(driver, centre):
+    drive = centre + driven([1.0] * 3, 200)
+    drive = np.append(np.linspace(0.0, drive[0], 40), drive[1:])
+    answer = answered(drive, driver)
+    columns = (answer, drive) if driver == "displacement" else (drive, answer)
+    (loop,) = steady_loops(recording_from_arrays(*columns), driver)
+    assert np.ptp(getattr(loop, driver)) == pytest.approx(2.0, rel=0.01)
+    np.testing.assert_allclose(area(loop), planted_area(driver), rtol=0.02)

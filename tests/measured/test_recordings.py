@@ -116,7 +116,10 @@ def pickled():
 BAD = {
     "empty.mat": (b"", "is no .mat file of numbers"),
     "text.mat": (b"force,displacement\n1,2\n", "is no .mat file of numbers"),
-    "new.mat": (b"MATLAB 7.3".ljust(512) + b"\x89HDF\r\n\x1a\n", "save it with save(..., '-v7')"),
+    "new.mat": (
+        b"MATLAB 7.3".ljust(512) + b"\x89HDF\r\n\x1a\n",
+        "is no .h5 file of numbers (",
+    ),
     "text.npy": (b"force,displacement\n", "is no .npy file of numbers (ValueError: "),
     "pickled.npy": (pickled(), "is no .npy file of numbers (ValueError: Object arrays cannot be"),
     "text.npz": (b"force,displacement\n", "is no .npz file of numbers (BadZipFile: "),
