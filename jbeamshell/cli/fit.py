@@ -65,7 +65,9 @@ def add_to(commands: Any) -> None:
         help="scene whose other keys stay fixed (default: the standard strip)",
     )
     parser.add_argument(
-        "--free", metavar="KEY,KEY,...", help=f"parameters to fit (default {EXAMPLE_FREE})"
+        "--free",
+        metavar="KEY,KEY,...",
+        help="parameters to fit (default: those that the data tell, with reasons)",
     )
     for name, (metavar, text) in REPEATED.items():
         parser.add_argument(f"--{name}", action="append", default=[], metavar=metavar, help=text)
@@ -75,10 +77,9 @@ def add_to(commands: Any) -> None:
         parser.add_argument(f"--{name}", type=kind, metavar="NUMBER", help=text)
     parser.add_argument(
         "--centre",
-        action="store_true",
-        default=None,
+        action=argparse.BooleanOptionalAction,
         help="shift closed loops so that their centres lie at the origin: removes the sensors' "
-        "offsets",
+        "offsets (default: only where gross slip makes them arbitrary)",
     )
     add_columns(parser)
     add_dimensions(parser)
@@ -187,6 +188,9 @@ def _given(options: argparse.Namespace, name: str) -> bool:
 
 def _free(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
     """Table of each free parameter, as a plan has it."""
+    about = (*options.start, *options.bounds, *options.prior)
+    if options.free is None and options.data and not about:
+        return {}  # the data choose
     words = EXAMPLE_FREE if options.free is None else options.free
     keys = [key.strip() for key in words.split(",") if key.strip()]
     if len(set(keys)) < len(keys):

@@ -8,7 +8,7 @@ The command line makes a plan of its options; larger studies are written in a TO
     [set]                              # values of all specimens
     "load.control" = "displacement"
 
-    [free."contact.friction"]          # one value for all specimens
+    [free."contact.friction"]          # one value for all specimens; without free, data choose
     [free."strip.height_ratio"]
     each = true                        # one value for each specimen
     low = 0.01
@@ -36,10 +36,11 @@ import numpy as np
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, read_toml
+from jbeamshell.identify.choose_free import chosen_free
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.sources import Source
 from jbeamshell.identify.specimens import Specimen
-from jbeamshell.identify.starts import estimate, started
+from jbeamshell.identify.starts import Estimate, estimate, started
 from jbeamshell.measured.curves import AmplitudeCurve, Measurement
 from jbeamshell.measured.loops import Loop, driver_of
 from jbeamshell.scene import library
@@ -147,8 +148,9 @@ def _with_specimen(
 ) -> Plan:
     """Plan with one more specimen.
 
-    If load.control is not given, it follows from the data; so do load.amplitude, and the starts of
-    numbers that are not known where the standard strip cannot be meant, see `started`.
+    If load.control is not given, it follows from the data; so do load.amplitude, the parameters to
+    fit, see `chosen_free`, and the starts of numbers that are not known where the standard strip
+    cannot be meant, see `started`.
     """
     own, notes = dict(values), list(plan.notes)
     loops = [item for item in data if isinstance(item, Loop)]
@@ -158,8 +160,15 @@ def _with_specimen(
         notes.append(f"{which}the {driver} drives these loops (set load.control to change it)")
         if driver != "force":
             own.pop("load.amplitude", None)
-    own, told = _started(own, data, plan.free)
-    notes += [f"{label}: {note}" if label else note for note in told]
+    found = estimate(data) if own.get("load.control", "force") in CONTROLS else None
+    free = plan.free
+    if not free:
+        reasons = chosen_free(own, data, found)
+        free = [Parameter(key) for key in reasons]
+        told = "; ".join(f"{key} ({reason})" for key, reason in reasons.items())
+        notes.append(f"free is not given (--free on the command line), so fitted are: {told}")
+    own, fresh = _started(own, found, free)
+    notes += [f"{label}: {note}" if label else note for note in fresh]
     control = own.get("load.control", "force")
     if "load.amplitude" not in own and control in CONTROLS:
         drives = [
@@ -170,14 +179,13 @@ def _with_specimen(
         if largest:
             own["load.amplitude"] = max(largest)
     specimen = Specimen(scene_from_values(own), data, label)
-    return plan._replace(specimens=[*plan.specimens, specimen], notes=notes)
+    return plan._replace(specimens=[*plan.specimens, specimen], free=free, notes=notes)
 
 
 def _started(
-    own: Mapping[str, Any], data: Sequence[Measurement], free: Sequence[Parameter]
+    own: Mapping[str, Any], found: Estimate | None, free: Sequence[Parameter]
 ) -> tuple[dict[str, Any], list[str]]:
     """Values with starts from the data for what neither the user nor the parameters give."""
-    found = estimate(data) if own.get("load.control", "force") in CONTROLS else None
     if found is None:
         return dict(own), []
     given = {parameter.key: parameter.start for parameter in free if parameter.start is not None}

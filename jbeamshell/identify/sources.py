@@ -17,6 +17,7 @@ from jbeamshell.measured.columns import QUANTITIES
 from jbeamshell.measured.curve_files import CURVES, read_curves
 from jbeamshell.measured.curves import Backbone, Measurement
 from jbeamshell.measured.drift import DRIFTS
+from jbeamshell.measured.findings import OFF_CENTRE
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop, loop_of
 from jbeamshell.measured.recordings import Recording, read_recordings
@@ -42,7 +43,8 @@ class Source:
         "recorded" takes the recording as one loop; "auto" averages if cycles repeat or if the
         driving column is noisy
     driver, drift : arguments of `steady_loops`
-    centre : True to take the zeros of the sensors from closed loops, see `Loop.centred`
+    centre : True to take the zeros of the sensors from closed loops, see `Loop.centred`; None to do
+        so where gross slip makes them arbitrary
     reverse : "force" or "displacement" to turn the sign of that column
     width : width of the specimen, by which forces are divided
     columns, units, decimal : arguments of `read_recordings`
@@ -62,7 +64,7 @@ class Source:
     cycles: str = "auto"
     driver: str | None = None
     drift: str = "keep"
-    centre: bool = False
+    centre: bool | None = None
     reverse: str | None = None
     width: float = 1.0
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -83,7 +85,7 @@ class Source:
             if not (value is None or isinstance(value, str)) or value not in known:
                 names = ", ".join(repr(word) for word in known if word)
                 raise InputError(f"{name} = {shown(value)}: choose among {names}")
-        if not isinstance(self.centre, bool):
+        if self.centre not in (None, True, False):
             raise InputError(f"centre = {self.centre!r}: give true or false")
         if not (is_number(self.width) and self.width > 0.0):
             raise InputError(f"width = {shown(self.width)}: give a positive number")
@@ -134,8 +136,10 @@ class Source:
                 yield Backbone(*columns, per_width.label), per_width.notes
             else:
                 loops = self._loops(per_width)
-                loops = [loop.centred() for loop in loops] if self.centre else loops
-                yield from ((loop, loop.notes) for loop in loops)
+                for loop in loops:
+                    wanted = _forgets_zero(loop) if self.centre is None else self.centre
+                    taken = loop.centred() if wanted else loop
+                    yield taken, taken.notes
 
     def _turned(self, recording: Recording) -> Recording:
         """Recording with the sign of one column turned, if that was asked for."""
@@ -158,3 +162,14 @@ class Source:
             if len(found.cycles) == 1 and noise < QUIET:
                 return [whole]
         return steady_loops(recording, self.driver, self.drift)
+
+
+def _forgets_zero(loop: Loop) -> bool:
+    """True for a closed loop off the zero of its displacement that slides as a whole.
+
+    A contact that slides has no place of its own, so the zero was never that of the strip.
+    """
+    levels = inspect(loop).views[0].levels if loop.closed else ()
+    middle = 0.5 * float(np.max(loop.displacement) + np.min(loop.displacement))
+    off = abs(middle) > OFF_CENTRE * float(np.ptp(loop.displacement))
+    return off and bool(levels) and levels[-1].shape.kind == "gross slip"

@@ -124,10 +124,9 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
         if the friction and the pressure that are known cannot resist the measured force
     """
     values = {key: value for key, value in known.items() if not key.startswith("load.")}
-    forced = known.get("load.control", "force") == "force"
-    scene = scene_from_values(values)
+    scene, forced = _scene_of(known)
     _check_known(scene, values, found, forced)
-    if _suits(scene, found, forced):
+    if suits(known, found):
         return dict(known), []
     fresh: dict[str, Any] = {}
 
@@ -182,13 +181,26 @@ def _check_known(scene: Scene, values: Mapping[str, Any], found: Estimate, force
         )
 
 
-def _suits(scene: Scene, found: Estimate, forced: bool) -> bool:
-    """True if data without units are such that the standard strip may be meant."""
+def suits(known: Mapping[str, Any], found: Estimate) -> bool:
+    """True if data without units are such that the standard strip may be meant.
+
+    Parameters
+    ----------
+    known : values by dotted key, which the standard strip takes
+    found : figures of the measurements
+    """
+    scene, forced = _scene_of(known)
     gross = float(scene.contact.friction) * _pressing(scene)
     most = BELOW if forced else SIMILAR
     low, high = plausible_stiffness(scene, ()) or (0.0, np.inf)
     stiffness = found.force / found.displacement
     return not found.si and found.peak < most * gross and low <= stiffness <= high
+
+
+def _scene_of(known: Mapping[str, Any]) -> tuple[Scene, bool]:
+    """Scene of known values but its load, and whether the force is controlled."""
+    values = {key: value for key, value in known.items() if not key.startswith("load.")}
+    return scene_from_values(values), known.get("load.control", "force") == "force"
 
 
 def _gross_slip(found: Estimate, scene: Scene, values: Mapping[str, Any], forced: bool) -> float:

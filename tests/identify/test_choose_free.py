@@ -1,0 +1,99 @@
+"""What is fitted where nobody names it: what the loops tell, and never what is given."""
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.identify.plan import plan_for, plan_from_values
+from jbeamshell.measured.curves import DissipationCurve, SqueezeCurve
+from jbeamshell.measured.example import example_loops
+from jbeamshell.measured.loops import make_loop
+from tests import rig
+
+SI = {"force": "N/m", "displacement": "m"}
+MU, ETA, STIFF = "contact.friction", "strip.height_ratio", "strip.axial_stiffness"
+SLIDERS, PRESSURE, LENGTH = "contact.stick_stiffness", "contact.pressure", "strip.length"
+
+
+def chosen(data, known=None):
+    plan = plan_for({"set": known or {}}, data)
+    (note,) = [note for note in plan.notes if note.startswith("free is not given")]
+    assert all(p.key in note for p in plan.free)
+    return [p.key for p in plan.free]
+
+
+def sliding(reach):
+    """Closed loop beyond gross slip of a slider behind a spring."""
+    u = rig.path(cycles=1)
+    force = 7.0 * rig.jenkins(u, reach) / reach
+    return make_loop(force[-201:], 1e-4 * u[-201:])._replace(units=SI, driver="displacement")
+
+
+def root():
+    """Closed loop beyond gross slip of a bar that slides from its end."""
+    way = np.clip((1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, 201))) / 0.4, 0.0, None)
+    down = 7.0 - 14.0 * np.sqrt(np.minimum(way[0] - way[:101], 1.0))
+    return make_loop(np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0))._replace(units=SI)
+
+
+def in_si(amplitude=1.3):
+    """A loop of finite elements below gross slip, in units that the standard strip has not."""
+    (loop,) = example_loops(0.1126, (amplitude,))
+    return loop._replace(force=1e5 * loop.force, displacement=10.0 * loop.displacement, units=SI)
+
+
+def test_a_plateau_tells_friction_and_the_stiffness_before_it():
+    assert chosen([sliding(0.3)]) == [MU, SLIDERS]
+    assert chosen([root()]) == [MU, STIFF]
+
+
+def test_below_gross_slip_work_and_displacement_tell():
+    assert chosen([in_si()]) == [MU, STIFF]
+    assert chosen([in_si()], known={STIFF: 3.4e8, LENGTH: 2.0}) == [MU, ETA]
+    assert chosen(example_loops()) == [MU, ETA]
+
+
+def test_what_is_given_is_not_fitted():
+    assert chosen([sliding(0.3)], known={SLIDERS: 1e-3}) == [MU]
+    dimensions = {LENGTH: 2.0, STIFF: 3.4e8, "strip.half_height": 0.1126}
+    assert chosen([in_si()], known=dimensions) == [MU]
+    friction = {MU: 0.1, PRESSURE: 1e6, LENGTH: 2.0, STIFF: 3.4e8}
+    assert chosen([in_si()], known=friction) == [ETA]
+    assert chosen([in_si()], known=friction | {ETA: 0.1}) == [MU, ETA]  # nothing is left
+
+
+def test_a_line_tells_a_stiffness_and_no_friction():
+    u = 1e-6 * np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
+    line = make_loop(2e9 * u, u)._replace(units=SI)
+    assert chosen([line]) == [STIFF]
+
+
+def test_other_curves_tell_what_they_can():
+    amplitude = np.array([0.3, 0.6, 1.2])
+    assert chosen([DissipationCurve(amplitude, amplitude**3)]) == [MU, ETA]
+    x = np.linspace(0.0, 2.0, 9)
+    assert chosen([SqueezeCurve(x, -np.exp(-x))]) == ["strip.kappa_s"]
+
+
+@pytest.mark.parametrize(("centre", "middle"), [(None, 0.0), (True, 0.0), (False, 3e-4)])
+def test_a_contact_that_slides_forgets_its_zero(tmp_path, centre, middle):
+    loop, rows = sliding(0.3), []
+    for force, displacement in zip(loop.force, loop.displacement, strict=True):
+        rows.append(f"{force!s},{displacement + 3e-4!s}")
+    (tmp_path / "rig.csv").write_text("\n".join(["force [N],displacement [m]", *rows]))
+    specimen = {"data": ["rig.csv"]} | ({} if centre is None else {"centre": centre})
+    plan = plan_from_values({"specimen": [specimen]}, tmp_path)
+    (taken,) = plan.specimens[0].measurements
+    found = 0.5 * (np.max(taken.displacement) + np.min(taken.displacement))
+    assert found == pytest.approx(middle, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_a_planted_slider_is_found_from_the_file_alone():
+    plan = plan_for({}, [sliding(0.3)])
+    fit = jb.identify.fit(plan.specimens, free=plan.free, **plan.options)
+    scene = fit.scene
+    gross = float(scene.contact.friction * scene.contact.pressure * scene.strip.length)
+    assert gross == pytest.approx(7.0, rel=0.005)
+    assert fit.describes
+    assert fit.misfit < 0.02
