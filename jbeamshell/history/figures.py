@@ -117,4 +117,5 @@ class CycleFigures(Record):
 
         Rather too large than too small; infinite if nothing slips.  See `History.doubts`.
         """
-        return jnp.fmax(*estimates(self.scene, self.slip_cycle))
+        errors = estimates(self.scene, self.slip_cycle)
+        return jnp.max(jnp.stack(errors))

@@ -95,6 +95,12 @@ class Laminate(eqx.Module):
         return (self.layers[:, 0] * self._in_plane[0]).sum()
 
     @property
+    def bending_stiffness(self) -> Array:
+        """Bending stiffness about the neutral line, per unit width, force times length."""
+        modulus = self._in_plane[0]
+        return self._integrals(modulus, self._neutral(modulus))[2]
+
+    @property
     def mean_shear_modulus(self) -> Array:
         """Mean of the shear modulus G = E/(2(1+nu)) over the height, stress."""
         return (self.layers[:, 0] * self._shear_moduli).sum() / self.height

@@ -16,7 +16,7 @@ from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.path_state import StepResults
 from jbeamshell.quasistatic.system import System
-from jbeamshell.scene.linearisation import buckling
+from jbeamshell.scene.buckling import NEAR_BUCKLING, weakest_column
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
@@ -49,11 +49,12 @@ def raise_if_failed(scene: Scene, steps: StepResults, path: LoadPath, before: in
         where = f"pressing down (to {100.0 * float(path.pressure[first]):.3g} % of the pressure)"
     reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
     error = float(steps.error[first])
-    force, limit = buckling(scene)
-    advice = ADVICE
-    if force >= limit:
-        advice = f"the part beyond the pressure buckles at {limit:.3g}: take a smaller "
-        advice += "load.amplitude, or press further along the strip"
+    advice, column = ADVICE, weakest_column(scene)
+    if column.force >= NEAR_BUCKLING * column.limit:
+        advice = (
+            f"the part without pressure from X = {column.begin:.4g} to {column.end:.4g} buckles "
+            f"at {column.limit:.3g}: take a smaller load.amplitude, or press more of the strip"
+        )
     raise UnconvergedError(
         f"{where} found no equilibrium ({reason}, out of balance {error:.2g} of mu F_N L): {advice}"
     )

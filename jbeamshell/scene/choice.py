@@ -22,9 +22,10 @@ import numpy as np
 from jbeamshell.common.checks import is_traced
 from jbeamshell.mechanics.elements import END_SIZE
 from jbeamshell.mechanics.friction import SharpSlip
+from jbeamshell.scene.buckling import weakest_column
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import CONTROLS
-from jbeamshell.scene.linearisation import NEAR_BUCKLING, Parts, buckling, linear_errors
+from jbeamshell.scene.linearisation import Parts, linear_errors
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.rungs import CONDENSED, PLANE_NODES
 
@@ -115,10 +116,10 @@ def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     # Numbers stay numbers within a caller's jit; the largest there are may overflow.
     with jax.ensure_compile_time_eval(), np.errstate(all="ignore"):
         error = linear_errors(strip, load, elastic, numbers or scene.number)
-        force, limit = buckling(scene, numbers)
+        column = weakest_column(scene, numbers)
     known = error[np.isfinite(error)]  # lanes of a sweep outside the domain have none
     small = known.size > 0 and np.max(known) <= LINEAR_PART * model.tolerance
-    return "linear" if small and not np.any(force >= NEAR_BUCKLING * limit) else "exact"
+    return "linear" if small and not column.near else "exact"
 
 
 def may_condense(scene: Parts) -> bool:

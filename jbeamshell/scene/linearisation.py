@@ -17,7 +17,6 @@ from jbeamshell.scene.pressure import is_table
 # Constants of `bound`, fitted by calibration/map_kinematics.py to map_kinematics.json beside it.
 BEAMSHELL = (3.2, 3.6, 3.6, 0.5, 0.0, 3.0)
 SECTIONS = (14.0, 2.7, 3.5, 1.7, 1.7, 3.0)
-NEAR_BUCKLING = 0.5  # part of the Euler load from which deflections double
 
 
 def bound(
@@ -95,7 +94,7 @@ def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> 
     -------
     relative error, 0.01 for 1 %, of the shape that the numbers broadcast to
     """
-    stiffness = _stretching(strip, numbers)
+    stiffness = stretching(strip, numbers)
     length, height = numbers("strip.length"), numbers("strip.half_height")
     amplitude, pressure = numbers("load.amplitude"), numbers("contact.pressure")
     pressure = np.max(pressure[:, 1]) if is_table(pressure) else pressure
@@ -113,39 +112,7 @@ def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> 
     return bound(pressed, slip / height, limit / pressure, softness, constants)
 
 
-def buckling(scene: Parts, numbers: Numbers | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Compression of the part of a strip beyond its pressure, and the compression that buckles it.
-
-    The latter is Euler's load of a column that the pressed part clamps and whose loaded end is
-    free, pi^2 E' (2H)^3/(48 l^2) over its length l (Timoshenko & Gere 1961, section 2.1).
-
-    Parameters
-    ----------
-    scene : scene without traced leaves
-    numbers : values by dotted key of the strips of a sweep; None is those of the scene
-
-    Returns
-    -------
-    compression : largest in the scene's cycles, force per unit width; under displacement control
-        that of a rigid clamp
-    limit : infinite if the pressure reaches the loaded end
-    """
-    numbers = numbers or scene.number
-    none = np.asarray(0.0), np.asarray(np.inf)
-    table, load = np.asarray(scene.contact.pressure, dtype=float), scene.load
-    if table.ndim == 0 or table[-1, 1] > 0.0 or load.cycles == 0:
-        return none
-    x, pressure = table.T
-    beyond = numbers("strip.length") - x[np.flatnonzero(pressure > 0.0)[-1] + 1]
-    if not np.all(beyond > 0.0):
-        return none
-    stretching = _stretching(scene.strip, numbers)
-    bending = stretching * (2.0 * numbers("strip.half_height")) ** 2 / 12.0
-    force = numbers("load.amplitude") * (1.0 if load.control == "force" else stretching / beyond)
-    return force, np.pi**2 * bending / (4.0 * beyond**2)
-
-
-def _stretching(strip: Strip, numbers: Numbers) -> np.ndarray:
+def stretching(strip: Strip, numbers: Numbers) -> np.ndarray:
     """Stretching stiffness E' 2H, force per unit width."""
     if strip.layers is not None:
         return np.asarray(strip.stretching_stiffness)

@@ -157,6 +157,70 @@ def test_what_a_scene_alone_makes_doubtful(changes, told):
     assert all(told in doubt for doubt in doubts)
 
 
+def one_resting_node(k_t):
+    """A cycle of a strip whose last node carries all of its end: v goes to and fro by 1."""
+    v = np.outer([1.0, 0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.1, 1.0])
+    tributary = np.array([1.0, 1.0, 0.5, 0.1, 0.05])
+    reaction = np.tile([10.0, 10.0, 0.0, 0.0, 60.0], (5, 1))
+    traction = np.zeros((5, 5))
+    traction[:, 0] = 2.0 * v[:, -1]
+    traction[:, -1] = np.clip(min(k_t, 1e3) * v[:, -1], -6.0, 6.0)
+    x = np.array([0.0, 1.0, 2.0, 2.3, 2.4])
+    return reliability.SlipCycle(x, tributary, v, traction, reaction, 0.1, k_t, 0.3)
+
+
+def test_an_elastic_slider_of_a_single_node_is_doubted():
+    soft, stiff, rigid = (reliability.slider_error(one_resting_node(k)) for k in (3.0, 6e2, np.inf))
+    held, load = 3.0 * 0.05, 2.0 + 3.0 * 0.05
+    assert soft == pytest.approx(reliability.RESTING * held / load)
+    assert stiff == pytest.approx(reliability.RESTING * 0.3 / 2.3 * 0.01)  # it slides nearly always
+    assert rigid == 0.0
+    even = one_resting_node(3.0)._replace(reaction=np.full((5, 5), 10.0))
+    assert reliability.slider_error(even) == 0.0
+    traced = jax.jit(reliability.slider_error)(one_resting_node(3.0))
+    assert float(traced) == pytest.approx(float(soft))
+
+
+@pytest.mark.slow
+def test_a_laminate_that_rests_on_its_corner_is_doubted_as_much_as_it_is_off():
+    layers = [[0.1871051, 4.135e6, 0.0547], [0.1073678, 6.195e5, 0.2985]]
+    strip = jb.Scene().replace(
+        {
+            "strip.height_ratio": 0.2655840800334541,
+            "strip.layers": [*layers, [0.2655840800334541 * 2 - 0.2944729, 5107.0, 0.2244]],
+            "strip.kappa_s": 1.6326,
+            "contact.friction": 0.1998,
+            "contact.stick_stiffness": 92.86,
+            "load.amplitude": 1.5992,
+            "model.rung": "condensed-squeeze",
+        }
+    )
+    runs = [
+        jb.solve(strip.replace({"model.nodes": n, "model.end_size": 1.0 / size}))
+        for n, size in ((65, 48), (129, 48), (257, 800))
+    ]
+    *coarse, fine = (float(run.dissipation) for run in runs)
+    for run, dissipation in zip(runs, coarse, strict=False):
+        assert any("rests on single nodes" in doubt for doubt in run.doubts)
+        assert 0.7 < float(run.dissipation_error) / (1.0 - dissipation / fine) < 1.5
+    ideal = strip.replace({"contact.stick_stiffness": 1000.0})
+    assert not any("single nodes" in doubt for doubt in jb.solve(ideal).doubts)
+
+
+@pytest.mark.parametrize("unit", [1e-30, 1e30])
+def test_the_estimate_knows_no_units(unit):
+    history = jb.solve(STRIP.replace(COARSE))
+    cycle = history.slip_cycle
+    scaled = cycle._replace(
+        **{name: unit * getattr(cycle, name) for name in ("x", "tributary", "v", "half_height")},
+        slip_stiffness=cycle.slip_stiffness / unit,
+    )
+    own, other = (
+        [*reliability.dissipation_errors(c), reliability.slider_error(c)] for c in (cycle, scaled)
+    )
+    np.testing.assert_allclose(other, own, rtol=1e-12)
+
+
 def test_an_open_loop_and_a_failed_run_are_doubted():
     history = jb.solve(STRIP.replace(COARSE))
     shifted = history.displacement.at[-1].add(0.01 * jnp.ptp(history.displacement))

@@ -1,0 +1,139 @@
+"""Buckling of the parts of a strip that nothing presses: Euler's load, and the compression there.
+
+Linear kinematics know no buckling.  A strip that is pressed, however little, does not buckle by
+small deflections; a part without pressure is a column between its supports.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jbeamshell.mechanics.homogeneous import shear_coefficient, shear_modulus
+from jbeamshell.scene.domain import Numbers
+from jbeamshell.scene.keys import FAR_ENDS
+from jbeamshell.scene.linearisation import Parts, stretching
+from jbeamshell.scene.parts import Contact
+from jbeamshell.scene.pressure import face_resultant, is_table
+
+NEAR_BUCKLING = 0.5  # part of the Euler load from which deflections double
+# Euler's load over pi^2 B/l^2 (Timoshenko & Gere 1961, section 2.1).
+OVERHANG, CLAMPED, HINGED = 0.25, 4.0, 2.0457
+
+
+class Column(NamedTuple):
+    """Part of a strip without pressure, and the load that buckles it.
+
+    Attributes
+    ----------
+    begin, end : positions X, length
+    force : largest compression in the scene's cycles, force per unit width
+    limit : Euler's load, force per unit width; infinite where there is no such part
+    """
+
+    begin: np.ndarray
+    end: np.ndarray
+    force: np.ndarray
+    limit: np.ndarray
+
+    @property
+    def near(self) -> bool:
+        """True if the compression comes near the load that buckles, for any strip."""
+        return bool(np.any(self.force >= NEAR_BUCKLING * self.limit))
+
+
+@np.errstate(all="ignore")  # the largest numbers there are may overflow
+def weakest_column(scene: Parts, numbers: Numbers | None = None) -> Column:
+    """Column that is nearest to buckling among the parts of a strip without pressure.
+
+    An overhang is clamped where the pressure ends and free at its loaded end; a part between
+    pressures is clamped at both ends; one at X = 0 is held as the far end is.  With the bending
+    stiffness B about the neutral line and the shear stiffness kappa G 2H, the load of Euler and
+    Engesser is 1/P = l^2/(c pi^2 B) + 1/(kappa G 2H).  Friction of pressures nearer to the loaded
+    end takes its part of a force; a displacement compresses the strip as far as the column's far
+    end at most.
+
+    Parameters
+    ----------
+    scene : scene without traced leaves
+    numbers : values by dotted key of the strips of a sweep; None is those of the scene
+    """
+    numbers = numbers or scene.number
+    length, load = numbers("strip.length"), scene.load
+    none = Column(length, length, np.zeros(()), np.asarray(np.inf))
+    parts = unpressed_parts(scene.contact)
+    if load.cycles == 0 or not parts:
+        return none
+    bending, shear = _stiffnesses(scene, numbers)
+    amplitude = numbers("load.amplitude")
+    held = "clamped" if "beta" in FAR_ENDS[scene.strip.far_end] else scene.strip.far_end
+    weakest = none
+    for start, stop in parts:
+        begin, end = np.clip(start, 0.0, length), np.clip(stop, 0.0, length)
+        overhangs = end == length
+        if start == -np.inf and held == "free":
+            continue  # nothing takes a compression
+        far = HINGED if start == -np.inf and held != "clamped" else CLAMPED
+        run = np.where(end > begin, end - begin, np.nan)
+        euler = np.where(overhangs, OVERHANG, far) * np.pi**2 * bending / run**2
+        limit = np.where(end > begin, 1.0 / (1.0 / euler + 1.0 / shear), np.inf)
+        held_back = numbers("contact.friction") * _pressed_beyond(scene.contact, stop, length)
+        force = np.maximum(amplitude - held_back, 0.0)
+        if load.control != "force":
+            force = amplitude * stretching(scene.strip, numbers) / (length - begin)
+        found = Column(*np.broadcast_arrays(begin, end, force, limit))
+        nearer = found.force / found.limit > weakest.force / weakest.limit
+        weakest = Column(*(np.where(nearer, a, b) for a, b in zip(found, weakest, strict=True)))
+    return weakest
+
+
+def unpressed_parts(contact: Contact) -> list[tuple[float, float]]:
+    """Parts (begin, end) in X that no pressure holds down, infinite beyond the tables."""
+    if contact.normal == "none":
+        return [(-np.inf, np.inf)]
+    faces = [np.asarray(p, dtype=float) for p in (contact.pressure, contact.bottom_pressure)]
+    rows = [face[:, 0] for face in faces if is_table(face)]
+    if not rows:
+        return []
+    edges = np.unique(np.concatenate(rows))
+    reach = max(float(edges[-1] - edges[0]), 1.0)
+    inner = np.concatenate([[edges[0] - reach], edges, [edges[-1] + reach]])
+    at = [inner[:-1] + part * np.diff(inner) for part in (0.25, 0.75)]
+    down, up = (
+        [np.interp(x, *f.T) if is_table(f) else np.full(x.size, np.max(f)) for x in at]
+        for f in faces
+    )
+    free = (down[0] <= up[0]) & (down[1] <= up[1])
+    ends = np.concatenate([[-np.inf], edges, [np.inf]])
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]])))
+    return [(float(ends[a]), float(ends[b])) for a, b in turns.reshape(-1, 2)]
+
+
+def _pressed_beyond(contact: Contact, start: float, length: np.ndarray) -> np.ndarray:
+    """Force of the pressures between X = start and L, downwards, per unit width."""
+    if start == np.inf:
+        return np.zeros(())
+    forces = []
+    for pressure in (contact.pressure, contact.bottom_pressure):
+        face = np.asarray(pressure, dtype=float)
+        if not is_table(face):
+            forces.append(np.max(face) * (length - start))
+            continue
+        first = np.interp(start, *face.T)
+        rest = np.vstack([[start, first], face[face[:, 0] >= start]])
+        forces.append(face_resultant(rest, length)[0] - first * start)
+    return np.maximum(forces[0] - forces[1], 0.0)
+
+
+def _stiffnesses(scene: Parts, numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """Bending stiffness about the neutral line, and shear stiffness, of a section."""
+    strip = scene.strip
+    if strip.section is not None:
+        section = strip.section
+        shear = section.shear_coefficient * section.mean_shear_modulus * section.height
+        return np.asarray(section.bending_stiffness), np.asarray(shear)
+    along, height = stretching(strip, numbers), 2.0 * numbers("strip.half_height")
+    bending = along * height**2 / (12.0 if scene.model.constants == "consistent" else 192.0)
+    nu = numbers("strip.poisson_ratio")
+    return bending, shear_coefficient(nu) * shear_modulus(along, nu, strip.plane)
