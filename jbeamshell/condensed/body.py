@@ -82,7 +82,9 @@ class Elimination(NamedTuple):
         return lax.scan(back, none, (self.inverse, self.known, onwards), reverse=True)[1]
 
 
-def eliminate(form: SectionForm, x: Array, loads: Array, held: bool) -> tuple[Elimination, Array]:
+def eliminate(
+    form: SectionForm, x: Array, loads: Array, held: tuple[np.ndarray, np.ndarray]
+) -> tuple[Elimination, Array]:
     """Eliminate a strip of linear elements down to its contact nodes.
 
     Parameters
@@ -90,7 +92,8 @@ def eliminate(form: SectionForm, x: Array, loads: Array, held: bool) -> tuple[El
     form : energy of the section, m fields
     x : (n,) stations, increasing, the loaded end last
     loads : (n,) nodal forces that press on the top face
-    held : True where the far end holds the fields of ``form.held``
+    held : (m,) True for fields that are zero at the far end, and at the loaded end; v and w of the
+        contact are left to the caller
 
     Returns
     -------
@@ -99,7 +102,7 @@ def eliminate(form: SectionForm, x: Array, loads: Array, held: bool) -> tuple[El
     """
     n, inner = x.size, form.pull.size - 2
     columns = 2 * n + 2
-    free = jnp.asarray(~form.held[2:] if held else np.ones(inner, bool), x.dtype)
+    free, free_last = (jnp.asarray(~end[2:], x.dtype) for end in held)
 
     def go(
         carry: tuple[Array, Array], station: tuple[Array, ...]
@@ -131,7 +134,8 @@ def eliminate(form: SectionForm, x: Array, loads: Array, held: bool) -> tuple[El
         total = total + _products(part[1], columns)
     matrix, sides = carry
     ends = jnp.stack([-form.pull[2:], loads[-1] * form.press[2:]], axis=1)
-    sides = sides + jnp.pad(ends, ((0, 0), (columns - 2, 0)))
+    sides = (sides + jnp.pad(ends, ((0, 0), (columns - 2, 0)))) * free_last[:, None]
+    matrix = matrix * free_last[:, None] * free_last + jnp.diag(1.0 - free_last)
     inverse = inverse_cholesky(matrix)
     last = inverse @ sides
     total = total + _products(last[None], columns)

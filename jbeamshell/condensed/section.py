@@ -99,4 +99,5 @@ def _beam(scene: Scene) -> SectionForm:
         modes=modes[..., active],
         spread=spread[pick],
         masses=masses[:, active][..., active],
+        top=int(np.flatnonzero(active == PSI)[0]) if PSI in active else 0,
     )

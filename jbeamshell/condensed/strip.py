@@ -9,6 +9,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.condensed.body import Body, Elimination, eliminate
+from jbeamshell.condensed.pair import Pair, joined
 from jbeamshell.condensed.pressing import press as press_down
 from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements
@@ -35,6 +36,7 @@ class Strip(NamedTuple):
     hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
     x, tributary, load : (n,) stations from the far end, contact lengths, forces of the top pressure
     settled, lift : (k,) tangential displacements and (n,) lifts under the pressures, frictionless
+    pair : second member of a lap joint; v, w, hessian, settled and lift are then relative to it
     """
 
     body: Body
@@ -46,6 +48,7 @@ class Strip(NamedTuple):
     load: Array
     settled: Array
     lift: Array
+    pair: Pair | None
 
 
 def condensed(scene: Scene, nodes: int) -> Strip:
@@ -54,11 +57,19 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     form, x = section_form(scene), stations(scene, nodes)
     down, up = pressing(scene, x)
     tributary = elements.tributary_lengths(RULE, x)
-    elimination, hessian = eliminate(form, x, down, "beta" in FAR_ENDS[far_end])
+    member, pair = scene.member, None
+    none = np.zeros_like(form.held)
+    held = form.held if "beta" in FAR_ENDS[far_end] else none
+    guided = scene.strip.loaded_end == "guided"
+    elimination, hessian = eliminate(form, x, down, (held, ~form.held if guided else none))
     last = 2 * x.size - 2
-    lifted = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
-    from_below = lifted[:, None] * np.eye(last + 4)[-1]
-    hessian = hessian - from_below - from_below.T
+    if member.support == "none":
+        lifted = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
+        from_below = lifted[:, None] * np.eye(last + 4)[-1]
+        hessian = hessian - from_below - from_below.T
+    else:
+        forms = form, section_form(scene.of_member())
+        pair, hessian = joined(hessian, forms, x, up, guided, member.support == "clamped")
     v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
     w = slice(last + 1, None, -2)
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
@@ -84,7 +95,7 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         r_0=reaction,
         c=-hessian[-2, -2],
     )
-    return Strip(body, form, elimination, hessian, x, tributary, down, settled, lift)
+    return Strip(body, form, elimination, hessian, x, tributary, down, settled, lift, pair)
 
 
 def pressing(scene: Scene, x: Array) -> tuple[Array, Array]:
@@ -104,7 +115,8 @@ def stays_flat(scene: Scene) -> bool:
     Layers and a Phi of the user's own may bend.
     """
     homogeneous = scene.strip.layers is None and scene.energy is None
-    return is_pressed_evenly(scene) and homogeneous and scene.contact.normal == "rigid"
+    alone = homogeneous and scene.member.support == "none"
+    return is_pressed_evenly(scene) and alone and scene.contact.normal == "rigid"
 
 
 def stations(scene: Scene, nodes: int) -> Array:
@@ -114,6 +126,8 @@ def stations(scene: Scene, nodes: int) -> Array:
     """
     length, half_height = scene.strip.length, scene.strip.half_height
     steps, model = scene.contact.steps(length), scene.model
+    if scene.member.support != "none":
+        return _joint_stations(scene, nodes)
     if model.solution == "condensed":
         grading = (model.end_size, steps, elements.GROWTH, model.far_size)
         return elements.vertices(nodes - 1, length, half_height, *grading)
@@ -124,6 +138,23 @@ def stations(scene: Scene, nodes: int) -> Array:
     sizes = jnp.where(inside, STEP_SIZE, PLANE_END_SIZE)
     growths = jnp.where(inside, elements.GROWTH, PLANE_GROWTH)
     return elements.vertices(nodes - 1, length, half_height, sizes, steps, growths, PLANE_FAR_SIZE)
+
+
+def _joint_stations(scene: Scene, nodes: int) -> Array:
+    """Stations of a lap joint, which are denser at both its ends and at steps of the pressure."""
+    length, half_height = scene.strip.length, scene.strip.half_height
+    steps, model = scene.contact.steps(length), scene.model
+    if model.solution == "condensed":
+        start = jnp.zeros_like(length)[None]
+        foci = start if steps is None else jnp.append(start, steps)
+        grading = (model.end_size, foci, elements.GROWTH, model.far_size)
+        return elements.vertices(nodes - 1, length, half_height, *grading)
+    none = jnp.zeros((0,), length.dtype) if steps is None else steps
+    foci = jnp.append(jnp.zeros_like(length), none)
+    ends = jnp.concatenate([jnp.array([True]), ~(none < length), jnp.array([True])])
+    sizes = jnp.where(ends, PLANE_END_SIZE, STEP_SIZE)
+    growths = jnp.where(ends, PLANE_GROWTH, elements.GROWTH)
+    return elements.vertices(nodes - 1, length, half_height, sizes, foci, growths, PLANE_FAR_SIZE)
 
 
 def spring_stiffness(scene: Scene, strip: Strip) -> Array:

@@ -116,6 +116,7 @@ def layered_form(material: Material) -> SectionForm:
         modes=jnp.asarray([jnp.stack(mode) for mode in modes]),
         spread=spread[pick],
         masses=jnp.stack([squares(i) for i in range(count)]),
+        top=int(np.flatnonzero(place == size + layers)[0]),
     )
 
 

@@ -35,6 +35,7 @@ class SectionForm(NamedTuple):
     spread : (m, m) second derivatives of the energy in how far the fields at an element's ends
         differ, per length
     masses : (layers, m, m) integrals of the squared displacement over each layer of material
+    top : place of the field beyond v and w with which the top face rises most; 0 if there is none
     """
 
     values: Array
@@ -47,6 +48,7 @@ class SectionForm(NamedTuple):
     modes: Array
     spread: Array
     masses: Array
+    top: int
 
     def element(self, lengths: Array) -> tuple[Array, Array, Array]:
         """Matrices (elements, m, m) of elements: start and start, end and end, start and end."""
@@ -68,4 +70,34 @@ def section_stiffness(energy: Callable[[Section, Section], Array], like: Array) 
     """
     return jax.hessian(lambda both: energy(both[0], both[1]))(
         jnp.zeros((2, *like.shape), like.dtype)
+    )
+
+
+def on_symmetry_plane(form: SectionForm) -> SectionForm:
+    """Form of a section whose top face keeps its height and slides freely.
+
+    The field at ``form.top`` follows from the others, and is left out.  Where there is none the
+    section cannot be squeezed: its w is to be held.
+    """
+    if form.top == 0:
+        return form
+    kept = np.delete(np.arange(form.pull.size), form.top)
+    others = -form.press[kept] / form.press[form.top]
+    fields = jnp.eye(form.pull.size, dtype=form.pull.dtype)[:, kept].at[form.top].set(others)
+
+    def within(matrix: Array) -> Array:
+        return fields.T @ matrix @ fields
+
+    return form._replace(
+        values=within(form.values),
+        mixed=within(form.mixed),
+        slopes=within(form.slopes),
+        pull=fields.T @ form.pull,
+        press=jnp.zeros_like(others),
+        held=form.held[kept],
+        further=form.further @ fields,
+        modes=form.modes[..., kept],
+        spread=within(form.spread),
+        masses=jax.vmap(within)(form.masses),
+        top=0,
     )

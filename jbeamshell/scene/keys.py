@@ -28,6 +28,8 @@ ARC_LENGTH = "arc-length"
 LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
 NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
+LOADED_ENDS = ("free", "guided")
+MEMBERS = ("none", "rolling", "clamped")
 SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form", *CONDENSED)
 
 TOLERANCE = 0.005
@@ -67,6 +69,11 @@ class StripKeys(Part):
     )
     far_end: str = word(
         "held", FAR_ENDS, "Support at X = 0: held (v = beta = 0), pinned (v = 0) or free."
+    )
+    loaded_end: str = word(
+        "free",
+        LOADED_ENDS,
+        "Support at X = L beside the load: free, or guided (no deflection; lap joints only).",
     )
     layers: Array | None = number(
         None,
@@ -201,6 +208,45 @@ class ModelKeys(Part):
     )
 
 
+class MemberKeys(Part):
+    """Second member of a lap joint, under the strip, section ``[member]``."""
+
+    heading: ClassVar[str] = "member"
+
+    support: str = word(
+        "none",
+        MEMBERS,
+        "Second member: none (a rigid base), rolling (held along X at X = 0, its bottom on a "
+        "symmetry plane: double shear) or clamped (at X = 0: single lap).",
+    )
+    height_ratio: Array | None = number(
+        None,
+        "Half its height over half the length; none is the strip's.",
+        symbol=r"\eta_2",
+    )
+    axial_stiffness: Array | None = number(
+        None,
+        "Its stretching stiffness E' 2H; none is that of the strip's material.",
+        symbol="(E' 2H)_2",
+        unit="force/width",
+    )
+    poisson_ratio: Array | None = number(
+        None,
+        "Its Poisson's ratio; none is the strip's.",
+        symbol=r"\nu_2",
+        low=-1.0,
+        high=0.5,
+        scale="linear",
+    )
+    layers: Array | None = number(
+        None,
+        "Rows [thickness, E, nu] of its layers from the contact downwards.",
+        unit="mixed",
+        table=True,
+        fix=LAYERS,
+    )
+
+
 # Keys that are no field of their own: they set, or read, a field in another form.
 INDIRECT = (
     Key(
@@ -243,7 +289,7 @@ INDIRECT = (
 
 
 TABLE: dict[str, Key] = {}
-for _part in (StripKeys, ContactKeys, LoadKeys, ModelKeys):
+for _part in (StripKeys, ContactKeys, LoadKeys, ModelKeys, MemberKeys):
     _others = (row for row in INDIRECT if row.name.startswith(f"{_part.heading}."))
     TABLE |= {row.name: row for row in (*rows(_part).values(), *_others)}
 # Keys that set a field through another number, in the order in which they apply.

@@ -1,4 +1,4 @@
-"""Parts of a Scene: strip, contact, load and model.
+"""Parts of a Scene: strip, second member, contact, load and model.
 
 Their fields, with defaults and domains, are the rows of the table in `jbeamshell.scene.keys`.  The
 defaults are the standard strip (after Brink 2015, chapter III, with chapter IV's squeeze strain).
@@ -27,6 +27,7 @@ from jbeamshell.scene.keys import (
     TABLE,
     ContactKeys,
     LoadKeys,
+    MemberKeys,
     ModelKeys,
     Part,
     StripKeys,
@@ -106,6 +107,43 @@ class Strip(StripKeys):
         if self.section is not None:
             return self.section.mean_shear_modulus
         return shear_modulus(self.plane_modulus, cast(Array, self.poisson_ratio), self.plane)
+
+
+class Member(MemberKeys):
+    """Second member of a lap joint, which the strip lies on; without one it lies on a rigid base.
+
+    It reaches from X = 0 to L, as the strip does.
+    """
+
+    def __check_init__(self) -> None:
+        if self.layers is None:
+            return
+        for name in ("axial_stiffness", "poisson_ratio"):
+            value = getattr(self, name)
+            fix = "member.layers say it already; leave it out"
+            require(f"member.{name}", value, value is None, fix)
+
+    def beside(self, strip: Strip) -> Strip:
+        """Member as a strip whose contact is its bottom face; what it leaves out is the strip's."""
+        own = self.layers is not None
+        ratio = strip.height_ratio if self.height_ratio is None else self.height_ratio
+        stiffness, nu = self.axial_stiffness, self.poisson_ratio
+        layers = self.layers if own or stiffness is not None or nu is not None else strip.layers
+        if layers is None:
+            height = ratio * strip.length
+            stiffness = strip.plane_modulus * height if stiffness is None else stiffness
+            nu = strip.poisson_ratio if nu is None else nu
+        return Strip(
+            length=strip.length,
+            height_ratio=ratio,
+            axial_stiffness=stiffness,
+            poisson_ratio=nu,
+            kappa_s=strip.kappa_s,
+            far_end="held",
+            layers=layers,
+            deviation=strip.deviation,
+            plane=strip.plane,
+        )
 
 
 class Contact(ContactKeys):
@@ -258,6 +296,7 @@ class Model(ModelKeys):
         return len(FIELDS) + 2 * max(self.order - 1, 0)
 
 
-SECTIONS: dict[str, type[Part]] = {part.heading: part for part in (Strip, Contact, Load, Model)}
+_PARTS = (Strip, Contact, Load, Model, Member)
+SECTIONS: dict[str, type[Part]] = {part.heading: part for part in _PARTS}
 for _section, _part in SECTIONS.items():  # `help` shows the keys of every part
     _part.__doc__ = f"{_part.__doc__}\n{textwrap.indent(key_table(_section), '    ')}\n"

@@ -32,7 +32,7 @@ from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, pla
 from jbeamshell.scene.choice import choose
 from jbeamshell.scene.domain import Numbers, support_rules
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
-from jbeamshell.scene.parts import SECTIONS, Contact, Load, Model, Strip
+from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Strip
 from jbeamshell.scene.quadratic import check_quadratic
 from jbeamshell.scene.rungs import IDEAL, general_rung, spelled_out
 
@@ -46,7 +46,7 @@ class Scene(eqx.Module):
 
     Attributes
     ----------
-    strip, contact, load, model : parts of the scene, see `jbeamshell.scene.parts`
+    strip, contact, load, model, member : parts of the scene, see `jbeamshell.scene.parts`
     energy : strain energy Phi(e, g, k, psi, psi') per unit length of the user's own, any JAX
         function of five scalars, such as ``lambda e, g, k, psi, dpsi: ...`` or an
         `equinox.Module` that carries parameters; None is the strip's own section
@@ -68,6 +68,7 @@ class Scene(eqx.Module):
     load: Load = eqx.field(default_factory=Load)
     model: Model = eqx.field(default_factory=Model)
     energy: Energy | None = None
+    member: Member = eqx.field(default_factory=Member)
 
     def __post_init__(self) -> None:
         for name, kind in SECTIONS.items():
@@ -219,6 +220,12 @@ class Scene(eqx.Module):
         if not is_traced(strip.length, contact.friction, *pressures):
             for rule in support_rules(strip, contact, model, self.number):
                 rule.demand()
+
+    def of_member(self) -> Scene:
+        """Scene with the second member in the strip's place, for its section alone."""
+        strip = self.member.beside(self.strip)
+        of_member: Scene = eqx.tree_at(lambda scene: scene.strip, self, strip)
+        return of_member
 
     @property
     def ideal_friction(self) -> bool:
