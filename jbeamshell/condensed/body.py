@@ -39,6 +39,7 @@ class Body(eqx.Module):
     K_tt, K_tn, K_nn : (n, n) stiffness, force per width and length
     f_t, f_n : (n,) part of the end load that a clamped contact node carries
     r_0 : (n,) nodal forces of the base under the pressures alone
+    t_0 : (k,) tangential ones, which are zero if the strip was pressed without friction
     c : displacement of the loaded end per end load with a clamped contact
     """
 
@@ -50,6 +51,7 @@ class Body(eqx.Module):
     f_t: Array
     f_n: Array
     r_0: Array
+    t_0: Array
     c: Array
 
 

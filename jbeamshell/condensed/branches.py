@@ -120,7 +120,7 @@ def factorise(body: Body, friction: Array) -> Factors:
 def pressed(body: Body) -> ContactState:
     """Contact under the pressures alone."""
     zero = jnp.zeros_like(body.f_t)
-    return ContactState(zero, zero, body.r_0, body.c * 0.0, body.c * 0.0)
+    return ContactState(zero, body.t_0, body.r_0, body.c * 0.0, body.c * 0.0)
 
 
 def follow(

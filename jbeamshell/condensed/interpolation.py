@@ -116,6 +116,7 @@ class Bodies(eqx.Module):
             f_t=found.f_t,
             f_n=found.f_n,
             r_0=(down - up)[::-1],
+            t_0=jnp.zeros_like(found.f_t),
             c=found.c / modulus,
         )
 

@@ -30,16 +30,25 @@ class Pair(NamedTuple):
 
     Attributes
     ----------
-    below : form of the member below, its contact face first
+    form : energy of the section of the member below, seen from its contact face
     elimination : of the fields of the member below
     upper, lower : (2n, 2n + 2) v and w of each member's contact nodes from the relative v and w,
-        the end load and the pressure; those of the lower one in the frame of the upper one
+        the end load and the pressure; those of the member below in the frame of the one above
     """
 
-    below: SectionForm
+    form: SectionForm
     elimination: Elimination
     upper: Array
     lower: Array
+
+    def above(self, given: Array) -> Array:
+        """What the member above is given, (steps, 2n + 2), from what the pair is given."""
+        return jnp.concatenate([given @ self.upper.T, given[:, -2:]], axis=1)
+
+    def below(self, given: Array) -> Array:
+        """What the member below is given, (steps, 2n + 2), in its own frame."""
+        own = given @ self.lower.T * jnp.tile(UNITS, self.lower.shape[0] // 2)
+        return jnp.concatenate([own, jnp.zeros_like(given[:, :1]), given[:, -1:]], axis=1)
 
 
 class Supports(NamedTuple):

@@ -12,6 +12,7 @@ from jax import Array
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import Status
 from jbeamshell.common.small import Small
+from jbeamshell.condensed.body import Elimination
 from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import (
     driven_by_displacement,
@@ -21,6 +22,7 @@ from jbeamshell.condensed.drives import (
 )
 from jbeamshell.condensed.events import Level
 from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
+from jbeamshell.condensed.pair import Pair
 from jbeamshell.condensed.strip import Strip, condensed, spring_stiffness, stays_flat
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
@@ -190,9 +192,10 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     force = every(state.force)
     sides = jnp.stack([v, w], axis=2).reshape(steps, 2 * n)
     given = jnp.concatenate([sides, force[:, None], part[:, None]], axis=1)
-    inner = strip.elimination.recovered(given.T)  # (n, m-2, steps)
-    fields = jnp.concatenate([v.T[None], w.T[None], jnp.moveaxis(inner, 1, 0)])  # (m, n, steps)
+    own = given if strip.pair is None else strip.pair.above(given)
+    fields = _fields(strip.elimination, own)
     further, sections = _sections(strip, fields)
+    below = None if strip.pair is None else _fields_below(strip.pair, given)
     reaction = along(state.r_n) / strip.tributary
     reaction = reaction + pressing * body.r_0[::-1] / strip.tributary
     slipping = along(levels.slipping).astype(bool)
@@ -214,7 +217,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
         load=strip.load,
         force=masked(force),
         displacement=masked(every(state.displacement)),
-        fields=masked(jnp.concatenate([v[..., None], w[..., None], further], axis=-1)),
+        fields=masked(jnp.concatenate([fields[:2].T, further], axis=-1)),
         gap=masked(w),
         sections=jax.tree.map(masked, sections),
         traction=masked(-along(state.r_t) / strip.tributary),
@@ -229,7 +232,24 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
         status=jnp.append(jnp.full(before, Status.CONVERGED), status),
         cycles=cycles,
         target=masked(every(driven)),
+        member=None if below is None else masked(below),
     )
+
+
+def _fields(elimination: Elimination, given: Array) -> Array:
+    """Fields (m, n, steps) of a form from v and w of the contact, load and pressure (steps, :)."""
+    contact = given[:, :-2].reshape(len(given), -1, 2)
+    inner = elimination.recovered(given.T)  # (n, m-2, steps)
+    return jnp.concatenate([contact.T, jnp.moveaxis(inner, 1, 0)])
+
+
+def _fields_below(pair: Pair, given: Array) -> Array:
+    """Fields v, w, beta, psi, ... (steps, n, k) of the member below, as the strip sees them."""
+    fields = _fields(pair.elimination, pair.below(given))
+    further = jnp.tensordot(pair.form.further, fields, 1)
+    turned = jnp.asarray([1.0, -1.0, -1.0])  # w and beta count the other way from below
+    seen = jnp.concatenate([fields[:2], further])
+    return seen.at[:3].multiply(turned[:, None, None]).T
 
 
 def _sections(strip: Strip, fields: Array) -> tuple[Array, Strains]:

@@ -10,6 +10,7 @@ from jax import Array
 
 from jbeamshell.condensed.body import Body, Elimination, eliminate
 from jbeamshell.condensed.pair import Pair, joined
+from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.pressing import press as press_down
 from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements
@@ -35,7 +36,7 @@ class Strip(NamedTuple):
     elimination : what finds the fields above the contact again
     hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
     x, tributary, load : (n,) stations from the far end, contact lengths, forces of the top pressure
-    settled, lift : (k,) tangential displacements and (n,) lifts under the pressures, frictionless
+    settled, lift : (k,) tangential displacements and (n,) lifts under the pressures
     pair : second member of a lap joint; v, w, hessian, settled and lift are then relative to it
     """
 
@@ -75,15 +76,18 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
     # Without friction the far end keeps its place, even if nothing else holds it.
     some = x.size - 1
-    press_t = press[v][:some]
-    if stays_flat(scene):
+    press_t, traction = press[v][:some], jnp.zeros_like(press[v])
+    stiffness = k_tt[:some, :some], k_tn[:some], hessian[w, w]
+    if scene.contact.assembly == "frictional":
+        loads = press[v], press[w], scene.contact.friction
+        lift, settled, reaction, traction = press_roughly(k_tt, k_tn, hessian[w, w], *loads)
+    elif stays_flat(scene):
         lift, reaction = jnp.zeros_like(x), (down - up)[::-1]
-        settled = solve(k_tt[:some, :some], -press_t)
+        settled = solve(stiffness[0], -press_t)
     else:
-        stiffness = k_tt[:some, :some], k_tn[:some], hessian[w, w]
         based = scene.contact.normal == "rigid"
         lift, settled, reaction = press_down(*stiffness, press_t, press[w], based)
-    settled = jnp.pad(settled, (0, k_tt.shape[0] - some))
+    settled = jnp.pad(settled, (0, k_tt.shape[0] - settled.size))
     body = Body(
         x=x[::-1],
         tributary=tributary[::-1],
@@ -93,6 +97,7 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         f_t=-hessian[v, -2],
         f_n=-hessian[w, -2],
         r_0=reaction,
+        t_0=traction,
         c=-hessian[-2, -2],
     )
     return Strip(body, form, elimination, hessian, x, tributary, down, settled, lift, pair)

@@ -103,7 +103,7 @@ class CycleFigures(Record):
         return SlipCycle(
             x=self.x,
             tributary=self.tributary,
-            v=self.fields[cycle, :, 0],
+            v=self.contact_v[cycle],
             traction=self.traction[cycle],
             reaction=self.reaction[cycle],
             friction=self.scene.contact.friction,

@@ -33,8 +33,11 @@ class Profiles(Record):
 
     @property
     def slip(self) -> Array:
-        """Tangential displacement of the contact since the pressure, (steps+1, n), length."""
-        return self.v - self.v[self.pressed]
+        """Tangential displacement of the contact since the pressure, (steps+1, n), length.
+
+        That of a lap joint is relative to its second member.
+        """
+        return self.contact_v - self.contact_v[self.pressed]
 
     @property
     def squeeze_stress(self) -> Array:
@@ -59,7 +62,8 @@ class Profiles(Record):
     @property
     def tip_deflection(self) -> Array:
         """Height of the bottom face at X = L over that at X = 0, (steps+1,), length."""
-        return self.gap[:, -1] - self.gap[:, 0]
+        height = self.gap if self.member is None else self.w
+        return height[:, -1] - height[:, 0]
 
     @property
     def lift_slope(self) -> Array:

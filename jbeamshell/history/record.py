@@ -27,7 +27,7 @@ class Record(eqx.Module):
     force : (steps+1,) end force F
     displacement : (steps+1,) mid-height displacement u(L) since the pressure, conjugate to F
     fields : (steps+1, n, m) v, w, beta, psi, and those of a hierarchic section
-    gap : (steps+1, n) height of the strip's bottom face over the foundation
+    gap : (steps+1, n) height of the strip's bottom face over what it lies on
     sections : (steps+1, elements) section forces N, Q, M, chi and xi in the places of e, g, k, psi
         and psi'
     traction : (steps+1, n) friction traction on the foundation (positive on a pull)
@@ -42,6 +42,8 @@ class Record(eqx.Module):
     status : (steps+1,) codes of `jbeamshell.Status`
     cycles : steps at the start, the turn and the end of each closed cycle
     target : (steps+1,) prescribed value of the controlled load
+    member : (steps+1, n, m) fields v, w, beta, psi, ... of the second member of a lap joint, up and
+        along X as those of the strip; None on a rigid base
     end : end of the path, for `continued`; None for Masing's rule and the bar's closed form
     """
 
@@ -68,8 +70,15 @@ class Record(eqx.Module):
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
     target: Array | None = None
     end: Any = None
+    member: Array | None = None
 
     @property
     def pressed(self) -> int:
         """Step at which the whole pressure acts, before any load."""
         return self.scene.load.pressure_steps - 1
+
+    @property
+    def contact_v(self) -> Array:
+        """Tangential displacement of the contact, to the second member if there is one."""
+        v = self.fields[..., 0]
+        return v if self.member is None else v - self.member[..., 0]

@@ -249,8 +249,8 @@ def _beyond_bar(x: float) -> float:
 
 def _pressing(scene: Scene) -> float:
     """Resultant of the pressures, F_N L."""
-    contact = scene.contact
-    force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length)
+    contact, support = scene.contact, scene.member.support
+    force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length, support)
     return float(force)
 
 

@@ -5,6 +5,7 @@ rules were measured (calibration/default_settings.py).
 
 * Rotations are linear where the bound on what that leaves out is a small part of the tolerance,
   see `jbeamshell.scene.linearisation`.
+* A lap joint is linear, and solved on its contact line.
 * A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
   in time and lets the strip lift off.  Any other strip is solved in load steps.
 
@@ -106,6 +107,8 @@ def _nodes(grid: Grid, tolerance: float, jumps: int) -> int:
 def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown."""
     strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
+    if scene.member.support != "none":
+        return "linear"
     if is_traced(strip, contact, load):
         before = model.kinematics
         return "exact" if before == AUTO else before
@@ -125,6 +128,8 @@ def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
 def may_condense(scene: Parts) -> bool:
     """True if a strip with linear kinematics can be solved on its contact line, and soon."""
     contact, load, model = scene.contact, scene.load, scene.model
+    if scene.member.support != "none":
+        return True
     few = "nodes" in model.open or model.nodes <= MOST_CONDENSED
     section = "beta" in model.fields and model.squeeze == "field" and scene.energy is None
     base = contact.normal == "rigid" and isinstance(contact.law, SharpSlip)

@@ -16,7 +16,7 @@ import numpy as np
 from jbeamshell.common.checks import require
 from jbeamshell.mechanics.bar import bar_backbone
 from jbeamshell.scene.keys import FAR_ENDS
-from jbeamshell.scene.parts import Contact, Load, Model, Strip
+from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
 from jbeamshell.scene.pressure import face_resultant, is_table, resultant
 
 EDGE = 1e-12  # part of the length by which a table may run beyond the strip, for round-off
@@ -47,19 +47,21 @@ class Rule(NamedTuple):
 
 
 @np.errstate(over="ignore", invalid="ignore")  # one of the rules refuses infinite forces
-def support_rules(strip: Strip, contact: Contact, model: Model, numbers: Numbers) -> list[Rule]:
+def support_rules(
+    strip: Strip, member: Member, contact: Contact, model: Model, numbers: Numbers
+) -> list[Rule]:
     """Rules by which pressures, friction and supports hold the strip, in the order of the checks.
 
     Parameters
     ----------
-    strip, contact, model : parts of the scene, for their words
+    strip, member, contact, model : parts of the scene, for their words
     numbers : values by dotted key
     """
     length, friction = numbers("strip.length"), numbers("contact.friction")
     top, bottom = numbers("contact.pressure"), numbers("contact.bottom_pressure")
     held = FAR_ENDS[strip.far_end]
     down, _ = face_resultant(top, length)
-    force, moment = resultant(top, bottom, length)
+    force, moment = resultant(top, bottom, length, member.support)
     rough = (friction > 0.0) | ("v" in held)
     fix = "nothing holds the strip along X (rigid-body motion): give strip.far_end or friction"
     rules = [Rule("contact.friction", friction, rough, fix)]
@@ -83,12 +85,14 @@ def support_rules(strip: Strip, contact: Contact, model: Model, numbers: Numbers
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def gross_slip_rule(load: Load, numbers: Numbers, targets: Any, part: Any = 1.0) -> Rule:
+def gross_slip_rule(
+    load: Load, member: Member, numbers: Numbers, targets: Any, part: Any = 1.0
+) -> Rule:
     """Rule that a controlled force stays below gross slip, mu F_N L.
 
     Parameters
     ----------
-    load : for its control
+    load, member : for their words
     numbers : values by dotted key
     targets : controlled loads, any shape
     part : part of the pressures that acts with each
@@ -96,9 +100,8 @@ def gross_slip_rule(load: Load, numbers: Numbers, targets: Any, part: Any = 1.0)
     key, friction, size = "load.amplitude", numbers("contact.friction"), np.abs(np.asarray(targets))
     if load.control != "force":
         return Rule(key, size, True, "")
-    force, _ = resultant(
-        numbers("contact.pressure"), numbers("contact.bottom_pressure"), numbers("strip.length")
-    )
+    top, bottom = numbers("contact.pressure"), numbers("contact.bottom_pressure")
+    force, _ = resultant(top, bottom, numbers("strip.length"), member.support)
     limit = friction * force
     below = stays_below(size, limit, np.asarray(part))
     worst = np.max(np.broadcast_to(size, np.shape(below)), where=~below, initial=0.0)

@@ -26,6 +26,7 @@ FAR_ENDS = {"held": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held 
 CONTROLS = ("force", "displacement")
 ARC_LENGTH = "arc-length"
 LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
+ASSEMBLIES = ("frictionless", "frictional")
 NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
 LOADED_ENDS = ("free", "guided")
@@ -135,6 +136,12 @@ class ContactKeys(Part):
     )
     normal: str = word(
         "rigid", NORMALS, "Normal contact: rigid, compliant, or none (no foundation)."
+    )
+    assembly: str = word(
+        "frictionless",
+        ASSEMBLIES,
+        "Pressing: frictionless (locks no shear in), or frictional, as bolts are tightened (lap "
+        "joints only).",
     )
     normal_stiffness: Array = number(
         50.0, "Stiffness of the compliant foundation, in units of E'/H.", symbol="k_n", unit="E'/H"

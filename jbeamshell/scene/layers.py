@@ -20,7 +20,9 @@ def fill_height(thickness: ArrayLike, height: ArrayLike) -> np.ndarray:
     return np.asarray(abs(np.asarray(thickness, float) - height) <= TOLERANCE * height)
 
 
-def check_layers(layers: Any, height: ArrayLike, plane: str) -> None:
+def check_layers(
+    layers: Any, height: ArrayLike, plane: str, key: str = "strip.layers"
+) -> None:
     """Refuse layers that make no section of the height 2H; traced values are left unchecked.
 
     Parameters
@@ -31,6 +33,8 @@ def check_layers(layers: Any, height: ArrayLike, plane: str) -> None:
         2H, length.
     plane : str
         "strain" or "stress".
+    key : str
+        Key that messages name.
 
     Raises
     ------
@@ -41,21 +45,21 @@ def check_layers(layers: Any, height: ArrayLike, plane: str) -> None:
     """
     if is_traced(layers):
         return
-    table = _rows(layers)
+    table = _rows(layers, key)
     for place, row in enumerate(table.tolist(), start=1):
         fix = _fault(row, plane)
         if fix:
-            raise InputError(f"strip.layers = {row} (row {place} from the bottom): {fix}")
+            raise InputError(f"{key} = {row} (row {place} from the bottom): {fix}")
     if is_traced(height):
         return
     total, whole = float(table[:, 0].sum()), float(np.asarray(height))
     fix = (
         f"the thicknesses add up to {total:.9g}, but the height 2H is {whole:.9g}; make them equal"
     )
-    require("strip.layers", table, bool(fill_height(total, whole)), fix)
+    require(key, table, bool(fill_height(total, whole)), fix)
 
 
-def _rows(layers: Any) -> np.ndarray:
+def _rows(layers: Any, key: str) -> np.ndarray:
     """Layers in double precision; raises `InputError` unless they are rows of three numbers."""
     try:
         table = np.asarray(layers)
@@ -63,7 +67,7 @@ def _rows(layers: Any) -> np.ndarray:
         table = np.empty(0)
     shaped = table.ndim == 2 and table.shape[0] > 0 and table.shape[1] == 3
     if not shaped or table.dtype.kind not in "fiu":
-        raise InputError(f"strip.layers = {shown(layers)}: {LAYERS}")
+        raise InputError(f"{key} = {shown(layers)}: {LAYERS}")
     return table.astype(np.float64)
 
 

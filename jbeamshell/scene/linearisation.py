@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from jbeamshell.mechanics.bar import bar_force
 from jbeamshell.mechanics.homogeneous import Energy, shear_modulus
 from jbeamshell.scene.domain import Numbers
-from jbeamshell.scene.parts import Contact, Load, Model, Strip
+from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
 from jbeamshell.scene.pressure import is_table
 
 # Constants of `bound`, fitted by calibration/map_kinematics.py to map_kinematics.json beside it.
@@ -54,6 +54,7 @@ class Parts(Protocol):
     load: Load
     model: Model
     energy: Energy | None
+    member: Member
 
     def number(self, key: str) -> np.ndarray: ...
 

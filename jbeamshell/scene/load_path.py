@@ -29,7 +29,7 @@ def check(
     whole, cycles = whole_path(scene, path)
     if not is_traced(scene, whole):
         _check_size(scene, whole)
-        gross_slip_rule(scene.load, scene.number, whole.target, whole.pressure).demand()
+        gross_slip_rule(scene.load, scene.member, scene.number, whole.target, whole.pressure).demand()
         bar_rule(scene.load, scene.model, scene.number).demand()
     return whole, cycles
 
@@ -89,8 +89,8 @@ def _own_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
 
 def _below_gross_slip(scene: Scene, targets: Array, pressures: Array) -> Array:
     """Forces of a traced path, NaN from gross slip on, where no step finds an equilibrium."""
-    contact = scene.contact
-    force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length)
+    contact, support = scene.contact, scene.member.support
+    force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length, support)
     below = stays_below(jnp.abs(targets), contact.friction * force, pressures)
     return jnp.where(below, targets, jnp.nan)
 

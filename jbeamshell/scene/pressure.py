@@ -53,12 +53,18 @@ def face_resultant(pressure: ArrayLike, length: ArrayLike) -> tuple[Any, Any]:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def resultant(top: ArrayLike, bottom: ArrayLike, length: ArrayLike) -> tuple[Any, Any]:
-    """Force of both pressures on strips, downwards, and its moment about X = 0.
+def resultant(
+    top: ArrayLike, bottom: ArrayLike, length: ArrayLike, support: str = "none"
+) -> tuple[Any, Any]:
+    """Force of the pressures on the contact, downwards, and its moment about X = 0.
 
-    Parameters and units are those of `face_resultant`.
+    The bottom pressure acts on the second member of a lap joint, if ``support`` names one.  Other
+    parameters and units are those of `face_resultant`.
     """
-    (down, turning), (up, lifting) = face_resultant(top, length), face_resultant(bottom, length)
+    down, turning = face_resultant(top, length)
+    if support != "none":
+        return down, turning
+    up, lifting = face_resultant(bottom, length)
     return down - up, turning - lifting
 
 

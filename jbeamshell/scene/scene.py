@@ -31,6 +31,7 @@ from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
 from jbeamshell.scene.choice import choose
 from jbeamshell.scene.domain import Numbers, support_rules
+from jbeamshell.scene.joint import check_joint
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
 from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Strip
 from jbeamshell.scene.quadratic import check_quadratic
@@ -84,6 +85,7 @@ class Scene(eqx.Module):
     def __check_init__(self) -> None:
         self._check_rung()
         self._check_contact()
+        check_joint(self)
         if self.energy is not None:
             self._check_energy(self.energy)
 
@@ -218,7 +220,7 @@ class Scene(eqx.Module):
             require("strip.far_end", strip.far_end, held, fix)
         pressures = (contact.pressure, contact.bottom_pressure)
         if not is_traced(strip.length, contact.friction, *pressures):
-            for rule in support_rules(strip, contact, model, self.number):
+            for rule in support_rules(strip, self.member, contact, model, self.number):
                 rule.demand()
 
     def of_member(self) -> Scene:

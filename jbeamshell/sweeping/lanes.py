@@ -112,7 +112,8 @@ class Lanes:
     def gross_slip(self) -> np.ndarray:
         """End force at which the whole contact slides: mu times the pressures' force."""
         top, bottom = self.value("contact.pressure"), self.value("contact.bottom_pressure")
-        force, _ = resultant(top, bottom, self.value("strip.length"))
+        support = self.scene.member.support
+        force, _ = resultant(top, bottom, self.value("strip.length"), support)
         return self.value("contact.friction") * force
 
     @property
@@ -154,14 +155,14 @@ class Lanes:
         """Truths of every rule, broadcasting to the lanes' shape."""
         for key in self.axes:
             yield TABLE[key].holds(self.grid(key))
-        strip, contact, load, model = (getattr(self.scene, part) for part in SECTIONS)
+        strip, contact, load, model, member = (getattr(self.scene, part) for part in SECTIONS)
         if strip.layers is not None:
             thickness = np.sum(np.asarray(strip.layers)[:, 0])
             yield fill_height(thickness, 2.0 * self.value("strip.half_height"))
         targets = self.value("load.amplitude") if load.cycles else 0.0
         for rule in (
-            *support_rules(strip, contact, model, self.value),
-            gross_slip_rule(load, self.value, targets),
+            *support_rules(strip, member, contact, model, self.value),
+            gross_slip_rule(load, member, self.value, targets),
             bar_rule(load, model, self.value),
         ):
             yield rule.holds

@@ -49,6 +49,7 @@ def bar(x, stiffness=3.4e4, load=1.0):
         f_t=jnp.zeros(n - 1).at[0].set(1.0),
         f_n=jnp.zeros(n),
         r_0=jnp.asarray(load * tributary),
+        t_0=jnp.zeros(n - 1),
         c=jnp.asarray(0.0),
     )
 

@@ -61,6 +61,7 @@ def two_nodes():
         f_t=jnp.array([1.0, 0.0]),
         f_n=jnp.zeros(2),
         r_0=jnp.ones(2),
+        t_0=jnp.zeros(2),
         c=jnp.asarray(0.25),
     )
 

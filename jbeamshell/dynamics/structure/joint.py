@@ -224,7 +224,7 @@ def largest_force(scene: Scene, force: Any = None) -> Any:
     require_number("force", force)
     if not is_traced(scene, force):
         by_force = dataclasses.replace(scene.load, control="force")
-        gross_slip_rule(by_force, scene.number, force)._replace(key="force").demand()
+        gross_slip_rule(by_force, scene.member, scene.number, force)._replace(key="force").demand()
     return force
 
 

@@ -1,0 +1,78 @@
+"""Lap joint: the rules of a scene with a second member."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from jbeamshell.common.checks import is_traced, require
+from jbeamshell.mechanics.homogeneous import Energy
+from jbeamshell.scene.layers import check_layers
+from jbeamshell.scene.parts import Contact, Member, Model, Strip
+from jbeamshell.scene.rows import rows
+
+
+class Parts(Protocol):
+    """Parts of a `jbeamshell.Scene` that the rules read."""
+
+    strip: Strip
+    contact: Contact
+    model: Model
+    member: Member
+    energy: Energy | None
+
+
+def check_joint(scene: Parts) -> None:
+    """Raise `InputError` for a lap joint that is none, or that cannot be solved."""
+    strip, contact, model, member = scene.strip, scene.contact, scene.model, scene.member
+    if member.support == "none":
+        _check_alone(scene)
+        return
+    fix = "must be 'free' in a lap joint, whose second member is held at X = 0"
+    require("strip.far_end", strip.far_end, strip.far_end == "free", fix)
+    fix = "must be left out in a lap joint, whose strip is straight"
+    require("strip.curvature", strip.curvature, strip.curvature is None, fix)
+    require("energy", scene.energy, scene.energy is None, "must be left out in a lap joint")
+    fix = "must be 'rigid' in a lap joint, whose second member is elastic"
+    require("contact.normal", contact.normal, contact.normal == "rigid", fix)
+    fix = "must be 'condensed' or 'plane' in a lap joint: leave it out, or take model.rung = plane"
+    require("model.solution", model.solution, model.condensed, fix)
+    _check_section(strip, member)
+    plain = member.layers is None and strip.layers is None
+    fix = "is for homogeneous members; take 0"
+    require("model.order", model.order, model.order == 0 or plain, fix)
+    if member.support != "rolling":
+        return
+    below = contact.bottom_pressure
+    none = is_traced(below) or not np.any(below[:, 1] if below.ndim else below)
+    fix = "must be 0 on a symmetry plane: take member.support = clamped"
+    require("contact.bottom_pressure", below, none, fix)
+    squeezed = "psi" in model.fields or strip.loaded_end == "free"
+    fix = "leaves no lift to a shell on a symmetry plane: take model.rung = squeeze or plane"
+    require("strip.loaded_end", strip.loaded_end, squeezed, fix)
+
+
+def _check_section(strip: Strip, member: Member) -> None:
+    """Refuse a section of the second member that is said twice, or not wholly."""
+    if member.layers is not None:
+        ratio = strip.height_ratio if member.height_ratio is None else member.height_ratio
+        check_layers(member.layers, ratio * strip.length, strip.plane, "member.layers")
+    own = [member.axial_stiffness is not None, member.poisson_ratio is not None]
+    fix = "needs member.axial_stiffness and member.poisson_ratio both on a strip with layers"
+    whole = strip.layers is None or member.layers is not None or all(own) or not any(own)
+    require("member", "homogeneous", whole, fix)
+
+
+def _check_alone(scene: Parts) -> None:
+    """Refuse what only a lap joint knows."""
+    for name in rows(Member):
+        value = getattr(scene.member, name)
+        fix = "needs a second member: give member.support, rolling or clamped"
+        require(f"member.{name}", value, name == "support" or value is None, fix)
+    fix = "needs a second member: take 'free', or give member.support"
+    end = scene.strip.loaded_end
+    require("strip.loaded_end", end, end == "free", fix)
+    fix = "needs a second member: take 'frictionless', or give member.support"
+    assembly = scene.contact.assembly
+    require("contact.assembly", assembly, assembly == "frictionless", fix)
