@@ -85,8 +85,12 @@ def supports_below(form: SectionForm, clamped: bool) -> Supports:
 
 
 def joined(
-    above: Array, forms: tuple[SectionForm, SectionForm], x: Array, up: Array,
-    guided: bool, clamped: bool
+    above: Array,
+    forms: tuple[SectionForm, SectionForm],
+    x: Array,
+    up: Array,
+    guided: bool,
+    clamped: bool,
 ) -> tuple[Pair, Array]:
     """Two members on their contact line.
 

@@ -185,7 +185,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     def every(values: Array) -> Array:
         return jnp.pad(values, (before, 0))
 
-    settled = jnp.pad(strip.settled[::-1], (n - k, 0))
+    settled, held = (jnp.pad(each[::-1], (n - k, 0)) for each in (strip.settled, body.t_0))
     driven = state.displacement if scene.load.control == "displacement" else state.force
     v = along(state.v) + part[:, None] * settled
     w = along(levels.lift) + pressing * strip.lift[::-1]
@@ -198,6 +198,8 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     below = None if strip.pair is None else _fields_below(strip.pair, given)
     reaction = along(state.r_n) / strip.tributary
     reaction = reaction + pressing * body.r_0[::-1] / strip.tributary
+    traction = -along(state.r_t) / strip.tributary
+    traction = traction - pressing * held / strip.tributary
     slipping = along(levels.slipping).astype(bool)
     forces = given @ strip.hessian  # conjugate to v, w, minus the end load and the pressure
     energy = 0.5 * jnp.sum(forces * given, axis=1) - forces[:, -2] * given[:, -2]
@@ -220,7 +222,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
         fields=masked(jnp.concatenate([fields[:2].T, further], axis=-1)),
         gap=masked(w),
         sections=jax.tree.map(masked, sections),
-        traction=masked(-along(state.r_t) / strip.tributary),
+        traction=masked(traction),
         reaction=masked(reaction),
         slipping=slipping,
         slip_work=masked(every(levels.slip_work)),

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.body import Body, Elimination, eliminate
 from jbeamshell.condensed.pair import Pair, joined
-from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.pressing import press as press_down
 from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements

@@ -8,7 +8,7 @@ from jax import Array
 from jbeamshell.common.errors import InputError
 from jbeamshell.history.record import Record
 from jbeamshell.history.reliability import SlipCycle, estimates
-from jbeamshell.mechanics.bar import cubic_law
+from jbeamshell.mechanics.bar import cubic_law, lap_cubic_law
 from jbeamshell.numerics.cycles import branch_work
 
 
@@ -53,10 +53,17 @@ class CycleFigures(Record):
 
     @property
     def dissipation_ratio(self) -> Array:
-        """Dissipation over that of the one-dimensional bar, (2/3) A^3/(E'2H q) (Goodman 1959)."""
-        stiffness, force = self.scene.strip.stretching_stiffness, self.loop[0]
+        """Dissipation over that of the one-dimensional bar, (2/3) A^3/(E'2H q) (Goodman 1959).
+
+        That of a lap joint is over two bars', see `jbeamshell.mechanics.bar.lap_cubic_law`.
+        """
+        scene, force = self.scene, self.loop[0]
+        stiffness, friction = scene.strip.stretching_stiffness, self.friction_per_length
         amplitude = 0.5 * (jnp.max(force) - jnp.min(force))
-        return self.dissipation / cubic_law(amplitude, stiffness, self.friction_per_length)
+        if scene.member.support == "none":
+            return self.dissipation / cubic_law(amplitude, stiffness, friction)
+        lower = scene.member.beside(scene.strip).stretching_stiffness
+        return self.dissipation / lap_cubic_law(amplitude, stiffness, lower, friction)
 
     @property
     def friction_per_length(self) -> Array:

@@ -153,3 +153,74 @@ def cubic_law(
     Goodman 1959.
     """
     return 2 / 3 * jnp.power(amplitude, 3) / axial_stiffness / friction_per_length
+
+
+def lap_backbone(
+    force: ArrayLike,
+    upper: ArrayLike,
+    lower: ArrayLike,
+    length: ArrayLike,
+    friction_per_length: ArrayLike,
+) -> Array:
+    """End displacement of the first loading of two bars that lap over a length L.
+
+    The upper bar is pulled at X = L and the lower one held at X = 0.  Slip starts at both ends; the
+    zones, F k_2/((k_1 + k_2) q) and F k_1/((k_1 + k_2) q) long, meet at gross slip, F = q L:
+
+        u = F L/(k_1 + k_2) + F |F| (k_1^3 + k_2^3)/(2 q k_1 k_2 (k_1 + k_2)^2).
+
+    Parameters
+    ----------
+    force : array_like, shape (...)
+        End force F [force], below gross slip.
+    upper, lower : array_like, shape (...)
+        Axial stiffnesses k_1 and k_2 [force].
+    length : array_like, shape (...)
+        Length L of the overlap [length].
+    friction_per_length : array_like, shape (...)
+        Friction force q [force / length].
+
+    Returns
+    -------
+    Array, shape (...)
+        End displacement u [length].
+
+    Notes
+    -----
+    The lap joint of Metherell, A. F. and Diller, S. V. (1968). Instantaneous energy dissipation
+    rate in a lap joint: uniform clamping pressure. Journal of Applied Mechanics 35, 123-128.
+    """
+    stuck = jnp.asarray(force) * length / (upper + lower)
+    return stuck + bar_backbone(force, _in_series(upper, lower), friction_per_length)
+
+
+def lap_cubic_law(
+    amplitude: ArrayLike, upper: ArrayLike, lower: ArrayLike, friction_per_length: ArrayLike
+) -> Array:
+    """Energy that two bars which lap dissipate per full cycle; see `lap_backbone`.
+
+    Parameters
+    ----------
+    amplitude : array_like, shape (...)
+        Largest end force ``A >= 0`` [force], below gross slip.
+    upper, lower : array_like, shape (...)
+        Axial stiffnesses k_1 and k_2 [force].
+    friction_per_length : array_like, shape (...)
+        Friction force q [force / length].
+
+    Returns
+    -------
+    Array, shape (...)
+        Dissipated energy ``D = (2/3) A^3 (k_1^3 + k_2^3)/(q k_1 k_2 (k_1 + k_2)^2)``.
+
+    Notes
+    -----
+    Metherell & Diller 1968, as in `lap_backbone`.
+    """
+    return cubic_law(amplitude, _in_series(upper, lower), friction_per_length)
+
+
+def _in_series(upper: ArrayLike, lower: ArrayLike) -> Array:
+    """Stiffness of one bar that slips as much as two that lap."""
+    one, other = jnp.asarray(upper), jnp.asarray(lower)
+    return one * other * (one + other) ** 2 / (one**3 + other**3)

@@ -10,6 +10,7 @@ from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.homogeneous import Energy
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.parts import Contact, Member, Model, Strip
+from jbeamshell.scene.pressure import pressure_values
 from jbeamshell.scene.rows import rows
 
 
@@ -45,7 +46,7 @@ def check_joint(scene: Parts) -> None:
     if member.support != "rolling":
         return
     below = contact.bottom_pressure
-    none = is_traced(below) or not np.any(below[:, 1] if below.ndim else below)
+    none = is_traced(below) or not np.any(pressure_values(np.asarray(below)))
     fix = "must be 0 on a symmetry plane: take member.support = clamped"
     require("contact.bottom_pressure", below, none, fix)
     squeezed = "psi" in model.fields or strip.loaded_end == "free"

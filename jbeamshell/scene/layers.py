@@ -20,9 +20,7 @@ def fill_height(thickness: ArrayLike, height: ArrayLike) -> np.ndarray:
     return np.asarray(abs(np.asarray(thickness, float) - height) <= TOLERANCE * height)
 
 
-def check_layers(
-    layers: Any, height: ArrayLike, plane: str, key: str = "strip.layers"
-) -> None:
+def check_layers(layers: Any, height: ArrayLike, plane: str, key: str = "strip.layers") -> None:
     """Refuse layers that make no section of the height 2H; traced values are left unchecked.
 
     Parameters

@@ -122,6 +122,24 @@ def block() -> Scene:
     return named("block")
 
 
+def double_shear() -> Scene:
+    """Half of a lap joint in double shear: a strip on an inner member, slipping at both ends.
+
+    The inner member lies on the symmetry plane and is held at X = 0; pressure is uniform.  Units
+    are any consistent ones.  Gross slip begins at F = 2.
+    """
+    return named("double-shear")
+
+
+def single_lap() -> Scene:
+    """A single lap joint: two members pressed together as if by a bolt, which bend and lift off.
+
+    The lower member is clamped at X = 0, the upper one pulled and guided at X = L.  Units are any
+    consistent ones.  Gross slip begins near F = 2.
+    """
+    return named("single-lap")
+
+
 _FUNCTIONS = {
     function.__name__.replace("_", "-"): function
     for function in (
@@ -135,6 +153,8 @@ _FUNCTIONS = {
         point_load,
         advancing,
         block,
+        double_shear,
+        single_lap,
     )
 }
 NAMES = tuple(_FUNCTIONS)

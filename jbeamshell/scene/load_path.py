@@ -29,7 +29,8 @@ def check(
     whole, cycles = whole_path(scene, path)
     if not is_traced(scene, whole):
         _check_size(scene, whole)
-        gross_slip_rule(scene.load, scene.member, scene.number, whole.target, whole.pressure).demand()
+        parts = scene.load, scene.member, scene.number
+        gross_slip_rule(*parts, whole.target, whole.pressure).demand()
         bar_rule(scene.load, scene.model, scene.number).demand()
     return whole, cycles
 

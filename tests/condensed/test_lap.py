@@ -1,0 +1,176 @@
+"""Lap joints: two members on their contact line, against elements, closed forms and their limits."""
+
+import csv
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.condensed import strip
+from jbeamshell.condensed.strip import stations
+from jbeamshell.mechanics.bar import lap_backbone, lap_cubic_law
+from jbeamshell.scene import library
+
+ELEMENTS = Path(__file__).parents[2] / "calibration/data/lap_joints.csv"
+JOINT = {"strip.far_end": "free", "member.support": "rolling", "load.amplitude": 1.0}
+SQUEEZE = jb.Scene().replace(JOINT | {"model.rung": "squeeze"})
+BOLT = [[0.75, 0.0], [0.75, 40.0], [1.25, 40.0], [1.25, 0.0]]
+
+
+def elements(problem):
+    with ELEMENTS.open() as file:
+        rows = [row for row in csv.DictReader(file) if row.pop("problem") == problem]
+    return [{name: float(value) for name, value in row.items()} for row in rows]
+
+
+def of_row(row):
+    """Values of the scene of a row of the finite elements."""
+    return {
+        "strip.height_ratio": row["H1"],
+        "member.height_ratio": row["H2"],
+        "member.axial_stiffness": 3.4e4 * row["E2_over_E1"] * row["H2"] / row["H1"],
+        "load.amplitude": row["A"],
+    }
+
+
+class TestElements:
+    @pytest.mark.slow
+    @pytest.mark.parametrize("row", elements("double-shear"), ids=str)
+    def test_double_shear(self, row):
+        history = jb.solve(library.double_shear().replace(of_row(row)))
+        assert float(history.dissipation) == pytest.approx(row["D"], rel=0.01)
+        assert float(history.secant_stiffness) == pytest.approx(row["K_sec"], rel=0.001)
+
+    @pytest.mark.slow
+    def test_single_lap(self):
+        (row,) = elements("single-lap")
+        history = jb.solve(library.single_lap())
+        assert float(history.dissipation) == pytest.approx(row["D"], rel=0.01)
+        assert float(history.secant_stiffness) == pytest.approx(row["K_sec"], rel=0.001)
+        start, turn, stop = history.cycles[-1]
+        ends = []
+        for step in (stop, turn):
+            touching = history.x[history.touching[step]]
+            ends += [float(touching[0]), float(touching[-1])]
+        assert ends == pytest.approx([0.6702, 1.3248, 0.6502, 1.3548], rel=0.02)
+        assert float(jnp.max(history.gap)) == pytest.approx(2.419e-4, rel=0.01)
+
+    @pytest.mark.slow
+    def test_sections_of_order_four_come_near(self):
+        rows = [row for row in elements("double-shear") if row["A"] == 1.0]
+        for row, error in zip(rows, (0.015, 0.1), strict=True):
+            scene = SQUEEZE.replace({"model.rung": "p4"} | of_row(row))
+            history = jb.solve(scene)
+            assert float(history.dissipation) == pytest.approx(row["D"], rel=error)
+            assert float(history.secant_stiffness) == pytest.approx(row["K_sec"], rel=0.005)
+
+
+class TestLimits:
+    @pytest.mark.slow
+    def test_a_stiff_member_is_a_rigid_base(self, monkeypatch):
+        alone = jb.Scene().replace(
+            {"strip.far_end": "free", "load.amplitude": 1.0, "model.rung": "condensed-squeeze"}
+        )
+        scene = SQUEEZE.replace({"member.axial_stiffness": 3.4e10})
+        joint = jb.solve(scene)
+        x = stations(scene, scene.model.nodes)  # one grid for both
+        monkeypatch.setattr(strip, "stations", lambda *_: x)
+        base = jb.solve(alone.replace({"load.steps_per_half_cycle": 22}), throw=False)
+        joint = jb.solve(scene.replace({"load.steps_per_half_cycle": 22}), throw=False)
+        for name in ("dissipation", "secant_stiffness", "peak_displacement"):
+            assert float(getattr(joint, name)) == pytest.approx(
+                float(getattr(base, name)), rel=1e-4
+            )
+
+    @pytest.mark.parametrize("ratio", [1.0, 3.0])
+    def test_thin_members_are_bars_that_lap(self, ratio):
+        thin = {"strip.height_ratio": 0.001, "member.height_ratio": 0.001}
+        thin |= {"member.axial_stiffness": 3.4e4 * ratio, "model.tolerance": 0.002}
+        history = jb.solve(SQUEEZE.replace(thin))
+        bars = 3.4e4, 3.4e4 * ratio
+        u = float(lap_backbone(1.0, *bars, 2.0, 1.0))
+        assert float(history.dissipation) == pytest.approx(
+            float(lap_cubic_law(1.0, *bars, 1.0)), rel=0.01
+        )
+        assert 1.0 / float(history.secant_stiffness) == pytest.approx(u, rel=0.002)
+        assert float(history.dissipation_ratio) == pytest.approx(1.0, rel=0.01)
+
+
+class TestBalance:
+    def test_the_loop_holds_the_work_of_friction(self):
+        history = jb.solve(SQUEEZE.replace({"load.steps_per_half_cycle": 400}))
+        loop, work = float(history.dissipation_loop), float(history.dissipation)
+        assert loop == pytest.approx(work, rel=2e-6)
+
+    def test_members_move_apart_by_gap_and_slip(self):
+        values = {"model.rung": "shell", "member.support": "clamped", "load.amplitude": 0.5}
+        values |= {"contact.pressure": BOLT, "contact.bottom_pressure": BOLT}
+        history = jb.solve(SQUEEZE.replace(values), throw=False)
+        scale = float(jnp.max(jnp.abs(history.v)))
+        np.testing.assert_allclose(
+            history.w - history.member[..., 1], history.gap, atol=1e-9 * scale
+        )
+        assert float(jnp.max(history.gap)) > 0.0
+        stuck = ~np.any(np.asarray(history.slipping), axis=0)
+        stuck &= np.all(np.asarray(history.touching), axis=0)
+        assert stuck.any()
+        np.testing.assert_allclose(history.slip[:, stuck], 0.0, atol=1e-9 * scale)
+        # The clamped face, and equilibrium of the upper member along X.
+        np.testing.assert_allclose(history.member[:, 0, :3], 0.0, atol=1e-9 * scale)
+        carried = history.traction @ history.tributary
+        np.testing.assert_allclose(carried, history.force, atol=1e-9)
+
+    def test_assembly_with_friction_locks_shear_in(self):
+        values = {"contact.assembly": "frictional", "member.axial_stiffness": 1e5}
+        smooth = jb.solve(SQUEEZE.replace({"member.axial_stiffness": 1e5}))
+        rough = jb.solve(SQUEEZE.replace(values))
+        held = np.abs(np.asarray(rough.traction[0]))
+        assert held.max() > 0.01
+        assert np.all(held <= 0.1 * np.asarray(rough.reaction[0]) * (1.0 + 1e-9))
+        np.testing.assert_allclose(smooth.traction[0], 0.0, atol=1e-12)
+        carried = rough.traction @ rough.tributary
+        np.testing.assert_allclose(carried, rough.force, atol=1e-8)
+
+
+def test_derivatives_have_slope_two():
+    keys = ("strip.height_ratio", "member.height_ratio", "contact.friction")
+    scene = SQUEEZE.replace({"member.height_ratio": 0.12}).pinned()
+
+    def work(numbers):
+        return jb.solve(scene.replace(dict(zip(keys, numbers, strict=True)))).dissipation
+
+    at, way = jnp.array([0.11, 0.12, 0.1]), jnp.array([0.1, -0.1, 0.05])
+    value, slope = jax.jit(lambda x: jax.jvp(work, (x,), (way,)))(at)
+    value_at = jax.jit(work)
+    errors = [abs(value_at(at + h * way) - value - h * slope) for h in (4e-4, 2e-4)]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
+
+
+def test_a_sweep_runs_over_both_heights():
+    sweep = jb.sweep(
+        SQUEEZE, {"strip.height_ratio": [0.05, 0.1], "member.height_ratio": [0.05, 0.2]}
+    )
+    assert np.all(np.isfinite(sweep.values["dissipation"]))
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"strip.far_end": "held"}, "strip.far_end = 'held': must be 'free' in a lap joint"),
+        ({"contact.normal": "compliant"}, "contact.normal"),
+        ({"model.solution": "stepwise"}, "model.solution = 'stepwise'"),
+        ({"contact.bottom_pressure": 3.0}, "must be 0 on a symmetry plane"),
+        ({"strip.curvature": 0.1}, "strip.curvature"),
+        ({"member.support": "none", "member.height_ratio": 0.1}, "give member.support"),
+        ({"member.support": "none", "strip.loaded_end": "guided"}, "give member.support"),
+        ({"member.support": "none", "contact.assembly": "frictional"}, "give member.support"),
+        ({"member.layers": [[0.1, 1e5, 0.3]]}, "member.layers"),
+        ({"load.amplitude": 2.5}, "gross slip"),
+    ],
+)
+def test_what_is_no_joint_is_refused(values, said):
+    with pytest.raises(jb.InputError, match=said.replace("(", "\\(")):
+        jb.solve(SQUEEZE.replace(values))
