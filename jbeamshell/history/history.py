@@ -179,6 +179,12 @@ class History(Profiles, ContactLine, CycleFigures):
 
         return plotting.contact_map(self, axes, **options)
 
+    def plot_deformed(self, step: int | None = None, axes: Any = None, **options: Any) -> Any:
+        """Draw the deformed members at a step; see `jbeamshell.plotting.deformed`."""
+        from jbeamshell import plotting
+
+        return plotting.deformed(self, step, axes, **options)
+
 
 @eqx.filter_jit
 def _last_values(history: History, names: tuple[str, ...]) -> dict[str, Array]:

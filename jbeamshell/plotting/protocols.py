@@ -32,6 +32,8 @@ class LoadPath(Protocol):
     force, displacement : (steps+1,) end force and end displacement
     cycles : steps at the start, the turn and the end of each closed cycle
     loop : force and displacement of the last closed cycle, (k,) each
+    fields : (steps+1, n, m) v, w, beta, psi, ... of the strip
+    member : likewise of the second member of a lap joint; None without one
     slip, beta, psi : (steps+1, n) slip since the pressing, rotation, squeeze strain
     traction, reaction : (steps+1, n) friction traction and normal reaction
     slipping, touching : (steps+1, n) True where a node slips, or touches the foundation
@@ -58,6 +60,10 @@ class LoadPath(Protocol):
     def cycles(self) -> Sequence[tuple[int, int, int]]: ...
     @property
     def loop(self) -> tuple[Array, Array]: ...
+    @property
+    def fields(self) -> Array: ...
+    @property
+    def member(self) -> Array | None: ...
     @property
     def slip(self) -> Array: ...
     @property

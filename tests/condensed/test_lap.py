@@ -1,4 +1,4 @@
-"""Lap joints: two members on their contact line, against elements, closed forms and their limits."""
+"""Lap joints: two members on their contact line, beside elements, closed forms and limits."""
 
 import csv
 from pathlib import Path
@@ -50,7 +50,7 @@ class TestElements:
         history = jb.solve(library.single_lap())
         assert float(history.dissipation) == pytest.approx(row["D"], rel=0.01)
         assert float(history.secant_stiffness) == pytest.approx(row["K_sec"], rel=0.001)
-        start, turn, stop = history.cycles[-1]
+        _, turn, stop = history.cycles[-1]
         ends = []
         for step in (stop, turn):
             touching = history.x[history.touching[step]]
@@ -118,6 +118,13 @@ class TestBalance:
         stuck &= np.all(np.asarray(history.touching), axis=0)
         assert stuck.any()
         np.testing.assert_allclose(history.slip[:, stuck], 0.0, atol=1e-9 * scale)
+        axes = history.plot_deformed()
+        upper, lower = (patch.get_xy()[:-1] for patch in axes.patches[:2])
+        n = history.x.size
+        rise = float(axes.get_title().rpartition(" ")[2]) * np.asarray(history.w[-1])
+        np.testing.assert_allclose(upper[:n, 1], rise, atol=1e-12)
+        assert np.all(upper[:n, 1] - lower[:n, 1] >= -1e-12)
+        assert np.all(upper[:n, 1] <= upper[n:, 1][::-1])
         # The clamped face, and equilibrium of the upper member along X.
         np.testing.assert_allclose(history.member[:, 0, :3], 0.0, atol=1e-9 * scale)
         carried = history.traction @ history.tributary

@@ -32,7 +32,10 @@ LIFTING = ["v", "w", "beta", "psi"]
 # --- files --------------------------------------------------------------------------------------
 
 positive = st.floats(1e-90, 1e90)
+MEMBER = {key for key in KEYS if key.startswith("member.")}
 OPTIONAL = {"strip.axial_stiffness", "strip.poisson_ratio", "strip.layers", "strip.curvature"}
+OPTIONAL |= MEMBER - {"member.support"}
+JOINT = {"member.support": "rolling", "strip.far_end": "free", "model.rung": "plane"}
 
 
 @st.composite
@@ -88,6 +91,7 @@ def values_of_all_keys(draw):
             "strip.height_ratio": ratio,
             "strip.kappa_s": draw(positive),
             "strip.far_end": far_end,
+            "strip.loaded_end": "free",
             "strip.deviation": draw(st.floats(-1e90, 1e90)),
             "strip.plane": draw(st.sampled_from(["strain", "stress"])),
             "contact.friction": friction,
@@ -97,7 +101,9 @@ def values_of_all_keys(draw):
             "contact.smoothing": draw(smoothing | st.just("sharp")),
             "contact.law": law,
             "contact.normal": normal,
+            "contact.assembly": "frictionless",
             "contact.normal_stiffness": draw(positive),
+            "member.support": "none",
             "load.control": draw(st.sampled_from(["force", "displacement"])),
             "load.amplitude": draw(positive),
             "load.cycles": cycles,
@@ -141,6 +147,17 @@ def test_toml_keeps_every_bit(path, values):
         if key != "contact.smoothing":  # the traps have no sharp end
             got = again.get(key)
             assert np.array_equal(got, value), key
+
+
+@given(height=positive, stiffness=positive, nu=st.floats(-0.99, 0.49), clamped=st.booleans())
+def test_toml_keeps_a_lap_joint(path, height, stiffness, nu, clamped):
+    values = JOINT | {"member.height_ratio": height, "member.axial_stiffness": stiffness}
+    values |= {"member.poisson_ratio": nu, "contact.assembly": "frictional"}
+    if clamped:
+        values |= {"member.support": "clamped", "strip.loaded_end": "guided"}
+    scene = Scene().replace(values)
+    write_scene(scene, path)
+    assert same(read_scene(path), scene)
 
 
 def test_an_empty_file_is_the_standard_strip(path):
@@ -319,7 +336,8 @@ BAD = [
         (key, value, "number|thickness, E")
         for key in NUMBERS
         for value in NO_NUMBERS
-        if value is not None or key not in ("strip.layers", "strip.curvature")
+        if value is not None or key not in ("strip.layers", "strip.curvature", *MEMBER)
+        if key != "member.layers" or not isinstance(value, list | np.ndarray)
     ],
     *[("contact.friction", value, "a number, not negative") for value in (-2.0, np.nan, np.inf)],
     *[("strip.deviation", value, "must be a number") for value in (np.nan, np.inf)],
@@ -586,12 +604,15 @@ FULL = {
 
 @pytest.mark.parametrize("key", NUMBERS)
 def test_gradients_and_batches_reach_every_number(key):
-    scene = Scene().replace(FULL | ({"strip.layers": LAYERS} if key == "strip.layers" else {}))
+    layers = {key: LAYERS} if key.endswith(".layers") else {}
+    beside = {} if layers else {key: 0.2}
+    scene = Scene().replace(JOINT | layers | beside if key in MEMBER else FULL | layers)
     value = scene.get(key)
 
     def weight(factor):
         leaves = jax.tree.leaves(scene.replace({key: value * factor}))
-        return sum((i + 1.0) * jnp.sum(jnp.log(leaf)) for i, leaf in enumerate(leaves))
+        some = (jnp.where((leaf > 0.0) & (leaf < jnp.inf), leaf, 1.0) for leaf in leaves)
+        return sum((i + 1.0) * jnp.sum(jnp.log(leaf)) for i, leaf in enumerate(some))
 
     below, here, above = jax.vmap(weight)(jnp.array([0.999999, 1.0, 1.000001]))
     np.testing.assert_allclose(here, weight(1.0), rtol=1e-14)

@@ -1,0 +1,166 @@
+"""Pictures of a strip or a lap joint as it deforms, with its pressures and its contact."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from jbeamshell.plotting.protocols import LoadPath
+from jbeamshell.plotting.steps import checked_steps, load_label
+from jbeamshell.plotting.style import DATA, FAINT, POSITION, single, style
+
+SHARE = 0.4  # of the half height H, as which the largest displacement is drawn
+STATES: dict[str, tuple[str, Any]] = {  # colour and line
+    "sticks": ("#56B4E9", "-"),
+    "slips": ("#D55E00", "-"),
+    "is lifted": ("0.55", ":"),
+}
+ARROWS = 24  # of the pressure on a face, at most
+FILL = ("#E8EEF4", "#F4EFE6")  # upper and lower member
+
+
+def deformed(
+    history: LoadPath,
+    step: int | None = None,
+    axes: Axes | None = None,
+    *,
+    scale: float | None = None,
+) -> Axes:
+    """Draw the deformed members with their pressures, and where the contact sticks, slips or lifts.
+
+    Parameters
+    ----------
+    history : LoadPath
+        Solved load path of a strip or of a lap joint, such as a `jbeamshell.History`.
+    step : int, optional
+        Index into the path; the end of the last cycle when not given.
+    axes : matplotlib.axes.Axes, optional
+        Where to draw; new axes when not given.
+    scale : float, optional
+        Factor of the displacements; when not given, one that makes them visible.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn into, with X and heights in the units of the scene.
+
+    Raises
+    ------
+    InputError
+        If there is no such step.
+    """
+    last = history.cycles[-1][2] if history.cycles else history.force.size - 1
+    (step,) = checked_steps(history, [last if step is None else step])
+    height = 2.0 * float(history.scene.strip.half_height)
+    members = [(np.asarray(history.fields[step]), height)]
+    if history.member is not None:
+        below = history.scene.member.beside(history.scene.strip)
+        members.append((np.asarray(history.member[step]), -2.0 * float(below.half_height)))
+    x = np.asarray(history.x)
+    moves = [_faces(fields, up) for fields, up in members]
+    largest = max(float(np.max(np.abs(np.stack(move)))) for move in moves)
+    factor = _rounded(SHARE * 0.5 * height / largest) if scale is None and largest else scale or 1.0
+    with style():
+        axes = single(axes)
+        axes.grid(False)
+        for (_, up), (contact, face), fill in zip(members, moves, FILL, strict=False):
+            outline = np.concatenate(
+                [_moved(x, 0.0, contact, factor), _moved(x, up, face, factor)[::-1]]
+            )
+            axes.fill(*outline.T, facecolor=fill, edgecolor=DATA, linewidth=0.8)
+        if history.member is None and history.scene.contact.normal != "none":
+            axes.axhline(0.0, color=DATA, linewidth=1.0)
+        _draw_pressures(axes, history, members, moves, factor)
+        _draw_contact(axes, history, step, _moved(x, 0.0, moves[0][0], factor))
+        force = float(history.force[step])
+        if abs(force) > 0.0:
+            tip = _moved(x, height, moves[0][1], factor)[-1]
+            start = (tip[0] + 0.01 * x[-1], tip[1] - 0.5 * height)
+            stop = (start[0] + 0.08 * x[-1], start[1])
+            ends = (stop, start) if force > 0.0 else (start, stop)
+            axes.annotate("", *ends, arrowprops={"arrowstyle": "-|>", "color": DATA})
+        axes.set(xlabel=POSITION, ylabel="height  [length]", xlim=(-0.04 * x[-1], 1.12 * x[-1]))
+        axes.set_title(f"{load_label(history, step)}, displacements x {factor:.3g}")
+        keys = [
+            Line2D([], [], color=colour, linestyle=line, linewidth=3.0, label=name)
+            for name, (colour, line) in STATES.items()
+        ]
+        axes.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
+    return axes
+
+
+def _faces(
+    fields: NDArray[np.float64], up: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Displacements (n, 2) of the contact face and of the face at a height."""
+    v, w, beta, psi = fields[:, :4].T
+    return np.stack([v, w], axis=1), np.stack([v - up * beta, w + up * psi], axis=1)
+
+
+def _moved(
+    x: NDArray[np.float64], height: float, moves: NDArray[np.float64], factor: float
+) -> NDArray[np.float64]:
+    """Points (n, 2) of a face with its displacements times a factor."""
+    return np.stack([x, np.full_like(x, height)], axis=1) + factor * moves
+
+
+def _rounded(value: float) -> float:
+    """Largest of 1, 2 and 5 times a power of ten that is no larger."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(part for part in (1.0, 2.0, 5.0) if part * power <= value) * power)
+
+
+def _draw_pressures(
+    axes: Axes,
+    history: LoadPath,
+    members: list[tuple[NDArray[np.float64], float]],
+    moves: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+    factor: float,
+) -> None:
+    """Arrows of the pressures on the outer faces."""
+    contact, x = history.scene.contact, np.asarray(history.x)
+    size = 0.6 * members[0][1] / float(contact.largest_pressure)
+    tables = [(np.asarray(contact.pressure), 0, 1.0)]
+    if history.member is not None:
+        tables.append((np.asarray(contact.bottom_pressure), 1, -1.0))
+    at = np.linspace(0.0, float(x[-1]), ARROWS + 1)[:-1] + 0.5 * float(x[-1]) / ARROWS
+    for table, member, way in tables:
+        pressure = np.full_like(at, table) if table.ndim == 0 else _at(at, table)
+        face = _moved(x, members[member][1], moves[member][1], factor)
+        for place, value in zip(at, pressure, strict=True):
+            if value > 0.0:
+                foot = np.interp(place, x, face[:, 1])
+                axes.annotate(
+                    "",
+                    (place, foot),
+                    (place, foot + way * size * value),
+                    arrowprops={"arrowstyle": "->", "color": FAINT, "linewidth": 0.8},
+                )
+        axes.update_datalim([(0.0, 1.7 * members[member][1])])
+    axes.autoscale_view()
+
+
+def _at(x: NDArray[np.float64], table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Pressure of a table at positions; its end values go on beyond it."""
+    return np.interp(x, table[:, 0], table[:, 1])
+
+
+def _draw_contact(axes: Axes, history: LoadPath, step: int, points: NDArray[np.float64]) -> None:
+    """Contact face in the colours of what its nodes do."""
+    if history.scene.contact.normal == "none":
+        return
+    touching, slipping = (np.asarray(a[step]) for a in (history.touching, history.slipping))
+    middle = 0.5 * (points[1:] + points[:-1])
+    begin = np.concatenate([points[:1], middle])
+    end = np.concatenate([middle, points[-1:]])
+    kinds = np.where(touching, np.where(slipping, 1, 0), 2)
+    for kind, (colour, line) in enumerate(STATES.values()):
+        parts = np.stack([begin, points, end], axis=1)[kinds == kind]
+        axes.add_collection(
+            LineCollection(parts, colors=colour, linestyles=line, linewidths=3.0, zorder=3)
+        )
