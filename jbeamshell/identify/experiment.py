@@ -21,8 +21,10 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.observations import Observation, observe
+from jbeamshell.identify.rig import rigged, with_rig
+from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.specimens import Specimen
-from jbeamshell.measured.curves import noise_of, weight_of
+from jbeamshell.measured.curves import Measurement, noise_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.scene import Scene
@@ -63,7 +65,12 @@ class Experiment:
     """
 
     def __init__(
-        self, specimens: Sequence[Specimen], *, points: int, noise: float | None = None
+        self,
+        specimens: Sequence[Specimen],
+        *,
+        points: int,
+        noise: float | None = None,
+        rig: Sequence[str] = (),
     ) -> None:
         """Set up the run of every measurement.
 
@@ -72,6 +79,7 @@ class Experiment:
         specimens : scenes with their measurements
         points : number of points to which each loop is thinned, approximately
         noise : standard deviation of measurements without noise, over their range
+        rig : keys of the rig that may change
 
         Raises
         ------
@@ -91,7 +99,7 @@ class Experiment:
                 self.measurements.append(thinned)
                 self.owners.append(owner)
         observations = [
-            observe(measurement, self.scenes[owner])
+            _observed(measurement, specimens[owner], rig)
             for owner, measurement in zip(self.owners, self.measurements, strict=True)
         ]
         prefixes = [f"{one.label}: " if len(specimens) > 1 else "" for one in specimens]
@@ -217,14 +225,25 @@ class Experiment:
         ]
 
 
+def _observed(measurement: Measurement, specimen: Specimen, rig: Sequence[str]) -> Observation:
+    """Run that reproduces a measurement, through the specimen's rig if there is one."""
+    plain = observe(measurement, specimen.scene)
+    if not (specimen.rig or rig):
+        return plain
+    return rigged(measurement, plain, specimen.scene, specimen.rig, rig)
+
+
 def _response(
     values: Array, observation: Observation, scene: Scene, keys: tuple[str, ...], solver: Newton
 ) -> tuple[Array, Array, Array, Array]:
     """Residual (n,), its derivatives (n, k), prediction (n,) and convergence of a run."""
 
     def residual(own: Array) -> tuple[Array, tuple[Array, Array, Array]]:
-        at = scene.replace(dict(zip(keys, own, strict=True)))
-        rows, prediction, converged = observation.residual(at, solver)
+        given = dict(zip(keys, own, strict=True))
+        at = scene.replace({key: value for key, value in given.items() if key not in RIG})
+        of_rig = {key: value for key, value in given.items() if key in RIG}
+        through = with_rig(observation, of_rig) if of_rig else observation
+        rows, prediction, converged = through.residual(at, solver)
         return rows, (rows, prediction, converged)
 
     jacobian, (rows, prediction, converged) = jax.jacfwd(residual, has_aux=True)(values)
@@ -248,7 +267,9 @@ def _filled(observation: Observation) -> Observation:
     Loops are thinned to about as many points; equal lengths let them share one compiled program.
     """
     more = (0, -observation.weight.size % observation.length_step)
-    longer = jax.tree.map(lambda column: jnp.pad(column, more, mode="edge"), observation)
+    longer = jax.tree.map(
+        lambda leaf: jnp.pad(leaf, more, mode="edge") if leaf.ndim else leaf, observation
+    )
     return eqx.tree_at(lambda o: o.weight, longer, jnp.pad(observation.weight, more))
 
 

@@ -17,6 +17,8 @@ from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit, fit_at
+from jbeamshell.identify.rig import with_starts
+from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, SearchResult, StoppingRule
 from jbeamshell.identify.search_space import SearchSpace, search_space
 from jbeamshell.identify.specimens import Specimen, as_specimens, inspected
@@ -147,9 +149,11 @@ def fit(
     require_choice("unchecked", unchecked, (False, True))
     parameters, specimens = as_parameters(free), as_specimens(data, scene, weights)
     doubts = inspected(specimens, [parameter.key for parameter in parameters], unchecked)
+    parameters = with_starts(parameters, specimens)
     space, scenes = search_space(parameters, {one.label: one.scene for one in specimens})
     specimens = [one._replace(scene=scenes[one.label]) for one in specimens]
-    experiment = Experiment(specimens, points=points, noise=noise)
+    rig = [key for key in space.keys if key in RIG]
+    experiment = Experiment(specimens, points=points, noise=noise, rig=rig)
     problem = Problem(experiment, space, solver or Newton(), save)
     if starts is None:
         bounded = all(parameter.bounded for parameter in parameters)

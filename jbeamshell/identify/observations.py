@@ -103,7 +103,7 @@ class LoopObservation(Observation):
     """
 
     path: Array
-    free_zero: bool = eqx.field(static=True, default=False)
+    free_zero: bool = eqx.field(static=True)
     length_step: ClassVar[int] = LENGTH_STEP
 
     @classmethod
@@ -165,10 +165,14 @@ class LoopObservation(Observation):
         history = solve(scene, self.path, solver=solver, throw=False)
         column = "displacement" if scene.load.control == "force" else "force"
         response = getattr(history, column)[history.pressed + 1 :]
-        if self.free_zero:
-            share = self.weight**2 / jnp.sum(self.weight**2)
-            response = response - jnp.sum(share * (response - self.measured))
-        return response, jnp.all(history.status == 0)
+        return self.shifted(response), jnp.all(history.status == 0)
+
+    def shifted(self, response: Array) -> Array:
+        """Response (n,) shifted to where it fits best, if its zero is unknown."""
+        if not self.free_zero:
+            return response
+        share = self.weight**2 / jnp.sum(self.weight**2)
+        return response - jnp.sum(share * (response - self.measured))
 
 
 class SqueezeObservation(Observation):

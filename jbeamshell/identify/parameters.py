@@ -12,7 +12,8 @@ import numpy as np
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.bijection import Bijection
-from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
+from jbeamshell.identify.rig_keys import FITTED, RIG
+from jbeamshell.scene.keys import NUMBERS, check_key
 
 SCALES = ("log", "linear")
 
@@ -52,8 +53,9 @@ class Parameter:
     each: bool = False
 
     def __post_init__(self) -> None:
-        check_key(self.key)
-        if self.key not in NUMBERS or self.key == "load.amplitude":
+        if self.key not in RIG:
+            check_key(self.key)
+        if self.key not in (*NUMBERS, *RIG) or self.key == "load.amplitude":
             raise InputError(
                 f"free {self.key!r}: is not a parameter of the strip or the contact; name one, "
                 "such as contact.friction"
@@ -67,7 +69,7 @@ class Parameter:
         known = isinstance(self.scale, str) and self.scale in SCALES
         self._require("scale", self.scale, self.scale is None or known, fix)
         low, high = self.bounds
-        least, most = TABLE[self.key].low, TABLE[self.key].high
+        least, most = FITTED[self.key].low, FITTED[self.key].high
         fix = f"must lie between {least:g} and {most:g}"
         self._require("low", self.low, least <= low < most, fix)
         self._require("high", self.high, least < high <= most, fix)
@@ -78,7 +80,7 @@ class Parameter:
     @property
     def bounds(self) -> tuple[float, float]:
         """Open interval in which to search."""
-        least, most = TABLE[self.key].low, TABLE[self.key].high
+        least, most = FITTED[self.key].low, FITTED[self.key].high
         low = least if self.low is None else float(self.low)
         return low, most if self.high is None else float(self.high)
 
@@ -92,7 +94,7 @@ class Parameter:
         low, high = self.bounds
         fix = f"must lie between low = {low:g} and high = {high:g}, both excluded"
         self._require("start", start, low < start < high, fix)
-        scale = TABLE[self.key].scale if self.scale is None else self.scale
+        scale = FITTED[self.key].scale if self.scale is None else self.scale
         return Bijection(start, low, high, scale == "log")
 
     def _check_prior(self) -> None:

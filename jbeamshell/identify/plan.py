@@ -38,6 +38,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, read_toml
 from jbeamshell.identify.choose_free import chosen_free
 from jbeamshell.identify.parameters import Parameter
+from jbeamshell.identify.rig import rig_of
+from jbeamshell.identify.rig_keys import PREFIX, RIG
 from jbeamshell.identify.sources import Source
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.identify.starts import Estimate, estimate, started
@@ -112,39 +114,56 @@ def plan_from_values(values: Mapping[str, Any], folder: Path) -> Plan:
     given = values.get("specimen", [])
     if not (isinstance(given, list) and given and all(isinstance(s, dict) for s in given)):
         raise InputError("specimen: write a table [[specimen]] with data for each")
-    plan, common = _without_specimens(values, folder)
+    plan, common, rig = _without_specimens(values, folder)
     for number, table in enumerate(given, 1):
         source = _source(table, table.get("label") or (f"{number}" if len(given) > 1 else ""))
         known = source.known(folder)
-        own = overridden(overridden(common, known.values), source.set)
+        of_strip, of_rig = _without_rig(source.set)
+        own = overridden(overridden(common, known.values), of_strip)
         if source.driver is None and own.get("load.control") in CONTROLS:
             source = dataclasses.replace(source, driver=own["load.control"])
         read = list(source.measurements(folder, bool(values.get("unchecked", False))))
         plan.notes.extend(f"{item.label}: {note}" for item, notes in read for note in notes)
         plan.notes.extend(known.notes)
-        plan = _with_specimen(plan, own, [item for item, _ in read], source.label)
+        measured = [item for item, _ in read]
+        plan = _with_specimen(plan, own, measured, source.label, rig | of_rig)
     return plan
 
 
 def plan_for(values: Mapping[str, Any], data: Sequence[Measurement]) -> Plan:
     """Plan of one specimen from entries without [[specimen]], for measurements at hand."""
-    return _with_specimen(*_without_specimens(values, Path()), data, "")
+    plan, common, rig = _without_specimens(values, Path())
+    return _with_specimen(plan, common, data, "", rig)
 
 
-def _without_specimens(values: Mapping[str, Any], folder: Path) -> tuple[Plan, dict[str, Any]]:
-    """Plan without specimens, and the scene values that all specimens share."""
+def _without_specimens(
+    values: Mapping[str, Any], folder: Path
+) -> tuple[Plan, dict[str, Any], dict[str, Any]]:
+    """Plan without specimens, and the values of scene and rig that all specimens share."""
     _check_names("entry", values, ("scene", "set", "free", "specimen", *OPTIONS))
     tables = {name: values.get(name, {}) for name in ("set", "free")}
     for name, table in tables.items():
         _check_table(name, table)
     free = [Parameter(key, **_parameter(key, table)) for key, table in tables["free"].items()]
     options = {name: values[name] for name in OPTIONS if name in values}
-    common = overridden(_base(values.get("scene"), folder), tables["set"])
-    return Plan([], free, options, []), common
+    of_strip, of_rig = _without_rig(tables["set"])
+    common = overridden(_base(values.get("scene"), folder), of_strip)
+    return Plan([], free, options, []), common, of_rig
+
+
+def _without_rig(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Values of a scene, and those of the rig."""
+    rig = {key: value for key, value in values.items() if key.startswith(PREFIX)}
+    rig_of(rig)  # raises for unknown keys and wrong values
+    return {key: value for key, value in values.items() if key not in rig}, rig
 
 
 def _with_specimen(
-    plan: Plan, values: Mapping[str, Any], data: Sequence[Measurement], label: str
+    plan: Plan,
+    values: Mapping[str, Any],
+    data: Sequence[Measurement],
+    label: str,
+    rig: Mapping[str, Any],
 ) -> Plan:
     """Plan with one more specimen.
 
@@ -178,7 +197,7 @@ def _with_specimen(
         largest = [float(np.max(np.abs(drive))) for drive in drives if drive is not None]
         if largest:
             own["load.amplitude"] = max(largest)
-    specimen = Specimen(scene_from_values(own), data, label)
+    specimen = Specimen(scene_from_values(own), data, label, rig=rig)
     return plan._replace(specimens=[*plan.specimens, specimen], free=free, notes=notes)
 
 
@@ -188,7 +207,7 @@ def _started(
     """Values with starts from the data for what neither the user nor the parameters give."""
     if found is None:
         return dict(own), []
-    given = {parameter.key: parameter.start for parameter in free if parameter.start is not None}
+    given = {p.key: p.start for p in free if p.start is not None and p.key not in RIG}
     return started(overridden(own, given), found)
 
 

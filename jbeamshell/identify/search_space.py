@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.bijection import Bijection
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.scene.keys import TABLE
+from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.scene.scene import Scene
 
 
@@ -50,9 +50,10 @@ class SearchSpace(NamedTuple):
         return np.array([bijection.point(value) for bijection, value in pairs])
 
     def of(self, values: ArrayLike, specimen: int) -> dict[str, float]:
-        """Values of one specimen by key."""
+        """Values of one specimen's scene by key."""
         own = np.asarray(values)[self.table[specimen]]
-        return dict(zip(self.keys, own.tolist(), strict=True))
+        pairs = zip(self.keys, own.tolist(), strict=True)
+        return {key: value for key, value in pairs if key not in RIG}
 
     def named(self, values: ArrayLike) -> dict[str, float]:
         """Values (n,) by the names of their axes."""
@@ -81,14 +82,14 @@ def search_space(
         if a key is not a single number of a scene, if a start lies out of bounds, or if the scenes
         start a shared parameter at different values
     """
-    given = {p.key: p.start for p in free if p.start is not None}
+    given = {p.key: p.start for p in free if p.start is not None and p.key not in RIG}
     started = {label: scene.replace(given) for label, scene in scenes.items()}
     names: list[str] = []
     owners: list[Parameter] = []
     bijections: list[Bijection] = []
     columns: list[list[int]] = []
     for parameter in free:
-        starts = [_start(scene, parameter.key) for scene in started.values()]
+        starts = [_start(scene, parameter) for scene in started.values()]
         if not parameter.each and len(set(starts)) > 1:
             low, high = min(starts), max(starts)
             raise InputError(
@@ -107,15 +108,16 @@ def search_space(
     return SearchSpace(keys, tuple(names), tuple(bijections), table, tuple(owners)), started
 
 
-def _start(scene: Scene, key: str) -> float:
-    start = scene.get(key)
+def _start(scene: Scene, parameter: Parameter) -> float:
+    key = parameter.key
+    start: Any = parameter.start if key in RIG else scene.get(key)
     if start is None:
         raise InputError(f"free {key!r}: the scene has no value for it; give a start")
     if np.ndim(start) > 0:
         raise InputError(f"free {key!r}: is a table in this scene; only a single number can be fit")
     if not np.isfinite(start):
         raise InputError(f"free {key!r}: is 'sharp' in this scene; give a number such as 16")
-    spread = -np.inf < TABLE[key].low < 0.0  # finite bounds around 0 give the search its scale
+    spread = -np.inf < parameter.bounds[0] < 0.0  # finite bounds around 0 give the search its scale
     if float(start) == 0.0 and not spread:
         raise InputError(f"free {key!r}: is 0 in this scene; give another number to start from")
     return float(start)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
+from jbeamshell.identify.rig_keys import PREFIX
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop
@@ -29,12 +30,14 @@ class Specimen(NamedTuple):
     data : one measurement or several
     label : name in messages and in the names of the specimen's own values
     weights : factors of the measurements' residuals, besides the curves' own; all 1 if empty
+    rig : values of the rig that are not 0, by dotted key, see `jbeamshell.identify.rig`
     """
 
     scene: Scene
     data: Measurement | Sequence[Measurement]
     label: str = ""
     weights: Sequence[float] = ()
+    rig: Mapping[str, Any] = {}
 
     @property
     def measurements(self) -> list[Measurement]:
@@ -119,7 +122,9 @@ def inspected(
     for specimen in specimens:
         loops = [item for item in specimen.measurements if isinstance(item, Loop)]
         seen = (
-            inspect(loops, stiffness=plausible_stiffness(specimen.scene, free)) if loops else None
+            inspect(loops, stiffness=plausible_stiffness(specimen.scene, [*free, *specimen.rig]))
+            if loops
+            else None
         )
         if seen is not None and not unchecked:
             seen.check()
@@ -136,10 +141,11 @@ def plausible_stiffness(scene: Scene, free: Sequence[str]) -> tuple[float, float
     Parameters
     ----------
     scene : strip with known dimensions
-    free : keys to fit; None is returned if they are of the strip's stiffness or dimensions
+    free : keys to fit; None is returned if they are of the strip's stiffness or dimensions, or of
+        the rig
     """
     strip = scene.strip
-    unknown = any(key.startswith("strip.") and key not in OF_SHEAR for key in free)
+    unknown = any(key.startswith(("strip.", PREFIX)) and key not in OF_SHEAR for key in free)
     if strip.axial_stiffness is None or unknown:
         return None
     stretching, length = float(strip.axial_stiffness), float(strip.length)

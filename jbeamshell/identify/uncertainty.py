@@ -201,7 +201,8 @@ def uncertainty_of(
     free = np.ix_(~at_bound, ~at_bound)
     eigenvalues, vectors = np.linalg.eigh((jacobian.T @ jacobian)[free])
     # A pseudo-inverse would give directions without influence no variance; theirs is large.
-    safe = np.maximum(eigenvalues, LEAST * np.max(eigenvalues, initial=0.0))
+    least = max(LEAST * np.max(eigenvalues, initial=0.0), np.finfo(float).tiny ** 0.5)
+    safe = np.maximum(eigenvalues, least)
     inverse = np.zeros((point.size, point.size))
     inverse[free] = (vectors / safe) @ vectors.T
     priors = np.ones(residual.size - emphasis.size)
