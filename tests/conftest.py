@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zlib
 from pathlib import Path
 
 import hypothesis
@@ -38,6 +39,19 @@ gc.set_threshold(100_000, 20, 20)  # tracing makes millions of objects that live
 
 hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 hypothesis.settings.load_profile("repeatable")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--part", help="K/N: the K-th of N parts of the tests, K from 0")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep one part of the tests, the same on all machines, so that N runs do all of them."""
+    if given := config.getoption("--part"):
+        part, parts = (int(number) for number in given.split("/"))
+        kept = [item for item in items if zlib.crc32(item.nodeid.encode()) % parts == part % parts]
+        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+        items[:] = kept
 
 
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:

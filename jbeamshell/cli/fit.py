@@ -193,6 +193,8 @@ def _free(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
         return {}  # the data choose
     words = EXAMPLE_FREE if options.free is None else options.free
     keys = [key.strip() for key in words.split(",") if key.strip()]
+    if not keys:
+        raise InputError("free: name at least one key, such as contact.friction")
     if len(set(keys)) < len(keys):
         raise InputError(f"--free {words}: names a key twice; name it once")
     free: dict[str, dict[str, Any]] = {key: {} for key in keys}
