@@ -1,0 +1,317 @@
+"""Files as rigs write them, sound and faulty, made from fixed seeds; how a fit of each must end.
+
+A file ends well in one of three ways: its parameters are those that were planted; the fit says
+honestly that the model does not describe it; or it is refused by a sentence that names the fix.
+"""
+
+from __future__ import annotations
+
+import csv
+import functools
+import io
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.io
+
+import jbeamshell as jb
+from jbeamshell.measured.example import example_loops
+from jbeamshell.scene.dimensions import dimensions_of
+from jbeamshell.scene.pressure import resultant
+from jbeamshell.scene.toml import scene_from_values
+from tests import rig
+
+WIDTH, FRICTION = 0.05, 0.3
+SPECIMEN = {
+    "length": "120mm",
+    "thickness": "12mm",
+    "width": "50mm",
+    "modulus": "210GPa",
+    "bolts": "2x8kN@30mm,90mm",
+}
+GROSS = FRICTION * 16e3  # N
+LENGTHS = [word for name, text in SPECIMEN.items() for word in (f"--{name}", text)]
+FREE = ["--free", "contact.friction"]
+KNOWN = [*LENGTHS, *FREE]
+UNITS = ["--unit", "force=kN", "--unit", "displacement=mm"]
+NAMES = ("time [s]", "force [kN]", "displacement [mm]")
+FITTING = 0.05  # misfit over the range up to which a loop of another law counts as described
+
+
+class Ending(NamedTuple):
+    """How a fit of a file ended.
+
+    Attributes
+    ----------
+    kind : "parameters", "not this model", "refused" or "silent"
+    told : what was said, or the figures that count
+    """
+
+    kind: str
+    told: str
+
+
+class Case(NamedTuple):
+    """A file, the words of the command besides it, and its ending.
+
+    Attributes
+    ----------
+    name : name of the file
+    write : writes the file to a path
+    words : options of `jbeamshell fit`
+    kinds : endings that are right
+    told : regular expression that the text of a refusal or a doubt must match
+    planted : value and relative tolerance by figure; "gross slip" is mu F_N L in N
+    """
+
+    name: str
+    write: Callable[[Path], object]
+    words: list[str]
+    kinds: tuple[str, ...]
+    told: str = ""
+    planted: dict[str, tuple[float, float]] = {}  # noqa: RUF012 - never changed
+
+
+# --- what is written ------------------------------------------------------------------------------
+
+
+def table(
+    columns: list[np.ndarray], names: tuple[str, ...] = NAMES, above: str = "", **dialect: str
+) -> bytes:
+    """Text of a table in a dialect: delimiter, decimal mark, encoding, and lines above it."""
+    file = io.StringIO()
+    writer = csv.writer(file, delimiter=dialect.get("delimiter", ","), lineterminator="\n")
+    writer.writerow(names)
+    for row in zip(*columns, strict=True):
+        writer.writerow([f"{x:.8g}".replace(".", dialect.get("decimal", ".")) for x in row])
+    return (above + file.getvalue()).encode(dialect.get("encoding", "utf-8"))
+
+
+@functools.cache
+def planted(amplitudes: tuple[float, ...], cycles: int, control: str) -> tuple[np.ndarray, np.ndarray]:
+    """Force [N] and displacement [m] of the specimen; amplitudes are parts of gross slip.
+
+    Under displacement control they are parts of the displacement at .9 of gross slip.
+    """
+    values = dimensions_of(SPECIMEN).values | {"contact.friction": FRICTION}
+    drive = rig.path(cycles, 80, amplitudes)
+    size = GROSS / WIDTH
+    if control == "displacement":
+        force, displacement = planted((0.9,), 1, "force")
+        size = float(np.max(displacement))
+    scene = scene_from_values(
+        values | {"load.control": control, "load.amplitude": size * max(amplitudes)}
+    )
+    history = jb.solve(scene, size * drive[1:])
+    first = history.pressed + 1
+    force = np.append(0.0, np.asarray(history.force)[first:]) * WIDTH
+    return force, np.append(0.0, np.asarray(history.displacement)[first:])
+
+
+def strip(
+    amplitudes: tuple[float, ...] = (0.7,),
+    cycles: int = 4,
+    control: str = "force",
+    noise: float = 0.0,
+    kind: str = "white",
+    seed: int = 0,
+) -> list[np.ndarray]:
+    """Time [s], force [kN] and displacement [mm] of the planted specimen."""
+    made = rig.recorded(*planted(amplitudes, cycles, control), noise, kind, seed, control)
+    return [np.asarray(made.time), 1e-3 * made.force, 1e3 * made.displacement]
+
+
+def other(force: np.ndarray, drive: np.ndarray, seed: int = 0) -> list[np.ndarray]:
+    """Time, force [kN] and displacement [mm] of another law, of the specimen's size."""
+    made = rig.recorded(3.0 * force, 0.01 * drive, 0.005, "white", seed, "displacement")
+    return [np.asarray(made.time), made.force, made.displacement]
+
+
+def text(columns: Callable[[], list[np.ndarray]], **dialect: Any) -> Callable[[Path], object]:
+    return lambda path: path.write_bytes(table(columns(), **dialect))
+
+
+def with_column(place: int, change: Callable[[np.ndarray], np.ndarray]) -> list[np.ndarray]:
+    """Columns of the planted strip of which one is changed."""
+    columns = strip(noise=0.002)
+    columns[place] = change(columns[place])
+    return columns
+
+
+def numpy_file(path: Path) -> None:
+    time, force, displacement = strip()
+    np.savez(path, time_s=time, force_N=1e3 * force, displacement_m=1e-3 * displacement)
+
+
+def matlab_file(path: Path) -> None:
+    time, force, displacement = strip()
+    scipy.io.savemat(path, {"rig": {"t": time, "force_kN": force, "displacement_mm": displacement}})
+
+
+def finite_elements() -> list[np.ndarray]:
+    """Three cycles of finite elements of a strip that was not made by this model."""
+    (loop,) = example_loops(0.1126, (1.3,))
+    force, displacement = (np.tile(c[:-1], 3) for c in (loop.force, loop.displacement))
+    return [0.01 * np.arange(force.size), force, displacement]
+
+
+# --- the files ------------------------------------------------------------------------------------
+
+RIGHT = ("parameters",)
+REFUSED = ("refused",)
+HONEST = ("parameters", "not this model")
+MU = {"contact.friction": (FRICTION, 0.03)}
+ROUGH = {"contact.friction": (FRICTION, 0.1)}
+GERMAN = ("Zeit [s]", "Prüfkraft [kN]", "Kolbenweg [mm]")
+FRENCH = ("Temps (s)", "Effort (kN)", "Déplacement (mm)")
+ITALIAN = ("Tempo[s]", "Forza[kN]", "Spostamento[mm]")
+ABOVE = "Prüfstand 3\nBediener: N. N.; 12.05.2024\n\n"
+STANDARD = {"strip.length": 2.0, "strip.axial_stiffness": 3.4e4, "contact.pressure": 10.0}
+OF_STANDARD = [w for key, value in STANDARD.items() for w in ("--set", f"{key}={value}")]
+
+
+def sound() -> Iterator[Case]:
+    """Loops of the planted strip, of finite elements, and of sliders that slide."""
+
+    def case(name: str, write: Callable[[Path], object], **more: Any) -> Case:
+        return Case(name, write, more.pop("words", KNOWN), RIGHT, **{"planted": MU, **more})
+
+    yield case("plain.csv", text(strip))
+    german = {"delimiter": ";", "decimal": ",", "encoding": "cp1252"}
+    yield case("german.csv", text(strip, names=GERMAN, above=ABOVE, **german))
+    yield case("french.txt", text(strip, names=FRENCH, above=ABOVE, delimiter="\t", decimal=","))
+    yield case("italian.txt", text(strip, names=ITALIAN, delimiter=" "))
+    yield case("spreadsheet.txt", text(strip, delimiter="\t", encoding="utf-16"))
+    yield case("arrays.npz", numpy_file)
+    yield case("workspace.mat", matlab_file)
+    for seed, kind in enumerate(rig.NOISES):
+        columns = functools.partial(strip, noise=0.02, kind=kind, seed=seed)
+        yield case(f"noise {kind}.csv", text(columns), planted=ROUGH)
+    rising = functools.partial(strip, (0.3, 0.5, 0.7, 0.8), 1, noise=0.005)
+    yield case("one cycle per level.csv", text(rising))
+    levels = functools.partial(strip, (0.4, 0.7), 3, noise=0.005)
+    yield case("three cycles per level.csv", text(levels))
+    sliding = functools.partial(strip, (3.0,), 3, "displacement", noise=0.005)
+    yield case("gross slip.csv", text(sliding))
+
+    def drifting() -> list[np.ndarray]:
+        return with_column(2, lambda u: u + 0.5 * np.ptp(u) * np.linspace(0.0, 1.0, u.size))
+
+    yield case("drifting.csv", text(drifting), words=[*KNOWN, "--drift", "linear"])
+    yield Case("drift kept.csv", text(drifting), KNOWN, HONEST, "--drift linear")
+    offset = text(lambda: with_column(2, lambda u: u + 3.0))
+    yield case("offset.csv", offset, words=[*KNOWN, "--centre"])
+    yield case(
+        "finite elements.csv",
+        text(finite_elements, names=("time", "force", "displacement")),
+        words=[*OF_STANDARD, *FREE, "--set", "strip.height_ratio=0.1126"],
+        planted={"contact.friction": (0.1, 0.05)},
+    )
+    jenkins = text(lambda: other(rig.jenkins(rig.path(3)), rig.path(3)))
+    yield Case("jenkins.csv", jenkins, FREE, RIGHT, planted={"gross slip": (900.0, 0.05)})
+
+
+def of_other_laws() -> Iterator[Case]:
+    """Joints that are not this model, of which some answer like it."""
+    u = rig.path(4)
+    answers = {
+        "iwan.csv": rig.iwan(u),
+        "bouc-wen.csv": rig.bouc_wen(u),
+        "viscous.csv": rig.viscous(u),
+        "elastic.csv": u,
+        "asymmetric.csv": rig.stops(u, [0.3], [1.0]) + 0.6 * np.maximum(u, 0.0) ** 2,
+    }
+    doubts = {"viscous.csv": "ellipse", "elastic.csv": "no friction", "asymmetric.csv": "differ"}
+    for name, force in answers.items():
+        columns = functools.partial(other, force, u)
+        yield Case(name, text(columns), FREE, HONEST, doubts.get(name, ""))
+    falling = functools.partial(strip, (0.8, 0.6, 0.4), 1)
+    yield Case("falling amplitudes.csv", text(falling), KNOWN, HONEST)
+    loading = [column[:20] for column in strip()]
+    yield Case("first loading.csv", text(lambda: loading), KNOWN, HONEST)
+    random = np.random.default_rng(1)
+    noise = [*strip()[:1], *random.standard_normal((2, strip()[0].size))]
+    told = "noise|describe|cycle"
+    yield Case("only noise.csv", text(lambda: noise), FREE, ("refused", "not this model"), told)
+
+
+def wrong() -> Iterator[Case]:
+    """Files with which something is wrong."""
+
+    def case(name: str, write: Callable[[Path], object], told: str, words: Any = KNOWN) -> Case:
+        return Case(name, write, list(words), REFUSED, told)
+
+    yield case("wrong sign.csv", text(lambda: with_column(1, np.negative)), "--reverse force")
+    metres = ("time [s]", "force [kN]", "displacement [m]")
+    yield case("wrong unit.csv", text(strip, names=metres), "--unit displacement=mm")
+    newtons = ("time [s]", "force [MN]", "displacement [mm]")
+    yield case("wrong force.csv", text(strip, names=newtons), "units wrong")
+    swapped = ("time [s]", "displacement [mm]", "force [kN]")
+    yield case("swapped.csv", text(strip, names=swapped), "--column force=", FREE)
+    clipped = text(lambda: with_column(1, lambda f: np.minimum(f, 0.6 * np.max(f))))
+    yield case("clipped.csv", clipped, "larger range")
+    u = rig.path(4)
+    for name, law in (("pinched.csv", rig.pinched), ("bearing.csv", rig.bearing)):
+        told = "within the clearance"
+        yield case(name, text(functools.partial(other, law(u), u)), told, FREE)
+    bare = ("time", "force", "displacement")
+    yield case("no units.csv", text(strip, names=bare), "--unit force=N")
+    half = ("time [s]", "force [kN]", "displacement")
+    yield case("one unit.csv", text(strip, names=half), r"write 'displacement \[m\]'")
+    twins = ("time [s]", "force 1 [kN]", "force 2 [kN]", "displacement [mm]")
+
+    def double() -> list[np.ndarray]:
+        time, force, displacement = strip()
+        return [time, force, force, displacement]
+
+    yield case("two forces.csv", text(double, names=twins), "--column force=")
+    strange = ("time [s]", "channel 1 [kN]", "channel 2 [mm]")
+    yield case("strange names.csv", text(strip, names=strange), "--column force=NAME")
+    stuck = text(lambda: with_column(1, np.zeros_like))
+    yield case("dead sensor.csv", stuck, "constant")
+
+    def broken(path: Path) -> None:
+        path.write_bytes(table(strip()).replace(b"\n0.05,", b"\n0.05,overload ", 1))
+
+    yield case("text in a cell.csv", broken, "leave the cell empty")
+
+
+def corpus() -> list[Case]:
+    """All files."""
+    return [*sound(), *of_other_laws(), *wrong()]
+
+
+# --- how they end ---------------------------------------------------------------------------------
+
+
+def words(case: Case, folder: Path) -> list[str]:
+    """Words of the command line that fits a case, whose file is written to the folder."""
+    case.write(folder / case.name)
+    return ["fit", str(folder / case.name), *case.words, "--json", "--out", str(folder / "out")]
+
+
+def ended(code: int, out: str, err: str, case: Case, folder: Path) -> Ending:
+    """Ending of the command from its exit code, what it printed and what it wrote."""
+    if code == 2:
+        line = err.strip().splitlines()[-1] if err.strip() else ""
+        fix = re.search(r"--\w|give|record|write|keep|name|remove|leave", line)
+        return Ending("refused" if fix and line.startswith("jbeamshell: ") else "silent", line)
+    figures = json.loads(out)
+    said = " ".join([*figures["warnings"], *figures["notes"]])
+    values = {key: one["value"] for key, one in figures["values"].items()}
+    scene = jb.read_scene(folder / "out" / "scene.toml")
+    normal, _ = resultant(
+        scene.contact.pressure, scene.contact.bottom_pressure, scene.strip.length
+    )
+    values["gross slip"] = float(scene.contact.friction) * float(normal)
+    shown = ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
+    told = f"misfit {100.0 * figures['misfit']:.2g} %; {shown}; {said}"
+    if code == 3:
+        return Ending("not this model" if "does not describe" in said else "silent", told)
+    near = [abs(values[key] - goal) <= close * goal for key, (goal, close) in case.planted.items()]
+    described = all(near) if near else figures["misfit"] < FITTING
+    return Ending("parameters" if code == 0 and described else "silent", told)
