@@ -92,7 +92,9 @@ def table(
 
 
 @functools.cache
-def planted(amplitudes: tuple[float, ...], cycles: int, control: str) -> tuple[np.ndarray, np.ndarray]:
+def planted(
+    amplitudes: tuple[float, ...], cycles: int, control: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Force [N] and displacement [m] of the specimen; amplitudes are parts of gross slip.
 
     Under displacement control they are parts of the displacement at .9 of gross slip.
@@ -304,9 +306,7 @@ def ended(code: int, out: str, err: str, case: Case, folder: Path) -> Ending:
     said = " ".join([*figures["warnings"], *figures["notes"]])
     values = {key: one["value"] for key, one in figures["values"].items()}
     scene = jb.read_scene(folder / "out" / "scene.toml")
-    normal, _ = resultant(
-        scene.contact.pressure, scene.contact.bottom_pressure, scene.strip.length
-    )
+    normal, _ = resultant(scene.contact.pressure, scene.contact.bottom_pressure, scene.strip.length)
     values["gross slip"] = float(scene.contact.friction) * float(normal)
     shown = ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
     told = f"misfit {100.0 * figures['misfit']:.2g} %; {shown}; {said}"

@@ -2,10 +2,8 @@
 
 import re
 
-import numpy as np
 import pytest
 
-import jbeamshell as jb
 from jbeamshell.cli.main import main
 from tests import corpus
 

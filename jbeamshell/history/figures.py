@@ -11,6 +11,15 @@ from jbeamshell.history.reliability import SlipCycle, estimates
 from jbeamshell.mechanics.bar import cubic_law, lap_cubic_law
 from jbeamshell.numerics.cycles import branch_work
 
+UNITS = {  # of the figures that are no pure numbers, in words
+    **dict.fromkeys(("dissipation", "dissipation_loop"), "force"),
+    **dict.fromkeys(("peak_displacement", "slip_length", "tip_deflection"), "length"),
+    **dict.fromkeys(("contact_end", "reaction_max_at"), "length"),
+    **dict.fromkeys(("secant_stiffness", "reaction_max", "reaction_min"), "stress"),
+    "squeeze_stress_max": "stress",
+    "curvature": "1/length",
+}
+
 
 class CycleFigures(Record):
     """Figures of the last cycle; scalars but for `loop` and `slip_cycle`.

@@ -13,7 +13,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
-from jbeamshell.history.figures import CycleFigures
+from jbeamshell.history.figures import UNITS, CycleFigures
 from jbeamshell.history.profiles import Profiles
 from jbeamshell.history.reliability import doubts_of_run
 from jbeamshell.history.saved import write_history
@@ -111,7 +111,10 @@ class History(Profiles, ContactLine, CycleFigures):
         chosen = choice.in_words(self.scene)
         figures = self.figures()
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
-        rows = [(name.replace("_", " "), in_words(value)) for name, value in figures.items()]
+        rows = [
+            (name.replace("_", " "), in_words(value) + f"  [{UNITS[name]}]" * (name in UNITS))
+            for name, value in figures.items()
+        ]
         return Summary("\n".join(filter(None, (title, chosen))), rows, doubts)
 
     def __str__(self) -> str:

@@ -36,6 +36,7 @@ from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
 from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Strip
 from jbeamshell.scene.quadratic import check_quadratic
 from jbeamshell.scene.rungs import IDEAL, general_rung, spelled_out
+from jbeamshell.scene.text import summary
 
 
 class Scene(eqx.Module):
@@ -107,6 +108,9 @@ class Scene(eqx.Module):
         if self.model.condensed and not is_traced(energy, self.strip.half_height):
             fix = f"take model.rung = {general_rung(self.model.rung)}"
             check_quadratic(energy, self.strip.half_height, "psi" in self.model.fields, fix)
+
+    def __str__(self) -> str:
+        return summary(self, self.energy is not None).as_text(28)
 
     def strain_energy(self) -> Energy:
         """Strain energy Phi(e, g, k, psi, psi') of this scene's section."""

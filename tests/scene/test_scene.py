@@ -646,3 +646,34 @@ def test_a_full_disk_leaves_the_old_file_and_one_clear_line(tmp_path):
         raise OSError(errno.ENOSPC, "No space left on device")
     assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
     assert target.read_text() == "old"
+
+
+def test_a_scene_is_printed_short_with_units():
+    table = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [2.0, 2.0]]
+    changed = {"contact.bottom_pressure": table, "strip.far_end": "free", "model.nodes": 33}
+    assert str(Scene().replace(changed)).splitlines() == [
+        "Strip of v w beta psi on 33 nodes, rung condensed-squeeze",
+        "  strip.length                 2  [length]",
+        "  strip.height_ratio           0.1126",
+        "  strip.axial_stiffness        34000  [force/width]",
+        "  strip.poisson_ratio          0.3",
+        "  strip.far_end                free",
+        "  contact.friction             0.1",
+        "  contact.pressure             10  [stress]",
+        "  contact.bottom_pressure      table of 4 rows  [stress]",
+        "  load.control                 force",
+        "  load.amplitude               0.7855  [force/width]",
+        "  chosen for a tolerance of 0.5 %: rung condensed-squeeze, linear kinematics, "
+        "20 steps per half cycle",
+    ]
+
+
+def test_numbers_that_are_traced_are_printed_as_such():
+    printed = []
+
+    def run(friction):
+        printed.append(str(Scene().replace({"contact.friction": friction})))
+        return friction
+
+    jax.jit(run)(0.2)
+    assert "contact.friction             traced" in printed[0]

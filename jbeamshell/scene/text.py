@@ -1,0 +1,67 @@
+"""Text of a scene: its numbers with their units, and what differs from the standard strip."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jbeamshell.common.checks import is_traced
+from jbeamshell.common.summary import Summary
+from jbeamshell.mechanics.friction import law_name
+from jbeamshell.scene.choice import Parts, in_words
+from jbeamshell.scene.keys import TABLE, unit_of
+
+ALWAYS = {
+    *("strip.length", "strip.height_ratio", "strip.axial_stiffness", "strip.poisson_ratio"),
+    *("contact.friction", "contact.pressure", "load.control", "load.amplitude"),
+}
+TITLE = ("model.fields", "model.nodes", "model.solution", "model.rung")
+
+
+def summary(scene: Parts, own_energy: bool) -> Summary:
+    """Numbers of a scene, and its words and settings that differ from the standard strip.
+
+    Parameters
+    ----------
+    scene : scene
+    own_energy : True if it has a strain energy of the user's own
+    """
+    rows = []
+    for name, key in TABLE.items():
+        if key.through or name in TITLE:
+            continue
+        section, field = name.split(".")
+        value = getattr(getattr(scene, section), field)
+        value = law_name(value) if name == "contact.law" else value
+        if value is None or not (name in ALWAYS or _differs(value, key.default)):
+            continue
+        unit = unit_of(name, scene.load.control) if key.kind == "number" else ""
+        rows.append((name, _shown(value) + (f"  [{unit}]" if unit not in ("", "1") else "")))
+    own = " with a strain energy of its own" * own_energy
+    fields = " ".join(scene.model.fields)
+    title = f"Strip of {fields} on {scene.model.nodes} nodes{own}, rung {scene.model.rung}"
+    return Summary(title, rows, tuple(filter(None, [in_words(scene)])))
+
+
+def _differs(value: Any, default: Any) -> bool:
+    if is_traced(value):
+        return True
+    if isinstance(default, float | int) and not isinstance(default, bool):
+        number = np.asarray(value)
+        return number.ndim > 0 or float(number) != float(default)
+    return bool(default is None or _shown(value) != _shown(default)) and default != "auto"
+
+
+def _shown(value: Any) -> str:
+    """Value in words: a number to six digits, a table by its rows."""
+    if is_traced(value):
+        return "traced"
+    if isinstance(value, tuple):
+        return ",".join(map(str, value))
+    if isinstance(value, str):
+        return value
+    array = np.asarray(value)
+    if array.ndim == 0:
+        return f"{array.item():.6g}" if array.dtype.kind == "f" else str(array.item())
+    return f"table of {len(array)} rows"
