@@ -10,6 +10,9 @@ import tempfile
 import zlib
 from pathlib import Path
 
+# Threads of LAPACK spin for each other: small systems take several times as long, on busy cores most.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import hypothesis
 import jax
 import pytest

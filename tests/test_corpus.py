@@ -4,7 +4,9 @@ import re
 
 import pytest
 
+import jbeamshell as jb
 from jbeamshell.cli.main import main
+from jbeamshell.common.errors import InputError
 from tests import corpus
 
 CASES = corpus.corpus()
@@ -13,6 +15,31 @@ CASES = corpus.corpus()
 def test_the_corpus_has_many_files_with_names_of_their_own():
     names = [case.name for case in CASES]
     assert len(set(names)) == len(names) >= 25
+
+
+SEEN = {  # findings of `jb.inspect` on files that no run of the model is needed for
+    "pinched.csv": "clearance",
+    "bearing.csv": "clearance",
+    "viscous.csv": "viscous",
+    "elastic.csv": "elastic",
+    "asymmetric.csv": "asymmetric",
+    "jenkins.csv": "",
+    "iwan.csv": "",
+    "bouc-wen.csv": "",
+    "finite elements.csv": "",
+}
+
+
+@pytest.mark.parametrize("name", SEEN)
+def test_an_inspection_names_what_is_in_a_file(name, tmp_path):
+    (case,) = (case for case in CASES if case.name == name)
+    case.write(tmp_path / name)
+    seen = jb.inspect(tmp_path / name)
+    assert {finding.name for finding in seen.findings} == {SEEN[name]} - {""}
+    assert seen.sound == ("refused" not in case.kinds)
+    if not seen.sound:
+        with pytest.raises(InputError, match=case.told):
+            seen.check()
 
 
 @pytest.mark.slow

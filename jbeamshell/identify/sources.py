@@ -17,7 +17,7 @@ from jbeamshell.measured.columns import QUANTITIES
 from jbeamshell.measured.curve_files import CURVES, read_curves
 from jbeamshell.measured.curves import Backbone, Measurement
 from jbeamshell.measured.drift import DRIFTS
-from jbeamshell.measured.findings import OFF_CENTRE
+from jbeamshell.measured.findings import DRIFT, OFF_CENTRE
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop, loop_of
 from jbeamshell.measured.recordings import Recording, read_recordings
@@ -129,8 +129,12 @@ class Source:
                     "do: give --unit force=N --unit displacement=mm, or what they are"
                 )
             per_width = self._turned(recording.per_width(width))
+            seen = inspect(per_width)
             if not unchecked:
-                inspect(per_width).check()
+                seen.check()
+            if self.drift == "keep":  # which the mean loops do not show
+                drifts = [f.text for view in seen.views for f in view.findings if f.name == DRIFT]
+                per_width = per_width._replace(notes=(*per_width.notes, *drifts))
             if self.kind == "backbone":
                 columns = per_width.force, per_width.displacement
                 yield Backbone(*columns, per_width.label), per_width.notes

@@ -18,6 +18,7 @@ from jbeamshell.common.errors import InputError
 
 # Base units; a force per width will do, as the model has unit width.
 QUANTITIES = {"force": ("N", "N/m"), "displacement": ("m",)}
+INSTEAD = {"acceleration": ("m/s^2",)}  # of the displacement
 FURTHER = {"time": ("s",), "normal_force": ("N", "N/m")}
 GROUPS = ("loop", "a", "amplitude")
 
@@ -32,13 +33,16 @@ SYNONYMS = {
         *("spostamento", "corsa", "scorrimento", "allungamento"),
     },
     "time": {"zeit", "temps", "tempo"},
+    "acceleration": {"acc", "accel", "beschleunigung", "accelerazione"},
 }
 COMPOUNDS = {"force": ("kraft",), "displacement": ("weg", "verschiebung"), "time": ("zeit",)}
+COMPOUNDS["acceleration"] = ("beschleunigung",)
 SHORT = {
     "force": {"f", "ft", "fx", "f_t", "f_x"},
     "displacement": {"u", "ux", "u_x"},
     "time": {"t"},
     "normal_force": {"fn", "normal"},
+    "acceleration": set[str](),
 }
 NORMAL = (
     *("normal", "clamp", "preload", "pretension"),
@@ -86,8 +90,8 @@ def find_columns(
 
     Returns
     -------
-    Index of the column by "force" and "displacement"; also by "time", "normal_force" and "group" if
-    there is exactly one
+    Index of the column by "force" and "displacement", or "acceleration" if there is no
+    displacement; also by "time", "normal_force" and "group" if there is exactly one
 
     Raises
     ------
@@ -96,7 +100,7 @@ def find_columns(
     """
     known = (*QUANTITIES, *FURTHER)
     for quantity in chosen:
-        if quantity not in known:
+        if quantity not in (*known, *INSTEAD):
             raise InputError(f"columns: {quantity!r} is no quantity: choose among {known}")
     held = _listed(titles)
     columns: dict[str, int] = {}
@@ -105,8 +109,12 @@ def find_columns(
             columns[quantity] = _chosen(titles, quantity, chosen[quantity], name, held)
             continue
         found = _candidates(titles, quantity)
+        if quantity == "displacement" and "acceleration" in chosen:
+            found = []
         if len(found) == 1:
             columns[quantity] = found[0]
+        elif quantity == "displacement" and (instead := _instead(titles, chosen, name, held)):
+            columns |= instead
         elif quantity in QUANTITIES:
             needed = f"{name}: needs one column named {quantity!r} {place}, which holds {held}: "
             if not found:
@@ -116,7 +124,7 @@ def find_columns(
             rivals = _listed([titles[i] for i in found])
             option = choice(quantity, titles[found[0]].strip()[:60])
             raise InputError(f"{needed}choose among {rivals[:90]} by {option}")
-    if columns["force"] == columns["displacement"]:
+    if list(columns.values()).count(columns["force"]) > 1:
         whole = titles[columns["force"]].strip()[:60]
         raise InputError(
             f"{name}: has one column only {place}: separate columns by commas, semicolons, tabs "
@@ -129,6 +137,18 @@ def find_columns(
     if group is not None and group not in columns.values():
         columns["group"] = group
     return columns
+
+
+def _instead(
+    titles: Sequence[str], chosen: Mapping[str, str], name: str, held: str
+) -> dict[str, int]:
+    """Index of the column of an acceleration; empty unless there is one, and no displacement."""
+    if "acceleration" in chosen:
+        place = _chosen(titles, "acceleration", chosen["acceleration"], name, held)
+        return {"acceleration": place}
+    found = _candidates(titles, "acceleration")
+    alone = len(found) == 1 and not _candidates(titles, "displacement")
+    return {"acceleration": found[0]} if alone else {}
 
 
 def is_header(titles: Sequence[str], chosen: Mapping[str, str]) -> bool:
@@ -177,11 +197,13 @@ def conversions(
                 "keep one of the two units"
             )
         units[quantity] = given.get(quantity) or own or row
-    named = [bool(units[q]) for q in QUANTITIES]
+    named = [bool(units[q]) for q in (*QUANTITIES, *INSTEAD) if q in units]
+    all_bases = QUANTITIES | FURTHER | INSTEAD
     found: dict[str, Conversion | None] = {}
     for quantity, unit in units.items():
         title = titles[quantity][:60]
-        bases = QUANTITIES.get(quantity) or FURTHER[quantity]
+        bases = all_bases[quantity]
+        unit = "gravity" if quantity == "acceleration" and unit == "g" else unit  # no gram
         converted = Conversion() if unit is None else conversion(unit, bases)
         if quantity in FURTHER:
             mixed = quantity == "normal_force" and bool(unit) != named[0]

@@ -30,6 +30,8 @@ from jbeamshell.measured.form import (
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.recordings import FEWEST_POINTS, HUGE, as_column
 
+ROUNDING = 1e-6  # of a column's range, below which cycles are the same numbers
+
 Floats = NDArray[np.float64]
 
 
@@ -264,6 +266,10 @@ def noise_of(measurement: Measurement) -> Floats | None:
     error = measurement.standard_error
     if error is None and measurement.noise is not None:
         error = measurement.noise / np.sqrt(measurement.cycles)
+    if measurement.scatter is not None and measurement.driver is not None:
+        answer = getattr(measurement, LOOP.response(measurement.driver))
+        if error is not None and error <= ROUNDING * np.ptp(answer):
+            error = None  # copies of one cycle tell no noise
     noise = _noise(error, measurement.force)
     check_noise(measurement.label, noise, measurement.force.size)
     return noise

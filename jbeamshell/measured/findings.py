@@ -23,7 +23,7 @@ from jbeamshell.measured.splitting import Cycles
 DRIFTING = 0.03  # drift over the response's range that is told
 OFF_CENTRE = 0.1  # middle of a cycle over its range that is told
 UNIT_ERROR = 10.0  # factor beyond a plausible stiffness that only a wrong unit explains
-CLIPPED = "clipped"
+CLIPPED, DRIFT = "clipped", "drift"
 FALLS = -0.5  # correlation of force and displacement of a first loading that leans backward
 
 
@@ -98,7 +98,9 @@ def of_levels(
     """
     recording, findings = found.recording, list[Finding]()
     several, whole = len(levels) > 1, not any(finding.name == CLIPPED for finding in before)
-    for level in reversed(levels):  # what the largest cycles tell is not said again
+    for number, level in reversed(
+        [*enumerate(levels)]
+    ):  # what the largest cycles tell is not said again
         where = f"cycles to {found.driver} = {_top(level, found, recording)}: " * several
         said = {finding.name for finding in (*before, *findings)}
         findings += [
@@ -107,7 +109,7 @@ def of_levels(
                 _of_work(level, recording),
                 _of_shape(level) if whole else None,  # a clipped turn looks like a clearance
                 _of_stiffness(level, stiffness),
-                _of_drift(level, found, recording),
+                _of_drift(level, number, found),
                 _of_centre(level, found, recording),
             )
             if finding and finding.name not in said
@@ -212,19 +214,24 @@ def _of_stiffness(level: Level, band: tuple[float, float] | None) -> Finding | N
     )
 
 
-def _of_drift(level: Level, found: Cycles, recording: Recording) -> Finding | None:
-    drift = level.shape.drift
-    if level.cycles < 3 or abs(drift) < max(DRIFTING, 4.0 * level.shape.error):
+def _of_drift(level: Level, number: int, found: Cycles) -> Finding | None:
+    """Finding about a slow change of either column over the cycles of a group."""
+    if level.cycles < 3:
         return None
-    size = with_unit(
-        drift * float(np.ptp(getattr(level.loop, found.responding))),
-        recording.unit(found.responding),
-    )
-    return Finding(
-        "drift",
-        f"the {found.responding} drifts by {size} over these cycles: remove it by --drift linear "
-        "(in Python drift='linear')",
-    )
+    middles = np.array([0.5 * (cycle.low + cycle.high) for cycle in found.group(number)])
+    wander = float(np.median(np.diff(middles))) * (middles.size - 1)
+    ranges = {name: float(np.ptp(getattr(level.loop, name))) for name in QUANTITIES}
+    for name, drift, noise in (
+        (found.responding, level.shape.drift * ranges[found.responding], level.shape.error),
+        (found.driver, wander, found.noise / ranges[found.driver]),
+    ):
+        if abs(drift) >= max(DRIFTING, 4.0 * noise) * ranges[name]:
+            return Finding(
+                DRIFT,
+                f"the {name} drifts by {with_unit(drift, found.recording.unit(name))} over these "
+                "cycles: remove it by --drift linear (in Python drift='linear')",
+            )
+    return None
 
 
 def _of_centre(level: Level, found: Cycles, recording: Recording) -> Finding | None:

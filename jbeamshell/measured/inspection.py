@@ -174,8 +174,8 @@ def inspect(
     else:
         paths: FilePath | Sequence[FilePath] = data  # type: ignore[assignment]
         items = list(read_recordings(paths, columns=columns, units=units, decimal=decimal))
-    recordings = [_recording(item).per_width(width) for item in items]
-    return Inspection(tuple(_view(recording, stiffness) for recording in recordings))
+    views = [_view(_recording(item).per_width(width), stiffness, _averaged(item)) for item in items]
+    return Inspection(tuple(views))
 
 
 def _recording(item: Recording | Loop) -> Recording:
@@ -184,7 +184,12 @@ def _recording(item: Recording | Loop) -> Recording:
     return Recording(item.force, item.displacement, item.label, notes=item.notes, units=item.units)
 
 
-def _view(recording: Recording, stiffness: tuple[float, float] | None) -> View:
+def _averaged(item: Recording | Loop) -> int:
+    """Number of cycles of which an item is the mean."""
+    return item.cycles if isinstance(item, Loop) else 1
+
+
+def _view(recording: Recording, stiffness: tuple[float, float] | None, averaged: int) -> View:
     findings = of_columns(recording)
     try:
         found = split_cycles(recording)
@@ -192,7 +197,7 @@ def _view(recording: Recording, stiffness: tuple[float, float] | None) -> View:
         reason = str(error).removeprefix(f"{recording.label}: ")
         return View(recording, None, (), (*findings, *of_loading(recording)), reason)
     levels = tuple(
-        Level(loop, len(found.group(number)), shape_of(found, number))
+        Level(loop, len(found.group(number)), shape_of(found, number, averaged))
         for number, loop in enumerate(steady_loops(recording, found.driver))
     )
     findings += of_levels(levels, found, findings, stiffness)

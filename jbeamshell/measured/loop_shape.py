@@ -103,8 +103,15 @@ KINDS = {
 }
 
 
-def shape_of(found: Cycles, number: int) -> LoopShape:
-    """Shape of the cycles of an amplitude group; the first third of them may be a run-in."""
+def shape_of(found: Cycles, number: int, averaged: int = 1) -> LoopShape:
+    """Shape of the cycles of an amplitude group; the first third of them may be a run-in.
+
+    Parameters
+    ----------
+    found : cycles of a recording
+    number : number of the group
+    averaged : number of cycles of which each is the mean already
+    """
     cycles = found.group(number)
     samples = [phases_of(found, cycle) for cycle in cycles[len(cycles) // 3 :]]
     count, per_cycle = len(samples), float(np.median([phase.size for _, phase in samples]))
@@ -126,7 +133,7 @@ def shape_of(found: Cycles, number: int) -> LoopShape:
     lean = float(np.corrcoef(recording.force, recording.displacement)[0, 1])
     work_error = max(work_error, _wiggle(curve, heights.mean(axis=0) / span))
     shape = _shape(parts.mean(axis=0), found.driver, lean, error, work_error, drift)
-    if count >= FEW_CYCLES:
+    if max(count, averaged) >= FEW_CYCLES:
         return shape
     unlike = shape.asymmetry  # slow noise makes unlike branches too
     return shape._replace(error=max(error, unlike / SURE), work_error=max(work_error, unlike))

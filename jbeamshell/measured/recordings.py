@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path
 from jbeamshell.common.summary import Summary, ranged
+from jbeamshell.measured.accelerations import displacement_of
 from jbeamshell.measured.columns import (
     FURTHER,
+    INSTEAD,
     QUANTITIES,
     Conversion,
     conversions,
@@ -205,7 +207,8 @@ def read_recordings(
     in brackets or after an underscore ("force [kN]", "displacement_mm") converts the column to N
     and m; without units the numbers are in the Scene's own.  A column "loop", "A" or "amplitude" of
     numbers separates several recordings.  Rows without force or displacement are left out and
-    counted.
+    counted.  An acceleration and an even time will do in place of the displacement: it is
+    integrated twice, without what is slower than the cycles.
 
     Parameters
     ----------
@@ -236,7 +239,7 @@ def read_recordings(
     if not (decimal is None or (isinstance(decimal, str) and decimal in (",", "."))):
         raise InputError(f"decimal = {decimal!r}: give ',' or '.'")
     for quantity in units or {}:
-        if quantity not in (*QUANTITIES, *FURTHER):
+        if quantity not in (*QUANTITIES, *FURTHER, *INSTEAD):
             known = (*QUANTITIES, *FURTHER)
             raise InputError(f"units: {quantity!r} is no quantity: choose among {known}")
     if isinstance(paths, str | os.PathLike):
@@ -283,7 +286,8 @@ def _read(
     columns = find_columns(table.titles, chosen, table.name, table.place)
     below = dict(zip(columns, table.units(list(columns.values())), strict=True))
     titles = {q: table.titles[i] for q, i in columns.items() if q != "group"}
-    must = ["force", "displacement", *(["group"] if "group" in columns else [])]
+    moved = "displacement" if "displacement" in columns else "acceleration"
+    must = ["force", moved, *(["group"] if "group" in columns else [])]
     may = [q for q in columns if q not in must]
     rows = table.numbers([columns[q] for q in must], [columns[q] for q in may])
     found_units = conversions(titles, below, given, table.name)
@@ -294,6 +298,8 @@ def _read(
         with np.errstate(over="ignore"):  # infinite numbers are refused below, with their place
             arrays[quantity] = None if own_unit is None or empty else column * own_unit.factor
     named = {q: own_unit.unit for q, own_unit in found_units.items() if own_unit is not None}
+    if named.pop("acceleration", ""):
+        named["displacement"] = "m"
     told: dict[str, Any] = {
         "titles": {q: title.strip() for q, title in titles.items()},
         "units": named if named["force"] else None,
@@ -327,4 +333,13 @@ def _recording(
         for quantity, column in arrays.items()
         if quantity != "group"
     }
-    return recording_from_arrays(label=label, **columns)
+    acceleration = columns.pop("acceleration", None)
+    if acceleration is None:
+        return recording_from_arrays(label=label, **columns)
+    columns["displacement"], known = displacement_of(acceleration, columns.get("time"), label)
+    kept: dict[str, Any] = {
+        name: None if column is None else column[known] for name, column in columns.items()
+    }
+    recording = recording_from_arrays(label=label, **kept)
+    note = "the displacement is the acceleration, integrated twice: its zero is not known"
+    return recording._replace(notes=(*recording.notes, note))

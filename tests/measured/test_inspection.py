@@ -12,6 +12,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import csv_text
 from jbeamshell.common.summary import ranged, with_unit
 from jbeamshell.measured.clipping import clipped
+from jbeamshell.measured.curves import noise_of
 from jbeamshell.measured.example import HEIGHT_RATIOS, example_loops
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loop_shape import CONVEX
@@ -145,6 +146,26 @@ def test_drift_offset_and_asymmetry_are_doubts():
         assert names(seen, grave=False) == {name}
         assert seen.sound
     assert "asymmetric" in names(inspect(rig.recorded(uneven, u, 0.005, driver="displacement")), 0)
+
+
+@pytest.mark.parametrize("driver", ["force", "displacement"])
+@pytest.mark.parametrize("drifting", ["force", "displacement"])
+def test_either_column_may_drift(driver, drifting):
+    u = rig.path(4, 80)
+    columns = {"force": rig.iwan(u), "displacement": u.copy()}
+    columns[drifting] += 0.5 * np.linspace(0.0, 1.0, u.size)
+    seen = inspect(rig.recorded(*columns.values(), 0.002, driver=driver))
+    assert "drift" in names(seen, grave=False)
+
+
+@pytest.mark.parametrize("cycles", [3, 6])
+def test_a_mean_loop_is_as_asymmetric_as_its_cycles(cycles):
+    u = rig.path(cycles + 1)
+    force = rig.stops(u, [0.3], [1.0]) + 0.6 * np.maximum(u, 0.0) ** 2
+    (loop,) = jb.measured.steady_loops(rig.recorded(force, u, 0.005, driver="displacement"))
+    assert loop.cycles >= 3
+    assert names(inspect(loop), grave=False) == {"asymmetric"}
+    assert names(inspect(loop._replace(cycles=1)), grave=False) != {"asymmetric"}  # may be noise
 
 
 def test_millimetres_taken_for_metres_are_told_from_the_specimens_stiffness():
@@ -319,3 +340,24 @@ def test_plans_turn_signs_and_take_data_unchecked(csv, tmp_path):
     assert plan.options["unchecked"]
     (one,), (other,) = turned.specimens[0].data, plan.specimens[0].data
     assert one.work == pytest.approx(-other.work)
+
+
+def test_a_fit_tells_a_drift_that_its_mean_loops_hide(csv, tmp_path):
+    u = rig.path(5)
+    csv("rig.csv", 12.0 * rig.iwan(u) + 2.0 * np.linspace(0.0, 1.0, u.size), 0.02 * u)
+    text = "[free.'contact.friction']\n[[specimen]]\ndata = ['rig.csv']\n"
+    (tmp_path / "plan.toml").write_text(text, "utf-8")
+    notes = jb.identify.read_plan(tmp_path / "plan.toml").notes
+    assert any("drifts by" in note and "--drift linear" in note for note in notes)
+    (tmp_path / "plan.toml").write_text(f"{text}drift = 'linear'\n", "utf-8")
+    notes = jb.identify.read_plan(tmp_path / "plan.toml").notes
+    assert not any("drifts by" in note for note in notes)
+
+
+def test_copies_of_one_cycle_tell_no_noise(csv):
+    u = rig.path(3, 80)
+    columns = [np.tile(column[-161:-81], 4) for column in (rig.iwan(u), 0.02 * u)]
+    whole = csv("rig.csv", *columns)
+    loops = jb.measured.steady_loops(jb.measured.read_recordings(whole)[0])
+    assert noise_of(loops[0]) is None
+    assert noise_of(loops[0]._replace(scatter=None, noise=0.1)) is not None
