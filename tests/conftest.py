@@ -10,7 +10,7 @@ import tempfile
 import zlib
 from pathlib import Path
 
-# Threads of LAPACK spin for each other: small systems take several times as long, on busy cores most.
+# Threads of LAPACK wait for each other by spinning, which starves what runs beside small systems.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import hypothesis

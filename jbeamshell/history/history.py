@@ -112,7 +112,10 @@ class History(Profiles, ContactLine, CycleFigures):
         figures = self.figures()
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
         rows = [
-            (name.replace("_", " "), in_words(value) + f"  [{UNITS[name]}]" * (name in UNITS))
+            (
+                name.replace("_", " "),
+                in_words(value) + (f"  [{UNITS[name]}]" if name in UNITS else ""),
+            )
             for name, value in figures.items()
         ]
         return Summary("\n".join(filter(None, (title, chosen))), rows, doubts)
