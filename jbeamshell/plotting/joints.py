@@ -56,15 +56,15 @@ def deformed(
     """
     last = history.cycles[-1][2] if history.cycles else history.force.size - 1
     (step,) = checked_steps(history, [last if step is None else step])
-    height = 2.0 * float(history.scene.strip.half_height)
-    members = [(np.asarray(history.fields[step]), height)]
+    scene, x = history.scene, np.asarray(history.x)
+    height = 2.0 * float(scene.strip.half_height)
+    members = [(np.asarray(history.fields), height)]
     if history.member is not None:
-        below = history.scene.member.beside(history.scene.strip)
-        members.append((np.asarray(history.member[step]), -2.0 * float(below.half_height)))
-    x = np.asarray(history.x)
-    moves = [_faces(fields, up) for fields, up in members]
-    largest = max(float(np.max(np.abs(np.stack(move)))) for move in moves)
-    factor = _rounded(SHARE * 0.5 * height / largest) if scale is None and largest else scale or 1.0
+        below = -2.0 * float(scene.member.beside(scene.strip).half_height)
+        members.append((np.asarray(history.member), below))
+    paths = [_faces(fields, up) for fields, up in members]
+    moves = [(contact[step], face[step]) for contact, face in paths]
+    factor = scale if scale is not None else _visible(paths, height)
     with style():
         axes = single(axes)
         axes.grid(False)
@@ -73,8 +73,7 @@ def deformed(
                 [_moved(x, 0.0, contact, factor), _moved(x, up, face, factor)[::-1]]
             )
             axes.fill(*outline.T, facecolor=fill, edgecolor=DATA, linewidth=0.8)
-        if history.member is None and history.scene.contact.normal != "none":
-            axes.axhline(0.0, color=DATA, linewidth=1.0)
+        _draw_supports(axes, history, members[-1][1])
         _draw_pressures(axes, history, members, moves, factor)
         _draw_contact(axes, history, step, _moved(x, 0.0, moves[0][0], factor))
         force = float(history.force[step])
@@ -97,9 +96,15 @@ def deformed(
 def _faces(
     fields: NDArray[np.float64], up: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Displacements (n, 2) of the contact face and of the face at a height."""
-    v, w, beta, psi = fields[:, :4].T
-    return np.stack([v, w], axis=1), np.stack([v - up * beta, w + up * psi], axis=1)
+    """Displacements (steps, n, 2) of the contact face and of the face at a height."""
+    v, w, beta, psi = (fields[..., i] for i in range(4))
+    return np.stack([v, w], axis=-1), np.stack([v - up * beta, w + up * psi], axis=-1)
+
+
+def _visible(paths: list[tuple[NDArray[np.float64], NDArray[np.float64]]], height: float) -> float:
+    """Factor with which the largest displacement of a path is seen."""
+    largest = max(float(np.nanmax(np.abs(np.stack(path)))) for path in paths)
+    return _rounded(SHARE * 0.5 * height / largest) if largest > 0.0 else 1.0
 
 
 def _moved(
@@ -113,6 +118,22 @@ def _rounded(value: float) -> float:
     """Largest of 1, 2 and 5 times a power of ten that is no larger."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(part for part in (1.0, 2.0, 5.0) if part * power <= value) * power)
+
+
+def _draw_supports(axes: Axes, history: LoadPath, bottom: float) -> None:
+    """Rigid base, symmetry plane, and the faces that are held or guided."""
+    scene = history.scene
+    support, top = scene.member.support, 2.0 * float(scene.strip.half_height)
+    if support == "rolling":
+        axes.axhline(bottom, color=DATA, linewidth=0.9, linestyle="-.")
+    elif support == "none" and scene.contact.normal != "none":
+        axes.axhline(0.0, color=DATA, linewidth=1.0)
+    if support != "none" or scene.strip.far_end != "free":
+        face = (bottom, 0.0) if support != "none" else (0.0, top)
+        axes.plot([0.0, 0.0], face, color=DATA, linewidth=3.5, solid_capstyle="butt")
+    if scene.strip.loaded_end == "guided":
+        end = float(history.x[-1])
+        axes.plot([end, end], [0.0, top], color=DATA, linewidth=2.5, linestyle=(0, (1, 1)))
 
 
 def _draw_pressures(
