@@ -23,6 +23,7 @@ from jbeamshell.condensed.slopes import Trace
 from jbeamshell.condensed.tableau import System, Tableau, changed, empty, reversed_at
 
 MOST_EVENTS = 40  # of a load branch, times the nodes
+SLIDES = 1e6  # compliance over that of the clamped contact at which a body slides as a whole
 
 
 class Level(NamedTuple):
@@ -34,7 +35,7 @@ class Level(NamedTuple):
     lift : (n,) lift w
     slip_work : work of friction in the step
     slipping : (k,) True for nodes that slip at its end
-    settled : True if all events up to here were found
+    settled : True if all events up to here were found, and the body does not slide as a whole
     """
 
     state: ContactState
@@ -216,7 +217,8 @@ def _run(
         trace = slopes.along(trace, system, at, tau, origin, sense)
     at = _moved(at, system.friction, tau)
     state, lift = _state(at, system.friction, origin, force)
-    settled = last.settled & (event.tau >= tau)
+    held = jnp.abs(at.rate[-1]) < SLIDES * jnp.abs(system.c)
+    settled = last.settled & (event.tau >= tau) & held
     return at, Level(state, lift, at.work - done, at.sigma != 0.0, settled), trace
 
 

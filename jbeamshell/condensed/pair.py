@@ -23,17 +23,20 @@ from jbeamshell.mechanics.section_form import SectionForm, on_symmetry_plane
 from jbeamshell.numerics.factors import inverse_cholesky
 
 UNITS = np.array([1.0, -1.0])  # v and w of the member below, seen from above
+OVERHANG = np.linspace(0.0, 1.0, 25) ** 2  # stations of an overhang, denser at the contact
 
 
 class Pair(NamedTuple):
     """What finds the movement of two members again from that of their contact.
 
+    The movement of a member is v and w of all its N stations, those of an overhang among them.
+
     Attributes
     ----------
     form : energy of the section of the member below, seen from its contact face
     elimination : of the fields of the member below
-    upper, lower : (2n, 2n + 2) v and w of each member's contact nodes from the relative v and w,
-        the end load and the pressure; those of the member below in the frame of the one above
+    upper, lower : (2N, 2n + 2) movement of each member from the relative v and w, the end load and
+        the pressure; that of the member below in its own frame
     """
 
     form: SectionForm
@@ -42,13 +45,32 @@ class Pair(NamedTuple):
     lower: Array
 
     def above(self, given: Array) -> Array:
-        """What the member above is given, (steps, 2n + 2), from what the pair is given."""
+        """What the member above is given, (steps, 2N + 2), from what the pair is given."""
         return jnp.concatenate([given @ self.upper.T, given[:, -2:]], axis=1)
 
     def below(self, given: Array) -> Array:
-        """What the member below is given, (steps, 2n + 2), in its own frame."""
-        own = given @ self.lower.T * jnp.tile(UNITS, self.lower.shape[0] // 2)
-        return jnp.concatenate([own, jnp.zeros_like(given[:, :1]), given[:, -1:]], axis=1)
+        """What the member below is given, (steps, 2N + 2), in its own frame; no load is."""
+        loads = given[:, -2:] * np.array([0.0, 1.0])
+        return jnp.concatenate([given @ self.lower.T, loads], axis=1)
+
+
+class Member(NamedTuple):
+    """Member on the stations of the contact, those of its overhang eliminated.
+
+    Attributes
+    ----------
+    form : energy of its section
+    elimination : of its fields at all N stations
+    movement : (2N, 2n + 2) v and w of all stations from those of the contact, load and pressure
+    hessian : (2n + 2, 2n + 2) of its potential in v and w of the contact, load and pressure
+    fixed : (2n,) True for v and w of the contact that a support holds
+    """
+
+    form: SectionForm
+    elimination: Elimination
+    movement: Array
+    hessian: Array
+    fixed: np.ndarray
 
 
 class Supports(NamedTuple):
@@ -64,64 +86,93 @@ class Supports(NamedTuple):
     loaded: np.ndarray
     flat: bool = False
 
-    def contact(self, nodes: int) -> np.ndarray:
-        """True for held v and w of the contact nodes, (2 nodes,)."""
+    def fixed(self, nodes: int) -> np.ndarray:
+        """True for held v and w of the stations, (2 nodes,)."""
         held = np.zeros((nodes, 2), bool)
         held[0], held[-1] = self.far[:2], self.loaded[:2]
         held[:, 1] |= self.flat
         return held.ravel()
 
 
-def supports_of(form: SectionForm, guided: bool) -> Supports:
-    """Supports of the member above: none, or no deflection at the loaded end."""
-    none = np.zeros_like(form.held)
-    return Supports(none, ~form.held if guided else none)
-
-
-def supports_below(form: SectionForm, clamped: bool) -> Supports:
-    """Supports of the member below at X = 0; one that rolls and cannot be squeezed stays flat."""
-    none = np.zeros_like(form.held)
-    return Supports(form.held | clamped, none, flat=not clamped and form.top == 0)
-
-
-def joined(
-    above: Array,
-    forms: tuple[SectionForm, SectionForm],
-    x: Array,
-    up: Array,
-    guided: bool,
-    clamped: bool,
-) -> tuple[Pair, Array]:
-    """Two members on their contact line.
+def upper_member(
+    form: SectionForm, x: Array, overhang: Array | None, down: Array, guided: bool
+) -> Member:
+    """Member that is pulled at X = L, or at the end of its overhang beyond.
 
     Parameters
     ----------
-    above : (2n + 2, 2n + 2) second derivatives of the potential of the member above, see
-        `jbeamshell.condensed.body.eliminate`
-    forms : energies of the sections above and below
-    x : (n,) stations of both
-    up : (n,) nodal forces of the pressure on the bottom face of the member below
-    guided, clamped : supports, see `supports_of` and `supports_below`
+    form : energy of its section
+    x : (n,) stations of the contact
+    overhang : length of the overhang; None is none
+    down : (n,) nodal forces of the pressure on its outer face
+    guided : True if its loaded end keeps its height
+    """
+    none = np.zeros_like(form.held)
+    supports = Supports(none, ~form.held if guided else none)
+    beyond = None if overhang is None else x[-1] + overhang * OVERHANG[1:]
+    return _member(form, x, (None, beyond), down, supports)
+
+
+def lower_member(
+    form: SectionForm, x: Array, overhang: Array | None, up: Array, clamped: bool
+) -> Member:
+    """Member that is held at X = 0, or at the end of its overhang before; see `upper_member`.
+
+    It is clamped there, or held along X and on a symmetry plane with its outer face.
+    """
+    form = form._replace(pull=jnp.zeros_like(form.pull))  # the load acts above
+    flat = not clamped and form.top == 0  # what cannot be squeezed keeps its height
+    form = form if clamped else on_symmetry_plane(form)
+    supports = Supports(form.held | clamped, np.zeros_like(form.held), flat)
+    before = None if overhang is None else x[0] - overhang * OVERHANG[:0:-1]
+    return _member(form, x, (before, None), up, supports)
+
+
+def _member(
+    form: SectionForm,
+    x: Array,
+    overhangs: tuple[Array | None, Array | None],
+    loads: Array,
+    supports: Supports,
+) -> Member:
+    """Member of a form on the stations of the contact and on those before and after."""
+    before, after = (0 if part is None else part.size for part in overhangs)
+    n = x.size
+    stations = jnp.concatenate(
+        [part for part in (overhangs[0], x, overhangs[1]) if part is not None]
+    )
+    loads = jnp.pad(loads, (before, after))
+    elimination, hessian = eliminate(form, stations, loads, (supports.far, supports.loaded))
+    fixed = supports.fixed(stations.size)
+    inside = np.zeros(fixed.size + 2, bool)
+    inside[2 * before : 2 * (before + n)] = inside[-2:] = True
+    kept, gone = np.flatnonzero(inside), np.flatnonzero(~inside & ~np.append(fixed, [True, True]))
+    movement = jnp.eye(2 * n + 2, dtype=x.dtype)[:-2]
+    movement = jnp.pad(movement, ((2 * before, 2 * after), (0, 0)))
+    left = hessian[np.ix_(kept, kept)]
+    if gone.size:
+        inverse = inverse_cholesky(hessian[np.ix_(gone, gone)])
+        reduced = inverse @ hessian[np.ix_(gone, kept)]
+        movement = movement.at[gone].set(-(inverse.T @ reduced))
+        left = left - reduced.T @ reduced
+    return Member(form, elimination, movement, left, fixed[kept[:-2]])
+
+
+def joined(upper: Member, lower: Member) -> tuple[Pair, Array]:
+    """Two members on their contact line.
 
     Returns
     -------
     pair : what finds both members again
     hessian : (2n + 2, 2n + 2) of the pair's potential in the relative v and w, load and pressure
     """
-    form = forms[1]._replace(pull=jnp.zeros_like(forms[1].pull))  # the load acts above
-    held = supports_below(form, clamped)
-    if not clamped:
-        form = on_symmetry_plane(form)
-        held = supports_below(form, clamped)._replace(flat=held.flat)
-    elimination, below = eliminate(form, x, up, (held.far, held.loaded))
-    n = x.size
-    sign = jnp.append(jnp.tile(jnp.asarray(UNITS), n), jnp.ones(2))
-    below = below * sign[:, None] * sign
-    fixed = supports_of(forms[0], guided).contact(n), held.contact(n)
+    dtype, size = upper.hessian.dtype, upper.fixed.size
+    sign = jnp.append(jnp.tile(jnp.asarray(UNITS), size // 2), jnp.ones(2))
+    above, below = upper.hessian, lower.hessian * sign[:, None] * sign
     # Both from the movement z of the member below and g: q_1 = z + g, q_2 = z, unless one is held.
-    moves = jnp.asarray(~(fixed[0] | fixed[1]), x.dtype)
-    first = jnp.asarray(~fixed[0], x.dtype)
-    second = jnp.where(fixed[0] & ~fixed[1], -1.0, 0.0)
+    moves = jnp.asarray(~(upper.fixed | lower.fixed), dtype)
+    first = jnp.asarray(~upper.fixed, dtype)
+    second = jnp.asarray(np.where(upper.fixed & ~lower.fixed, -1.0, 0.0), dtype)
 
     def in_both(scales: Array, both: Array) -> Array:
         return scales[:, None] * both * scales
@@ -133,6 +184,9 @@ def joined(
     reduced = inverse @ mixed
     hessian = in_both(one, above) + in_both(other, below) - reduced.T @ reduced
     z = -(inverse.T @ reduced) * moves[:, None]
-    given = jnp.eye(2 * n, 2 * n + 2)
-    pair = Pair(form, elimination, z + first[:, None] * given, z + second[:, None] * given)
+    given = jnp.eye(size, size + 2, dtype=dtype)
+    loads = jnp.eye(size + 2, dtype=dtype)[-2:]
+    q_1 = jnp.concatenate([z + first[:, None] * given, loads])
+    q_2 = sign[:, None] * jnp.concatenate([z + second[:, None] * given, loads])
+    pair = Pair(lower.form, lower.elimination, upper.movement @ q_1, lower.movement @ q_2)
     return pair, hessian

@@ -12,7 +12,6 @@ from jax import Array
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import Status
 from jbeamshell.common.small import Small
-from jbeamshell.condensed.body import Elimination
 from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import (
     driven_by_displacement,
@@ -23,7 +22,7 @@ from jbeamshell.condensed.drives import (
 from jbeamshell.condensed.events import Level
 from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
 from jbeamshell.condensed.pair import Pair
-from jbeamshell.condensed.strip import Strip, condensed, spring_stiffness, stays_flat
+from jbeamshell.condensed.strip import Strip, condensed, fields, spring_stiffness, stays_flat
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.numerics.cycles import turning_points
@@ -193,8 +192,8 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     sides = jnp.stack([v, w], axis=2).reshape(steps, 2 * n)
     given = jnp.concatenate([sides, force[:, None], part[:, None]], axis=1)
     own = given if strip.pair is None else strip.pair.above(given)
-    fields = _fields(strip.elimination, own)
-    further, sections = _sections(strip, fields)
+    moved = fields(strip.elimination, own)[:, :n]
+    further, sections = _sections(strip, moved)
     below = None if strip.pair is None else _fields_below(strip.pair, given)
     reaction = along(state.r_n) / strip.tributary
     reaction = reaction + pressing * body.r_0[::-1] / strip.tributary
@@ -219,7 +218,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
         load=strip.load,
         force=masked(force),
         displacement=masked(every(state.displacement)),
-        fields=masked(jnp.concatenate([fields[:2].T, further], axis=-1)),
+        fields=masked(jnp.concatenate([moved[:2].T, further], axis=-1)),
         gap=masked(w),
         sections=jax.tree.map(masked, sections),
         traction=masked(traction),
@@ -238,35 +237,29 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     )
 
 
-def _fields(elimination: Elimination, given: Array) -> Array:
-    """Fields (m, n, steps) of a form from v and w of the contact, load and pressure (steps, :)."""
-    contact = given[:, :-2].reshape(len(given), -1, 2)
-    inner = elimination.recovered(given.T)  # (n, m-2, steps)
-    return jnp.concatenate([contact.T, jnp.moveaxis(inner, 1, 0)])
-
-
 def _fields_below(pair: Pair, given: Array) -> Array:
     """Fields v, w, beta, psi, ... (steps, n, k) of the member below, as the strip sees them."""
-    fields = _fields(pair.elimination, pair.below(given))
-    further = jnp.tensordot(pair.form.further, fields, 1)
+    n = given.shape[1] // 2 - 1
+    moved = fields(pair.elimination, pair.below(given))[:, -n:]
+    further = jnp.tensordot(pair.form.further, moved, 1)
     turned = jnp.asarray([1.0, -1.0, -1.0])  # w and beta count the other way from below
-    seen = jnp.concatenate([fields[:2], further])
+    seen = jnp.concatenate([moved[:2], further])
     return seen.at[:3].multiply(turned[:, None, None]).T
 
 
-def _sections(strip: Strip, fields: Array) -> tuple[Array, Strains]:
+def _sections(strip: Strip, moved: Array) -> tuple[Array, Strains]:
     """Further fields (steps, n, k), and N, Q, M, chi and xi of every element, (steps, elements).
 
     Parameters
     ----------
-    fields : (m, n, steps) of the section's form
+    moved : fields (m, n, steps) of the section's form
     """
     form = strip.form
     values, slopes = form.modes[:, 0], form.modes[:, 1]
     on_mean = values @ form.values + slopes @ form.mixed.T
     on_slope = values @ form.mixed + slopes @ form.slopes
     rows = jnp.concatenate([on_mean, on_slope, form.further])
-    found = jnp.moveaxis(jnp.tensordot(rows, fields, 1), 2, 1)  # (rows, steps, n)
+    found = jnp.moveaxis(jnp.tensordot(rows, moved, 1), 2, 1)  # (rows, steps, n)
     mean, slope, further = jnp.split(found, [len(on_mean), 2 * len(on_mean)])
     between = jnp.diff(slope, axis=2) / jnp.diff(strip.x)
     forces = 0.5 * (mean[..., 1:] + mean[..., :-1]) + between

@@ -10,7 +10,7 @@ from jax import Array
 
 from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.body import Body, Elimination, eliminate
-from jbeamshell.condensed.pair import Pair, joined
+from jbeamshell.condensed.pair import Member, Pair, joined, lower_member, upper_member
 from jbeamshell.condensed.pressing import press as press_down
 from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements
@@ -58,19 +58,19 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     form, x = section_form(scene), stations(scene, nodes)
     down, up = pressing(scene, x)
     tributary = elements.tributary_lengths(RULE, x)
-    member, pair = scene.member, None
-    none = np.zeros_like(form.held)
-    held = form.held if "beta" in FAR_ENDS[far_end] else none
-    guided = scene.strip.loaded_end == "guided"
-    elimination, hessian = eliminate(form, x, down, (held, ~form.held if guided else none))
-    last = 2 * x.size - 2
-    if member.support == "none":
+    if scene.member.support == "none":
+        pair = None
+        none = np.zeros_like(form.held)
+        held = form.held if "beta" in FAR_ENDS[far_end] else none
+        elimination, hessian = eliminate(form, x, down, (held, none))
         lifted = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
-        from_below = lifted[:, None] * np.eye(last + 4)[-1]
+        from_below = lifted[:, None] * np.eye(lifted.size)[-1]
         hessian = hessian - from_below - from_below.T
     else:
-        forms = form, section_form(scene.of_member())
-        pair, hessian = joined(hessian, forms, x, up, guided, member.support == "clamped")
+        upper, lower = _members(scene, form, x, down, up)
+        elimination = upper.elimination
+        pair, hessian = joined(upper, lower)
+    last = 2 * x.size - 2
     v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
     w = slice(last + 1, None, -2)
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
@@ -101,6 +101,16 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         c=-hessian[-2, -2],
     )
     return Strip(body, form, elimination, hessian, x, tributary, down, settled, lift, pair)
+
+
+def _members(scene: Scene, form: SectionForm, x: Array, down: Array, up: Array) -> list[Member]:
+    """Both members of a lap joint."""
+    strip, member = scene.strip, scene.member
+    below = section_form(scene.of_member())
+    return [
+        upper_member(form, x, strip.overhang, down, strip.loaded_end == "guided"),
+        lower_member(below, x, member.overhang, up, member.support == "clamped"),
+    ]
 
 
 def pressing(scene: Scene, x: Array) -> tuple[Array, Array]:
@@ -168,8 +178,30 @@ def spring_stiffness(scene: Scene, strip: Strip) -> Array:
 
 
 def moving_volume(strip: Strip) -> Array:
-    """Integral of |u|^2/u(L)^2 over each layer, (layers,), under an end load, all nodes stuck."""
+    """Integral of |u|^2/u(L)^2 over each layer, (layers,), under an end load, all nodes stuck.
+
+    A second member's counts with the lowest layer; overhangs do not count.
+    """
     n = strip.x.size
-    given = jnp.zeros((2 * n + 2, 1)).at[-2, 0].set(1.0 / strip.body.c)
-    fields = jnp.pad(strip.elimination.recovered(given)[..., 0], ((0, 0), (2, 0)))
-    return jnp.einsum("i,ij,ljk,ik->l", strip.tributary, fields, strip.form.masses, fields)
+    given = jnp.zeros((1, 2 * n + 2)).at[0, -2].set(1.0 / strip.body.c)
+    if strip.pair is None:
+        return _volume(strip, strip.form, strip.elimination, given, slice(n))
+    upper, lower = strip.pair.above(given), strip.pair.below(given)
+    volume = _volume(strip, strip.form, strip.elimination, upper, slice(n))
+    other = _volume(strip, strip.pair.form, strip.pair.elimination, lower, slice(-n, None))
+    return volume.at[0].add(jnp.sum(other))
+
+
+def _volume(
+    strip: Strip, form: SectionForm, elimination: Elimination, given: Array, contact: slice
+) -> Array:
+    """Moving volume (layers,) of one member along the contact."""
+    moved = fields(elimination, given)[:, contact, 0]
+    return jnp.einsum("i,mi,lmk,ki->l", strip.tributary, moved, form.masses, moved)
+
+
+def fields(elimination: Elimination, given: Array) -> Array:
+    """Fields (m, n, steps) of a form from v and w of its stations, load and pressure (steps, :)."""
+    contact = given[:, :-2].reshape(len(given), -1, 2)
+    inner = elimination.recovered(given.T)  # (n, m-2, steps)
+    return jnp.concatenate([contact.T, jnp.moveaxis(inner, 1, 0)])

@@ -33,6 +33,8 @@ def deformed(
 ) -> Axes:
     """Draw the deformed members with their pressures, and where the contact sticks, slips or lifts.
 
+    Overhangs of a lap joint are left out.
+
     Parameters
     ----------
     history : LoadPath
@@ -128,10 +130,11 @@ def _draw_supports(axes: Axes, history: LoadPath, bottom: float) -> None:
         axes.axhline(bottom, color=DATA, linewidth=0.9, linestyle="-.")
     elif support == "none" and scene.contact.normal != "none":
         axes.axhline(0.0, color=DATA, linewidth=1.0)
-    if support != "none" or scene.strip.far_end != "free":
+    held = support != "none" or scene.strip.far_end != "free"
+    if held and scene.member.overhang is None:
         face = (bottom, 0.0) if support != "none" else (0.0, top)
         axes.plot([0.0, 0.0], face, color=DATA, linewidth=3.5, solid_capstyle="butt")
-    if scene.strip.loaded_end == "guided":
+    if scene.strip.loaded_end == "guided" and scene.strip.overhang is None:
         end = float(history.x[-1])
         axes.plot([end, end], [0.0, top], color=DATA, linewidth=2.5, linestyle=(0, (1, 1)))
 

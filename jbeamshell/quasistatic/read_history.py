@@ -94,6 +94,8 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
         "sections": Strains(*sections),
         "slipping": jax.ShapeDtypeStruct((steps, nodes), bool),
     }
+    if scene.member.support != "none":
+        shapes["member"] = number((steps, nodes, arrays["member"].shape[-1]))
     cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])
     stepwise = scene.model.solution == "stepwise"
     end: Any = PathEnd(eqx.filter_eval_shape(initial_state, scene)) if stepwise else None

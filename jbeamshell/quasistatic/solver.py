@@ -31,6 +31,10 @@ from jbeamshell.quasistatic.stepping import Method, march
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
 from jbeamshell.scene.scene import Scene
 
+NO_END = (
+    "no equilibrium: all of the contact slides, or its events come to no end; take a smaller "
+    "load.amplitude, load.control = displacement, or other model.nodes"
+)
 STACK = 3  # frames from a warning to the caller of `jbeamshell.solve`
 
 
@@ -134,18 +138,15 @@ def _condensed(
     history = solve_condensed(scene, path, cycles, nested=nested, own=own)
     history = dataclasses.replace(history, end=WholePath())
     if traced:
-        failed, fix = history.status[-1] != Status.CONVERGED, "take other model.nodes"
-        message = f"the events of a load step come to no end: {fix}"
-        return eqx.error_if(history, failed, message) if throw else history
+        failed = history.status[-1] != Status.CONVERGED
+        return eqx.error_if(history, failed, f"a load step has {NO_END}") if throw else history
     if nested and not history.converged:
         again = solve_condensed(scene, path, cycles, own=own)
         history = dataclasses.replace(again, end=history.end)
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
         load = float(path.target[step])
-        raise UnconvergedError(
-            f"load step {step} (load {load:.6g}): its events come to no end; take other model.nodes"
-        )
+        raise UnconvergedError(f"load step {step} (load {load:.6g}) has {NO_END}")
     if throw:
         warn_of_doubts(history, stacklevel=STACK + 1)
     return history

@@ -74,6 +74,8 @@ def _check_alone(scene: Parts) -> None:
     fix = "needs a second member: take 'free', or give member.support"
     end = scene.strip.loaded_end
     require("strip.loaded_end", end, end == "free", fix)
+    fix = "needs a second member: leave it out, or give member.support"
+    require("strip.overhang", scene.strip.overhang, scene.strip.overhang is None, fix)
     fix = "needs a second member: take 'frictionless', or give member.support"
     assembly = scene.contact.assembly
     require("contact.assembly", assembly, assembly == "frictionless", fix)

@@ -76,6 +76,11 @@ class StripKeys(Part):
         LOADED_ENDS,
         "Support at X = L beside the load: free, or guided (no deflection; lap joints only).",
     )
+    overhang: Array | None = number(
+        None,
+        "Length beyond X = L, at whose end the load acts (lap joints only); none is none.",
+        unit="length",
+    )
     layers: Array | None = number(
         None,
         "Rows [thickness, E, nu] of the layers from the bottom up, in place of the stiffness "
@@ -244,6 +249,11 @@ class MemberKeys(Part):
         low=-1.0,
         high=0.5,
         scale="linear",
+    )
+    overhang: Array | None = number(
+        None,
+        "Its length before X = 0, at whose end it is held; none is none.",
+        unit="length",
     )
     layers: Array | None = number(
         None,

@@ -325,6 +325,10 @@ class Scene(eqx.Module):
 
     def by_load_steps(self) -> Scene:
         """Copy that is solved in load steps, if how it is solved was left open."""
+        support = self.member.support
+        fix = "is for loads under constant pressures, at rest; for vibrations take "
+        fix += "jb.dynamics.Joint.of(scene) in a structure"
+        require("member.support", support, support == "none", fix)
         if "solution" not in self.model.open:
             return self
         return self.replace({"model.solution": "stepwise"})

@@ -98,6 +98,12 @@ class TestLimits:
         assert 1.0 / float(history.secant_stiffness) == pytest.approx(u, rel=0.002)
         assert float(history.dissipation_ratio) == pytest.approx(1.0, rel=0.01)
 
+    def test_overhangs_are_springs_in_series(self):
+        joint = jb.solve(SQUEEZE)
+        longer = jb.solve(SQUEEZE.replace({"strip.overhang": 0.6, "member.overhang": 0.4}))
+        added = 1.0 / longer.secant_stiffness - 1.0 / joint.secant_stiffness
+        assert float(added) == pytest.approx(1.0 / 3.4e4, rel=0.01)
+
 
 class TestBalance:
     def test_the_loop_holds_the_work_of_friction(self):
@@ -142,6 +148,21 @@ class TestBalance:
         np.testing.assert_allclose(carried, rough.force, atol=1e-8)
 
 
+def test_a_single_lap_beyond_its_gross_slip_is_told():
+    values = {"member.support": "clamped", "strip.loaded_end": "guided", "load.amplitude": 1.99}
+    values |= {"contact.pressure": BOLT, "contact.bottom_pressure": BOLT, "model.rung": "shell"}
+    with pytest.raises(jb.UnconvergedError, match="all of the contact slides"):
+        jb.solve(SQUEEZE.replace(values))
+
+
+def test_a_saved_joint_is_read_again(tmp_path):
+    history = jb.solve(SQUEEZE)
+    history.save(tmp_path / "joint.npz")
+    again = jb.read_history(tmp_path / "joint.npz")
+    np.testing.assert_array_equal(again.member, history.member)
+    assert again.figures() == history.figures()
+
+
 def test_derivatives_have_slope_two():
     keys = ("strip.height_ratio", "member.height_ratio", "contact.friction")
     scene = SQUEEZE.replace({"member.height_ratio": 0.12}).pinned()
@@ -176,6 +197,7 @@ def test_a_sweep_runs_over_both_heights():
         ({"member.support": "none", "contact.assembly": "frictional"}, "give member.support"),
         ({"member.layers": [[0.1, 1e5, 0.3]]}, "member.layers"),
         ({"load.amplitude": 2.5}, "gross slip"),
+        ({"member.support": "none", "strip.overhang": 0.1}, "give member.support"),
     ],
 )
 def test_what_is_no_joint_is_refused(values, said):

@@ -32,9 +32,9 @@ LIFTING = ["v", "w", "beta", "psi"]
 # --- files --------------------------------------------------------------------------------------
 
 positive = st.floats(1e-90, 1e90)
-MEMBER = {key for key in KEYS if key.startswith("member.")}
+OF_JOINT = {key for key in KEYS if key.startswith("member.")} | {"strip.overhang"}
 OPTIONAL = {"strip.axial_stiffness", "strip.poisson_ratio", "strip.layers", "strip.curvature"}
-OPTIONAL |= MEMBER - {"member.support"}
+OPTIONAL |= OF_JOINT - {"member.support"}
 JOINT = {"member.support": "rolling", "strip.far_end": "free", "model.rung": "plane"}
 
 
@@ -336,7 +336,7 @@ BAD = [
         (key, value, "number|thickness, E")
         for key in NUMBERS
         for value in NO_NUMBERS
-        if value is not None or key not in ("strip.layers", "strip.curvature", *MEMBER)
+        if value is not None or key not in ("strip.layers", "strip.curvature", *OF_JOINT)
         if key != "member.layers" or not isinstance(value, list | np.ndarray)
     ],
     *[("contact.friction", value, "a number, not negative") for value in (-2.0, np.nan, np.inf)],
@@ -606,7 +606,7 @@ FULL = {
 def test_gradients_and_batches_reach_every_number(key):
     layers = {key: LAYERS} if key.endswith(".layers") else {}
     beside = {} if layers else {key: 0.2}
-    scene = Scene().replace(JOINT | layers | beside if key in MEMBER else FULL | layers)
+    scene = Scene().replace(JOINT | layers | beside if key in OF_JOINT else FULL | layers)
     value = scene.get(key)
 
     def weight(factor):
