@@ -1,7 +1,8 @@
 """Parameters of a scene from measurements: least squares on the response, with uncertainty.
 
 `fit` searches, and its `Fit` holds the values with their uncertainty.  `profile` computes the
-confidence interval of one parameter by running the model.  `read_plan` reads a study from a file.
+confidence interval of one parameter by running the model.  `posterior` is a density for samplers
+of other libraries.  `read_plan` reads a study from a file.
 """
 
 from jbeamshell.identify.fitting import MAX_ITERATIONS as MAX_ITERATIONS
@@ -12,6 +13,8 @@ from jbeamshell.identify.fitting import fit_kappa_s as fit_kappa_s
 from jbeamshell.identify.parameters import Parameter as Parameter
 from jbeamshell.identify.plan import Plan as Plan
 from jbeamshell.identify.plan import read_plan as read_plan
+from jbeamshell.identify.posterior import Posterior as Posterior
+from jbeamshell.identify.posterior import posterior as posterior
 from jbeamshell.identify.profile_likelihood import Profile as Profile
 from jbeamshell.identify.profile_likelihood import profile as profile
 from jbeamshell.identify.results import Fit as Fit

@@ -5,10 +5,12 @@ The model runs at plain values; its derivatives are multiplied by the slopes of 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
-from scipy.special import expit, logit
+from jax import Array
+from scipy.special import logit
 
 FARTHEST = 40.0  # largest coordinate in the search space; beyond it exp overflows or vanishes
 INSET = 1e-9  # distance of a box from its open bounds, over its width
@@ -34,12 +36,22 @@ class Bijection(NamedTuple):
 
     def value(self, point: float) -> float:
         """Parameter at a point of the search space."""
-        return self._unscaled(self._at(point)[0])
+        return self._unscaled(self._at(float(point))[0])
 
     def slope(self, point: float) -> float:
         """Derivative of the parameter with respect to the point."""
-        t, dt = self._at(point)
-        return dt * self._unscaled(t) if self.log else dt
+        t, dt = self._at(float(point))
+        return float(dt * self._unscaled(t) if self.log else dt)
+
+    def traced(self, point: Array) -> tuple[Array, Array]:
+        """Parameter at a traced point, and the derivative of its scale t there."""
+        t, dt = self._at(point, jnp)
+        return (jnp.exp(t) if self.log else t), jnp.broadcast_to(jnp.asarray(dt), jnp.shape(point))
+
+    def at_part(self, part: float) -> float:
+        """Parameter at a part, 0 to 1, of the way from bound to bound on its scale."""
+        low, high = self._scaled(self.low), self._scaled(self.high)
+        return self._unscaled(low + part * (high - low))
 
     def point(self, value: float) -> float:
         """Inverse of `value`; values on or beyond a bound are moved inside."""
@@ -83,18 +95,19 @@ class Bijection(NamedTuple):
     def _unscaled(self, t: float) -> float:
         return float(np.exp(t)) if self.log else float(t)
 
-    def _at(self, point: float) -> tuple[float, float]:
-        """Parameter on its scale, and its derivative."""
+    def _at(self, point: Any, numbers: Any = np) -> tuple[Any, Any]:
+        """Parameter on its scale, and its derivative; ``numbers`` is numpy or jax.numpy."""
         start, low, high = map(self._scaled, (self.start, self.low, self.high))
-        unbounded = not (self.log or np.isfinite(low) or np.isfinite(high))
-        p = float(point) if unbounded else float(np.clip(point, -FARTHEST, FARTHEST))
+        if not (self.log or np.isfinite(low) or np.isfinite(high)):
+            return start + self._unit * point, self._unit
+        p = numbers.clip(point, -FARTHEST, FARTHEST)
         if np.isfinite(low) and np.isfinite(high):
-            part = expit(logit((start - low) / (high - low)) + p)
+            part = 1.0 / (1.0 + numbers.exp(-p - logit((start - low) / (high - low))))
             return low + (high - low) * part, (high - low) * part * (1.0 - part)
         if np.isfinite(low):
-            rise = (start - low) * np.exp(p)
+            rise = (start - low) * numbers.exp(p)
             return low + rise, rise
         if np.isfinite(high):
-            fall = (high - start) * np.exp(-p)
+            fall = (high - start) * numbers.exp(-p)
             return high - fall, fall
         return start + self._unit * p, self._unit

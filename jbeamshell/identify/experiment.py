@@ -148,6 +148,25 @@ class Experiment:
         """
         return self._joined(self._run(_respond, table, keys, solver))
 
+    def traced_cost(
+        self, keys: tuple[str, ...], table: Array, solver: Newton
+    ) -> tuple[Array, Array]:
+        """Sum of the squared residuals and its derivatives (specimens, k), as traced functions.
+
+        Parameters
+        ----------
+        keys : (k,) dotted keys of the values
+        table : (specimens, k) values, which may be traced
+        solver : settings of Newton's method
+        """
+        cost, slopes = jnp.zeros(()), jnp.zeros(table.shape)
+        for run, owner, rows in zip(self._runs, self.owners, self.slices, strict=True):
+            residual, jacobian, *_ = _respond(table[owner], *run, keys, solver)
+            emphasis = self.emphasis[rows][0] ** 2
+            cost = cost + emphasis * jnp.sum(residual**2)
+            slopes = slopes.at[owner].add(2.0 * emphasis * residual @ jacobian)
+        return cost, slopes
+
     def batch(
         self, keys: tuple[str, ...], tables: NDArray[np.float64], solver: Newton
     ) -> list[Prediction]:

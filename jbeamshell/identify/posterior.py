@@ -1,0 +1,186 @@
+"""Posterior density of a fit's parameters, for samplers of other libraries.
+
+Samplers that move freely, such as those of blackjax, numpyro or emcee, take `Posterior.logdensity`
+of points in the unbounded search space; nested samplers, such as dynesty, take
+`Posterior.prior_transform` of the unit cube and `Posterior.loglikelihood` of its values.
+
+The likelihood is that of the fit: normal where measured noise explains the residuals, else with
+Student's distribution of the estimated noise, whose few independent points include what the model
+leaves.  The prior of a parameter is its own normal one, or flat on its scale: in log x for most.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+from numpy.typing import NDArray
+from scipy import stats
+
+from jbeamshell.common.errors import InputError
+from jbeamshell.identify.problem import Problem
+from jbeamshell.identify.results import Fit
+from jbeamshell.identify.search_space import SearchSpace
+from jbeamshell.identify.uncertainty import Uncertainty
+
+
+class Posterior(NamedTuple):
+    """Posterior density of n parameters; made by `posterior`.
+
+    Attributes
+    ----------
+    problem : least-squares problem of the fit
+    uncertainty : uncertainty of the fit, with its search space
+    least : sum of the squared residuals of the data at the fit
+    """
+
+    problem: Problem
+    uncertainty: Uncertainty
+    least: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self._space.names
+
+    @property
+    def start(self) -> NDArray[np.float64]:
+        """Point (n,) of the fit, from which a sampler may start."""
+        return self.uncertainty.point
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance (n, n) of the points by the fit, the inverse mass matrix of a sampler."""
+        return self.uncertainty.covariance
+
+    def constrain(self, theta: ArrayLike) -> Array:
+        """Parameters (n,) within their bounds at a point (n,), traced or not."""
+        return self._values_and_scales(jnp.asarray(theta))[0]
+
+    def unconstrain(self, values: ArrayLike) -> NDArray[np.float64]:
+        """Point (n,) at parameters (n,) within their bounds."""
+        return self._space.point(values)
+
+    def loglikelihood(self, values: ArrayLike) -> Array:
+        """Logarithm of the likelihood of parameters (n,) over that of the fit.
+
+        It can be traced, mapped and differentiated once.
+        """
+        u, at = self.uncertainty, jnp.asarray(values)
+        rise = (_cost(self.problem, self._space)(at) - self.least) / u.sigma**2
+        if u.freedom is None:
+            return -0.5 * rise
+        # The density whose marginals are the fit's intervals, where the model is linear.
+        return -0.5 * (u.freedom + at.size) * jnp.log1p(rise / u.freedom)
+
+    def logdensity(self, theta: ArrayLike) -> Array:
+        """Logarithm of the posterior density at a point (n,) of the search space.
+
+        It can be traced, mapped and differentiated once.
+        """
+        point = jnp.asarray(theta)
+        values, scales = self._values_and_scales(point)
+        # A flat density on the scale t is dt/dtheta here; a normal one of x has dx/dt too.
+        total = self.loglikelihood(values) + jnp.sum(jnp.log(scales))
+        for axis, mean, deviation in self.problem.priors:
+            value = values[axis]
+            total = total - 0.5 * ((value - mean) / deviation) ** 2
+            if self._space.bijections[axis].log:
+                total = total + jnp.log(value)
+        return total
+
+    def prior_transform(self, cube: ArrayLike) -> NDArray[np.float64]:
+        """Parameters (n,) at a point (n,) of the unit cube, distributed as the prior.
+
+        Raises `InputError` for a parameter with neither a normal prior nor two finite bounds on its
+        scale, whose flat prior is no distribution.
+        """
+        priors = {axis: rest for axis, *rest in self.problem.priors}
+        parts = np.asarray(cube, float)
+        values = []
+        for axis, (name, bijection) in enumerate(
+            zip(self.names, self._space.bijections, strict=True)
+        ):
+            if axis in priors:
+                mean, deviation = priors[axis]
+                low, high = (np.subtract(bijection[1:3], mean) / deviation).tolist()
+                values.append(stats.truncnorm.ppf(parts[axis], low, high, mean, deviation))
+                continue
+            lowest = 0.0 if bijection.log else -np.inf
+            if not (bijection.low > lowest and np.isfinite(bijection.high)):
+                raise InputError(
+                    f"{name}: its prior is flat between {bijection.low:g} and {bijection.high:g}, "
+                    "which is no distribution: give both bounds (--bounds), or a prior (--prior)"
+                )
+            values.append(bijection.at_part(float(parts[axis])))
+        return np.asarray(values)
+
+    @property
+    def _space(self) -> SearchSpace:
+        return self.uncertainty.space
+
+    def _values_and_scales(self, point: Array) -> tuple[Array, Array]:
+        """Parameters (n,), and the derivatives (n,) of their scales with respect to the point."""
+        pairs = [bijection.traced(p) for bijection, p in zip(self._space.bijections, point)]  # noqa: B905 - a traced point has no length to check
+        values, scales = zip(*pairs, strict=True)
+        return jnp.stack(values), jnp.stack(scales)
+
+
+def posterior(result: Fit) -> Posterior:
+    """Posterior density of the parameters of a fit.
+
+    Parameters
+    ----------
+    result : result of `fit`
+
+    Raises
+    ------
+    InputError
+        if the result was not made by `fit`, or if a value ended at its bound
+
+    Examples
+    --------
+    ::
+
+        problem = jb.identify.posterior(jb.identify.fit(loops, scene, ["contact.friction"]))
+        sampler = blackjax.nuts(problem.logdensity, 0.5, problem.covariance)
+        state = sampler.init(problem.start)
+    """
+    problem, uncertainty = result.problem, result.uncertainty
+    if problem is None or uncertainty is None:
+        raise InputError("posterior: this result was not made by fit")
+    for name, at_bound in zip(uncertainty.space.names, uncertainty.at_bound, strict=True):
+        if at_bound:
+            raise InputError(
+                f"posterior: {name} ended at its bound; widen its bounds, or leave it out"
+            )
+    rows = problem.experiment.weight.size
+    best = problem(uncertainty.space, uncertainty.point).residual[:rows]
+    return Posterior(problem, uncertainty, float(best @ best))
+
+
+def _cost(problem: Problem, space: SearchSpace) -> jax.custom_jvp:
+    """Function of the parameters (n,): sum of the squared residuals of the data.
+
+    The model is differentiated forward, with the residuals; gradients need no second run.
+    """
+
+    def both(values: Array) -> tuple[Array, Array]:
+        table = values[space.table]
+        cost, slopes = problem.experiment.traced_cost(space.keys, table, problem.solver)
+        return cost, jnp.zeros_like(values).at[space.table].add(slopes)
+
+    @jax.custom_jvp
+    def cost(values: Array) -> Array:
+        return both(values)[0]
+
+    @cost.defjvp
+    def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+        found, gradient = both(primals[0])
+        return found, gradient @ tangents[0]
+
+    return cost

@@ -1,0 +1,112 @@
+"""Posterior densities against closed forms."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy import stats
+from toy import KEYS, TRUTH, X, formula, readings, scene
+
+import jbeamshell as jb
+from jbeamshell import identify
+from jbeamshell.identify.parameters import Parameter
+
+MU, ETA, KAPPA = KEYS
+NOISE = 2e-3
+FIXED = {MU: TRUTH[MU], ETA: TRUTH[ETA]}
+LINEAR = Parameter(KAPPA, low=0.0, high=5.0, scale="linear")
+SLOPE = 0.2 * X  # of the formula along kappa_s
+
+
+@pytest.fixture(scope="module")
+def known():
+    """Posterior of three parameters under measured noise."""
+    free = [Parameter(MU, low=0.01, high=1.0), Parameter(ETA, low=0.01, high=2.0), KAPPA]
+    return identify.posterior(identify.fit(readings(NOISE, known=True), scene(), free))
+
+
+def along(density, values):
+    """Density over one parameter, normalised, at its values (points,)."""
+    found = np.exp(jax.vmap(density.loglikelihood)(values[:, None]))
+    return found / np.trapezoid(found, values)
+
+
+def test_the_likelihood_is_that_of_the_noise(known):
+    data = readings(NOISE, known=True)
+    for values in ([0.1, 0.2, 0.44], [0.103, 0.19, 0.5]):
+        left = (np.asarray(formula(X, *values)) - data.y) / NOISE
+        best = (np.asarray(formula(X, *known.constrain(known.start))) - data.y) / NOISE
+        expected = -0.5 * (left @ left - best @ best)
+        assert float(known.loglikelihood(values)) == pytest.approx(expected, rel=1e-6)
+
+
+def test_points_and_values_are_one_to_one(known):
+    for theta in (known.start, known.start + 0.3):
+        values = known.constrain(theta)
+        np.testing.assert_allclose(values, known.uncertainty.space.values(theta), rtol=1e-12)
+        np.testing.assert_allclose(known.unconstrain(values), theta, rtol=1e-9, atol=1e-12)
+
+
+def test_gradients_are_derivatives_under_all_transformations(known):
+    at = jnp.asarray(known.start + 0.01)
+    value, gradient = jax.jit(jax.value_and_grad(known.logdensity))(at)
+    assert float(value) == pytest.approx(float(known.logdensity(at)), rel=1e-12)
+    for axis in range(3):
+        step = 1e-5 * np.eye(3)[axis]
+        rise = (known.logdensity(at + step) - known.logdensity(at - step)) / 2e-5
+        assert float(gradient[axis]) == pytest.approx(float(rise), rel=1e-5, abs=1e-5)
+    several = jnp.stack([at, at + 0.02])
+    each = [float(known.logdensity(one)) for one in several]
+    np.testing.assert_allclose(jax.vmap(known.logdensity)(several), each, rtol=1e-12)
+
+
+def test_one_linear_parameter_is_normal_and_without_known_noise_student():
+    rest = readings(NOISE).y - np.asarray(formula(X, *FIXED.values(), 0.0))
+    best, spread = SLOPE @ rest / (SLOPE @ SLOPE), 1.0 / np.sqrt(SLOPE @ SLOPE)
+    values = best + NOISE * spread * np.linspace(-8.0, 8.0, 401)
+    density = identify.posterior(identify.fit(readings(NOISE, known=True), scene(**FIXED), LINEAR))
+    expected = stats.norm.pdf(values, best, NOISE * spread)
+    np.testing.assert_allclose(along(density, values), expected, rtol=1e-3, atol=1e-6)
+    density = identify.posterior(identify.fit(readings(NOISE), scene(**FIXED), LINEAR))
+    freedom = X.size - 1
+    left = rest - best * SLOPE
+    size = np.sqrt(left @ left / freedom) * spread
+    expected = stats.t.pdf(values, freedom, best, size)
+    np.testing.assert_allclose(along(density, values), expected, rtol=5e-3, atol=1e-3)
+
+
+def test_flat_and_normal_priors_weigh_as_they_say():
+    data = readings(NOISE, known=True)
+    flat = identify.posterior(identify.fit(data, scene(**FIXED), Parameter(KAPPA)))
+    one, other = flat.start, flat.start + 0.5  # log kappa_s: flat in the point itself
+    rise = float(flat.logdensity(other) - flat.logdensity(one))
+    likely = flat.loglikelihood(flat.constrain(other)) - flat.loglikelihood(flat.constrain(one))
+    assert rise == pytest.approx(float(likely), rel=1e-9)
+    prior = Parameter(KAPPA, prior=(0.45, 0.02))
+    given = identify.posterior(identify.fit(data, scene(**FIXED), prior))
+    (x, y) = (float(given.constrain(theta)[0]) for theta in (one, other))
+    weight = float(given.logdensity(other) - given.logdensity(one))
+    weight -= float(given.loglikelihood([y]) - given.loglikelihood([x]))
+    belief = stats.norm(0.45, 0.02)
+    expected = belief.logpdf(y) - belief.logpdf(x) + np.log(y / x)
+    assert weight == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_unit_cube_becomes_the_prior(known):
+    with pytest.raises(jb.InputError, match=r"strip.kappa_s: its prior is flat between 0 and inf"):
+        known.prior_transform([0.5, 0.5, 0.5])
+    free = [Parameter(MU, low=0.01, high=1.0), LINEAR]
+    whole = identify.posterior(identify.fit(readings(NOISE), scene(**{ETA: 0.2}), free))
+    np.testing.assert_allclose(whole.prior_transform([0.5, 0.25]), [0.1, 1.25], rtol=1e-12)
+    prior = Parameter(KAPPA, prior=(0.45, 0.02))
+    fit = identify.fit(readings(NOISE, known=True), scene(**FIXED), prior)
+    (value,) = identify.posterior(fit).prior_transform([0.975])
+    assert value == pytest.approx(0.45 + 1.959964 * 0.02, rel=1e-6)
+
+
+def test_a_value_at_its_bound_has_no_posterior():
+    free = [Parameter(MU, low=0.12, high=0.5), ETA]
+    data = readings(NOISE, known=True)
+    fit = identify.fit(data, scene(**{KAPPA: 0.44}), free, method="l-bfgs-b", starts=1)
+    with pytest.raises(jb.InputError, match=r"posterior: contact.friction ended at its bound"):
+        identify.posterior(fit)
