@@ -26,7 +26,8 @@ def configure(
 ) -> None:
     """Choose how JAX compiles and calls in this process.
 
-    Processes that this one starts inherit ``fast_loops``, not the other options.
+    LAPACK gets one thread, unless OPENBLAS_NUM_THREADS says otherwise.  Processes that this one
+    starts inherit that and ``fast_loops``, not the other options.
 
     Parameters
     ----------
@@ -55,6 +56,8 @@ def configure(
 
         jb.configure(cache="compiled")  # before anything is computed
     """
+    # Matrices here are small: threads of LAPACK would wait for each other longer than they work.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # SciPy reads it when JAX first needs it
     if cache is not None:
         jax.config.update("jax_compilation_cache_dir", str(cache))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", WORTH_KEEPING)

@@ -14,6 +14,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array, lax
+from jax.typing import ArrayLike
 from jaxtyping import PyTree
 
 from jbeamshell.condensed import slopes
@@ -66,7 +67,7 @@ def walk(
     friction: Array,
     start: ContactState,
     forces: Array,
-    turns: Array,
+    turns: ArrayLike | tuple[bool, ...],
     lift: Array | None = None,
     needed: Array | bool = True,
 ) -> Level:

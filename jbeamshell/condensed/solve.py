@@ -19,7 +19,7 @@ from jbeamshell.condensed.drives import (
     spring_energy,
     with_springs,
 )
-from jbeamshell.condensed.events import Level
+from jbeamshell.condensed.events import Level, walk
 from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
 from jbeamshell.condensed.pair import Pair
 from jbeamshell.condensed.strip import Strip, condensed, fields, spring_stiffness, stays_flat
@@ -94,9 +94,10 @@ def nests(scene: Scene) -> bool:
     """True if the slip zones of a scene's cycles are most often nested, so that factors do.
 
     Sections of low order hold a point reaction at the loaded corner, which slips and opens out of
-    turn.
+    turn, and a lap joint slips from both ends.
     """
-    return scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
+    alone = scene.member.support == "none"
+    return alone and (scene.model.solution == "plane" or scene.model.order >= NESTED_FROM)
 
 
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
@@ -159,7 +160,8 @@ def _levels(
     if nested or not targets.size:
         found, sound = nested_levels(body, friction, pressed(body), targets, turns)
     else:
-        found = levels(body, friction, pressed(body), targets, turns, lift)
+        follow = levels if strip.pair is None else walk  # whose slip zones are never nested
+        found = follow(body, friction, pressed(body), targets, turns, lift)
         sound = jnp.all(jnp.isfinite(strip.lift))
     state = found.state
     if scene.load.control == "displacement":

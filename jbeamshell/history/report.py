@@ -53,6 +53,8 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
             drawn["profiles.png"] = history.plot_profiles()
     if {"w", "psi"} & set(scene.model.fields):
         drawn["contact.png"] = history.plot_contact()
+    if scene.member.support != "none":
+        drawn["joint.png"] = history.plot_deformed()
     pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
     return write_folder(folder, texts, pictures)
 
