@@ -30,6 +30,7 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
     | ``loop.png`` | the loop, if there are loads after the pressure |
     | ``profiles.png`` | slip, rotation, traction and reaction, if there are loads and friction |
     | ``contact.png`` | reaction, gap and squeeze, if w or psi is a field |
+    | ``joint.png`` | the deformed members, if there is a second one |
 
     Parameters
     ----------
