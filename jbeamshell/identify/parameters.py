@@ -12,7 +12,7 @@ import numpy as np
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.bijection import Bijection
-from jbeamshell.identify.rig_keys import FITTED, RIG
+from jbeamshell.identify.rig_keys import FITTED, PREFIX, RIG, check_rig_key
 from jbeamshell.scene.keys import NUMBERS, check_key
 
 SCALES = ("log", "linear")
@@ -20,11 +20,11 @@ SCALES = ("log", "linear")
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """Number of the scene that a fit may change.
+    """Number of the scene or of the rig that a fit may change.
 
     Attributes
     ----------
-    key : dotted key, such as "contact.friction"
+    key : dotted key, such as "contact.friction" or "rig.compliance"
     start : value at which the search starts; None takes the scene's own value
     low, high : bounds, both excluded; None takes the bounds in the table of keys
     scale : "log" for a quantity known by its order of magnitude, or "linear"; None takes the scale
@@ -53,8 +53,8 @@ class Parameter:
     each: bool = False
 
     def __post_init__(self) -> None:
-        if self.key not in RIG:
-            check_key(self.key)
+        of_rig = isinstance(self.key, str) and self.key.startswith(PREFIX)
+        (check_rig_key if of_rig else check_key)(self.key)
         if self.key not in (*NUMBERS, *RIG) or self.key == "load.amplitude":
             raise InputError(
                 f"free {self.key!r}: is not a parameter of the strip or the contact; name one, "

@@ -26,7 +26,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.observations import LoopObservation, Observation
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.rig_keys import PREFIX, RIG
+from jbeamshell.identify.rig_keys import PREFIX, RIG, check_rig_key
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, Measurement
 from jbeamshell.measured.loops import Loop
@@ -74,8 +74,7 @@ def rig_of(values: Mapping[str, Any]) -> Rig:
     """
     fields = dict.fromkeys((name.removeprefix(PREFIX) for name in RIG), 0.0)
     for key, value in values.items():
-        if key not in RIG:
-            raise InputError(f"unknown key {key!r}: keys of the rig are {', '.join(RIG)}")
+        check_rig_key(key)
         low = RIG[key].low
         number = isinstance(value, int | float) and not isinstance(value, bool)
         fix = "give a number" + (", 0 or more" if low == 0.0 else "")

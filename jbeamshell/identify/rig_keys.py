@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from jbeamshell.common.errors import InputError
 from jbeamshell.scene.keys import TABLE
 from jbeamshell.scene.rows import Key
 
@@ -29,3 +30,9 @@ RIG: dict[str, Key] = dict(
     )
 )
 FITTED = TABLE | RIG  # all numbers that a fit may change, and the settings that it may not
+
+
+def check_rig_key(key: str) -> None:
+    """Raise `InputError` for a key of the rig that does not exist."""
+    if key not in RIG:
+        raise InputError(f"unknown key {key!r}: keys of the rig are {', '.join(RIG)}")

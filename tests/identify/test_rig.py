@@ -155,6 +155,8 @@ def test_what_a_rig_cannot_be_is_refused():
         seen_by(weak, by_force, stiffness=1.0)
     with pytest.raises(jb.InputError, match=r"unknown key 'rig.mass': keys of the rig are rig.com"):
         rig.rig_of({"rig.mass": 1.0})
+    with pytest.raises(jb.InputError, match=r"unknown key 'rig.mass': keys of the rig are rig.com"):
+        identify.Parameter("rig.mass")
     for bad in (-1.0, "soft", True, np.nan):
         with pytest.raises(jb.InputError, match=r"rig.compliance = .*: give a number, 0 or more"):
             rig.rig_of({COMPLIANCE: bad})
