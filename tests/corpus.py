@@ -205,6 +205,14 @@ def sound() -> Iterator[Case]:
 
     yield case("drifting.csv", text(drifting), words=[*KNOWN, "--drift", "linear"])
     yield Case("drift kept.csv", text(drifting), KNOWN, HONEST, "--drift linear")
+
+    def shaken() -> list[np.ndarray]:
+        time, force, displacement = strip(cycles=12)
+        speed = np.gradient(1e-3 * displacement, time)
+        return [time, force, np.gradient(speed, time)]
+
+    accelerations = ("time [s]", "force [kN]", "acceleration [m/s^2]")
+    yield case("accelerations.csv", text(shaken, names=accelerations), planted=ROUGH)
     offset = text(lambda: with_column(2, lambda u: u + 3.0))
     yield case("offset.csv", offset, words=[*KNOWN, "--centre"])
     yield case(

@@ -56,8 +56,8 @@ def add_to(commands: Any) -> None:
         "data",
         nargs="*",
         metavar="DATA|PLAN.toml",
-        help="files of one specimen (.csv, .mat, .npz), or a plan of several specimens; "
-        "default: the finite-element loops that ship",
+        help="files of one specimen (.csv, .txt, .mat, .npz, .h5, .tdms, .uff), or a plan of "
+        "several specimens; default: the finite-element loops that ship",
     )
     parser.add_argument(
         "--scene",

@@ -20,7 +20,9 @@ def add_to(commands: Any) -> None:
         "amplitudes, work; and what speaks against a fit.  The exit code is 2 if a fit refuses "
         "them.",
     )
-    parser.add_argument("data", nargs="+", metavar="DATA", help="files (.csv, .mat, .npz)")
+    parser.add_argument(
+        "data", nargs="+", metavar="DATA", help="files (.csv, .txt, .mat, .npz, .h5, .tdms, .uff)"
+    )
     add_columns(parser)
     parser.add_argument("--width", metavar="50MM", help=DIMENSIONS["width"].text)
     add_folder(parser)

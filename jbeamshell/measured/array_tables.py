@@ -32,10 +32,10 @@ class ArrayTable(Table):
         self.name = Path(path).name
         self.place = "in its variables"
         data, suffix = read_bytes(path), Path(path).suffix.lower()
-        if suffix == ".mat" and HDF5 in data[:1024]:
-            suffix = ".h5"  # MATLAB 7.3
+        new = suffix == ".mat" and HDF5 in data[:1024]  # MATLAB 7.3
+        read = READERS[".h5" if new else suffix]
         try:
-            columns = [column for item in READERS[suffix](data) for column in _columns(*item)]
+            columns = [column for item in read(data) for column in _columns(*item)]
         except InputError as error:  # a library is missing
             raise InputError(f"{self.name}: {error}") from None
         except Exception as error:  # a parser may raise anything for a broken file

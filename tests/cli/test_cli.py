@@ -14,6 +14,8 @@ from jbeamshell.cli import main
 from jbeamshell.quasistatic import recovery, solver
 from tests.command import BASE, options
 
+ROOT = Path(jb.__file__).parent.parent
+
 # --- bad input ----------------------------------------------------------------------------------
 
 
@@ -156,6 +158,17 @@ def test_commands_that_do_not_exist(cli, capsys, words):
     assert "usage: jbeamshell" in err
 
 
+def test_options_that_messages_name_exist():
+    commands = next(a for a in main._parser()._actions if a.choices).choices.values()
+    known = {option for command in commands for option in command._option_string_actions}
+    named = set()
+    for file in (ROOT / "jbeamshell").rglob("*.py"):
+        if file.name not in ("jax_options.py", "text_tables.py"):  # of XLA, and a missing number
+            named |= set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", file.read_text("utf-8")))
+    assert {"--drift", "--reverse", "--column", "--unit"} <= named
+    assert named <= known | {"--version"}
+
+
 # --- what goes wrong later ----------------------------------------------------------------------
 
 
@@ -189,8 +202,6 @@ def test_an_interrupted_program_ends_without_taking_python_down(monkeypatch, cap
 
 
 # --- as a program -------------------------------------------------------------------------------
-
-ROOT = Path(jb.__file__).parent.parent
 
 
 def python(*words):

@@ -118,7 +118,7 @@ BAD = {
     "text.mat": (b"force,displacement\n1,2\n", "is no .mat file of numbers"),
     "new.mat": (
         b"MATLAB 7.3".ljust(512) + b"\x89HDF\r\n\x1a\n",
-        "is no .h5 file of numbers (",
+        "is no .mat file of numbers (OSError: ",
     ),
     "text.npy": (b"force,displacement\n", "is no .npy file of numbers (ValueError: "),
     "pickled.npy": (pickled(), "is no .npy file of numbers (ValueError: Object arrays cannot be"),
