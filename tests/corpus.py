@@ -35,8 +35,8 @@ SPECIMEN = {
 }
 GROSS = FRICTION * 16e3  # N
 LENGTHS = [word for name, text in SPECIMEN.items() for word in (f"--{name}", text)]
-FREE = ["--free", "contact.friction"]
-KNOWN = [*LENGTHS, *FREE]
+KNOWN = [*LENGTHS, "--free", "contact.friction"]
+ALONE: list[str] = []  # no word besides the file
 UNITS = ["--unit", "force=kN", "--unit", "displacement=mm"]
 NAMES = ("time [s]", "force [kN]", "displacement [mm]")
 FITTING = 0.05  # misfit over the range up to which a loop of another law counts as described
@@ -182,7 +182,7 @@ def sound() -> Iterator[Case]:
     def case(name: str, write: Callable[[Path], object], **more: Any) -> Case:
         return Case(name, write, more.pop("words", KNOWN), RIGHT, **{"planted": MU, **more})
 
-    yield case("plain.csv", text(strip))
+    yield case("plain.csv", text(strip), words=LENGTHS)
     german = {"delimiter": ";", "decimal": ",", "encoding": "cp1252"}
     yield case("german.csv", text(strip, names=GERMAN, above=ABOVE, **german))
     yield case("french.txt", text(strip, names=FRENCH, above=ABOVE, delimiter="\t", decimal=","))
@@ -218,11 +218,11 @@ def sound() -> Iterator[Case]:
     yield case(
         "finite elements.csv",
         text(finite_elements, names=("time", "force", "displacement")),
-        words=[*OF_STANDARD, *FREE, "--set", "strip.height_ratio=0.1126"],
+        words=[*OF_STANDARD, "--free", "contact.friction", "--set", "strip.height_ratio=0.1126"],
         planted={"contact.friction": (0.1, 0.05)},
     )
     jenkins = text(lambda: other(rig.jenkins(rig.path(3)), rig.path(3)))
-    yield Case("jenkins.csv", jenkins, FREE, RIGHT, planted={"gross slip": (900.0, 0.05)})
+    yield Case("jenkins.csv", jenkins, ALONE, RIGHT, planted={"gross slip": (900.0, 0.05)})
 
 
 def of_other_laws() -> Iterator[Case]:
@@ -238,7 +238,7 @@ def of_other_laws() -> Iterator[Case]:
     doubts = {"viscous.csv": "ellipse", "elastic.csv": "no friction", "asymmetric.csv": "differ"}
     for name, force in answers.items():
         columns = functools.partial(other, force, u)
-        yield Case(name, text(columns), FREE, HONEST, doubts.get(name, ""))
+        yield Case(name, text(columns), ALONE, HONEST, doubts.get(name, ""))
     falling = functools.partial(strip, (0.8, 0.6, 0.4), 1)
     yield Case("falling amplitudes.csv", text(falling), KNOWN, HONEST)
     loading = [column[:20] for column in strip()]
@@ -246,7 +246,7 @@ def of_other_laws() -> Iterator[Case]:
     random = np.random.default_rng(1)
     noise = [*strip()[:1], *random.standard_normal((2, strip()[0].size))]
     told = "noise|describe|cycle"
-    yield Case("only noise.csv", text(lambda: noise), FREE, ("refused", "not this model"), told)
+    yield Case("only noise.csv", text(lambda: noise), ALONE, ("refused", "not this model"), told)
 
 
 def wrong() -> Iterator[Case]:
@@ -261,13 +261,13 @@ def wrong() -> Iterator[Case]:
     newtons = ("time [s]", "force [MN]", "displacement [mm]")
     yield case("wrong force.csv", text(strip, names=newtons), "units wrong")
     swapped = ("time [s]", "displacement [mm]", "force [kN]")
-    yield case("swapped.csv", text(strip, names=swapped), "--column force=", FREE)
+    yield case("swapped.csv", text(strip, names=swapped), "--column force=", ALONE)
     clipped = text(lambda: with_column(1, lambda f: np.minimum(f, 0.6 * np.max(f))))
     yield case("clipped.csv", clipped, "larger range")
     u = rig.path(4)
     for name, law in (("pinched.csv", rig.pinched), ("bearing.csv", rig.bearing)):
         told = "within the clearance"
-        yield case(name, text(functools.partial(other, law(u), u)), told, FREE)
+        yield case(name, text(functools.partial(other, law(u), u)), told, ALONE)
     bare = ("time", "force", "displacement")
     yield case("no units.csv", text(strip, names=bare), "--unit force=N")
     half = ("time [s]", "force [kN]", "displacement")

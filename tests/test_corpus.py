@@ -2,6 +2,7 @@
 
 import re
 
+import jax
 import pytest
 
 import jbeamshell as jb
@@ -42,7 +43,16 @@ def test_an_inspection_names_what_is_in_a_file(name, tmp_path):
             seen.check()
 
 
+@pytest.fixture
+def optimised():
+    """Compile as a user's command does; the other tests compile more than they run."""
+    jax.config.update("jax_disable_most_optimizations", False)
+    yield
+    jax.config.update("jax_disable_most_optimizations", True)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("optimised")
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_no_file_ends_in_silence(case, tmp_path, capsys):
     code = main(corpus.words(case, tmp_path))
