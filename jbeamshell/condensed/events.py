@@ -35,7 +35,7 @@ class Level(NamedTuple):
     state : contact
     lift : (n,) lift w
     slip_work : work of friction in the step
-    slipping : (k,) True for nodes that slip at its end
+    slipping : (k,) True for closed nodes that slip at its end
     settled : True if all events up to here were found, and the body does not slide as a whole
     """
 
@@ -220,7 +220,8 @@ def _run(
     state, lift = _state(at, system.friction, origin, force)
     held = jnp.abs(at.rate[-1]) < SLIDES * jnp.abs(system.c)
     settled = last.settled & (event.tau >= tau) & held
-    return at, Level(state, lift, at.work - done, at.sigma != 0.0, settled), trace
+    slipping = (at.sigma != 0.0) & ~at.opened[: at.sigma.size]
+    return at, Level(state, lift, at.work - done, slipping, settled), trace
 
 
 @eqx.filter_custom_jvp

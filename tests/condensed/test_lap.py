@@ -120,6 +120,7 @@ class TestBalance:
             history.w - history.member[..., 1], history.gap, atol=1e-9 * scale
         )
         assert float(jnp.max(history.gap)) > 0.0
+        assert not np.any(np.asarray(history.slipping) & ~np.asarray(history.touching))
         stuck = ~np.any(np.asarray(history.slipping), axis=0)
         stuck &= np.all(np.asarray(history.touching), axis=0)
         assert stuck.any()
