@@ -212,6 +212,8 @@ def _gross_slip(found: Estimate, scene: Scene, values: Mapping[str, Any], forced
     if found.slides:
         return least
     part = PARTS[1] if x is None else float(np.clip(0.5 * SLENDER * x, *PARTS))
+    if x is None and found.halfway is not None:  # cycles without work hardly slip
+        part = PARTS[0]
     guess = force / part
     tall = any(key in values for key in HEIGHT)
     stiff = "strip.axial_stiffness" in values or ("strip.youngs_modulus" in values and tall)

@@ -114,6 +114,14 @@ def test_a_plateau_tells_gross_slip_and_a_straight_way_to_it_soft_sliders():
     assert float(root.contact.stick_stiffness) == 1000.0
 
 
+def test_a_line_starts_where_hardly_anything_slips():
+    u = rig.path(4)
+    loops = steady_loops(rig.recorded(7.0 * u, 1e-4 * u, 0.002)._replace(units=SI))
+    scene = plan_for({"free": {STIFF: {}}}, loops).specimens[0].scene
+    gross = float(scene.contact.friction * scene.contact.pressure * scene.strip.length)
+    assert gross == pytest.approx(70.0, rel=0.02)
+
+
 def test_the_standard_strip_stays_where_its_loops_are_fitted():
     for ratio in HEIGHT_RATIOS:
         plan = plan_for({"free": {MU: {}}}, example_loops(ratio))
