@@ -22,7 +22,13 @@ from .numerics.newton import Newton as Newton
 from .quasistatic.read_history import read_history as read_history
 from .quasistatic.response import response as response
 from .scene import library as library
-from .scene.parts import Contact as Contact, Load as Load, Model as Model, Strip as Strip
+from .scene.parts import (
+    Contact as Contact,
+    Load as Load,
+    Member as Member,
+    Model as Model,
+    Strip as Strip,
+)
 from .scene.scene import Scene as Scene
 from .scene.toml import (
     read_scene as read_scene,

@@ -43,7 +43,7 @@ HOMES = {
     "pint": "measured/columns.py",
     "distributed": "cli/sweep.py",
     "tqdm": "common/progress.py",
-    "lazy_loader": ("__init__.py", "dynamics/__init__.py"),
+    "lazy_loader": ("__init__.py", "dynamics/__init__.py", "scene/__init__.py"),
 }
 
 

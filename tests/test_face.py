@@ -66,3 +66,4 @@ def test_a_name_loads_what_it_needs_alone():
     assert "jax" in solving
     assert not solving & (HEAVY - {"jax", "numpy", "scipy"})
     assert "matplotlib" in loaded_by("import jbeamshell; jbeamshell.plotting.loop")
+    assert "jax" in loaded_by("import jbeamshell; jbeamshell.library.standard")
