@@ -83,7 +83,7 @@ class Bodies(eqx.Module):
         layers, pressure = scene.strip.layers, scene.contact.pressure
         require("strip.layers", layers, layers is None, "must be left out to interpolate bodies")
         support = scene.member.support
-        require("member.support", support, support == "none", "must be 'none' to interpolate bodies")
+        require("member.support", support, support == "none", "must be none for bodies")
         fix = "must be left out to interpolate bodies: it has no moduli to scale with"
         require("energy", scene.energy, scene.energy is None, fix)
         fix = "must be one number to interpolate bodies"
