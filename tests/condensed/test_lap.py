@@ -204,3 +204,19 @@ def test_a_sweep_runs_over_both_heights():
 def test_what_is_no_joint_is_refused(values, said):
     with pytest.raises(jb.InputError, match=said.replace("(", "\\(")):
         jb.solve(SQUEEZE.replace(values))
+
+
+@pytest.mark.slow
+def test_planted_height_and_friction_are_found():
+    true = SQUEEZE.replace({"member.height_ratio": 0.15})
+    random, loops = np.random.default_rng(0), []
+    for amplitude in (1.0, 1.5):
+        force, u = map(np.asarray, jb.solve(true.replace({"load.amplitude": amplitude})).loop)
+        noise = 2e-3 * np.ptp(u) * random.normal(size=u.size)
+        loops.append(jb.measured.Loop(force, u + noise, f"A = {amplitude}"))
+    start = true.replace({"member.height_ratio": 0.11, "contact.friction": 0.12})
+    free = ["member.height_ratio", "contact.friction"]
+    fit = jb.identify.fit(loops, start, free)
+    for key, value in zip(free, (0.15, 0.1), strict=True):
+        assert fit.values[key] == pytest.approx(value, abs=3.0 * fit.errors[key])
+        assert fit.errors[key] < 0.01 * value
