@@ -63,7 +63,7 @@ def test_gradients_are_derivatives_under_all_transformations(known):
 def test_one_linear_parameter_is_normal_and_without_known_noise_student():
     rest = readings(NOISE).y - np.asarray(formula(X, *FIXED.values(), 0.0))
     best, spread = SLOPE @ rest / (SLOPE @ SLOPE), 1.0 / np.sqrt(SLOPE @ SLOPE)
-    values = best + NOISE * spread * np.linspace(-8.0, 8.0, 401)
+    values = best + NOISE * spread * np.linspace(-8.0, 8.0, 161)
     density = identify.posterior(identify.fit(readings(NOISE, known=True), scene(**FIXED), LINEAR))
     expected = stats.norm.pdf(values, best, NOISE * spread)
     np.testing.assert_allclose(along(density, values), expected, rtol=1e-3, atol=1e-6)
