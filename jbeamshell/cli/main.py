@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 from importlib.metadata import version
+from types import FrameType
 
 import jax
 
@@ -40,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def program() -> None:
     """Run the command line as a program: ends this process with the exit code."""
+    signal.signal(signal.SIGINT, _interrupt)
     code = main()
     if code != INTERRUPTED:
         sys.exit(code)
@@ -48,6 +52,14 @@ def program() -> None:
         with contextlib.suppress(OSError):
             stream.flush()
     os._exit(code)
+
+
+def _interrupt(_: int, frame: FrameType | None) -> None:
+    """Interrupt the program; later where Python would ignore it, in a hook of JAX."""
+    if frame is not None and frame.f_code.co_name == "_xla_gc_callback":
+        threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)).start()
+        return
+    raise KeyboardInterrupt
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -3,8 +3,10 @@
 import functools
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -158,6 +160,19 @@ def test_commands_that_do_not_exist(cli, capsys, words):
     assert "usage: jbeamshell" in err
 
 
+def test_an_interrupt_within_the_hook_of_the_collector_is_not_lost():
+    def _xla_gc_callback():
+        main._interrupt(signal.SIGINT, sys._getframe())
+
+    before = signal.signal(signal.SIGINT, main._interrupt)
+    try:
+        _xla_gc_callback()
+        with pytest.raises(KeyboardInterrupt):
+            time.sleep(5.0)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_options_that_messages_name_exist():
     commands = next(a for a in main._parser()._actions if a.choices).choices.values()
     known = {option for command in commands for option in command._option_string_actions}
@@ -195,6 +210,7 @@ def test_an_interrupted_program_ends_without_taking_python_down(monkeypatch, cap
         raise SystemExit(f"ended with {code}")
 
     monkeypatch.setattr(main.os, "_exit", ended)
+    monkeypatch.setattr(main.signal, "signal", lambda *_: None)
     for code, told in ((130, "ended with 130"), (2, "2"), (0, "0")):
         monkeypatch.setattr(main, "main", lambda code=code: code)
         with pytest.raises(SystemExit, match=f"^{told}$"):
