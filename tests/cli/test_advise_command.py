@@ -27,6 +27,7 @@ def test_the_answer_as_json(cli):
     assert (told["quantity"], told["tolerance"]) == ("dissipation", 0.05)
 
 
+@pytest.mark.slow
 def test_the_answer_in_words(cli):
     code, out, _ = cli("advise", "standard", "--tol", ".2", "--set", "strip.height_ratio=0.02")
     assert code == 0

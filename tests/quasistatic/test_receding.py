@@ -170,6 +170,7 @@ def test_an_open_contact_forgets_its_traction(clamped):
     assert np.ptp(ends) > 0.1  # it recedes and advances along the cycle
 
 
+@pytest.mark.slow
 def test_a_unilateral_end_does_not_mind_how_fine_it_is():
     """With the lift frozen the corner goes into tension, and D drifts with the end element."""
     thick = {"model.fields": ["v", "w", "beta", "psi"], "load.amplitude": 0.3247}
