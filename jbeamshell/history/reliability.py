@@ -194,6 +194,8 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
 def _exact(scene: Scene) -> str:
     """Fix that makes a scene's kinematics exact."""
     model = scene.model
+    if scene.member.support != "none":
+        return "a lap joint knows no others: take a smaller load.amplitude"
     rung = f"model.rung = {general_rung(model.rung)} with " if model.condensed else ""
     return f"take {rung}model.kinematics = exact"
 

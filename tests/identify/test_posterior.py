@@ -1,4 +1,4 @@
-"""Posterior densities against closed forms."""
+"""Posterior densities against closed forms, and sampled against profile likelihoods."""
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +10,7 @@ from toy import KEYS, TRUTH, X, formula, readings, scene
 import jbeamshell as jb
 from jbeamshell import identify
 from jbeamshell.identify.parameters import Parameter
+from jbeamshell.measured.example import example_loops
 
 MU, ETA, KAPPA = KEYS
 NOISE = 2e-3
@@ -110,3 +111,28 @@ def test_a_value_at_its_bound_has_no_posterior():
     fit = identify.fit(data, scene(**{KAPPA: 0.44}), free, method="l-bfgs-b", starts=1)
     with pytest.raises(jb.InputError, match=r"posterior: contact.friction ended at its bound"):
         identify.posterior(fit)
+
+
+@pytest.mark.slow
+def test_sampled_intervals_are_those_of_profiles():
+    """Random walk of blackjax on loops of finite elements with 1 % noise."""
+    import blackjax
+
+    random, loops = np.random.default_rng(5), []
+    for loop in example_loops(0.1126, (0.5851, 1.6)):
+        u = loop.displacement
+        noise = 0.01 * np.ptp(u) * random.standard_normal(u.size)
+        loops.append(loop._replace(displacement=u + noise))
+    coarse = {"model.nodes": 21, "model.kinematics": "linear", "model.solution": "stepwise"}
+    fit = identify.fit(loops, jb.Scene().replace(coarse), [MU, ETA], points=48)
+    problem = identify.posterior(fit)
+    stride = blackjax.mcmc.random_walk.normal(1.7 * np.linalg.cholesky(problem.covariance))
+    sampler = blackjax.additive_step_random_walk(problem.logdensity, stride)
+    step, state, points = jax.jit(sampler.step), sampler.init(jnp.asarray(problem.start)), []
+    for key in jax.random.split(jax.random.key(1), 4000):
+        state, _ = step(key, state)
+        points.append(np.asarray(problem.constrain(state.position)))
+    sampled = np.quantile(np.array(points)[200:], (0.025, 0.975), axis=0).T
+    for name, ends in zip(problem.names, sampled, strict=True):
+        profiled = np.array(identify.profile(fit, name).interval)
+        np.testing.assert_allclose(ends, profiled, atol=0.1 * np.ptp(profiled))
