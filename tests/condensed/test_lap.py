@@ -207,6 +207,15 @@ def test_what_is_no_joint_is_refused(values, said):
         jb.solve(SQUEEZE.replace(values))
 
 
+def test_plane_members_need_double_precision():
+    jax.config.update("jax_enable_x64", False)
+    try:
+        with pytest.raises(jb.InputError, match="needs double precision in a lap joint"):
+            library.double_shear()
+    finally:
+        jax.config.update("jax_enable_x64", True)
+
+
 @pytest.mark.slow
 def test_planted_height_and_friction_are_found():
     true = SQUEEZE.replace({"member.height_ratio": 0.15})
