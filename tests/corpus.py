@@ -43,7 +43,7 @@ FITTING = 0.05  # misfit over the range up to which a loop of another law counts
 
 
 class Ending(NamedTuple):
-    """How a fit of a file ended.
+    """End of a fit of a file.
 
     Attributes
     ----------

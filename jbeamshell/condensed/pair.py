@@ -27,7 +27,7 @@ OVERHANG = np.linspace(0.0, 1.0, 25) ** 2  # stations of an overhang, denser at 
 
 
 class Pair(NamedTuple):
-    """What finds the movement of two members again from that of their contact.
+    """Movement of two members, found again from that of their contact.
 
     The movement of a member is v and w of all its N stations, those of an overhang among them.
 
@@ -45,11 +45,11 @@ class Pair(NamedTuple):
     lower: Array
 
     def above(self, given: Array) -> Array:
-        """What the member above is given, (steps, 2N + 2), from what the pair is given."""
+        """Movement of the member above and its loads, (steps, 2N + 2), from the pair's."""
         return jnp.concatenate([given @ self.upper.T, given[:, -2:]], axis=1)
 
     def below(self, given: Array) -> Array:
-        """What the member below is given, (steps, 2N + 2), in its own frame; no load is."""
+        """Movement of the member below in its own frame and its loads, (steps, 2N + 2)."""
         loads = given[:, -2:] * np.array([0.0, 1.0])
         return jnp.concatenate([given @ self.lower.T, loads], axis=1)
 

@@ -1,4 +1,4 @@
-"""What a fitted model leaves: how many independent points it counts as, and how much is not noise.
+"""Residuals of a fitted model: their number of independent points, and their part beyond noise.
 
 Least squares takes residuals for independent noise.  What a wrong model leaves is smooth along a
 curve, so many points of it say no more than a few.

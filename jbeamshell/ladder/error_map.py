@@ -77,6 +77,7 @@ def place(scene: Scene) -> np.ndarray | str:
         "an energy of its own": scene.energy is not None,
         "layers": strip.layers is not None,
         "a curvature": strip.curvature is not None,
+        "a second member": scene.member.support != "none",
         "a far end that is not held": strip.far_end != "held",
         "a pressure that varies": contact.pressure.ndim > 0,
         "a pressure from below": contact.bottom_pressure.ndim > 0 or contact.bottom_pressure != 0,

@@ -59,13 +59,14 @@ class TestElements:
         assert float(jnp.max(history.gap)) == pytest.approx(2.419e-4, rel=0.01)
 
     @pytest.mark.slow
-    def test_sections_of_order_four_come_near(self):
-        rows = [row for row in elements("double-shear") if row["A"] == 1.0]
-        for row, error in zip(rows, (0.015, 0.1), strict=True):
-            scene = SQUEEZE.replace({"model.rung": "p4"} | of_row(row))
-            history = jb.solve(scene)
-            assert float(history.dissipation) == pytest.approx(row["D"], rel=error)
-            assert float(history.secant_stiffness) == pytest.approx(row["K_sec"], rel=0.005)
+    def test_sections_of_higher_order_climb_to_them(self):
+        (row,) = (r for r in elements("double-shear") if (r["A"], r["H2"]) == (1.0, 0.2358))
+        errors = []
+        for rung in ("squeeze", "p2", "p4", "p6"):
+            history = jb.solve(SQUEEZE.replace({"model.rung": rung} | of_row(row)))
+            errors.append(float(history.dissipation) / row["D"] - 1.0)
+        assert np.all(np.diff(errors) < 0.0)
+        assert errors[-1] > 0.0
 
 
 class TestLimits:
@@ -75,7 +76,6 @@ class TestLimits:
             {"strip.far_end": "free", "load.amplitude": 1.0, "model.rung": "condensed-squeeze"}
         )
         scene = SQUEEZE.replace({"member.axial_stiffness": 3.4e10})
-        joint = jb.solve(scene)
         x = stations(scene, scene.model.nodes)  # one grid for both
         monkeypatch.setattr(strip, "stations", lambda *_: x)
         base = jb.solve(alone.replace({"load.steps_per_half_cycle": 22}), throw=False)
@@ -109,7 +109,7 @@ class TestBalance:
     def test_the_loop_holds_the_work_of_friction(self):
         history = jb.solve(SQUEEZE.replace({"load.steps_per_half_cycle": 400}))
         loop, work = float(history.dissipation_loop), float(history.dissipation)
-        assert loop == pytest.approx(work, rel=2e-6)
+        assert loop == pytest.approx(work, rel=1e-6)
 
     def test_members_move_apart_by_gap_and_slip(self):
         values = {"model.rung": "shell", "member.support": "clamped", "load.amplitude": 0.5}

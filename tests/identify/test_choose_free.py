@@ -1,4 +1,4 @@
-"""What is fitted where nobody names it: what the loops tell, and never what is given."""
+"""Choice of the parameters where nobody names any: the loops tell them, what is given stays."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a wrong model leaves: independent points, intervals that include it, and plain words."""
+"""Residuals of a wrong model: independent points, intervals that include it, plain words."""
 
 import numpy as np
 import pytest
