@@ -3,6 +3,7 @@ from . import (
     dynamics as dynamics,
     identify as identify,
     ladder as ladder,
+    laws as laws,
     measured as measured,
     plotting as plotting,
     reference as reference,

@@ -20,6 +20,7 @@ ORDER = [
     "measured",
     "scene",
     "reference",
+    "laws",
     "plotting",
     "history",
     "condensed",
