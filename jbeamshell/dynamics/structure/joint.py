@@ -10,6 +10,9 @@ of its contact; `jbeamshell.condensed.network` has both, and every branch betwee
 from __future__ import annotations
 
 import dataclasses
+import os
+import warnings
+from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -26,17 +29,22 @@ from jbeamshell.common.checks import (
     require,
     require_number,
 )
-from jbeamshell.common.jax_options import ONCE
+from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.condensed.network import Network, Response
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.dynamics.export import table
+from jbeamshell.dynamics.export.element import Element
+from jbeamshell.dynamics.export.targets import write
+from jbeamshell.dynamics.structure.strip_line import (
+    mean_of,
+    slider_line,
+    slider_line_once,
+    walked_line,
+)
 from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
 BACKBONE = "give as many displacements as forces, both rising from above zero, softening throughout"
-POINTS = 48  # of a backbone that is walked
-SMALLEST_FORCE = 1e-2  # its first point, over the largest force
-ANGLES = 512  # quadrature points of half a cycle, for the first harmonic
-BELOW = 1.0 - 1e-6  # thresholds nearer to the largest force are left out
+DOUBTED_ASYMMETRY = 0.05  # of an exported joint
 TRACED = "is differentiated on the contact line only: take model.rung = plane, or plain numbers"
 
 
@@ -48,6 +56,8 @@ class Joint(eqx.Module):
     displacement, force : (k,) points of the backbone; the last slope continues beyond them
     network : sliders of the strip behind it, per width; None for a backbone alone
     width : of the strip
+    asymmetry : largest difference of the strip's pull and push from the backbone, over the
+        displacement at one force
 
     Raises
     ------
@@ -65,13 +75,20 @@ class Joint(eqx.Module):
     force: Array
     network: Network | None
     width: Array
+    asymmetry: Array
 
     def __init__(
-        self, displacement: Any, force: Any, network: Network | None = None, width: Any = 1.0
+        self,
+        displacement: Any,
+        force: Any,
+        network: Network | None = None,
+        width: Any = 1.0,
+        asymmetry: Any = 0.0,
     ) -> None:
         self.displacement = as_leaf(displacement, "joint.displacement", BACKBONE)
         self.force = as_leaf(force, "joint.force", BACKBONE)
         self.network, self.width = network, as_leaf(width, "joint.width")
+        self.asymmetry = as_leaf(asymmetry, "joint.asymmetry")
 
     def __check_init__(self) -> None:
         if is_traced(self.displacement, self.force):
@@ -114,16 +131,29 @@ class Joint(eqx.Module):
         if scene.model.condensed:
             soft = not scene.ideal_friction
             inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
-            sliders = _sliders if inside else _sliders_once
-            network, u, f, count = sliders(scene, as_leaf(force, "force"), soft)
+            line = slider_line if inside else slider_line_once
+            network, sides, f, count = line(scene, as_leaf(force, "force"), soft)
+            u, asymmetry = mean_of(*sides)
             if is_traced(u):
-                return cls(u, width * f, network, width)
+                return cls(u, width * f, network, width, asymmetry)
             if np.all(np.isfinite(u)):
                 kept = np.append(np.arange(u.size - 1) < int(count), True)
                 u, f = np.asarray(u)[kept], width * np.asarray(f)[kept]
-                return cls(u, f, network, width)
+                return cls(u, f, network, width, asymmetry)
         require("scene", "traced", not is_traced(scene, force), TRACED)
-        return cls(*_walked(scene, float(force), width), width=width)
+        u, f, asymmetry = walked_line(scene, float(force), width)
+        return cls(u, f, width=width, asymmetry=asymmetry)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Joint:
+        """Joint with the backbone of a table, such as `export` writes: CSV or MATLAB.
+
+        Raises
+        ------
+        InputError
+            for a file that holds no columns ``displacement`` and ``force``, or no backbone
+        """
+        return cls(*table.read(path))
 
     @property
     def springs(self) -> Array:
@@ -180,10 +210,12 @@ class Joint(eqx.Module):
         The real part is elastic; the imaginary part is the energy per cycle over pi amplitude^2.
         """
         size = jnp.asarray(amplitude)
-        angle = jnp.pi * (jnp.arange(ANGLES) + 0.5) / ANGLES  # from +amplitude to -amplitude
-        half_swing = 0.5 * size[..., None] * (1.0 - jnp.cos(angle))
-        branch = self.backbone(size)[..., None] - 2.0 * self.backbone(half_swing)
-        elastic = 2.0 / ANGLES * jnp.sum(branch * jnp.cos(angle), axis=-1) / size
+        springs, slip = self.springs, self.displacement[:-1]
+        moves = slip < size[..., None]
+        part = jnp.where(moves, slip, 0.5) / jnp.where(moves, size[..., None], 1.0)
+        angle = jnp.arccos(1.0 - 2.0 * part)  # of the cycle from its turn until the slider slips
+        share = jnp.where(moves, (angle - 0.5 * jnp.sin(2.0 * angle)) / jnp.pi, 1.0)
+        elastic = springs[-1] + jnp.sum(springs[:-1] * share, axis=-1)
         return elastic + 1j * self.dissipation(size) / (jnp.pi * size**2)
 
     def path_forces(self, path: ArrayLike) -> NDArray[np.float64]:
@@ -207,6 +239,60 @@ class Joint(eqx.Module):
             forces.append(sliders.sum() + springs[-1] * u)
         return np.array(forces)
 
+    def export(
+        self,
+        to: str,
+        path: str | os.PathLike[str],
+        *,
+        units: tuple[str, str] = ("length", "force"),
+    ) -> Path:
+        """Write the joint for another program; returns the path.
+
+        Parameters
+        ----------
+        to : ``opensees`` (OpenSeesPy lines), ``fmu`` (FMI 2 co-simulation), ``tmdsimpy`` (its
+            forces), ``calculix`` (cards for CalculiX and Abaqus) or ``table`` (CSV or MATLAB)
+        path : file, which says width, units, sign and limits
+        units : names of the scene's units of length and force, for the file alone
+
+        Raises
+        ------
+        InputError
+            for an unknown target, a traced joint, another ending of the file's name, a file that
+            cannot be written, or a library that is missing
+
+        Warns
+        -----
+        DoubtfulWarning
+            if pull and push differ by more than a twentieth from the exported mean
+
+        Examples
+        --------
+        ::
+
+            Joint.of(scene, 1.2, width=30.0).export("opensees", "joint.py", units=("mm", "N"))
+        """
+        require("joint", "traced", not is_traced(self), "export it outside jit, grad and vmap")
+        words = isinstance(units, tuple | list) and len(units) == 2 and all(map(_is_word, units))
+        require("units", units, words, "name those of length and force, such as ('mm', 'N')")
+        springs = np.asarray(self.springs, float)
+        element = Element(
+            np.asarray(self.displacement, float),
+            np.asarray(self.force, float),
+            springs[:-1],
+            np.asarray(self.limits, float),
+            spring=float(springs[-1]),
+            width=float(self.width),
+            asymmetry=float(self.asymmetry),
+            units=(units[0], units[1]),
+        )
+        written = write(element, to, path)
+        if element.asymmetry > DOUBTED_ASYMMETRY:
+            text = f"doubtful: pull and push differ by {element.asymmetry:.0%} of u from their mean"
+            fix = "which is exported; joint.path_forces has each way exactly"
+            warnings.warn(f"{text}, {fix}", DoubtfulWarning, stacklevel=2)
+        return written
+
     @property
     def _points(self) -> tuple[Array, Array]:
         """Points of the backbone, with the origin."""
@@ -228,36 +314,9 @@ def largest_force(scene: Scene, force: Any = None) -> Any:
     return force
 
 
-def _sliders(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array, Array, Array]:
-    """Network, mean backbone (k + 1,) of pull and push, and its count of points below the force.
-
-    The points are the means of the thresholds, and the force; those beyond are laid evenly on the
-    straight line from the last one below it.  The displacements are NaN where the slip zones are
-    not nested.
-    """
-    network = Network.of(scene, soft)
-    ways = jnp.asarray([1.0, -1.0])
-    sides = jax.vmap(lambda way: network.sliders(network.rest, way))(ways)
-    levels = jnp.mean(sides.force, axis=0)[1:]
-    below = levels < BELOW * force
-    count, last = jnp.sum(below), jnp.max(jnp.where(below, levels, 0.0), initial=0.0)
-    number = jnp.arange(levels.size)
-    part = (number + 1 - count) / (levels.size + 1 - count)
-
-    def mean(forces: Array) -> Array:
-        return jnp.mean(jax.vmap(lambda side: side.displacement_after(forces))(sides), axis=0)
-
-    def points(inside: Array, begin: Array, end: Array) -> Array:
-        return jnp.append(jnp.where(number < count, inside, begin + (end - begin) * part), end)
-
-    f = points(levels, last, force)
-    u = points(mean(levels), mean(last), mean(force))
-    nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
-    rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
-    return network, jnp.where(jnp.all(nested) & rising, u, jnp.nan), f, count
-
-
-_sliders_once = jax.jit(_sliders, static_argnums=2, compiler_options=ONCE)
+def _is_word(text: object) -> bool:
+    """True for printable text of one line, which a file can hold."""
+    return isinstance(text, str) and 0 < len(text) < 30 and text.isascii() and text.isprintable()
 
 
 def _exact(network: Network, path: NDArray[np.float64]) -> Array:
@@ -276,30 +335,3 @@ def _exact(network: Network, path: NDArray[np.float64]) -> Array:
 @jax.jit
 def _along(network: Network, path: Array) -> Response:
     return network.along(path)
-
-
-def _walked(
-    scene: Scene, force: float, width: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Backbone of load steps under pull and push."""
-    levels = np.geomspace(SMALLEST_FORCE * force, force, POINTS)
-    pull, push = (np.asarray(solve(scene, sign * levels).displacement) for sign in (1.0, -1.0))
-    u = 0.5 * (pull - push)[-POINTS:]
-    return _softening(u, width * levels)
-
-
-def _softening(
-    u: NDArray[np.float64], f: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points of the concave hull of a backbone; sliders cannot stiffen."""
-    kept = [(0.0, 0.0)]
-    for point in zip(u, f, strict=True):
-        while len(kept) > 1 and _slope(kept[-2], kept[-1]) <= _slope(kept[-1], point):
-            kept.pop()
-        kept.append(point)
-    x, y = np.array(kept[1:]).T
-    return x, y
-
-
-def _slope(a: tuple[float, float], b: tuple[float, float]) -> float:
-    return (b[1] - a[1]) / (b[0] - a[0])
