@@ -30,7 +30,10 @@ class JointOfSliders(Fmi2Slave):
             ("stiffness", Fmi2Causality.output, f"dF/du of the last step in {force}/{length}"),
             ("dissipated", Fmi2Causality.output, f"work of friction so far in {force} {length}"),
         ):
-            kind: dict[str, Any] = {"causality": causality, "variability": Fmi2Variability.continuous}
+            kind: dict[str, Any] = {
+                "causality": causality,
+                "variability": Fmi2Variability.continuous,
+            }
             if causality == Fmi2Causality.output:
                 kind["initial"] = Fmi2Initial.exact
             self.register_variable(Real(name, description=words, **kind))

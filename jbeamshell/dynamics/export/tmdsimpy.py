@@ -25,8 +25,8 @@ def write(element: Element, draft: Path) -> None:
     """Write a module with `jenkins` and `stiffness`."""
     notes = [
         "In a model: import this file, add each of jenkins(Q, T) by add_nl_force, and",
-        "stiffness(Q, T) to K.  tmdsimpy samples the cycle: 2**10 times a cycle give its harmonic",
-        "within 1e-5 or so.",
+        "stiffness(Q, T) to K.  tmdsimpy samples the cycle: Nt = 2**10 gives the first harmonic",
+        "within 1e-6.",
     ]
     draft.write_text(
         element.comment("#", notes)

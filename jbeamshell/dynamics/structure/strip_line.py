@@ -11,7 +11,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.common.jax_options import ONCE
-from jbeamshell.condensed.network import Network
+from jbeamshell.condensed.network import Network, Sliders
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.scene.scene import Scene
 
@@ -42,9 +42,13 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array,
     number = jnp.arange(levels.size)
     part = (number + 1 - count) / (levels.size + 1 - count)
 
-    inside = jnp.where(number < count, levels, last + (force - last) * part)
-    f = jnp.append(inside, force)
-    u = jax.vmap(lambda side: side.displacement_after(f))(sides)
+    def points(inside: Array, begin: Array, end: Array) -> Array:
+        return jnp.append(jnp.where(number < count, inside, begin + (end - begin) * part), end)
+
+    def line(side: Sliders) -> Array:
+        return points(*map(side.displacement_after, (levels, last, force)))
+
+    f, u = points(levels, last, force), jax.vmap(line)(sides)
     nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
     rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
     return network, jnp.where(jnp.all(nested) & rising, u, jnp.nan), f, count

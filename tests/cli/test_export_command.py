@@ -1,0 +1,30 @@
+"""`jbeamshell export`: a file that says what it is, or one line and no file."""
+
+import pytest
+
+from jbeamshell.dynamics import Joint
+
+PLANE = ["--set", "model.rung=plane", "--set", "model.nodes=33"]
+
+
+def test_it_writes_a_joint(cli, tmp_path):
+    path = tmp_path / "joint.csv"
+    words = ["--width", "30", "--units", "mm, N", "--force", "1.2", "--out", path]
+    code, out, err = cli("export", *PLANE, "--to", "table", *words)
+    assert (code, out) == (0, "")
+    assert err == f"wrote {path}\n"
+    assert "u in mm, F in N" in path.read_text()
+    assert float(Joint.read(path).force[-1]) == pytest.approx(36.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--to", "table", "--force", "5"], "gross slip"),
+        (["--to", "table", "--width", "0"], "width = 0.0"),
+        (["--to", "table", "--units", "mm"], "name those of length and force"),
+        (["--to", "opensees"], "end the name of a file for 'opensees' in .py"),
+    ],
+)
+def test_bad_input_is_one_line(refused, words, complaint):
+    assert complaint in refused("export", *PLANE, *words)
