@@ -10,10 +10,41 @@ Examples
 >>> law.path_forces([0.01, -0.01, 0.005])
 """
 
+from jbeamshell.common.errors import InputError
+from jbeamshell.laws.bar import Bar as Bar
+from jbeamshell.laws.bouc_wen import BoucWen as BoucWen
+from jbeamshell.laws.dahl import Dahl as Dahl
 from jbeamshell.laws.iwan4 import Iwan4 as Iwan4
+from jbeamshell.laws.jang_barber import JangBarber as JangBarber
 from jbeamshell.laws.jenkins import Jenkins as Jenkins
 from jbeamshell.laws.law import Law as Law
+from jbeamshell.laws.lugre import LuGre as LuGre
 from jbeamshell.laws.masing import MasingLaw as MasingLaw
+from jbeamshell.laws.mindlin import Mindlin as Mindlin
+from jbeamshell.laws.parallel_iwan import ParallelIwan as ParallelIwan
+from jbeamshell.laws.parallel_iwan import sliders as sliders
+from jbeamshell.laws.power_law import PowerLaw as PowerLaw
+from jbeamshell.laws.series_iwan import SeriesIwan as SeriesIwan
 
-LAWS: dict[str, type[Law]] = {law.heading: law for law in (Jenkins, Iwan4)}
-"""Laws by the names that ``--model`` knows."""
+LAWS: dict[str, type[Law]] = {
+    law.heading: law
+    for law in (Jenkins, Iwan4, Bar, Mindlin, BoucWen, Dahl, LuGre, JangBarber, PowerLaw)
+}
+"""Laws by the names that ``--model`` knows, besides "sliders4" and the like, see `law_named`."""
+
+
+def law_named(name: str) -> type[Law]:
+    """Law of a name in `LAWS`, or of some parallel sliders, such as "sliders4".
+
+    Raises
+    ------
+    InputError
+        for an unknown name
+    """
+    count = name.removeprefix("sliders") if isinstance(name, str) else ""
+    if isinstance(name, str) and name.startswith("sliders") and count.isdecimal():
+        return sliders(int(count))
+    if not isinstance(name, str) or name not in LAWS:
+        known = ", ".join(LAWS)
+        raise InputError(f"model = {name!r}: choose {known}, or sliders with their count: sliders4")
+    return LAWS[name]

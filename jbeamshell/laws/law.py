@@ -16,8 +16,8 @@ from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.errors import InputError
 from jbeamshell.scene.rows import Key, Part, rows
 
-BISECTIONS = 60  # halvings of the logarithm of a displacement
-LONGEST = 40.0  # logarithm of the largest displacement tried, over that without slip
+BISECTIONS = 64  # halvings of the logarithm of a displacement
+LONGEST = 40.0  # logarithm of the displacements tried, about that without slip
 CYCLES = 3  # cycles that are run where no closed form is known; the last one counts
 POINTS = 129  # of one branch of such a cycle; odd, for Simpson's rule
 BEYOND = "is gross slip of this law or more: ask for less than"
@@ -37,6 +37,7 @@ class Law(Part):
     """
 
     masing: ClassVar[bool] = False  # True if loops are the backbone doubled, see `MasingLaw`
+    fitted: ClassVar[tuple[str, ...]] = ()  # numbers that a loop tells; all if empty
 
     @property
     @abc.abstractmethod
@@ -78,10 +79,19 @@ class Law(Part):
         force = self.backbone(size) if self.masing else self._over(size, self._reached)
         return force / size
 
+    def dissipation_at_force(self, force: ArrayLike) -> Array:
+        """Energy lost per steady cycle at a force amplitude; see `displacement`."""
+        return self.dissipation(self.displacement(force))
+
     @classmethod
     def table(cls) -> dict[str, Key]:
         """Rows of the law's numbers by dotted key, such as "iwan4.stiffness"."""
         return {row.name: row for row in rows(cls).values()}
+
+    @classmethod
+    def free(cls) -> tuple[str, ...]:
+        """Dotted keys of the numbers that a loop tells."""
+        return tuple(f"{cls.heading}.{name}" for name in cls.fitted) or tuple(cls.table())
 
     def get(self, key: str) -> Any:
         """Number of a dotted key."""
@@ -135,7 +145,7 @@ class Law(Part):
             below = rising(jnp.exp(middle)) < force
             return jnp.where(below, middle, low), jnp.where(below, high, middle)
 
-        ends = lax.fori_loop(0, BISECTIONS, halve, (least, least + LONGEST))
+        ends = lax.fori_loop(0, BISECTIONS, halve, (least - LONGEST, least + LONGEST))
         u = lax.stop_gradient(jnp.exp(0.5 * (ends[0] + ends[1])))
         value, slope = jax.jvp(rising, (u,), (jnp.ones_like(u),))
         step = (force - value) / jnp.where(slope > 0.0, slope, jnp.inf)

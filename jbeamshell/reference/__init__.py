@@ -1,8 +1,8 @@
 """Exact solutions from the literature, each with its source.
 
-The bar on a frictional foundation and Masing's rule, the stuck strip, Filon's squeezed strip and
-the psi model beside it, the bimetal strip, and receding contact.  Units are any consistent set; a
-strip has unit width, so forces are per width.
+The bar on a frictional foundation and Masing's rule, Cattaneo's and Mindlin's contact, the stuck
+strip, Filon's squeezed strip and the psi model beside it, the bimetal strip, and receding contact.
+Units are any consistent set; a strip has unit width, so forces are per width.
 
 Examples
 --------
@@ -26,6 +26,12 @@ from jbeamshell.reference.masing import bar_hysteresis as bar_hysteresis
 from jbeamshell.reference.masing import masing_dissipation as masing_dissipation
 from jbeamshell.reference.masing import masing_loop as masing_loop
 from jbeamshell.reference.masing import masing_pull_push as masing_pull_push
+from jbeamshell.reference.mindlin import counter_slip_part as counter_slip_part
+from jbeamshell.reference.mindlin import goodman_energy as goodman_energy
+from jbeamshell.reference.mindlin import mindlin_energy as mindlin_energy
+from jbeamshell.reference.mindlin import pair_compliance as pair_compliance
+from jbeamshell.reference.mindlin import sphere_law as sphere_law
+from jbeamshell.reference.mindlin import stuck_part as stuck_part
 from jbeamshell.reference.receding import beam_contact_length as beam_contact_length
 from jbeamshell.reference.receding import strip_contact_length as strip_contact_length
 from jbeamshell.reference.squeeze import best_decay_ratio as best_decay_ratio
