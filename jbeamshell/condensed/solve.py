@@ -11,6 +11,7 @@ from jax import Array
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import Status
+from jbeamshell.common.precision import in_double
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import (
@@ -35,6 +36,7 @@ Cycles = tuple[tuple[int, int, int], ...]
 NESTED_FROM = 6  # order of a section from which on no point reaction disturbs the corner's slip
 
 
+@in_double
 def solve(
     scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False, own: bool = True
 ) -> History:
@@ -160,7 +162,9 @@ def _levels(
     if nested or not targets.size:
         found, sound = nested_levels(body, friction, pressed(body), targets, turns)
     else:
-        follow = levels if strip.pair is None else walk  # whose slip zones are never nested
+        # Slip zones of a joint are never nested, and factors overflow in single precision.
+        factored = strip.pair is None and body.f_t.dtype == np.float64
+        follow = levels if factored else walk
         found = follow(body, friction, pressed(body), targets, turns, lift)
         sound = jnp.all(jnp.isfinite(strip.lift))
     state = found.state

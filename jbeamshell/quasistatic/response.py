@@ -13,6 +13,7 @@ from jax import Array
 from jbeamshell.common.checks import check_words, is_traced, require, require_choice
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.native import Native
+from jbeamshell.common.precision import doubled, in_double, is_single
 from jbeamshell.condensed.solve import nests
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
@@ -89,6 +90,22 @@ def response(
         require_choice("figures", name, RESPONSES)
 
     scene = pinned(scene, figures)
+    ask = _response(scene, over, figures, solver, method)
+    if not scene.model.condensed or is_traced(scene) or not is_single(scene):
+        return ask
+    with jax.enable_x64(True):
+        precise = _response(doubled(scene), over, figures, solver, method)
+    return in_double(precise, within=ask)
+
+
+def _response(
+    scene: Scene,
+    over: Sequence[str],
+    figures: Sequence[str],
+    solver: Newton | None,
+    method: Method | None,
+) -> Response:
+    """Response of a scene with its settings as they were chosen; see `response`."""
 
     def solved_by(method: Method) -> Response:
         def figures_of(*values: Array) -> dict[str, Array]:

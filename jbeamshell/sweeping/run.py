@@ -17,11 +17,13 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+import jax
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.checks import check_words, require
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.files import as_path
+from jbeamshell.common.precision import doubled, is_single
 from jbeamshell.common.progress import counting, in_notebook
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.response import pinned
@@ -116,12 +118,17 @@ def sweep(
         result["dissipation"]  # (32, 2)
     """
     begun = time.perf_counter()
-    job = _job(scene, over, figures, paired, solver)
-    check_place(processes, executor, devices)
-    table = None if out is None else _check_out(out)
-    store = None if table is None else Store(f"{table}{PARTS}")
     place = _Place(processes, executor, devices)
-    with counting(progress, "sweep", "lane") as told:
+    with contextlib.ExitStack() as stack:
+        names, lanes = _lanes_of(scene, over, figures, paired)
+        if lanes.scene.model.condensed and is_single(lanes.scene):
+            stack.enter_context(jax.enable_x64(True))
+            lanes = dataclasses.replace(lanes, scene=doubled(lanes.scene))
+        job = _job(lanes, names, solver)
+        check_place(processes, executor, devices)
+        table = None if out is None else _check_out(out)
+        store = None if table is None else Store(f"{table}{PARTS}")
+        told = stack.enter_context(counting(progress, "sweep", "lane"))
         result = _run(job, store, place, _Watch(begun, told))
     if store is not None and table is not None:
         store.publish(result, table)
@@ -129,23 +136,23 @@ def sweep(
     return result
 
 
-def _job(
-    scene: Scene,
-    over: Mapping[str, ArrayLike],
-    figures: Sequence[str],
-    paired: bool,
-    solver: Newton | None,
-) -> Job:
-    names = [figures] if isinstance(figures, str) else figures
+def _lanes_of(
+    scene: Scene, over: Mapping[str, ArrayLike], figures: Sequence[str], paired: bool
+) -> tuple[tuple[str, ...], Lanes]:
+    """Names of the figures, and lanes with the settings that serve all of them."""
+    names = (figures,) if isinstance(figures, str) else figures
     check_words("figures", names)
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
-    fix = "give a jbeamshell.Newton"
-    require("solver", solver, solver is None or isinstance(solver, Newton), fix)
     lanes = lanes_of(scene, over, paired)
     check_size(lanes.size, len(names))
-    lanes = dataclasses.replace(lanes, scene=pinned(scene, names, lanes.value))
-    check_figures(lanes.scene, tuple(lanes.axes), tuple(names), solver)
-    return Job(lanes, tuple(names), solver)
+    return tuple(names), dataclasses.replace(lanes, scene=pinned(scene, names, lanes.value))
+
+
+def _job(lanes: Lanes, figures: tuple[str, ...], solver: Newton | None) -> Job:
+    fix = "give a jbeamshell.Newton"
+    require("solver", solver, solver is None or isinstance(solver, Newton), fix)
+    check_figures(lanes.scene, tuple(lanes.axes), figures, solver)
+    return Job(lanes, figures, solver)
 
 
 def _check_out(out: str | os.PathLike[str]) -> Path:
