@@ -15,6 +15,11 @@ from .common.errors import (
     UnconvergedError as UnconvergedError,
 )
 from .common.jax_options import configure as configure
+from .condensed.contact import solve_contact as solve_contact
+from .condensed.contact_file import read_contact as read_contact
+from .condensed.stiffness_model import StiffnessModel as StiffnessModel
+from .condensed.substructure import Substructure as Substructure
+from .history.contact_history import ContactHistory as ContactHistory
 from .history.history import History as History
 from .ladder.advice import Advice as Advice, advise as advise
 from .ladder.solving import solve as solve

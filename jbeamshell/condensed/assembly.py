@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array
@@ -37,18 +38,26 @@ class Assembly(NamedTuple):
 
 
 def press_roughly(
-    k_tt: Array, k_tn: Array, k_nn: Array, press_t: Array, press_n: Array, friction: Array
+    k_tt: Array,
+    k_tn: Array,
+    k_nn: Array,
+    press_t: Array,
+    press_n: Array,
+    friction: Array,
+    gap: Array | None = None,
 ) -> Assembly:
     """Pressing of a body with friction; first derivatives are exact.
 
+    Over an initial gap the body first lies down under the even reactions alone.
+
     Parameters
     ----------
-    k_tt, k_tn, k_nn : (n, n) stiffness
-    press_t, press_n : (n,) nodal forces of the base if nothing moved
+    k_tt, k_tn, k_nn : (k, k), (k, n) and (n, n) stiffness
+    press_t, press_n : (k,) and (n,) nodal forces of the base if nothing moved
     friction : mu
+    gap : (n,) distance of the nodes before anything presses; None is none
     """
-    zero = jnp.zeros_like(press_n)
-    even = jax.lax.stop_gradient(FIRST * jnp.mean(press_n)) + zero
+    zero, even = jnp.zeros_like(press_n), jax.lax.stop_gradient(FIRST * jnp.mean(press_n))
     body = Body(
         x=zero,
         tributary=zero,
@@ -57,12 +66,18 @@ def press_roughly(
         K_nn=k_nn,
         f_t=-press_t,
         f_n=even - press_n,
-        r_0=even,
-        t_0=zero,
+        r_0=even + zero,
+        t_0=jnp.zeros_like(press_t),
         c=jnp.ones_like(friction),
     )
-    once = jnp.ones(1, bool)
-    levels = walk(body, friction, pressed(body), jnp.ones_like(press_n[:1]), once)
-    at = jax.tree.map(lambda part: jnp.where(levels.settled[0], part[0], jnp.nan), levels.state)
-    lift = jnp.where(levels.settled[0], levels.lift[0], jnp.nan)
-    return Assembly(lift, at.v, at.r_n, at.r_t)
+    once, whole = jnp.ones(1, bool), jnp.ones_like(press_n[:1])
+    state, lift, sound = pressed(body), zero, jnp.asarray(True)
+    if gap is not None:
+        over = eqx.tree_at(lambda b: (b.f_t, b.f_n), body, (k_tn @ gap, k_nn @ gap))
+        lying = walk(over, friction, state, whole, once)
+        state, lift = jax.tree.map(lambda part: part[0], (lying.state, lying.lift))
+        state, sound = state._replace(force=0.0 * body.c), lying.settled[0]
+    levels = walk(body, friction, state, whole, once, lift)
+    sound = sound & levels.settled[0]
+    at = jax.tree.map(lambda part: jnp.where(sound, part[0], jnp.nan), levels.state)
+    return Assembly(jnp.where(sound, levels.lift[0], jnp.nan), at.v, at.r_n, at.r_t)

@@ -166,13 +166,33 @@ def joined(upper: Member, lower: Member) -> tuple[Pair, Array]:
     pair : what finds both members again
     hessian : (2n + 2, 2n + 2) of the pair's potential in the relative v and w, load and pressure
     """
-    dtype, size = upper.hessian.dtype, upper.fixed.size
-    sign = jnp.append(jnp.tile(jnp.asarray(UNITS), size // 2), jnp.ones(2))
-    above, below = upper.hessian, lower.hessian * sign[:, None] * sign
-    # Both from the movement z of the member below and g: q_1 = z + g, q_2 = z, unless one is held.
-    moves = jnp.asarray(~(upper.fixed | lower.fixed), dtype)
-    first = jnp.asarray(~upper.fixed, dtype)
-    second = jnp.asarray(np.where(upper.fixed & ~lower.fixed, -1.0, 0.0), dtype)
+    sign = jnp.append(jnp.tile(jnp.asarray(UNITS), upper.fixed.size // 2), jnp.ones(2))
+    below = lower.hessian * sign[:, None] * sign
+    hessian, q_1, q_2 = together(upper.hessian, below, upper.fixed, lower.fixed)
+    moves = upper.movement @ q_1, lower.movement @ (sign[:, None] * q_2)
+    return Pair(lower.form, lower.elimination, *moves), hessian
+
+
+def together(
+    above: Array, below: Array, fixed_above: np.ndarray, fixed_below: np.ndarray
+) -> tuple[Array, Array, Array]:
+    """Potential of two bodies in their relative displacements g = q_1 - q_2.
+
+    Parameters
+    ----------
+    above, below : (2n + 2, 2n + 2) second derivatives in q of each body, end load and pressure
+    fixed_above, fixed_below : (2n,) True for displacements that a support holds
+
+    Returns
+    -------
+    hessian : (2n + 2, 2n + 2) in g, end load and pressure
+    q_1, q_2 : (2n + 2, 2n + 2) displacements of each body and the loads from these
+    """
+    dtype, size = above.dtype, fixed_above.size
+    # Both from the movement z of the body below and g: q_1 = z + g, q_2 = z, unless one is held.
+    moves = jnp.asarray(~(fixed_above | fixed_below), dtype)
+    first = jnp.asarray(~fixed_above, dtype)
+    second = jnp.asarray(np.where(fixed_above & ~fixed_below, -1.0, 0.0), dtype)
 
     def in_both(scales: Array, both: Array) -> Array:
         return scales[:, None] * both * scales
@@ -187,6 +207,5 @@ def joined(upper: Member, lower: Member) -> tuple[Pair, Array]:
     given = jnp.eye(size, size + 2, dtype=dtype)
     loads = jnp.eye(size + 2, dtype=dtype)[-2:]
     q_1 = jnp.concatenate([z + first[:, None] * given, loads])
-    q_2 = sign[:, None] * jnp.concatenate([z + second[:, None] * given, loads])
-    pair = Pair(lower.form, lower.elimination, upper.movement @ q_1, lower.movement @ q_2)
-    return pair, hessian
+    q_2 = jnp.concatenate([z + second[:, None] * given, loads])
+    return hessian, q_1, q_2

@@ -45,6 +45,7 @@ def press(
     press_t: Array,
     press_n: Array,
     foundation: bool = True,
+    gap: Array | None = None,
 ) -> Pressing:
     """Pressing of a body without friction.
 
@@ -56,25 +57,29 @@ def press(
     press_t, press_n : (k,) and (n,) nodal forces of the base if nothing moved
     foundation : False to leave the body without a base under pressures that balance; the last node
         keeps its height
+    gap : (n,) distance of the nodes before anything presses; None is none.  The lift is what is
+        left of it
     """
     known = solve(k_tt, jnp.concatenate([k_tn, press_t[:, None]], axis=1))
     stiffness = k_nn - k_tn.T @ known[:, :-1]
     r_0 = press_n - k_tn.T @ known[:, -1]
+    down, away = jnp.sum(r_0), jnp.zeros_like(r_0) if gap is None else gap
+    r_0 = r_0 - stiffness @ away
     opened, found = jnp.arange(r_0.size) < r_0.size - 1, jnp.asarray(True)
     if foundation:
-        opened, found = lax.stop_gradient(_open_nodes(stiffness, r_0))
+        opened, found = lax.stop_gradient(_open_nodes(stiffness, r_0, down))
     both = opened[:, None] & opened
     matrix = jnp.where(both, stiffness, jnp.diag(jnp.diag(stiffness)))
     lift = jnp.where(opened, solve(matrix, jnp.where(opened, -r_0, 0.0)), 0.0)
     lift = jnp.where(found, lift, jnp.nan)
     reaction = jnp.where(opened | (not foundation), 0.0, r_0 + stiffness @ lift)
-    return Pressing(lift, -known[:, -1] - known[:, :-1] @ lift, reaction)
+    return Pressing(lift, -known[:, -1] - known[:, :-1] @ (lift - away), reaction)
 
 
-def _open_nodes(stiffness: Array, r_0: Array) -> tuple[Array, Array]:
-    """Open nodes (n,), and True if the events came to an end."""
+def _open_nodes(stiffness: Array, r_0: Array, down: Array) -> tuple[Array, Array]:
+    """Open nodes (n,), and True if the events came to an end; ``down`` is the whole pressure."""
     n = r_0.size
-    even = jnp.maximum(jnp.sum(r_0), 0.0) / n * jnp.ones(n)
+    even = jnp.maximum(down, 0.0) / n * jnp.ones(n)
     rows = jnp.concatenate([stiffness, even[:, None], (r_0 - even)[:, None]], axis=1)
 
     class Walk(NamedTuple):
@@ -100,4 +105,4 @@ def _open_nodes(stiffness: Array, r_0: Array) -> tuple[Array, Array]:
 
     start = Walk(rows, jnp.zeros(n, bool), jnp.zeros(()), jnp.asarray(0))
     end = lax.while_loop(unfinished, go, start)
-    return end.opened, (next_event(end)[0] >= 1.0) & (jnp.sum(r_0) > 0.0)
+    return end.opened, (next_event(end)[0] >= 1.0) & (down > 0.0)

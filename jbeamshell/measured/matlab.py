@@ -17,22 +17,26 @@ from typing import Any
 import numpy as np
 
 LONGEST_TIME = 60.0  # seconds to read a file
+SPARSE = ":"  # before row, column, value and shape, the parts of a sparse matrix
 
 
-def variables(data: bytes, largest: int) -> Iterator[tuple[str, np.ndarray]]:
+def variables(
+    data: bytes, largest: int, *, sparse: bool = False
+) -> Iterator[tuple[str, np.ndarray]]:
     """Numbers in a MATLAB file of version 7 or before, with their names.
 
     Parameters
     ----------
     data : content of the file
     largest : bytes that its variables may take
+    sparse : True to give sparse matrices too, in parts: "K:row", "K:column", "K:value", "K:shape"
 
     Raises
     ------
     ValueError
         if it is no such file, with the reason
     """
-    command = [sys.executable, "-P", __file__, str(largest)]
+    command = [sys.executable, "-P", __file__, str(largest), *["sparse"][: int(sparse)]]
     try:
         ended = subprocess.run(command, input=data, capture_output=True, timeout=LONGEST_TIME)
     except subprocess.TimeoutExpired:
@@ -45,13 +49,22 @@ def variables(data: bytes, largest: int) -> Iterator[tuple[str, np.ndarray]]:
             yield name, archive[str(place)]
 
 
-def _unpacked(data: bytes, largest: int) -> Iterator[tuple[str, np.ndarray]]:
+def _unpacked(data: bytes, largest: int, sparse: bool) -> Iterator[tuple[str, np.ndarray]]:
     from scipy.io import loadmat, whosmat  # slow to import
+    from scipy.sparse import coo_array, issparse
 
-    if sum(8 * math.prod(shape) for _, shape, _ in whosmat(io.BytesIO(data))) > largest:
+    found = whosmat(io.BytesIO(data))
+    full = (math.prod(shape) for _, shape, kind in found if not (sparse and kind == "sparse"))
+    if 8 * sum(full) > largest:
         raise ValueError(f"more than {largest // 10**6} MB when unpacked")
     for name, value in loadmat(io.BytesIO(data)).items():
-        if not name.startswith("__"):
+        if sparse and issparse(value):
+            parts = coo_array(value)
+            yield f"{name}{SPARSE}row", parts.row
+            yield f"{name}{SPARSE}column", parts.col
+            yield f"{name}{SPARSE}value", parts.data
+            yield f"{name}{SPARSE}shape", np.array(parts.shape)
+        elif not name.startswith("__"):
             yield from _fields(name, value)
 
 
@@ -71,7 +84,8 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _main() -> None:
-    found = list(_unpacked(sys.stdin.buffer.read(), int(sys.argv[1])))
+    data, largest, sparse = sys.stdin.buffer.read(), int(sys.argv[1]), "sparse" in sys.argv[2:]
+    found = list(_unpacked(data, largest, sparse))
     arrays: dict[str, Any] = {str(place): array for place, (_, array) in enumerate(found)}
     archive = io.BytesIO()
     np.savez(archive, names=json.dumps([name for name, _ in found]), **arrays)

@@ -22,6 +22,7 @@ from jbeamshell.plotting.motions import ring_down as ring_down
 from jbeamshell.plotting.motions import ring_down_sheet as ring_down_sheet
 from jbeamshell.plotting.motions import spectrogram as spectrogram
 from jbeamshell.plotting.motions import vibration as vibration
+from jbeamshell.plotting.paths import contact_lines as contact_lines
 from jbeamshell.plotting.paths import loop as loop
 from jbeamshell.plotting.paths import profiles as profiles
 from jbeamshell.plotting.style import DATA as DATA

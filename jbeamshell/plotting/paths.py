@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.plotting.protocols import LoadPath
+from jbeamshell.plotting.protocols import ContactPath, LoadPath, LoopPath
 from jbeamshell.plotting.steps import checked_steps, default_steps, load_label
 from jbeamshell.plotting.style import (
     DATA,
@@ -26,12 +26,12 @@ from jbeamshell.plotting.style import (
 )
 
 
-def loop(history: LoadPath, axes: Axes | None = None) -> Axes:
+def loop(history: LoopPath, axes: Axes | None = None) -> Axes:
     """Draw end force over end displacement, with the last closed cycle emphasised.
 
     Parameters
     ----------
-    history : LoadPath
+    history : LoopPath
         Solved load path, such as a `jbeamshell.History`.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
@@ -126,6 +126,52 @@ def profiles(
         dot = Line2D([], [], color=DATA, marker="o", linestyle="", markersize=3.2)
         handles, labels = traction.get_legend_handles_labels()
         traction.legend([*handles, dot], [*labels, "slips"], loc="best")
+    return grid
+
+
+def contact_lines(
+    history: ContactPath, steps: Sequence[int] | None = None, axes: ArrayLike | None = None
+) -> np.ndarray:
+    """Draw slip, gap, friction traction and normal reaction of substructures along X.
+
+    Parameters
+    ----------
+    history : ContactPath
+        Contact between substructures, such as a `jbeamshell.ContactHistory`.
+    steps : sequence of int, optional
+        Indices into the path. When not given: the pressing and the turns of the last cycle.
+    axes : array_like of matplotlib.axes.Axes, optional
+        Four axes; a new figure when not given.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes
+        The axes drawn into, in the shape they came in, or (2, 2).
+
+    Raises
+    ------
+    InputError
+        If a step lies outside the path, or there are not four axes.
+    """
+    turns = history.cycles[-1][1:] if history.cycles else (-1,)
+    chosen = checked_steps(history, (0, *turns) if steps is None else steps)
+    x = np.asarray(history.x)
+    names = {"slip": "slip  [length]", "gap": "gap  [length]"}
+    names |= {"traction": "friction traction  [stress]", "reaction": "normal reaction  [stress]"}
+    with style():
+        grid = _four(axes)
+        for panel, (name, title) in zip(grid.ravel(), names.items(), strict=True):
+            values = np.asarray(getattr(history, name))
+            for step, colour in zip(chosen, colours(len(chosen)), strict=True):
+                label = f"$F = {float(history.force[step]):.4g}$" if step else "pressed"
+                panel.plot(x, values[step], color=colour, label=label)
+                moving = np.asarray(history.slipping[step])
+                if name == "traction":
+                    panel.plot(x[moving], values[step][moving], "o", color=colour, markersize=3.2)
+            panel.set(title=title, xlabel=POSITION)
+        dot = Line2D([], [], color=DATA, marker="o", linestyle="", markersize=3.2)
+        handles, labels = grid.ravel()[2].get_legend_handles_labels()
+        grid.ravel()[2].legend([*handles, dot], [*labels, "slips"], loc="best")
     return grid
 
 

@@ -16,7 +16,52 @@ from numpy.typing import ArrayLike
 from jbeamshell.scene.scene import Scene
 
 
-class LoadPath(Protocol):
+class LoopPath(Protocol):
+    """Force over displacement, step by step, (steps+1,) each.
+
+    Attributes
+    ----------
+    force, displacement : load, and the displacement conjugate to it
+    cycles : steps at the start, the turn and the end of each closed cycle
+    loop : force and displacement of the last closed cycle, (k,) each
+    """
+
+    @property
+    def force(self) -> Array: ...
+    @property
+    def displacement(self) -> Array: ...
+    @property
+    def cycles(self) -> Sequence[tuple[int, int, int]]: ...
+    @property
+    def loop(self) -> tuple[Array, Array]: ...
+
+
+class ContactPath(LoopPath, Protocol):
+    """Contact between substructures, step by step, such as a `jbeamshell.ContactHistory`.
+
+    Attributes
+    ----------
+    x : (n,) places of the contact nodes
+    slip, gap, traction, reaction : (steps+1, n) tangential displacement, height, friction traction
+        and normal reaction
+    slipping : (steps+1, n) True where a node slips
+    """
+
+    @property
+    def x(self) -> Array: ...
+    @property
+    def slip(self) -> Array: ...
+    @property
+    def gap(self) -> Array: ...
+    @property
+    def traction(self) -> Array: ...
+    @property
+    def reaction(self) -> Array: ...
+    @property
+    def slipping(self) -> Array: ...
+
+
+class LoadPath(LoopPath, Protocol):
     """Solved load path, step by step, such as a `jbeamshell.History`.
 
     Pictures along X also read the profiles ``gap``, ``beta``, ``psi``, ``squeeze_stress`` and
@@ -29,9 +74,6 @@ class LoadPath(Protocol):
     middles : (elements,) middles of the elements
     pressed : first step at which the whole pressure acts
     pressure : (steps+1,) part of the pressures that acts
-    force, displacement : (steps+1,) end force and end displacement
-    cycles : steps at the start, the turn and the end of each closed cycle
-    loop : force and displacement of the last closed cycle, (k,) each
     fields : (steps+1, n, m) v, w, beta, psi, ... of the strip
     member : likewise of the second member of a lap joint; None without one
     slip, beta, psi : (steps+1, n) slip since the pressing, rotation, squeeze strain
@@ -52,14 +94,6 @@ class LoadPath(Protocol):
     def pressed(self) -> int: ...
     @property
     def pressure(self) -> Array: ...
-    @property
-    def force(self) -> Array: ...
-    @property
-    def displacement(self) -> Array: ...
-    @property
-    def cycles(self) -> Sequence[tuple[int, int, int]]: ...
-    @property
-    def loop(self) -> tuple[Array, Array]: ...
     @property
     def fields(self) -> Array: ...
     @property

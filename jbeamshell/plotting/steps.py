@@ -8,10 +8,10 @@ import numpy as np
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.numerics.cycles import turning_points
-from jbeamshell.plotting.protocols import LoadPath
+from jbeamshell.plotting.protocols import LoadPath, LoopPath
 
 
-def checked_steps(history: LoadPath, steps: Sequence[int]) -> list[int]:
+def checked_steps(history: LoopPath, steps: Sequence[int]) -> list[int]:
     """Indices counted from the start of the path; raises `InputError` for one that lies outside."""
     count = history.force.shape[0]
     for step in steps:

@@ -1,0 +1,179 @@
+"""Stiffness matrices in files: NumPy, MATLAB, Matrix Market, CalculiX and Nastran.
+
+| suffix | content |
+|---|---|
+| ``.npz`` | of `scipy.sparse.save_npz`, or of `numpy.savez` with ``stiffness`` and ``dofs`` |
+| ``.mat`` | a square matrix, dense or sparse; ``stiffness`` or ``K`` if there are several |
+| ``.mtx`` | Matrix Market, or what CalculiX and Abaqus write for ``*SUBSTRUCTURE GENERATE`` |
+| ``.sti`` | CalculiX's ``*FREQUENCY, SOLVER=MATRIXSTORAGE``, with the ``.dof`` beside it |
+| ``.op4`` | Nastran's OUTPUT4, read by pyyeti |
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.io
+import scipy.sparse
+from numpy.typing import NDArray
+
+from jbeamshell.common.errors import InputError
+from jbeamshell.measured import matlab
+from jbeamshell.measured.tables import LARGEST, read_bytes
+
+NAMES = ("stiffness", "K", "k")  # of the matrix, where a file holds several
+ARRAYS = "give an archive of scipy.sparse.save_npz, or of numpy.savez with stiffness= and dofs="
+
+
+class Rows(NamedTuple):
+    """Matrix of a file, and the node and direction of each row where the file says them.
+
+    Attributes
+    ----------
+    matrix : (N, N) sparse
+    dofs : (N, 2) node and direction of each row, or None
+    """
+
+    matrix: scipy.sparse.csc_array
+    dofs: NDArray[np.int64] | None = None
+
+
+def read_matrix(path: str | os.PathLike[str]) -> Rows:
+    """Matrix of a file, by its suffix.
+
+    Raises
+    ------
+    InputError
+        for a file that cannot be read, another suffix, or one that holds no matrix
+    """
+    name, suffix = Path(path).name, Path(path).suffix.lower()
+    if suffix not in READERS:
+        raise InputError(f"{name}: is no file of a matrix: it must end in {', '.join(READERS)}")
+    data = read_bytes(path)
+    try:
+        return READERS[suffix](data, Path(path))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+    except Exception as error:  # a parser may raise anything for a broken file
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
+        raise InputError(f"{name}: is no {suffix} file of a matrix ({reason})") from None
+
+
+def _archive(data: bytes, _: Path) -> Rows:
+    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        if "indptr" in archive.files:
+            return Rows(scipy.sparse.csc_array(scipy.sparse.load_npz(io.BytesIO(data))))
+        named = {name: archive[name] for name in archive.files}
+    dofs = named.pop("dofs", None)
+    return Rows(_the_matrix(named, ARRAYS), None if dofs is None else dofs.astype(np.int64))
+
+
+def _matlab(data: bytes, _: Path) -> Rows:
+    named: dict[str, Any] = {}
+    for name, value in matlab.variables(data, LARGEST, sparse=True):
+        whole, beside, of_sparse = name.rpartition(matlab.SPARSE)
+        if beside:
+            named.setdefault(whole, {})[of_sparse] = value
+        else:
+            named[name] = value
+    dofs = named.pop("dofs", None)
+    for name, value in named.items():
+        if isinstance(value, dict):
+            places = value["row"].ravel(), value["column"].ravel()
+            named[name] = scipy.sparse.csc_array(
+                (value["value"].ravel(), places), shape=tuple(value["shape"].ravel())
+            )
+    found = _the_matrix(named, "give one square matrix, or name it stiffness")
+    return Rows(found, None if dofs is None else dofs.astype(np.int64))
+
+
+def _the_matrix(named: dict[str, Any], fix: str) -> scipy.sparse.csc_array:
+    """Matrix among variables by name: the one of a known name, or the only square one."""
+    square = {
+        name: value
+        for name, value in named.items()
+        if value.ndim == 2 and value.shape[0] == value.shape[1] > 1
+    }
+    known = [square[name] for name in NAMES if name in square]
+    if not known and len(square) != 1:
+        raise InputError(f"holds {len(square)} square matrices: {fix}")
+    return scipy.sparse.csc_array(known[0] if known else next(iter(square.values())))
+
+
+def _text(data: bytes, path: Path) -> Rows:
+    if data.lstrip()[:2] == b"%%":
+        return Rows(scipy.sparse.csc_array(scipy.io.mmread(io.BytesIO(data))))
+    return _substructure(data.decode("ascii"))
+
+
+def _substructure(text: str) -> Rows:
+    """Rows of ``*SUBSTRUCTURE MATRIX OUTPUT``: nodes in comments, degrees of freedom, lower half.
+
+    Element node k is the k-th in the comments, and its directions are given from line "k, ..." on.
+    """
+    head, found, rest = text.partition("*MATRIX,TYPE=STIFFNESS")
+    if not found:
+        raise InputError("holds no *MATRIX,TYPE=STIFFNESS: add STIFFNESS=YES to the output")
+    _, _, comments = head.partition("ELEMENT NODES")
+    nodes: list[int] = []
+    given: list[tuple[int, list[int]]] = []
+    for line in comments.splitlines()[1:]:
+        numbers = [int(word) for word in re.findall(r"\d+", line)]
+        if line.startswith("**"):
+            nodes += numbers
+        elif len(numbers) == 1 and not given:  # direction of the first node
+            given.append((1, numbers))
+        elif numbers:
+            given.append((numbers[0], numbers[1:]))
+    rows = [(nodes[place - 1], direction) for place, found in given for direction in found]
+    body, _, _ = rest.partition("*")
+    values = np.array(body.replace(",", " ").split(), float)
+    size = len(rows)
+    if values.size != size * (size + 1) // 2:
+        raise InputError(f"holds {values.size} numbers for {size} rows: write it again")
+    full = np.zeros((size, size))
+    full[np.tril_indices(size)] = values
+    full = full + np.tril(full, -1).T
+    return Rows(scipy.sparse.csc_array(full), np.array(rows))
+
+
+def _stored(data: bytes, path: Path) -> Rows:
+    """Rows of CalculiX's matrix storage: triplets of the upper half, and node.direction."""
+    named = path.with_suffix(".dof")
+    words = read_bytes(named).decode("ascii").split()
+    dofs = np.array([[int(part) for part in word.split(".")] for word in words])
+    table = np.array(data.split(), float).reshape(-1, 3)
+    row, column = table[:, :2].astype(int).T - 1
+    half = scipy.sparse.coo_array((table[:, 2], (row, column)), shape=(len(dofs), len(dofs)))
+    beyond = scipy.sparse.triu(half, 1)
+    return Rows(scipy.sparse.csc_array(half + beyond.T), dofs)
+
+
+def _nastran(_: bytes, path: Path) -> Rows:
+    try:
+        from pyyeti.nastran import op4
+    except ImportError:
+        raise InputError("needs pyyeti: pip install 'jbeamshell[nastran]'") from None
+    names, matrices, *_ = op4.load(str(path), into="list", sparse=True)
+    named = {
+        name: scipy.sparse.csc_array(matrix) for name, matrix in zip(names, matrices, strict=True)
+    }
+    for name, matrix in list(named.items()):
+        if name.lower().startswith("k"):
+            named["stiffness"] = matrix
+    return Rows(_the_matrix(named, "give one square matrix, or name it KAA"))
+
+
+READERS: dict[str, Callable[[bytes, Path], Rows]] = {
+    ".npz": _archive,
+    ".mat": _matlab,
+    ".mtx": _text,
+    ".sti": _stored,
+    ".op4": _nastran,
+}

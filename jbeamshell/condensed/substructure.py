@@ -1,0 +1,192 @@
+"""Substructure: an elastic body of any origin, condensed to the nodes of its contact line.
+
+Finite-element programs call it a substructure or a superelement.  With q the tangential
+displacements and heights of its n contact nodes, node by node, P its loads and r the nodal forces
+of what it touches,
+
+    r = K q - f P,      d = f' q + c P,
+
+with d the displacements conjugate to the loads.  Load 0 pulls to and fro, the others press.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jbeamshell.common.checks import as_leaf, is_traced, require
+from jbeamshell.common.errors import InputError
+from jbeamshell.common.files import as_path, written_whole
+from jbeamshell.measured.tables import read_bytes
+
+LOOSE = 1e-11  # of the largest eigenvalue: below it a mode costs no energy
+MODES = ("moves along X", "moves along the normal", "turns")
+
+
+class Substructure(eqx.Module):
+    """Elastic body on its contact line.
+
+    `jbeamshell.StiffnessModel` makes one from a matrix of finite elements.  All arrays are numbers
+    of a pytree, so that results can be differentiated for them.
+
+    Attributes
+    ----------
+    x : (n,) places X of the contact nodes, rising
+    stiffness : (2n, 2n) K, tangential and normal in turn
+    forces : (2n, m) f, of the pull and of m - 1 pressures
+    flexibility : (m, m) c; zero if left out
+    tributary : (n,) contact lengths; half the way to the neighbours if left out
+    fixed : (2n,) True for displacements that a support holds; none if left out
+
+    Raises
+    ------
+    InputError
+        for shapes that do not go together, a matrix that is not symmetric, or a negative mode
+
+    Examples
+    --------
+    ::
+
+        body.save("upper.npz")
+        body = jb.Substructure.read("upper.npz")
+    """
+
+    x: Array
+    stiffness: Array
+    forces: Array
+    flexibility: Array
+    tributary: Array
+    fixed: tuple[bool, ...] = eqx.field(static=True)
+
+    def __init__(
+        self,
+        x: Any,
+        stiffness: Any,
+        forces: Any,
+        flexibility: Any = None,
+        *,
+        tributary: Any = None,
+        fixed: Sequence[bool] = (),
+    ) -> None:
+        self.x, self.stiffness = as_leaf(x, "x"), as_leaf(stiffness, "stiffness")
+        self.forces = as_leaf(forces, "forces")
+        loads, half = self.forces.shape[-1:], 0.5 * jnp.diff(self.x)
+        none = jnp.zeros((*loads, *loads))
+        self.flexibility = none if flexibility is None else as_leaf(flexibility, "flexibility")
+        beside = jnp.append(half, 0.0) + jnp.append(0.0, half)
+        self.tributary = beside if tributary is None else as_leaf(tributary, "tributary")
+        self.fixed = tuple(map(bool, fixed)) or (False,) * (2 * self.x.size)
+
+    def __check_init__(self) -> None:
+        n, m = self.x.size, self.forces.shape[-1] if self.forces.ndim == 2 else 0
+        shapes = {
+            "x": (self.x, (n,)),
+            "tributary": (self.tributary, (n,)),
+            "stiffness": (self.stiffness, (2 * n, 2 * n)),
+            "forces": (self.forces, (2 * n, m)),
+            "flexibility": (self.flexibility, (m, m)),
+        }
+        for key, (value, shape) in shapes.items():
+            require(f"{key}.shape", value.shape, value.shape == shape and m > 0, f"must be {shape}")
+        require("fixed", len(self.fixed), len(self.fixed) == 2 * n, f"must be {2 * n} truths")
+        if is_traced(self.x, self.tributary, self.stiffness, self.forces, self.flexibility):
+            return
+        x, stiffness = np.asarray(self.x), np.asarray(self.stiffness)
+        require("x", x, bool(np.all(np.diff(x) > 0.0)), "must rise from node to node")
+        whole = all(bool(np.all(np.isfinite(value))) for value, _ in shapes.values())
+        require("substructure", "NaN or infinity", whole, "give finite numbers")
+        apart = float(np.max(np.abs(stiffness - stiffness.T)))
+        size = float(np.max(np.abs(stiffness)))
+        same = apart <= 1e-8 * size
+        require("stiffness", f"max|K - K'| {apart:.3g}", same, "is not symmetric: mirror it")
+        free = ~np.array(self.fixed)
+        values = np.linalg.eigvalsh(stiffness[np.ix_(free, free)])
+        fix = "has a negative mode: check the supports and the sign of the matrix"
+        good = bool(values[0] >= -LOOSE * values[-1])
+        require("stiffness", f"least eigenvalue {values[0]:.3g}", good, fix)
+
+    @property
+    def bolts(self) -> int:
+        """Number of loads that press."""
+        return int(self.forces.shape[1]) - 1
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write to an .npz file; see `read`."""
+        target = as_path(path)
+        require("path", str(path), target.suffix == ".npz", "end the name in .npz")
+        names = ("x", "tributary", "stiffness", "forces", "flexibility", "fixed")
+        arrays: dict[str, Any] = {name: np.asarray(getattr(self, name)) for name in names}
+        with written_whole(target) as draft:
+            np.savez(draft, **arrays)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Substructure:
+        """Substructure in an .npz file of its arrays by name.
+
+        ``flexibility``, ``tributary`` and ``fixed`` may be left out.
+
+        Raises
+        ------
+        InputError
+            if the file cannot be read, or holds no substructure
+        """
+        data = read_bytes(path)
+        try:
+            with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+                found = {name: np.asarray(archive[name]) for name in archive.files}
+        except Exception as error:  # NumPy may raise anything for a broken file
+            raise InputError(f"{path}: is no .npz file of NumPy ({error})") from None
+        missing = [name for name in ("x", "stiffness", "forces") if name not in found]
+        fix = "give numpy.savez x=, stiffness= and forces=, or read a jbeamshell.StiffnessModel"
+        require(str(path), f"without {', '.join(missing)}", not missing, fix)
+        return cls(
+            found["x"],
+            found["stiffness"],
+            found["forces"],
+            found.get("flexibility"),
+            tributary=found.get("tributary"),
+            fixed=np.ravel(found.get("fixed", ())).tolist(),
+        )
+
+
+def potential(body: Substructure, bolts: Array) -> Array:
+    """Second derivatives (2n + 2, 2n + 2) of a body's potential in q, the pull and the pressing.
+
+    Parameters
+    ----------
+    body : substructure with m - 1 pressures
+    bolts : (m - 1,) their sizes when the pressing is 1
+    """
+    mixed = jnp.concatenate([jnp.eye(1, body.bolts + 1), jnp.append(0.0, bolts)[None]]).T
+    if body.bolts != bolts.size:  # a body that no bolt presses
+        mixed = jnp.eye(1, 2)
+    forces = -body.forces @ mixed
+    return jnp.block([[body.stiffness, forces], [forces.T, -mixed.T @ body.flexibility @ mixed]])
+
+
+def loose_mode(stiffness: np.ndarray, x: np.ndarray) -> str:
+    """Name of the movement that costs no energy; empty if there is none.
+
+    Parameters
+    ----------
+    stiffness : (2n, 2n) tangential and normal in turn, zero for what is fixed
+    x : (n,) places of the nodes
+    """
+    values, vectors = np.linalg.eigh(stiffness)
+    loose = vectors[:, values < LOOSE * values[-1]]
+    if not loose.size:
+        return ""
+    middle = x - np.mean(x)
+    rigid = np.zeros((3, x.size, 2))
+    rigid[0, :, 0] = rigid[1, :, 1] = 1.0
+    rigid[2, :, 1] = middle
+    modes = rigid.reshape(3, -1)
+    share = np.linalg.norm(modes @ loose, axis=1) / np.linalg.norm(modes, axis=1)
+    return MODES[int(np.argmax(share))] if np.max(share) > 0.5 else "deforms without energy"

@@ -1,0 +1,126 @@
+"""History of a contact between substructures: the record of every load step, and its figures."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jbeamshell.common.files import as_json, csv_text
+from jbeamshell.common.summary import Summary, in_words
+from jbeamshell.history.figures import UNITS
+from jbeamshell.history.loop_figures import LoopFigures
+
+FIGURES = (
+    "dissipation",
+    "dissipation_loop",
+    "secant_stiffness",
+    "loss_factor",
+    "peak_displacement",
+    "slip_length",
+)
+
+
+class ContactHistory(LoopFigures):
+    """Result of `jbeamshell.solve_contact`: the pressing, then the loads.
+
+    Step 0 is the contact under its pressures alone.  Steps without equilibrium hold NaN.
+
+    Attributes
+    ----------
+    x, tributary : (n,) places of the contact nodes, rising, and their contact lengths
+    force, displacement : (steps+1,) load, and the displacement conjugate to it since the pressing
+    slip, gap : (steps+1, n) tangential displacement since the pressing and height of the body, over
+        what it touches
+    traction, reaction : (steps+1, n) friction traction on what is below, normal reaction
+    slipping : (steps+1, n) True if the node slips at the end of the step
+    slip_work : (steps+1,) work of friction in each step
+    settled : (steps+1,) True where equilibrium was found
+    cycles : steps at the start, the turn and the end of each closed cycle
+
+    Examples
+    --------
+    >>> history = jb.solve_contact(upper, lower, friction=0.1, amplitude=0.5)
+    >>> float(history.dissipation)
+    """
+
+    x: Array
+    tributary: Array
+    force: Array
+    displacement: Array
+    slip: Array
+    gap: Array
+    traction: Array
+    reaction: Array
+    slipping: Array
+    slip_work: Array
+    settled: Array
+    cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
+
+    @property
+    def converged(self) -> bool:
+        """True if every step found its equilibrium."""
+        return bool(np.all(np.asarray(self.settled)))
+
+    @property
+    def touching(self) -> Array:
+        """True if a node is in contact, (steps+1, n)."""
+        return self.reaction > 0.0
+
+    def figures(self) -> dict[str, float]:
+        """Figures of the last cycle and of the contact at the last step, as plain numbers."""
+        found = {name: float(getattr(self, name)) for name in FIGURES if self.cycles}
+        return found | {
+            "reaction_max": float(jnp.max(self.reaction[-1])),
+            "opening_max": float(jnp.max(self.gap)),
+            "contact_length": float(self.touching[-1] @ self.tributary),
+        }
+
+    def __str__(self) -> str:
+        title = f"{self.force.size} levels on {self.x.size} contact nodes"
+        units = UNITS | {"opening_max": "length", "contact_length": "length"}
+        rows = [
+            (
+                name.replace("_", " "),
+                in_words(value) + (f"  [{units[name]}]" if name in units else ""),
+            )
+            for name, value in self.figures().items()
+        ]
+        return Summary(title, rows).as_text()
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw force over displacement; returns the axes."""
+        from jbeamshell import plotting
+
+        return plotting.loop(self, axes)
+
+    def plot_contact(self, steps: Any = None, axes: Any = None) -> Any:
+        """Draw slip, gap, traction and reaction along X at chosen steps; returns the axes."""
+        from jbeamshell import plotting
+
+        return plotting.contact_lines(self, steps, axes)
+
+    def write(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write ``loop.csv``, ``contact.csv``, ``result.json`` and pictures to a folder."""
+        from jbeamshell.plotting.folder import check_folder, write_folder
+
+        names = ("force", "displacement", "slip_work", "settled")
+        loop = np.column_stack([np.asarray(getattr(self, name)) for name in names])
+        along = ("slip", "gap", "traction", "reaction", "slipping")
+        size = self.gap.shape
+        step, x = np.indices(size)[0], np.broadcast_to(np.asarray(self.x), size)
+        rows = [step, x, *(np.asarray(getattr(self, name)) for name in along)]
+        contact = np.column_stack([row.ravel() for row in rows])
+        texts = {
+            "loop.csv": csv_text(names, loop.tolist()),
+            "contact.csv": csv_text(("step", "x", *along), contact.tolist()),
+            "result.json": as_json(self.figures()),
+        }
+        drawn = {"loop.png": self.plot(), "contact.png": self.plot_contact()}
+        pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
+        return write_folder(check_folder(folder), texts, pictures)

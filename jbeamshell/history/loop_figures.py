@@ -1,0 +1,88 @@
+"""Figures of the last load cycle that any loop has: dissipation, stiffness, loss factor."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array
+
+from jbeamshell.common.errors import InputError
+from jbeamshell.numerics.cycles import branch_work
+
+
+class LoopFigures(eqx.Module):
+    """Figures of the last cycle; scalars but for `loop`.
+
+    Attributes
+    ----------
+    tributary : (n,) contact length of each node
+    force, displacement : (steps+1,) load and the displacement conjugate to it
+    slipping : (steps+1, n) True if the node slipped in the step
+    slip_work : (steps+1,) work dissipated by friction in each step
+    cycles : steps at the start, the turn and the end of each closed cycle
+
+    Raises
+    ------
+    InputError
+        if the path holds no closed cycle
+    """
+
+    tributary: eqx.AbstractVar[Array]
+    force: eqx.AbstractVar[Array]
+    displacement: eqx.AbstractVar[Array]
+    slipping: eqx.AbstractVar[Array]
+    slip_work: eqx.AbstractVar[Array]
+    cycles: eqx.AbstractVar[tuple[tuple[int, int, int], ...]]
+
+    @property
+    def _last(self) -> tuple[int, int, int]:
+        """Steps at the start, the turn and the end of the last cycle."""
+        if not self.cycles:
+            raise InputError(
+                "path: holds no closed cycle, so there is no dissipation per cycle; "
+                "let it return to a load at which it turned, or sum slip_work"
+            )
+        return self.cycles[-1]
+
+    @property
+    def loop(self) -> tuple[Array, Array]:
+        """Force and displacement along the last cycle, (levels,) each."""
+        start, _, stop = self._last
+        return self.force[start : stop + 1], self.displacement[start : stop + 1]
+
+    @property
+    def dissipation(self) -> Array:
+        """Work of friction in the last cycle, D, per unit width."""
+        start, _, stop = self._last
+        return jnp.sum(self.slip_work[start + 1 : stop + 1])
+
+    @property
+    def dissipation_loop(self) -> Array:
+        """Area of the last loop, with each branch integrated by parabolas."""
+        start, turn, stop = self._last
+        down, up = slice(start, turn + 1), slice(turn, stop + 1)
+        there, back = (branch_work(self.force[b], self.displacement[b]) for b in (down, up))
+        return there + back
+
+    @property
+    def secant_stiffness(self) -> Array:
+        """Range of force over range of displacement of the last loop."""
+        force, displacement = self.loop
+        return jnp.ptp(force) / jnp.ptp(displacement)
+
+    @property
+    def loss_factor(self) -> Array:
+        """Loss factor D/(2 pi W), with W the energy of the secant stiffness at the amplitude."""
+        force, displacement = self.loop
+        return self.dissipation / (2.0 * jnp.pi * jnp.ptp(force) * jnp.ptp(displacement) / 8.0)
+
+    @property
+    def peak_displacement(self) -> Array:
+        """Largest abs(u(L)) of the last loop, length."""
+        return jnp.max(jnp.abs(self.loop[1]))
+
+    @property
+    def slip_length(self) -> Array:
+        """Largest length of contact that slipped in one step of the last cycle."""
+        start, _, stop = self._last
+        return jnp.max(self.slipping[start + 1 : stop + 1] @ self.tributary)

@@ -1,0 +1,281 @@
+"""Bodies of any origin: matrices in files, their condensation, and their contact."""
+
+import json
+import shutil
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse
+
+import jbeamshell as jb
+from calibration.finite_elements import body as calculix
+from jbeamshell.cli.main import main
+from jbeamshell.condensed.pair import lower_member, upper_member
+from jbeamshell.condensed.section import section_form
+from jbeamshell.condensed.strip import pressing, stations
+
+DATA = Path(__file__).parent / "calculix"  # of strip.inp by CalculiX 2.20
+SCENE = jb.Scene().replace(
+    {
+        "strip.far_end": "free",
+        "member.support": "rolling",
+        "member.height_ratio": 0.2,
+        "member.axial_stiffness": 8e4,
+        "model.rung": "squeeze",
+        "model.nodes": 25,
+        "load.amplitude": 1.0,
+        "load.steps_per_half_cycle": 8,
+    }
+)
+LOAD = {"amplitude": 1.0, "steps_per_half_cycle": 8, "assembly": "frictionless"}
+
+
+def as_body(member, x, signs):
+    whole = np.append(np.tile(signs, x.size), [1.0, 1.0])
+    hessian = np.asarray(member.hessian) * whole[:, None] * whole
+    return jb.Substructure(
+        x, hessian[:-2, :-2], -hessian[:-2, -2:], -hessian[-2:, -2:], fixed=member.fixed
+    )
+
+
+def members(scene):
+    """Both members of a lap joint as bodies of a user's own."""
+    x = stations(scene, scene.model.nodes)
+    down, up = pressing(scene, x)
+    upper = upper_member(section_form(scene), x, None, down, False)
+    clamped = scene.member.support == "clamped"
+    lower = lower_member(section_form(scene.of_member()), x, None, up, clamped)
+    return as_body(upper, x, [1.0, 1.0]), as_body(lower, x, [1.0, -1.0])
+
+
+UPPER, LOWER = members(SCENE)
+
+
+def slice_of(nodes=6, rows=3):
+    return calculix.strip_slice(jb.Scene(), nodes, rows)
+
+
+def strip_body():
+    made = slice_of()
+    model = jb.StiffnessModel.read(DATA / "strip.sti")
+    return model.condensed(made.contact, pull=made.pull, press=[made.press])
+
+
+class TestContact:
+    def test_two_members_are_a_lap_joint(self):
+        joint, found = jb.solve(SCENE, throw=False), jb.solve_contact(UPPER, LOWER, **LOAD)
+        assert found.converged
+        for name in ("dissipation", "dissipation_loop", "secant_stiffness", "slip_length"):
+            assert float(getattr(found, name)) == pytest.approx(
+                float(getattr(joint, name)), rel=1e-9
+            )
+        np.testing.assert_allclose(found.reaction, joint.reaction, atol=1e-8)
+        np.testing.assert_allclose(found.traction, joint.traction, atol=1e-9)
+
+    def test_displacements_that_forces_caused_cause_them(self):
+        forces = jb.solve_contact(UPPER, LOWER, **LOAD)
+        load = {"path": forces.displacement[1:], "assembly": "frictionless"}
+        found = jb.solve_contact(UPPER, LOWER, control="displacement", **load)
+        np.testing.assert_allclose(found.force, forces.force, atol=1e-8)
+        np.testing.assert_allclose(found.gap, forces.gap, atol=1e-12)
+        assert float(jnp.sum(found.slip_work)) == pytest.approx(float(jnp.sum(forces.slip_work)))
+
+    def test_pressing_follows_the_bolts_and_friction_work_fills_the_loop(self):
+        once = jb.solve_contact(UPPER, LOWER, **LOAD)
+        twice = jb.solve_contact(UPPER, LOWER, **LOAD | {"amplitude": 2.0}, bolts=2.0)
+        assert float(twice.dissipation) == pytest.approx(4.0 * float(once.dissipation), rel=1e-9)
+        assert float(once.dissipation_loop) == pytest.approx(float(once.dissipation), rel=0.02)
+
+    def test_an_even_gap_costs_nothing_to_a_body_that_nothing_holds_up(self):
+        flat = jb.solve_contact(UPPER, LOWER, **LOAD)
+        above = jb.solve_contact(UPPER, LOWER, **LOAD, gap=1e-4)
+        assert float(above.dissipation) == pytest.approx(float(flat.dissipation), rel=1e-7)
+
+    @pytest.mark.parametrize("assembly", ["frictional", "frictionless"])
+    def test_a_curved_body_stands_off_where_the_pressure_does_not_flatten_it(self, assembly):
+        gap = 5e-3 * (np.asarray(UPPER.x) / 2.0) ** 2
+        load = LOAD | {"assembly": assembly, "amplitude": 0.2}
+        found = jb.solve_contact(UPPER, LOWER, **load, gap=gap)
+        pressed = np.asarray(found.reaction[0])
+        assert 0.0 < float(found.gap[0, -1]) < gap[-1]
+        assert pressed[-1] == 0.0
+        assert not np.any(found.gap[0][pressed > 0.0])
+        total = float(np.asarray(UPPER.tributary) @ pressed)
+        assert total == pytest.approx(20.0, rel=1e-9)  # what presses is carried
+
+    @pytest.mark.slow
+    def test_derivatives_have_slope_two(self):
+        gap = jnp.asarray(1e-5 * (np.asarray(UPPER.x) / 2.0) ** 2)
+
+        def work(numbers):
+            friction, bolt, height = numbers
+            load = LOAD | {"friction": friction, "bolts": bolt, "gap": height * gap}
+            return jb.solve_contact(UPPER, LOWER, **load).dissipation
+
+        at, way = jnp.array([0.1, 1.0, 1.0]), jnp.array([0.02, 0.1, 0.5])
+        value, slope = jax.jvp(work, (at,), (way,))
+        errors = [abs(work(at + h * way) - value - h * slope) for h in (4e-3, 2e-3)]
+        assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
+
+
+class TestMatrices:
+    def test_a_slice_of_calculix_stretches_as_a_bar(self):
+        made, body = slice_of(), strip_body()
+        assert made.deck == (DATA / "strip.inp").read_text("ascii")
+        free = ~np.array(body.fixed)
+        free[1] = False  # nothing else holds its height
+        pull = np.asarray(body.forces)[free, 0]
+        stiffness = np.asarray(body.stiffness)[np.ix_(free, free)]
+        u = float(body.flexibility[0, 0]) + pull @ np.linalg.solve(stiffness, pull)
+        assert u == pytest.approx(2.0 / 3.4e4, rel=1e-6)
+        assert float(body.forces[1::2, 1].sum()) == pytest.approx(-20.0, rel=1e-9)
+
+    @pytest.mark.parametrize("kind", ["npz", "dense.npz", "mat", "mtx"])
+    def test_every_file_holds_the_same_model(self, tmp_path, kind):
+        model = jb.StiffnessModel.read(DATA / "strip.sti")
+        path, dofs = tmp_path / f"strip.{kind}", model.dofs
+        if kind == "npz":
+            scipy.sparse.save_npz(path, model.matrix)
+        elif kind == "dense.npz":
+            np.savez(path, K=model.matrix.toarray(), dofs=dofs)
+            dofs = None
+        elif kind == "mat":
+            scipy.io.savemat(path, {"K": model.matrix, "dofs": dofs})
+            dofs = None
+        else:
+            scipy.io.mmwrite(path, model.matrix, symmetry="symmetric", precision=17)
+        again = jb.StiffnessModel.read(path, dofs=dofs)
+        np.testing.assert_allclose(again.matrix.toarray(), model.matrix.toarray(), rtol=1e-14)
+        np.testing.assert_array_equal(again.dofs, model.dofs)
+
+    def test_a_matrix_that_was_condensed_before_gives_the_same_body(self):
+        body, made = strip_body(), slice_of()
+        model = jb.StiffnessModel.read(DATA / "strip.sti")
+        numbers = {tuple(dof): i for i, dof in enumerate(model.dofs.tolist())}
+        loaded = [tuple(row) for row in [*made.contact[:, :1], *made.pull, *made.press]]
+        nodes = {int(row[0]) for row in loaded}
+        kept = [i for dof, i in numbers.items() if dof[0] in nodes]
+        gone = np.setdiff1d(np.arange(len(numbers)), kept)
+        full = model.matrix.toarray()
+        parts = [full[np.ix_(a, b)] for a, b in ((kept, kept), (gone, gone), (gone, kept))]
+        small = parts[0] - parts[2].T @ np.linalg.solve(parts[1], parts[2])
+        again = jb.StiffnessModel(small, model.dofs[kept]).condensed(
+            made.contact, pull=made.pull, press=[made.press]
+        )
+        scale = float(jnp.max(jnp.abs(body.stiffness)))
+        np.testing.assert_allclose(again.stiffness, body.stiffness, atol=1e-10 * scale)
+        np.testing.assert_allclose(again.forces, body.forces, atol=1e-10)
+
+    def test_abaqus_text_is_read(self, tmp_path):
+        text = "**\n*USER ELEMENT,NODES= 2,LINEAR\n** ELEMENT NODES\n**  7,  9,\n  1\n 2,  1\n"
+        text += "*MATRIX,TYPE=STIFFNESS\n 2.0,\n-1.0, 3.0,\n"
+        (tmp_path / "small.mtx").write_text(text)
+        model = jb.StiffnessModel.read(tmp_path / "small.mtx")
+        np.testing.assert_array_equal(model.matrix.toarray(), [[2.0, -1.0], [-1.0, 3.0]])
+        np.testing.assert_array_equal(model.dofs, [[7, 1], [9, 1]])
+
+    def test_a_saved_body_is_read_again(self, tmp_path):
+        LOWER.save(tmp_path / "lower.npz")
+        again = jb.Substructure.read(tmp_path / "lower.npz")
+        assert again.fixed == LOWER.fixed
+        for name in ("x", "stiffness", "forces", "flexibility", "tributary"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(LOWER, name))
+
+    @pytest.mark.slow
+    @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+    def test_from_a_mesh_of_calculix_to_a_loop(self, tmp_path):
+        scene = jb.Scene().replace({"model.rung": "plane", "model.nodes": 49})
+        body = calculix.body_of(calculix.strip_slice(scene, 49), tmp_path)
+        found = jb.solve_contact(body, amplitude=scene.load.amplitude, assembly="frictionless")
+        plane = jb.solve(scene)
+        assert float(found.dissipation) == pytest.approx(float(plane.dissipation), rel=0.01)
+        assert float(found.secant_stiffness) == pytest.approx(
+            float(plane.secant_stiffness), rel=0.003
+        )
+
+
+def test_a_file_of_two_bodies_is_solved_by_the_command(tmp_path, capsys):
+    made = slice_of()
+    for name in ("contact", "pull"):
+        np.savetxt(tmp_path / f"{name}.csv", getattr(made, name), delimiter=",", header="node")
+    shutil.copy(DATA / "strip.sti", tmp_path)
+    shutil.copy(DATA / "strip.dof", tmp_path)
+    press = [row.tolist() for row in made.press]
+    text = f"""
+    amplitude = 0.4
+    cycles = 1
+    steps_per_half_cycle = 8
+    [upper]
+    file = "strip.sti"
+    contact = "contact.csv"
+    pull = "pull.csv"
+    press = [{press}]
+    """
+    (tmp_path / "joint.toml").write_text(text)
+    words = [str(tmp_path / "joint.toml"), "--friction", "0.2", "--json"]
+    assert main(["bodies", *words, "--out", str(tmp_path / "out")]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    load = {"amplitude": 0.4, "cycles": 1, "steps_per_half_cycle": 8, "friction": 0.2}
+    own = jb.solve_contact(strip_body(), **load)
+    assert figures["dissipation"] == pytest.approx(float(own.dissipation), rel=1e-9)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "loop.csv",
+        "contact.csv",
+        "result.json",
+        "loop.png",
+        "contact.png",
+    }
+    (tmp_path / "joint.toml").write_text(text.replace("cycles", "bicycles"))
+    assert main(["bodies", words[0]]) == 2
+    assert "key bicycles" in capsys.readouterr().err
+
+
+def changed(body, **arrays):
+    names = ("x", "stiffness", "forces", "flexibility", "tributary", "fixed")
+    return jb.Substructure(**{name: getattr(body, name) for name in names} | arrays)
+
+
+@pytest.mark.parametrize(
+    ("what", "said"),
+    [
+        (lambda: jb.solve_contact(UPPER, changed(LOWER, x=LOWER.x * 1.01)), "lower.x\\[24\\]"),
+        (lambda: jb.solve_contact(UPPER, UPPER), "moves along X with the other one: hold"),
+        (lambda: changed(UPPER, stiffness=-UPPER.stiffness), "has a negative mode"),
+        (lambda: changed(UPPER, stiffness=jnp.triu(UPPER.stiffness)), "is not symmetric"),
+        (lambda: changed(UPPER, forces=UPPER.forces[:-1]), "forces.shape"),
+        (lambda: jb.solve_contact(changed(UPPER, forces=UPPER.forces[:, :1])), "flexibility"),
+        (lambda: jb.solve_contact(UPPER, LOWER, bolts=[1.0, 2.0]), "bolts"),
+        (lambda: jb.solve_contact(UPPER, LOWER, gap=-1.0), "gap = -1.0"),
+        (lambda: jb.solve_contact("upper"), "give a jbeamshell.Substructure"),
+        (lambda: jb.StiffnessModel(np.eye(3)[:2], [[1, 1], [1, 2]]), "must be square"),
+        (lambda: jb.StiffnessModel(np.eye(2), [[1, 1]]), "each of its 2 rows"),
+        (lambda: jb.StiffnessModel(np.tri(2), [[1, 1], [1, 2]]), "is not symmetric"),
+        (lambda: jb.StiffnessModel.read("upper.xyz"), "it must end in .npz"),
+        (lambda: jb.Substructure.read(DATA / "strip.sti"), "is no .npz file"),
+    ],
+)
+def test_what_is_no_body_is_refused(what, said):
+    with pytest.raises(jb.InputError, match=said):
+        what()
+
+
+def test_tables_that_do_not_fit_the_model_are_refused():
+    model, made = jb.StiffnessModel.read(DATA / "strip.sti"), slice_of()
+    with pytest.raises(jb.InputError, match="contact = 999: is no node"):
+        model.condensed([[999, 0.0], [1, 1.0]])
+    with pytest.raises(jb.InputError, match="node 999, direction 2: is not in the model"):
+        model.condensed(made.contact, press=[[[999, 2, 1.0]]])
+    loose = jb.StiffnessModel(
+        np.diag([1.0, 1.0, 1.0, 1.0, 0.0]), [[1, 1], [1, 2], [2, 1], [2, 2], [3, 1]]
+    )
+    with pytest.raises(jb.InputError, match="a part moves freely"):
+        loose.condensed([[1, 0.0], [2, 1.0]])
+
+
+def test_gross_slip_is_told():
+    with pytest.raises(jb.UnconvergedError, match="all of the contact slides"):
+        jb.solve_contact(UPPER, LOWER, **LOAD | {"amplitude": 3.0})
