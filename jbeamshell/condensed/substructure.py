@@ -96,6 +96,8 @@ class Substructure(eqx.Module):
         for key, (value, shape) in shapes.items():
             require(f"{key}.shape", value.shape, value.shape == shape and m > 0, f"must be {shape}")
         require("fixed", len(self.fixed), len(self.fixed) == 2 * n, f"must be {2 * n} truths")
+        fix = "need double precision: write jax.config.update('jax_enable_x64', True)"
+        require("stiffness", "numbers of 32 bits", self.stiffness.dtype == jnp.float64, fix)
         if is_traced(self.x, self.tributary, self.stiffness, self.forces, self.flexibility):
             return
         x, stiffness = np.asarray(self.x), np.asarray(self.stiffness)

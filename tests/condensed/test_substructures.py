@@ -279,3 +279,12 @@ def test_tables_that_do_not_fit_the_model_are_refused():
 def test_gross_slip_is_told():
     with pytest.raises(jb.UnconvergedError, match="all of the contact slides"):
         jb.solve_contact(UPPER, LOWER, **LOAD | {"amplitude": 3.0})
+
+
+def test_bodies_need_double_precision():
+    jax.config.update("jax_enable_x64", False)
+    try:
+        with pytest.raises(jb.InputError, match="need double precision"):
+            jb.Substructure(np.arange(2.0), np.eye(4), np.ones((4, 2)))
+    finally:
+        jax.config.update("jax_enable_x64", True)
