@@ -48,7 +48,8 @@ def press_roughly(
 ) -> Assembly:
     """Pressing of a body with friction; first derivatives are exact.
 
-    Over an initial gap the body first lies down under the even reactions alone.
+    An initial gap grows together with the pressures.  Where bolts close it one after the other,
+    other shear is locked in; the contact pressure, without friction, is the same.
 
     Parameters
     ----------
@@ -70,14 +71,11 @@ def press_roughly(
         t_0=jnp.zeros_like(press_t),
         c=jnp.ones_like(friction),
     )
-    once, whole = jnp.ones(1, bool), jnp.ones_like(press_n[:1])
-    state, lift, sound = pressed(body), zero, jnp.asarray(True)
     if gap is not None:
-        over = eqx.tree_at(lambda b: (b.f_t, b.f_n), body, (k_tn @ gap, k_nn @ gap))
-        lying = walk(over, friction, state, whole, once)
-        state, lift = jax.tree.map(lambda part: part[0], (lying.state, lying.lift))
-        state, sound = state._replace(force=0.0 * body.c), lying.settled[0]
-    levels = walk(body, friction, state, whole, once, lift)
-    sound = sound & levels.settled[0]
-    at = jax.tree.map(lambda part: jnp.where(sound, part[0], jnp.nan), levels.state)
-    return Assembly(jnp.where(sound, levels.lift[0], jnp.nan), at.v, at.r_n, at.r_t)
+        closed = body.f_t + k_tn @ gap, body.f_n + k_nn @ gap
+        body = eqx.tree_at(lambda b: (b.f_t, b.f_n), body, closed)
+    once = jnp.ones(1, bool)
+    levels = walk(body, friction, pressed(body), jnp.ones_like(press_n[:1]), once)
+    at = jax.tree.map(lambda part: jnp.where(levels.settled[0], part[0], jnp.nan), levels.state)
+    lift = jnp.where(levels.settled[0], levels.lift[0], jnp.nan)
+    return Assembly(lift, at.v, at.r_n, at.r_t)

@@ -70,7 +70,8 @@ def solve_contact(
     control : "force" or "displacement", what the amplitude is of
     path : (levels,) loads instead of the cycles
     bolts : size of each pressing load of the bodies, a number or one for each
-    gap : distance of the nodes before anything presses, a number or (n,)
+    gap : distance of the nodes before anything presses, a number or (n,); in a frictional assembly
+        it grows together with the pressures
     assembly : "frictional", as bolts are tightened one with the other, or "frictionless", which
         locks no shear in
     throw : False to return steps without equilibrium as NaN

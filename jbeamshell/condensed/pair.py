@@ -173,6 +173,20 @@ def joined(upper: Member, lower: Member) -> tuple[Pair, Array]:
     return Pair(lower.form, lower.elimination, *moves), hessian
 
 
+def over_gap(pair: Pair, hessian: Array, gap: Array) -> tuple[Pair, Array]:
+    """Pair and potential in the opening w + g_0 instead of the relative lift w.
+
+    Parameters
+    ----------
+    pair, hessian : see `joined`
+    gap : (n,) distance g_0 of the members before anything presses
+    """
+    shift = jnp.stack([jnp.zeros_like(gap), -gap], axis=1).ravel()
+    change = jnp.eye(shift.size + 2, dtype=gap.dtype).at[:-2, -1].add(shift)
+    moved = pair._replace(upper=pair.upper @ change, lower=pair.lower @ change)
+    return moved, change.T @ hessian @ change
+
+
 def together(
     above: Array, below: Array, fixed_above: np.ndarray, fixed_below: np.ndarray
 ) -> tuple[Array, Array, Array]:

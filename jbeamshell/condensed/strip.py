@@ -10,7 +10,7 @@ from jax import Array
 
 from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.body import Body, Elimination, eliminate
-from jbeamshell.condensed.pair import Member, Pair, joined, lower_member, upper_member
+from jbeamshell.condensed.pair import Member, Pair, joined, lower_member, over_gap, upper_member
 from jbeamshell.condensed.pressing import press as press_down
 from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements
@@ -70,6 +70,7 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         upper, lower = _members(scene, form, x, down, up)
         elimination = upper.elimination
         pair, hessian = joined(upper, lower)
+    gap = None if scene.contact.gap is None else initial_gap(scene.contact.gap, x)
     last = 2 * x.size - 2
     v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
     w = slice(last + 1, None, -2)
@@ -78,15 +79,18 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     some = x.size - 1
     press_t, traction = press[v][:some], jnp.zeros_like(press[v])
     stiffness = k_tt[:some, :some], k_tn[:some], hessian[w, w]
+    away = None if gap is None else gap[::-1]
     if scene.contact.assembly == "frictional":
         loads = press[v], press[w], scene.contact.friction
-        lift, settled, reaction, traction = press_roughly(k_tt, k_tn, hessian[w, w], *loads)
+        lift, settled, reaction, traction = press_roughly(k_tt, k_tn, hessian[w, w], *loads, away)
     elif stays_flat(scene):
         lift, reaction = jnp.zeros_like(x), (down - up)[::-1]
         settled = solve(stiffness[0], -press_t)
     else:
         based = scene.contact.normal == "rigid"
-        lift, settled, reaction = press_down(*stiffness, press_t, press[w], based)
+        lift, settled, reaction = press_down(*stiffness, press_t, press[w], based, away)
+    if gap is not None and pair is not None:
+        pair, hessian = over_gap(pair, hessian, gap)
     settled = jnp.pad(settled, (0, k_tt.shape[0] - settled.size))
     body = Body(
         x=x[::-1],
@@ -101,6 +105,11 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         c=-hessian[-2, -2],
     )
     return Strip(body, form, elimination, hessian, x, tributary, down, settled, lift, pair)
+
+
+def initial_gap(gap: Array, x: Array) -> Array:
+    """Distance (n,) of the members at their stations, from a number or a table."""
+    return jnp.interp(x, gap[:, 0], gap[:, 1]) if gap.ndim else jnp.broadcast_to(gap, x.shape)
 
 
 def _members(scene: Scene, form: SectionForm, x: Array, down: Array, up: Array) -> list[Member]:

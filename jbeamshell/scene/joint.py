@@ -79,6 +79,9 @@ def _check_alone(scene: Parts) -> None:
     require("strip.loaded_end", end, end == "free", fix)
     fix = "needs a second member: leave it out, or give member.support"
     require("strip.overhang", scene.strip.overhang, scene.strip.overhang is None, fix)
+    fix = "needs a second member: leave it out, or give member.support (a curved strip on a rigid "
+    fix += "base has strip.curvature)"
+    require("contact.gap", scene.contact.gap, scene.contact.gap is None, fix)
     fix = "needs a second member: take 'frictionless', or give member.support"
     assembly = scene.contact.assembly
     require("contact.assembly", assembly, assembly == "frictionless", fix)

@@ -37,6 +37,8 @@ TOLERANCE = 0.005
 FINEST = 1e-4  # tolerance below which the finest mesh may not reach
 LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 PRESSURE = "give a number or a table of [X, pressure] rows"
+BOLTS = "give rows of numbers [X, force, width of the patch]"
+GAP = "give a number or a table of [X, gap] rows"
 WIDTH = 96  # characters of a line of the printed table
 
 
@@ -147,6 +149,16 @@ class ContactKeys(Part):
         ASSEMBLIES,
         "Pressing: frictionless (locks no shear in), or frictional, as bolts are tightened (lap "
         "joints only).",
+    )
+    gap: Array | None = number(
+        None,
+        "Distance to the second member before anything presses, of curved members: a number, or "
+        "rows [X, gap] (lap joints only); none is none.",
+        symbol="g_0",
+        unit="length",
+        closed=True,
+        table=True,
+        fix=GAP,
     )
     normal_stiffness: Array = number(
         50.0, "Stiffness of the compliant foundation, in units of E'/H.", symbol="k_n", unit="E'/H"
@@ -283,6 +295,17 @@ INDIRECT = (
         symbol="E",
         unit="stress",
         through="strip.axial_stiffness",
+    ),
+    Key(
+        "contact.bolts",
+        "number",
+        None,
+        "Bolts, rows [X, force per width, width of the patch]; sets the pressure on the top face, "
+        "and below a clamped second member.",
+        unit="mixed",
+        table=True,
+        through="contact.pressure",
+        fix=BOLTS,
     ),
     Key("contact.law", "word", "elastic-slip", "Friction law by its name.", choices=tuple(LAWS)),
     Key(

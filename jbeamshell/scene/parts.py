@@ -34,7 +34,7 @@ from jbeamshell.scene.keys import (
     key_table,
 )
 from jbeamshell.scene.layers import check_layers
-from jbeamshell.scene.pressure import check_pressure, pressure_values
+from jbeamshell.scene.pressure import check_gap, check_pressure, pressure_values
 from jbeamshell.scene.rungs import CONDENSED, name_of
 
 MODELS = (
@@ -167,6 +167,8 @@ class Contact(ContactKeys):
             pressure = getattr(self, key)
             if not isinstance(pressure, jax.core.Tracer):
                 check_pressure(f"contact.{key}", np.asarray(pressure))
+        if self.gap is not None and not isinstance(self.gap, jax.core.Tracer):
+            check_gap(np.asarray(self.gap))
         if not isinstance(self.pressure, jax.core.Tracer):
             presses = bool(np.any(pressure_values(np.asarray(self.pressure)) > 0.0))
             require("contact.pressure", self.pressure, presses, "must press somewhere")
@@ -175,6 +177,17 @@ class Contact(ContactKeys):
     def smoothing(self) -> Array:
         """Exponent m of the friction law; infinite for the sharp slider."""
         return getattr(self.law, "smoothing", jnp.asarray(np.inf))
+
+    @property
+    def bolts(self) -> Array | None:
+        """Bolts (k, 3) of X, force and width if the pressure is that of patches, else None."""
+        table = self.pressure
+        if table.ndim == 0 or table.shape[0] % 4:
+            return None
+        rows = table.reshape(-1, 4, 2)
+        begin, end = rows[:, 0, 0], rows[:, 3, 0]
+        width = end - begin
+        return jnp.stack([0.5 * (begin + end), rows[:, 1, 1] * width, width], axis=1)
 
     @property
     def largest_pressure(self) -> Array:

@@ -10,10 +10,11 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require
-from jbeamshell.scene.keys import PRESSURE
+from jbeamshell.scene.keys import BOLTS, GAP, PRESSURE
 
 
 def is_table(pressure: Any) -> bool:
@@ -84,3 +85,45 @@ def check_pressure(key: str, pressure: np.ndarray) -> None:
         require(key, pressure, bool(np.all(run >= 0.0)), "its X must not decrease from row to row")
         thrice = bool(np.any((run[1:] == 0.0) & (run[:-1] == 0.0)))
         require(key, pressure, not thrice, "gives one X three times; two rows make a step")
+
+
+def bolt_pressure(bolts: Array, length: Array) -> Array:
+    """Pressure table (4k, 2) of bolts, each an even pressure on a patch.
+
+    Parameters
+    ----------
+    bolts : (k, 3) rows of X, force per width and width of the patch, rising in X
+    length : L
+
+    Raises
+    ------
+    InputError
+        for a bolt off the overlap, and bolts whose patches overlap
+    """
+    key = "contact.bolts"
+    require(key, bolts, bolts.ndim == 2 and bolts.shape[1] == 3, BOLTS)
+    middle, force, width = bolts.T
+    begin, end = middle - 0.5 * width, middle + 0.5 * width
+    if not is_traced(bolts, length):
+        good = bool(np.all(np.isfinite(bolts)) and np.all(np.asarray(bolts[:, 1:]) > 0.0))
+        require(key, bolts, good, "forces and widths must be positive numbers")
+        slack = 1e-12 * float(length)
+        inside = bool(begin[0] >= -slack and np.all(np.asarray(end) <= float(length) + slack))
+        fix = f"a patch lies off the overlap, X from 0 to {float(length):g}: move it or narrow it"
+        require(key, bolts, inside and bool(np.min(np.asarray(begin)) >= -slack), fix)
+        apart = bool(np.all(np.asarray(begin[1:] - end[:-1]) >= -slack))
+        require(key, bolts, apart, "patches overlap, or X falls: sort the rows and narrow them")
+    pressure = force / width
+    begin = jnp.maximum(begin, jnp.append(0.0, end[:-1]))  # round-off between patches that touch
+    rows = [(begin, 0.0 * pressure), (begin, pressure), (end, pressure), (end, 0.0 * pressure)]
+    return jnp.stack([jnp.stack(row, axis=1) for row in rows], axis=1).reshape(-1, 2)
+
+
+def check_gap(gap: np.ndarray) -> None:
+    """Raise `InputError` unless a gap is a number or a table of [X, gap] rows, not negative."""
+    table = is_table(gap)
+    require("contact.gap", gap, gap.ndim == 0 or table, GAP)
+    good = bool(np.all(np.isfinite(gap)) and np.all(pressure_values(gap) >= 0.0))
+    require("contact.gap", gap, good, "must be finite and nowhere negative")
+    rises = not table or bool(np.all(np.diff(gap[:, 0]) > 0.0))
+    require("contact.gap", gap, rises, "its X must rise from row to row")

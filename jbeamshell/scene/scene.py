@@ -34,6 +34,7 @@ from jbeamshell.scene.domain import Numbers, support_rules
 from jbeamshell.scene.joint import check_joint
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
 from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Strip
+from jbeamshell.scene.pressure import bolt_pressure
 from jbeamshell.scene.quadratic import check_quadratic
 from jbeamshell.scene.rungs import IDEAL, general_rung, spelled_out
 from jbeamshell.scene.text import summary
@@ -296,6 +297,12 @@ class Scene(eqx.Module):
             for name in ("axial_stiffness", "poisson_ratio"):
                 parts["strip"].setdefault(name, None)
         contact = parts["contact"]
+        if "contact.bolts" in values:
+            rows = _number("contact.bolts", values["contact.bolts"])
+            length = as_leaf(parts["strip"].get("length", self.strip.length), "strip.length")
+            contact["pressure"] = bolt_pressure(rows, length)
+            both = parts["member"].get("support", self.member.support) == "clamped"
+            contact.setdefault("bottom_pressure", contact["pressure"] if both else 0.0)
         if "law" in contact or "smoothing" in contact:
             contact["law"] = _make_law(self.contact.law, contact)
         # An amplitude of another control has another unit: it must be given anew.

@@ -181,7 +181,7 @@ def lanes_of(scene: Scene, over: Mapping[str, ArrayLike], paired: bool = False) 
     require("over", over, some, "name at least one key and its values, in a dictionary")
     for key in over:
         check_key(key)
-        number = key in NUMBERS and key != "strip.layers"
+        number = key in NUMBERS and key not in ("strip.layers", "contact.bolts")
         require("over", key, number, "is no single number of the scene: set it in the scene")
         if DERIVED.get(key) in over:
             raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")

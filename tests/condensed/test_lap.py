@@ -149,6 +149,68 @@ class TestBalance:
         np.testing.assert_allclose(carried, rough.force, atol=1e-8)
 
 
+BEND = [[0.0, 0.0], [1.0, 2e-5], [2.0, 8e-5]]  # of a member that is curved
+
+
+class TestGap:
+    @pytest.mark.slow
+    def test_a_member_that_is_free_settles_over_an_even_gap(self):
+        flat, above = (jb.solve(SQUEEZE.replace({"contact.gap": g})) for g in (None, 1e-3))
+        assert float(above.dissipation) == pytest.approx(float(flat.dissipation), rel=1e-7)
+        lowered = above.w - above.member[..., 1]
+        np.testing.assert_allclose(lowered + 1e-3, above.gap, atol=1e-12)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("assembly", ["frictional", "frictionless"])
+    def test_derivatives_in_gap_and_bolt_forces_have_slope_two(self, assembly):
+        values = {"contact.assembly": assembly, "contact.gap": BEND}
+        bolts = jnp.array([[0.7, 12.0, 0.4], [1.3, 12.0, 0.4]])
+        values |= {"model.nodes": 65, "load.steps_per_half_cycle": 2, "load.cycles": 1}
+        scene = library.single_lap().replace({"model.rung": "squeeze"} | values)
+        scene = scene.replace({"contact.bolts": bolts}).pinned()
+
+        def work(numbers):
+            size, one, other = numbers
+            forces = bolts.at[:, 1].set(jnp.stack([one, other]))
+            new = {
+                "contact.gap": jnp.asarray(BEND) * jnp.stack([jnp.ones(()), size]),
+                "contact.bolts": forces,
+            }
+            return jb.solve(scene.replace(new), throw=False).dissipation
+
+        at, way = jnp.array([1.0, 12.0, 11.0]), jnp.array([0.5, 1.0, -2.0])
+        value, slope = jax.jit(lambda x: jax.jvp(work, (x,), (way,)))(at)
+        value_at = jax.jit(work)
+        errors = [abs(value_at(at + h * way) - value - h * slope) for h in (4e-3, 2e-3)]
+        assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.4)
+
+    @pytest.mark.parametrize(
+        ("values", "said"),
+        [
+            ({"contact.gap": [[0.0, -1.0], [1.0, 0.0]]}, "contact.gap = .* nowhere negative"),
+            ({"contact.gap": 1.0, "member.support": "none"}, "strip.curvature"),
+            ({"contact.bolts": [[1.9, 8.0, 0.4]]}, "lies off the overlap, X from 0 to 2"),
+            ({"contact.bolts": [[0.5, 8.0, 0.4], [0.8, 8.0, 0.4]]}, "patches overlap"),
+            ({"contact.bolts": [[1.0, -8.0, 0.4]]}, "must be positive"),
+            (
+                {"contact.bolts": [[1.0, 8.0]]},
+                "give rows of numbers \\[X, force, width of the patch",
+            ),
+            ({"contact.bolts": [[1.0, 8.0, 0.4]], "contact.pressure": 3.0}, "say the same thing"),
+        ],
+    )
+    def test_gaps_and_bolts_that_make_no_sense_are_refused(self, values, said):
+        with pytest.raises(jb.InputError, match=said):
+            SQUEEZE.replace(values)
+
+    def test_bolts_are_patches_of_pressure_on_both_faces(self):
+        rows = [[0.5, 8.0, 0.4], [1.5, 6.0, 0.3]]
+        lap = SQUEEZE.replace({"member.support": "clamped", "contact.bolts": rows})
+        np.testing.assert_allclose(lap.contact.bolts, rows)
+        np.testing.assert_array_equal(lap.contact.bottom_pressure, lap.contact.pressure)
+        assert float(SQUEEZE.replace({"contact.bolts": rows}).contact.bottom_pressure) == 0.0
+
+
 def test_a_single_lap_beyond_its_gross_slip_is_told():
     values = {"member.support": "clamped", "strip.loaded_end": "guided", "load.amplitude": 1.99}
     values |= {"contact.pressure": BOLT, "contact.bottom_pressure": BOLT, "model.rung": "shell"}

@@ -52,6 +52,20 @@ def members(scene):
     return as_body(upper, x, [1.0, 1.0]), as_body(lower, x, [1.0, -1.0])
 
 
+def moved(body, signs):
+    """Body mirrored, or turned by 180 degrees: X counts from the other end, directions turn."""
+    nodes = np.arange(body.x.size)[::-1]
+    places = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
+    sign = np.tile(signs, nodes.size)
+    return jb.Substructure(
+        2.0 - body.x[nodes],
+        sign[:, None] * np.asarray(body.stiffness)[np.ix_(places, places)] * sign,
+        sign[:, None] * np.asarray(body.forces)[places],
+        body.flexibility,
+        fixed=np.array(body.fixed)[places].tolist(),
+    )
+
+
 UPPER, LOWER = members(SCENE)
 
 
@@ -83,6 +97,19 @@ class TestContact:
         np.testing.assert_allclose(found.force, forces.force, atol=1e-8)
         np.testing.assert_allclose(found.gap, forces.gap, atol=1e-12)
         assert float(jnp.sum(found.slip_work)) == pytest.approx(float(jnp.sum(forces.slip_work)))
+
+    def test_a_mirrored_joint_under_a_mirrored_load_answers_alike(self):
+        joint = jb.solve_contact(UPPER, LOWER, **LOAD)
+        mirrored = jb.solve_contact(*(moved(body, [-1.0, 1.0]) for body in (UPPER, LOWER)), **LOAD)
+        # Turned by 180 degrees the pulled body is the one below.
+        turned = jb.solve_contact(*(moved(body, [-1.0, -1.0]) for body in (LOWER, UPPER)), **LOAD)
+        for other, sign in ((mirrored, -1.0), (turned, 1.0)):
+            for name in ("dissipation", "secant_stiffness"):
+                assert float(getattr(other, name)) == pytest.approx(
+                    float(getattr(joint, name)), rel=1e-10
+                )
+            np.testing.assert_allclose(other.reaction[:, ::-1], joint.reaction, atol=1e-9)
+            np.testing.assert_allclose(other.slip[:, ::-1], sign * joint.slip, atol=1e-14)
 
     def test_pressing_follows_the_bolts_and_friction_work_fills_the_loop(self):
         once = jb.solve_contact(UPPER, LOWER, **LOAD)
