@@ -1,3 +1,7 @@
+from .four_parameters import (
+    FourParameters as FourParameters,
+    four_parameters as four_parameters,
+)
 from .release import RingDownStudy as RingDownStudy, let_go as let_go
 from .ringdown import RingDown as RingDown, ring_down as ring_down
 from .strip.attached_masses import AttachedMasses as AttachedMasses

@@ -14,6 +14,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.laws.bar import Bar as Bar
 from jbeamshell.laws.bouc_wen import BoucWen as BoucWen
 from jbeamshell.laws.dahl import Dahl as Dahl
+from jbeamshell.laws.four_parameters import iwan4_through as iwan4_through
 from jbeamshell.laws.iwan4 import Iwan4 as Iwan4
 from jbeamshell.laws.jang_barber import JangBarber as JangBarber
 from jbeamshell.laws.jenkins import Jenkins as Jenkins
@@ -25,6 +26,7 @@ from jbeamshell.laws.parallel_iwan import ParallelIwan as ParallelIwan
 from jbeamshell.laws.parallel_iwan import sliders as sliders
 from jbeamshell.laws.power_law import PowerLaw as PowerLaw
 from jbeamshell.laws.series_iwan import SeriesIwan as SeriesIwan
+from jbeamshell.laws.strip_formula import iwan4_of_strip as iwan4_of_strip
 
 LAWS: dict[str, type[Law]] = {
     law.heading: law

@@ -26,6 +26,9 @@ from jbeamshell.reference.masing import bar_hysteresis as bar_hysteresis
 from jbeamshell.reference.masing import masing_dissipation as masing_dissipation
 from jbeamshell.reference.masing import masing_loop as masing_loop
 from jbeamshell.reference.masing import masing_pull_push as masing_pull_push
+from jbeamshell.reference.micro_slip import energy_exponent as energy_exponent
+from jbeamshell.reference.micro_slip import height_factor as height_factor
+from jbeamshell.reference.micro_slip import slip_energy as slip_energy
 from jbeamshell.reference.mindlin import counter_slip_part as counter_slip_part
 from jbeamshell.reference.mindlin import goodman_energy as goodman_energy
 from jbeamshell.reference.mindlin import mindlin_energy as mindlin_energy

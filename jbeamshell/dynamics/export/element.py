@@ -13,6 +13,8 @@ from importlib.metadata import version
 import numpy as np
 from numpy.typing import NDArray
 
+from jbeamshell.dynamics.four_parameters import FourParameters
+
 NEGLIGIBLE = 1e-13  # stiffness of a slider that is left out, over that of all
 
 
@@ -29,6 +31,7 @@ class Element:
     width : width of the strip, with which forces are multiplied already
     asymmetry : largest difference of pull and push from the backbone, over the displacement
     units : names of the units of displacement and force
+    model : four-parameter Iwan model of the same joint, for targets that have one
     """
 
     displacement: NDArray[np.float64]
@@ -39,6 +42,7 @@ class Element:
     width: float
     asymmetry: float
     units: tuple[str, str]
+    model: FourParameters | None = None
 
     @property
     def sliders(self) -> list[tuple[float, float]]:

@@ -34,12 +34,19 @@ from jbeamshell.condensed.network import Network, Response
 from jbeamshell.dynamics.export import table
 from jbeamshell.dynamics.export.element import Element
 from jbeamshell.dynamics.export.targets import write
+from jbeamshell.dynamics.four_parameters import (
+    ENOUGH,
+    FRACTIONS,
+    FourParameters,
+    gross_slip,
+)
 from jbeamshell.dynamics.structure.strip_line import (
     mean_of,
     slider_line,
     slider_line_once,
     walked_line,
 )
+from jbeamshell.laws.four_parameters import iwan4_through
 from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
@@ -58,6 +65,7 @@ class Joint(eqx.Module):
     width : of the strip
     asymmetry : largest difference of the strip's pull and push from the backbone, over the
         displacement at one force
+    capacity : force of gross slip, beyond the backbone; infinite if it is not known
 
     Raises
     ------
@@ -76,6 +84,7 @@ class Joint(eqx.Module):
     network: Network | None
     width: Array
     asymmetry: Array
+    capacity: Array
 
     def __init__(
         self,
@@ -84,11 +93,13 @@ class Joint(eqx.Module):
         network: Network | None = None,
         width: Any = 1.0,
         asymmetry: Any = 0.0,
+        capacity: Any = np.inf,
     ) -> None:
         self.displacement = as_leaf(displacement, "joint.displacement", BACKBONE)
         self.force = as_leaf(force, "joint.force", BACKBONE)
         self.network, self.width = network, as_leaf(width, "joint.width")
         self.asymmetry = as_leaf(asymmetry, "joint.asymmetry")
+        self.capacity = as_leaf(capacity, "joint.capacity")
 
     def __check_init__(self) -> None:
         if is_traced(self.displacement, self.force):
@@ -128,6 +139,7 @@ class Joint(eqx.Module):
         """
         force = largest_force(scene, force)
         require_number("width", width)
+        capacity = width * gross_slip(scene)
         if scene.model.condensed:
             soft = not scene.ideal_friction
             inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
@@ -135,14 +147,14 @@ class Joint(eqx.Module):
             network, sides, f, count = line(scene, as_leaf(force, "force"), soft)
             u, asymmetry = mean_of(*sides)
             if is_traced(u):
-                return cls(u, width * f, network, width, asymmetry)
+                return cls(u, width * f, network, width, asymmetry, capacity)
             if np.all(np.isfinite(u)):
                 kept = np.append(np.arange(u.size - 1) < int(count), True)
                 u, f = np.asarray(u)[kept], width * np.asarray(f)[kept]
-                return cls(u, f, network, width, asymmetry)
+                return cls(u, f, network, width, asymmetry, capacity)
         require("scene", "traced", not is_traced(scene, force), TRACED)
         u, f, asymmetry = walked_line(scene, float(force), width)
-        return cls(u, f, width=width, asymmetry=asymmetry)
+        return cls(u, f, None, width, asymmetry, capacity)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Joint:
@@ -239,6 +251,29 @@ class Joint(eqx.Module):
             forces.append(sliders.sum() + springs[-1] * u)
         return np.array(forces)
 
+    def four_parameters(self) -> FourParameters:
+        """Segalman's model nearest to the joint's own loops, with its errors.
+
+        `jbeamshell.dynamics.four_parameters` takes the scene's steady cycles instead, up to .95 of
+        gross slip.
+
+        Raises
+        ------
+        InputError
+            if the force of gross slip is not known, or the backbone ends below .3 of it
+        """
+        capacity = float(self.capacity)
+        fix = "is not known: take Joint.of(scene), or give capacity="
+        require("joint.capacity", capacity, bool(np.isfinite(capacity)), fix)
+        force = capacity * np.array(FRACTIONS)
+        force = force[force <= float(self.force[-1])]
+        fix = f"ends too far below gross slip, {capacity:.6g}: take Joint.of(scene) with more force"
+        require("joint.force", float(self.force[-1]), force.size >= ENOUGH, fix)
+        u = np.interp(force, np.append(0.0, self.force), np.append(0.0, self.displacement))
+        d = np.asarray(self.dissipation(u))
+        law = iwan4_through(capacity, float(self.stiffness), force, u, d)
+        return FourParameters(law, force, u, d)
+
     def export(
         self,
         to: str,
@@ -285,6 +320,7 @@ class Joint(eqx.Module):
             width=float(self.width),
             asymmetry=float(self.asymmetry),
             units=(units[0], units[1]),
+            model=self.four_parameters() if to == "tmdsimpy" and self._nears_slip else None,
         )
         written = write(element, to, path)
         if element.asymmetry > DOUBTED_ASYMMETRY:
@@ -292,6 +328,11 @@ class Joint(eqx.Module):
             fix = "which is exported; joint.path_forces has each way exactly"
             warnings.warn(f"{text}, {fix}", DoubtfulWarning, stacklevel=2)
         return written
+
+    @property
+    def _nears_slip(self) -> bool:
+        """True if the backbone tells the four parameters."""
+        return float(self.force[-1]) >= FRACTIONS[ENOUGH - 1] * float(self.capacity)
 
     @property
     def _points(self) -> tuple[Array, Array]:

@@ -1,0 +1,123 @@
+"""Segalman's four parameters of a strip or lap joint, from its geometry alone.
+
+The scene is solved in steady cycles of rising amplitude; F_S is its gross slip, and K_T, chi and
+beta follow from the curves of displacement and dissipation, without a test.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jbeamshell.common.checks import require, require_number
+from jbeamshell.history.history import History
+from jbeamshell.laws.four_parameters import exponents, iwan4_through
+from jbeamshell.laws.iwan4 import Iwan4
+from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.pressure import resultant
+from jbeamshell.scene.scene import Scene
+
+FRACTIONS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  # of gross slip
+LITTLE = 0.01  # of gross slip, at which the contact is taken to stick
+LEAST = 1e-9  # energy of a cycle that is felt, over F u
+ENOUGH = 4  # amplitudes
+CYCLE = np.array([1.0, -1.0, 1.0, -1.0, 1.0])  # the last two branches are the steady cycle
+
+
+class FourParameters(NamedTuple):
+    """Four-parameter Iwan model of a scene or joint, and how far it is from it.
+
+    Attributes
+    ----------
+    law : model; forces are those of the whole width
+    force, displacement, dissipation : (k,) amplitudes and energies of the joint's steady cycles
+    """
+
+    law: Iwan4
+    force: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    dissipation: NDArray[np.float64]
+
+    @property
+    def dissipation_error(self) -> NDArray[np.float64]:
+        """Relative errors (k,) of the model's dissipation, at the forces."""
+        reached = self.law.displacement(self.force)
+        return np.asarray(self.law.dissipation(reached)) / self.dissipation - 1.0
+
+    @property
+    def displacement_error(self) -> NDArray[np.float64]:
+        """Relative errors (k,) of the model's displacement, at the forces."""
+        return np.asarray(self.law.displacement(self.force)) / self.displacement - 1.0
+
+    @property
+    def exponents(self) -> NDArray[np.float64]:
+        """Exponents (k,) of the power laws D ~ F^n that touch the dissipation."""
+        return exponents(self.force, self.dissipation)
+
+    def __str__(self) -> str:
+        law, n = self.law, self.exponents
+        off = np.abs(self.dissipation_error)
+        names = (("F_S", law.slip_force), ("K_T", law.stiffness), ("chi", law.chi))
+        numbers = [f"{name} = {float(x):.6g}" for name, x in (*names, ("beta", law.beta))]
+        return (
+            f"four-parameter Iwan model: {', '.join(numbers)}\n"
+            f"dissipation: off by {np.median(off):.1%} (median), {np.max(off):.1%} (worst)\n"
+            f"displacement: off by {np.max(np.abs(self.displacement_error)):.1%} at most\n"
+            f"power law D ~ F^n: n from {np.min(n):.2f} to {np.max(n):.2f}"
+        )
+
+
+def four_parameters(scene: Scene, *, width: float = 1.0) -> FourParameters:
+    """Four-parameter Iwan model of a strip or lap joint, fitted to no test but to its geometry.
+
+    Parameters
+    ----------
+    scene : scene, whose load is not used; take ``model.rung = plane`` for elasticity's figures
+    width : of the strip, by which forces and energies are multiplied
+
+    Raises
+    ------
+    InputError
+        for a scene without gross slip, or one that is driven otherwise than by a force
+    UnconvergedError
+        if a load step has no equilibrium
+
+    Examples
+    --------
+    >>> print(jb.dynamics.four_parameters(jb.Scene().replace({"model.rung": "plane"})))
+    """
+    require_number("width", width)
+    force = scene.load.control == "force"
+    require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
+    limit = float(gross_slip(scene))
+    slips = limit > 0.0 and scene.contact.normal != "none"
+    fix = "must have gross slip: give it friction and contact"
+    require("contact.friction", scene.contact.friction, slips, fix)
+    sizes = limit * np.array([LITTLE, *FRACTIONS])
+    u, d = steady(solve(scene, np.outer(sizes, CYCLE).ravel()), sizes.size)
+    f, d, stiffest = width * sizes, width * d, float(np.max(width * sizes / u))
+    felt = d > LEAST * f * u
+    felt[0] = False
+    fix = "slips at too few amplitudes, if at all: the contact sticks, or take more model.nodes"
+    require("scene", int(np.sum(felt)), int(np.sum(felt)) >= ENOUGH, fix)
+    law = iwan4_through(width * limit, stiffest, f[felt], u[felt], d[felt])
+    return FourParameters(law, f[felt], u[felt], d[felt])
+
+
+def gross_slip(scene: Scene) -> Any:
+    """End force per width at which the whole contact slips, mu F_N L; may be traced."""
+    contact, length = scene.contact, scene.strip.length
+    down, _ = resultant(contact.pressure, contact.bottom_pressure, length, scene.member.support)
+    return contact.friction * down
+
+
+def steady(history: History, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Displacement amplitudes (k,) and work of friction (k,) of the last cycle of each size."""
+    size = count * CYCLE.size
+    u, work = (
+        np.asarray(each)[-size:].reshape(count, -1)
+        for each in (history.displacement, history.slip_work)
+    )
+    return 0.5 * np.abs(u[:, -1] - u[:, -2]), np.sum(work[:, -2:], axis=1)

@@ -1,0 +1,69 @@
+"""Four parameters of a scene from its geometry, and of a joint from its loops."""
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.dynamics import Joint, four_parameters
+from jbeamshell.laws import Iwan4, iwan4_of_strip
+
+U = np.geomspace(1e-3, 3.0, 60)
+LAW = Iwan4(slip_force=1.0, stiffness=1.0, chi=-0.4, beta=0.5)
+
+
+@pytest.mark.slow
+def test_the_loops_of_a_joint_give_its_parameters():
+    u = np.asarray(LAW.displacement(np.linspace(0.01, 0.96, 200)))
+    joint = Joint(u, LAW.backbone(u), capacity=1.0)
+    found = joint.four_parameters()
+    assert float(found.law.chi) == pytest.approx(-0.4, abs=0.01)
+    assert float(found.law.beta) == pytest.approx(0.5, abs=0.02)
+    assert np.max(np.abs(found.dissipation_error)) < 0.01
+    assert np.all(found.exponents > 2.0)
+    assert "chi = -0.39" in str(found)
+
+
+def test_a_joint_without_gross_slip_has_no_parameters():
+    with pytest.raises(jb.InputError, match=r"joint\.capacity = inf: is not known"):
+        Joint(U, np.tanh(U)).four_parameters()
+    with pytest.raises(jb.InputError, match="ends too far below gross slip"):
+        Joint(U, np.tanh(U), capacity=50.0).four_parameters()
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ({"load.control": "displacement", "load.amplitude": 1e-5}, "must be 'force'"),
+        ({"contact.friction": 0.0}, "must have gross slip: give it friction and contact"),
+    ],
+)
+def test_scenes_without_gross_slip_are_refused(values, complaint):
+    with pytest.raises(jb.InputError, match=complaint):
+        four_parameters(jb.Scene().replace(values))
+
+
+@pytest.mark.slow
+class TestScenes:
+    def test_a_bolt_and_its_formula(self):
+        rows = [[0.5, 0.0], [0.5, 20.0], [1.5, 20.0], [1.5, 0.0]]
+        scene = jb.Scene().replace({"model.rung": "plane", "contact.pressure": rows})
+        found = four_parameters(scene, width=3.0)
+        assert float(found.law.slip_force) == pytest.approx(6.0)
+        assert np.median(np.abs(found.dissipation_error)) < 0.12
+        assert np.max(np.abs(found.displacement_error)) < 0.05
+        law = iwan4_of_strip(scene)
+        reached = law.displacement(found.force / 3.0)
+        off = np.abs(3.0 * np.asarray(law.dissipation(reached)) / found.dissipation - 1.0)
+        assert np.median(off) < 0.15
+        assert np.max(off) < 0.35
+
+    def test_a_single_lap_joint_is_nearly_an_iwan_model(self):
+        found = four_parameters(jb.library.single_lap())
+        assert np.median(np.abs(found.dissipation_error)) < 0.04
+        assert np.max(np.abs(found.displacement_error)) < 0.05
+
+    def test_an_even_pressure_up_to_the_end_is_none(self):
+        found = four_parameters(jb.Scene().replace({"model.rung": "plane"}))
+        assert np.max(found.exponents) > 6.0
+        assert np.max(np.abs(found.dissipation_error)) > 5.0
+        assert "n from 3.0" in str(found)
