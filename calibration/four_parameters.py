@@ -2,8 +2,8 @@
 
     python calibration/four_parameters.py
 
-writes four_parameters.json beside this file (about four minutes).  Every scene is plane elasticity
-in steady cycles of .1 to .95 of gross slip.  A row holds the exponents of D ~ F^n, the parameters
+writes four_parameters.json beside this file (a quarter of an hour).  Every scene is plane
+elasticity in steady cycles of .1 to .95 of gross slip.  A row holds the exponents of D ~ F^n, the parameters
 of the four-parameter Iwan model that is nearest to the scene's displacement and dissipation, those
 of the short formula of `jbeamshell.laws.iwan4_of_strip`, the errors of both, and those of
 `jbeamshell.reference.slip_energy`.
@@ -107,13 +107,18 @@ def energy_errors(about: dict[str, Any], each: dict[str, Any]) -> dict[str, Any]
 def main() -> None:
     """Write the record."""
     warnings.simplefilter("ignore", jb.DoubtfulWarning)
-    rows = []
+    rows: list[dict[str, Any]] = []
+    failed: list[dict[str, Any]] = []
     for about, scene in scenes():
-        each = row(scene)
+        try:
+            each = row(scene)
+        except jb.UnconvergedError as error:
+            failed.append(about | {"why": str(error)})
+            continue
         further = formula_errors(scene, each) | energy_errors(about, each)
         rows.append(about | each | further)
-        print({key: each for key, each in rows[-1].items() if key not in CURVES}, flush=True)
-    record = {"about": provenance(), "rows": rows}
+        print({key: rows[-1][key] for key in rows[-1] if key not in CURVES}, flush=True)
+    record = {"about": provenance(), "rows": rows, "failed": failed}
     write_text(HERE / "four_parameters.json", json.dumps(record, indent=1) + "\n")
 
 
