@@ -3,10 +3,10 @@
     python calibration/four_parameters.py
 
 writes four_parameters.json beside this file (a quarter of an hour).  Every scene is plane
-elasticity in steady cycles of .1 to .95 of gross slip.  A row holds the exponents of D ~ F^n, the parameters
-of the four-parameter Iwan model that is nearest to the scene's displacement and dissipation, those
-of the short formula of `jbeamshell.laws.iwan4_of_strip`, the errors of both, and those of
-`jbeamshell.reference.slip_energy`.
+elasticity in steady cycles of .1 to .95 of gross slip.  A row holds the exponents of D ~ F^n, the
+parameters of the four-parameter Iwan model that is nearest to the scene's displacement and
+dissipation, those of the short formula of `jbeamshell.laws.iwan4_of_strip`, the errors of both, and
+those of `jbeamshell.reference.slip_energy`.
 `python -m calibration.charts.four_parameters` draws it.
 """
 
