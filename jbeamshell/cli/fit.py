@@ -65,6 +65,11 @@ def add_to(commands: Any) -> None:
         help="scene whose other keys stay fixed (default: the standard strip)",
     )
     parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="law of a joint in place of a strip: iwan4, jenkins, bouc-wen, sliders4, ...",
+    )
+    parser.add_argument(
         "--free",
         metavar="KEY,KEY,...",
         help="parameters to fit (default: those that the data tell, with reasons)",
@@ -139,6 +144,8 @@ def _plan(options: argparse.Namespace) -> Any:
     values = {name: getattr(options, name) for name in plan.OPTIONS if _given(options, name)}
     if options.scene is not None:
         values["scene"] = options.scene
+    if options.model is not None:
+        values["model"] = options.model
     values["set"] = assignments(options.set)
     values["free"] = _free(options)
     if not options.data:
@@ -175,6 +182,8 @@ def _example(values: dict[str, Any]) -> Any:
     from jbeamshell.scene import library
     from jbeamshell.scene.toml import overridden
 
+    if "model" in values:
+        return plan.plan_for(values, example_loops())
     start = {key: value for key, value in EXAMPLE_START.items() if key in values["free"]}
     scene = values.pop("scene", None)
     below = overridden(start, {} if scene is None else library.values_from(scene))
@@ -189,7 +198,8 @@ def _given(options: argparse.Namespace, name: str) -> bool:
 def _free(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
     """Table of each free parameter, as a plan has it."""
     about = (*options.start, *options.bounds, *options.prior)
-    if options.free is None and options.data and not about:
+    chosen = options.data or options.model is not None
+    if options.free is None and chosen and not about:
         return {}  # the data choose
     words = EXAMPLE_FREE if options.free is None else options.free
     keys = [key.strip() for key in words.split(",") if key.strip()]

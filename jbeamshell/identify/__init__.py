@@ -2,14 +2,19 @@
 
 `fit` searches, and its `Fit` holds the values with their uncertainty.  `profile` computes the
 confidence interval of one parameter by running the model.  `posterior` is a density for samplers
-of other libraries.  `read_plan` reads a study from a file.
+of other libraries.  `read_plan` reads a study from a file.  `compare` fits several laws of a joint
+to one target; `Driven` is such a law in place of a scene, driven by force or displacement.
 """
 
+from jbeamshell.identify.comparison import Comparison as Comparison
+from jbeamshell.identify.comparison import compare as compare
 from jbeamshell.identify.fitting import MAX_ITERATIONS as MAX_ITERATIONS
 from jbeamshell.identify.fitting import METHODS as METHODS
 from jbeamshell.identify.fitting import FitProgress as FitProgress
 from jbeamshell.identify.fitting import fit as fit
 from jbeamshell.identify.fitting import fit_kappa_s as fit_kappa_s
+from jbeamshell.identify.models import Drive as Drive
+from jbeamshell.identify.models import Driven as Driven
 from jbeamshell.identify.parameters import Parameter as Parameter
 from jbeamshell.identify.plan import Plan as Plan
 from jbeamshell.identify.plan import read_plan as read_plan

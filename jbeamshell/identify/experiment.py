@@ -20,6 +20,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.identify.models import Model
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.rig import rigged, with_rig
 from jbeamshell.identify.rig_keys import RIG
@@ -27,7 +28,6 @@ from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Measurement, noise_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.scene.scene import Scene
 
 
 class Prediction(NamedTuple):
@@ -253,7 +253,7 @@ def _observed(measurement: Measurement, specimen: Specimen, rig: Sequence[str]) 
 
 
 def _response(
-    values: Array, observation: Observation, scene: Scene, keys: tuple[str, ...], solver: Newton
+    values: Array, observation: Observation, scene: Model, keys: tuple[str, ...], solver: Newton
 ) -> tuple[Array, Array, Array, Array]:
     """Residual (n,), its derivatives (n, k), prediction (n,) and convergence of a run."""
 
@@ -273,7 +273,7 @@ _respond = eqx.filter_jit(_response)
 _respond_batch = eqx.filter_jit(eqx.filter_vmap(_response, in_axes=(0, None, None, None, None)))
 
 
-def _shape(run: tuple[Observation, Scene]) -> Any:
+def _shape(run: tuple[Observation, Model]) -> Any:
     """Key that runs have in common if they share one compiled program."""
     arrays, rest = eqx.partition(run, eqx.is_array)
     shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in jax.tree.leaves(arrays))

@@ -14,6 +14,7 @@ from jbeamshell.common.checks import require, require_choice, require_count
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.progress import bar
 from jbeamshell.identify.experiment import Experiment
+from jbeamshell.identify.models import Driven
 from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit, fit_at
@@ -21,7 +22,8 @@ from jbeamshell.identify.rig import with_starts
 from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, SearchResult, StoppingRule
 from jbeamshell.identify.search_space import SearchSpace, search_space
-from jbeamshell.identify.specimens import Specimen, as_specimens, inspected
+from jbeamshell.identify.specimens import Specimen, as_specimens, free_of, inspected
+from jbeamshell.laws import Law
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.recordings import FEWEST_POINTS
 from jbeamshell.numerics.newton import Newton
@@ -29,6 +31,8 @@ from jbeamshell.scene.scene import Scene
 
 POINTS = 96  # points of a loop at which the model is run
 MAX_ITERATIONS = 40
+OF_LAWS = 5  # times as many for laws, which cost little and creep to their limits
+LAW_STARTS = 6
 METHODS = tuple(SEARCHES)
 STARTS = 3  # default number of searches if all parameters have two bounds
 ADAM_STARTS = 8
@@ -67,7 +71,7 @@ class FitProgress(NamedTuple):
 
 def fit(
     data: Measurement | Specimen | Sequence[Measurement] | Sequence[Specimen],
-    scene: Scene | None = None,
+    scene: Scene | Law | Driven | str | None = None,
     free: Sequence[str | Parameter] = (),
     *,
     weights: Sequence[float] = (),
@@ -77,7 +81,7 @@ def fit(
     save: str | os.PathLike[str] | None = None,
     solver: Newton | None = None,
     points: int = POINTS,
-    max_iterations: int = MAX_ITERATIONS,
+    max_iterations: int | None = None,
     tolerance: float = 1e-7,
     progress: Callable[[FitProgress], None] | None = None,
     throw: bool = True,
@@ -95,20 +99,24 @@ def fit(
     ----------
     data : a measurement or a list of them, of one kind or several; or one `Specimen` or several,
         which bring their own scenes
-    scene : start values, and all values that stay fixed; None with specimens
+    scene : start values, and all values that stay fixed; None with specimens.  Or a law of a joint
+        in place of the strip: a `jbeamshell.laws.Law`, or its name, such as "iwan4", to start it
+        from the data
     free : what to fit: keys such as "contact.friction", or `Parameter` with bounds, scale, prior,
-        and whether every specimen has a value of its own
+        and whether every specimen has a value of its own; if empty, the numbers of a law that loops
+        tell
     weights : factors of the measurements' residuals, besides the curves' own; all 1 if empty
     method : "levenberg-marquardt"; "l-bfgs-b", which may end on a bound; or "adam", which starts
         from all points at once and finishes the best by Levenberg-Marquardt
     starts : number of starts: the given one, and others spread between the bounds (a factor e to
         either side of a missing bound).  "adam" uses all of them, the other methods the best of
-        four times as many.  None means 8 for "adam"; else 3 if all parameters have two bounds, or 1
+        four times as many.  None means 8 for "adam"; else 6 for a law, 3 if all parameters of a
+        strip have two bounds, or 1
     noise : standard deviation of measurements without noise, over their range
     save : file that keeps every model run; if it exists, the fit continues from it
     solver : settings of Newton's method; None takes the defaults
     points : number of points to which each loop is thinned, approximately
-    max_iterations : largest number of iterations of each search
+    max_iterations : largest number of iterations of each search; None is 40, for laws 200
     tolerance : relative change of the parameters at which a search stops; a flat cost stops it too
     progress : called after every step with a `FitProgress`; None shows a bar where a person watches
     throw : True to raise if the fit did not converge; if False, read ``status``
@@ -137,17 +145,24 @@ def fit(
         loops = jb.measured.read_loops("rig.csv")
         fit = jb.identify.fit(loops, jb.library.standard(), ["contact.friction"])
         fit.values["contact.friction"], fit.errors["contact.friction"]
+
+        law = jb.identify.fit(loops, "iwan4").law  # four parameters in place of the strip
+        law.dissipation_at_force(0.5)
     """
     require_choice("method", method, METHODS)
     require_count("starts", 1 if starts is None else starts, 1)
     require_count("points", points, FEWEST_POINTS)
-    require_count("max_iterations", max_iterations, 1)
     _require_positive("noise", 1.0 if noise is None else noise, "part of the range, such as 0.01")
     _require_positive("tolerance", tolerance, "number, such as 1e-7")
     valid = solver is None or isinstance(solver, Newton)
     require("solver", solver, valid, "give a jbeamshell.Newton")
     require_choice("unchecked", unchecked, (False, True))
-    parameters, specimens = as_parameters(free), as_specimens(data, scene, weights)
+    specimens = as_specimens(data, scene, weights)
+    if max_iterations is None:
+        of_strip = isinstance(specimens[0].scene, Scene)
+        max_iterations = MAX_ITERATIONS if of_strip else OF_LAWS * MAX_ITERATIONS
+    require_count("max_iterations", max_iterations, 1)
+    parameters = as_parameters(free or free_of(specimens))
     doubts = inspected(specimens, [parameter.key for parameter in parameters], unchecked)
     parameters = with_starts(parameters, specimens)
     space, scenes = search_space(parameters, {one.label: one.scene for one in specimens})
@@ -157,7 +172,9 @@ def fit(
     problem = Problem(experiment, space, solver or Newton(), save)
     if starts is None:
         bounded = all(parameter.bounded for parameter in parameters)
-        starts = ADAM_STARTS if method == "adam" else STARTS if bounded else 1
+        of_law = not isinstance(specimens[0].scene, Scene)
+        few = LAW_STARTS if of_law else STARTS if bounded else 1
+        starts = ADAM_STARTS if method == "adam" else few
     noise_cost = experiment.weight.size if experiment.noisy else 0
     stopping = StoppingRule(max_iterations, tolerance, noise_cost)
     try:
@@ -286,6 +303,6 @@ def _spread(space: SearchSpace, count: int) -> list[Vector]:
     parts = (cells + random.uniform(size=cells.shape)) / max(count, 1)
     boxed, box = space.boxed()
     near = np.clip(box, -1.0, 1.0)
-    bounded = np.array([parameter.bounded for parameter in space.parameters])
+    bounded = np.all(np.isfinite(box), axis=1)  # a bound of 0 is none on a logarithmic scale
     low, high = np.where(bounded[:, None], box, near).T
     return [space.point(boxed.values(low + part * (high - low))) for part in parts]

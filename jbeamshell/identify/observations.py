@@ -14,23 +14,23 @@ from typing import Any, ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
+from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.curves import (
-    AmplitudeCurve,
-    Backbone,
-    DissipationCurve,
-    SqueezeCurve,
-    StiffnessCurve,
-    noise_of,
+from jbeamshell.identify.models import (
+    FIGURES,
+    Model,
+    check_amplitudes,
+    check_path,
+    cycle_figures,
+    of_strips_alone,
+    response_along,
 )
+from jbeamshell.measured.curves import AmplitudeCurve, Backbone, SqueezeCurve, noise_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.solver import solve
-from jbeamshell.scene.load_path import check
-from jbeamshell.scene.scene import Scene
 
 LENGTH_STEP = 32  # runs are filled up to multiples of this, where further points are cheap
 APPROACH = 8  # load steps from zero to the first point of a loop
@@ -65,12 +65,12 @@ class Observation(eqx.Module):
         return prediction
 
     @abc.abstractmethod
-    def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
         """Run the model.
 
         Parameters
         ----------
-        scene : strip, contact and load; may hold traced leaves
+        scene : strip with its load, or law; may hold traced leaves
         solver : settings of Newton's method
 
         Returns
@@ -79,7 +79,7 @@ class Observation(eqx.Module):
         converged : True if every load step found equilibrium
         """
 
-    def residual(self, scene: Scene, solver: Newton) -> tuple[Array, Array, Array]:
+    def residual(self, scene: Model, solver: Newton) -> tuple[Array, Array, Array]:
         """Weighted difference (n,), prediction (n,), and whether every load step converged."""
         prediction, converged = self.predict(scene, solver)
         difference = (prediction - self.measured) * self.weight
@@ -107,14 +107,14 @@ class LoopObservation(Observation):
     length_step: ClassVar[int] = LENGTH_STEP
 
     @classmethod
-    def of(cls, loop: Loop, scene: Scene) -> LoopObservation:
+    def of(cls, loop: Loop, scene: Model) -> LoopObservation:
         """Run of a loop; raises `InputError` if a force exceeds gross slip."""
         control = scene.load.control
         run_in = getattr(loop.thinned(RUN_IN, control), control) if loop.closed else np.zeros(0)
         return cls._through(loop, scene, run_in)
 
     @classmethod
-    def of_backbone(cls, backbone: Backbone, scene: Scene) -> LoopObservation:
+    def of_backbone(cls, backbone: Backbone, scene: Model) -> LoopObservation:
         """Run of a first loading; raises `InputError` if it turns back or exceeds gross slip."""
         drive = getattr(backbone, scene.load.control)
         steps = np.diff(drive, prepend=0.0) * np.sign(drive[-1])
@@ -129,14 +129,14 @@ class LoopObservation(Observation):
 
     @classmethod
     def _through(
-        cls, measurement: Loop | Backbone, scene: Scene, run_in: NDArray[np.float64]
+        cls, measurement: Loop | Backbone, scene: Model, run_in: NDArray[np.float64]
     ) -> LoopObservation:
         drive = getattr(measurement, scene.load.control)
         responding = measurement.form.response(scene.load.control)
         response = getattr(measurement, responding)
         approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
         path = np.concatenate([approach, run_in, drive])
-        check(scene, path)
+        check_path(scene, path)
         uncompared = np.zeros(path.size - drive.size)
         noise = noise_of(measurement)
         driver = getattr(measurement, "driver", None) or scene.load.control
@@ -160,12 +160,10 @@ class LoopObservation(Observation):
             getattr(measurement, "free_zero", False),
         )
 
-    def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
         """Responding column (n,), and whether every load step converged."""
-        history = solve(scene, self.path, solver=solver, throw=False)
-        column = "displacement" if scene.load.control == "force" else "force"
-        response = getattr(history, column)[history.pressed + 1 :]
-        return self.shifted(response), jnp.all(history.status == 0)
+        response, converged = response_along(scene, self.path, solver)
+        return self.shifted(response), converged
 
     def shifted(self, response: Array) -> Array:
         """Response (n,) shifted to where it fits best, if its zero is unknown."""
@@ -190,8 +188,9 @@ class SqueezeObservation(Observation):
     length_step: ClassVar[int] = LENGTH_STEP
 
     @classmethod
-    def of(cls, curve: SqueezeCurve, scene: Scene) -> SqueezeObservation:
+    def of(cls, curve: SqueezeCurve, scene: Model) -> SqueezeObservation:
         """Run of a curve; raises `InputError` if the scene cannot reproduce it."""
+        scene = of_strips_alone(f"{curve.label}: squeeze stress", scene)
         if "psi" not in scene.model.fields:
             raise InputError(
                 f"{curve.label}: model.fields = {list(scene.model.fields)} have no squeeze stress: "
@@ -210,18 +209,12 @@ class SqueezeObservation(Observation):
         weight = weight if curve.noise is None else 1.0 / curve.noise
         return cls(*map(jnp.asarray, (curve.stress, weight, curve.x)))
 
-    def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
         """Squeeze stress (n,), linear between element midpoints, and whether it converged."""
-        history = solve(scene.replace({"load.cycles": 0}), solver=solver, throw=False)
+        strip = of_strips_alone("squeeze stress", scene)
+        history = solve(strip.replace({"load.cycles": 0}), solver=solver, throw=False)
         stress = jnp.interp(self.x, history.middles, history.squeeze_stress[-1])
         return stress, jnp.all(history.status == 0)
-
-
-# Figure of a `History` that each curve over amplitude measures.
-FIGURES: dict[type[AmplitudeCurve], str] = {
-    DissipationCurve: "dissipation",
-    StiffnessCurve: "secant_stiffness",
-}
 
 
 class AmplitudeObservation(Observation):
@@ -247,38 +240,29 @@ class AmplitudeObservation(Observation):
         return np.exp(prediction)
 
     @classmethod
-    def of(cls, curve: AmplitudeCurve, scene: Scene) -> AmplitudeObservation:
+    def of(cls, curve: AmplitudeCurve, scene: Model) -> AmplitudeObservation:
         """Runs of a curve; raises `InputError` if a force exceeds gross slip."""
         values = getattr(curve, curve.form.y)
-        check(scene, np.sort(curve.amplitude))
+        check_amplitudes(scene, curve.amplitude)
         weight = np.ones(values.size) if curve.noise is None else values / curve.noise
         figure = np.full(values.size, list(FIGURES).index(type(curve)), dtype=np.int32)
         return cls(*map(jnp.asarray, (np.log(values), weight, curve.amplitude, figure)))
 
-    def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
         """Logarithms (n,) of the figure, and whether every load step converged."""
-        cycles = max(scene.load.cycles, 1)
-
-        def one(point: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            amplitude, figure, measured = point
-            to = {"load.amplitude": amplitude, "load.cycles": cycles}
-            history = solve(scene.replace(to), solver=solver, throw=False)
-            value = lax.select_n(figure, *(getattr(history, name) for name in FIGURES.values()))
-            least = NEGLIGIBLE * jnp.exp(measured)
-            return jnp.log(jnp.maximum(value, least)), jnp.all(history.status == 0)
-
-        logarithms, converged = lax.map(one, (self.amplitude, self.figure, self.measured))
-        return logarithms, jnp.all(converged)
+        values, converged = cycle_figures(scene, self.amplitude, self.figure, solver)
+        least = NEGLIGIBLE * jnp.exp(self.measured)
+        return jnp.log(jnp.maximum(values, least)), jnp.all(converged)
 
 
 @functools.singledispatch
-def observe(measurement: Any, scene: Scene) -> Observation:
+def observe(measurement: Any, scene: Model) -> Observation:
     """Run of a scene that reproduces a measurement.
 
     Parameters
     ----------
     measurement : a `Loop`, or a curve of `jbeamshell.measured.curves`
-    scene : strip, contact and load that were measured
+    scene : strip and load that were measured, or law
 
     Raises
     ------

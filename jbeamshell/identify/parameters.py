@@ -12,19 +12,19 @@ import numpy as np
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.bijection import Bijection
-from jbeamshell.identify.rig_keys import FITTED, PREFIX, RIG, check_rig_key
-from jbeamshell.scene.keys import NUMBERS, check_key
+from jbeamshell.identify.rig_keys import RIG, fitted_row, law_of
+from jbeamshell.scene.keys import NUMBERS
 
 SCALES = ("log", "linear")
 
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """Number of the scene or of the rig that a fit may change.
+    """Number of the scene, of a law or of the rig that a fit may change.
 
     Attributes
     ----------
-    key : dotted key, such as "contact.friction" or "rig.compliance"
+    key : dotted key, such as "contact.friction", "iwan4.chi" or "rig.compliance"
     start : value at which the search starts; None takes the scene's own value
     low, high : bounds, both excluded; None takes the bounds in the table of keys
     scale : "log" for a quantity known by its order of magnitude, or "linear"; None takes the scale
@@ -53,9 +53,9 @@ class Parameter:
     each: bool = False
 
     def __post_init__(self) -> None:
-        of_rig = isinstance(self.key, str) and self.key.startswith(PREFIX)
-        (check_rig_key if of_rig else check_key)(self.key)
-        if self.key not in (*NUMBERS, *RIG) or self.key == "load.amplitude":
+        row = fitted_row(self.key)
+        known = self.key in (*NUMBERS, *RIG) or law_of(self.key) is not None
+        if not known or self.key == "load.amplitude":
             raise InputError(
                 f"free {self.key!r}: is not a parameter of the strip or the contact; name one, "
                 "such as contact.friction"
@@ -69,7 +69,7 @@ class Parameter:
         known = isinstance(self.scale, str) and self.scale in SCALES
         self._require("scale", self.scale, self.scale is None or known, fix)
         low, high = self.bounds
-        least, most = FITTED[self.key].low, FITTED[self.key].high
+        least, most = row.low, row.high
         fix = f"must lie between {least:g} and {most:g}"
         self._require("low", self.low, least <= low < most, fix)
         self._require("high", self.high, least < high <= most, fix)
@@ -80,7 +80,7 @@ class Parameter:
     @property
     def bounds(self) -> tuple[float, float]:
         """Open interval in which to search."""
-        least, most = FITTED[self.key].low, FITTED[self.key].high
+        least, most = fitted_row(self.key).low, fitted_row(self.key).high
         low = least if self.low is None else float(self.low)
         return low, most if self.high is None else float(self.high)
 
@@ -94,7 +94,7 @@ class Parameter:
         low, high = self.bounds
         fix = f"must lie between low = {low:g} and high = {high:g}, both excluded"
         self._require("start", start, low < start < high, fix)
-        scale = FITTED[self.key].scale if self.scale is None else self.scale
+        scale = fitted_row(self.key).scale if self.scale is None else self.scale
         return Bijection(start, low, high, scale == "log")
 
     def _check_prior(self) -> None:

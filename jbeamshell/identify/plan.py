@@ -3,6 +3,7 @@
 The command line makes a plan of its options; larger studies are written in a TOML file:
 
     scene = "standard"                 # name of a scene, or a file; this is the default
+    model = "iwan4"                    # a law of a joint in place of a strip, without a scene
     noise = 0.01                       # over the range; leave it out if the data carry noise
 
     [set]                              # values of all specimens
@@ -33,16 +34,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jbeamshell.common.checks import shown
+from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, read_toml
 from jbeamshell.identify.choose_free import chosen_free
+from jbeamshell.identify.driving import as_model
+from jbeamshell.identify.models import Drive, Driven
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.rig import rig_of
 from jbeamshell.identify.rig_keys import PREFIX, RIG
 from jbeamshell.identify.sources import Source
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.identify.starts import Estimate, estimate, started
+from jbeamshell.laws import law_named
 from jbeamshell.measured.curves import AmplitudeCurve, Measurement
 from jbeamshell.measured.loops import Loop, driver_of
 from jbeamshell.scene import library
@@ -61,12 +65,14 @@ class Plan(NamedTuple):
     free : parameters to fit
     options : further arguments of `identify.fit`
     notes : sentences on what was done to the data, and what was chosen by default
+    model : name of a law of a joint in place of a strip; empty for a strip
     """
 
     specimens: list[Specimen]
     free: list[Parameter]
     options: dict[str, Any]
     notes: list[str]
+    model: str = ""
 
 
 def read_plan(path: str | Path, unchecked: bool = False) -> Plan:
@@ -119,7 +125,8 @@ def plan_from_values(values: Mapping[str, Any], folder: Path) -> Plan:
         source = _source(table, table.get("label") or (f"{number}" if len(given) > 1 else ""))
         known = source.known(folder)
         of_strip, of_rig = _without_rig(source.set)
-        own = overridden(overridden(common, known.values), of_strip)
+        of_scene = {} if plan.model else known.values
+        own = overridden(overridden(common, of_scene), of_strip)
         if source.driver is None and own.get("load.control") in CONTROLS:
             source = dataclasses.replace(source, driver=own["load.control"])
         read = list(source.measurements(folder, bool(values.get("unchecked", False))))
@@ -140,13 +147,19 @@ def _without_specimens(
     values: Mapping[str, Any], folder: Path
 ) -> tuple[Plan, dict[str, Any], dict[str, Any]]:
     """Plan without specimens, and the values of scene and rig that all specimens share."""
-    _check_names("entry", values, ("scene", "set", "free", "specimen", *OPTIONS))
+    _check_names("entry", values, ("scene", "model", "set", "free", "specimen", *OPTIONS))
     tables = {name: values.get(name, {}) for name in ("set", "free")}
     for name, table in tables.items():
         _check_table(name, table)
     free = [Parameter(key, **_parameter(key, table)) for key, table in tables["free"].items()]
     options = {name: values[name] for name in OPTIONS if name in values}
     of_strip, of_rig = _without_rig(tables["set"])
+    model = values.get("model", "")
+    if model != "":
+        law_named(model)
+        given = values.get("scene")
+        require("scene", given, given is None, f"the law {model!r} takes its place: leave it out")
+        return Plan([], free, options, [], model), dict(of_strip), of_rig
     common = overridden(_base(values.get("scene"), folder), of_strip)
     return Plan([], free, options, []), common, of_rig
 
@@ -171,6 +184,8 @@ def _with_specimen(
     fit, see `chosen_free`, and the starts of numbers that are not known where the standard strip
     cannot be meant, see `started`.
     """
+    if plan.model:
+        return _with_law(plan, values, data, label, rig)
     own, notes = dict(values), list(plan.notes)
     loops = [item for item in data if isinstance(item, Loop)]
     if "load.control" not in own and loops:
@@ -198,6 +213,28 @@ def _with_specimen(
         if largest:
             own["load.amplitude"] = max(largest)
     specimen = Specimen(scene_from_values(own), data, label, rig=rig)
+    return plan._replace(specimens=[*plan.specimens, specimen], free=free, notes=notes)
+
+
+def _with_law(
+    plan: Plan,
+    values: Mapping[str, Any],
+    data: Sequence[Measurement],
+    label: str,
+    rig: Mapping[str, Any],
+) -> Plan:
+    """Plan with one more specimen, of a law that starts from its data; see `as_model`."""
+    own, name = dict(values), plan.model
+    control = own.pop("load.control", None)
+    driven = as_model(name, data)
+    assert isinstance(driven, Driven)
+    given = {p.key: p.start for p in plan.free if p.start is not None and p.key not in RIG}
+    driven = driven.replace(own | given)
+    driven = driven if control is None else Driven(driven.law, Drive(control))
+    where, by = (f"{label}: " if label else ""), driven.load.control
+    notes = [*plan.notes, f"{where}{name} in place of a strip, driven by the {by}"]
+    free = plan.free or [Parameter(key) for key in driven.law.free() if key not in own]
+    specimen = Specimen(driven, data, label, rig=rig)
     return plan._replace(specimens=[*plan.specimens, specimen], free=free, notes=notes)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from jbeamshell import plotting
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_json, csv_text
+from jbeamshell.identify.models import Model
 from jbeamshell.measured.form import by_form
 from jbeamshell.plotting.folder import write_folder
 from jbeamshell.plotting.protocols import LikelihoodProfile, ModelOverData
@@ -23,9 +24,9 @@ class Fitted(ModelOverData, Protocol):
     """Model over its data, with the fitted scenes: the first, and all by the specimens' labels."""
 
     @property
-    def scene(self) -> Scene: ...
+    def scene(self) -> Model: ...
     @property
-    def scenes(self) -> Mapping[str, Scene]: ...
+    def scenes(self) -> Mapping[str, Model]: ...
 
 
 def write_fit(
@@ -37,8 +38,9 @@ def write_fit(
     """Write tables, fitted scenes, figures and pictures of a fit.
 
     The files are a table for each form of measurement, such as overlay.csv of loops and backbones
-    or dissipation.csv; scene.toml, or scene_1.toml and so on for several specimens; result.json,
-    overlay.png and residuals.png. With profiles there are profiles.csv and profiles.png too.
+    or dissipation.csv; scene.toml, law.toml for a law, or scene_1.toml and so on for several
+    specimens; result.json, overlay.png and residuals.png. With profiles there are profiles.csv and
+    profiles.png too.
 
     Parameters
     ----------
@@ -60,9 +62,10 @@ def write_fit(
     texts = {f"{name}.csv": text for name, text in tables(result).items()}
     scenes = list(result.scenes.values()) or [result.scene]
     for number, scene in enumerate(scenes, 1):
-        name = "scene.toml" if len(scenes) == 1 else f"scene_{number}.toml"
+        kind = "scene" if isinstance(scene, Scene) else "law"
+        name = f"{kind}.toml" if len(scenes) == 1 else f"{kind}_{number}.toml"
         with contextlib.suppress(InputError):
-            texts[name] = scene_to_toml(scene)
+            texts[name] = scene_to_toml(scene) if isinstance(scene, Scene) else scene.law.as_toml()
     if profiles:
         rows = [
             (profile.name, *pair)

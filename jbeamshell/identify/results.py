@@ -10,13 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jbeamshell.common.checks import require
 from jbeamshell.common.summary import Summary
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.model_error import LIMITS, model_misfit
+from jbeamshell.identify.models import Driven, Model
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
-from jbeamshell.scene.scene import Scene
+from jbeamshell.laws import Law
 
 WRONG_MODEL = 2.0  # misfit over noise above which the model must be wrong
 WORTH_SAYING = 1e-3  # of the range, left by the model
@@ -27,7 +29,8 @@ class Fit(NamedTuple):
 
     Attributes
     ----------
-    scene : scene with the fitted values, ready to run; of several specimens the first
+    scene : scene with the fitted values, ready to run; of several specimens the first.  For a law
+        a `Driven`, see `law`
     values, errors : fitted value and standard error (one sigma) by key, or by "key[specimen]" where
         every specimen has its own.  They count what the model leaves as so many independent points
         as its correlation along the curves allows
@@ -49,7 +52,7 @@ class Fit(NamedTuple):
     problem : least-squares problem, for `bands` and `identify.profile`
     """
 
-    scene: Scene
+    scene: Model
     values: dict[str, float]
     errors: dict[str, float]
     correlation: NDArray[np.float64]
@@ -60,7 +63,7 @@ class Fit(NamedTuple):
     status: str
     model_runs: int
     labels: Sequence[str] = ()
-    scenes: dict[str, Scene] = {}  # noqa: RUF012 - never changed
+    scenes: dict[str, Model] = {}  # noqa: RUF012 - never changed
     intervals: dict[str, tuple[float, float]] = {}  # noqa: RUF012
     warnings: Sequence[str] = ()
     left: Sequence[float] = ()
@@ -68,6 +71,13 @@ class Fit(NamedTuple):
     minima: Sequence[tuple[dict[str, float], float]] = ()
     uncertainty: Uncertainty | None = None
     problem: Problem | None = None
+
+    @property
+    def law(self) -> Law:
+        """Fitted law of a joint, of several specimens the first; raises for a strip."""
+        require("law", "a strip", isinstance(self.scene, Driven), "read scene instead")
+        assert isinstance(self.scene, Driven)
+        return self.scene.law
 
     @property
     def _summary(self) -> Summary:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
+from jbeamshell.identify.models import Model, response_along
 from jbeamshell.identify.observations import LoopObservation, Observation
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.rig_keys import PREFIX, RIG, check_rig_key
@@ -32,8 +33,6 @@ from jbeamshell.measured.curves import Backbone, Measurement
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.reversals import find_turns
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.solver import solve
-from jbeamshell.scene.scene import Scene
 
 GRADE = 3.0  # points of a branch are dense after its turn, where a stiff strip hardly moves
 PASSES = 5  # runs in which the strip's own turns are found
@@ -153,27 +152,22 @@ class RiggedObservation(LoopObservation):
     near: Array
     series: bool = eqx.field(static=True)
 
-    def predict(self, scene: Scene, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
         """Responding column (n,), and whether every load step converged."""
         if scene.load.control == "force":
             path = self.path - self.rig.force_zero
-            response, converged = self._run(scene, path, solver)
+            response, converged = response_along(scene, path, solver)
             _, response = self.rig.seen(path, response, self.phase)
         else:
             path = self.path - self.rig.displacement_zero
-            run = self._behind_spring if self.series else self._run
+            run = self._behind_spring if self.series else response_along
             force, converged = run(scene, path, solver)
             strip = path - self.rig.compliance * force
             response, _ = self.rig.seen(force, strip, self.phase)
         response = response + self.rig.drift * self.time
         return self.shifted(response), converged
 
-    def _run(self, scene: Scene, path: Array, solver: Newton) -> tuple[Array, Array]:
-        history = solve(scene, path, solver=solver, throw=False)
-        column = "displacement" if scene.load.control == "force" else "force"
-        return getattr(history, column)[history.pressed + 1 :], jnp.all(history.status == 0)
-
-    def _behind_spring(self, scene: Scene, path: Array, solver: Newton) -> tuple[Array, Array]:
+    def _behind_spring(self, scene: Model, path: Array, solver: Newton) -> tuple[Array, Array]:
         """Force of the strip (n,) where spring and strip together follow a path."""
         begin, end, compliance = self.begin, self.end, self.rig.compliance
         zero = jnp.zeros(1)
@@ -181,7 +175,7 @@ class RiggedObservation(LoopObservation):
         def run(turns: Array, _: None) -> tuple[Array, tuple[Array, Array, Array]]:
             known = jnp.append(zero, turns)
             strip = known[begin] + (known[end] - known[begin]) * self.part
-            force, converged = self._run(scene, strip, solver)
+            force, converged = response_along(scene, strip, solver)
             together = strip + compliance * force
             moved, rise = (jnp.diff(jnp.append(zero, a)) for a in (strip, together))
             slope = jnp.where(moved == 0.0, 1.0, rise) / jnp.where(moved == 0.0, 1.0, moved)
@@ -201,7 +195,7 @@ class RiggedObservation(LoopObservation):
 def rigged(
     measurement: Measurement,
     observation: Observation,
-    scene: Scene,
+    scene: Model,
     values: Mapping[str, Any],
     free: Sequence[str],
 ) -> RiggedObservation:
@@ -211,7 +205,7 @@ def rigged(
     ----------
     measurement : loop or backbone
     observation : its run without a rig
-    scene : strip, contact and load
+    scene : strip with its load, or law
     values : values of the rig that are not 0, by dotted key
     free : keys of the rig that a fit may change
 

@@ -1,11 +1,12 @@
-"""Keys of the rig, beside those of the scene: numbers of an experiment that can be fitted."""
+"""Keys that a fit knows beside those of the scene: those of the rig, and of laws of a joint."""
 
 from __future__ import annotations
 
 import math
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.scene.keys import TABLE
+from jbeamshell.laws import LAWS, Law, law_named
+from jbeamshell.scene.keys import TABLE, check_key
 from jbeamshell.scene.rows import Key
 
 PREFIX = "rig."
@@ -29,7 +30,25 @@ RIG: dict[str, Key] = dict(
         _row("drift", "Change of the response's reading over the loop.", "mixed", ANY, "linear"),
     )
 )
-FITTED = TABLE | RIG  # all numbers that a fit may change, and the settings that it may not
+
+
+def law_of(key: object) -> type[Law] | None:
+    """Law that has a number of a dotted key; None if there is none."""
+    if not isinstance(key, str):
+        return None
+    heading = key.partition(".")[0]
+    known = heading in LAWS or heading.removeprefix("sliders").isdecimal()
+    law = law_named(heading) if known else None
+    return law if law is not None and key in law.table() else None
+
+
+def fitted_row(key: str) -> Key:
+    """Row of a key of the scene, of the rig or of a law; raises `InputError` if there is none."""
+    if law := law_of(key):
+        return law.table()[key]
+    of_rig = isinstance(key, str) and key.startswith(PREFIX)
+    (check_rig_key if of_rig else check_key)(key)
+    return RIG[key] if of_rig else TABLE[key]
 
 
 def check_rig_key(key: str) -> None:

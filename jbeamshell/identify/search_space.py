@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.bijection import Bijection
+from jbeamshell.identify.models import Model
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.rig_keys import RIG
-from jbeamshell.scene.scene import Scene
 
 
 class SearchSpace(NamedTuple):
@@ -67,8 +67,8 @@ class SearchSpace(NamedTuple):
 
 
 def search_space(
-    free: Sequence[Parameter], scenes: Mapping[str, Scene]
-) -> tuple[SearchSpace, dict[str, Scene]]:
+    free: Sequence[Parameter], scenes: Mapping[str, Model]
+) -> tuple[SearchSpace, dict[str, Model]]:
     """Search space of several specimens' parameters, and their scenes at its start.
 
     Parameters
@@ -108,7 +108,7 @@ def search_space(
     return SearchSpace(keys, tuple(names), tuple(bijections), table, tuple(owners)), started
 
 
-def _start(scene: Scene, parameter: Parameter) -> float:
+def _start(scene: Model, parameter: Parameter) -> float:
     key = parameter.key
     start: Any = parameter.start if key in RIG else scene.get(key)
     if start is None:

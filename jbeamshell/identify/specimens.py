@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
+from jbeamshell.identify.driving import as_model, feature_doubts
+from jbeamshell.identify.models import Model
 from jbeamshell.identify.rig_keys import PREFIX
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.inspection import inspect
@@ -26,14 +28,14 @@ class Specimen(NamedTuple):
 
     Attributes
     ----------
-    scene : start values, and all values that stay fixed
+    scene : start values, and all values that stay fixed; or a law of a joint
     data : one measurement or several
     label : name in messages and in the names of the specimen's own values
     weights : factors of the measurements' residuals, besides the curves' own; all 1 if empty
     rig : values of the rig that are not 0, by dotted key, see `jbeamshell.identify.rig`
     """
 
-    scene: Scene
+    scene: Model
     data: Measurement | Sequence[Measurement]
     label: str = ""
     weights: Sequence[float] = ()
@@ -68,7 +70,7 @@ class Specimen(NamedTuple):
             raise InputError(f"data{where}: no measurement given; read loops with read_loops")
 
 
-def as_specimens(data: Any, scene: Scene | None, weights: Sequence[float]) -> list[Specimen]:
+def as_specimens(data: Any, scene: Any, weights: Sequence[float]) -> list[Specimen]:
     """Specimens with labels, no two alike, from what `fit` was given.
 
     Raises
@@ -84,15 +86,18 @@ def as_specimens(data: Any, scene: Scene | None, weights: Sequence[float]) -> li
             raise InputError(
                 "scene: give one, or a Specimen (a scene with its data) in place of data"
             )
-        require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
-        return [Specimen(scene, data, weights=weights)]
+        one = Specimen(scene, data, weights=weights)
+        return [one._replace(scene=as_model(scene, one.measurements))]
     if not all(isinstance(item, Specimen) for item in given):
         raise InputError("data: mixes specimens with measurements: make each a Specimen")
     for name, present in {"scene": scene is not None, "weights": len(weights) > 0}.items():
         if present:
             raise InputError(f"{name}: the specimens bring their own; leave it out")
     labelled = [
-        specimen._replace(label=specimen.label or f"specimen {number}")
+        specimen._replace(
+            scene=as_model(specimen.scene, specimen.measurements),
+            label=specimen.label or f"specimen {number}",
+        )
         for number, specimen in enumerate(given, 1)
     ]
     labels = [specimen.label for specimen in labelled]
@@ -100,6 +105,12 @@ def as_specimens(data: Any, scene: Scene | None, weights: Sequence[float]) -> li
     if repeated:
         raise InputError(f"specimens: two have the label {repeated[0]!r}: give each its own")
     return labelled
+
+
+def free_of(specimens: Sequence[Specimen]) -> tuple[str, ...]:
+    """Keys of the numbers that loops tell of the first specimen's law; none of a strip."""
+    first = specimens[0].scene
+    return () if isinstance(first, Scene) else first.law.free()
 
 
 def inspected(
@@ -129,10 +140,11 @@ def inspected(
         if seen is not None and not unchecked:
             seen.check()
         doubts += [] if seen is None else seen.doubts()
+        doubts += feature_doubts(specimen.scene, loops)
     return doubts
 
 
-def plausible_stiffness(scene: Scene, free: Sequence[str]) -> tuple[float, float] | None:
+def plausible_stiffness(scene: Model, free: Sequence[str]) -> tuple[float, float] | None:
     """Least and largest force per width over displacement that a strip can have.
 
     A strip that is held at its far end is at least as stiff as without friction, E'2H/L; a third of
@@ -144,6 +156,8 @@ def plausible_stiffness(scene: Scene, free: Sequence[str]) -> tuple[float, float
     free : keys to fit; None is returned if they are of the strip's stiffness or dimensions, or of
         the rig
     """
+    if not isinstance(scene, Scene):
+        return None
     strip = scene.strip
     unknown = any(key.startswith(("strip.", PREFIX)) and key not in OF_SHEAR for key in free)
     if strip.axial_stiffness is None or unknown:

@@ -79,4 +79,8 @@ class Bar(MasingLaw):
     @staticmethod
     def _start(force: float, displacement: float, work: float, stiffness: float) -> dict[str, Any]:
         """Numbers to start a fit from; see `Law.started`."""
-        return {"slip_force": 1.1 * force, "slip_displacement": 1.2 * displacement}
+        # Beyond gross slip D = 4 F_S (U - 2 u_S/3); below it the loop tells F_S^2/u_S alone.
+        slip = 1.5 * displacement - 0.375 * work / force
+        slides = slip < 0.95 * displacement
+        reach = max(slip, 0.02 * displacement) if slides else 1.1 * displacement
+        return {"slip_force": force * (1.0 if slides else 1.1**0.5), "slip_displacement": reach}

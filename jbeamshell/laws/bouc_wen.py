@@ -52,7 +52,9 @@ class BoucWen(Law):
         1.0, "Limit of the hysteretic force, F_S.", symbol="F_S", unit="force/width"
     )
     stiffness: Array = number(1.0, "Stiffness at rest, k.", symbol="k", unit="(force/width)/length")
-    exponent: Array = number(1.5, "Sharpness n of the turn to sliding.", symbol="n", low=0.5)
+    exponent: Array = number(
+        1.5, "Sharpness n of the turn to sliding.", symbol="n", low=1.0, high=50.0, closed=True
+    )
     unloading: Array = number(
         0.5, "Bend g of unloading; 1/2 is straight.", symbol="g", high=1.0, scale="linear"
     )
@@ -116,7 +118,7 @@ class BoucWen(Law):
     @staticmethod
     def _start(force: float, displacement: float, work: float, stiffness: float) -> dict[str, Any]:
         """Numbers to start a fit from; see `Law.started`."""
-        return {"slip_force": 1.1 * force, "stiffness": stiffness, "exponent": 1.0}
+        return {"slip_force": 1.1 * force, "stiffness": stiffness, "exponent": 1.5}
 
     def _force(self, u: Array, z: Array) -> Array:
         """Force of a displacement and a hysteretic part."""

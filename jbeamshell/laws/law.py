@@ -101,6 +101,11 @@ class Law(Part):
         """Copy with other numbers, by dotted key; they may be traced."""
         return self.changed(**{self._field_of(key): value for key, value in values.items()})
 
+    def as_toml(self) -> str:
+        """Entries of a plan of a fit that has this law: its name, and its numbers."""
+        numbers = [f'"{key}" = {np.asarray(self.get(key)).tolist()!r}' for key in self.table()]
+        return "\n".join([f'model = "{self.heading}"', "", "[set]", *numbers, ""])
+
     @classmethod
     def started(cls, force: float, displacement: float, work: float, stiffness: float) -> Self:
         """Law to start a fit from, near a loop.

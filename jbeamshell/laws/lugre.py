@@ -52,7 +52,11 @@ class LuGre(Law):
         closed=True,
     )
     breakaway: Array = number(
-        1.0, "Force of breakaway over the Coulomb force, F_B/F_C, 1 or more.", low=1.0, closed=True
+        1.0,
+        "Force of breakaway over the Coulomb force, F_B/F_C, 1 or more.",
+        low=1.0,
+        closed=True,
+        fix="must be a number, 1 or more",
     )
     stribeck_speed: Array = number(
         1.0, "Speed within which it decays, v_S.", symbol="v_S", unit="length/time"

@@ -22,7 +22,7 @@ from jbeamshell.common.checks import is_traced, require, require_count
 from jbeamshell.laws.masing import MasingLaw
 from jbeamshell.scene.rows import number
 
-FROM, UPTO = 0.02, 1.0  # least and largest slip displacement of `sliders`, over their reach
+FROM = 0.02  # first slip displacement of `sliders` over the last, at the start of a fit
 MOST = 32
 
 
@@ -102,21 +102,23 @@ class ParallelIwan(Network):
 
 
 class Sliders(Network):
-    """Sliders whose slip displacements are spread evenly on a logarithmic scale up to a reach.
+    """Sliders whose slip displacements are spread evenly on a logarithmic scale.
 
     Attributes
     ----------
-    reach : largest slip displacement
-    force1, force2, ... : slip forces, of the first slider to slip first
+    first, reach : slip displacements of the first slider and of the last
+    force1, force2, ... : slip forces, of the first slider first
     """
 
+    first: Array = number(FROM, "First slip displacement.", symbol="u_1", unit="length")
     reach: Array = number(1.0, "Largest slip displacement.", symbol="u_n", unit="length")
     count: ClassVar[int]
 
     @property
     def slips(self) -> Array:
         """Slip displacements (n,)."""
-        return self.reach * jnp.geomspace(FROM, UPTO, self.count)
+        part = jnp.linspace(0.0, 1.0, self.count)
+        return self.first * (self.reach / self.first) ** part
 
     @property
     def limits(self) -> Array:
@@ -142,10 +144,11 @@ def sliders(count: int) -> type[Sliders]:
 
     def start(force: float, displacement: float, work: float, stiffness: float) -> dict[str, Any]:
         # A bar's backbone softens like a root; its points give positive sliders.
-        slips = 1.05 * displacement * np.geomspace(FROM, UPTO, count)
+        slips = 1.05 * displacement * np.geomspace(FROM, 1.0, count)
         rise = 1.05 * force * np.sqrt(slips / slips[-1])
         network = ParallelIwan.of_points(slips, rise)
-        return {"reach": slips[-1]} | dict(zip(names, np.asarray(network.limits), strict=True))
+        ends = {"first": slips[0], "reach": slips[-1]}
+        return ends | dict(zip(names, np.asarray(network.limits), strict=True))
 
     sentence = "Slip force of slider {}."
     fields = {

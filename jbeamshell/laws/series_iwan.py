@@ -3,7 +3,8 @@ r"""Series-series Iwan model: springs in a row, with a slider to ground at every
 The loaded end slips first.  The force F less the friction T_j of all nodes up to spring j stretches
 it, so that on first loading
 
-    u = sum over j of max(F - T_j, 0)/k_j,   T_j = f_1 + ... + f_j.
+    u = sum over j of max(F - T_j, 0)/k_j,   D = 4 sum over j of T_j max(A - T_j, 0)/k_j,
+    T_j = f_1 + ... + f_j.
 
 Static condensation of the nodes between leaves just these thresholds and compliances: the bar of
 Quinn and Segalman by elements, and the reduced interface of Guthrie and Kammer.
@@ -67,7 +68,8 @@ class SeriesIwan(MasingLaw):
         Friction acts at the nodes, half as much at the two ends; u has an error of order 2.
         """
         require_count("count", count, 1)
-        part = jnp.ones(count + 1).at[jnp.array([0, -1])].set(0.5)
+        part = np.ones(count + 1)
+        part[[0, -1]] = 0.5
         one = friction_per_length * length / count
         return cls(jnp.full(count, axial_stiffness * count / length), one * part)
 
@@ -86,6 +88,12 @@ class SeriesIwan(MasingLaw):
         """Displacement amplitude of a force amplitude; see `Law.displacement`."""
         over = self._below_capacity(force)[..., None] - self._thresholds
         return jnp.sum(jnp.maximum(over, 0.0) / self.springs, axis=-1)
+
+    def dissipation_at_force(self, force: ArrayLike) -> Array:
+        """Energy lost per steady cycle at a force amplitude; see `Law.displacement`."""
+        held = self._thresholds
+        over = jnp.maximum(self._below_capacity(force)[..., None] - held, 0.0)
+        return 4.0 * jnp.sum(held * over / self.springs, axis=-1)
 
     def backbone(self, u: ArrayLike) -> Array:
         """Force on first loading, an odd function of the displacement; any shape."""

@@ -9,6 +9,7 @@ which attributes they read.
 >>> plotting.save(axes.figure, "loop.png")
 """
 
+from jbeamshell.plotting.comparisons import comparison as comparison
 from jbeamshell.plotting.contacts import contact as contact
 from jbeamshell.plotting.contacts import contact_map as contact_map
 from jbeamshell.plotting.fits import likelihoods as likelihoods

@@ -296,3 +296,51 @@ class LikelihoodProfile(Protocol):
     def interval(self) -> tuple[float, float]: ...
     @property
     def level(self) -> float: ...
+
+
+class ComparedModel(Protocol):
+    """One model of a comparison.
+
+    Attributes
+    ----------
+    name : name of the model
+    fit : None for the target itself, or where there is no fit
+    energy : (n,) energy per cycle at the target's amplitudes
+    numbers : count of fitted numbers
+    seconds : time of one response
+    """
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def fit(self) -> object: ...
+    @property
+    def energy(self) -> np.ndarray: ...
+    @property
+    def numbers(self) -> int: ...
+    @property
+    def seconds(self) -> float: ...
+
+
+class ComparedModels(Protocol):
+    """Models fitted to one target, such as a `jbeamshell.identify.Comparison`.
+
+    Attributes
+    ----------
+    amplitude, energy : (n,) amplitudes and energies of the target's steady cycles
+    drive : column of the amplitudes, "force" or "displacement"
+    rows : the models
+    """
+
+    @property
+    def amplitude(self) -> np.ndarray: ...
+    @property
+    def energy(self) -> np.ndarray: ...
+    @property
+    def drive(self) -> str: ...
+    @property
+    def rows(self) -> Sequence[ComparedModel]: ...
+
+    def error(self, row: Any) -> np.ndarray:
+        """Relative error (n,) of a model's energies."""
+        ...

@@ -9,7 +9,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell import identify
-from jbeamshell.identify import rig
+from jbeamshell.identify import models, rig
 from jbeamshell.identify.observations import observe
 from jbeamshell.identify.plan import plan_for
 from jbeamshell.identify.rig_keys import RIG
@@ -49,7 +49,7 @@ def sliders(scene, path, **_):
 
 @pytest.fixture
 def slid(monkeypatch):
-    monkeypatch.setattr(rig, "solve", sliders)
+    monkeypatch.setattr(models, "solve", sliders)
 
 
 def cycle(amplitude, points=60):

@@ -26,6 +26,7 @@ def many_sliders(law, path, count=4000):
     return np.array(forces)
 
 
+@pytest.mark.slow
 def test_iwan4_follows_many_sliders_along_nested_reversals():
     path = NESTED * float(LAW.phi_max)
     errors = [
@@ -65,6 +66,7 @@ def test_the_area_of_a_simulated_loop_is_the_closed_dissipation():
     assert area == pytest.approx(float(LAW.dissipation(size)), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_displacements_on_a_path_of_forces_are_the_inverse():
     path = 0.7 * NESTED[:9] * float(LAW.phi_max)
     forces = LAW.path_forces(path)
@@ -77,10 +79,10 @@ def test_a_path_may_be_traced_and_differentiated():
     def last(law, path):
         return law.path_forces(path)[7]
 
-    np.testing.assert_allclose(jax.jit(last)(LAW, path), LAW.path_forces(path)[7], rtol=1e-12)
-    step = 1e-6
-    found = jax.grad(last)(LAW, path).chi
-    ends = (last(LAW.replace({"iwan4.chi": -0.5 + sign * step}), path) for sign in (1.0, -1.0))
+    step, traced = 1e-6, jax.jit(last)
+    np.testing.assert_allclose(traced(LAW, path), LAW.path_forces(path)[7], rtol=1e-12)
+    found = jax.jit(jax.grad(last))(LAW, path).chi
+    ends = (traced(LAW.replace({"iwan4.chi": -0.5 + sign * step}), path) for sign in (1.0, -1.0))
     high, low = ends
     assert float(found) == pytest.approx(float((high - low) / (2.0 * step)), rel=1e-6)
 

@@ -24,6 +24,7 @@ def test_stick_and_counter_slip_of_a_cylinder():
     assert float(reference.counter_slip_part(0.0, 0.5)) == pytest.approx(0.86603, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_energy_is_that_of_the_law_and_of_its_loop():
     law = reference.sphere_law(3.0, 0.7, 0.02)
     force = jnp.array([0.3, 1.5, 2.9])
@@ -54,6 +55,7 @@ def test_gross_slip_is_refused_and_other_shapes_too():
     assert jnp.isnan(jax.jit(reference.stuck_part)(1.1))
 
 
+@pytest.mark.slow
 def test_a_rigid_partner_adds_no_compliance():
     one = reference.pair_compliance(200.0, 0.3, jnp.inf, 0.3)
     assert float(one) == pytest.approx(1.7 / 200.0, rel=1e-12)

@@ -1,0 +1,92 @@
+"""Laws of a joint in place of the standard strip: what each loses of its dissipation.
+
+The standard strip of five heights is cycled between forces of .2 to 1.9 (gross slip is at 2).
+Segalman's four parameters, Bouc-Wen, Jenkins and some numbers of parallel sliders are fitted to the
+dissipation and the secant stiffness of these cycles over the displacement, all logarithms alike.
+The error of D is that at the displacement which the strip reaches.  Writes laws_of_a_strip.json and
+laws_of_a_strip.png beside this file; takes minutes:
+
+    python calibration/laws_of_a_strip.py
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jax
+
+jax.config.update("jax_enable_x64", True)
+
+import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
+from provenance import provenance  # noqa: E402
+
+import jbeamshell as jb  # noqa: E402
+from jbeamshell import plotting  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.identify.comparison import Comparison  # noqa: E402
+
+HERE = Path(__file__).parent
+HEIGHTS = (0.01, 0.0511, 0.1126, 0.2358, 0.4)
+AMPLITUDES = np.linspace(0.2, 1.9, 18)
+MODELS = ("iwan4", "bouc-wen", "jenkins", "sliders4", "sliders8", "sliders16")
+
+
+def compared(eta: float) -> Comparison:
+    """Comparison on the strip of one height."""
+    scene = jb.Scene().replace({"strip.height_ratio": eta, "model.nodes": 161})
+    return jb.identify.compare(scene, MODELS, amplitudes=AMPLITUDES)
+
+
+def figures(eta: float) -> dict[str, Any]:
+    """Values, errors of D and misfit of each model on the strip of one height."""
+    found = compared(eta)
+    table = {}
+    for row in found.rows[1:]:
+        assert row.fit is not None, row.told
+        error = np.abs(found.error(row))
+        table[row.name] = {
+            "values": row.fit.values,
+            "error": found.error(row).tolist(),
+            "median": float(np.median(error)),
+            "worst": float(np.max(error)),
+            "misfit": row.misfit,
+            "status": row.fit.status,
+        }
+    return {"energy": found.energy.tolist(), "models": table}
+
+
+def draw(record: dict[str, Any]) -> Any:
+    """Draw the error of D over the force, a panel for each height."""
+    heights = record["heights"]
+    with plotting.style():
+        size = (3.1 * len(heights), 3.6)
+        figure, axes = plt.subplots(1, len(heights), sharey=True, figsize=size)
+        for panel, (eta, found) in zip(axes, heights.items(), strict=True):
+            names = found["models"]
+            for name, colour in zip(names, plotting.colours(len(names)), strict=True):
+                error = 100.0 * np.array(names[name]["error"])
+                panel.plot(record["amplitude"], error, color=colour, label=name)
+            panel.axhline(0.0, color=plotting.FAINT, linewidth=1.0, zorder=1.0)
+            panel.set(xlabel=plotting.FORCE, title=rf"$\eta$ = {eta}")
+            panel.set_yscale("symlog", linthresh=1.0)
+        axes[0].set_ylabel("error of $D$  [%]")
+        axes[0].legend(loc="best", ncols=1)
+    return figure
+
+
+def main() -> None:
+    """Compare on all heights; write the record and the chart."""
+    heights = {}
+    for eta in HEIGHTS:
+        heights[f"{eta:g}"] = figures(eta)
+        for name, own in heights[f"{eta:g}"]["models"].items():
+            told = f"median {100 * own['median']:.3g} %, worst {100 * own['worst']:.3g} %"
+            print(f"eta {eta:g}  {name:10s} {told}, misfit {100 * own['misfit']:.3g} %")
+    record = {"provenance": provenance(), "amplitude": AMPLITUDES.tolist(), "heights": heights}
+    write_text(HERE / "laws_of_a_strip.json", json.dumps(record, indent=1) + "\n")
+    plotting.save(draw(record), HERE / "laws_of_a_strip.png")
+
+
+if __name__ == "__main__":
+    main()

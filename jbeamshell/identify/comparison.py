@@ -1,0 +1,258 @@
+"""Comparison of laws of a joint on one target: what each loses, and what it costs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import InputError, UnconvergedError
+from jbeamshell.identify.driving import as_model
+from jbeamshell.identify.fitting import fit
+from jbeamshell.identify.models import Driven, Model
+from jbeamshell.identify.observations import Observation, observe
+from jbeamshell.identify.results import Fit
+from jbeamshell.identify.specimens import Specimen
+from jbeamshell.laws import Law, PowerLaw
+from jbeamshell.measured.curves import DissipationCurve, Measurement, StiffnessCurve
+from jbeamshell.measured.loops import Loop
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.scene import Scene
+
+MODELS = ("iwan4", "bouc-wen", "jenkins", "sliders4")
+LEVELS = np.geomspace(0.1, 1.0, 12)  # amplitudes of a strip's cycles, over its own
+REPEATS = 5  # runs of which the fastest counts
+
+Floats = NDArray[np.float64]
+
+
+class Compared(NamedTuple):
+    """One model of a comparison.
+
+    Attributes
+    ----------
+    name : name of the model
+    fit : its fit; None for the strip itself, or where there is none
+    energy : (n,) energy per cycle at the target's amplitudes
+    misfit : root mean square of the residual over the range, or of the logarithm
+    seconds : one response to all data, compiled
+    told : why there is no fit, or what to doubt in it; empty if nothing
+    """
+
+    name: str
+    fit: Fit | None
+    energy: Floats
+    misfit: float
+    seconds: float
+    told: str = ""
+
+    @property
+    def numbers(self) -> int:
+        """Count of fitted numbers."""
+        return 0 if self.fit is None else len(self.fit.values)
+
+
+class Comparison(NamedTuple):
+    """Models fitted to one target; print it, or draw it by `plot`.
+
+    Attributes
+    ----------
+    amplitude : (n,) amplitudes of the target's steady cycles
+    energy : (n,) their energies per cycle; a model's are those of the same cycles, of a strip at
+        the displacements that it reaches
+    drive : column of the amplitudes, "force" or "displacement"
+    rows : the models, in the order given; first the strip itself, if it is the target
+    """
+
+    amplitude: Floats
+    energy: Floats
+    drive: str
+    rows: tuple[Compared, ...]
+
+    def error(self, row: Compared) -> Floats:
+        """Relative error (n,) of a model's energies."""
+        return np.asarray(row.energy / self.energy - 1.0)
+
+    def __str__(self) -> str:
+        head = f"  {'model':12s} numbers  misfit  error of D: median  worst     time"
+        lines = [head]
+        for row in self.rows:
+            error = np.abs(self.error(row))
+            if np.all(np.isnan(error)):
+                lines.append(f"  {row.name:12s} {row.told}")
+                continue
+            figures = f"{100 * row.misfit:5.2g} %  {100 * np.median(error):16.2g} %"
+            worst = f"{100 * np.max(error):5.3g} %  {1e6 * row.seconds:6.0f} us"
+            note = f"  ({row.told})" if row.told else ""
+            lines.append(f"  {row.name:12s} {row.numbers:7d}  {figures}  {worst}{note}")
+        return "\n".join(lines)
+
+    def figures(self) -> dict[str, Any]:
+        """Comparison as plain numbers for JSON; a model without a fit has None."""
+        return {
+            "drive": self.drive,
+            "amplitude": self.amplitude.tolist(),
+            "energy": self.energy.tolist(),
+            "models": {
+                row.name: {
+                    "values": {} if row.fit is None else row.fit.values,
+                    "energy": [float(e) if np.isfinite(e) else None for e in row.energy],
+                    "misfit": row.misfit if np.isfinite(row.misfit) else None,
+                    "seconds": row.seconds if np.isfinite(row.seconds) else None,
+                    "told": row.told,
+                }
+                for row in self.rows
+            },
+        }
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw energy over amplitude, and its error; returns the two axes."""
+        from jbeamshell import plotting
+
+        return plotting.comparison(self, axes)
+
+
+def compare(
+    target: Measurement | Sequence[Measurement] | Scene,
+    models: Sequence[str | Law] = MODELS,
+    *,
+    amplitudes: ArrayLike | None = None,
+    **options: Any,
+) -> Comparison:
+    """Fit several laws of a joint to one target, and tell what each loses.
+
+    Parameters
+    ----------
+    target : measured loops, or curves with a dissipation among them; or a strip, whose steady
+        cycles under forces give its dissipation and secant stiffness over the displacement
+    models : names of laws, see `jbeamshell.laws.law_named`, or laws as starts
+    amplitudes : (n,) force amplitudes of a strip's cycles, below gross slip; None spreads twelve up
+        to that of the scene
+    options : further arguments of `fit`, such as ``noise``
+
+    Returns
+    -------
+    Comparison
+        misfit, dissipation over amplitude and time of each model.  A model that cannot be fitted
+        stays in the table with the reason.
+
+    Raises
+    ------
+    InputError
+        for no model, or a target without steady cycles
+
+    Examples
+    --------
+    >>> print(jb.identify.compare(jb.Scene(), ["iwan4", "jenkins"]))
+    """
+    several = isinstance(models, list | tuple) and len(models) > 0
+    require("models", models, several, "give a list of names or laws, such as ['iwan4']")
+    if isinstance(target, Scene):
+        return _with_strip(target, models, amplitudes, options)
+    require("amplitudes", amplitudes, amplitudes is None, "are the target's own: leave them out")
+    data = Specimen(Driven(PowerLaw()), target).measurements
+    amplitude, energy, drive = _energies(data)
+    rows = [_fitted(model, data, amplitude, drive, options) for model in models]
+    return Comparison(amplitude, energy, drive, tuple(rows))
+
+
+def _with_strip(
+    scene: Scene,
+    models: Sequence[str | Law],
+    amplitudes: ArrayLike | None,
+    options: dict[str, Any],
+) -> Comparison:
+    """Comparison on a strip, with the strip itself in the first row."""
+    require("load.control", scene.load.control, scene.load.control == "force", "must be 'force'")
+    given = LEVELS * float(scene.load.amplitude) if amplitudes is None else amplitudes
+    amplitude = np.atleast_1d(np.asarray(given, dtype=float))
+    cycles = [
+        solve(scene.replace({"load.amplitude": size, "load.cycles": max(scene.load.cycles, 1)}))
+        for size in amplitude.tolist()
+    ]
+    energy = np.array([float(history.dissipation) for history in cycles])
+    stiffness = np.array([float(history.secant_stiffness) for history in cycles])
+    own = Compared(
+        "strip", None, energy, 0.0, _seconds([DissipationCurve(amplitude, energy)], scene)
+    )
+    reached = amplitude / stiffness
+    data = [DissipationCurve(reached, energy), StiffnessCurve(reached, stiffness)]
+    over_force = [DissipationCurve(amplitude, energy)]
+    rows = [
+        _fitted(model, over_force, amplitude, "force", options)
+        if _is_power(model)
+        else _fitted(model, data, reached, "displacement", options)
+        for model in models
+    ]
+    return Comparison(amplitude, energy, "force", (own, *rows))
+
+
+def _energies(data: Sequence[Measurement]) -> tuple[Floats, Floats, str]:
+    """Amplitudes and energies of a target's steady cycles, and what drives them."""
+    curves = [item for item in data if isinstance(item, DissipationCurve)]
+    loops = [item for item in data if isinstance(item, Loop) and item.closed]
+    if curves:
+        columns = ([getattr(c, name) for c in curves] for name in ("amplitude", "dissipation"))
+        amplitude, energy = map(np.concatenate, columns)
+        return amplitude, energy, "force"
+    if not loops:
+        raise InputError("target: give closed loops, or a curve of dissipation over amplitude")
+    sizes = np.array([0.5 * np.ptp(loop.displacement) for loop in loops])
+    order = np.argsort(sizes)
+    return sizes[order], np.array([loop.work for loop in loops])[order], "displacement"
+
+
+def _fitted(
+    model: str | Law,
+    data: Sequence[Measurement],
+    amplitude: Floats,
+    drive: str,
+    options: dict[str, Any],
+) -> Compared:
+    """One model, fitted to the data that it can answer."""
+    name = model if isinstance(model, str) else model.heading
+    nothing = np.full(amplitude.shape, np.nan)
+    try:
+        driven = as_model(model, data, drive)
+        own = [i for i in data if not (_is_power(model) and isinstance(i, StiffnessCurve))]
+        found = fit(own, driven, **({"throw": False} | options))
+    except (InputError, UnconvergedError) as error:
+        return Compared(name, None, nothing, np.nan, np.nan, str(error))
+    law = found.law
+    by_force = law.dissipation_at_force if drive == "force" else law.dissipation
+    energy = np.asarray(eqx.filter_jit(by_force)(amplitude))
+    told = "" if found.status == "converged" else "the search has not converged"
+    if not found.describes:
+        told = "; ".join(filter(None, (told, "does not describe these data")))
+    return Compared(name, found, energy, found.misfit, _seconds(own, found.scene), told)
+
+
+def _is_power(model: str | Law) -> bool:
+    """True for the power law, which answers its energy over the force alone."""
+    heading = model if isinstance(model, str) else model.heading
+    return heading == PowerLaw.heading
+
+
+def _seconds(data: Sequence[Measurement], model: Model) -> float:
+    """Time of one response of a model to all data, compiled, the fastest of some."""
+    observations = [observe(item, model) for item in data]
+    jax.block_until_ready(_respond(observations, model))
+    times = []
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        jax.block_until_ready(_respond(observations, model))
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+@eqx.filter_jit
+def _respond(observations: Sequence[Observation], model: Model) -> list[Any]:
+    """Responses of a model to all observations."""
+    return [observation.predict(model, Newton())[0] for observation in observations]

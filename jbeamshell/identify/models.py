@@ -1,0 +1,153 @@
+"""Models that a fit runs: a strip, or a law of a joint that is driven by force or displacement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Self
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+from jax.typing import ArrayLike
+
+from jbeamshell.common.checks import require, require_choice
+from jbeamshell.common.errors import InputError
+from jbeamshell.laws import Law, MasingLaw, PowerLaw
+from jbeamshell.measured.curves import AmplitudeCurve, DissipationCurve, StiffnessCurve
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.keys import CONTROLS
+from jbeamshell.scene.load_path import check
+from jbeamshell.scene.scene import Scene
+
+# Figure of a `History` that each curve over amplitude measures.
+FIGURES: dict[type[AmplitudeCurve], str] = {
+    DissipationCurve: "dissipation",
+    StiffnessCurve: "secant_stiffness",
+}
+
+
+class Drive(NamedTuple):
+    """Column that drives a law.
+
+    Attributes
+    ----------
+    control : "force" or "displacement"
+    """
+
+    control: str = "displacement"
+
+
+class Driven(eqx.Module):
+    """Law of a joint in place of a strip.
+
+    Attributes
+    ----------
+    law : the law
+    load : what drives it; a force on a path only where the law follows Masing's rule
+
+    Examples
+    --------
+    >>> model = Driven(jb.laws.Iwan4(slip_force=2.0), Drive("force"))
+    >>> model.get("iwan4.chi")
+    """
+
+    law: Law
+    load: Drive = eqx.field(static=True, default=Drive())
+
+    def __check_init__(self) -> None:
+        require("law", self.law, isinstance(self.law, Law), "give a jbeamshell.laws.Law")
+        require_choice("load.control", self.load.control, CONTROLS)
+
+    def get(self, key: str) -> Any:
+        """Number of the law by its dotted key."""
+        return self.law.get(key)
+
+    def replace(self, values: Mapping[str, Any]) -> Self:
+        """Copy with other numbers of the law, by dotted key; they may be traced."""
+        return type(self)(self.law.replace(values), self.load)
+
+
+Model = Scene | Driven
+
+
+def check_path(model: Model, path: ArrayLike) -> None:
+    """Raise `InputError` if a model cannot follow a path of its driving column."""
+    if isinstance(model, Scene):
+        check(model, path)
+        return
+    law = model.law
+    law.path_forces(jnp.zeros(1))  # raises for a law without loops
+    if model.load.control == "force":
+        fix = f"{law.heading} is driven by the displacement alone: take 'displacement'"
+        require("load.control", "force", isinstance(law, MasingLaw), fix)
+        check_forces(model, path)
+
+
+def check_amplitudes(model: Model, amplitude: ArrayLike) -> None:
+    """Raise `InputError` if a model has no steady cycle of one of the amplitudes."""
+    if isinstance(model, Scene):
+        check(model, np.sort(np.asarray(amplitude)))
+    elif model.load.control == "force":
+        check_forces(model, amplitude)
+
+
+def check_forces(model: Driven, force: ArrayLike) -> None:
+    """Raise `InputError` if forces reach a law's gross slip at its start values."""
+    law, largest = model.law, float(np.max(np.abs(np.asarray(force))))
+    fix = f"reaches gross slip of {law.heading} at the start, {float(law.capacity):.6g}: start from"
+    require("force", largest, largest < float(law.capacity), f"{fix} a larger one")
+
+
+def response_along(model: Model, path: Array, solver: Newton) -> tuple[Array, Array]:
+    """Answering column (T,) on a path (T,) of the driving one, and whether all of it converged."""
+    by_force = model.load.control == "force"
+    if isinstance(model, Scene):
+        history = solve(model, path, solver=solver, throw=False)
+        response = history.displacement if by_force else history.force
+        return response[history.pressed + 1 :], jnp.all(history.status == 0)
+    law = model.law
+    if by_force and isinstance(law, MasingLaw):
+        response = law.path_displacements(path)
+    else:
+        response = law.path_forces(path)
+    return response, jnp.all(jnp.isfinite(response))
+
+
+def cycle_figures(
+    model: Model, amplitude: Array, figure: Array, solver: Newton
+) -> tuple[Array, Array]:
+    """Figures (n,) of the steady cycles of some amplitudes (n,), and whether each converged.
+
+    Parameters
+    ----------
+    model : strip, or law
+    amplitude : (n,) amplitudes of the driving column
+    figure : (n,) index of the figure in `FIGURES`
+    solver : settings of Newton's method
+    """
+    if isinstance(model, Scene):
+        scene, cycles = model, max(model.load.cycles, 1)
+
+        def one(point: tuple[Array, Array]) -> tuple[Array, Array]:
+            to = {"load.amplitude": point[0], "load.cycles": cycles}
+            history = solve(scene.replace(to), solver=solver, throw=False)
+            figures = (getattr(history, name) for name in FIGURES.values())
+            return lax.select_n(point[1], *figures), jnp.all(history.status == 0)
+
+        return lax.map(one, (amplitude, figure))
+    law = model.law
+    if isinstance(law, PowerLaw):
+        values = jnp.where(figure == 0, law.dissipation_at_force(amplitude), jnp.nan)
+    else:
+        size = law.displacement(amplitude) if model.load.control == "force" else amplitude
+        values = lax.select_n(figure, law.dissipation(size), law.secant_stiffness(size))
+    return values, jnp.isfinite(values)
+
+
+def of_strips_alone(what: str, model: Model) -> Scene:
+    """Scene of a model; raises `InputError` for a law, which has nothing of the kind."""
+    if isinstance(model, Scene):
+        return model
+    raise InputError(f"{what}: a law of a joint has none; give a Scene")

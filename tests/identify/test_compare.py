@@ -1,0 +1,91 @@
+"""Comparison of laws: the right one loses nothing, the others what they must."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import identify, laws, plotting
+from jbeamshell.common.errors import InputError
+from jbeamshell.identify.comparison import Compared, Comparison
+from jbeamshell.measured.curves import DissipationCurve, StiffnessCurve
+
+FORCE = np.linspace(0.2, 1.9, 7)
+LAW = laws.Mindlin(2.0, 50.0)
+
+
+def curves():
+    """Curves of a law over the force amplitude."""
+    size = np.asarray(LAW.displacement(FORCE))
+    return [
+        DissipationCurve(FORCE, np.asarray(LAW.dissipation(size))),
+        StiffnessCurve(FORCE, np.asarray(LAW.secant_stiffness(size))),
+    ]
+
+
+@pytest.fixture(scope="module")
+def made():
+    """Comparison of two models, of which one was not fitted."""
+    energy = FORCE**3
+    right = Compared("right", None, 1.1 * energy, 0.02, 3e-5)
+    wrong = Compared("wrong", None, np.full(7, np.nan), np.nan, np.nan, "has no loop")
+    return Comparison(FORCE, energy, "force", (right, right, wrong))
+
+
+@pytest.mark.slow
+def test_the_planted_law_loses_nothing_and_a_power_law_does():
+    compared = identify.compare(curves(), ["mindlin", laws.PowerLaw(0.01, 3.2, 1.0)])
+    mindlin, power = compared.rows
+    np.testing.assert_allclose(compared.error(mindlin), 0.0, atol=1e-6)
+    assert np.max(np.abs(compared.error(power))) > 0.05
+    assert (mindlin.numbers, power.numbers) == (2, 2)
+    assert mindlin.seconds > 0.0
+    assert compared.drive == "force"
+    figures = compared.figures()
+    assert figures["models"]["mindlin"]["values"]["mindlin.slip_force"] == pytest.approx(2.0)
+
+
+def test_a_comparison_is_printed_and_recorded(made):
+    rows = (made.rows[0], made.rows[2])
+    lines = str(made._replace(rows=rows)).splitlines()
+    assert lines[1].split() == ["right", "0", "2", "%", "10", "%", "10", "%", "30", "us"]
+    assert lines[2].split() == ["wrong", "has", "no", "loop"]
+    figures = made._replace(rows=rows).figures()["models"]
+    assert figures["wrong"]["misfit"] is None
+    assert figures["wrong"]["energy"] == [None] * 7
+    assert json.dumps(figures, allow_nan=False)
+
+
+def test_a_comparison_is_drawn(made):
+    fitted = made.rows[1]._replace(fit=SimpleNamespace(values={"a": 1.0}))
+    energies, errors = made._replace(rows=(made.rows[0], fitted, made.rows[2])).plot()
+    texts = [text.get_text() for text in energies.get_legend().get_texts()]
+    assert texts == ["right: 1 numbers, 30 us", "target"]
+    np.testing.assert_allclose(errors.lines[0].get_ydata(), 10.0)
+    plotting.close(energies.figure)
+
+
+def test_bad_input_is_one_clear_line():
+    data = curves()
+    with pytest.raises(InputError, match=r"^models = \[\]: give a list of names or laws"):
+        identify.compare(data, [])
+    with pytest.raises(InputError, match=r"^amplitudes = \[1.0\]: are the target's own"):
+        identify.compare(data, ["iwan4"], amplitudes=[1.0])
+    with pytest.raises(InputError, match=r"^target: give closed loops, or a curve of dissipation"):
+        identify.compare(data[1], ["iwan4"])
+    unknown = identify.compare(data, ["iwan5"])
+    assert "choose jenkins, iwan4" in unknown.rows[0].told
+    assert "choose jenkins, iwan4" in str(unknown)
+
+
+@pytest.mark.slow
+def test_a_strip_is_compared_with_laws_of_its_own_cycles():
+    found = identify.compare(
+        jb.Scene(), ["sliders8", "jenkins"], amplitudes=np.linspace(0.2, 1.9, 9)
+    )
+    strip, sliders, jenkins = found.rows
+    assert strip.name == "strip"
+    assert np.median(np.abs(found.error(sliders))) < 0.05
+    assert np.median(np.abs(found.error(jenkins))) > 0.2

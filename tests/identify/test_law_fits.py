@@ -1,0 +1,136 @@
+"""Fits of a joint's law in place of a strip: planted numbers, intervals, doubts, bad input."""
+
+import numpy as np
+import pytest
+
+from jbeamshell import identify, laws
+from jbeamshell.common.errors import InputError
+from jbeamshell.identify.driving import feature_doubts
+from jbeamshell.identify.models import Drive, Driven
+from jbeamshell.identify.specimens import Specimen, inspected
+from jbeamshell.measured.curves import DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.loops import Loop
+from jbeamshell.scene.library import standard
+
+SIZES = (0.006, 0.012, 0.03)
+PLANTED = {
+    "jenkins": laws.Jenkins(1.0, 100.0),
+    "iwan4": laws.Iwan4(1.0, 100.0, -0.5, 0.4),
+    "bar": laws.Bar(1.0, 0.02),
+    "mindlin": laws.Mindlin(1.0, 100.0),
+    "bouc-wen": laws.BoucWen(1.0, 100.0, 1.6, 0.6, 0.05),
+    "dahl": laws.Dahl(1.0, 100.0),
+    "lugre": laws.LuGre(1.0, 100.0, 0.05),
+    "sliders4": laws.law_named("sliders4")(0.001, 0.02, 0.2, 0.3, 0.3, 0.2),
+}
+NOISE = 0.01
+
+
+def loops(law, random=None, sizes=SIZES, points=64):
+    """Steady loops of a law, the third cycle of each, with noise of 1 % of the force's range."""
+    found = []
+    for size in sizes:
+        way = np.cos(2.0 * np.pi * np.arange(points + 1) / points)
+        path = size * np.concatenate([np.linspace(0.0, 1.0, 17)[1:], way, way, way])
+        force = np.asarray(law.path_forces(path))[-points - 1 :]
+        if random is not None:
+            force = force + NOISE * np.ptp(force) * random.normal(size=force.size)
+        found.append(Loop(force, size * way, f"U = {size:g}", driver="displacement"))
+    return found
+
+
+def test_the_four_parameters_of_iwan_are_found_with_their_intervals():
+    data = loops(PLANTED["iwan4"], np.random.default_rng(1))
+    fit = identify.fit(data, "iwan4", noise=NOISE, starts=1)
+    assert fit.describes
+    for key, (low, high) in fit.intervals.items():
+        truth = float(PLANTED["iwan4"].get(key))
+        assert low - 0.5 * (high - low) < truth < high + 0.5 * (high - low)
+    assert float(fit.law.dissipation(0.01)) == pytest.approx(
+        float(PLANTED["iwan4"].dissipation(0.01)), rel=0.02
+    )
+
+
+@pytest.mark.slow
+def test_curves_over_the_force_amplitude_tell_a_law():
+    law = laws.Mindlin(2.0, 50.0)
+    force = np.linspace(0.2, 1.9, 9)
+    size = np.asarray(law.displacement(force))
+    curves = [
+        DissipationCurve(force, np.asarray(law.dissipation(size))),
+        StiffnessCurve(force, np.asarray(law.secant_stiffness(size))),
+    ]
+    fit = identify.fit(curves, "mindlin", starts=1)
+    assert fit.scene.load.control == "force"
+    assert fit.values["mindlin.slip_force"] == pytest.approx(2.0, rel=1e-6)
+    assert fit.values["mindlin.stiffness"] == pytest.approx(50.0, rel=1e-6)
+    power = identify.fit(curves[:1], "power-law", starts=1)
+    assert 3.0 < power.values["power-law.exponent"] < 4.0
+
+
+@pytest.mark.slow
+def test_a_model_that_cannot_follow_the_data_says_so():
+    data = loops(PLANTED["dahl"])
+    fit = identify.fit(data, "bar", starts=1)
+    assert not fit.describes
+    assert "this model does not describe these data" in fit.warnings[0]
+
+
+def test_asymmetry_and_memory_that_a_law_lacks_are_doubts():
+    loop = loops(PLANTED["mindlin"], sizes=(0.03,))[0]
+    lopsided = loop._replace(force=loop.force + 0.15 * np.abs(loop.force))
+    jenkins, dahl = Driven(PLANTED["jenkins"]), Driven(PLANTED["dahl"])
+    (text,) = feature_doubts(jenkins, [loop, lopsided])
+    assert "pull and push differ by" in text
+    ends = ((1.0, -1.0), (-1.0, 0.4), (0.4, -0.4), (-0.4, 1.0))
+    u = 0.01 * np.concatenate([np.linspace(a, b, 20)[1:] for a, b in ends])
+    nested = Loop(u.copy(), u, "nested")
+    (text,) = feature_doubts(dahl, [nested])
+    assert "dahl forgets where: its minor loops do not close" in text
+    assert feature_doubts(jenkins, [nested]) == feature_doubts(standard(), [nested]) == []
+    assert text in inspected([Specimen(dahl, [nested])], [], unchecked=True)
+
+
+@pytest.mark.slow
+def test_a_law_is_driven_by_force_where_it_has_masings_memory():
+    law = PLANTED["mindlin"]
+    path = 0.8 * np.cos(np.pi * np.arange(65) / 32)
+    u = np.asarray(law.path_displacements(np.append(np.linspace(0, 0.8, 9)[1:], path)))[-65:]
+    data = Loop(path, u, "by force")
+    fit = identify.fit(data, Driven(laws.Mindlin(1.2, 80.0), Drive("force")))
+    assert fit.values["mindlin.stiffness"] == pytest.approx(100.0, rel=1e-6)
+    with pytest.raises(InputError, match=r"^load.control = 'force': dahl is driven by the displac"):
+        identify.fit(data, Driven(laws.Dahl(1.2, 80.0), Drive("force")))
+    with pytest.raises(
+        InputError, match=r"^force = 0.8: reaches gross slip of mindlin at the star"
+    ):
+        identify.fit(data, Driven(laws.Mindlin(0.7, 80.0), Drive("force")))
+
+
+def test_bad_input_is_one_clear_line():
+    data = loops(PLANTED["jenkins"])
+    with pytest.raises(InputError, match=r"^model = 'iwan5': choose jenkins, iwan4"):
+        identify.fit(data, "iwan5")
+    with pytest.raises(InputError, match=r"^scene = 3: give a jbeamshell.Scene, a law such as"):
+        identify.fit(data, 3)
+    with pytest.raises(InputError, match=r"^unknown key 'contact.friction': the numbers of this l"):
+        identify.fit(data, "iwan4", ["contact.friction"])
+    with pytest.raises(InputError, match=r"^free 'iwan4.chi': low = -2.0: must lie between -1 and"):
+        identify.Parameter("iwan4.chi", low=-2.0)
+    with pytest.raises(InputError, match=r"^power-law: knows the energy per cycle alone"):
+        identify.fit(data, "power-law")
+    squeeze = SqueezeCurve(np.linspace(0.0, 1.0, 9), np.linspace(-1.0, -0.1, 9))
+    with pytest.raises(InputError, match=r"^squeeze: squeeze stress: a law of a joint has none"):
+        identify.fit([squeeze, *data], "jenkins")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PLANTED)
+def test_intervals_of_planted_numbers_hold_as_often_as_they_say(name):
+    random = np.random.default_rng(11)
+    held = []
+    for _ in range(50):
+        fit = identify.fit(loops(PLANTED[name], random), name, noise=NOISE, starts=1)
+        for key, (low, high) in fit.intervals.items():
+            held.append(low < float(PLANTED[name].get(key)) < high)
+    assert 0.9 <= np.mean(held) <= 0.99
