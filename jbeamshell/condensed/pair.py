@@ -110,7 +110,7 @@ def upper_member(
     none = np.zeros_like(form.held)
     supports = Supports(none, ~form.held if guided else none)
     beyond = None if overhang is None else x[-1] + overhang * OVERHANG[1:]
-    return _member(form, x, (None, beyond), down, supports)
+    return member(form, x, (None, beyond), down, supports)
 
 
 def lower_member(
@@ -125,10 +125,10 @@ def lower_member(
     form = form if clamped else on_symmetry_plane(form)
     supports = Supports(form.held | clamped, np.zeros_like(form.held), flat)
     before = None if overhang is None else x[0] - overhang * OVERHANG[:0:-1]
-    return _member(form, x, (before, None), up, supports)
+    return member(form, x, (before, None), up, supports)
 
 
-def _member(
+def member(
     form: SectionForm,
     x: Array,
     overhangs: tuple[Array | None, Array | None],

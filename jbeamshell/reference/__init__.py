@@ -1,7 +1,8 @@
 """Exact solutions from the literature, each with its source.
 
 The bar on a frictional foundation and Masing's rule, Cattaneo's and Mindlin's contact, the stuck
-strip, Filon's squeezed strip and the psi model beside it, the bimetal strip, and receding contact.
+strip, a beam of two layers that slip, two bars that lap, Filon's squeezed strip and the psi model
+beside it, the bimetal strip, and receding contact.
 Units are any consistent set; a strip has unit width, so forces are per width.
 
 Examples
@@ -15,6 +16,8 @@ from jbeamshell.mechanics.bar import bar_force as bar_force
 from jbeamshell.mechanics.bar import bar_slip_length as bar_slip_length
 from jbeamshell.mechanics.bar import bar_slip_profile as bar_slip_profile
 from jbeamshell.mechanics.bar import cubic_law as cubic_law
+from jbeamshell.mechanics.bar import lap_backbone as lap_backbone
+from jbeamshell.mechanics.bar import lap_cubic_law as lap_cubic_law
 from jbeamshell.mechanics.homogeneous import shear_coefficient as shear_coefficient
 from jbeamshell.reference.bimetal import bimetal_curvature as bimetal_curvature
 from jbeamshell.reference.bimetal import tip_deflection as tip_deflection
@@ -22,6 +25,9 @@ from jbeamshell.reference.filon import filon_average as filon_average
 from jbeamshell.reference.filon import filon_average_step as filon_average_step
 from jbeamshell.reference.filon import filon_midplane as filon_midplane
 from jbeamshell.reference.filon import filon_midplane_step as filon_midplane_step
+from jbeamshell.reference.layered_beam import layered_beam_deflection as layered_beam_deflection
+from jbeamshell.reference.layered_beam import layered_beam_dissipation as layered_beam_dissipation
+from jbeamshell.reference.layered_beam import layered_beam_slip_force as layered_beam_slip_force
 from jbeamshell.reference.masing import bar_hysteresis as bar_hysteresis
 from jbeamshell.reference.masing import masing_dissipation as masing_dissipation
 from jbeamshell.reference.masing import masing_loop as masing_loop
