@@ -249,3 +249,26 @@ def test_bad_input_is_one_clear_line(name):
     with pytest.raises(jb.InputError, match=message) as refusal:
         call()
     assert "\n" not in str(refusal.value)
+
+
+def test_pull_and_push_each_have_their_backbone():
+    joint = Joint.of(PLANE, 1.2, width=3.0)
+    assert joint.sides is not None
+    pull, push = (float(joint.backbone(way * 1e-5, mean=False)) for way in (1.0, -1.0))
+    assert pull > float(joint.backbone(1e-5)) > -push > 0.0  # a pull presses the corner down
+    at_end = joint.backbone(jnp.stack([joint.sides[0, -1], -joint.sides[1, -1]]), mean=False)
+    np.testing.assert_allclose(at_end, [3.6, -3.6], rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_lap_joint_is_walked_exactly_on_any_path():
+    values = {"model.rung": "squeeze", "model.nodes": 41, "load.amplitude": 1.2}
+    lap = jb.library.double_shear().replace(values)
+    joint = Joint.of(lap)
+    forces = np.array([0.6, 1.2, 0.3, -0.9, 0.0, 1.0])
+    path = np.asarray(jb.solve(lap, forces, throw=False).displacement)[1:]
+    np.testing.assert_allclose(joint.path_forces(path), forces, atol=1e-8)
+    for way, side in zip((1.0, -1.0), joint.sides, strict=True):
+        u = jb.solve(lap, [way * 0.7], throw=False).displacement[-1]
+        assert float(jnp.interp(0.7, joint.force, side)) == pytest.approx(way * float(u), rel=2e-3)
+        assert float(joint.backbone(u, mean=False)) == pytest.approx(way * 0.7, rel=2e-3)

@@ -44,6 +44,7 @@ from jbeamshell.dynamics.structure.strip_line import (
     mean_of,
     slider_line,
     slider_line_once,
+    walked_forces,
     walked_line,
 )
 from jbeamshell.laws.four_parameters import iwan4_through
@@ -51,6 +52,7 @@ from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
 BACKBONE = "give as many displacements as forces, both rising from above zero, softening throughout"
+SIDES = "give the displacements of pull and push, (2, k), both positive, at the forces"
 DOUBTED_ASYMMETRY = 0.05  # of an exported joint
 TRACED = "is differentiated on the contact line only: take model.rung = plane, or plain numbers"
 
@@ -66,6 +68,9 @@ class Joint(eqx.Module):
     asymmetry : largest difference of the strip's pull and push from the backbone, over the
         displacement at one force
     capacity : force of gross slip, beyond the backbone; infinite if it is not known
+    sides : (2, k) displacements of a pull and of a push at the forces; None if they are the
+        backbone's
+    scene : scene behind a joint without a network, such as a lap joint, for `path_forces`
 
     Raises
     ------
@@ -85,6 +90,8 @@ class Joint(eqx.Module):
     width: Array
     asymmetry: Array
     capacity: Array
+    sides: Array | None
+    scene: Scene | None
 
     def __init__(
         self,
@@ -94,17 +101,24 @@ class Joint(eqx.Module):
         width: Any = 1.0,
         asymmetry: Any = 0.0,
         capacity: Any = np.inf,
+        sides: Any = None,
+        scene: Scene | None = None,
     ) -> None:
         self.displacement = as_leaf(displacement, "joint.displacement", BACKBONE)
         self.force = as_leaf(force, "joint.force", BACKBONE)
         self.network, self.width = network, as_leaf(width, "joint.width")
         self.asymmetry = as_leaf(asymmetry, "joint.asymmetry")
         self.capacity = as_leaf(capacity, "joint.capacity")
+        self.sides = None if sides is None else as_leaf(sides, "joint.sides", SIDES)
+        self.scene = scene
 
     def __check_init__(self) -> None:
         if is_traced(self.displacement, self.force):
             return
         u, f = np.asarray(self.displacement), np.asarray(self.force)
+        if self.sides is not None:
+            shape = self.sides.shape
+            require("joint.sides", shape, shape == (2, u.size), SIDES)
         paired = u.ndim == 1 and u.shape == f.shape and u.size > 0
         require("joint.force", f.shape, paired, BACKBONE)
         slopes = np.diff(f, prepend=0.0) / np.diff(u, prepend=0.0)
@@ -147,14 +161,16 @@ class Joint(eqx.Module):
             network, sides, f, count = line(scene, as_leaf(force, "force"), soft)
             u, asymmetry = mean_of(*sides)
             if is_traced(u):
-                return cls(u, width * f, network, width, asymmetry, capacity)
+                return cls(u, width * f, network, width, asymmetry, capacity, sides)
             if np.all(np.isfinite(u)):
                 kept = np.append(np.arange(u.size - 1) < int(count), True)
                 u, f = np.asarray(u)[kept], width * np.asarray(f)[kept]
-                return cls(u, f, network, width, asymmetry, capacity)
+                ways = np.asarray(sides)[:, kept]
+                return cls(u, f, network, width, asymmetry, capacity, ways)
         require("scene", "traced", not is_traced(scene, force), TRACED)
-        u, f, asymmetry = walked_line(scene, float(force), width)
-        return cls(u, f, None, width, asymmetry, capacity)
+        u, f, asymmetry, ways = walked_line(scene, float(force), width)
+        walked = scene if scene.model.condensed else None
+        return cls(u, f, None, width, asymmetry, capacity, ways, walked)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Joint:
@@ -190,9 +206,20 @@ class Joint(eqx.Module):
         """Stiffness of the stuck joint."""
         return self._slopes[0]
 
-    def backbone(self, u: ArrayLike) -> Array:
-        """Force on first loading, an odd function of the displacement; any shape."""
+    def backbone(self, u: ArrayLike, *, mean: bool = True) -> Array:
+        """Force on first loading; any shape.
+
+        Parameters
+        ----------
+        u : displacement, positive for a pull
+        mean : True for the mean of pull and push, an odd function; False for each its own
+        """
         size = jnp.abs(jnp.asarray(u))
+        if not mean and self.sides is not None:
+            pull, push = (
+                eqx.tree_at(lambda joint: joint.displacement, self, s) for s in self.sides
+            )
+            return jnp.where(jnp.asarray(u) < 0.0, push.backbone(u), pull.backbone(u))
         inside = jnp.interp(size, *self._points)
         beyond = jnp.maximum(size - self.displacement[-1], 0.0) * self._slopes[-1]
         return jnp.sign(u) * (inside + beyond)
@@ -233,16 +260,21 @@ class Joint(eqx.Module):
     def path_forces(self, path: ArrayLike) -> NDArray[np.float64]:
         """Forces (T,) on a path (T,) of displacements, which starts with unloaded sliders.
 
-        A strip's are exact, pull and push apart, and not those of the mean backbone.
+        Those of a strip or a lap joint are exact, pull and push apart, and not those of the mean
+        backbone.
 
         Raises
         ------
         InputError
             for a path of a strip beyond gross slip, or on which its slip zones are not nested
+        UnconvergedError
+            for a path of a lap joint without equilibrium
         """
         points = np.atleast_1d(np.asarray(path, float))
         if self.network is not None:
             return np.asarray(self.width * _exact(self.network, points))
+        if self.scene is not None and not is_traced(self.scene):
+            return np.asarray(self.width * walked_forces(self.scene, points))
         springs, limits = np.asarray(self.springs), np.asarray(self.limits)
         sliders, last, forces = np.zeros(limits.size), 0.0, []
         for u in points:

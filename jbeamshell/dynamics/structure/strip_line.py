@@ -59,13 +59,22 @@ slider_line_once = jax.jit(slider_line, static_argnums=2, compiler_options=ONCE)
 
 def walked_line(
     scene: Scene, force: float, width: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Backbone of load steps under pull and push, and their asymmetry."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float, NDArray[np.float64]]:
+    """Backbone of load steps, its asymmetry, and the displacements (2, k) of pull and push."""
     levels = np.geomspace(SMALLEST_FORCE * force, force, POINTS)
     ways = (1.0, -1.0)
-    sides = (way * np.asarray(solve(scene, way * levels).displacement)[-POINTS:] for way in ways)
-    u, asymmetry = mean_of(*sides)
-    return *_softening(u, width * levels), float(asymmetry)
+    sides = [way * np.asarray(solve(scene, way * levels).displacement)[-POINTS:] for way in ways]
+    mean, asymmetry = mean_of(*sides)
+    u, f = _softening(mean, width * levels)
+    kept = np.isin(mean, u)
+    return u, f, float(asymmetry), np.stack(sides)[:, kept]
+
+
+def walked_forces(scene: Scene, path: NDArray[np.float64]) -> Array:
+    """Forces (T,) per width of a scene on its contact line, walked event by event."""
+    size = max(float(np.max(np.abs(path), initial=0.0)), np.finfo(float).tiny)
+    driven = scene.replace({"load.control": "displacement", "load.amplitude": size})
+    return solve(driven, path).force[-path.size :]
 
 
 def _softening(
