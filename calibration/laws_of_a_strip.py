@@ -29,6 +29,7 @@ from jbeamshell.identify.comparison import Comparison  # noqa: E402
 HERE = Path(__file__).parent
 HEIGHTS = (0.01, 0.0511, 0.1126, 0.2358, 0.4)
 AMPLITUDES = np.linspace(0.2, 1.9, 18)
+SHOWN = "0.1126"  # height whose energies are drawn
 MODELS = ("iwan4", "bouc-wen", "jenkins", "sliders4", "sliders8", "sliders16")
 
 
@@ -57,21 +58,29 @@ def figures(eta: float) -> dict[str, Any]:
 
 
 def draw(record: dict[str, Any]) -> Any:
-    """Draw the error of D over the force, a panel for each height."""
-    heights = record["heights"]
+    """Draw D over the force of one height, and the errors over all heights."""
+    heights, force = record["heights"], np.array(record["amplitude"])
+    one = heights[SHOWN]
+    names = list(one["models"])
     with plotting.style():
-        size = (3.1 * len(heights), 3.6)
-        figure, axes = plt.subplots(1, len(heights), sharey=True, figsize=size)
-        for panel, (eta, found) in zip(axes, heights.items(), strict=True):
-            names = found["models"]
-            for name, colour in zip(names, plotting.colours(len(names)), strict=True):
-                error = 100.0 * np.array(names[name]["error"])
-                panel.plot(record["amplitude"], error, color=colour, label=name)
-            panel.axhline(0.0, color=plotting.FAINT, linewidth=1.0, zorder=1.0)
-            panel.set(xlabel=plotting.FORCE, title=rf"$\eta$ = {eta}")
-            panel.set_yscale("symlog", linthresh=1.0)
-        axes[0].set_ylabel("error of $D$  [%]")
-        axes[0].legend(loc="best", ncols=1)
+        figure, (energies, errors) = plt.subplots(1, 2, figsize=(10.8, 4.4))
+        for name, colour in zip(names, plotting.colours(len(names)), strict=True):
+            energy = np.array(one["energy"]) * (1.0 + np.array(one["models"][name]["error"]))
+            energies.plot(force, np.where(energy > 0.0, energy, np.nan), color=colour, label=name)
+            eta = [float(key) for key in heights]
+            for figure_of, line in (("median", "-"), ("worst", ":")):
+                errs = [100.0 * heights[key]["models"][name][figure_of] for key in heights]
+                errors.plot(eta, errs, line, marker="o", markersize=3.5, color=colour)
+        energies.plot(force, one["energy"], label=rf"strip, $\eta$ = {SHOWN}", **plotting.DOTS)
+        low = 0.3 * min(one["energy"])
+        energies.set(xlabel=plotting.FORCE, ylabel="$D$, work per cycle  [force]", yscale="log")
+        energies.set_ylim(bottom=low)
+        energies.legend(loc="lower right")
+        errors.set(xlabel=r"height  $\eta$", ylabel="error of $D$: median, dotted worst  [%]")
+        errors.set(xscale="log", yscale="log")
+        errors.yaxis.set_major_formatter("{x:g}")
+        errors.set_xticks(eta, list(heights))
+        errors.minorticks_off()
     return figure
 
 

@@ -9,7 +9,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from jbeamshell import identify
+from jbeamshell import identify, laws
 from jbeamshell.cli import main
 from jbeamshell.measured.loops import read_loops
 from tests import rig
@@ -321,3 +321,19 @@ def test_bad_data_are_refused(refused, tmp_path, content, told):
     if content is not None:
         path.write_text(content)
     assert told in refused("fit", path)
+
+
+def test_a_law_takes_the_place_of_the_strip(tmp_path, capsys):
+    u = 0.02 * np.cos(np.linspace(0.0, 2.0 * np.pi, 65))
+    path = np.append(np.linspace(0.0, 0.02, 9)[1:], u)
+    force = np.asarray(laws.Jenkins(1.0, 100.0).path_forces(path))[-65:]
+    rows = "\n".join(f"{a},{b}" for a, b in zip(force, u, strict=True))
+    (tmp_path / "loop.csv").write_text(f"force,displacement\n{rows}\n", encoding="utf-8")
+    words = ["fit", str(tmp_path / "loop.csv"), "--model", "jenkins", "--starts", "1", "--json"]
+    assert main.main(words) == 0
+    values = json.loads(capsys.readouterr().out)["values"]
+    assert values["jenkins.slip_force"]["value"] == pytest.approx(1.0, rel=1e-6)
+    assert values["jenkins.stiffness"]["value"] == pytest.approx(100.0, rel=1e-6)
+    assert main.main([*words, "--scene", "standard"]) == 2
+    told = capsys.readouterr().err
+    assert "scene = 'standard': the law 'jenkins' takes its place: leave it out" in told

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jbeamshell as jb
 from jbeamshell import laws, reference
 from jbeamshell.common.errors import InputError
 
@@ -210,3 +211,17 @@ def test_bad_input_is_one_clear_line():
 def test_the_power_law_has_its_exponent():
     law = laws.PowerLaw(level=2.0, exponent=2.6, force=0.5)
     np.testing.assert_allclose(law.dissipation_at_force([0.5, 1.0]), [2.0, 2.0 * 2.0**2.6])
+
+
+@pytest.mark.slow
+def test_a_row_of_sliders_is_the_strip_that_only_stretches():
+    scene = jb.Scene().replace(
+        {"model.fields": ["v"], "model.nodes": 161, "model.solution": "stepwise"}
+    )
+    energy = float(jb.solve(scene.replace({"load.amplitude": 1.234})).dissipation)
+    rows = [laws.SeriesIwan.of_bar(3.4e4, 1.0, 2.0, count) for count in (20, 40, 80, 160)]
+    found = [float(row.dissipation_at_force(1.234)) for row in rows]
+    assert found[-1] == pytest.approx(energy, rel=1e-3)
+    exact = float(laws.Bar.of(3.4e4, 1.0, 2.0).dissipation_at_force(1.234))
+    errors = np.abs(np.array(found) / exact - 1.0)
+    assert np.polyfit(np.log([20, 40, 80, 160]), np.log(errors), 1)[0] < -1.7

@@ -1,5 +1,7 @@
 """Laws by Masing's rule: exact along any path, against many sliders; closed forms of energy."""
 
+import tomllib
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -106,6 +108,12 @@ def test_softening_laws_refuse_gross_slip_and_negative_stiffness(name):
         law.replace({f"{name}.stiffness": -1.0})
     with pytest.raises(InputError, match=rf"unknown key '{name}.k'"):
         law.replace({f"{name}.k": 1.0})
+
+
+def test_a_law_is_written_as_entries_of_a_plan():
+    entries = tomllib.loads(LAW.as_toml())
+    assert entries["model"] == "iwan4"
+    assert entries["set"] == {key: float(LAW.get(key)) for key in LAW.table()}
 
 
 def test_a_traced_force_of_gross_slip_gives_no_number():
