@@ -19,7 +19,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.mechanics.friction import coulomb_cap
-from jbeamshell.scene.buckling import weakest_column
+from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.linearisation import linear_error
 from jbeamshell.scene.rungs import IDEAL, general_rung
 from jbeamshell.scene.scene import Scene
@@ -176,7 +176,8 @@ def doubts_of_run(history: Run) -> tuple[str, ...]:
 def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
     model, strip, found = scene.model, scene.strip, []
-    if model.kinematics == "linear" and (error := linear_error(scene)) > TOLERANCE:
+    error = linear_error(scene) + sway(scene) if model.kinematics == "linear" else 0.0
+    if error > TOLERANCE:
         found.append(f"{_off(error)}: kinematics are linear; {_exact(scene)}")
     found += _buckling(scene)
     beamshell = "psi" in model.fields and model.order == 0 and model.solution != "plane"
@@ -208,8 +209,9 @@ def _buckling(scene: Scene) -> tuple[str, ...]:
     column = weakest_column(scene)
     if not column.near:
         return ()
+    part = "part without pressure" if scene.member.support == "none" else "column"
     return (
-        f"the part without pressure from X = {column.begin:.4g} to {column.end:.4g} may buckle: "
+        f"the {part} from X = {column.begin:.4g} to {column.end:.4g} may buckle: "
         f"its Euler load is {column.limit:.3g} and the compression reaches {column.force:.3g}, "
         f"which linear kinematics do not see; {_exact(scene)}, or press more of the strip",
     )

@@ -1,7 +1,8 @@
 """Buckling of the parts of a strip that nothing presses: Euler's load, and the compression there.
 
 Linear kinematics know no buckling.  A strip that is pressed, however little, does not buckle by
-small deflections; a part without pressure is a column between its supports.
+small deflections; a part without pressure is a column between its supports.  So is the overhang of
+a lap joint, and a whole single lap, whose eccentric load bends it.
 """
 
 from __future__ import annotations
@@ -63,12 +64,12 @@ def weakest_column(scene: Parts, numbers: Numbers | None = None) -> Column:
     length, load = numbers("strip.length"), scene.load
     none = Column(length, length, np.zeros(()), np.asarray(np.inf))
     parts = unpressed_parts(scene.contact)
-    if load.cycles == 0 or not parts:
+    if load.cycles == 0:
         return none
     bending, shear = _stiffnesses(scene, numbers)
     amplitude = numbers("load.amplitude")
     held = "clamped" if "beta" in FAR_ENDS[scene.strip.far_end] else scene.strip.far_end
-    weakest = none
+    columns = _columns_of_joint(scene, numbers)
     for start, stop in parts:
         begin, end = np.clip(start, 0.0, length), np.clip(stop, 0.0, length)
         overhangs = end == length
@@ -82,10 +83,58 @@ def weakest_column(scene: Parts, numbers: Numbers | None = None) -> Column:
         force = np.maximum(amplitude - held_back, 0.0)
         if load.control != "force":
             force = amplitude * stretching(scene.strip, numbers) / (length - begin)
-        found = Column(*np.broadcast_arrays(begin, end, force, limit))
+        columns.append(Column(*np.broadcast_arrays(begin, end, force, limit)))
+    weakest = none
+    for found in columns:
         nearer = found.force / found.limit > weakest.force / weakest.limit
         weakest = Column(*(np.where(nearer, a, b) for a, b in zip(found, weakest, strict=True)))
     return weakest
+
+
+def sway(scene: Parts) -> float:
+    """Relative error of linear kinematics in a single lap: its load over the load that buckles it.
+
+    By so much the load's moment grows, or falls, with the deflection (Timoshenko & Gere 1961,
+    section 1.11).
+    """
+    if scene.member.support != "clamped" or scene.load.cycles == 0:
+        return 0.0
+    whole = _columns_of_joint(scene, scene.number)[-1]
+    return float(whole.force / whole.limit)
+
+
+def _columns_of_joint(scene: Parts, numbers: Numbers) -> list[Column]:
+    """Overhangs of a lap joint, and last a whole single lap; the load compresses all of them.
+
+    The loaded end is free, or guided and turns; the end of the second member is clamped.  Where the
+    loaded end is free the joint sways, so that both overhangs are free at one end.
+    """
+    strip, member, load = scene.strip, scene.member, scene.load
+    if member.support == "none":
+        return []
+    length = numbers("strip.length")
+    none = np.zeros(())
+    far = none if member.overhang is None else numbers("member.overhang")
+    beyond = none if strip.overhang is None else numbers("strip.overhang")
+    factor = OVERHANG if strip.loaded_end == "free" else HINGED
+    upper, lower = (_stiffnesses(scene, numbers, second) for second in (False, True))
+    along = stretching(strip, numbers)
+    Span = tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]
+    spans: list[Span] = [(length, length + beyond, upper)]
+    if member.support == "clamped":
+        spans += [(-far, 0.0 * length, lower)]
+        weaker = np.minimum(upper[0], lower[0]), np.minimum(upper[1], lower[1])
+        spans += [(-far, length + beyond, weaker)]
+    found = []
+    for begin, end, (bending, shear) in spans:
+        run = np.where(end > begin, end - begin, np.nan)
+        euler = factor * np.pi**2 * bending / run**2
+        limit = np.where(end > begin, 1.0 / (1.0 / euler + 1.0 / shear), np.inf)
+        force = numbers("load.amplitude")
+        if load.control != "force":
+            force = force * along / length
+        found.append(Column(*np.broadcast_arrays(begin, end, force, limit)))
+    return found
 
 
 def unpressed_parts(contact: Contact) -> list[tuple[float, float]]:
@@ -126,14 +175,26 @@ def _pressed_beyond(contact: Contact, start: float, length: np.ndarray) -> np.nd
     return np.maximum(forces[0] - forces[1], 0.0)
 
 
-def _stiffnesses(scene: Parts, numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Bending stiffness about the neutral line, and shear stiffness, of a section."""
-    strip = scene.strip
+def _stiffnesses(
+    scene: Parts, numbers: Numbers, second: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Bending stiffness about the neutral line, and shear stiffness, of a section.
+
+    Parameters
+    ----------
+    scene, numbers : scene, and values by dotted key of the strips of a sweep
+    second : True for the second member, which is the scene's own
+    """
+    strip = scene.member.beside(scene.strip) if second else scene.strip
     if strip.section is not None:
         section = strip.section
         shear = section.shear_coefficient * section.mean_shear_modulus * section.height
         return np.asarray(section.bending_stiffness), np.asarray(shear)
-    along, height = stretching(strip, numbers), 2.0 * numbers("strip.half_height")
+    if second:
+        along, height = (np.asarray(a) for a in (strip.axial_stiffness, 2.0 * strip.half_height))
+        nu = np.asarray(strip.poisson_ratio)
+    else:
+        along, height = stretching(strip, numbers), 2.0 * numbers("strip.half_height")
+        nu = numbers("strip.poisson_ratio")
     bending = along * height**2 / (12.0 if scene.model.constants == "consistent" else 192.0)
-    nu = numbers("strip.poisson_ratio")
     return bending, shear_coefficient(nu) * shear_modulus(along, nu, strip.plane)

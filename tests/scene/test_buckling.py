@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.scene.buckling import unpressed_parts, weakest_column
+from jbeamshell.history.reliability import doubts_of_scene
+from jbeamshell.scene.buckling import sway, unpressed_parts, weakest_column
 
 SLENDER = jb.Scene().replace(
     {
@@ -72,3 +73,27 @@ def test_exact_rotations_lose_equilibrium_at_the_euler_load_of_a_gap():
         jb.solve(scene.replace({"model.kinematics": "linear"}))
     with pytest.raises(jb.UnconvergedError, match=r"load -2\.8.*buckles at 2\.8"):
         jb.solve(scene.replace({"model.kinematics": "exact"}))
+
+
+JOINT = {"strip.far_end": "free", "model.rung": "squeeze", "strip.height_ratio": 0.003}
+
+
+def test_overhangs_of_a_joint_are_columns():
+    lap = jb.Scene().replace(JOINT | {"member.support": "rolling", "strip.overhang": 1.0})
+    column = weakest_column(lap)
+    assert (float(column.begin), float(column.end)) == (2.0, 3.0)
+    assert float(column.limit) == pytest.approx(EULER / 4.0, rel=1e-3)
+    guided = weakest_column(lap.replace({"strip.loaded_end": "guided"}))
+    assert float(guided.limit) == pytest.approx(2.0457 * EULER, rel=1e-3)
+    assert np.isinf(weakest_column(lap.replace({"strip.overhang": None})).limit)
+
+
+def test_a_slender_single_lap_sways():
+    values = {"member.support": "clamped", "contact.bottom_pressure": 10.0, "member.overhang": 0.5}
+    lap = jb.Scene().replace(JOINT | values | {"load.amplitude": 0.1})
+    assert sway(lap) == pytest.approx(0.1 / (EULER / 4.0 / 2.5**2), rel=1e-3)
+    assert any("may buckle" in doubt for doubt in doubts_of_scene(lap))
+    thick = lap.replace({"strip.height_ratio": 0.1})
+    assert sway(thick) < 0.01
+    assert not doubts_of_scene(thick)
+    assert sway(lap.replace({"member.support": "rolling", "contact.bottom_pressure": 0.0})) == 0.0
