@@ -187,6 +187,21 @@ def over_gap(pair: Pair, hessian: Array, gap: Array) -> tuple[Pair, Array]:
     return moved, change.T @ hessian @ change
 
 
+def with_shanks(hessian: Array, stiffness: Array, down: Array, settled: Array) -> Array:
+    """Potential of `joined` with the shanks of its bolts, springs between the members along X.
+
+    Parameters
+    ----------
+    hessian : (2n + 2, 2n + 2)
+    stiffness : of all shanks together, force per width and length
+    down : (n,) nodal forces of the pressure, in proportion to which it is spread
+    settled : (n,) tangential displacements under the pressure, at which the shanks are unloaded
+    """
+    n = down.size
+    slip = jnp.eye(2 * n, 2 * n + 2, dtype=hessian.dtype)[::2].at[:, -1].add(-settled)
+    return hessian + slip.T @ ((stiffness * down / jnp.sum(down))[:, None] * slip)
+
+
 def together(
     above: Array, below: Array, fixed_above: np.ndarray, fixed_below: np.ndarray
 ) -> tuple[Array, Array, Array]:

@@ -10,7 +10,15 @@ from jax import Array
 
 from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.body import Body, Elimination, eliminate
-from jbeamshell.condensed.pair import Member, Pair, joined, lower_member, over_gap, upper_member
+from jbeamshell.condensed.pair import (
+    Member,
+    Pair,
+    joined,
+    lower_member,
+    over_gap,
+    upper_member,
+    with_shanks,
+)
 from jbeamshell.condensed.pressing import press as press_down
 from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements
@@ -92,10 +100,12 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     if gap is not None and pair is not None:
         pair, hessian = over_gap(pair, hessian, gap)
     settled = jnp.pad(settled, (0, k_tt.shape[0] - settled.size))
+    if scene.contact.bolt_stiffness is not None:
+        hessian = with_shanks(hessian, scene.contact.bolt_stiffness, down, settled[::-1])
     body = Body(
         x=x[::-1],
         tributary=tributary[::-1],
-        K_tt=k_tt,
+        K_tt=hessian[v, v],
         K_tn=k_tn,
         K_nn=hessian[w, w],
         f_t=-hessian[v, -2],

@@ -82,6 +82,9 @@ def _check_alone(scene: Parts) -> None:
     fix = "needs a second member: leave it out, or give member.support (a curved strip on a rigid "
     fix += "base has strip.curvature)"
     require("contact.gap", scene.contact.gap, scene.contact.gap is None, fix)
+    stiffness = scene.contact.bolt_stiffness
+    fix = "needs a second member: leave it out, or give member.support"
+    require("contact.bolt_stiffness", stiffness, stiffness is None, fix)
     fix = "needs a second member: take 'frictionless', or give member.support"
     assembly = scene.contact.assembly
     require("contact.assembly", assembly, assembly == "frictionless", fix)

@@ -160,6 +160,13 @@ class ContactKeys(Part):
         table=True,
         fix=GAP,
     )
+    bolt_stiffness: Array | None = number(
+        None,
+        "Stiffness of the bolts' shanks against slip, which stays beyond gross slip; spread as the "
+        "pressure (lap joints only); none is none.",
+        symbol="k_b",
+        unit="stress",
+    )
     normal_stiffness: Array = number(
         50.0, "Stiffness of the compliant foundation, in units of E'/H.", symbol="k_n", unit="E'/H"
     )

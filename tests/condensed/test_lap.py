@@ -149,6 +149,20 @@ class TestBalance:
         np.testing.assert_allclose(carried, rough.force, atol=1e-8)
 
 
+def test_shanks_hold_a_joint_beyond_gross_slip():
+    rigid = {"strip.axial_stiffness": 3.4e9, "contact.bolt_stiffness": 5e3, "model.nodes": 25}
+    rigid |= {"load.amplitude": 3.0, "load.steps_per_half_cycle": 8}
+    history = jb.solve(SQUEEZE.replace(rigid), throw=False)
+    assert history.converged
+    # Two blocks and a spring: F = mu F_N L + k_b u, turned at 3.
+    assert float(history.dissipation) == pytest.approx(4.0 * 2.0 * (3.0 - 2.0) / 5e3, rel=1e-4)
+    assert float(history.peak_displacement) == pytest.approx(1.0 / 5e3, rel=1e-4)
+    held = float(history.traction[-1] @ history.tributary)
+    spring = 5e3 * float(history.slip[-1] @ history.tributary) / 2.0
+    assert held + spring == pytest.approx(3.0, rel=1e-6)  # of a stiffness 7e5 times the spring's
+    assert float(jnp.max(jnp.abs(history.energy_imbalance))) < 0.02 * float(history.dissipation)
+
+
 BEND = [[0.0, 0.0], [1.0, 2e-5], [2.0, 8e-5]]  # of a member that is curved
 
 
@@ -262,6 +276,7 @@ def test_a_sweep_runs_over_both_heights():
         ({"member.layers": [[0.1, 1e5, 0.3]]}, "member.layers"),
         ({"load.amplitude": 2.5}, "gross slip"),
         ({"member.support": "none", "strip.overhang": 0.1}, "give member.support"),
+        ({"member.support": "none", "contact.bolt_stiffness": 1e3}, "give member.support"),
     ],
 )
 def test_what_is_no_joint_is_refused(values, said):

@@ -33,7 +33,8 @@ LIFTING = ["v", "w", "beta", "psi"]
 # --- files --------------------------------------------------------------------------------------
 
 positive = st.floats(1e-90, 1e90)
-OF_JOINT = {key for key in KEYS if key.startswith("member.")} | {"strip.overhang", "contact.gap"}
+OF_JOINT = {key for key in KEYS if key.startswith("member.")}
+OF_JOINT |= {"strip.overhang", "contact.gap", "contact.bolt_stiffness"}
 OPTIONAL = {"strip.axial_stiffness", "strip.poisson_ratio", "strip.layers", "strip.curvature"}
 OPTIONAL |= OF_JOINT - {"member.support"}
 JOINT = {"member.support": "rolling", "strip.far_end": "free", "model.rung": "plane"}
