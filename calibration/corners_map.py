@@ -38,6 +38,7 @@ LIFT = {"model.fields": ["v", "w", "beta", "psi"]}
 STEPWISE = {"model.solution": "stepwise"}
 EXACT = STEPWISE | {"model.kinematics": "exact"}
 MANY_STEPS = {"load.steps_per_half_cycle": 40}
+FINE = MANY_STEPS | {"model.nodes": 129, "model.end_size": 1.0 / 48.0}
 
 
 def bottom(random: Random) -> Values:
@@ -154,6 +155,57 @@ def events(random: Random) -> Values:
     return make(random)
 
 
+def lap(random: Random) -> Values:
+    """Lap joints: two members of other heights and stiffness, pressed evenly or as by a bolt."""
+    found = plain(random)
+    thinner, softer = np.exp(random.uniform(-1.0, 1.0, 2))
+    support = str(random.choice(["rolling", "clamped"]))
+    found |= {
+        "strip.far_end": "free",
+        "member.support": support,
+        "member.height_ratio": thinner * found["strip.height_ratio"],
+        "member.axial_stiffness": 3.4e4 * thinner * softer,
+        "member.poisson_ratio": random.uniform(0.0, 0.45),
+        "model.rung": str(random.choice(["squeeze", "p2", "plane"])),
+    }
+    if support == "clamped":
+        found["strip.loaded_end"] = "guided"
+    if random.uniform() < 0.5:
+        begin, end = np.sort(random.uniform(0.2, 1.8, 2))
+        bolt = [[begin, 0.0], [begin, 20.0], [end, 20.0], [end, 0.0]]
+        found["contact.pressure"] = bolt
+        if support == "clamped":
+            found["contact.bottom_pressure"] = bolt
+            found["contact.assembly"] = str(random.choice(["frictionless", "frictional"]))
+        found["load.amplitude"] *= end - begin
+    return found
+
+
+def sliders(random: Random) -> Values:
+    """Elastic slip from soft to stiff, in plane strain or stress, on every support."""
+    make = plain if random.uniform() < 0.5 else pressed_in_part
+    return make(random) | {
+        "contact.stick_stiffness": float(np.exp(random.uniform(np.log(3.0), np.log(1e4)))),
+        "strip.far_end": str(random.choice(["held", "pinned", "free"])),
+        "strip.plane": str(random.choice(["strain", "stress"])),
+        "strip.poisson_ratio": random.uniform(-0.5, 0.499),
+    }
+
+
+def given(random: Random) -> Values:
+    """Settings that a user gives, coarse ones among them, in place of those that are chosen."""
+    make = (plain, pressed_in_part, bottom, layered, displaced)[random.integers(5)]
+    found = make(random) | {
+        "model.nodes": int(random.choice([17, 33, 65])),
+        "load.steps_per_half_cycle": int(random.choice([2, 4, 10])),
+        "model.kinematics": str(random.choice(["linear", "exact"])),
+        "model.rung": str(random.choice(["shell", "squeeze"])),
+    }
+    if random.uniform() < 0.5:
+        found["model.end_size"] = float(random.choice([1.0, 0.25, 1.0 / 24.0]))
+    return found
+
+
 # Kinds of scenes, and what the other solver sets; none where one solver applies.
 KINDS: dict[str, tuple[Callable[[Random], Values], Values | None]] = {
     "both faces": (bottom, STEPWISE | LIFT),
@@ -169,6 +221,9 @@ KINDS: dict[str, tuple[Callable[[Random], Values], Values | None]] = {
     "compliant and smooth": (soft, None),
     "frozen": (frozen, EXACT | LIFT),
     "events": (events, STEPWISE | LIFT),
+    "lap joints": (lap, None),
+    "elastic sliders": (sliders, STEPWISE | LIFT),
+    "given settings": (given, FINE),
 }
 
 

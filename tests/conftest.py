@@ -48,6 +48,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--part", help="K/N: the K-th of N parts of the tests, K from 0")
 
 
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Let pass the doubts that a test says it meets, and all doubts of studies of many scenes."""
+    met = [words for mark in item.iter_markers("doubtful") for words in mark.args]
+    met += [""] if item.get_closest_marker("slow") else []
+    for words in met:
+        item.add_marker(pytest.mark.filterwarnings(f"ignore:doubtful.*{words}:UserWarning"))
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Keep one part of the tests, the same on all machines, so that N runs do all of them."""
     if given := config.getoption("--part"):

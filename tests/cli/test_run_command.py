@@ -29,6 +29,7 @@ RUN_FILES = TABLES | {"loop.png", "profiles.png", "contact.png"}
 # --- run ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.doubtful("few nodes")
 def test_run_prints_one_json_object(cli):
     code, out, err = cli("run", *BASE, "--json")
     assert (code, err) == (0, "")

@@ -271,6 +271,7 @@ class TestHistory:
 
 
 class TestRung:
+    @pytest.mark.doubtful("in the corner", "few nodes")
     def test_a_response_is_what_a_run_says(self):
         scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 33})
         one_step = scene.replace({"load.steps_per_half_cycle": 1})
@@ -282,6 +283,7 @@ class TestRung:
             assert int(found["status"]) == 0
             np.testing.assert_allclose(found["dissipation"], run.dissipation, rtol=1e-10)
 
+    @pytest.mark.doubtful("few nodes")
     def test_a_history_is_read_as_it_was_written(self, tmp_path):
         history = plane(scene_of(0.1126), **{"model.nodes": 33, "load.steps_per_half_cycle": 1})
         history.save(tmp_path / "run.npz")
@@ -289,6 +291,7 @@ class TestRung:
         assert again.scene.model.rung == "plane"
         np.testing.assert_array_equal(again.fields, history.fields)
 
+    @pytest.mark.doubtful("in the corner", "few nodes")
     def test_a_sweep_walks_what_is_not_nested_alone(self):
         scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 33})
         scene = scene.replace({"load.steps_per_half_cycle": 1})
@@ -322,6 +325,7 @@ class TestRung:
             imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
             assert imbalance < 0.05  # trapezoids of the work over 8 steps a branch
 
+    @pytest.mark.doubtful("few nodes")
     def test_a_traced_path_is_the_path(self):
         scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 17})
         loads = np.array([0.5, 1.0, 0.4, -0.3, -0.8, -0.8, 0.1, 1.0])

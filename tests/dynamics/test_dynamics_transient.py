@@ -355,3 +355,9 @@ def test_an_interrupted_motion_keeps_the_part_computed():
     kept = dynamics.simulate(strip, span, **common, most_steps=120, throw=False)
     assert kept.status == dynamics.Ending.TOO_MANY_STEPS
     assert kept.figures()["status"] == "too_many_steps"
+    assert kept.doubts == ()
+    with pytest.warns(jb.DoubtfulWarning, match=r"energy balance.*smaller step or tolerance"):
+        coarse = dynamics.simulate(
+            strip, 40.0 * span, **common, most_steps=120, step=0.2 * span, throw=False
+        )
+    assert f"doubtful: {coarse.doubts[0]}" in str(coarse)

@@ -175,6 +175,13 @@ class TestTransient:
             )
         assert 0.0 < cut.value.motion.reached < 50.0
 
+    def test_energies_that_do_not_add_up_are_doubted(self, shaken):
+        structure, motion = shaken
+        assert motion.doubts == ()
+        start = {"velocity": motion.velocity[0], "samples": 2001, "method": "tsit5"}
+        with pytest.warns(jb.DoubtfulWarning, match=r"energy balance.*smaller step or tolerance"):
+            dynamics.shake(structure, float(motion.time[-1]), **start, tolerance=0.1)
+
 
 class TestRingDown:
     TIME = np.linspace(0.0, 30.0, 6001)

@@ -1,3 +1,5 @@
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -43,6 +45,9 @@ def test_figures_of_the_standard_strip():
     assert float(history.loss_factor) == pytest.approx(
         float(history.dissipation) / (np.pi * 0.7855 * amplitude)
     )
+    *_, stop = history.cycles[-1]
+    last = jnp.zeros_like(history.slip_work).at[stop].set(1.0)
+    assert float(dataclasses.replace(history, slip_work=last).dissipation) == 1.0
     # Well past onset the slip zone is F - 1.7 eta long (mu F_N = 1).
     assert float(history.slip_length) == pytest.approx(0.7855 - 1.7 * 0.1126, abs=0.05)
     assert history.converged

@@ -100,6 +100,32 @@ def test_the_recorded_scenes_hold_no_silent_failure(name, least):
 # --- doubts -------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("nodes", [4, 64])
+def test_the_error_of_the_grid_counts_the_nodes_that_share_the_work(nodes):
+    slip = np.outer([0.0, 1.0, 0.0], np.ones(nodes))
+    even = reliability.SlipCycle(
+        x=np.arange(nodes) + 1.0,
+        tributary=np.ones(nodes),
+        v=slip,
+        traction=2.0 * slip - 1.0,
+        reaction=np.full_like(slip, 2.0),
+        friction=np.asarray(0.5),
+        slip_stiffness=np.asarray(np.inf),
+        half_height=np.asarray(1.0),
+    )
+    grid, corner = reliability.dissipation_errors(even)
+    assert grid == pytest.approx(nodes**-1.5)
+    assert corner == 0.0
+    # A reaction that gathers in the corner matters so far as slip falls within H of the end.
+    gathered = even._replace(reaction=even.reaction + 2.0 * (even.x == nodes))
+    assert reliability.dissipation_errors(gathered)[1] == 0.0
+    falling = gathered._replace(v=slip * np.where(even.x < nodes, 0.5, 1.0))
+    found = reliability.dissipation_errors(falling)[1]
+    work = 0.5 * (nodes - 1.0) + 2.0  # of caps 1 and 2, in each half of the cycle
+    assert found == pytest.approx(reliability.SAFETY * 0.5 * 1.0 / work)
+
+
+@pytest.mark.doubtful("in the corner")
 def test_a_doubtful_run_warns_with_the_fix():
     scene = STRIP.replace(LITTLE | COARSE)
     with pytest.warns(jb.DoubtfulWarning, match=r"off by about \d+ %: few nodes do .*end_size"):
@@ -129,6 +155,7 @@ def test_the_estimate_falls_with_the_elements():
     assert grid[0] > 2.0 * grid[1] > 4.0 * grid[2]
 
 
+@pytest.mark.doubtful("nothing slips")
 def test_where_nothing_slips_the_dissipation_is_doubted():
     tiny = {"load.amplitude": 1e-4, "contact.stick_stiffness": 2.0}
     history = jb.solve(STRIP.replace(tiny | COARSE))
@@ -208,6 +235,7 @@ def test_a_laminate_that_rests_on_its_corner_is_doubted_as_much_as_it_is_off():
 
 
 @pytest.mark.parametrize("unit", [1e-30, 1e30])
+@pytest.mark.doubtful("few nodes")
 def test_the_estimate_knows_no_units(unit):
     history = jb.solve(STRIP.replace(COARSE))
     cycle = history.slip_cycle
@@ -221,6 +249,7 @@ def test_the_estimate_knows_no_units(unit):
     np.testing.assert_allclose(other, own, rtol=1e-12)
 
 
+@pytest.mark.doubtful("few nodes")
 def test_an_open_loop_and_a_failed_run_are_doubted():
     history = jb.solve(STRIP.replace(COARSE))
     shifted = history.displacement.at[-1].add(0.01 * jnp.ptp(history.displacement))
@@ -242,6 +271,7 @@ def test_the_command_line_passes_doubts_on(capsys):
 # --- many cycles, few digits ----------------------------------------------------------------------
 
 
+@pytest.mark.doubtful("few nodes")
 def test_a_thousand_cycles_neither_drift_nor_lose_energy():
     settings = {"model.nodes": 21, "load.cycles": 1000}
     history = jb.solve(STRIP.replace(COARSE | settings))
@@ -256,6 +286,7 @@ def test_a_thousand_cycles_neither_drift_nor_lose_energy():
     assert float(history.dissipation_loop) == pytest.approx(float(history.dissipation), rel=0.02)
 
 
+@pytest.mark.doubtful("few nodes")
 def test_single_precision_holds_what_it_can_and_refuses_the_rest():
     shell = COARSE | {"model.fields": ["v", "beta"], "model.solution": "stepwise"}
     code = f"""

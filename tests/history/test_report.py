@@ -35,7 +35,8 @@ FIT_FILES = {"overlay.csv", "overlay.png", "residuals.png", "result.json", "scen
 
 @pytest.fixture(scope="module")
 def history():
-    return jb.solve(STRIP.replace(COARSE))
+    with pytest.warns(jb.DoubtfulWarning, match="few nodes"):
+        return jb.solve(STRIP.replace(COARSE))
 
 
 def pressed(history, steps, **values):

@@ -295,7 +295,8 @@ def test_filling_up_adds_nothing(monkeypatch):
 def planted():
     """The model's own steady loop, and where a fit of it starts."""
     truth = STRIP.replace(MODEL)
-    history = jb.solve(truth)
+    with pytest.warns(jb.DoubtfulWarning, match="few nodes"):
+        history = jb.solve(truth)
     return history, truth.replace({MU: 0.13, ETA: 0.09})
 
 

@@ -101,6 +101,7 @@ def test_a_coarser_tolerance_is_never_dearer():
     assert times[-1] < times[0]
 
 
+@pytest.mark.doubtful("in the corner")
 def test_thin_bars_need_no_more_than_the_bar_and_corners_need_plane_elasticity():
     thin = STRIP.replace({"strip.height_ratio": 0.01, "load.amplitude": 1.5})
     assert jb.advise(thin, 0.01).rung == "bar"

@@ -71,6 +71,7 @@ def test_the_bar_is_the_cubic_law():
 
 
 @pytest.mark.parametrize(("control", "bottom"), [("force", 4.0), ("displacement", 0.0)])
+@pytest.mark.doubtful("few nodes")
 def test_the_closed_bar_is_the_limit_of_the_stepwise_one(control, bottom):
     amplitude = {"force": 0.8, "displacement": 1e-5}[control]
     load = {"load.control": control, "load.amplitude": amplitude, "load.cycles": 1}
@@ -81,6 +82,7 @@ def test_the_closed_bar_is_the_limit_of_the_stepwise_one(control, bottom):
     np.testing.assert_allclose(stepped.v[-1], closed.v[-1], atol=6e-3 * float(closed.v.max()))
 
 
+@pytest.mark.doubtful("few nodes")
 def test_masing_doubles_the_backbone():
     """Its loop is the closed form's of the mean backbone, its dissipation near the full cycle's."""
     history, full = jb.solve(on("masing")), jb.solve(on("squeeze"))
@@ -100,6 +102,7 @@ def test_masing_doubles_the_backbone():
     assert int(jnp.sum(history.iterations)) < int(jnp.sum(full.iterations))
 
 
+@pytest.mark.doubtful("few nodes")
 def test_one_backbone_is_worse_than_two():
     full = float(jb.solve(on("squeeze")).dissipation)
     two, one = (

@@ -19,6 +19,7 @@ from jbeamshell.mechanics.friction import (
     FrictionLaw,
     SharpSlip,
     TanhIncrement,
+    coulomb_cap,
     plastic_slip,
 )
 
@@ -39,6 +40,33 @@ def _optimised():
     jax.config.update("jax_disable_most_optimizations", False)
     yield
     jax.config.update("jax_disable_most_optimizations", True)
+
+
+class Hardening(FrictionLaw):
+    """Half of every increment is plastic, and the traction rises with all of it."""
+
+    def traction(self, dv, t_n, cap, k_t):
+        return t_n + 0.5 * k_t * dv
+
+
+def test_the_work_of_a_law_of_ones_own_is_exact_where_traction_rises_linearly():
+    law, slip = Hardening(), np.linspace(0.0, 2.0, 5)
+    whole = law.slip_work(slip[-1], 0.0, K_T, 9.0, 9.0, K_T)  # traction K_T at slip 2
+    t = 0.5 * K_T * slip
+    parts = [law.slip_work(0.5, *pair, 9.0, 9.0, K_T) for pair in itertools.pairwise(t)]
+    assert whole == pytest.approx(sum(parts)) == pytest.approx(0.5 * K_T * 1.0)
+
+
+def test_an_iterate_thrown_across_the_cone_is_put_to_its_middle():
+    t_n = 0.3
+    for sign in (1.0, -1.0):
+        put = SHARP.limit(sign * 2.0 / K_T, -sign * 9.0 / K_T, t_n, 1.0, K_T)
+        assert SHARP.traction(put, t_n, 1.0, K_T) == pytest.approx(0.0, abs=1e-15)
+        assert SHARP.limit(sign * 0.1, sign * 9.0, t_n, 1.0, K_T) == sign * 9.0
+
+
+def test_a_base_that_pulls_has_no_friction():
+    np.testing.assert_array_equal(coulomb_cap(0.5, np.array([-2.0, 0.0, 2.0])), [0.0, 0.0, 1.0])
 
 
 @jax.jit

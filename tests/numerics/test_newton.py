@@ -35,3 +35,15 @@ def test_an_iterate_within_the_tolerance_is_kept_where_the_next_step_leads_far_o
     _, (iterations, error) = Newton().solve(problem, jnp.full((1, 1), start), jnp.ones(()))
     assert error <= 1e-10
     assert iterations < 20
+
+
+def test_no_more_steps_are_tried_than_allowed():
+    """The tangent is twice too stiff: every step halves the residual."""
+    problem = Problem(
+        evaluate=lambda x: (x, jnp.zeros(())),
+        limit=lambda old, new: new,
+        tangent=lambda _, slope: row(slope[None, None]),
+        refresh=lambda x: jnp.full((), 2.0),
+    )
+    found = Newton(max_iterations=5).solve(problem, jnp.ones((1, 1)), jnp.full((), 2.0))
+    assert found[1] == (5, 0.5**5)

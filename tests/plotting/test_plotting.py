@@ -23,7 +23,8 @@ COARSE = {
 
 @pytest.fixture(scope="module")
 def history():
-    return jb.solve(STRIP.replace(COARSE))
+    with pytest.warns(jb.DoubtfulWarning, match="few nodes"):
+        return jb.solve(STRIP.replace(COARSE))
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,8 @@ def clamped():
         "model.fields": ["v", "w", "beta", "psi"],
         "model.nodes": 61,
     }
-    return jb.solve(STRIP.replace(COARSE | values))
+    with pytest.warns(jb.DoubtfulWarning, match="few nodes"):
+        return jb.solve(STRIP.replace(COARSE | values))
 
 
 @pytest.fixture(scope="module")

@@ -91,6 +91,7 @@ def test_a_curvature_that_vanishes_leaves_a_straight_strip(kinematics):
         np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-11)
 
 
+@pytest.mark.doubtful("few nodes")
 def test_pressure_alone_squeezes_uniformly():
     history = jb.solve(STRIP.replace(SMALL))
     plane_modulus = history.scene.strip.plane_modulus
@@ -101,6 +102,7 @@ def test_pressure_alone_squeezes_uniformly():
 
 
 @pytest.mark.parametrize("pressure", [10.0, [[0.0, 4.0], [1.0, 12.0], [2.0, 9.0]]])
+@pytest.mark.doubtful("few nodes")
 def test_reactions_carry_the_pressure_at_every_load(pressure):
     history = jb.solve(STRIP.replace(SMALL | {"contact.pressure": pressure}))
     system = System(history.scene)
@@ -109,6 +111,7 @@ def test_reactions_carry_the_pressure_at_every_load(pressure):
     np.testing.assert_allclose(carried, applied, rtol=1e-7)
 
 
+@pytest.mark.doubtful("few nodes")
 def test_tractions_balance_the_end_force_away_from_the_held_end():
     history = jb.solve(STRIP.replace(SMALL))
     inner = history.traction[:, 1:] @ history.tributary[1:]
@@ -116,6 +119,7 @@ def test_tractions_balance_the_end_force_away_from_the_held_end():
     assert float(jnp.max(jnp.abs(inner - history.force))) < 0.02 * 0.7855
 
 
+@pytest.mark.doubtful("few nodes")
 def test_pull_lowers_the_loaded_end_and_pull_and_push_differ():
     history = jb.solve(STRIP.replace(SMALL))
     start, turn, _ = history.cycles[-1]
@@ -194,6 +198,7 @@ def test_unilateral_lift_cures_the_tension_at_the_loaded_end(fields):
     assert ratios[1] == pytest.approx(ratios[0], rel=0.015)
 
 
+@pytest.mark.doubtful("in the corner", "few nodes")
 def test_frozen_lift_reports_tension_and_drifts_with_the_end_element():
     ratios, reactions = [], []
     for nodes in (81, 321):
@@ -204,6 +209,7 @@ def test_frozen_lift_reports_tension_and_drifts_with_the_end_element():
     assert abs(ratios[1] / ratios[0] - 1.0) > 0.01
 
 
+@pytest.mark.doubtful("few nodes")
 def test_displacement_control_finds_the_force_of_force_control():
     by_force = jb.solve(STRIP.replace(SMALL))
     scene = by_force.scene.replace({"load.control": "displacement", "load.amplitude": 1.0})
@@ -238,6 +244,7 @@ def test_strip_held_at_the_contact_point_only_turns_there():
     assert float(jnp.max(jnp.abs(pinned.slip[:, 0]))) < 1e-18
 
 
+@pytest.mark.doubtful("few nodes")
 def test_exact_and_linear_kinematics_agree_at_small_strain():
     exact, linear = (
         jb.solve(STRIP.replace(SMALL | {"model.kinematics": name})).dissipation

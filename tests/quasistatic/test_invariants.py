@@ -13,6 +13,9 @@ from toy import STRIP
 import jbeamshell as jb
 from jbeamshell.quasistatic.system import System
 
+# Random strips on 41 nodes: what slips may be a corner, or nothing.
+pytestmark = pytest.mark.doubtful("few nodes", "in the corner", "single nodes", "nothing slips")
+
 # One compiled shape for all that cycles; linear kinematics, for which scalings are exact.
 BASE = {
     "model.nodes": 41,

@@ -36,6 +36,7 @@ def test_steps_do_not_matter():
 
 
 @pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-12), (16.0, 1e-4)])
+@pytest.mark.doubtful("in the corner", "few nodes", "nothing slips")
 def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
     scene = STRIP.replace({"model.nodes": 41, "contact.smoothing": smoothing})
     path = [*np.linspace(0.01, 0.1, 10), *[-0.1, 0.1] * 100]
@@ -48,6 +49,7 @@ def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing,
 
 
 @pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-13), (16.0, 1e-4)])
+@pytest.mark.doubtful("few nodes", "nothing slips", "single nodes")
 def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
     scene = STRIP.replace({"model.nodes": 41, "contact.smoothing": smoothing})
     history = jb.solve(scene, [*np.linspace(0.07, 0.7, 10), *[0.6, 0.7] * 100])
@@ -60,6 +62,7 @@ def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
 
 
 @pytest.mark.parametrize("smoothing", ["sharp", 8.0, 32.0])
+@pytest.mark.doubtful("few nodes")
 def test_smoothing_does_not_change_the_dissipation(smoothing):
     scene = STRIP.replace(SMALL | {"contact.smoothing": smoothing})
     assert float(jb.solve(scene).dissipation_ratio) == pytest.approx(0.7695, abs=2e-3)
@@ -116,6 +119,7 @@ def test_inside_a_transformation_the_failure_is_loud_too():
         jax.block_until_ready(run(0.1))
 
 
+@pytest.mark.doubtful("few nodes")
 def test_a_failed_step_is_walked_in_pieces():
     """The recovered path ends where a path with small steps ends."""
     # So smooth that large steps take more iterations than small ones.
@@ -156,6 +160,7 @@ def test_beyond_gross_slip_force_control_is_refused():
         jb.solve(STRIP, [1.0, 2.0])
 
 
+@pytest.mark.doubtful("few nodes")
 def test_compiling_alone_solves_nothing():
     scene = STRIP.replace(SMALL)
     solver.compile_for(scene)
@@ -164,6 +169,7 @@ def test_compiling_alone_solves_nothing():
     assert solver._solve._cached._cache_size() == size
 
 
+@pytest.mark.doubtful("few nodes")
 def test_plain_numbers_inside_a_callers_jit():
     scene = STRIP.replace(SMALL)
     inside = jax.jit(lambda: jb.solve(scene).dissipation)()

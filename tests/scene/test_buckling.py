@@ -36,6 +36,15 @@ def test_parts_that_no_pressure_holds_down(pressure, bottom, parts):
     assert unpressed_parts(SLENDER.replace(values).contact) == parts
 
 
+def test_a_thick_column_shears_too():
+    """Engesser: the reciprocals of the loads of bending and of shear add up."""
+    values = {"strip.height_ratio": 0.1, "contact.pressure": OVERHANG}
+    limit = weakest_column(SLENDER.replace(values)).limit
+    bending = np.pi**2 * 34000.0 * 0.2**2 / 12.0 / 4.0 / 1.4**2
+    shear = 10.0 * 1.3 / (12.0 + 11.0 * 0.3) * 0.35 * 34000.0
+    assert float(limit) == pytest.approx(1.0 / (1.0 / bending + 1.0 / shear), rel=1e-4)
+
+
 def test_columns_are_clamped_by_pressures():
     overhang = weakest_column(SLENDER.replace({"contact.pressure": OVERHANG}))
     assert float(overhang.limit) == pytest.approx(EULER / 4.0 / 1.4**2, rel=1e-4)

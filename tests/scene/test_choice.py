@@ -74,6 +74,9 @@ def test_nodes_follow_the_tolerance():
     assert nodes(0.005) == CONTACT_LINE.nodes
     assert (nodes(0.00125) - 1) == 2 * (nodes(0.005) - 1)  # second order
     assert nodes(0.02) < nodes(0.005)
+    ramp = {"contact.pressure": [[0.0, 10.0], [2.0, 8.0]], "model.rung": "condensed-squeeze"}
+    # Half as many more for each row at which the pressure may jump.
+    assert jb.Scene().replace(ramp).model.nodes - 1 == 1.5 * (nodes(0.005) - 1)
 
 
 def test_traced_numbers_keep_what_was_chosen():

@@ -52,6 +52,7 @@ def test_only_the_trap_moves_while_the_load_rests():
 # --- load steps against events --------------------------------------------------------------------
 
 
+@pytest.mark.doubtful("few nodes")
 def test_load_steps_come_to_the_path_from_event_to_event():
     exact, stiffness, changes = events.dissipation(scene_of("standard", 41))
     off = [abs(cycled("sharp", steps)[0] / exact - 1.0) for steps in (1, 2, 4, CYCLE)]

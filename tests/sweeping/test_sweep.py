@@ -47,6 +47,7 @@ def lanes_in(sweep):
 # --- what a lane says -----------------------------------------------------------------------------
 
 
+@pytest.mark.doubtful("in the corner", "few nodes", "nothing slips")
 def test_every_lane_says_what_solve_says(result):
     assert result.shape == (5, 2)
     for at, numbers in lanes_in(result):
@@ -101,6 +102,7 @@ def _eta(heights):
     return {"strip.height_ratio": heights}
 
 
+@pytest.mark.doubtful("in the corner", "few nodes", "nothing slips")
 def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, monkeypatch):
     batched, alone = runner.Runner._answers, []
 
@@ -134,6 +136,7 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
         assert np.all(np.isnan(hurt[name][~known]))
 
 
+@pytest.mark.doubtful("in the corner", "few nodes")
 def test_a_figure_of_nought_over_nought_is_told_from_a_failure(result, monkeypatch):
     batched = runner.Runner._answers
 
@@ -389,6 +392,7 @@ def test_lanes_advance_together_as_far_as_they_share_a_body():
     assert width({"contact.pressure": pressures[:5]}) == 8
 
 
+@pytest.mark.doubtful("few nodes")
 def test_lanes_of_plane_elasticity_share_their_bodies():
     """A grid whose heights share a body, beside the same strips paired at random."""
     plane = {"model.rung": "plane", "model.nodes": 17, "load.steps_per_half_cycle": 1}

@@ -3,17 +3,67 @@
 from __future__ import annotations
 
 import enum
-from typing import Any
+import warnings
+from typing import Any, Protocol
 
 import equinox as eqx
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.errors import DoubtfulWarning, UnconvergedError
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.scene.scene import Scene
+
+OPEN = 1e-2  # part of the energy that moved by which a balance may be open without a doubt
+
+
+class Balance(Protocol):
+    """Energies and works of a motion, (T,) each; those of times that were not reached are NaN."""
+
+    @property
+    def kinetic(self) -> Array: ...
+    @property
+    def stored(self) -> Array: ...
+    @property
+    def external_work(self) -> Array: ...
+    @property
+    def friction_work(self) -> Array: ...
+    @property
+    def damping_work(self) -> Array: ...
+    @property
+    def imbalance(self) -> Array: ...
+
+
+def open_part(motion: Balance) -> float:
+    """Largest error of the energy balance over the energy that moved.
+
+    That is the largest of the works since t = 0 and of the range of kinetic plus stored energy.
+    """
+    energy = np.asarray(motion.kinetic) + np.asarray(motion.stored)
+    lost = np.asarray(motion.friction_work) + np.asarray(motion.damping_work)
+    works = np.nanmax(np.abs([np.asarray(motion.external_work), lost]))
+    moved = max(float(works), float(np.nanmax(energy) - np.nanmin(energy)))
+    error = float(np.nanmax(np.abs(np.asarray(motion.imbalance))))
+    return error / moved if moved > 0.0 else 0.0
+
+
+def doubts_of_balance(motion: Balance) -> tuple[str, ...]:
+    """Doubt about a motion whose energies do not add up."""
+    part = open_part(motion)
+    if part <= OPEN:
+        return ()
+    return (
+        f"the energy balance is open by {100.0 * part:.2g} % of the energy that moved: take "
+        "shorter time steps (a smaller step or tolerance)",
+    )
+
+
+def warn_of_doubts(doubts: tuple[str, ...]) -> None:
+    """Warn of doubts at the line that called the caller."""
+    for doubt in doubts:
+        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=3)
 
 
 class Ending(enum.IntEnum):
@@ -65,6 +115,11 @@ class Ledger(eqx.Module):
         change = self.energy - self.energy[0]
         return change - self.external_work + self.friction_work + self.damping_work
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Sentences that say what may be wrong, and the fix; none if the energies add up."""
+        return doubts_of_balance(self)
+
     def plot(self, axes: Any = None) -> Any:
         """Draw u(L) over time; see `jbeamshell.plotting.vibration`."""
         from jbeamshell import plotting
@@ -86,8 +141,9 @@ class Ledger(eqx.Module):
         }
 
     def __str__(self) -> str:
-        """Summary, one quantity a line."""
-        return "\n".join(f"{name:24s} {value}" for name, value in self.figures().items())
+        """Summary, one quantity a line, and the doubts."""
+        lines = [f"{name:24s} {value}" for name, value in self.figures().items()]
+        return "\n".join([*lines, *(f"doubtful: {doubt}" for doubt in self.doubts)])
 
 
 class Motion(Ledger):

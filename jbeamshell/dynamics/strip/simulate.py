@@ -24,7 +24,12 @@ from jbeamshell.dynamics.strip.equations import Equations, MotionState, movable
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.midpoint import Midpoint
-from jbeamshell.dynamics.strip.motion import Ending, InterruptedMotionError, Motion
+from jbeamshell.dynamics.strip.motion import (
+    Ending,
+    InterruptedMotionError,
+    Motion,
+    warn_of_doubts,
+)
 from jbeamshell.dynamics.strip.step_equations import StepMatrices
 from jbeamshell.dynamics.strip.stepsize import EXPLICIT, METHODS, STIFF, longest_step
 from jbeamshell.mechanics.friction import ElasticSlip
@@ -92,6 +97,11 @@ def simulate(
     InterruptedMotionError
         if the solver stops before ``span``; it carries the part that was computed
 
+    Warns
+    -----
+    DoubtfulWarning
+        if the energies do not add up, see ``motion.doubts``
+
     Examples
     --------
     A mass on a strip under a harmonic force:
@@ -131,6 +141,8 @@ def simulate(
     )
     if throw and not is_traced(motion):
         _raise_if_interrupted(motion, float(span))
+    if not is_traced(motion):
+        warn_of_doubts(motion.doubts)
     return motion
 
 

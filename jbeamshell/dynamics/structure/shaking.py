@@ -13,10 +13,11 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import POSITIVE, require, require_choice, require_number
+from jbeamshell.common.checks import POSITIVE, is_traced, require, require_choice, require_number
 from jbeamshell.common.errors import UnconvergedError
 from jbeamshell.common.progress import watched
 from jbeamshell.dynamics.strip import rate_friction
+from jbeamshell.dynamics.strip.motion import doubts_of_balance, warn_of_doubts
 from jbeamshell.dynamics.structure.matrices import Structure, dense
 
 SOLVERS: dict[str, Callable[[], Any]] = {
@@ -63,6 +64,11 @@ class StructureMotion(NamedTuple):
         """Error of the energy balance, (T,); zero but for errors of the time steps."""
         change = self.kinetic + self.stored - self.kinetic[0] - self.stored[0]
         return change - self.external_work + self.friction_work + self.damping_work
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Sentences that say what may be wrong, and the fix; none if the energies add up."""
+        return doubts_of_balance(self)
 
 
 class InterruptedShakingError(UnconvergedError):
@@ -143,6 +149,11 @@ def shake(
     InterruptedShakingError
         if the solver stops before ``span``; it carries the part that was computed
 
+    Warns
+    -----
+    DoubtfulWarning
+        if the energies do not add up, see ``motion.doubts``
+
     Examples
     --------
     >>> motion = shake(structure, 50.0, velocity=[1.0, 0.0])
@@ -168,6 +179,8 @@ def shake(
             "or more steps (most_steps)",
             motion,
         )
+    if not is_traced(motion):
+        warn_of_doubts(motion.doubts)
     return motion
 
 

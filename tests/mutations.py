@@ -1,0 +1,134 @@
+"""Faults planted in the core, one at a time: are they found by the ordinary tests?
+
+    python tests/mutations.py [--only WORD ...] [--again]
+
+copies the project, plants a fault of mutations.txt, runs the tests that the list names for its
+file until one fails, and writes mutations.json beside this file after every fault: the test that
+found it, or nothing.  Faults that were found before are left out, unless --again is given.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import random
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+RECORD = Path(__file__).with_suffix(".json")
+LIST = Path(__file__).with_suffix(".txt")
+LONGEST = 900.0  # seconds after which a fault is found: its tests never end
+# Libraries are loaded before pytest, which would say so.
+OPTIONS = ["-x", "-q", "-p", "no:cacheprovider", "-W", "ignore:Module already imported"]
+
+
+class Fault(NamedTuple):
+    """Fault: in a file of the package, one text replaced by another.
+
+    Attributes
+    ----------
+    file, right, wrong : file, its text, which it holds once, and what takes its place
+    tests : tests that are to find it
+    """
+
+    file: str
+    right: str
+    wrong: str
+    tests: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        return f"{self.file}: {self.right} -> {self.wrong}"
+
+
+def faults() -> Iterator[Fault]:
+    """Faults of the list: of each file its tests, then rows of right and wrong."""
+    file, tests = "", ()
+    for line in LIST.read_text(encoding="utf-8").splitlines():
+        if line.startswith("# "):
+            file, *tests = line[2:].split()
+        elif line:
+            right, wrong = line.split(" ==> ")
+            yield Fault(file, right, wrong, tuple(f"tests/{one}" for one in tests))
+
+
+def sample(count: int, seed: int) -> list[Fault]:
+    """Random faults of the list."""
+    return random.Random(seed).sample(list(faults()), count)
+
+
+def copied(folder: Path) -> Path:
+    """Copy of the project in a folder, as far as tests read it."""
+    for name in ("jbeamshell", "tests", "calibration"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md"):
+        shutil.copy(ROOT / name, folder)
+    return folder
+
+
+def killed(fault: Fault, project: Path) -> str:
+    """First test that finds a fault planted in a copy of the project; empty if none does."""
+    place = project / "jbeamshell" / fault.file
+    text = place.read_text(encoding="utf-8")
+    assert text.count(fault.right) == 1, f"{fault.name}: {text.count(fault.right)} times"
+    place.write_text(text.replace(fault.right, fault.wrong), encoding="utf-8")
+    log = project / "log"
+    child = multiprocessing.get_context("fork").Process(target=_test, args=(fault, project, log))
+    try:
+        child.start()
+        child.join(LONGEST)
+        if child.is_alive():
+            child.kill()
+            return "never ends"
+    finally:
+        place.write_text(text, encoding="utf-8")
+    for line in log.read_text(encoding="utf-8").splitlines():
+        if line.startswith(("FAILED ", "ERROR ")):
+            return line.split()[1]
+    assert child.exitcode == 0, log.read_text(encoding="utf-8")
+    return ""
+
+
+def _test(fault: Fault, project: Path, log: Path) -> None:
+    """Run the tests of a fault in a copy of the project; the libraries are loaded already."""
+    os.chdir(project)
+    os.environ |= {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"}
+    sys.dont_write_bytecode = True
+    sys.path[:0] = [str(project)]
+    with log.open("w", encoding="utf-8") as file:
+        for stream in (1, 2):
+            os.dup2(file.fileno(), stream)
+        sys.exit(int(pytest.main([*OPTIONS, *fault.tests])))
+
+
+def main() -> None:
+    """Plant the faults, and write the record after each."""
+    import diffrax  # noqa: F401  (once for all faults, as is all that it imports)
+    import matplotlib.pyplot  # noqa: F401
+
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", nargs="*", default=[""], help="parts of their names")
+    parser.add_argument("--again", action="store_true", help="those that were found before too")
+    given = parser.parse_args()
+    record = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
+    with tempfile.TemporaryDirectory() as folder:
+        project, every = copied(Path(folder)), list(faults())
+        for fault in every:
+            chosen = any(word in fault.name for word in given.only)
+            if not chosen or (record.get(fault.name) and not given.again):
+                continue
+            record[fault.name] = killed(fault, project)
+            print(record[fault.name] or "SURVIVES", "|", fault.name, flush=True)
+            known = {one.name: record[one.name] for one in every if one.name in record}
+            RECORD.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
