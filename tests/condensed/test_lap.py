@@ -151,7 +151,10 @@ class TestBalance:
 
 def test_shanks_hold_a_joint_beyond_gross_slip():
     rigid = {"strip.axial_stiffness": 3.4e9, "contact.bolt_stiffness": 5e3, "model.nodes": 25}
-    rigid |= {"load.amplitude": 3.0, "load.steps_per_half_cycle": 8}
+    rigid |= {
+        "load.amplitude": 3.0,
+        "load.steps_per_half_cycle": 12,
+    }  # of .5, so that it turns at one
     history = jb.solve(SQUEEZE.replace(rigid), throw=False)
     assert history.converged
     # Two blocks and a spring: F = mu F_N L + k_b u, turned at 3.
@@ -160,7 +163,7 @@ def test_shanks_hold_a_joint_beyond_gross_slip():
     held = float(history.traction[-1] @ history.tributary)
     spring = 5e3 * float(history.slip[-1] @ history.tributary) / 2.0
     assert held + spring == pytest.approx(3.0, rel=1e-6)  # of a stiffness 7e5 times the spring's
-    assert float(jnp.max(jnp.abs(history.energy_imbalance))) < 0.02 * float(history.dissipation)
+    assert float(jnp.max(jnp.abs(history.energy_imbalance))) < 1e-5 * float(history.dissipation)
 
 
 BEND = [[0.0, 0.0], [1.0, 2e-5], [2.0, 8e-5]]  # of a member that is curved
