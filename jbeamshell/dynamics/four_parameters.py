@@ -6,24 +6,21 @@ beta follow from the curves of displacement and dissipation, without a test.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require, require_number
-from jbeamshell.history.history import History
+from jbeamshell.dynamics.steady_cycles import SteadyCycles, gross_slip
 from jbeamshell.laws.four_parameters import exponents, iwan4_through
 from jbeamshell.laws.iwan4 import Iwan4
-from jbeamshell.quasistatic.solver import solve
-from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
 FRACTIONS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  # of gross slip
 LITTLE = 0.01  # of gross slip, at which the contact is taken to stick
 LEAST = 1e-9  # energy of a cycle that is felt, over F u
 ENOUGH = 4  # amplitudes
-CYCLE = np.array([1.0, -1.0, 1.0, -1.0, 1.0])  # the last two branches are the steady cycle
 
 
 class FourParameters(NamedTuple):
@@ -96,28 +93,12 @@ def four_parameters(scene: Scene, *, width: float = 1.0) -> FourParameters:
     fix = "must have gross slip: give it friction and contact"
     require("contact.friction", scene.contact.friction, slips, fix)
     sizes = limit * np.array([LITTLE, *FRACTIONS])
-    u, d = steady(solve(scene, np.outer(sizes, CYCLE).ravel()), sizes.size)
-    f, d, stiffest = width * sizes, width * d, float(np.max(width * sizes / u))
+    cycles = SteadyCycles.of(scene, sizes)
+    f, u, d = width * sizes, cycles.displacement, width * cycles.dissipation
+    stiffest = float(np.max(f / u))
     felt = d > LEAST * f * u
     felt[0] = False
     fix = "slips at too few amplitudes, if at all: the contact sticks, or take more model.nodes"
     require("scene", int(np.sum(felt)), int(np.sum(felt)) >= ENOUGH, fix)
     law = iwan4_through(width * limit, stiffest, f[felt], u[felt], d[felt])
     return FourParameters(law, f[felt], u[felt], d[felt])
-
-
-def gross_slip(scene: Scene) -> Any:
-    """End force per width at which the whole contact slips, mu F_N L; may be traced."""
-    contact, length = scene.contact, scene.strip.length
-    down, _ = resultant(contact.pressure, contact.bottom_pressure, length, scene.member.support)
-    return contact.friction * down
-
-
-def steady(history: History, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Displacement amplitudes (k,) and work of friction (k,) of the last cycle of each size."""
-    size = count * CYCLE.size
-    u, work = (
-        np.asarray(each)[-size:].reshape(count, -1)
-        for each in (history.displacement, history.slip_work)
-    )
-    return 0.5 * np.abs(u[:, -1] - u[:, -2]), np.sum(work[:, -2:], axis=1)

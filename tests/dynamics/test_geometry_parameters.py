@@ -5,6 +5,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.dynamics import Joint, four_parameters
+from jbeamshell.dynamics.steady_cycles import SteadyCycles, gross_slip
 from jbeamshell.laws import Iwan4, iwan4_of_strip
 
 U = np.geomspace(1e-3, 3.0, 60)
@@ -67,3 +68,13 @@ class TestScenes:
         assert np.max(found.exponents) > 6.0
         assert np.max(np.abs(found.dissipation_error)) > 5.0
         assert "n from 3.0" in str(found)
+
+    def test_a_lap_joint_dissipates_as_its_own_cycles(self):
+        scene = jb.library.single_lap()
+        force = float(gross_slip(scene)) * np.array([0.1, 0.25, 0.5, 0.75, 0.93])
+        cycles = SteadyCycles.of(scene, force)
+        joint = Joint.of(scene, force[-1])
+        assert joint.network is None
+        u = np.interp(force, np.append(0.0, joint.force), np.append(0.0, joint.displacement))
+        np.testing.assert_allclose(u, cycles.displacement, rtol=0.025)
+        np.testing.assert_allclose(joint.dissipation(u), cycles.dissipation, rtol=0.05)

@@ -5,6 +5,7 @@ u, a spring of stiffness s starts to slip at the force s u; a spring with the la
 (Iwan 1966).  Their loops follow Masing's rule exactly: the branch from U is F(U) - 2 F((U-u)/2).
 A strip becomes one such element by the mean of its pull and its push, whose sliders are the nodes
 of its contact; `jbeamshell.condensed.network` has both, and every branch between them, exactly.
+Scenes that are no network, such as lap joints, become the element nearest to their steady cycles.
 """
 
 from __future__ import annotations
@@ -38,14 +39,14 @@ from jbeamshell.dynamics.four_parameters import (
     ENOUGH,
     FRACTIONS,
     FourParameters,
-    gross_slip,
 )
+from jbeamshell.dynamics.steady_cycles import gross_slip
 from jbeamshell.dynamics.structure.strip_line import (
+    cycled_line,
     mean_of,
     slider_line,
     slider_line_once,
     walked_forces,
-    walked_line,
 )
 from jbeamshell.laws.four_parameters import iwan4_through
 from jbeamshell.scene.domain import gross_slip_rule
@@ -131,7 +132,8 @@ class Joint(eqx.Module):
         """Joint with the mean backbone of a strip's pull and push.
 
         Scenes on the rung ``plane``, or one such as ``condensed-squeeze``, give the sliders of
-        their contact where slip zones are nested; the backbones of others are walked and fitted.
+        their contact where slip zones are nested.  The sliders of others are those whose loops are
+        nearest to the scene's own steady cycles, as in lap joints, which open and are no network.
 
         Parameters
         ----------
@@ -144,7 +146,7 @@ class Joint(eqx.Module):
         ------
         InputError
             for a force or a width that is not positive, a force beyond gross slip, or traced
-            numbers in a scene whose backbone is walked
+            numbers in a scene whose steady cycles are run
 
         Examples
         --------
@@ -168,7 +170,7 @@ class Joint(eqx.Module):
                 ways = np.asarray(sides)[:, kept]
                 return cls(u, f, network, width, asymmetry, capacity, ways)
         require("scene", "traced", not is_traced(scene, force), TRACED)
-        u, f, asymmetry, ways = walked_line(scene, float(force), width)
+        u, f, asymmetry, ways = cycled_line(scene, float(force), width)
         walked = scene if scene.model.condensed else None
         return cls(u, f, None, width, asymmetry, capacity, ways, walked)
 

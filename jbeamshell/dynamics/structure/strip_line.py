@@ -1,4 +1,4 @@
-"""Backbones of a strip's pull and push: the corners of its network's lines, or load steps."""
+"""Backbones of a strip: the corners of its network's lines, or nearest to its steady cycles."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.jax_options import ONCE
 from jbeamshell.condensed.network import Network, Sliders
+from jbeamshell.dynamics.steady_cycles import SteadyCycles
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.scene.scene import Scene
 
-POINTS = 48  # of a backbone that is walked
-SMALLEST_FORCE = 1e-2  # its first point, over the largest force
+# Amplitudes of steady cycles, over the largest
+AMPLITUDES = np.append(np.geomspace(0.05, 0.4, 16), np.linspace(0.4, 1.0, 17)[1:])
+LEAST = 1e-7  # energy of a cycle that matters, over F u
 BELOW = 1.0 - 1e-6  # thresholds nearer to the largest force are left out
 
 
@@ -57,17 +59,35 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array,
 slider_line_once = jax.jit(slider_line, static_argnums=2, compiler_options=ONCE)
 
 
-def walked_line(
+def cycled_line(
     scene: Scene, force: float, width: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float, NDArray[np.float64]]:
-    """Backbone of load steps, its asymmetry, and the displacements (2, k) of pull and push."""
-    levels = np.geomspace(SMALLEST_FORCE * force, force, POINTS)
+    """Backbone whose loops by Masing's rule are nearest to a scene's steady cycles.
+
+    A slider in series with compliance c_i and threshold F_i adds c_i (F - F_i) to the displacement
+    at an amplitude F, and 4 c_i F_i (F - F_i) to the energy of a cycle.  The c_i >= 0 that are
+    nearest to both at all amplitudes, in relative squares, need no further condition.
+
+    Returns
+    -------
+    (k,) displacements and forces, the asymmetry of first loading, and the displacements (2, k) of
+    pull and push in it
+    """
+    levels = force * AMPLITUDES
     ways = (1.0, -1.0)
-    sides = [way * np.asarray(solve(scene, way * levels).displacement)[-POINTS:] for way in ways]
-    mean, asymmetry = mean_of(*sides)
-    u, f = _softening(mean, width * levels)
-    kept = np.isin(mean, u)
-    return u, f, float(asymmetry), np.stack(sides)[:, kept]
+    sides = [way * np.asarray(solve(scene, way * levels).displacement) for way in ways]
+    sides = [side[-levels.size :] for side in sides]
+    cycles = SteadyCycles.of(scene, levels)
+    u, d = cycles.displacement, np.maximum(cycles.dissipation, LEAST * levels * cycles.displacement)
+    thresholds = np.append(0.0, levels[:-1])
+    beyond = np.maximum(levels[:, None] - thresholds, 0.0)
+    rows = np.vstack([beyond / u[:, None], 4.0 * thresholds * beyond / d[:, None]])
+    scale = np.max(rows, axis=0)
+    from scipy.optimize import nnls  # slow to import
+
+    parts, _ = nnls(rows / scale, np.append(np.ones(u.size), cycles.dissipation / d))
+    asymmetry = float(mean_of(*sides)[1])
+    return beyond @ (parts / scale), width * levels, asymmetry, np.stack(sides)
 
 
 def walked_forces(scene: Scene, path: NDArray[np.float64]) -> Array:
@@ -75,20 +95,3 @@ def walked_forces(scene: Scene, path: NDArray[np.float64]) -> Array:
     size = max(float(np.max(np.abs(path), initial=0.0)), np.finfo(float).tiny)
     driven = scene.replace({"load.control": "displacement", "load.amplitude": size})
     return solve(driven, path).force[-path.size :]
-
-
-def _softening(
-    u: NDArray[np.float64], f: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points of the concave hull of a backbone; sliders cannot stiffen."""
-    kept = [(0.0, 0.0)]
-    for point in zip(u, f, strict=True):
-        while len(kept) > 1 and _slope(kept[-2], kept[-1]) <= _slope(kept[-1], point):
-            kept.pop()
-        kept.append(point)
-    x, y = np.array(kept[1:]).T
-    return x, y
-
-
-def _slope(a: tuple[float, float], b: tuple[float, float]) -> float:
-    return (b[1] - a[1]) / (b[0] - a[0])
