@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -31,7 +30,7 @@ from jbeamshell.common.checks import (
     require_number,
 )
 from jbeamshell.common.errors import DoubtfulWarning
-from jbeamshell.condensed.network import Network, Response
+from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.export import table
 from jbeamshell.dynamics.export.element import Element
 from jbeamshell.dynamics.export.targets import write
@@ -44,6 +43,7 @@ from jbeamshell.dynamics.steady_cycles import gross_slip
 from jbeamshell.dynamics.structure.strip_line import (
     cycled_line,
     mean_of,
+    network_forces,
     slider_line,
     slider_line_once,
     walked_forces,
@@ -274,7 +274,7 @@ class Joint(eqx.Module):
         """
         points = np.atleast_1d(np.asarray(path, float))
         if self.network is not None:
-            return np.asarray(self.width * _exact(self.network, points))
+            return np.asarray(self.width * network_forces(self.network, points))
         if self.scene is not None and not is_traced(self.scene):
             return np.asarray(self.width * walked_forces(self.scene, points))
         springs, limits = np.asarray(self.springs), np.asarray(self.limits)
@@ -392,21 +392,3 @@ def largest_force(scene: Scene, force: Any = None) -> Any:
 def _is_word(text: object) -> bool:
     """True for printable text of one line, which a file can hold."""
     return isinstance(text, str) and 0 < len(text) < 30 and text.isascii() and text.isprintable()
-
-
-def _exact(network: Network, path: NDArray[np.float64]) -> Array:
-    """Forces (T,) per width of a network on a path (T,) of displacements."""
-    found = _along(network, jnp.asarray(path))
-    reached, limit = jnp.max(jnp.abs(found.state.force), initial=0.0), network.gross_slip
-    fix = f"must stay below gross slip, mu F_N L = {float(limit):.6g} per width"
-    require("force on the path", float(reached), bool(reached < limit), fix)
-    first = int(np.argmin(found.valid))
-    nested = bool(np.all(np.asarray(found.valid)))
-    fix = "slip zones are not nested from here on: take jbeamshell.condensed.solve"
-    require(f"path[{first}]", path[first], nested, fix)
-    return found.state.force
-
-
-@jax.jit
-def _along(network: Network, path: Array) -> Response:
-    return network.along(path)

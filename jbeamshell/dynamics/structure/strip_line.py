@@ -10,8 +10,9 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from jbeamshell.common.checks import require
 from jbeamshell.common.jax_options import ONCE
-from jbeamshell.condensed.network import Network, Sliders
+from jbeamshell.condensed.network import Network, Response, Sliders
 from jbeamshell.dynamics.steady_cycles import SteadyCycles
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.scene.scene import Scene
@@ -95,3 +96,21 @@ def walked_forces(scene: Scene, path: NDArray[np.float64]) -> Array:
     size = max(float(np.max(np.abs(path), initial=0.0)), np.finfo(float).tiny)
     driven = scene.replace({"load.control": "displacement", "load.amplitude": size})
     return solve(driven, path).force[-path.size :]
+
+
+def network_forces(network: Network, path: NDArray[np.float64]) -> Array:
+    """Forces (T,) per width of a network on a path (T,) of displacements."""
+    found = _along(network, jnp.asarray(path))
+    reached, limit = jnp.max(jnp.abs(found.state.force), initial=0.0), network.gross_slip
+    fix = f"must stay below gross slip, mu F_N L = {float(limit):.6g} per width"
+    require("force on the path", float(reached), bool(reached < limit), fix)
+    first = int(np.argmin(found.valid))
+    nested = bool(np.all(np.asarray(found.valid)))
+    fix = "slip zones are not nested from here on: take jbeamshell.condensed.solve"
+    require(f"path[{first}]", path[first], nested, fix)
+    return found.state.force
+
+
+@jax.jit
+def _along(network: Network, path: Array) -> Response:
+    return network.along(path)
