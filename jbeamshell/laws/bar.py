@@ -72,6 +72,13 @@ class Bar(MasingLaw):
         beyond = self.slip_force * (size - inside)
         return 2.0 / 3.0 * inside * self.backbone(inside) + beyond
 
+    def dissipation(self, amplitude: ArrayLike) -> Array:
+        """Energy lost per steady cycle at a displacement amplitude; any shape."""
+        size = jnp.abs(jnp.asarray(amplitude))
+        inside = jnp.minimum(size, self.slip_displacement)
+        beyond = 4.0 * self.slip_force * (size - inside)
+        return 4.0 / 3.0 * inside * self.backbone(inside) + beyond
+
     def displacement(self, force: ArrayLike) -> Array:
         """Displacement amplitude of a force amplitude; see `Law.displacement`."""
         return self.slip_displacement * (self._below_capacity(force) / self.slip_force) ** 2

@@ -105,6 +105,14 @@ class Iwan4(MasingLaw):
         beyond = self.slip_force * jnp.maximum(size - self.phi_max, 0.0)
         return self.stiffness * self.phi_max**2 * inside + beyond
 
+    def dissipation(self, amplitude: ArrayLike) -> Array:
+        """Energy lost per steady cycle at a displacement amplitude; any shape."""
+        size = jnp.abs(jnp.asarray(amplitude))
+        r, lost = self._part(size)
+        power = 4.0 * (self.chi + 1.0) / (self.chi + 3.0) * lost * r**2 * r ** (self.chi + 1.0)
+        sliding = 4.0 * self.slip_force * jnp.maximum(size - self.phi_max, 0.0)
+        return self.stiffness * self.phi_max**2 * power + sliding
+
     @staticmethod
     def _start(force: float, displacement: float, work: float, stiffness: float) -> dict[str, Any]:
         """Numbers to start a fit from; see `Law.started`."""

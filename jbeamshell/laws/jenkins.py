@@ -48,6 +48,11 @@ class Jenkins(MasingLaw):
         stuck = jnp.minimum(size, limit)
         return self.stiffness * stuck * (size - 0.5 * stuck)
 
+    def dissipation(self, amplitude: ArrayLike) -> Array:
+        """Energy lost per steady cycle at a displacement amplitude; any shape."""
+        slip = jnp.abs(jnp.asarray(amplitude)) - self.slip_force / self.stiffness
+        return 4.0 * self.slip_force * jnp.maximum(slip, 0.0)
+
     def displacement(self, force: ArrayLike) -> Array:
         """Displacement amplitude of a force amplitude; see `Law.displacement`."""
         return self._below_capacity(force) / self.stiffness

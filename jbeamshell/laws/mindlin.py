@@ -1,6 +1,7 @@
 r"""Cattaneo's and Mindlin's spheres in contact as a law of a joint.
 
-    F = F_S (1 - (1 - u/u_S)^(3/2)),   u_S = 3 F_S/(2 K).
+    F = F_S (1 - (1 - r)^(3/2)),   r = u/u_S,   u_S = 3 F_S/(2 K),
+    D = F_S u_S (4 r - 16/5 + (16/5) (1 - r)^(5/2) + 4 r (1 - r)^(3/2)).
 
 The contact of two spheres under a constant normal force, see `jbeamshell.reference.mindlin`.  Its
 energy per cycle is that of Mindlin and Deresiewicz.
@@ -17,11 +18,17 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
+from scipy.special import binom
 
 from jbeamshell.laws.masing import MasingLaw
 from jbeamshell.scene.rows import number
+
+SMALL = 0.1  # displacement over that of gross slip below which the energy is a series
+TERMS = np.arange(3, 19)
+SERIES = ((-1.0) ** TERMS * (3.2 * binom(2.5, TERMS) - 4.0 * binom(1.5, TERMS - 1)))[::-1]
 
 
 class Mindlin(MasingLaw):
@@ -59,6 +66,18 @@ class Mindlin(MasingLaw):
         size = jnp.abs(jnp.asarray(u))
         stored = 0.4 * self.slip_displacement * (1.0 - self._left(size) ** 2.5)
         return self.slip_force * (size - stored)
+
+    def dissipation(self, amplitude: ArrayLike) -> Array:
+        """Energy lost per steady cycle at a displacement amplitude; any shape."""
+        size = jnp.abs(jnp.asarray(amplitude))
+        r = size / self.slip_displacement
+        left = self._left(size)
+        closed = 4.0 * r - 3.2 + 3.2 * left**2.5 + 4.0 * r * left**1.5
+        small = r < SMALL  # the sum cancels down to a cube
+        near = jnp.where(small, r, 0.0)
+        series = near**3 * jnp.polyval(jnp.asarray(SERIES, r.dtype), near)
+        energy = jnp.where(small, series, closed)
+        return self.slip_force * self.slip_displacement * energy
 
     def displacement(self, force: ArrayLike) -> Array:
         """Displacement amplitude of a force amplitude; see `Law.displacement`."""

@@ -60,6 +60,11 @@ class Network(MasingLaw):
         stuck = jnp.minimum(size, self.limits / self.springs)
         return jnp.sum(self.springs * stuck * (size - 0.5 * stuck), axis=-1)
 
+    def dissipation(self, amplitude: ArrayLike) -> Array:
+        """Energy lost per steady cycle at a displacement amplitude; any shape."""
+        slips = jnp.abs(jnp.asarray(amplitude))[..., None] - self.limits / self.springs
+        return 4.0 * jnp.sum(self.limits * jnp.maximum(slips, 0.0), axis=-1)
+
 
 class ParallelIwan(Network):
     """Parallel Jenkins elements of any stiffness and slip force.

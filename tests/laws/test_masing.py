@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.laws import LAWS, Iwan4, Jenkins
+from jbeamshell.laws import LAWS, Bar, Iwan4, Jenkins, Mindlin, ParallelIwan
+from jbeamshell.laws.masing import MasingLaw
 
 LAW = Iwan4(slip_force=2.0, stiffness=100.0, chi=-0.5, beta=0.3)
 NESTED = np.array([0.5, -0.3, 0.2, -0.1, 0.15, 0.05, 0.9, -1.2, 1.2, 0.1, 0.5, 0.2, 1.3, 1.3, -0.4])
+
+masing_energy = MasingLaw.dissipation
 
 
 def many_sliders(law, path, count=4000):
@@ -48,16 +51,32 @@ def test_iwan4_meets_its_four_parameters():
     assert float(s / lost) == pytest.approx(0.3, rel=1e-12)
 
 
-@pytest.mark.parametrize(("chi", "beta"), [(-0.8, 0.0), (-0.5, 0.3), (0.0, 2.0)])
-def test_iwan4_dissipates_by_its_closed_form(chi, beta):
-    law = Iwan4(slip_force=2.0, stiffness=100.0, chi=chi, beta=beta)
-    size = law.phi_max * jnp.array([0.01, 0.02, 0.3, 0.9, 1.0, 1.7])
-    inside = jnp.minimum(size, law.phi_max)
-    closed = 4.0 * law.density[0] * inside ** (chi + 3.0) / ((chi + 2.0) * (chi + 3.0))
-    sliding = 4.0 * law.slip_force * jnp.maximum(size - law.phi_max, 0.0)
-    np.testing.assert_allclose(law.dissipation(size), closed + sliding, rtol=1e-9)
-    slope = jnp.diff(jnp.log(law.dissipation(size[:2]))) / jnp.log(2.0)
-    assert float(slope[0]) == pytest.approx(chi + 3.0, rel=1e-9)
+MASING = {
+    "iwan4": LAW,
+    "iwan4, even": Iwan4(slip_force=2.0, stiffness=100.0, chi=0.0, beta=2.0),
+    "jenkins": Jenkins(slip_force=2.0, stiffness=100.0),
+    "bar": Bar(2.0, 0.05),
+    "mindlin": Mindlin(2.0, 100.0),
+    "parallel": ParallelIwan([60.0, 30.0, 10.0], [0.6, 0.9, 0.5]),
+}
+
+
+@pytest.mark.parametrize("name", MASING)
+def test_closed_energy_is_that_of_masings_loop_and_never_negative(name):
+    law, size = MASING[name], jnp.array([0.0, 1e-7, 0.002, 0.006, 0.02, 0.07])
+    closed, doubled = jax.jit(lambda law: (law.dissipation(size), masing_energy(law, size)))(law)
+    np.testing.assert_allclose(closed, doubled, rtol=1e-9, atol=1e-15)
+    assert np.all(np.asarray(closed) >= 0.0)
+
+
+@pytest.mark.parametrize("chi", [-0.8, -0.3, 0.0])
+def test_iwan4_dissipates_by_a_power_of_its_displacement(chi):
+    law = Iwan4(slip_force=2.0, stiffness=100.0, chi=chi, beta=0.2)
+    small, twice = law.dissipation(law.phi_max * jnp.array([0.01, 0.02]))
+    assert float(jnp.log2(twice / small)) == pytest.approx(chi + 3.0, rel=1e-12)
+    r, _ = law.density
+    expected = 4.0 * r * (0.01 * law.phi_max) ** (chi + 3.0) / ((chi + 2.0) * (chi + 3.0))
+    assert float(small) == pytest.approx(float(expected), rel=1e-12)
 
 
 def test_the_area_of_a_simulated_loop_is_the_closed_dissipation():
