@@ -21,6 +21,7 @@ STATES: dict[str, tuple[str, Any]] = {  # colour and line
     "is lifted": ("0.55", ":"),
 }
 ARROWS = 24  # of the pressure on a face, at most
+BEAM = 21  # points along an overhang
 FILL = ("#E8EEF4", "#F4EFE6")  # upper and lower member
 
 
@@ -33,7 +34,7 @@ def deformed(
 ) -> Axes:
     """Draw the deformed members with their pressures, and where the contact sticks, slips or lifts.
 
-    Overhangs of a lap joint are left out.
+    Overhangs of a lap joint are beams without shear from the contact's ends to theirs.
 
     Parameters
     ----------
@@ -66,13 +67,17 @@ def deformed(
         members.append((np.asarray(history.member), below))
     paths = [_faces(fields, up) for fields, up in members]
     moves = [(contact[step], face[step]) for contact, face in paths]
+    beyond = _overhangs(history, step, members)
     factor = scale if scale is not None else _visible(paths, height)
     with style():
         axes = single(axes)
         axes.grid(False)
-        for (_, up), (contact, face), fill in zip(members, moves, FILL, strict=False):
+        for (_, up), (contact, face), more, fill in zip(members, moves, beyond, FILL, strict=False):
+            at, low, high = np.concatenate([more[0][0], x, more[1][0]]), contact, face
+            low = np.concatenate([more[0][1], low, more[1][1]])
+            high = np.concatenate([more[0][2], high, more[1][2]])
             outline = np.concatenate(
-                [_moved(x, 0.0, contact, factor), _moved(x, up, face, factor)[::-1]]
+                [_moved(at, 0.0, low, factor), _moved(at, up, high, factor)[::-1]]
             )
             axes.fill(*outline.T, facecolor=fill, edgecolor=DATA, linewidth=0.8)
         _draw_supports(axes, history, members[-1][1])
@@ -80,12 +85,15 @@ def deformed(
         _draw_contact(axes, history, step, _moved(x, 0.0, moves[0][0], factor))
         force = float(history.force[step])
         if abs(force) > 0.0:
-            tip = _moved(x, height, moves[0][1], factor)[-1]
+            corner = _moved(x, height, moves[0][1], factor)[-1:]
+            tip = np.concatenate(
+                [corner, _moved(beyond[0][1][0], height, beyond[0][1][2], factor)]
+            )[-1]
             start = (tip[0] + 0.01 * x[-1], tip[1] - 0.5 * height)
             stop = (start[0] + 0.08 * x[-1], start[1])
             ends = (stop, start) if force > 0.0 else (start, stop)
             axes.annotate("", *ends, arrowprops={"arrowstyle": "-|>", "color": DATA})
-        axes.set(xlabel=POSITION, ylabel="height  [length]", xlim=(-0.04 * x[-1], 1.12 * x[-1]))
+        axes.set(xlabel=POSITION, ylabel="height  [length]", xlim=_reach(history, 0.04, 0.12))
         axes.set_title(f"{load_label(history, step)}, displacements x {factor:.3g}")
         keys = [
             Line2D([], [], color=colour, linestyle=line, linewidth=3.0, label=name)
@@ -101,6 +109,75 @@ def _faces(
     """Displacements (steps, n, 2) of the contact face and of the face at a height."""
     v, w, beta, psi = (fields[..., i] for i in range(4))
     return np.stack([v, w], axis=-1), np.stack([v - up * beta, w + up * psi], axis=-1)
+
+
+Part = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+def _overhangs(
+    history: LoadPath, step: int, members: list[tuple[NDArray[np.float64], float]]
+) -> list[tuple[Part, Part]]:
+    """Parts of each member before X = 0 and beyond L: X, and displacements of both its faces."""
+    scene, x = history.scene, np.asarray(history.x)
+    none: Part = np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2))
+    found = [(none, none) for _ in members]
+    if scene.strip.overhang is not None:
+        fields, up = members[0]
+        size = float(scene.strip.overhang)
+        strain = float(history.force[step]) / float(scene.strip.stretching_stiffness)
+        s = np.linspace(0.0, 1.0, BEAM)
+        _, w, beta, _ = (float(value) for value in fields[step, -1, :4])
+        bend = 0.0 if scene.strip.loaded_end == "free" else -(w + beta * size)
+        lift = beta * size * s + bend * (1.5 * s**2 - 0.5 * s**3)  # no moment at the end
+        turned = beta + bend * (3.0 * s - 1.5 * s**2) / size - beta
+        part = _part(fields[step, -1], up, x[-1] + size * s, strain * size * s, lift, turned)
+        found[0] = none, part
+    if history.member is not None and scene.member.overhang is not None:
+        fields, up = members[1]
+        size = float(scene.member.overhang)
+        s = np.linspace(1.0, 0.0, BEAM)  # from the clamp on
+        v, w, beta, _ = (float(value) for value in fields[step, 0, :4])
+        v -= 0.5 * up * beta  # at mid-height
+        bends = scene.member.support == "clamped"
+        whole = _clamped(w, beta * size, 1.0 - s) if bends else w
+        slope = _slope(w, beta * size, 1.0 - s) / size if bends else beta * (1.0 - s)
+        lift, turned = whole - w + 0.0 * s, slope - beta + 0.0 * s
+        found[1] = _part(fields[step, 0], up, -size * s, -v * s, lift, turned), none
+    return found
+
+
+def _part(
+    section: NDArray[np.float64],
+    up: float,
+    x: NDArray[np.float64],
+    along: NDArray[np.float64],
+    lift: NDArray[np.float64],
+    turned: NDArray[np.float64],
+) -> Part:
+    """Overhang whose sections go along, lift and turn beyond the one at the contact's end."""
+    v, w, beta, psi = (float(value) for value in section[:4])
+    middle = v - 0.5 * up * beta + along
+    turn = 0.5 * up * (beta + turned)
+    low = np.stack([middle + turn, w + lift], axis=1)
+    return x, low, np.stack([middle - turn, w + lift + up * psi], axis=1)
+
+
+def _clamped(w: float, slope: float, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Deflection of a beam from a clamp at t = 0 to w and a slope at t = 1."""
+    return w * t**2 * (3.0 - 2.0 * t) + slope * t**2 * (t - 1.0)
+
+
+def _slope(w: float, slope: float, t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Derivative of `_clamped`."""
+    return 6.0 * w * t * (1.0 - t) + slope * t * (3.0 * t - 2.0)
+
+
+def _reach(history: LoadPath, before: float, beyond: float) -> tuple[float, float]:
+    """Range of X of both members, with margins in parts of it."""
+    ends = history.scene.member.overhang, history.scene.strip.overhang
+    first, last = (0.0 if end is None else float(end) for end in ends)
+    stop = float(history.x[-1]) + last
+    return -first - before * (first + stop), stop + beyond * (first + stop)
 
 
 def _visible(paths: list[tuple[NDArray[np.float64], NDArray[np.float64]]], height: float) -> float:
@@ -131,11 +208,13 @@ def _draw_supports(axes: Axes, history: LoadPath, bottom: float) -> None:
     elif support == "none" and scene.contact.normal != "none":
         axes.axhline(0.0, color=DATA, linewidth=1.0)
     held = support != "none" or scene.strip.far_end != "free"
-    if held and scene.member.overhang is None:
+    if held:
         face = (bottom, 0.0) if support != "none" else (0.0, top)
-        axes.plot([0.0, 0.0], face, color=DATA, linewidth=3.5, solid_capstyle="butt")
-    if scene.strip.loaded_end == "guided" and scene.strip.overhang is None:
+        first = 0.0 if scene.member.overhang is None else -float(scene.member.overhang)
+        axes.plot([first, first], face, color=DATA, linewidth=3.5, solid_capstyle="butt")
+    if scene.strip.loaded_end == "guided":
         end = float(history.x[-1])
+        end += 0.0 if scene.strip.overhang is None else float(scene.strip.overhang)
         axes.plot([end, end], [0.0, top], color=DATA, linewidth=2.5, linestyle=(0, (1, 1)))
 
 

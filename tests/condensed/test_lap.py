@@ -103,6 +103,15 @@ class TestLimits:
         longer = jb.solve(SQUEEZE.replace({"strip.overhang": 0.6, "member.overhang": 0.4}))
         added = 1.0 / longer.secant_stiffness - 1.0 / joint.secant_stiffness
         assert float(added) == pytest.approx(1.0 / 3.4e4, rel=0.01)
+        tips = []
+        for step in (0, -1):
+            axes = longer.plot_deformed(step, scale=100.0)
+            upper, lower = (patch.get_xy()[:-1] for patch in axes.patches[:2])
+            np.testing.assert_allclose(lower[[0, -1], 0], -0.4, atol=1e-12)  # where it is held
+            middle = len(upper) // 2  # the outline turns at the loaded end
+            tips.append(np.mean(upper[middle - 1 : middle + 1, 0]))
+        moved = tips[1] - tips[0]
+        assert moved == pytest.approx(100.0 * float(longer.displacement[-1]), rel=0.03)
 
 
 class TestBalance:
