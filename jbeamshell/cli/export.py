@@ -55,13 +55,13 @@ def run(options: argparse.Namespace) -> int:
     """Condense and write; returns the exit code."""
     from jbeamshell.dynamics.structure.joint import Joint
 
-    joint = Joint.of(scene_of(options), options.force, width=options.width)
     with warnings.catch_warnings(record=True) as doubts:
         warnings.simplefilter("always")
+        joint = Joint.of(scene_of(options), options.force, width=options.width)
         path = FILES[options.to] if options.out is None else options.out
         units = tuple(word.strip() for word in options.units.split(","))
         written = joint.export(options.to, path, units=units)
-    for doubt in doubts:
-        warn(str(doubt.message))
+    for text in dict.fromkeys(str(doubt.message) for doubt in doubts):
+        warn(text)
     say_written([written])
     return 0
