@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import warnings
 from typing import Any
 
 from jbeamshell.cli.arguments import add_scene, add_settings, scene_of
-from jbeamshell.cli.terminal import say_written, warn
+from jbeamshell.cli.terminal import doubts_in_lines, say_written
 
 FILES = {
     "opensees": "joint.py",
@@ -55,13 +54,10 @@ def run(options: argparse.Namespace) -> int:
     """Condense and write; returns the exit code."""
     from jbeamshell.dynamics.structure.joint import Joint
 
-    with warnings.catch_warnings(record=True) as doubts:
-        warnings.simplefilter("always")
+    with doubts_in_lines():
         joint = Joint.of(scene_of(options), options.force, width=options.width)
         path = FILES[options.to] if options.out is None else options.out
         units = tuple(word.strip() for word in options.units.split(","))
         written = joint.export(options.to, path, units=units)
-    for text in dict.fromkeys(str(doubt.message) for doubt in doubts):
-        warn(text)
     say_written([written])
     return 0

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jbeamshell.cli.arguments import add_folder, add_json, add_scene, add_settings, scene_of
-from jbeamshell.cli.terminal import put, say, say_written
+from jbeamshell.cli.terminal import doubts_in_lines, put, say, say_written
 from jbeamshell.common.errors import InputError
 
 ROWS = 12  # rows of the printed table, about
@@ -74,14 +74,15 @@ def run(options: argparse.Namespace) -> int:
 
         folder = check_folder(options.out)
     say("compiling ...")
-    study = let_go(
-        scene,
-        options.force,
-        payload=options.payload,
-        inertia=Inertia(options.density),
-        cycles=options.cycles,
-        whole={"auto": None, "whole": True, "sliders": False}[options.strip],
-    )
+    with doubts_in_lines():
+        study = let_go(
+            scene,
+            options.force,
+            payload=options.payload,
+            inertia=Inertia(options.density),
+            cycles=options.cycles,
+            whole={"auto": None, "whole": True, "sliders": False}[options.strip],
+        )
     if study.light:
         say(
             "the strip is plane elasticity's network of sliders: its own mass, which adds "

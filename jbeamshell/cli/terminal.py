@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from jbeamshell.common.errors import InputError
@@ -40,6 +42,16 @@ def say(text: str) -> None:
 def warn(text: str) -> None:
     """Print a warning, whether a person or a script reads it."""
     print(f"jbeamshell: warning: {text}", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def doubts_in_lines() -> Iterator[None]:
+    """Context that prints the warnings met in it at its end, each once and on one line."""
+    with warnings.catch_warnings(record=True) as met:
+        warnings.simplefilter("always")
+        yield
+    for text in dict.fromkeys(" ".join(str(each.message).split()) for each in met):
+        warn(text)
 
 
 def complain(error: object, code: int) -> int:

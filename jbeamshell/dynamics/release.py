@@ -160,8 +160,8 @@ def let_go(
     if motion is None or not nested:
         require("whole", whole, whole is not False, NOT_NESTED)
         require("model.rung", scene.model.rung, not scene.model.condensed, NO_INERTIA)
-        joint = Joint.of(scene, end_force)
         motion = _whole(scene, end_force, mass, inertia, cycles, per_cycle, samples, progress)
+        joint = Joint.of(scene, end_force)
     found = ring_down(motion.time, motion.displacement)
     smallest = 0.5 * float(found.amplitude.min())
     return RingDownStudy(motion, found, _prediction(joint, mass, smallest), mass, share)

@@ -1,7 +1,11 @@
 """`jbeamshell export`: a file that says what it is, or one line and no file."""
 
+import warnings
+
 import pytest
 
+from jbeamshell.cli.terminal import doubts_in_lines
+from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.dynamics import Joint
 
 PLANE = ["--set", "model.rung=plane", "--set", "model.nodes=33"]
@@ -28,3 +32,11 @@ def test_it_writes_a_joint(cli, tmp_path):
 )
 def test_bad_input_is_one_line(refused, words, complaint):
     assert complaint in refused("export", *PLANE, *words)
+
+
+def test_doubts_are_one_line_each(capsys):
+    with doubts_in_lines():
+        for text in ("doubtful: few\nnodes", "doubtful: few\nnodes", "doubtful: soft"):
+            warnings.warn(text, DoubtfulWarning, stacklevel=1)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [f"jbeamshell: warning: doubtful: {end}" for end in ("few nodes", "soft")]
