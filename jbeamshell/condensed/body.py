@@ -11,11 +11,11 @@ from __future__ import annotations
 import itertools
 from typing import NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
+from jbeamshell.common.pytrees import Tree
 from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.numerics.factors import inverse_cholesky
 
@@ -23,7 +23,7 @@ PARTS = 3  # of a strip, eliminated one after the other with as many contact nod
 FEW = 100  # nodes up to which one part, which compiles in a third of the time, is as fast
 
 
-class Body(eqx.Module):
+class Body(Tree):
     """Matrices of a body over its n contact nodes, numbered from the loaded end.
 
     With v and w the tangential displacements and lifts since the pressure, F the end load and r the

@@ -8,6 +8,7 @@ time: load levels only say where it is looked at.  Derivatives of the levels are
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -21,7 +22,7 @@ from jbeamshell.condensed import slopes
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import ContactState
 from jbeamshell.condensed.slopes import Trace
-from jbeamshell.condensed.tableau import System, Tableau, changed, empty, reversed_at
+from jbeamshell.condensed.tableau import OPEN, System, Tableau, changed, empty, reversed_at
 
 MOST_EVENTS = 40  # of a load branch, times the nodes
 SLIDES = 1e6  # compliance over that of the clamped contact at which a body slides as a whole
@@ -70,6 +71,8 @@ def walk(
     turns: ArrayLike | tuple[bool, ...],
     lift: Array | None = None,
     needed: Array | bool = True,
+    *,
+    lifting: int | None = None,
 ) -> Level:
     """Levels of a load path, stacked along the first axis.
 
@@ -84,6 +87,8 @@ def walk(
     turns : (levels,) True where the load has turned since the level before; so is the first
     lift : (n,) lift at the start; None is none
     needed : False to leave out the walk at no cost; its levels mean nothing then
+    lifting : number of nodes that may lift off, from the loaded end, which is quicker if few do;
+        from where another one opens levels are not settled; None is all
 
     Returns
     -------
@@ -92,7 +97,8 @@ def walk(
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
     turns, needed = jnp.asarray(turns), jnp.asarray(needed)
-    return _walk(body, jnp.asarray(friction), start, forces, lift, turns=turns, needed=needed)
+    given = body, jnp.asarray(friction), start, forces, lift
+    return _walk(*given, turns=turns, needed=needed, lifting=lifting)
 
 
 @eqx.filter_custom_jvp
@@ -105,40 +111,43 @@ def _walk(
     *,
     turns: Array,
     needed: Array,
+    lifting: int | None,
 ) -> Level:
-    return _lane_by_lane(body, friction, start, forces, lift, turns, needed)
+    return _lane_by_lane(lifting)(body, friction, start, forces, lift, turns, needed)
 
 
 @_walk.def_jvp
 def _walk_jvp(
-    primals: tuple[PyTree, ...], tangents: tuple[PyTree, ...], *, turns: Array, needed: Array
+    primals: tuple[PyTree, ...],
+    tangents: tuple[PyTree, ...],
+    *,
+    turns: Array,
+    needed: Array,
+    lifting: int | None,
 ) -> tuple[Level, Level]:
     changes = tuple(jax.tree.map(_full, *both) for both in zip(primals, tangents, strict=True))
     path = functools.partial(_differentiable, turns=turns, needed=needed)
     return jax.jvp(path, primals, changes)
 
 
-@jax.custom_batching.sequential_vmap
-def _lane_by_lane(
-    body: Body,
-    friction: Array,
-    start: ContactState,
-    forces: Array,
-    lift: Array,
-    turns: Array,
-    needed: Array,
-) -> Level:
+@functools.cache
+def _lane_by_lane(lifting: int | None) -> Callable[..., Level]:
     """Levels of a path; in a batch one lane after the other, which a loop in step is slower than.
 
     Lanes that need no walk cost nothing.
     """
-    paths = (body, friction, start, forces, lift, turns)
+    path = functools.partial(_differentiable, lifting=lifting)
 
-    def nothing() -> Level:
-        shapes = jax.eval_shape(_differentiable, *paths, needed)
-        return jax.tree.map(lambda like: jnp.zeros(like.shape, like.dtype), shapes)
+    @jax.custom_batching.sequential_vmap
+    def lane(*given: PyTree) -> Level:
+        def nothing() -> Level:
+            shapes = jax.eval_shape(path, *given)
+            return jax.tree.map(lambda like: jnp.zeros(like.shape, like.dtype), shapes)
 
-    return lax.cond(needed, lambda: _differentiable(*paths, needed), nothing)
+        needed = given[-1]
+        return lax.cond(needed, lambda: path(*given), nothing)
+
+    return lane
 
 
 def _differentiable(
@@ -149,15 +158,19 @@ def _differentiable(
     lift: Array,
     turns: Array,
     needed: Array,
+    lifting: int | None = None,
 ) -> Level:
-    """Levels of a path, level by level differentiable."""
+    """Levels of a path, level by level differentiable; see `walk`."""
+    k, n = start.v.size, lift.size
+    lifting = n if lifting is None else lifting
     matrix = jnp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
     pull = jnp.concatenate([body.f_t, body.f_n])
     forces_then = jnp.concatenate([start.r_t, start.r_n]) + pull * start.force
     reference = forces_then - matrix @ jnp.concatenate([start.v, lift])
     system = System(matrix, pull, body.c, friction, reference)
     none = jnp.zeros_like(start.v, bool)
-    first = Level(start, lift, jnp.zeros_like(body.c), none, jnp.asarray(True))
+    down = jnp.all(lift[lifting:] <= 0.0)
+    first = Level(start, lift, jnp.zeros_like(body.c), none, down)
 
     def go(
         carry: tuple[Tableau, ContactState, Level], to: tuple[Array, Array]
@@ -171,7 +184,7 @@ def _differentiable(
         )
         return (lax.stop_gradient(at), origin, level), level
 
-    carry = (empty(start.v.size, lift.size), lax.stop_gradient(start), first)
+    carry = (empty(k, n, lifting), lax.stop_gradient(start), first)
     return lax.scan(go, carry, (forces, turns))[1]
 
 
@@ -191,7 +204,7 @@ def _run(
     tau = jnp.abs(force - origin.force)
 
     def turn(both: tuple[Tableau, Array]) -> tuple[Tableau, Array]:
-        return reversed_at(system, last.state, last.lift, sense), jnp.asarray(False)
+        return reversed_at(system, last.state, last.lift, sense, at.lifting), jnp.asarray(False)
 
     # Loops that run once: in a batch they cost nothing where no lane needs them.
     at, _ = lax.while_loop(lambda both: both[1], turn, (at, turned & needed))
@@ -199,7 +212,8 @@ def _run(
 
     def unfinished(now: Walk) -> Array:
         few = now.at.events < MOST_EVENTS * now.at.opened.size
-        return needed & (now.event.tau < tau) & few
+        able = (now.event.kind != OPEN) | (now.event.node < now.at.lifting)
+        return needed & (now.event.tau < tau) & few & able
 
     def go(now: Walk) -> Walk:
         event, trace = now.event, now.trace

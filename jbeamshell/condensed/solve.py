@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import math
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -33,12 +35,14 @@ from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 
 Cycles = tuple[tuple[int, int, int], ...]
+Search = Literal["events", "near events", "factors", "either"]
+LIFTING = 0.125  # of the nodes, that most often lift off at the loaded end
 NESTED_FROM = 6  # order of a section from which on no point reaction disturbs the corner's slip
 
 
 @in_double
 def solve(
-    scene: Scene, path: LoadPath, cycles: Cycles, *, nested: bool = False, own: bool = True
+    scene: Scene, path: LoadPath, cycles: Cycles, *, by: Search = "events", own: bool = True
 ) -> History:
     """Press a strip down and walk a load path.
 
@@ -53,8 +57,9 @@ def solve(
     scene : scene on a condensed rung; may be traced
     path, cycles : whole path of the scene and its closed cycles, see
         `jbeamshell.scene.load_path.check`
-    nested : True to take factors alone, whose steps are marked unconverged where slip zones are not
-        nested; False walks such paths event by event
+    by : "events" to walk the path event by event; "factors" to take these alone, where slip zones
+        are nested; "either" to walk where they are not; "near events" to walk while the nodes near
+        the loaded end alone lift off.  Steps of another kind are marked unconverged
     own : True if the loads are the scene's own cycles, whose turns are always known
 
     Returns
@@ -88,18 +93,20 @@ def solve(
     soft = not scene.ideal_friction
     known = isinstance(turns, tuple)
     given = (scene, strip, targets, () if known else turns)
-    history: History = _walk(given, turns if known else (), cycles, nested, soft)
+    history: History = _walk(given, turns if known else (), cycles, by, soft)
     return history
 
 
-def nests(scene: Scene) -> bool:
-    """True if the slip zones of a scene's cycles are most often nested, so that factors do.
+def quickest(scene: Scene) -> Search:
+    """Search that most often does for a scene's cycles.
 
-    Sections of low order hold a point reaction at the loaded corner, which slips and opens out of
-    turn, and a lap joint slips from both ends.
+    Slip zones are nested where no point reaction at the loaded corner slips and opens out of turn,
+    as that of sections of low order does.  A lap joint slips and opens at both ends.
     """
-    alone = scene.member.support == "none"
-    return alone and (scene.model.solution == "plane" or scene.model.order >= NESTED_FROM)
+    if scene.member.support != "none":
+        return "events"
+    nested = scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
+    return "factors" if nested else "near events"
 
 
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
@@ -133,7 +140,7 @@ def _walk(
     given: tuple[Scene, Strip, Array, Turns],
     known: tuple[bool, ...],
     cycles: Cycles,
-    nested: bool,
+    by: Search,
     soft: bool,
 ) -> History:
     """History of a strip pressed down and loaded along targets; see `solve`.
@@ -145,12 +152,12 @@ def _walk(
     """
     scene, strip, targets, traced = given
     turns = known if isinstance(traced, tuple) else traced
-    found = _levels(scene, strip, targets, turns, nested, soft)
+    found = _levels(scene, strip, targets, turns, by, soft)
     return _history(scene, strip, found, cycles, soft)
 
 
 def _levels(
-    scene: Scene, strip: Strip, targets: Array, turns: Turns, nested: bool, soft: bool
+    scene: Scene, strip: Strip, targets: Array, turns: Turns, by: Search, soft: bool
 ) -> Level:
     """Levels after the pressing."""
     body, friction = strip.body, scene.contact.friction
@@ -159,13 +166,17 @@ def _levels(
         body, springs = with_springs(body, spring_stiffness(scene, strip))
     if scene.load.control == "displacement":
         body = driven_by_displacement(body)
-    if nested or not targets.size:
-        found, sound = nested_levels(body, friction, pressed(body), targets, turns)
+    start = pressed(body)
+    if by == "factors" or not targets.size:
+        found, sound = nested_levels(body, friction, start, targets, turns)
     else:
-        # Slip zones of a joint are never nested, and factors overflow in single precision.
-        factored = strip.pair is None and body.f_t.dtype == np.float64
-        follow = levels if factored else walk
-        found = follow(body, friction, pressed(body), targets, turns, lift)
+        # Factors overflow in single precision.
+        if by == "either" and body.f_t.dtype == np.float64:
+            found = levels(body, friction, start, targets, turns, lift)
+        else:
+            lifting = math.ceil(LIFTING * strip.x.size) if by == "near events" else None
+            turned = jnp.asarray(turns)
+            found = walk(body, friction, start, targets, turned, lift, lifting=lifting)
         sound = jnp.all(jnp.isfinite(strip.lift))
     state = found.state
     if scene.load.control == "displacement":

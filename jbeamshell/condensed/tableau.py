@@ -43,14 +43,14 @@ class System(NamedTuple):
 
 
 class Tableau(NamedTuple):
-    """Contact between two events; k nodes may slip, n may lift.
+    """Contact between two events; k of n nodes may slip, and the first m may lift.
 
-    Rows and columns are the k tangential and the n normal ones.  The last row is the displacement
-    of the loaded end; the last two columns are the value at tau = 0 and the rate.
+    Rows are the k tangential and the n normal ones, and the displacement of the loaded end.
+    Columns are the k tangential and the first m normal ones, the value at tau = 0 and the rate.
 
     Attributes
     ----------
-    rows : (k + n + 1, k + n + 2)
+    rows : (k + n + 1, k + m + 2)
     sigma : (k,) 1 and -1 for nodes that slip along and against v, 0 for those that stick
     opened : (n,) True for open nodes
     held : (k,) slip at which sticking nodes are held, since the reversal
@@ -66,6 +66,11 @@ class Tableau(NamedTuple):
     tau: Array
     work: Array
     events: Array
+
+    @property
+    def lifting(self) -> int:
+        """Number m of nodes that may lift."""
+        return int(self.rows.shape[1] - 2 - self.sigma.size)
 
     @property
     def rate(self) -> Array:
@@ -86,11 +91,11 @@ class Tableau(NamedTuple):
         return jnp.concatenate([origin + slip, lift]), jnp.where(self.opened, 0.0, normal)
 
 
-def empty(k: int, n: int) -> Tableau:
+def empty(k: int, n: int, lifting: int) -> Tableau:
     """Tableau of no contact, to be filled at the first reversal."""
     zero = jnp.zeros(())
     return Tableau(
-        rows=jnp.zeros((k + n + 1, k + n + 2)),
+        rows=jnp.zeros((k + n + 1, k + lifting + 2)),
         sigma=jnp.zeros(k),
         opened=jnp.zeros(n, bool),
         held=jnp.zeros(k),
@@ -100,14 +105,16 @@ def empty(k: int, n: int) -> Tableau:
     )
 
 
-def reversed_at(system: System, state: ContactState, lift: Array, sense: Array) -> Tableau:
+def reversed_at(
+    system: System, state: ContactState, lift: Array, sense: Array, lifting: int
+) -> Tableau:
     """Tableau at a reversal: all closed nodes stick, open ones stay open."""
     k, n = state.v.size, lift.size
     value = jnp.concatenate([state.r_t, state.r_n, state.displacement[None]])
     rate = sense * jnp.append(-system.pull, system.c)
-    rows = jnp.concatenate([system.matrix, system.pull[None]])
+    rows = jnp.concatenate([system.matrix, system.pull[None]])[:, : k + lifting]
     rows = jnp.concatenate([rows, value[:, None], rate[:, None]], axis=1)
-    start = empty(k, n)._replace(rows=rows)
+    start = empty(k, n, lifting)._replace(rows=rows)
     wanted = lift > 0.0
 
     def open_next(at: Tableau) -> Tableau:
@@ -159,6 +166,5 @@ def exchanged_rows(
     share = rows[:, i] / pivot
     beside = (rows[other] - share[other] * row).at[i].set(share[other])
     new = ((-row / pivot).at[i].set(1.0 / pivot) + rest * beside).at[-2].add(more)
-    numbers = jnp.arange(rows.shape[1])
-    swept = jnp.where(numbers == i, share[:, None], rows - share[:, None] * row)
-    return jnp.where(numbers[: rows.shape[0], None] == i, new, swept)
+    swept = rows - share[:, None] * row
+    return swept.at[:, i].set(share).at[i].set(new)

@@ -7,11 +7,12 @@ from typing import Any
 import equinox as eqx
 from jax import Array
 
+from jbeamshell.common.pytrees import Tree
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.scene.scene import Scene
 
 
-class Record(eqx.Module):
+class Record(Tree):
     """Arrays of a load path; units are those of the scene, and forces are per unit width.
 
     Step 0 is the first pressure step; with ``load.pressure_steps`` = 1 that is the strip under the

@@ -14,7 +14,7 @@ from jbeamshell.common.checks import check_words, is_traced, require, require_ch
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.native import Native
 from jbeamshell.common.precision import doubled, in_double, is_single
-from jbeamshell.condensed.solve import nests
+from jbeamshell.condensed.solve import quickest
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
@@ -119,7 +119,8 @@ def _response(
     compiled = jax.jit(solved_by(method or Method.NEWTON))
     if is_traced(scene):
         return compiled
-    staged = slip_patterns.applies(scene) or (scene.model.condensed and nests(scene))
+    staged = slip_patterns.applies(scene)
+    staged = staged or (scene.model.condensed and quickest(scene) != "events")
     again = method is None and staged  # what does not settle, by Newton or by events
     first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
     first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)

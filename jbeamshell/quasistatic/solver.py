@@ -14,7 +14,7 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.common.precision import is_single
-from jbeamshell.condensed.solve import Cycles, nests
+from jbeamshell.condensed.solve import Cycles, quickest
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
@@ -138,18 +138,19 @@ def _condensed(
     method: Method | None,
     own: bool,
 ) -> History:
-    """History on the contact line, first from factors alone unless derivatives may be taken."""
+    """History on the contact line, by the quickest search unless derivatives may be taken."""
     traced = is_traced(scene, path) or is_staged()
-    events = method is Method.NEWTON or (traced and method is None)
-    nested = nests(scene) and not events
+    by = quickest(scene)
+    if method is Method.NEWTON or (traced and method is None):
+        by = "either" if traced and by == "factors" else "events"
     if traced and not _precise(scene):
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
-    history = solve_condensed(scene, path, cycles, nested=nested, own=own)
+    history = solve_condensed(scene, path, cycles, by=by, own=own)
     history = dataclasses.replace(history, end=WholePath())
     if traced:
         failed = history.status[-1] != Status.CONVERGED
         return eqx.error_if(history, failed, f"a load step has {NO_END}") if throw else history
-    if nested and not history.converged:
+    if by != "events" and not history.converged:
         again = solve_condensed(scene, path, cycles, own=own)
         history = dataclasses.replace(again, end=history.end)
     if throw and not history.converged:

@@ -21,6 +21,7 @@ from jbeamshell.common.checks import (
     require_choice,
     require_count,
 )
+from jbeamshell.common.pytrees import Tree
 
 MOST_STEPS = 10**6  # largest count of nodes, steps or cycles
 AUTO = "auto"  # value of a setting that the scene chooses itself
@@ -171,7 +172,7 @@ def _field(
     return eqx.field(default=value, static=static, metadata={"row": row})
 
 
-class Part(eqx.Module):
+class Part(Tree):
     """Section of the table as a frozen pytree, which converts and checks its values when made.
 
     Attributes

@@ -19,6 +19,7 @@ from jax import Array
 
 from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.pytrees import Tree
 from jbeamshell.mechanics.friction import (
     LAWS,
     FrictionLaw,
@@ -40,7 +41,7 @@ from jbeamshell.scene.rungs import IDEAL, general_rung, spelled_out
 from jbeamshell.scene.text import summary
 
 
-class Scene(eqx.Module):
+class Scene(Tree):
     """Strip, its contact, its load and the model of it.
 
     Settings that are "auto" are chosen when the scene is made, see `jbeamshell.scene.choice`; its
