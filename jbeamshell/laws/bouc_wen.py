@@ -20,13 +20,14 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 from jax.typing import ArrayLike
 
-from jbeamshell.laws.law import Law
+from jbeamshell.laws.law import Law, as_path
 from jbeamshell.scene.rows import number
 
 SUBSTEPS = 8  # of each piece of a path
@@ -85,7 +86,11 @@ class BoucWen(Law):
 
     def path_forces(self, path: ArrayLike) -> Array:
         """Forces (T,) on a path (T,) of displacements, from rest; second order in its pieces."""
-        points = jnp.atleast_1d(jnp.asarray(path, dtype=jnp.result_type(float)))
+        return self._forces(as_path(path))
+
+    @eqx.filter_jit
+    def _forces(self, points: Array) -> Array:
+        """Forces (T,) on a path (T,), compiled."""
         pieces = jnp.diff(points, prepend=0.0) / self.slip_displacement
 
         def go(z: Array, piece: Array) -> tuple[Array, Array]:

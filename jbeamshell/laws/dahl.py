@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 from jax.typing import ArrayLike
 
-from jbeamshell.laws.law import Law
+from jbeamshell.laws.law import Law, as_path
 from jbeamshell.scene.rows import number
 
 
@@ -51,7 +52,11 @@ class Dahl(Law):
 
     def path_forces(self, path: ArrayLike) -> Array:
         """Forces (T,) on a path (T,) of displacements, exact, from rest."""
-        points = jnp.atleast_1d(jnp.asarray(path, dtype=jnp.result_type(float)))
+        return self._forces(as_path(path))
+
+    @eqx.filter_jit
+    def _forces(self, points: Array) -> Array:
+        """Forces (T,) on a path (T,), compiled."""
         moves = jnp.diff(points, prepend=0.0)
 
         def go(force: Array, move: Array) -> tuple[Array, Array]:

@@ -15,12 +15,13 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require
-from jbeamshell.laws.law import Law
+from jbeamshell.laws.law import Law, as_path
 from jbeamshell.mechanics.friction import SharpSlip, coulomb_cap
 from jbeamshell.scene.rows import number
 
@@ -63,17 +64,21 @@ class JangBarber(Law):
         path : (T,) displacements
         normal : (T,) normal forces at the points, negative where the node is off; None holds N
         """
-        points = jnp.atleast_1d(jnp.asarray(path, dtype=jnp.result_type(float)))
+        points = as_path(path)
         normal = self.normal_force if normal is None else jnp.asarray(normal)
         caps = coulomb_cap(self.friction, jnp.broadcast_to(normal, points.shape))
+        return self._forces(jnp.diff(points, prepend=0.0), caps)
+
+    @eqx.filter_jit
+    def _forces(self, moves: Array, caps: Array) -> Array:
+        """Forces (T,) after moves (T,) under Coulomb caps (T,), compiled."""
 
         def go(force: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
             move, cap = step
             end = SharpSlip().traction(move, force, cap, self.stiffness)
             return end, end
 
-        moves = jnp.diff(points, prepend=0.0)
-        return lax.scan(go, jnp.zeros((), points.dtype), (moves, caps))[1]
+        return lax.scan(go, jnp.zeros((), moves.dtype), (moves, caps))[1]
 
     def dissipation(self, amplitude: ArrayLike) -> Array:
         """Energy lost per steady cycle under the constant normal force; any shape."""

@@ -176,3 +176,8 @@ class Law(Part):
         """Function of one amplitude over amplitudes of any shape."""
         size = jnp.asarray(amplitude, dtype=jnp.result_type(float))
         return jax.vmap(one)(size.ravel()).reshape(size.shape)
+
+
+def as_path(path: ArrayLike) -> Array:
+    """Path (T,) as an array of floating-point numbers."""
+    return jnp.atleast_1d(jnp.asarray(path, dtype=jnp.result_type(float)))

@@ -18,11 +18,12 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 from jax.typing import ArrayLike
 
-from jbeamshell.laws.law import Law
+from jbeamshell.laws.law import Law, as_path
 from jbeamshell.scene.rows import number
 
 
@@ -89,12 +90,16 @@ class LuGre(Law):
         path : (T,) displacements, from 0
         time : (T,) times, rising from above 0; None moves at the law's ``speed``
         """
-        points = jnp.atleast_1d(jnp.asarray(path, dtype=jnp.result_type(float)))
-        moves = jnp.diff(points, prepend=0.0)
+        moves = jnp.diff(as_path(path), prepend=0.0)
         if time is None:
             speeds = jnp.sign(moves) * self.speed
         else:
             speeds = moves / jnp.diff(jnp.asarray(time), prepend=0.0)
+        return self._forces(moves, speeds)
+
+    @eqx.filter_jit
+    def _forces(self, moves: Array, speeds: Array) -> Array:
+        """Forces (T,) at the end of moves (T,) of constant speeds, compiled."""
 
         def go(z: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
             move, v = step
@@ -105,7 +110,7 @@ class LuGre(Law):
             rate = jnp.where(move == 0.0, 0.0, v * (1.0 - end / safe))
             return end, self.stiffness * end + self.damping * rate + self.viscous * v
 
-        return lax.scan(go, jnp.zeros((), points.dtype), (moves, speeds))[1]
+        return lax.scan(go, jnp.zeros((), moves.dtype), (moves, speeds))[1]
 
     def dissipation(self, amplitude: ArrayLike) -> Array:
         """Energy lost per steady cycle at a displacement amplitude and the given speed."""

@@ -22,13 +22,16 @@ import abc
 from collections.abc import Callable
 from typing import ClassVar, NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced
-from jbeamshell.laws.law import Law
+from jbeamshell.laws.law import Law, as_path
+
+SIZES = 8  # depths of the memory are multiples of this, so that paths share a compiled program
 
 
 class Memory(NamedTuple):
@@ -77,10 +80,15 @@ class Memory(NamedTuple):
         return Memory(along, answers, count, way, (target, reached))
 
 
-def along_path(path: ArrayLike, backbone: Callable[[Array], Array]) -> Array:
-    """Answering column (T,) on a path (T,) of the driven one, from rest, by Masing's rule."""
-    points = jnp.atleast_1d(jnp.asarray(path, dtype=jnp.result_type(float)))
-    depth = points.size if is_traced(points) else _turns(np.asarray(points)) + 1
+def along_path(points: Array, backbone: Callable[[Array], Array], depth: int) -> Array:
+    """Answering column (T,) on a path (T,) of the driven one, from rest, by Masing's rule.
+
+    Parameters
+    ----------
+    points : (T,) path
+    backbone : answer on first loading
+    depth : most turns that are remembered
+    """
 
     def go(memory: Memory, target: Array) -> tuple[Memory, Array]:
         moved = memory.moved(target, backbone)
@@ -108,7 +116,8 @@ class MasingLaw(Law):
 
     def path_forces(self, path: ArrayLike) -> Array:
         """Forces (T,) on a path (T,) of displacements, exact, from rest."""
-        return along_path(path, self.backbone)
+        points = as_path(path)
+        return _forces(self, points, _depth(points))
 
     def path_displacements(self, path: ArrayLike) -> Array:
         """Displacements (T,) on a path (T,) of forces, exact, from rest.
@@ -118,12 +127,26 @@ class MasingLaw(Law):
         InputError
             for a force that is the law's `capacity` or more; traced, it gives NaN
         """
-        self._below_capacity(path)
-        return along_path(path, lambda force: jnp.sign(force) * self.displacement(force))
+        points = as_path(path)
+        self._below_capacity(points)
+        return _displacements(self, points, _depth(points))
 
 
-def _turns(path: np.ndarray) -> int:
-    """Number of turns of a path from rest."""
-    ways = np.sign(np.diff(path, prepend=0.0))
+@eqx.filter_jit
+def _forces(law: MasingLaw, points: Array, depth: int) -> Array:
+    return along_path(points, law.backbone, depth)
+
+
+@eqx.filter_jit
+def _displacements(law: MasingLaw, points: Array, depth: int) -> Array:
+    return along_path(points, lambda force: jnp.sign(force) * law.displacement(force), depth)
+
+
+def _depth(points: Array) -> int:
+    """Most turns that a path from rest can have to remember, of few different sizes."""
+    if is_traced(points):
+        return points.size
+    ways = np.sign(np.diff(np.asarray(points), prepend=0.0))
     ways = ways[ways != 0.0]
-    return int(np.sum(ways[1:] != ways[:-1]))
+    turns = int(np.sum(ways[1:] != ways[:-1]))
+    return SIZES * (turns // SIZES + 1)
