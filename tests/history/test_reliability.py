@@ -100,19 +100,25 @@ def test_the_recorded_scenes_hold_no_silent_failure(name, least):
 # --- doubts -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("nodes", [4, 64])
-def test_the_error_of_the_grid_counts_the_nodes_that_share_the_work(nodes):
-    slip = np.outer([0.0, 1.0, 0.0], np.ones(nodes))
-    even = reliability.SlipCycle(
+def even_cycle(nodes, slip=1.0):
+    """Cycle in which rigid sliders of equal length under even pressure all slip by the same."""
+    there = np.outer([0.0, 1.0, 0.0], np.ones(nodes))
+    return reliability.SlipCycle(
         x=np.arange(nodes) + 1.0,
         tributary=np.ones(nodes),
-        v=slip,
-        traction=2.0 * slip - 1.0,
-        reaction=np.full_like(slip, 2.0),
+        v=slip * there,
+        traction=2.0 * there - 1.0,
+        reaction=np.full_like(there, 2.0),
         friction=np.asarray(0.5),
         slip_stiffness=np.asarray(np.inf),
         half_height=np.asarray(1.0),
     )
+
+
+@pytest.mark.parametrize("nodes", [4, 64])
+def test_the_error_of_the_grid_counts_the_nodes_that_share_the_work(nodes):
+    even = even_cycle(nodes)
+    slip = even.v
     grid, corner = reliability.dissipation_errors(even)
     assert grid == pytest.approx(nodes**-1.5)
     assert corner == 0.0
@@ -123,6 +129,14 @@ def test_the_error_of_the_grid_counts_the_nodes_that_share_the_work(nodes):
     found = reliability.dissipation_errors(falling)[1]
     work = 0.5 * (nodes - 1.0) + 2.0  # of caps 1 and 2, in each half of the cycle
     assert found == pytest.approx(reliability.SAFETY * 0.5 * 1.0 / work)
+
+
+@pytest.mark.parametrize("rung", ["condensed-squeeze", "masing"])
+def test_where_nothing_slips_the_estimate_is_infinite(rung):
+    scene = jb.Scene().replace({"model.rung": rung})
+    errors = reliability.estimates(scene, even_cycle(4, slip=0.0))
+    assert np.max(errors) == np.inf
+    assert np.max(reliability.estimates(scene, even_cycle(64))) == pytest.approx(64**-1.5)
 
 
 @pytest.mark.doubtful("in the corner")

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.measured.drift import _through
 from jbeamshell.measured.loops import Loop, make_loop, read_loops
 from jbeamshell.measured.recordings import recording_from_arrays
 from jbeamshell.measured.reversals import find_driver, find_turns, has_plateau
@@ -439,3 +440,9 @@ def test_offset_and_one_sided_cycles_are_found(driver, centre):
     (loop,) = steady_loops(recording_from_arrays(*columns), driver)
     assert np.ptp(getattr(loop, driver)) == pytest.approx(2.0, rel=0.01)
     np.testing.assert_allclose(area(loop), planted_area(driver), rtol=0.02)
+
+
+def test_drift_goes_on_beyond_the_cycles_as_it_was_at_each_end():
+    middles, offsets = np.array([1.0, 2.0, 4.0]), np.array([0.0, 1.0, 0.0])
+    found = _through(np.array([0.0, 1.5, 3.0, 5.0]), middles, offsets)
+    np.testing.assert_allclose(found, [-1.0, 0.5, 0.5, -0.5])
