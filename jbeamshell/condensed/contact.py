@@ -32,7 +32,7 @@ from jbeamshell.condensed.events import Level, walk
 from jbeamshell.condensed.levels import turns_of
 from jbeamshell.condensed.pair import together
 from jbeamshell.condensed.pressing import press
-from jbeamshell.condensed.substructure import LOOSE, Substructure, loose_mode, potential
+from jbeamshell.condensed.substructure import Substructure, loose_mode, potential
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.keys import ASSEMBLIES, CONTROLS
@@ -40,6 +40,7 @@ from jbeamshell.scene.parts import Load
 
 MATCH = 1e-6  # of the contact's length, within which nodes match
 STEPS = 16  # per half cycle
+HARDLY = 1e-11  # energy of a movement over that of the nodes alone, from which nothing resists
 
 
 def solve_contact(
@@ -114,7 +115,8 @@ def solve_contact(
     contact = hessian, upper.x, upper.tributary, as_leaf(friction)
     flat = assembly == "frictional" and not is_traced(away) and not np.any(away)
     distance = None if flat else jnp.broadcast_to(away, upper.x.shape)
-    words = control, assembly, _slides(hessian, held)
+    slides = assembly == "frictionless" and (_slides(upper) or _slides(lower))
+    words = control, assembly, slides
     levels: Level = _walked((contact, distance, targets), held, words)
     if not is_traced(levels) and throw:
         _demand(levels, targets)
@@ -189,13 +191,15 @@ def _check_held(upper: Substructure, lower: Substructure) -> None:
     require("lower", "loose body", not mode, fix)
 
 
-def _slides(hessian: Array, held: tuple[bool, ...]) -> bool:
-    """True if nothing but friction keeps the contact from slipping as a whole."""
-    if is_traced(hessian):
-        return True
-    v = 2 * np.flatnonzero(~np.array(held))
-    values = np.linalg.eigvalsh(np.asarray(hessian)[np.ix_(v, v)])
-    return bool(values[0] < LOOSE * values[-1])
+def _slides(body: Substructure | None) -> bool:
+    """True if nothing but friction keeps a body from moving along X."""
+    if body is None or any(body.fixed[::2]):
+        return False
+    fix = "asks the numbers of the bodies what holds them: take 'frictional' where they are traced"
+    require("assembly", "frictionless", not is_traced(body.stiffness), fix)
+    stiffness = np.asarray(body.stiffness)
+    energy = float(np.sum(stiffness[::2, ::2]))  # of a unit displacement
+    return energy < HARDLY * body.x.size * float(np.max(stiffness))
 
 
 @jax.jit

@@ -135,6 +135,23 @@ class TestContact:
         assert total == pytest.approx(20.0, rel=1e-9)  # what presses is carried
 
     @pytest.mark.slow
+    def test_a_held_body_answers_alike_within_a_derivative(self):
+        body = strip_body()
+        load = {"amplitude": 0.5, "steps_per_half_cycle": 8, "assembly": "frictionless"}
+
+        def work(bolts):
+            return jb.solve_contact(body, bolts=bolts, **load).dissipation
+
+        assert float(jax.jvp(work, (1.0,), (1.0,))[0]) == pytest.approx(float(work(1.0)), rel=1e-9)
+
+        def of_stiffness(k):
+            upper = changed(UPPER, stiffness=k * UPPER.stiffness)
+            return jb.solve_contact(upper, LOWER, **LOAD).dissipation
+
+        with pytest.raises(jb.InputError, match="take 'frictional' where they are traced"):
+            jax.jit(of_stiffness)(1.0)
+
+    @pytest.mark.slow
     def test_derivatives_have_slope_two(self):
         gap = jnp.asarray(1e-5 * (np.asarray(UPPER.x) / 2.0) ** 2)
 
