@@ -57,6 +57,7 @@ def test_the_loop_of_the_backbone_holds_the_dissipation():
     assert float(slope) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_thin_layers_meet_it():
     for ratio in (1.5, 4.0):
         lost, deflection = compared("condensed-shell", 0.01, ratio)
