@@ -3,7 +3,8 @@
     python tests/damaged.py FOLDER SEED COUNT
 
 damages good files of ``FOLDER`` at random: bytes set, cut, doubled, swapped or appended.  It prints
-a line of JSON for each, in the order of their numbers: format, damage, outcome and seconds.
+a line of JSON for each, in the order of their numbers: file, damage, outcome and seconds of the
+processor.
 """
 
 import json
@@ -91,9 +92,9 @@ def main(folder: Path, seed: int, count: int) -> None:
         kind, damaged = damage(content[name], random)
         path = work / name
         path.write_bytes(damaged)
-        begin = time.perf_counter()
+        begin = time.process_time()
         row = {"file": name, "damage": kind, "outcome": outcome(path, good[name])}
-        row["seconds"] = round(time.perf_counter() - begin, 4)
+        row["seconds"] = round(time.process_time() - begin, 4)
         print(json.dumps(row), flush=True)
 
 

@@ -111,3 +111,9 @@ def test_a_centred_loop_has_lost_its_zeros_and_nothing_else():
     assert "zeros of the sensors: displacement -0.2 and force 0.7" in centred.notes[-1]
     with pytest.raises(InputError, match="is not closed"):
         make_loop(force[:200], displacement[:200]).centred()
+
+
+def test_an_elastic_path_of_uneven_points_does_no_work():
+    way = np.linspace(0.0, 1.0, 12)
+    u = np.concatenate([way**2, way[::-1] ** 3])
+    assert make_loop(3.0 * u, u).work == pytest.approx(0.0, abs=1e-14)

@@ -1,0 +1,58 @@
+"""Units do not matter: lengths and forces in any units give the same figures, exactly."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+
+BOLT = [[0.5, 0.0], [0.5, 20.0], [1.5, 20.0], [1.5, 0.0]]
+COARSE = {"model.nodes": 33, "load.steps_per_half_cycle": 8}
+SCENES = {
+    "contact line": {},
+    "bolt": {"contact.pressure": BOLT, "load.amplitude": 0.6},
+    "plane": {"model.rung": "plane"},
+    "stepwise": COARSE | {"model.solution": "stepwise", "model.kinematics": "exact"},
+    "smooth": COARSE | {"contact.smoothing": 8.0},
+    "masing": COARSE | {"model.rung": "masing"},
+    "p3": COARSE | {"model.rung": "p3", "model.solution": "stepwise"},
+    "compliant": COARSE
+    | {"model.fields": ["v", "w", "beta", "psi"], "contact.normal": "compliant"},
+    "displaced": COARSE | {"load.control": "displacement", "load.amplitude": 2e-5},
+    "lap": {"strip.far_end": "free", "member.support": "rolling", "load.amplitude": 1.0},
+}
+FIGURES = ("dissipation", "secant_stiffness", "loss_factor", "dissipation_error", "slip_length")
+
+
+def figures(values, length=1.0, force=1.0):
+    """Figures of a scene whose lengths and forces (per width) are in other units, as in its own."""
+    scene = jb.Scene().replace(values)
+    units = {"length": length, "force/width": force, "stress": force / length}
+    keys = ("strip.length", "strip.axial_stiffness", "load.amplitude")
+    other = {key: float(scene.get(key)) * length ** (key == "strip.length") for key in keys}
+    other["strip.axial_stiffness"] *= units["force/width"]
+    control = scene.load.control == "force"
+    other["load.amplitude"] *= units["force/width" if control else "length"]
+    pressure = np.asarray(scene.get("contact.pressure"))
+    scale = np.array([length, units["stress"]]) if pressure.ndim else units["stress"]
+    other["contact.pressure"] = pressure * scale
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jb.DoubtfulWarning)
+        history = jb.solve(scene.replace(other))
+    in_units = {
+        "dissipation": length * force,
+        "secant_stiffness": force / length,
+        "slip_length": length,
+    }
+    return [float(getattr(history, name)) / in_units.get(name, 1.0) for name in FIGURES]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_figures_and_estimates_know_no_units(name):
+    known = figures(SCENES[name])
+    exact = 1e-9 if name == "plane" else 1e-10  # its elements at the corner are 2e-5 H long
+    for length, force in [(1e-9, 1.0), (1e9, 1.0), (1.0, 1e-9), (1.0, 1e9), (1e9, 1e-9)]:
+        found = figures(SCENES[name], length, force)
+        np.testing.assert_allclose(found, known, rtol=exact, atol=0.0, err_msg=f"{length} {force}")

@@ -1,0 +1,24 @@
+"""Faults planted in the core are found by the ordinary tests; see `mutations`."""
+
+import json
+
+import mutations
+import pytest
+
+# Two survive that change no result: from how evenly pressing starts, and a margin of a check that
+# others of the same branch imply on all strips tried.
+FOUND = json.loads(mutations.RECORD.read_text(encoding="utf-8"))
+
+
+def test_the_record_says_which_test_finds_each_fault():
+    every = list(mutations.faults())
+    assert set(FOUND) == {fault.name for fault in every}
+    assert len(every) >= 60
+    assert sum(map(bool, FOUND.values())) >= 0.95 * len(every)
+
+
+@pytest.mark.slow
+def test_some_faults_are_found_again(tmp_path):
+    project = mutations.copied(tmp_path)
+    for fault in mutations.sample(3, seed=22):
+        assert mutations.killed(fault, project) or not FOUND[fault.name], fault.name
