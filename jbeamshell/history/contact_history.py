@@ -26,7 +26,7 @@ FIGURES = (
 )
 
 
-class ContactHistory(LoopFigures):
+class ContactHistory(LoopFigures, eqx.Module):
     """Result of `jbeamshell.solve_contact`: the pressing, then the loads.
 
     Step 0 is the contact under its pressures alone.  Steps without equilibrium hold NaN.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import equinox as eqx
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
 from jax import Array
 
@@ -10,7 +11,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.numerics.cycles import branch_work
 
 
-class LoopFigures(eqx.Module):
+class LoopFigures:
     """Figures of the last cycle; scalars but for `loop`.
 
     Attributes
@@ -27,12 +28,13 @@ class LoopFigures(eqx.Module):
         if the path holds no closed cycle
     """
 
-    tributary: eqx.AbstractVar[Array]
-    force: eqx.AbstractVar[Array]
-    displacement: eqx.AbstractVar[Array]
-    slipping: eqx.AbstractVar[Array]
-    slip_work: eqx.AbstractVar[Array]
-    cycles: eqx.AbstractVar[tuple[tuple[int, int, int], ...]]
+    if TYPE_CHECKING:  # fields of the classes that have these figures, in the order they choose
+        tributary: Array
+        force: Array
+        displacement: Array
+        slipping: Array
+        slip_work: Array
+        cycles: tuple[tuple[int, int, int], ...]
 
     @property
     def _last(self) -> tuple[int, int, int]:

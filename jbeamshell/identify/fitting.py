@@ -162,7 +162,8 @@ def fit(
         of_strip = isinstance(specimens[0].scene, Scene)
         max_iterations = MAX_ITERATIONS if of_strip else OF_LAWS * MAX_ITERATIONS
     require_count("max_iterations", max_iterations, 1)
-    parameters = as_parameters(free or free_of(specimens))
+    chosen = not isinstance(free, list | tuple) or len(free) > 0
+    parameters = as_parameters(free if chosen else free_of(specimens))
     doubts = inspected(specimens, [parameter.key for parameter in parameters], unchecked)
     parameters = with_starts(parameters, specimens)
     space, scenes = search_space(parameters, {one.label: one.scene for one in specimens})

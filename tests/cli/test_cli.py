@@ -178,7 +178,8 @@ def test_options_that_messages_name_exist():
     known = {option for command in commands for option in command._option_string_actions}
     named = set()
     for file in (ROOT / "jbeamshell").rglob("*.py"):
-        if file.name not in ("jax_options.py", "text_tables.py"):  # of XLA, and a missing number
+        # Options of XLA and of pythonfmu, and a missing number.
+        if file.name not in ("jax_options.py", "fmu.py", "text_tables.py"):
             named |= set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", file.read_text("utf-8")))
     assert {"--drift", "--reverse", "--column", "--unit"} <= named
     assert named <= known | {"--version"}

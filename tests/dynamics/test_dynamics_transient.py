@@ -114,7 +114,8 @@ def speed_between(motion, signals, places):
     return (places[1] - places[0]) / (times[1] - times[0])
 
 
-@pytest.mark.parametrize("wave", ["axial", pytest.param("shear", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("wave", ["axial", "shear"])
 def test_fronts_run_at_the_speeds_of_waves(wave):
     axial = wave == "axial"
     strip = STRIP.replace(

@@ -128,7 +128,8 @@ def ratios(order, **more):
     return np.asarray(ratio) / list(TRUTH.values())
 
 
-@pytest.mark.parametrize("order", [pytest.param(1, marks=pytest.mark.slow), 3])
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [1, 3])
 def test_the_ladder_climbs_to_elasticity(order):
     np.testing.assert_allclose(ratios(order), LADDER[order], rtol=0.02)
 

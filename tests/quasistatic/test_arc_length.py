@@ -14,6 +14,7 @@ def scene(values):
     return STRIP.replace(SMALL | values)
 
 
+@pytest.mark.slow
 def test_it_goes_over_gross_slip_as_the_displacement_does():
     history = jb.solve(scene(FREE))
     force, displacement = map(np.asarray, (history.force, history.displacement))

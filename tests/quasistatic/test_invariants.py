@@ -98,6 +98,7 @@ def test_displacements_follow_the_force(values):
     assert np.min(moves) > 0.01 * np.ptp(np.asarray(history.displacement)) / FINE
 
 
+@pytest.mark.slow
 @few
 @given(strips)
 def test_the_number_of_load_steps_hardly_matters_and_holding_the_load_not_at_all(values):

@@ -35,7 +35,9 @@ def test_steps_do_not_matter():
     assert error[1] < 2e-3
 
 
-@pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-12), (16.0, 1e-4)])
+@pytest.mark.parametrize(
+    ("smoothing", "drift"), [("sharp", 1e-12), pytest.param(16.0, 1e-4, marks=pytest.mark.slow)]
+)
 @pytest.mark.doubtful("in the corner", "few nodes", "nothing slips")
 def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
     scene = STRIP.replace({"model.nodes": 41, "contact.smoothing": smoothing})
@@ -61,14 +63,20 @@ def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
     assert work < drift * 0.7 * peaks[0]
 
 
-@pytest.mark.parametrize("smoothing", ["sharp", 8.0, 32.0])
+@pytest.mark.parametrize("smoothing", ["sharp", pytest.param(8.0, marks=pytest.mark.slow), 32.0])
 @pytest.mark.doubtful("few nodes")
 def test_smoothing_does_not_change_the_dissipation(smoothing):
     scene = STRIP.replace(SMALL | {"contact.smoothing": smoothing})
     assert float(jb.solve(scene).dissipation_ratio) == pytest.approx(0.7695, abs=2e-3)
 
 
-@pytest.mark.parametrize(("grid", "order"), [("finite-difference", 2.0), ("collocation", 4.0)])
+@pytest.mark.parametrize(
+    ("grid", "order"),
+    [
+        ("finite-difference", 2.0),
+        pytest.param("collocation", 4.0, marks=pytest.mark.slow),
+    ],
+)
 def test_order_of_convergence_in_the_grid(grid, order):
     """A stuck strip on its elastic foundation is smooth: no slip front spoils the order."""
 
