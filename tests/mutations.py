@@ -9,24 +9,21 @@ found it, or nothing.  Faults that were found before are left out, unless --agai
 
 import argparse
 import json
-import multiprocessing
 import os
 import random
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-import pytest
-
 ROOT = Path(__file__).parents[1]
 RECORD = Path(__file__).with_suffix(".json")
 LIST = Path(__file__).with_suffix(".txt")
 LONGEST = 900.0  # seconds after which a fault is found: its tests never end
-# Libraries are loaded before pytest, which would say so.
-OPTIONS = ["-x", "-q", "-p", "no:cacheprovider", "-W", "ignore:Module already imported"]
+OPTIONS = ["-x", "-q", "-p", "no:cacheprovider"]
 
 
 class Fault(NamedTuple):
@@ -79,40 +76,31 @@ def killed(fault: Fault, project: Path) -> str:
     text = place.read_text(encoding="utf-8")
     assert fault.right in text, f"{fault.name}: is not in the file any more"
     place.write_text(text.replace(fault.right, fault.wrong), encoding="utf-8")
-    log = project / "log"
-    child = multiprocessing.get_context("fork").Process(target=_test, args=(fault, project, log))
+    command = [sys.executable, "-m", "pytest", *OPTIONS, *fault.tests]
+    path = {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
-        child.start()
-        child.join(LONGEST)
-        if child.is_alive():
-            child.kill()
-            return "never ends"
+        done = subprocess.run(
+            command,
+            cwd=project,
+            env=os.environ | path,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=LONGEST,
+        )
+    except subprocess.TimeoutExpired:
+        return "never ends"
     finally:
         place.write_text(text, encoding="utf-8")
-    for line in log.read_text(encoding="utf-8").splitlines():
+    for line in done.stdout.splitlines():
         if line.startswith(("FAILED ", "ERROR ")):
             return line.split()[1]
-    assert child.exitcode == 0, log.read_text(encoding="utf-8")
+    assert done.returncode == 0, done.stdout + done.stderr
     return ""
-
-
-def _test(fault: Fault, project: Path, log: Path) -> None:
-    """Run the tests of a fault in a copy of the project; the libraries are loaded already."""
-    os.chdir(project)
-    os.environ |= {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"}
-    sys.dont_write_bytecode = True
-    sys.path[:0] = [str(project)]
-    with log.open("w", encoding="utf-8") as file:
-        for stream in (1, 2):
-            os.dup2(file.fileno(), stream)
-        sys.exit(int(pytest.main([*OPTIONS, *fault.tests])))
 
 
 def main() -> None:
     """Plant the faults, and write the record after each."""
-    import diffrax  # noqa: F401  (once for all faults, as is all that it imports)
-    import matplotlib.pyplot  # noqa: F401
-
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="*", default=[""], help="parts of their names")
     parser.add_argument("--again", action="store_true", help="those that were found before too")
