@@ -66,10 +66,12 @@ def weakest_column(scene: Parts, numbers: Numbers | None = None) -> Column:
     parts = unpressed_parts(scene.contact)
     if load.cycles == 0:
         return none
+    columns = _columns_of_joint(scene, numbers)
+    if not columns and not parts:
+        return none
     bending, shear = _stiffnesses(scene, numbers)
     amplitude = numbers("load.amplitude")
     held = "clamped" if "beta" in FAR_ENDS[scene.strip.far_end] else scene.strip.far_end
-    columns = _columns_of_joint(scene, numbers)
     for start, stop in parts:
         begin, end = np.clip(start, 0.0, length), np.clip(stop, 0.0, length)
         overhangs = end == length
