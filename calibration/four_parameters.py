@@ -41,7 +41,7 @@ PATCHES: dict[str, Any] = {
 
 
 def scenes() -> Iterator[tuple[dict[str, Any], jb.Scene]]:
-    """What a row varies, and its scene."""
+    """Varied numbers of a row, and its scene."""
     for patch, pressure in PATCHES.items():
         scene = jb.Scene().replace({"model.rung": "plane", "contact.pressure": pressure})
         for eta in HEIGHTS:

@@ -57,9 +57,9 @@ def solve(
     scene : scene on a condensed rung; may be traced
     path, cycles : whole path of the scene and its closed cycles, see
         `jbeamshell.scene.load_path.check`
-    by : "events" to walk the path event by event; "factors" to take these alone, where slip zones
-        are nested; "either" to walk where they are not; "near events" to walk while the nodes near
-        the loaded end alone lift off.  Steps of another kind are marked unconverged
+    by : "events" walks any path event by event.  "near events" does so while only nodes near the
+        loaded end lift off, and "factors" needs nested slip zones; both mark other steps
+        unconverged.  "either" takes factors where zones are nested, and events elsewhere
     own : True if the loads are the scene's own cycles, whose turns are always known
 
     Returns

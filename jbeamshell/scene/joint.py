@@ -39,9 +39,6 @@ def check_joint(scene: Parts) -> None:
     require("contact.normal", contact.normal, contact.normal == "rigid", fix)
     fix = "must be 'condensed' or 'plane' in a lap joint: leave it out, or take model.rung = plane"
     require("model.solution", model.solution, model.condensed, fix)
-    double = model.solution != "plane" or strip.length.dtype == np.float64
-    fix = "needs double precision in a lap joint: write jax.config.update('jax_enable_x64', True)"
-    require("model.rung", "plane", double, fix)
     _check_section(strip, member)
     plain = member.layers is None and strip.layers is None
     fix = "is for homogeneous members; take 0"

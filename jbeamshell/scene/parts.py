@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import require
+from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.elements import CONTACT_LINE_FAR_SIZE, FAR_SIZE, ORDER, table_steps
 from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
 from jbeamshell.mechanics.homogeneous import shear_modulus, youngs_modulus
@@ -180,12 +180,20 @@ class Contact(ContactKeys):
 
     @property
     def bolts(self) -> Array | None:
-        """Bolts (k, 3) of X, force and width if the pressure is that of patches, else None."""
+        """Bolts (k, 3) of X, force and width if the pressure is that of patches, else None.
+
+        A traced table of four rows for each patch is taken for one.
+        """
         table = self.pressure
         if table.ndim == 0 or table.shape[0] % 4:
             return None
         rows = table.reshape(-1, 4, 2)
         begin, end = rows[:, 0, 0], rows[:, 3, 0]
+        if not is_traced(table):
+            even = np.asarray(rows)
+            steps = np.all(even[:, ::2, 0] == even[:, 1::2, 0])
+            if not (steps and np.all(even[:, 1, 1] == even[:, 2, 1]) and not even[:, ::3, 1].any()):
+                return None
         width = end - begin
         return jnp.stack([0.5 * (begin + end), rows[:, 1, 1] * width, width], axis=1)
 

@@ -682,3 +682,11 @@ def test_numbers_that_are_traced_are_printed_as_such():
 
     jax.jit(run)(0.2)
     assert "contact.friction             traced" in printed[0]
+
+
+def test_only_patches_of_pressure_are_bolts():
+    bolts = [[0.4, 3.0, 0.2], [1.2, 5.0, 0.3]]
+    scene = Scene().replace({"contact.bolts": bolts})
+    np.testing.assert_allclose(scene.get("contact.bolts"), bolts, rtol=1e-12)
+    step = [[0.0, 30.0], [0.6, 30.0], [0.6, 0.0], [2.0, 0.0]]
+    assert Scene().replace({"contact.pressure": step}).get("contact.bolts") is None
