@@ -25,7 +25,6 @@ from .structure.joint import Joint as Joint
 from .structure.matrices import Attachment as Attachment, Structure as Structure
 from .structure.modal import (
     ModalCurve as ModalCurve,
-    harmonic_balance as harmonic_balance,
     modal_curve as modal_curve,
 )
 from .structure.shaking import (

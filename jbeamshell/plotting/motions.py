@@ -91,7 +91,7 @@ def modal_curve(
 
     Parameters
     ----------
-    curve : result of `jbeamshell.dynamics.modal_curve` or `harmonic_balance`
+    curve : result of `jbeamshell.dynamics.modal_curve` or `nonlinear_mode`
     mass : mass whose root divides the modal displacements, to give those drawn
     label : words of the legend
     axes : two axes; a new figure when not given

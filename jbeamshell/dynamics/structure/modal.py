@@ -6,22 +6,19 @@ the backbone alpha(q) of the mode, Masing's rule gives
 
     omega^2 = alpha/q,      zeta = D/(2 pi alpha q),      D = 8 int_0^q alpha dq - 4 alpha q.
 
-`harmonic_balance` is an independent check: it replaces every joint by the first harmonic of its
-loop (its describing function) and solves the complex eigenproblem at every amplitude.
+`jbeamshell.dynamics.nonlinear_mode` is an independent check, and has the damping of the structure.
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
-import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import UnconvergedError
-from jbeamshell.dynamics.structure.matrices import Structure, dense
+from jbeamshell.dynamics.structure.matrices import Structure
 
 AMPLITUDES = "give rising positive modal displacements"
 MAX_ITERATIONS = 100
@@ -107,62 +104,6 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
         dissipation=loss,
         joints=np.abs(np.array(joints)[pick]),
     )
-
-
-def harmonic_balance(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> ModalCurve:
-    """Frequency and damping of a mode over its amplitude, by harmonic balance with one harmonic.
-
-    The complex eigenproblem has the describing function of every joint at its amplitude.  The
-    damping is that of the joints and of the structure; see `modal_curve` for the parameters.
-
-    Raises
-    ------
-    InputError
-        for amplitudes that are not positive and rising
-    UnconvergedError
-        if the mode does not converge
-    """
-    amplitude = _checked(amplitudes)
-    omega, shapes = structure.modes(mode + 1)
-    matrices = (structure.mass, structure.stiffness, structure.damping)
-    mass, stiffness, damping = map(dense, matrices)
-    directions, shape = structure.directions, shapes[:, mode].astype(complex)
-    value, rows = 1j * omega[mode], []
-    for q in amplitude:
-        for _ in range(MAX_ITERATIONS):
-            u = np.maximum(np.abs(directions.T @ shape) * q, 1e-30)
-            harmonics = [
-                complex(attached.joint.first_harmonic(jnp.asarray(size)))
-                for attached, size in zip(structure.attachments, u, strict=True)
-            ]
-            total = stiffness + (directions * np.array(harmonics)) @ directions.T
-            new, shape = _nearest(mass, damping, total, value, shapes[:, mode])
-            converged, value = abs(new - value) <= 1e-9 * abs(new), new
-            if converged:
-                break
-        else:
-            raise UnconvergedError(
-                f"harmonic balance does not converge at the modal displacement {q:.6g}: give more "
-                "amplitudes below it, or none above"
-            )
-        loss = sum(np.pi * h.imag * size**2 for h, size in zip(harmonics, u, strict=True))
-        rows.append((q, abs(value), -value.real / abs(value), loss, u))
-    q, frequency, zeta, loss, joints = zip(*rows, strict=True)
-    return ModalCurve(*map(np.array, (q, frequency, zeta, loss, joints)))
-
-
-def _nearest(
-    mass: NDArray[Any], damping: NDArray[Any], stiffness: NDArray[Any], value: complex, like: Any
-) -> tuple[complex, NDArray[np.complex128]]:
-    """Eigenvalue of lambda^2 M + lambda C + K nearest to a value, and its shape of unit q."""
-    size = mass.shape[0]
-    zero, one = np.zeros((size, size)), np.eye(size)
-    left = np.block([[zero, one], [-stiffness, -damping]])
-    right = np.block([[one, zero], [zero, mass]])
-    values, vectors = scipy.linalg.eig(left, right)
-    best = int(np.argmin(np.abs(values - value)))
-    shape = vectors[:size, best]
-    return complex(values[best]), shape / (like @ mass @ shape)
 
 
 def _equilibrium(
