@@ -86,6 +86,8 @@ def _beam(scene: Scene) -> SectionForm:
     heights = bottom[:, None] + 0.5 * thickness[:, None] * (1.0 + points)
     shapes = jax.vmap(jax.vmap(lambda height: parts(still, height)))(heights)
     masses = jnp.einsum("l,p,lpai,lpaj->lij", 0.5 * thickness, weights, shapes, shapes)
+    moment = jnp.einsum("l,p,lp,lpi->i", 0.5 * thickness, weights, heights, shapes[:, :, 0])
+    turn = -moment / (2.0 * half_height**3 / 3.0)
 
     pick = np.ix_(active, active)
     return SectionForm(
@@ -93,6 +95,7 @@ def _beam(scene: Scene) -> SectionForm:
         mixed=stiffness[0, :, 1][pick],
         slopes=stiffness[1, :, 1][pick],
         pull=jax.grad(along)(still)[active],
+        turn=turn[active],
         press=parts(still, half_height)[1, active],
         held=held[active],
         further=jnp.eye(still.size, dtype=still.dtype)[2:, active],

@@ -25,6 +25,7 @@ from jbeamshell.mechanics import elements
 from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.numerics.factors import solve
 from jbeamshell.scene.keys import FAR_ENDS
+from jbeamshell.scene.parts import Load
 from jbeamshell.scene.scene import Scene
 
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
@@ -127,9 +128,18 @@ def _members(scene: Scene, form: SectionForm, x: Array, down: Array, up: Array) 
     strip, member = scene.strip, scene.member
     below = section_form(scene.of_member())
     return [
-        upper_member(form, x, strip.overhang, down, strip.loaded_end == "guided"),
+        upper_member(
+            loaded(form, scene.load), x, strip.overhang, down, strip.loaded_end == "guided"
+        ),
         lower_member(below, x, member.overhang, up, member.support == "clamped"),
     ]
+
+
+def loaded(form: SectionForm, load: Load) -> SectionForm:
+    """Form of a section whose end is loaded by a moment, or by a force away from mid-height."""
+    if load.kind == "moment":
+        return form._replace(pull=form.turn)
+    return form if load.arm is None else form._replace(pull=form.pull - load.arm * form.turn)
 
 
 def pressing(scene: Scene, x: Array) -> tuple[Array, Array]:

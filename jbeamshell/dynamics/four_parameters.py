@@ -88,6 +88,8 @@ def four_parameters(scene: Scene, *, width: float = 1.0) -> FourParameters:
     require_number("width", width)
     force = scene.load.control == "force"
     require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
+    fix = "must be 'force': a moment has no gross slip"
+    require("load.kind", scene.load.kind, scene.load.kind == "force", fix)
     limit = float(gross_slip(scene))
     slips = limit > 0.0 and scene.contact.normal != "none"
     fix = "must have gross slip: give it friction and contact"

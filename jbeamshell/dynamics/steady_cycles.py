@@ -48,7 +48,12 @@ class SteadyCycles(NamedTuple):
 
 
 def gross_slip(scene: Scene) -> Any:
-    """End force per width at which the whole contact slips, mu F_N L; may be traced."""
+    """End force per width at which the whole contact slips, mu F_N L; may be traced.
+
+    Infinite for a moment, under which nothing slides off.
+    """
+    if scene.load.kind == "moment":
+        return np.inf
     contact, length = scene.contact, scene.strip.length
     down, _ = resultant(contact.pressure, contact.bottom_pressure, length, scene.member.support)
     return contact.friction * down

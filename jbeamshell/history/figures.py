@@ -33,9 +33,12 @@ class CycleFigures(Record, LoopFigures):
     def dissipation_ratio(self) -> Array:
         """Dissipation over that of the one-dimensional bar, (2/3) A^3/(E'2H q) (Goodman 1959).
 
-        That of a lap joint is over two bars', see `jbeamshell.mechanics.bar.lap_cubic_law`.
+        That of a lap joint is over two bars', see `jbeamshell.mechanics.bar.lap_cubic_law`.  NaN
+        under a moment, which no bar takes.
         """
         scene, force = self.scene, self.loop[0]
+        if scene.load.kind == "moment":
+            return jnp.full_like(self.dissipation, jnp.nan)
         stiffness, friction = scene.strip.stretching_stiffness, self.friction_per_length
         amplitude = 0.5 * (jnp.max(force) - jnp.min(force))
         if scene.member.support == "none":

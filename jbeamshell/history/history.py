@@ -101,6 +101,8 @@ class History(Profiles, ContactLine, CycleFigures):
     def _summary(self) -> Summary:
         strip, control = self.scene.strip, self.scene.load.control
         driver = self.force if control == "force" else self.displacement
+        if self.scene.load.kind == "moment":
+            control = "moment" if control == "force" else "rotation"
         what = f"{control} amplitude {float(jnp.max(jnp.abs(driver))):.4g}"
         if not self.cycles and not jnp.any(driver):
             what = f"pressed by {float(jnp.sum(self.load)):.4g}"
@@ -163,7 +165,7 @@ class History(Profiles, ContactLine, CycleFigures):
         """Draw force over displacement; returns the axes."""
         from jbeamshell import plotting
 
-        return plotting.loop(self, axes)
+        return plotting.loop(self, axes, moment=self.scene.load.kind == "moment")
 
     def plot_profiles(self, steps: Any = None, axes: Any = None) -> Any:
         """Draw slip, rotation, traction and reaction along X at chosen steps; returns the axes."""

@@ -141,7 +141,7 @@ def slider_error(cycle: SlipCycle) -> Array:
     reach = stiffness * numbers.ptp(cycle.v, axis=0)
     elastic = numbers.minimum(2.0 * held / numbers.where(reach > 0.0, reach, 1.0), 1.0)
     let_go = numbers.sum(held * numbers.where(reach > 0.0, elastic, 1.0))
-    load = 0.5 * numbers.ptp(numbers.sum(force, axis=1))
+    load = 0.5 * numbers.max(numbers.sum(numbers.abs(force - force[0]), axis=1))
     error = RESTING * let_go / numbers.where(load > 0.0, load, 1.0)
     return numbers.where(elastic_slip & (load > 0.0), error, 0.0)
 

@@ -110,6 +110,7 @@ def layered_form(material: Material) -> SectionForm:
         mixed=mixed_form[pick],
         slopes=slopes[pick],
         pull=along(mean),
+        turn=along(turning),
         press=across(top),
         held=np.append(np.ones(size, bool), np.zeros(size, bool))[place],
         further=jnp.stack([along(turning), across(squeeze) / edges[-1]]),

@@ -25,6 +25,7 @@ class SectionForm(NamedTuple):
     ----------
     values, mixed, slopes : (m, m) blocks of S for (q, q), (q, q') and (q', q')
     pull : (m,) parts of the fields in the displacement along X that the end load moves through
+    turn : (m,) parts of the fields in the mean rotation, which an end moment moves through
     press : (m,) parts of the fields in the lift of the top face
     held : (m,) True for fields that are zero at a held far end
     further : (k, m) parts of the fields in those that a history has beside v and w: the rotation
@@ -42,6 +43,7 @@ class SectionForm(NamedTuple):
     mixed: Array
     slopes: Array
     pull: Array
+    turn: Array
     press: Array
     held: np.ndarray
     further: Array
@@ -93,6 +95,7 @@ def on_symmetry_plane(form: SectionForm) -> SectionForm:
         mixed=within(form.mixed),
         slopes=within(form.slopes),
         pull=fields.T @ form.pull,
+        turn=fields.T @ form.turn,
         press=jnp.zeros_like(others),
         held=form.held[kept],
         further=form.further @ fields,

@@ -18,15 +18,17 @@ from jbeamshell.plotting.style import (
     DISPLACEMENT,
     FAINT,
     FORCE,
+    MOMENT,
     PALETTE,
     POSITION,
+    ROTATION,
     colours,
     single,
     style,
 )
 
 
-def loop(history: LoopPath, axes: Axes | None = None) -> Axes:
+def loop(history: LoopPath, axes: Axes | None = None, *, moment: bool = False) -> Axes:
     """Draw end force over end displacement, with the last closed cycle emphasised.
 
     Parameters
@@ -35,6 +37,8 @@ def loop(history: LoopPath, axes: Axes | None = None) -> Axes:
         Solved load path, such as a `jbeamshell.History`.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
+    moment : bool
+        True if the load is a moment, and its displacement a rotation.
 
     Returns
     -------
@@ -54,7 +58,8 @@ def loop(history: LoopPath, axes: Axes | None = None) -> Axes:
         if closed:
             force, displacement = map(np.asarray, history.loop)
             axes.plot(displacement, force, color=PALETTE[0], linewidth=2.0, label="last cycle")
-        axes.set(xlabel=DISPLACEMENT, ylabel=FORCE)
+        labels = (ROTATION, MOMENT) if moment else (DISPLACEMENT, FORCE)
+        axes.set(xlabel=labels[0], ylabel=labels[1])
         axes.legend(loc="upper left")
     return axes
 

@@ -58,6 +58,8 @@ DOTS: dict[str, Any] = {
 FEW = 4  # marks of an axis, at most, whose labels are long
 FORCE = form.FORCE.label
 DISPLACEMENT = form.DISPLACEMENT.label
+MOMENT = "$M$  [force length/width]"
+ROTATION = "rotation of the end  [rad]"
 POSITION = form.POSITION.label
 SQUEEZE = form.SQUEEZE_STRESS.label
 

@@ -244,4 +244,4 @@ def _symbol(key: str | None) -> str:
 
 def _label(key: str, result: SweptFigures) -> str:
     """Label of an axis: symbol and unit of a key."""
-    return f"{_symbol(key)}  [{unit_of(key, result.scene.load.control)}]"
+    return f"{_symbol(key)}  [{unit_of(key, result.scene.load)}]"

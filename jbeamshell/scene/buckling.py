@@ -14,7 +14,7 @@ import numpy as np
 from jbeamshell.mechanics.homogeneous import shear_coefficient, shear_modulus
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import FAR_ENDS
-from jbeamshell.scene.linearisation import Parts, stretching
+from jbeamshell.scene.linearisation import Parts, pull, stretching
 from jbeamshell.scene.parts import Contact
 from jbeamshell.scene.pressure import face_resultant, is_table
 
@@ -70,7 +70,7 @@ def weakest_column(scene: Parts, numbers: Numbers | None = None) -> Column:
     if not columns and not parts:
         return none
     bending, shear = _stiffnesses(scene, numbers)
-    amplitude = numbers("load.amplitude")
+    amplitude = pull(load, numbers("load.amplitude"))
     held = "clamped" if "beta" in FAR_ENDS[scene.strip.far_end] else scene.strip.far_end
     for start, stop in parts:
         begin, end = np.clip(start, 0.0, length), np.clip(stop, 0.0, length)
@@ -132,7 +132,7 @@ def _columns_of_joint(scene: Parts, numbers: Numbers) -> list[Column]:
         run = np.where(end > begin, end - begin, np.nan)
         euler = factor * np.pi**2 * bending / run**2
         limit = np.where(end > begin, 1.0 / (1.0 / euler + 1.0 / shear), np.inf)
-        force = numbers("load.amplitude")
+        force = pull(load, numbers("load.amplitude"))
         if load.control != "force":
             force = force * along / length
         found.append(Column(*np.broadcast_arrays(begin, end, force, limit)))

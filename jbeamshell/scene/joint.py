@@ -9,7 +9,7 @@ import numpy as np
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.homogeneous import Energy
 from jbeamshell.scene.layers import check_layers
-from jbeamshell.scene.parts import Contact, Member, Model, Strip
+from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
 from jbeamshell.scene.pressure import pressure_values
 from jbeamshell.scene.rows import rows
 
@@ -19,6 +19,7 @@ class Parts(Protocol):
 
     strip: Strip
     contact: Contact
+    load: Load
     model: Model
     member: Member
     energy: Energy | None
@@ -40,6 +41,9 @@ def check_joint(scene: Parts) -> None:
     fix = "must be 'condensed' or 'plane' in a lap joint: leave it out, or take model.rung = plane"
     require("model.solution", model.solution, model.condensed, fix)
     _check_section(strip, member)
+    load = scene.load
+    fix = "is for a force: leave it out with load.kind = moment"
+    require("load.arm", load.arm, load.arm is None or load.kind == "force", fix)
     plain = member.layers is None and strip.layers is None
     fix = "is for homogeneous members; take 0"
     require("model.order", model.order, model.order == 0 or plain, fix)
@@ -79,6 +83,11 @@ def _check_alone(scene: Parts) -> None:
     fix = "needs a second member: leave it out, or give member.support (a curved strip on a rigid "
     fix += "base has strip.curvature)"
     require("contact.gap", scene.contact.gap, scene.contact.gap is None, fix)
+    load = scene.load
+    fix = "needs a second member: take 'force', or give member.support"
+    require("load.kind", load.kind, load.kind == "force", fix)
+    fix = "needs a second member: leave it out, or give member.support"
+    require("load.arm", load.arm, load.arm is None, fix)
     stiffness = scene.contact.bolt_stiffness
     fix = "needs a second member: leave it out, or give member.support"
     require("contact.bolt_stiffness", stiffness, stiffness is None, fix)

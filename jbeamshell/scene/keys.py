@@ -26,6 +26,7 @@ FAR_ENDS = {"held": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held 
 CONTROLS = ("force", "displacement")
 ARC_LENGTH = "arc-length"
 LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
+LOAD_KINDS = ("force", "moment")
 ASSEMBLIES = ("frictionless", "frictional")
 NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
@@ -182,6 +183,20 @@ class LoadKeys(Part):
         (*CONTROLS, ARC_LENGTH),
         "Controlled quantity: force (F), displacement (u at X = L) or arc-length (along the path "
         "of u and F L/(E' 2H)).",
+    )
+    kind: str = word(
+        "force",
+        LOAD_KINDS,
+        "What acts on the end: a force F along X, or a moment M (lap joints only).  A moment opens "
+        "the joint if positive; u is then the rotation of the end, and F is M.",
+    )
+    arm: Array | None = number(
+        None,
+        "Height above mid-height at which the force acts, and at which u is taken (lap joints "
+        "only); none is mid-height.",
+        unit="length",
+        low=-math.inf,
+        scale="linear",
     )
     amplitude: Array = number(
         0.7855,
@@ -370,6 +385,11 @@ def check_key(key: str) -> None:
         raise InputError(f"unknown key {key!r}: {hint}")
 
 
-def unit_of(key: str, control: str) -> str:
+def unit_of(key: str, load: LoadKeys) -> str:
     """Unit of a number of the scene; that of the amplitude depends on what is controlled."""
-    return "length" if key == "load.amplitude" and control in LENGTHS else TABLE[key].unit
+    if key != "load.amplitude":
+        return TABLE[key].unit
+    turns = load.kind == "moment"
+    if load.control in LENGTHS:
+        return "rad" if turns else "length"
+    return "force length/width" if turns else TABLE[key].unit

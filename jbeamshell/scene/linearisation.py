@@ -100,7 +100,7 @@ def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> 
     amplitude, pressure = numbers("load.amplitude"), numbers("contact.pressure")
     pressure = np.max(pressure[:, 1]) if is_table(pressure) else pressure
     limit = numbers("contact.friction") * pressure
-    force = amplitude
+    force = pull(load, amplitude)
     if load.control == "displacement":
         force = bar_force(amplitude, stiffness, limit)
     slip = np.where(limit > 0.0, np.minimum(length, force / limit), length)  # else all of it slips
@@ -111,6 +111,11 @@ def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> 
     pressed = 2.0 * height * pressure / stiffness
     constants = SECTIONS if elastic else BEAMSHELL
     return bound(pressed, slip / height, limit / pressure, softness, constants)
+
+
+def pull(load: Load, amplitude: np.ndarray) -> np.ndarray:
+    """Largest force along X under an amplitude of the load: a moment has none."""
+    return amplitude if load.kind == "force" else 0.0 * amplitude
 
 
 def stretching(strip: Strip, numbers: Numbers) -> np.ndarray:

@@ -92,7 +92,7 @@ def _below_gross_slip(scene: Scene, targets: Array, pressures: Array) -> Array:
     """Forces of a traced path, NaN from gross slip on, where no step finds an equilibrium."""
     contact, support = scene.contact, scene.member.support
     force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length, support)
-    if contact.bolt_stiffness is not None:  # bolts hold a joint beyond
+    if contact.bolt_stiffness is not None or scene.load.kind == "moment":  # nothing slides off
         return targets
     below = stays_below(jnp.abs(targets), contact.friction * force, pressures)
     return jnp.where(below, targets, jnp.nan)

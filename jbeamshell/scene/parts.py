@@ -229,9 +229,11 @@ class Load(LoadKeys):
 
     def __post_init__(self) -> None:
         TABLE["load.control"].check(self.control)
+        TABLE["load.kind"].check(self.kind)
         if self.amplitude is None:
-            fix = f"give the amplitude under {self.control} control"
-            known = self.control == "force" or self.cycles == 0
+            turns = " of a moment" if self.kind == "moment" else ""
+            fix = f"give the amplitude{turns} under {self.control} control"
+            known = (self.control, self.kind) == ("force", "force") or self.cycles == 0
             require("load.amplitude", None, known, fix)
             self.amplitude = TABLE["load.amplitude"].default
         super().__post_init__()

@@ -306,9 +306,10 @@ class Scene(Tree):
             contact.setdefault("bottom_pressure", contact["pressure"] if both else 0.0)
         if "law" in contact or "smoothing" in contact:
             contact["law"] = _make_law(self.contact.law, contact)
-        # An amplitude of another control has another unit: it must be given anew.
-        if parts["load"].get("control", self.load.control) != self.load.control:
-            parts["load"].setdefault("amplitude", None)
+        # An amplitude of another control or kind has another unit: it must be given anew.
+        for word in ("control", "kind"):
+            if parts["load"].get(word, getattr(self.load, word)) != getattr(self.load, word):
+                parts["load"].setdefault("amplitude", None)
         fresh = {
             section: getattr(self, section).changed(**changes) if changes else None
             for section, changes in parts.items()

@@ -36,7 +36,7 @@ def summary(scene: Parts, own_energy: bool) -> Summary:
         value = law_name(value) if name == "contact.law" else value
         if value is None or not (name in ALWAYS or _differs(value, key.default)):
             continue
-        unit = unit_of(name, scene.load.control) if key.kind == "number" else ""
+        unit = unit_of(name, scene.load) if key.kind == "number" else ""
         rows.append((name, _shown(value) + (f"  [{unit}]" if unit not in ("", "1") else "")))
     own = " with a strain energy of its own" * own_energy
     fields = " ".join(scene.model.fields)

@@ -21,8 +21,9 @@ from jbeamshell.scene.scene import Scene, check_word
 
 def scene_from_values(values: Mapping[str, Any]) -> Scene:
     """Scene from dotted keys on top of the standard strip."""
-    if values.get("load.control") in LENGTHS and "load.amplitude" not in values:
-        return Scene(load=Load(values["load.control"]))  # raises: the amplitude is missing
+    control, kind = values.get("load.control", "force"), values.get("load.kind", "force")
+    if (control in LENGTHS or kind == "moment") and "load.amplitude" not in values:
+        return Scene(load=Load(control, kind))  # raises: the amplitude is missing
     return Scene().replace(values)
 
 

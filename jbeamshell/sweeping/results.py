@@ -159,7 +159,7 @@ class Sweep:
 
             result.to_xarray()["dissipation"].sel({"load.amplitude": 0.8}, method="nearest").plot()
         """
-        xarray, control = _library("xarray"), self.scene.load.control
+        xarray, load = _library("xarray"), self.scene.load
         dims = ["lane"] if self.paired else list(self.axes)
         variables: dict[str, Any] = {
             name: (dims, values, {"units": UNITS[name]} if name in UNITS else {})
@@ -169,7 +169,7 @@ class Sweep:
         flags = {"flag_values": np.array(Outcome, np.int8), "flag_meanings": words}
         variables |= {"status": (dims, self.status, flags), "doubtful": (dims, self.doubtful)}
         kept = {
-            key: ("lane" if self.paired else key, values, {"units": unit_of(key, control)})
+            key: ("lane" if self.paired else key, values, {"units": unit_of(key, load)})
             for key, values in self.axes.items()
         }
         try:

@@ -11,6 +11,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell.condensed import strip
 from jbeamshell.condensed.strip import stations
+from jbeamshell.dynamics import Joint
 from jbeamshell.mechanics.bar import lap_backbone, lap_cubic_law
 from jbeamshell.scene import library
 
@@ -175,6 +176,55 @@ def test_shanks_hold_a_joint_beyond_gross_slip():
     assert float(jnp.max(jnp.abs(history.energy_imbalance))) < 1e-5 * float(history.dissipation)
 
 
+def moments(amplitude, **values):
+    """Single lap under a moment on its end."""
+    values = {"load.kind": "moment", "load.amplitude": amplitude} | values
+    return library.single_lap().replace(values)
+
+
+class TestMoments:
+    @pytest.mark.parametrize("rung", ["squeeze", "p3", "plane"])
+    def test_an_arm_adds_the_rotation_of_the_end(self, rung):
+        scene = library.single_lap().replace({"model.rung": rung, "model.nodes": 25})
+
+        def compliance(values):
+            return float(strip.condensed(scene.replace(values), 25).body.c)
+
+        middle, above, below = (compliance({"load.arm": arm}) for arm in (0.0, 0.1, -0.1))
+        turning = compliance({"load.kind": "moment", "load.amplitude": 1.0})
+        assert above - 2.0 * middle + below == pytest.approx(2.0 * 0.1**2 * turning, rel=1e-9)
+
+    @pytest.mark.slow
+    def test_stuck_thin_members_bend_as_one_beam(self):
+        errors = []
+        for eta in (0.01, 0.005, 0.0025):
+            values = {"strip.height_ratio": eta, "contact.friction": 5.0, "model.rung": "squeeze"}
+            values |= {"contact.pressure": 10.0, "contact.bottom_pressure": 10.0}
+            scene = moments(1e-4, **values, **{"strip.loaded_end": "free"})
+            history = jb.solve(scene, throw=False)
+            stiffness = 3.4e4 / (2.0 * eta) * (4.0 * eta) ** 3 / 12.0
+            turned = float(history.peak_displacement) * stiffness / (1e-4 * 2.0)
+            errors.append(turned - 1.0)
+        ratios = np.array(errors[:-1]) / errors[1:]
+        np.testing.assert_allclose(ratios, 2.0, rtol=0.05)  # the end is softer by some heights
+
+    @pytest.mark.slow
+    def test_a_moment_opens_the_joint_and_dissipates(self):
+        history = jb.solve(moments(1.0, **{"load.steps_per_half_cycle": 400}))
+        loop, work = float(history.dissipation_loop), float(history.dissipation)
+        assert loop == pytest.approx(work, rel=1e-3)
+        assert work > 0.0
+        turn, stop = history.cycles[-1][1:]
+        open_ends = [float(history.x[history.touching[at]][-1]) for at in (turn, stop)]
+        assert open_ends[1] < open_ends[0]  # a positive moment opens
+        assert history.plot().get_xlabel() == "rotation of the end  [rad]"
+        joint = Joint.of(moments(0.3))
+        assert np.isinf(joint.capacity)
+        assert float(joint.dissipation(joint.displacement[-1])) == pytest.approx(
+            float(jb.solve(moments(0.3)).dissipation), rel=0.02
+        )
+
+
 BEND = [[0.0, 0.0], [1.0, 2e-5], [2.0, 8e-5]]  # of a member that is curved
 
 
@@ -289,6 +339,9 @@ def test_a_sweep_runs_over_both_heights():
         ({"load.amplitude": 2.5}, "gross slip"),
         ({"member.support": "none", "strip.overhang": 0.1}, "give member.support"),
         ({"member.support": "none", "contact.bolt_stiffness": 1e3}, "give member.support"),
+        ({"member.support": "none", "load.arm": 0.1}, "load.arm = 0.1: needs a second member"),
+        ({"load.kind": "moment"}, "give the amplitude of a moment under force control"),
+        ({"load.kind": "moment", "load.amplitude": 1.0, "load.arm": 0.1}, "load.arm"),
     ],
 )
 def test_what_is_no_joint_is_refused(values, said):

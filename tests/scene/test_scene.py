@@ -34,9 +34,9 @@ LIFTING = ["v", "w", "beta", "psi"]
 
 positive = st.floats(1e-90, 1e90)
 OF_JOINT = {key for key in KEYS if key.startswith("member.")}
-OF_JOINT |= {"strip.overhang", "contact.gap", "contact.bolt_stiffness"}
+OF_JOINT |= {"strip.overhang", "contact.gap", "contact.bolt_stiffness", "load.kind", "load.arm"}
 OPTIONAL = {"strip.axial_stiffness", "strip.poisson_ratio", "strip.layers", "strip.curvature"}
-OPTIONAL |= OF_JOINT - {"member.support"}
+OPTIONAL |= OF_JOINT - {"member.support", "load.kind"}
 JOINT = {"member.support": "rolling", "strip.far_end": "free", "model.rung": "plane"}
 
 
@@ -107,6 +107,7 @@ def values_of_all_keys(draw):
             "contact.normal_stiffness": draw(positive),
             "member.support": "none",
             "load.control": draw(st.sampled_from(["force", "displacement"])),
+            "load.kind": "force",
             "load.amplitude": draw(positive),
             "load.cycles": cycles,
             "load.steps_per_half_cycle": 2 * draw(st.integers(1, 1000)),
