@@ -96,7 +96,8 @@ def four_parameters(scene: Scene, *, width: float = 1.0) -> FourParameters:
     require("contact.friction", scene.contact.friction, slips, fix)
     sizes = limit * np.array([LITTLE, *FRACTIONS])
     cycles = SteadyCycles.of(scene, sizes)
-    f, u, d = width * sizes, cycles.displacement, width * cycles.dissipation
+    u, d = np.asarray(cycles.displacement), width * np.asarray(cycles.dissipation)
+    f = width * sizes
     stiffest = float(np.max(f / u))
     felt = d > LEAST * f * u
     felt[0] = False

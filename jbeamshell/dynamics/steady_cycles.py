@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
+from jax import Array
+from jax.typing import ArrayLike
 
+from jbeamshell.common.checks import is_traced
+from jbeamshell.common.errors import Status
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
@@ -24,27 +28,30 @@ class SteadyCycles(NamedTuple):
     dissipation : (k,) work of friction in a cycle
     """
 
-    force: NDArray[np.float64]
-    displacement: NDArray[np.float64]
-    dissipation: NDArray[np.float64]
+    force: Array
+    displacement: Array
+    dissipation: Array
 
     @classmethod
-    def of(cls, scene: Scene, forces: NDArray[np.float64]) -> SteadyCycles:
-        """Cycles of rising amplitude, one after the other.
+    def of(cls, scene: Scene, forces: ArrayLike) -> SteadyCycles:
+        """Cycles of rising amplitude, one after the other; NaN where traced ones do not converge.
 
         Raises
         ------
         UnconvergedError
             if a load step has no equilibrium
         """
-        history = solve(scene, np.outer(forces, CYCLE).ravel())
-        size = forces.size * CYCLE.size
+        throw = not is_traced(scene, forces, jnp.zeros(()))
+        levels = jnp.asarray(forces)
+        history = solve(scene, (levels[:, None] * CYCLE).ravel(), throw=throw)
+        size = levels.size * CYCLE.size
         u, work = (
-            np.asarray(each)[-size:].reshape(forces.size, -1)
+            each[-size:].reshape(levels.size, -1)
             for each in (history.displacement, history.slip_work)
         )
-        half = 0.5 * np.abs(u[:, -1] - u[:, -2])
-        return cls(forces, half, np.sum(work[:, -2:], axis=1))
+        sound = jnp.where(jnp.all(history.status == Status.CONVERGED), 1.0, jnp.nan)
+        half = 0.5 * jnp.abs(u[:, -1] - u[:, -2])
+        return cls(levels, sound * half, sound * jnp.sum(work[:, -2:], axis=1))
 
 
 def gross_slip(scene: Scene) -> Any:

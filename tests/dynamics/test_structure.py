@@ -73,21 +73,46 @@ class TestJoint:
         np.testing.assert_allclose(joint.displacement, mean, rtol=1e-12)
         np.testing.assert_allclose(joint.stiffness * joint.network.body.c, 3.0, rtol=1e-6)
 
-    def test_its_dissipation_has_derivatives_to_the_scene(self):
-        keys = ("contact.friction", "strip.height_ratio")
+    def test_a_spring_in_series_adds_its_displacement(self):
+        springy = JOINT.in_series(2.0)
+        force = jnp.array([0.1, 0.5, 0.9])
+        u = jnp.interp(force, JOINT.force, JOINT.displacement)
+        np.testing.assert_allclose(springy.backbone(u + force / 2.0), force, rtol=1e-9)
+        loss = JOINT.dissipation(u)
+        np.testing.assert_allclose(springy.dissipation(u + force / 2.0), loss, rtol=1e-9)
+        assert float(springy.stiffness) == pytest.approx(1.0 / (1.0 / float(JOINT.stiffness) + 0.5))
+
+    def test_energy_per_cycle_is_masings(self):
+        u = np.linspace(0.01, 5.0, 30)
+        fine = np.linspace(0.0, 1.0, 20001)
+        work = np.array([np.trapezoid(np.asarray(JOINT.backbone(x * fine)), x * fine) for x in u])
+        loss = 8.0 * work - 4.0 * u * np.asarray(JOINT.backbone(u))
+        np.testing.assert_allclose(JOINT.dissipation(u), loss, rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(JOINT.work(-u), work, rtol=1e-6)
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("name", ["lap", "stepwise-bar"])
+    def test_steady_cycles_have_derivatives_to_the_scene(self, name):
+        values = {"model.rung": name, "model.nodes": 41}
+        if name == "lap":
+            scene = jb.library.double_shear().replace(values | {"model.rung": "squeeze"})
+        else:
+            scene = jb.Scene().replace(values)
+        plain = Joint.of(scene, 0.8)
+        u = 0.93 * plain.displacement[-1]
 
         @jax.jit
-        def loss(values):
-            scene = PLANE.replace(dict(zip(keys, values, strict=True)))
-            return 1e5 * Joint.of(scene, 1.2).dissipation(1.5e-5)
+        def loss(mu):
+            joint = Joint.of(scene.replace({"contact.friction": mu}), 0.8)
+            return joint.dissipation(u) / plain.dissipation(u)
 
-        at, way = jnp.array([0.1, 0.1126]), jnp.array([0.02, 0.01])
-        value, slope = loss(at), jax.jit(jax.grad(loss))(at) @ way
-        plain = Joint.of(PLANE, 1.2).dissipation(1.5e-5)
-        assert float(value) == pytest.approx(1e5 * float(plain), rel=1e-10)
-        steps = 0.02 * 0.5 ** np.arange(4)
-        left = [abs(float(loss(at + h * way) - value - h * slope)) for h in steps]
-        assert np.allclose(np.diff(np.log2(left)), -2.0, atol=0.1)
+        mu = float(scene.contact.friction)
+        value, slope = loss(mu), jax.jit(jax.grad(loss))(mu)
+        assert float(value) == pytest.approx(1.0, rel=1e-9)
+        h = 1e-5 * mu  # below the next event of the piecewise line
+        assert float(slope) == pytest.approx(
+            float(loss(mu + h) - loss(mu - h)) / (2.0 * h), rel=1e-4
+        )
 
     def test_a_bar_of_load_steps_has_goodmans_energy(self):
         bar = STRIP.replace({"model.rung": "stepwise-bar", "model.nodes": 101})
@@ -131,6 +156,43 @@ class TestModes:
         curve = modal_curve(chain(), [1e-4, 1e-3])
         assert np.allclose(curve.frequency, chain().modes()[0][0], rtol=1e-9)
         assert np.all(curve.damping < 1e-9)
+
+    @pytest.mark.parametrize("ratio", [0.02, [0.01, 0.03]])
+    def test_small_motion_has_the_damping_of_the_structure(self, ratio):
+        small = [1e-4, 1e-3]
+        plain = chain()
+        damped = Structure(plain.mass, plain.stiffness, plain.attachments, damping_ratio=ratio)
+        as_matrix = Structure(plain.mass, plain.stiffness, plain.attachments, damped.damping)
+        for mode, zeta in enumerate(np.broadcast_to(ratio, 2)):
+            for structure in (damped, as_matrix):
+                assert np.allclose(modal_curve(structure, small, mode).damping, zeta, rtol=1e-9)
+        more = modal_curve(damped, [1.0]).damping - modal_curve(plain, [1.0]).damping
+        slower = modal_curve(plain, small[:1]).frequency / modal_curve(plain, [1.0]).frequency
+        assert np.allclose(more, np.ravel(ratio)[0] * slower)
+
+    def test_they_have_derivatives_to_every_number(self):
+        """Of scene and joint, mass, stiffness and damping, in a jit of its own."""
+        strip = PLANE.replace({"model.nodes": 17})
+
+        @jax.jit
+        @jax.value_and_grad
+        def curve(values):
+            mu, eta, width, series, mass, spring, ratio = values
+            scene = strip.replace({"contact.friction": mu, "strip.height_ratio": eta})
+            joint = Joint.of(scene, 1.2, width=width).in_series(1e5 * series)
+            masses = mass * jnp.array([[1.0, 0.0], [0.0, 0.3]])
+            springs = 1e5 * spring * jnp.array([[1.0, -1.0], [-1.0, 1.5]])
+            attached = [Attachment(joint, 0)]
+            structure = Structure(masses, springs, attached, damping_ratio=ratio)
+            found = modal_curve(structure, [1e-5, 2.3e-5])
+            return jnp.sum(100.0 * found.damping + found.frequency / 500.0)
+
+        at = jnp.array([0.1, 0.1126, 1.0, 2.0, 1.0, 1.0, 0.01])
+        way = at * jnp.array([0.1, -0.05, 0.07, 0.1, 0.03, -0.1, 0.1])
+        value, slope = curve(at)
+        steps = 0.02 * 0.5 ** np.arange(4)
+        left = [abs(float(curve(at + h * way)[0] - value - h * slope @ way)) for h in steps]
+        assert np.allclose(np.diff(np.log2(left)), -2.0, atol=0.1)
 
 
 @pytest.fixture(scope="module")
@@ -215,6 +277,16 @@ REFUSED = {
     "complex": (lambda: Structure(many(1.0), many(1.0 + 1.0j)), "stiffness.*real"),
     "complex dense": (lambda: Structure(np.eye(1), [[1.0 + 1.0j]]), "stiffness.*real"),
     "feeding": (lambda: Structure(many(1.0), many(1.0), damping=many(-1.0)), "damping.*negative"),
+    "ratio": (lambda: Structure(np.eye(1), np.eye(1), damping_ratio=-0.1), "damping_ratio = -0.1"),
+    "ratios": (lambda: Structure(np.eye(1), np.eye(1), damping_ratio=[0.1] * 2), "damping_ratio"),
+    "large": (lambda: Structure(many(1.0), many(1.0), damping_ratio=0.1).damping, "give damping="),
+    "traced large": (
+        lambda: jax.jit(lambda r: Structure(many(1.0), many(1.0), damping_ratio=r).size)(0.1),
+        "reduce the structure",
+    ),
+    "no joints": (lambda: modal_curve(Structure(np.eye(1), np.eye(1)), [1.0]), "give a joint"),
+    "series": (lambda: JOINT.in_series(-1.0), "series stiffness = -1.0"),
+    "sliders": (lambda: Joint.of(STRIP, 1.0, by="sliders"), "by = 'sliders'"),
     "nowhere": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 1)]), "attachments"),
     "to itself": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 0, 0)]), "attachm"),
     "stiffening": (lambda: Joint([1.0, 2.0], [1.0, 3.0]), "softening"),
@@ -228,7 +300,7 @@ REFUSED = {
         lambda: jax.jit(
             lambda mu: Joint.of(STRIP.replace({"model.rung": "bar", "contact.friction": mu}), 0.1)
         )(0.2),
-        "scene = 'traced'.*plane",
+        "model.solution = 'closed-form'.*stepwise",
     ),
     "path beyond gross slip": (
         lambda: Joint.of(PLANE, 1.0).path_forces([1e-2]),

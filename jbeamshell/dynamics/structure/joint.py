@@ -27,6 +27,7 @@ from jbeamshell.common.checks import (
     as_leaf,
     is_traced,
     require,
+    require_choice,
     require_number,
 )
 from jbeamshell.common.errors import DoubtfulWarning
@@ -55,7 +56,8 @@ from jbeamshell.scene.scene import Scene
 BACKBONE = "give as many displacements as forces, both rising from above zero, softening throughout"
 SIDES = "give the displacements of pull and push, (2, k), both positive, at the forces"
 DOUBTED_ASYMMETRY = 0.05  # of an exported joint
-TRACED = "is differentiated on the contact line only: take model.rung = plane, or plain numbers"
+BY = ("sliders", "cycles")
+UNLIKE = "needs sliders that follow one another: take 'cycles', or None"
 
 
 class Joint(eqx.Module):
@@ -128,25 +130,32 @@ class Joint(eqx.Module):
         require("joint.force", f, rising and softening and slopes[0] > 0.0, BACKBONE)
 
     @classmethod
-    def of(cls, scene: Scene, force: Any = None, *, width: Any = 1.0) -> Joint:
+    def of(
+        cls, scene: Scene, force: Any = None, *, width: Any = 1.0, by: str | None = None
+    ) -> Joint:
         """Joint with the mean backbone of a strip's pull and push.
 
         Scenes on the rung ``plane``, or one such as ``condensed-squeeze``, give the sliders of
         their contact where slip zones are nested.  The sliders of others are those whose loops are
         nearest to the scene's own steady cycles, as in lap joints, which open and are no network.
 
+        All numbers may be traced by `jax.jit` and `jax.grad`.  A traced scene cannot tell whether
+        its slip zones are nested, nor whether a load step failed: the joint then holds NaN.
+
         Parameters
         ----------
-        scene : scene of the strip, whose load path is not used.  On such a rung it may be traced;
-            slip zones that are not nested then give NaN
+        scene : scene of the strip, whose load path is not used
         force : largest end force per width, below gross slip; None is ``scene.load.amplitude``
         width : width of the strip, by which forces are multiplied
+        by : "sliders" of the contact, or "cycles" that are run; None takes the sliders where they
+            are nested.  A traced strip on a contact line takes them unless told otherwise, a traced
+            lap joint or strip of load steps its cycles
 
         Raises
         ------
         InputError
-            for a force or a width that is not positive, a force beyond gross slip, or traced
-            numbers in a scene whose steady cycles are run
+            for a force or a width that is not positive, a force beyond gross slip, or sliders of a
+            scene that has none
 
         Examples
         --------
@@ -155,8 +164,12 @@ class Joint(eqx.Module):
         """
         force = largest_force(scene, force)
         require_number("width", width)
+        require_choice("by", by, (None, *BY))
         capacity = width * gross_slip(scene)
-        if scene.model.condensed:
+        condensed = scene.model.condensed
+        traced = is_traced(scene, force)
+        lap = scene.member.support != "none"
+        if condensed and by != "cycles" and not (traced and lap and by is None):
             soft = not scene.ideal_friction
             inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
             line = slider_line if inside else slider_line_once
@@ -166,12 +179,11 @@ class Joint(eqx.Module):
                 return cls(u, width * f, network, width, asymmetry, capacity, sides)
             if np.all(np.isfinite(u)):
                 kept = np.append(np.arange(u.size - 1) < int(count), True)
-                u, f = np.asarray(u)[kept], width * np.asarray(f)[kept]
-                ways = np.asarray(sides)[:, kept]
-                return cls(u, f, network, width, asymmetry, capacity, ways)
-        require("scene", "traced", not is_traced(scene, force), TRACED)
-        u, f, asymmetry, ways = cycled_line(scene, float(force), width)
-        walked = scene if scene.model.condensed else None
+                sides = sides[:, kept]
+                return cls(u[kept], width * f[kept], network, width, asymmetry, capacity, sides)
+        require("by", by, by != "sliders", UNLIKE)
+        u, f, asymmetry, ways = cycled_line(scene, as_leaf(force, "force"), width)
+        walked = scene if condensed and not traced else None
         return cls(u, f, None, width, asymmetry, capacity, ways, walked)
 
     @classmethod
@@ -208,6 +220,32 @@ class Joint(eqx.Module):
         """Stiffness of the stuck joint."""
         return self._slopes[0]
 
+    def in_series(self, stiffness: Any) -> Joint:
+        """Joint with a spring in series, which its points then contain.
+
+        The loops remain those of sliders.  Pull and push keep their difference, and paths are
+        those of the mean.
+
+        Parameters
+        ----------
+        stiffness : stiffness of the spring, force over displacement; may be traced
+
+        Raises
+        ------
+        InputError
+            for a stiffness that is not positive
+
+        Examples
+        --------
+        >>> Joint([1.0, 3.0], [1.0, 2.0]).in_series(1.0).displacement.tolist()
+        [2.0, 5.0]
+        """
+        require_number("series stiffness", stiffness)
+        more = self.force / as_leaf(stiffness, "series stiffness")
+        u, sides = self.displacement + more, None if self.sides is None else self.sides + more
+        asymmetry = jnp.max(self.asymmetry * self.displacement / u)
+        return Joint(u, self.force, None, self.width, asymmetry, self.capacity, sides)
+
     def backbone(self, u: ArrayLike, *, mean: bool = True) -> Array:
         """Force on first loading; any shape.
 
@@ -216,15 +254,13 @@ class Joint(eqx.Module):
         u : displacement, positive for a pull
         mean : True for the mean of pull and push, an odd function; False for each its own
         """
-        size = jnp.abs(jnp.asarray(u))
+        u = jnp.asarray(u)
         if not mean and self.sides is not None:
             pull, push = (
                 eqx.tree_at(lambda joint: joint.displacement, self, s) for s in self.sides
             )
-            return jnp.where(jnp.asarray(u) < 0.0, push.backbone(u), pull.backbone(u))
-        inside = jnp.interp(size, *self._points)
-        beyond = jnp.maximum(size - self.displacement[-1], 0.0) * self._slopes[-1]
-        return jnp.sign(u) * (inside + beyond)
+            return jnp.where(u < 0.0, push.backbone(u), pull.backbone(u))
+        return self.springs[-1] * u + jnp.sum(self.springs[:-1] * self._stretched(u), axis=-1)
 
     def tangent(self, u: ArrayLike) -> Array:
         """Slope of the backbone; any shape."""
@@ -233,17 +269,18 @@ class Joint(eqx.Module):
 
     def work(self, u: ArrayLike) -> Array:
         """Work on first loading, the integral of the backbone from 0 to u; any shape."""
-        x, f = self._points
-        size = jnp.abs(jnp.asarray(u))
-        at_points = jnp.append(0.0, jnp.cumsum(0.5 * (f[1:] + f[:-1]) * jnp.diff(x)))
-        segment = jnp.clip(jnp.searchsorted(x, size, side="right") - 1, 0, x.size - 1)
-        beyond = size - x[segment]
-        return at_points[segment] + 0.5 * beyond * (f[segment] + self.backbone(size))
+        u = jnp.asarray(u)
+        stored = self.springs[:-1] * self._stretched(u) ** 2 / 2.0
+        slid = 0.25 * self.dissipation(jnp.abs(u))
+        return 0.5 * self.springs[-1] * u**2 + jnp.sum(stored, axis=-1) + slid
 
     def dissipation(self, amplitude: ArrayLike) -> Array:
-        """Energy lost per cycle at a displacement amplitude, by Masing's rule; any shape."""
-        size = jnp.asarray(amplitude)
-        return 8.0 * self.work(size) - 4.0 * self.backbone(size) * size
+        """Energy lost per cycle at a displacement amplitude, 4 times limit times slip; any shape.
+
+        It equals that of Masing's rule.
+        """
+        slip = jnp.maximum(jnp.asarray(amplitude)[..., None] - self.displacement[:-1], 0.0)
+        return 4.0 * jnp.sum(self.limits * slip, axis=-1)
 
     def first_harmonic(self, amplitude: ArrayLike) -> Array:
         """Complex stiffness, the first harmonic of the loop over the amplitude; any shape.
@@ -368,11 +405,10 @@ class Joint(eqx.Module):
         """True if the backbone tells the four parameters."""
         return float(self.force[-1]) >= FRACTIONS[ENOUGH - 1] * float(self.capacity)
 
-    @property
-    def _points(self) -> tuple[Array, Array]:
-        """Points of the backbone, with the origin."""
-        zero = jnp.zeros(1)
-        return jnp.append(zero, self.displacement), jnp.append(zero, self.force)
+    def _stretched(self, u: Array) -> Array:
+        """Displacements (..., k-1) of the springs of the sliders on first loading."""
+        slip = self.displacement[:-1]
+        return jnp.clip(u[..., None], -slip, slip)
 
 
 def largest_force(scene: Scene, force: Any = None) -> Any:

@@ -5,19 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
-from numpy.typing import NDArray
+from jax import Array, lax
+from jax.scipy.linalg import solve_triangular
+from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.common.checks import require
+from jbeamshell.common.checks import TINY, as_leaf, is_traced, require, require_number
 from jbeamshell.dynamics.structure.joint import Joint
 
 SQUARE = "give a square matrix of numbers, dense or scipy sparse, as large as the mass matrix"
 SYMMETRIC = "must be symmetric; take (A + A.T)/2 if only rounding makes it unsymmetric"
 SYMMETRY_ROUNDING = 1e-8
 DENSE = 400  # largest number of degrees of freedom for dense linear algebra
+LARGE = f"needs all modes: give damping= of a structure of more than {DENSE} degrees of freedom"
+SPARSE = f"needs dense matrices of at most {DENSE} degrees of freedom: reduce the structure first"
+RATIOS = "give one damping ratio, or one for each of the lowest modes"
 
 
 class Attachment(NamedTuple):
@@ -37,10 +44,15 @@ class Attachment(NamedTuple):
 class Structure:
     """Structure with joints, M x_tt + C x_t + K x + joint forces = f.
 
+    Numbers of its matrices, ratios and joints may be traced by `jax.jit` and `jax.grad`, if it has
+    few degrees of freedom; a traced structure is not checked.
+
     Attributes
     ----------
-    mass, damping, stiffness : (n, n) symmetric matrices, dense or scipy sparse
+    mass, stiffness : (n, n) symmetric matrices, dense or scipy sparse
     attachments : joints; the matrices do not contain their stiffness
+    damping_ratio : (m,) damping ratios of the lowest modes with all joints stuck, beside those of
+        the given damping matrix; zeros beyond them
 
     Examples
     --------
@@ -58,8 +70,17 @@ class Structure:
         stiffness: Any,
         attachments: Sequence[Attachment] = (),
         damping: Any = None,
+        damping_ratio: ArrayLike | None = None,
     ) -> None:
         """Structure from its matrices and joints.
+
+        Parameters
+        ----------
+        mass, stiffness : (n, n) symmetric matrices, dense or scipy sparse
+        attachments : joints; the matrices do not contain their stiffness
+        damping : (n, n) damping matrix; None is none
+        damping_ratio : damping ratio of all modes, or one for each of the lowest, with all joints
+            stuck; it adds to the matrix.  So small motion is damped as that of measured structures
 
         Raises
         ------
@@ -67,13 +88,15 @@ class Structure:
             for matrices that are not square, of one size, real, symmetric and finite; for a mass
             that is not positive definite; for a damping with a negative mode; for a joint at a
             degree of freedom that does not exist; for a rigid-body mode, or one of negative
-            stiffness, with all joints stuck
+            stiffness, with all joints stuck; for a negative damping ratio, or more than modes; for
+            ratios or traced numbers of a large structure
         """
         self.mass = _checked("mass", mass)
         size = self.mass.shape[0]
         self.stiffness = _checked("stiffness", stiffness, size)
         undamped = 0.0 * self.mass
-        self.damping = undamped if damping is None else _checked("damping", damping, size)
+        self._given_damping = undamped if damping is None else _checked("damping", damping, size)
+        self.damping_ratio = _ratios(damping_ratio, size)
         self.attachments = tuple(attachments)
         for place, attached in enumerate(self.attachments):
             ends = [attached.first, *([] if attached.second is None else [attached.second])]
@@ -81,7 +104,41 @@ class Structure:
             apart = len(set(ends)) == len(ends)
             fix = f"name two different degrees of freedom from 0 to {size - 1}, or one and None"
             require(f"attachments[{place}]", ends, inside and apart, fix)
-        self._check_modes()
+        if not self.traced:
+            self._check_modes()
+        elif size > DENSE or scipy.sparse.issparse(self.mass + self.stiffness):
+            require("structure", "traced", size <= DENSE, SPARSE)
+            self.mass, self.stiffness = dense(self.mass), dense(self.stiffness)
+
+    @property
+    def traced(self) -> bool:
+        """True if any number of the structure is traced by a JAX transformation."""
+        matrices = (self.mass, self.stiffness, self._given_damping, self.damping_ratio)
+        return is_traced(*matrices, [a.joint for a in self.attachments])
+
+    @property
+    def damping(self) -> Any:
+        """Damping matrix C (n, n): the given one, and that of the damping ratios."""
+        if not self.damping_ratio.size:
+            return self._given_damping
+        require("damping_ratio", self.damping_ratio.shape, self.size <= DENSE, LARGE)
+        omega, shapes = self.modes(self.damping_ratio.size)
+        momenta = dense(self.mass) @ shapes
+        own = (momenta * (2.0 * self.damping_ratio * omega)) @ momenta.T
+        return dense(self._given_damping) + own
+
+    def modal_damping(self, shape: Any, omega: Any, mode: int) -> Any:
+        """Damping 2 zeta omega of a mode of unit modal mass with all joints stuck.
+
+        Parameters
+        ----------
+        shape : (n,) shape of the mode
+        omega : its angular frequency
+        mode : its number, counted from 0
+        """
+        known = mode < self.damping_ratio.size
+        ratio = self.damping_ratio[mode] if known else 0.0
+        return shape @ (self._given_damping @ shape) + 2.0 * ratio * omega
 
     @property
     def size(self) -> int:
@@ -101,16 +158,24 @@ class Structure:
     @property
     def stuck_stiffness(self) -> Any:
         """Stiffness matrix (n, n) with all joints stuck."""
-        own = np.array([float(a.joint.stiffness) for a in self.attachments])
+        springs = [a.joint.stiffness for a in self.attachments]
         directions = self.directions
+        if self.traced:
+            return self.stiffness + (directions * jnp.asarray(springs)) @ directions.T
+        own = np.array(springs, float)
         if scipy.sparse.issparse(self.stiffness):
             directions = scipy.sparse.csr_array(directions)
             return self.stiffness + directions @ scipy.sparse.diags_array(own) @ directions.T
         return self.stiffness + (directions * own) @ directions.T
 
-    def modes(self, count: int = 6) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Angular frequencies (k,) and shapes (n, k) of unit modal mass, all joints stuck."""
+    def modes(self, count: int = 6) -> tuple[Any, Any]:
+        """Angular frequencies (k,) and shapes (n, k) of unit modal mass, all joints stuck.
+
+        Traced ones have derivatives where no other mode has the same frequency.
+        """
         stuck, count = self.stuck_stiffness, min(count, self.size)
+        if self.traced:
+            return _traced_modes(stuck, jnp.asarray(self.mass), count)
         if self.size <= DENSE or count >= self.size - 1:
             values, shapes = scipy.linalg.eigh(dense(stuck), dense(self.mass))
         else:
@@ -121,8 +186,10 @@ class Structure:
         order = np.argsort(values)[:count]
         return np.sqrt(np.maximum(values[order], 0.0)), shapes[:, order]
 
-    def static_displacements(self, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    def static_displacements(self, loads: Any) -> Any:
         """Static displacements (n, k) under loads (n, k), all joints stuck."""
+        if self.traced:
+            return jnp.linalg.solve(self.stuck_stiffness, loads)
         if self.size <= DENSE:
             return scipy.linalg.solve(dense(self.stuck_stiffness), loads, assume_a="pos")
         solver = scipy.sparse.linalg.splu(scipy.sparse.csc_array(self.stuck_stiffness))
@@ -131,9 +198,10 @@ class Structure:
     def _check_modes(self) -> None:
         """Raise `InputError` for matrices with negative modes, or a rigid-body mode."""
         require("mass", self.mass.shape, _is_positive(self.mass), "must be positive definite")
-        damped = _is_positive(self.damping, SYMMETRY_ROUNDING) or not abs(self.damping).max()
+        own = self._given_damping
+        damped = _is_positive(own, SYMMETRY_ROUNDING) or not abs(own).max()
         fix = "must have no negative mode: it would feed energy into the structure"
-        require("damping", self.damping.shape, damped, fix)
+        require("damping", own.shape, damped, fix)
         stable = _is_positive(self.stuck_stiffness, SYMMETRY_ROUNDING)
         fix = "has a negative mode with all joints stuck: the structure is unstable"
         require("stiffness", self.stiffness.shape, stable, fix)
@@ -144,8 +212,50 @@ class Structure:
         require("stiffness", self.stiffness.shape, held, fix)
 
 
+def _ratios(given: ArrayLike | None, size: int) -> Any:
+    """Damping ratios (m,) of the lowest modes; raises `InputError`."""
+    if given is None:
+        return np.zeros(0)
+    ratios = as_leaf(given, "damping_ratio", RATIOS)
+    fits = ratios.ndim == 0 or (ratios.ndim == 1 and ratios.size <= size)
+    require("damping_ratio", ratios.shape, fits, RATIOS)
+    each = jnp.broadcast_to(ratios, (size,)) if ratios.ndim == 0 else ratios
+    if is_traced(each):
+        return each
+    for ratio in np.asarray(each).tolist():
+        require_number("damping_ratio", ratio, "must be a number from 0 to 1", -TINY, 1.0)
+    return np.asarray(each, float)
+
+
+def _traced_modes(stiffness: Array, mass: Array, count: int) -> tuple[Array, Array]:
+    """Modes of traced matrices; their derivatives are those of K phi = lambda M phi."""
+    k, m = map(lax.stop_gradient, (stiffness, mass))
+    lower = jnp.linalg.cholesky(m)
+    half = solve_triangular(lower, k, lower=True)
+    values, vectors = jnp.linalg.eigh(solve_triangular(lower, half.T, lower=True))
+    shapes = solve_triangular(lower.T, vectors)
+
+    def one(value: Array, shape: Array) -> tuple[Array, Array]:
+        # A step of Newton's method leaves the values and brings the derivatives.
+        moved, side = mass @ shape, m @ shape
+        residual = stiffness @ shape - value * moved
+        residual = jnp.append(residual, 0.5 * (1.0 - shape @ moved))
+        edge = jnp.append(-side, 0.0)[None]
+        matrix = jnp.vstack([jnp.hstack([k - value * m, -side[:, None]]), edge])
+        step = jnp.linalg.solve(matrix, residual)
+        return value - step[-1], shape - step[:-1]
+
+    found, forms = jax.vmap(one, (0, 1), (0, 1))(values[:count], shapes[:, :count])
+    return jnp.sqrt(found), forms
+
+
 def _checked(name: str, matrix: Any, size: int | None = None) -> Any:
     """Matrix of floats, dense or sparse; raises `InputError`."""
+    if is_traced(matrix):
+        shape = jnp.shape(matrix)
+        square = len(shape) == 2 and shape[0] == shape[1]
+        require(name, shape, square and size in (None, shape[0]), SQUARE)
+        return jnp.asarray(matrix)
     sparse = scipy.sparse.issparse(matrix)
     real = not np.iscomplexobj(matrix.data if sparse else matrix)
     require(name, np.shape(matrix), real, "must be real: give its real part if the rest is zero")
@@ -190,6 +300,6 @@ def _is_positive(matrix: Any, margin: float = 0.0) -> bool:
     return kept and bool(np.all(factors.U.diagonal() > 0.0))
 
 
-def dense(matrix: Any) -> NDArray[np.float64]:
+def dense(matrix: Any) -> Any:
     """Matrix as a dense array."""
     return matrix.toarray() if scipy.sparse.issparse(matrix) else matrix

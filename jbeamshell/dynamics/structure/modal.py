@@ -13,16 +13,24 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array, lax
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.common.checks import require
+from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.precision import in_double
+from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Structure
 
 AMPLITUDES = "give rising positive modal displacements"
 MAX_ITERATIONS = 100
 SUBSTEPS = 8  # load steps between two amplitudes
+ROUNDING = 4e3  # residual over the rounding of a displacement, at which an equilibrium is found
+LINEAR = "give a joint: a structure without any is linear, see its modes"
 
 
 class ModalCurve(NamedTuple):
@@ -32,16 +40,16 @@ class ModalCurve(NamedTuple):
     ----------
     amplitude : modal displacement q
     frequency : angular frequency
-    damping : damping ratio zeta
+    damping : damping ratio zeta of joints and structure
     dissipation : energy lost in the joints per cycle
     joints : (k, joints) amplitudes of the joints' displacements
     """
 
-    amplitude: NDArray[np.float64]
-    frequency: NDArray[np.float64]
-    damping: NDArray[np.float64]
-    dissipation: NDArray[np.float64]
-    joints: NDArray[np.float64]
+    amplitude: Any
+    frequency: Any
+    damping: Any
+    dissipation: Any
+    joints: Any
 
     def plot(self, axes: Any = None) -> Any:
         """Draw frequency and damping over amplitude; see `jbeamshell.plotting.modal_curve`."""
@@ -53,7 +61,11 @@ class ModalCurve(NamedTuple):
 def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> ModalCurve:
     """Frequency and damping of a mode over its amplitude, by quasi-static modal analysis.
 
-    The damping is that of the joints alone.
+    The damping is that of the joints, D/(2 pi alpha q), and that of the structure's damping matrix
+    and ratios, 2 zeta_0 omega_0/(2 omega), whose mode is taken as without slip.
+
+    Every number of the structure may be traced by `jax.jit` and `jax.grad`: those of a joint's
+    scene, the matrices, the damping ratios.  A traced curve without equilibrium is NaN.
 
     Parameters
     ----------
@@ -64,7 +76,7 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
     Raises
     ------
     InputError
-        for amplitudes that are not positive and rising
+        for amplitudes that are not positive and rising, or a structure without joints
     UnconvergedError
         if no static equilibrium is found
 
@@ -76,69 +88,134 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
     [1.0, 0.866]
     """
     amplitude = _checked(amplitudes)
-    _, shapes = structure.modes(mode + 1)
+    require("attachments", 0, bool(structure.attachments), LINEAR)
+    omega, shapes = structure.modes(mode + 1)
     shape, directions = shapes[:, mode], structure.directions
     load = structure.mass @ shape
-    displacements = structure.static_displacements(np.column_stack([load, directions]))
+    stack = jnp.column_stack if structure.traced else np.column_stack
+    displacements = structure.static_displacements(stack([load, directions]))
     # Let r be the forces that the joints lose by slip.  Then q = a alpha + b r, u = b alpha + S r.
-    a, b = load @ displacements[:, 0], directions.T @ displacements[:, 0]
-    compliance = directions.T @ displacements[:, 1:]
-    levels = np.unique(np.concatenate([_refined(amplitude), amplitude]))
-    u = np.zeros(b.size)
-    alphas, joints = [0.0], [u]
-    for q in levels:
-        u, alpha = _equilibrium(structure, q, a, b, compliance, u)
-        alphas.append(alpha)
-        joints.append(u)
-    forces = np.array(alphas)
-    losses: Any = sum(
-        np.asarray(attached.joint.dissipation(np.abs(np.array(joints)[:, place])))
-        for place, attached in enumerate(structure.attachments)
+    statics = _Statics(
+        load @ displacements[:, 0],
+        directions.T @ displacements[:, 0],
+        directions.T @ displacements[:, 1:],
+        structure.modal_damping(shape, omega[mode], mode),
     )
-    pick = 1 + np.searchsorted(levels, amplitude)
-    force, loss = forces[pick], np.broadcast_to(losses, forces.shape)[pick]
-    return ModalCurve(
-        amplitude=amplitude,
-        frequency=np.sqrt(force / amplitude),
-        damping=loss / (2.0 * np.pi * force * amplitude),
-        dissipation=loss,
-        joints=np.abs(np.array(joints)[pick]),
-    )
+    backbones = tuple((a.joint.displacement, a.joint.force) for a in structure.attachments)
+    curve, sound = _curve(backbones, statics, jnp.asarray(amplitude))
+    if is_traced(curve):
+        return jax.tree.map(lambda column: jnp.where(sound, column.T, jnp.nan).T, curve)
+    if not np.all(sound):
+        raise UnconvergedError(
+            "no equilibrium of the joints at the modal displacement "
+            f"{amplitude[int(np.argmin(sound))]:.6g}: give more amplitudes below it"
+        )
+    return jax.tree.map(np.asarray, curve)
 
 
-def _equilibrium(
-    structure: Structure,
-    q: Any,
-    a: Any,
-    b: NDArray[np.float64],
-    compliance: NDArray[np.float64],
-    guess: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], float]:
-    """Displacements of the joints and modal force alpha at a modal displacement, by Newton."""
-    joints, u = [attached.joint for attached in structure.attachments], guess.copy()
-    stuck = np.array([float(joint.stiffness) for joint in joints])
-    for _ in range(MAX_ITERATIONS):
-        force = np.array([float(j.backbone(x)) for j, x in zip(joints, u, strict=True)])
-        slope = np.array([float(j.tangent(x)) for j, x in zip(joints, u, strict=True)])
-        lost = stuck * u - force
-        alpha = (q - b @ lost) / a
-        residual = u - b * alpha - compliance @ lost
-        if np.max(np.abs(residual), initial=0.0) <= 1e-12 * np.max(np.abs(b * q / a), initial=0.0):
-            return u, float(alpha)
-        change = stuck - slope
-        tangent = np.eye(u.size) + np.outer(b, b * change) / a - compliance * change
-        u = u - np.linalg.solve(tangent, residual)
-    raise UnconvergedError(
-        f"no equilibrium of the joints at the modal displacement {q:.6g}: give more amplitudes "
-        "below it"
-    )
+class _Statics(NamedTuple):
+    """Structure as its joints and one mode feel it.
+
+    Attributes
+    ----------
+    a : compliance of the mode, phi^T M K^-1 M phi
+    b : (joints,) displacements of the joints under the mode's load
+    compliance : (joints, joints) displacements of the joints under their forces
+    damping : 2 zeta_0 omega_0 without slip
+    """
+
+    a: Array
+    b: Array
+    compliance: Array
+    damping: Array
 
 
-def _refined(amplitude: NDArray[np.float64]) -> NDArray[np.float64]:
+@in_double
+@eqx.filter_jit
+def _curve(
+    backbones: tuple[tuple[Array, Array], ...], statics: _Statics, amplitude: Array
+) -> tuple[ModalCurve, Array]:
+    """Curve, and whether each of its points converged."""
+    joints = _alike(backbones)
+    known, found = lax.stop_gradient((joints, statics))
+    levels = _refined(amplitude)
+
+    def reach(start: Array, q: Array) -> tuple[Array, tuple[Array, Array]]:
+        u, sound = _equilibrium(known, found, q, start)
+        return u, (u, sound)
+
+    _, (path, sound) = lax.scan(reach, jnp.zeros_like(found.b), levels)
+
+    def one(q: Array, u: Array) -> ModalCurve:
+        # A step of Newton's method leaves the values and brings the derivatives.
+        residual, _ = _residual(joints, statics, q, u)
+        _, matrix = _residual(known, found, q, u)
+        u = u - jnp.linalg.solve(matrix, residual)
+        force = _modal_force(joints, statics, q, u)
+        loss = jnp.sum(jax.vmap(Joint.dissipation)(joints, jnp.abs(u)))
+        omega = jnp.sqrt(force / q)
+        zeta = loss / (2.0 * jnp.pi * force * q) + 0.5 * statics.damping / omega
+        return ModalCurve(q, omega, zeta, loss, jnp.abs(u))
+
+    curve = jax.vmap(one)(amplitude, lax.stop_gradient(path[SUBSTEPS - 1 :: SUBSTEPS]))
+    return curve, jnp.cumprod(sound)[SUBSTEPS - 1 :: SUBSTEPS] > 0
+
+
+def _alike(backbones: tuple[tuple[Array, Array], ...]) -> Joint:
+    """Joints of equally many points, stacked; further ones lie on the last straight line."""
+    size = max(u.size for u, _ in backbones)
+    stacked = []
+    for u, f in backbones:
+        steps = jnp.arange(1, size + 1 - u.size)
+        slope = Joint(u, f).springs[-1]
+        further = u[-1] * (1.0 + steps)
+        longer = jnp.append(f, f[-1] + slope * (further - u[-1]))
+        stacked.append(Joint(jnp.append(u, further), longer))
+    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *stacked)
+
+
+def _lost(joints: Joint, u: Array) -> Array:
+    """Forces (joints,) that the joints lose by slip."""
+    return jax.vmap(lambda joint, x: joint.stiffness * x - joint.backbone(x))(joints, u)
+
+
+def _modal_force(joints: Joint, statics: _Statics, q: Array, u: Array) -> Array:
+    """Modal force alpha at a modal displacement."""
+    return (q - statics.b @ _lost(joints, u)) / statics.a
+
+
+def _residual(joints: Joint, statics: _Statics, q: Array, u: Array) -> tuple[Array, Array]:
+    """Displacements of the joints less those of their forces, and the derivative."""
+    a, b, compliance, _ = statics
+    residual = u - b * _modal_force(joints, statics, q, u) - compliance @ _lost(joints, u)
+    softer = jax.vmap(lambda joint, x: joint.stiffness - joint.tangent(x))(joints, u)
+    return residual, jnp.eye(u.size) + jnp.outer(b, b * softer) / a - compliance * softer
+
+
+def _equilibrium(joints: Joint, statics: _Statics, q: Array, guess: Array) -> tuple[Array, Array]:
+    """Displacements of the joints at a modal displacement by Newton's method, and if it ended."""
+    most = ROUNDING * jnp.finfo(guess.dtype).eps * jnp.max(jnp.abs(statics.b * q / statics.a))
+
+    def left(state: tuple[Array, Array, Array]) -> Array:
+        _, size, count = state
+        return (size > most) & (count < MAX_ITERATIONS)
+
+    def improved(state: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+        u, _, count = state
+        residual, matrix = _residual(joints, statics, q, u)
+        size = jnp.max(jnp.abs(residual))
+        step = jnp.linalg.solve(matrix, residual)
+        return jnp.where(size > most, u - step, u), size, count + 1
+
+    u, size, _ = lax.while_loop(left, improved, (guess, jnp.inf * jnp.ones_like(q), jnp.zeros((), int)))
+    return u, size <= most
+
+
+def _refined(amplitude: Array) -> Array:
     """Amplitudes with equal load steps between them."""
-    ends = np.append(0.0, amplitude)
-    parts = np.arange(1, SUBSTEPS + 1) / SUBSTEPS
-    return (ends[:-1, None] + np.diff(ends)[:, None] * parts).ravel()
+    ends = jnp.append(0.0, amplitude)
+    parts = jnp.arange(1, SUBSTEPS + 1) / SUBSTEPS
+    return (ends[:-1, None] + jnp.diff(ends)[:, None] * parts).ravel()
 
 
 def _checked(amplitudes: ArrayLike) -> NDArray[np.float64]:

@@ -7,10 +7,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, lax
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import require
+from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.jax_options import ONCE
 from jbeamshell.condensed.network import Network, Response, Sliders
 from jbeamshell.dynamics.steady_cycles import SteadyCycles
@@ -60,9 +60,7 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array,
 slider_line_once = jax.jit(slider_line, static_argnums=2, compiler_options=ONCE)
 
 
-def cycled_line(
-    scene: Scene, force: float, width: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float, NDArray[np.float64]]:
+def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, Array, Array]:
     """Backbone whose loops by Masing's rule are nearest to a scene's steady cycles.
 
     A slider in series with compliance c_i and threshold F_i adds c_i (F - F_i) to the displacement
@@ -72,23 +70,49 @@ def cycled_line(
     Returns
     -------
     (k,) displacements and forces, the asymmetry of first loading, and the displacements (2, k) of
-    pull and push in it
+    pull and push in it; NaN where a traced scene has no equilibrium
     """
-    levels = force * AMPLITUDES
+    levels = force * jnp.asarray(AMPLITUDES)
+    throw = not is_traced(scene, force, jnp.zeros(()))
     ways = (1.0, -1.0)
-    sides = [way * np.asarray(solve(scene, way * levels).displacement) for way in ways]
+    sides = [way * solve(scene, way * levels, throw=throw).displacement for way in ways]
     sides = [side[-levels.size :] for side in sides]
     cycles = SteadyCycles.of(scene, levels)
-    u, d = cycles.displacement, np.maximum(cycles.dissipation, LEAST * levels * cycles.displacement)
-    thresholds = np.append(0.0, levels[:-1])
-    beyond = np.maximum(levels[:, None] - thresholds, 0.0)
-    rows = np.vstack([beyond / u[:, None], 4.0 * thresholds * beyond / d[:, None]])
-    scale = np.max(rows, axis=0)
+    u, loss = cycles.displacement, cycles.dissipation
+    d = jnp.maximum(loss, LEAST * levels * u)
+    thresholds = jnp.append(0.0, levels[:-1])
+    beyond = jnp.maximum(levels[:, None] - thresholds, 0.0)
+    rows = jnp.vstack([beyond / u[:, None], 4.0 * thresholds * beyond / d[:, None]])
+    scale = jnp.max(rows, axis=0)
+    parts = not_negative(rows / scale, jnp.append(jnp.ones(u.size), loss / d))
+    return beyond @ (parts / scale), width * levels, mean_of(*sides)[1], jnp.stack(sides)
+
+
+def not_negative(matrix: Array, target: Array) -> Array:
+    """Least-squares solution (k,) that is not negative, with derivatives; NaN for NaN.
+
+    Parameters
+    ----------
+    matrix : (rows, k) of full rank
+    target : (rows,)
+    """
+    count, given = matrix.shape[1], map(lax.stop_gradient, (matrix, target))
+    shape = jax.ShapeDtypeStruct((count,), bool)
+    active = jax.pure_callback(_active, shape, *given, vmap_method="sequential")
+    # The others are zero, each by a row of its own, so that the factorisation keeps its rank.
+    whole = jnp.vstack([jnp.where(active, matrix, 0.0), jnp.diag(jnp.where(active, 0.0, 1.0))])
+    q, r = jnp.linalg.qr(whole)
+    return jax.scipy.linalg.solve_triangular(r, q.T @ jnp.append(target, jnp.zeros(count)))
+
+
+def _active(matrix: Any, target: Any) -> NDArray[np.bool_]:
+    """True for the positive entries of the solution, by Lawson and Hanson's method."""
     from scipy.optimize import nnls  # slow to import
 
-    parts, _ = nnls(rows / scale, np.append(np.ones(u.size), cycles.dissipation / d))
-    asymmetry = float(mean_of(*sides)[1])
-    return beyond @ (parts / scale), width * levels, asymmetry, np.stack(sides)
+    rows, wanted = np.asarray(matrix, float), np.asarray(target, float)
+    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(wanted))):
+        return np.ones(rows.shape[1], bool)
+    return np.asarray(nnls(rows, wanted)[0] > 0.0)
 
 
 def walked_forces(scene: Scene, path: NDArray[np.float64]) -> Array:
