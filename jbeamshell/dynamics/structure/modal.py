@@ -207,7 +207,8 @@ def _equilibrium(joints: Joint, statics: _Statics, q: Array, guess: Array) -> tu
         step = jnp.linalg.solve(matrix, residual)
         return jnp.where(size > most, u - step, u), size, count + 1
 
-    u, size, _ = lax.while_loop(left, improved, (guess, jnp.inf * jnp.ones_like(q), jnp.zeros((), int)))
+    start = (guess, jnp.inf * jnp.ones_like(q), jnp.zeros((), int))
+    u, size, _ = lax.while_loop(left, improved, start)
     return u, size <= most
 
 
