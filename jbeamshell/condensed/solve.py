@@ -28,7 +28,6 @@ from jbeamshell.condensed.pair import Pair
 from jbeamshell.condensed.strip import Strip, condensed, fields, spring_stiffness, stays_flat
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
-from jbeamshell.numerics.cycles import turning_points
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.parts import Load
 from jbeamshell.scene.rungs import general_rung
@@ -122,9 +121,12 @@ def _turns_of_cycles(cycles: int, steps: int) -> tuple[bool, ...]:
 
 
 def _known_turns(loads: np.ndarray) -> tuple[bool, ...]:
+    """Turns as `turns_of` finds them: where a load rests, the step that leaves it has turned."""
     turns = np.zeros(loads.size, bool)
-    if loads.size:
-        turns[turning_points(np.append(0.0, loads))[:-1]] = True
+    moves = np.sign(np.diff(loads, prepend=0.0))
+    moving = np.flatnonzero(moves)
+    turns[moving[np.diff(moves[moving], prepend=0.0) != 0.0]] = True
+    turns[:1] = True
     return tuple(turns.tolist())
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.condensed import branches, events, levels, strip
+from jbeamshell.condensed.solve import _known_turns
 
 NODES = 21
 TURNS = jnp.asarray([1.0, 0.3, -1.0, -0.2, 1.0])
@@ -96,3 +97,34 @@ class TestLevels:
         for i, body in enumerate(bodies):
             one = value(body, frictions[i], 0.05)
             np.testing.assert_allclose(batch[i], one, rtol=1e-9, atol=1e-12)
+
+
+class TestTurns:
+    def test_a_load_that_rests_turns_when_it_leaves(self):
+        assert _known_turns(np.array([1.0, 1.0, 0.5, 0.5, -1.0])) == (
+            True,
+            False,
+            True,
+            False,
+            False,
+        )
+        assert _known_turns(np.array([0.0, 1.0, 2.0])) == (True, True, False)
+
+    def test_known_turns_are_those_of_a_traced_path(self):
+        traced = jax.jit(levels.turns_of)
+        for seed in range(20):
+            moves = np.random.default_rng(seed).integers(-1, 2, 12)
+            loads = np.cumsum(moves).astype(float)
+            assert _known_turns(loads) == tuple(np.asarray(traced(loads)).tolist())
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("rung", ["plane", "condensed-squeeze"])
+    def test_a_rest_changes_nothing(self, rung):
+        # Samples of a sine are alike on both sides of its turn: a rest at every turn.
+        scene = jb.Scene().replace({"model.rung": rung})
+        loads = np.sin(2.0 * np.pi * np.arange(1, 76) / 50)
+        rests = np.flatnonzero(np.diff(loads, prepend=0.0) == 0.0)
+        assert rests.size
+        with_rests = jb.solve(scene, loads).displacement[-75:]
+        without = jb.solve(scene, np.delete(loads, rests)).displacement
+        assert float(with_rests[-1]) == pytest.approx(float(without[-1]), rel=1e-9)
