@@ -105,6 +105,12 @@ class ContactHistory(LoopFigures, eqx.Module):
 
         return plotting.contact_lines(self, steps, axes)
 
+    def animate(self, steps: Any = None, **options: Any) -> Any:
+        """Film of the last cycle, to be saved as a GIF; see `jbeamshell.plotting.animate`."""
+        from jbeamshell import plotting
+
+        return plotting.animate(self, steps, **options)
+
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write ``loop.csv``, ``contact.csv``, ``result.json`` and pictures to a folder."""
         from jbeamshell.plotting.folder import check_folder, write_folder

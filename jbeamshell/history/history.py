@@ -193,6 +193,12 @@ class History(Profiles, ContactLine, CycleFigures):
 
         return plotting.deformed(self, step, axes, **options)
 
+    def animate(self, steps: Any = None, **options: Any) -> Any:
+        """Film of the last cycle, to be saved as a GIF; see `jbeamshell.plotting.animate`."""
+        from jbeamshell import plotting
+
+        return plotting.animate(self, steps, **options)
+
 
 @eqx.filter_jit
 def _last_values(history: History, names: tuple[str, ...]) -> dict[str, Array]:

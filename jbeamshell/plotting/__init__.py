@@ -12,6 +12,8 @@ which attributes they read.
 from jbeamshell.plotting.comparisons import comparison as comparison
 from jbeamshell.plotting.contacts import contact as contact
 from jbeamshell.plotting.contacts import contact_map as contact_map
+from jbeamshell.plotting.films import Film as Film
+from jbeamshell.plotting.films import animate as animate
 from jbeamshell.plotting.fits import likelihoods as likelihoods
 from jbeamshell.plotting.fits import overlay as overlay
 from jbeamshell.plotting.fits import residuals as residuals
@@ -37,6 +39,9 @@ from jbeamshell.plotting.style import SQUEEZE as SQUEEZE
 from jbeamshell.plotting.style import STYLE as STYLE
 from jbeamshell.plotting.style import close as close
 from jbeamshell.plotting.style import colours as colours
+from jbeamshell.plotting.style import in_units as in_units
+from jbeamshell.plotting.style import looks as looks
+from jbeamshell.plotting.style import panels as panels
 from jbeamshell.plotting.style import save as save
 from jbeamshell.plotting.style import style as style
 from jbeamshell.plotting.style import thumbnail as thumbnail

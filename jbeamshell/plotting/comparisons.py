@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
 from jbeamshell.plotting.protocols import ComparedModels
-from jbeamshell.plotting.style import DOTS, FAINT, colours, mark_decades, style
+from jbeamshell.plotting.style import DOTS, FAINT, looks, mark_decades, panels, style
 
 ALONG = {"force": "amplitude of $F$  [force/width]", "displacement": "amplitude of $u$  [length]"}
 
@@ -29,15 +28,15 @@ def comparison(compared: ComparedModels, axes: Any = None) -> tuple[Axes, Axes]:
     """
     with style():
         if axes is None:
-            axes = plt.subplots(1, 2, figsize=(10.4, 4.2))[1]
+            axes = panels(1, 2)[0]
         energies, errors = axes
         x = compared.amplitude
         drawn = [row for row in compared.rows if row.fit is not None]
-        for row, colour in zip(drawn, colours(len(drawn)), strict=True):
+        for row, look in zip(drawn, looks(len(drawn)), strict=True):
             told = f"{row.name}: {row.numbers} numbers, {1e6 * row.seconds:.0f} us"
             positive = np.where(row.energy > 0.0, row.energy, np.nan)  # a stuck law loses nothing
-            energies.plot(x, positive, color=colour, label=told)
-            errors.plot(x, 100.0 * compared.error(row), color=colour, label=row.name)
+            energies.plot(x, positive, **look, label=told)
+            errors.plot(x, 100.0 * compared.error(row), **look, label=row.name)
         energies.plot(x, compared.energy, label="target", **DOTS)
         errors.axhline(0.0, color=FAINT, linewidth=1.0, zorder=1.0)
         largest = max((float(np.max(np.abs(compared.error(row)))) for row in drawn), default=0.0)

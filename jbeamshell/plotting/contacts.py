@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
@@ -22,9 +21,14 @@ from jbeamshell.plotting.style import (
     DOTS,
     FAINT,
     FORCE,
+    LIFTED,
     POSITION,
+    SLIPS,
     SQUEEZE,
-    colours,
+    STICKS,
+    below,
+    looks,
+    panels,
     single,
     style,
 )
@@ -35,10 +39,10 @@ PROFILES = {
     "gap": ("gap under the strip", "gap  [length]"),
     "beta": ("rotation", r"$\beta$  [rad]"),
     "squeeze_stress": ("mean squeeze stress", SQUEEZE),
-    "psi": ("squeeze strain", r"$\psi$  [1]"),
+    "psi": ("squeeze strain", r"$\psi$  [dimensionless]"),
     "squeeze_couple": ("squeeze couple", r"$\xi$  [couple/width]"),
 }
-STATES = ("0.93", "#56B4E9", "#E69F00")  # lifted, touching, slipping
+STATES = (LIFTED, STICKS, SLIPS)
 AROUND = 5.0  # half heights H that `contact` shows beside corners and ends of contact
 
 
@@ -111,29 +115,31 @@ def contact(
             if name == squeezed:
                 x, pressure = _pressure_corners(history, max(history.pressure[i] for i in chosen))
                 drawn += panel.plot(x, sign * pressure, color=FAINT, linewidth=1.1)
-            for step, end, colour in zip(chosen, ends, colours(len(chosen)), strict=True):
+            for step, end, look in zip(chosen, ends, looks(len(chosen)), strict=True):
                 values = np.asarray(getattr(history, name)[step])
                 at_nodes = values.size == history.x.size
                 x = np.asarray(history.x if at_nodes else history.middles)
-                drawn += panel.plot(x, values, color=colour)
+                drawn += panel.plot(x, values, **look)
                 if np.isfinite(end):
-                    panel.axvline(end, color=colour, linestyle=":", linewidth=1.0, zorder=1.0)
+                    panel.axvline(
+                        end, color=look["color"], linestyle=":", linewidth=1.0, zorder=1.0
+                    )
             if name in reference:
                 x, values = map(np.asarray, reference[name])
                 drawn += panel.plot(x, values, **DOTS)
             _show(panel, drawn, low, high, _size(history, name))
-        looks: list[tuple[str, dict[str, Any]]] = [
-            (load_label(history, step) if len(chosen) > 1 else "shell", {"color": colour})
-            for step, colour in zip(chosen, colours(len(chosen)), strict=True)
+        keys: list[tuple[str, dict[str, Any]]] = [
+            (load_label(history, step) if len(chosen) > 1 else "shell", look)
+            for step, look in zip(chosen, looks(len(chosen)), strict=True)
         ]
         if squeezed in names:
-            looks.append(("pressure on top", {"color": FAINT, "linewidth": 1.1}))
+            keys.append(("pressure on top", {"color": FAINT, "linewidth": 1.1}))
         if np.any(np.isfinite(ends)):
-            looks.append(("contact ends", {"color": DATA, "linestyle": ":", "linewidth": 1.0}))
+            keys.append(("contact ends", {"color": DATA, "linestyle": ":", "linewidth": 1.0}))
         if reference:
-            looks.append((reference_label, DOTS))
-        keys = [Line2D([], [], label=label, **look) for label, look in looks]
-        grid.ravel()[0].legend(handles=keys, loc="best")
+            keys.append((reference_label, DOTS))
+        handles = [Line2D([], [], label=label, **look) for label, look in keys]
+        grid.ravel()[0].legend(handles=handles, loc="best")
     return grid
 
 
@@ -200,12 +206,12 @@ def contact_map(
             keys.append(Line2D([], [], color=DATA, linewidth=1.2, label="contact ends"))
         axes.set(ylabel=POSITION, ylim=(0.0, float(history.x[-1])) if xlim is None else xlim)
         if pressing:
-            axes.set_xlabel("part of the pressure that acts  [1]")
+            axes.set_xlabel("part of the pressure that acts")
         else:
             turns = sorted(set(turning_points(driver[~failed])))
-            axes.set_xticks(turns, [f"${driver[turn]:.4g}$" for turn in turns])
+            axes.set_xticks(turns, [f"${driver[turn]:.3g}$" for turn in turns])
             axes.set_xlabel(f"{FORCE}, along the path")
-        axes.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        below(axes, keys)
     return axes
 
 
@@ -213,9 +219,9 @@ def _many(count: int) -> np.ndarray:
     """Axes of a new figure, (count,), in rows of up to three."""
     columns = 2 if count == 4 else min(count, 3)
     rows = -(-count // columns)
-    figure, grid = plt.subplots(rows, columns, figsize=(3.8 * columns, 3.0 * rows), squeeze=False)
+    grid = panels(rows, columns)
     for spare in grid.ravel()[count:]:
-        figure.delaxes(spare)
+        spare.remove()
     return grid.ravel()[:count]
 
 

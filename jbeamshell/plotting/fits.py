@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
@@ -15,9 +15,12 @@ from jbeamshell.plotting.protocols import LikelihoodProfile, ModelOverData
 from jbeamshell.plotting.style import (
     DOTS,
     FAINT,
+    MARKS,
     PALETTE,
     colours,
+    looks,
     mark_decades,
+    panels,
     style,
 )
 
@@ -43,11 +46,11 @@ def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
     """
     bands = fit.bands(BAND) if fit.problem is not None else None
     with style():
-        panels = _panels(fit, axes)
-        for form, places, panel in panels:
-            for place, colour in zip(places, colours(len(places)), strict=True):
+        drawn = _panels(fit, axes)
+        for form, places, panel in drawn:
+            for place, look in zip(places, looks(len(places)), strict=True):
                 data, model = fit.data[place], fit.model[place]
-                panel.plot(*_xy(form, model), color=colour, label=f"model, {data.label}")
+                panel.plot(*_xy(form, model), **look, label=f"model, {data.label}")
                 first = "data" if place == places[0] else "_nolegend_"
                 x, y = _xy(form, data)
                 size = {"markersize": 5.0} if x.size < FEW else {}
@@ -55,13 +58,13 @@ def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
                 if bands is not None:
                     low, high = (_xy(form, end) for end in bands[place])
                     x, y = (np.append(a, b[::-1]) for a, b in zip(low, high, strict=True))
-                    panel.fill(x, y, color=colour, alpha=0.2, linewidth=0.0)
+                    panel.fill(x, y, color=look["color"], alpha=0.2, linewidth=0.0)
             panel.set(xlabel=form.columns[form.x].label, ylabel=form.columns[form.y].label)
             panel.set(xscale=form.scale, yscale=form.scale)
             if form.scale == "log":
                 mark_decades(panel.xaxis, panel.yaxis)
             panel.legend(loc="best")
-    return [panel for _, _, panel in panels]
+    return [panel for _, _, panel in drawn]
 
 
 def residuals(fit: ModelOverData, axes: Any = None) -> list[Axes]:
@@ -81,20 +84,22 @@ def residuals(fit: ModelOverData, axes: Any = None) -> list[Axes]:
     """
     left, columns = fit.residuals, fit.columns
     with style():
-        panels = _panels(fit, axes)
-        for form, places, panel in panels:
+        drawn = _panels(fit, axes)
+        for form, places, panel in drawn:
             along = next(name for name in form.columns if name != columns[places[0]])
-            for place, colour in zip(places, colours(len(places)), strict=True):
+            for place, colour, mark in zip(
+                places, colours(len(places)), cycle(MARKS), strict=False
+            ):
                 data = fit.data[place]
-                look = {"color": colour, "label": data.label}
-                panel.plot(getattr(data, along), 100.0 * left[place], ".", **look)
+                look = {"color": colour, "label": data.label, "markersize": 3.0}
+                panel.plot(getattr(data, along), 100.0 * left[place], mark, **look)
             panel.axhline(0.0, color=FAINT, linewidth=1.0, zorder=1.0)
             panel.set(xlabel=form.columns[along].label, xscale=form.scale)
             if form.scale == "log":
                 mark_decades(panel.xaxis)
             panel.set(ylabel=LOG_PER_CENT if form.scale == "log" else PER_CENT)
             panel.legend(loc="best")
-    return [panel for _, _, panel in panels]
+    return [panel for _, _, panel in drawn]
 
 
 def _xy(form: Form, measurement: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -123,8 +128,8 @@ def likelihoods(profiles: Sequence[LikelihoodProfile], axes: Any = None) -> list
         one for each profile; dotted lines mark the ends of its interval
     """
     with style():
-        panels = _checked_axes(len(profiles), axes)
-        for profile, panel in zip(profiles, panels, strict=True):
+        drawn = _checked_axes(len(profiles), axes)
+        for profile, panel in zip(profiles, drawn, strict=True):
             # The root of the rise is nearly straight on either side of the minimum.
             side = np.sign(profile.values - profile.values[np.argmin(profile.rises)])
             fine = np.linspace(profile.values[0], profile.values[-1], 200)
@@ -135,16 +140,15 @@ def likelihoods(profiles: Sequence[LikelihoodProfile], axes: Any = None) -> list
                 if np.isfinite(end):
                     panel.axvline(end, color=PALETTE[1], linestyle=":", linewidth=1.2)
             low, high = profile.interval
-            panel.set(xlabel=profile.name, ylabel="rise of the misfit, over the noise squared  [1]")
+            panel.set(xlabel=profile.name, ylabel="rise of the misfit / noise$^2$")
             panel.set_title(f"{100.0 * profile.level:g} %: {low:.4g} to {high:.4g}")
-    return panels
+    return drawn
 
 
 def _checked_axes(count: int, axes: Any) -> list[Axes]:
     """Axes as given if there are as many, or new ones."""
     if axes is None:
-        size = (5.2 * count, 4.2)
-        return list(plt.subplots(1, count, figsize=size, squeeze=False)[1][0])
+        return list(panels(1, count)[0])
     drawn = list(np.ravel(axes))
     if len(drawn) != count:
         raise InputError(f"axes: there are {count} to draw, not {len(drawn)}: give one for each")

@@ -11,7 +11,7 @@ from matplotlib.ticker import EngFormatter
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.plotting.protocols import InspectedData
-from jbeamshell.plotting.style import FAINT, PALETTE, colours, style
+from jbeamshell.plotting.style import FAINT, PALETTE, PANEL, looks, style
 
 LAYOUT: Any = [["loop", "force"], ["loop", "displacement"]]
 MOST_NAMED = 6  # loops in a legend
@@ -34,7 +34,7 @@ def inspection(seen: InspectedData, axes: Any = None) -> list[Axes]:
         panels = _three(axes)
         loops, *courses = panels
         levels = [level for view in seen.views for level in view.levels]
-        own = iter(colours(len(levels)))
+        own = iter(looks(len(levels)))
         first = seen.views[0].recording
         for view in seen.views:
             recording = view.recording
@@ -42,9 +42,8 @@ def inspection(seen: InspectedData, axes: Any = None) -> list[Axes]:
             loops.plot(recording.displacement, recording.force, label="_nolegend_", **shown)
             for level in view.levels:
                 told = f"{level.cycles} cycles: " if level.cycles > 1 else ""
-                colour = next(own)
                 mean = level.loop.displacement, level.loop.force
-                loops.plot(*mean, color=colour, label=f"{told}{level.shape.kind}")
+                loops.plot(*mean, **next(own), label=f"{told}{level.shape.kind}")
             timed = all(one.recording.time is not None for one in seen.views)
             count = np.arange(recording.force.size)
             for panel, name in zip(courses, ("force", "displacement"), strict=True):
@@ -86,7 +85,7 @@ def _title(seen: InspectedData) -> str:
 def _three(axes: Any) -> list[Axes]:
     """Three axes, new ones unless given."""
     if axes is None:
-        grid = plt.subplot_mosaic(LAYOUT, figsize=(9.0, 4.6), width_ratios=[1.2, 1.0])[1]
+        grid = plt.subplot_mosaic(LAYOUT, figsize=(2.2 * PANEL[0], 1.3 * PANEL[1]))[1]
         return [grid["loop"], grid["force"], grid["displacement"]]
     drawn = list(np.ravel(axes))
     if len(drawn) != 3:

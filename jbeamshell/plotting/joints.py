@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from jax import Array
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
@@ -12,12 +13,12 @@ from numpy.typing import NDArray
 
 from jbeamshell.plotting.protocols import LoadPath
 from jbeamshell.plotting.steps import checked_steps, load_label
-from jbeamshell.plotting.style import DATA, FAINT, POSITION, single, style
+from jbeamshell.plotting.style import DATA, FAINT, POSITION, SLIPS, STICKS, below, single, style
 
-SHARE = 0.4  # of the half height H, as which the largest displacement is drawn
+SHARE = 0.8  # of the half height H, as which the largest displacement is drawn
 STATES: dict[str, tuple[str, Any]] = {  # colour and line
-    "sticks": ("#56B4E9", "-"),
-    "slips": ("#D55E00", "-"),
+    "sticks": (STICKS, "-"),
+    "slips": (SLIPS, "-"),
     "is lifted": ("0.55", ":"),
 }
 ARROWS = 24  # of the pressure on a face, at most
@@ -31,9 +32,11 @@ def deformed(
     axes: Axes | None = None,
     *,
     scale: float | None = None,
+    sections: int = 0,
 ) -> Axes:
     """Draw the deformed members with their pressures, and where the contact sticks, slips or lifts.
 
+    Displacements along X are counted from the pressed members, as u(L) is.
     Overhangs of a lap joint are beams without shear from the contact's ends to theirs.
 
     Parameters
@@ -46,6 +49,8 @@ def deformed(
         Where to draw; new axes when not given.
     scale : float, optional
         Factor of the displacements; when not given, one that makes them visible.
+    sections : int
+        Number of cross-sections to draw, dark where the contact slips.
 
     Returns
     -------
@@ -59,16 +64,12 @@ def deformed(
     """
     last = history.cycles[-1][2] if history.cycles else history.force.size - 1
     (step,) = checked_steps(history, [last if step is None else step])
-    scene, x = history.scene, np.asarray(history.x)
-    height = 2.0 * float(scene.strip.half_height)
-    members = [(np.asarray(history.fields), height)]
-    if history.member is not None:
-        below = -2.0 * float(scene.member.beside(scene.strip).half_height)
-        members.append((np.asarray(history.member), below))
+    x, members = np.asarray(history.x), _members(history)
+    height = members[0][1]
     paths = [_faces(fields, up) for fields, up in members]
     moves = [(contact[step], face[step]) for contact, face in paths]
     beyond = _overhangs(history, step, members)
-    factor = scale if scale is not None else _visible(paths, height)
+    factor = visible_scale(history) if scale is None else scale
     with style():
         axes = single(axes)
         axes.grid(False)
@@ -82,6 +83,9 @@ def deformed(
             axes.fill(*outline.T, facecolor=fill, edgecolor=DATA, linewidth=0.8)
         _draw_supports(axes, history, members[-1][1])
         _draw_pressures(axes, history, members, moves, factor)
+        for (_, up), (contact, face) in zip(members, moves, strict=True):
+            faces = _moved(x, 0.0, contact, factor), _moved(x, up, face, factor)
+            _draw_sections(axes, history, step, faces, sections)
         _draw_contact(axes, history, step, _moved(x, 0.0, moves[0][0], factor))
         force = float(history.force[step])
         if abs(force) > 0.0:
@@ -94,13 +98,38 @@ def deformed(
             ends = (stop, start) if force > 0.0 else (start, stop)
             axes.annotate("", *ends, arrowprops={"arrowstyle": "-|>", "color": DATA})
         axes.set(xlabel=POSITION, ylabel="height  [length]", xlim=_reach(history, 0.04, 0.12))
-        axes.set_title(f"{load_label(history, step)}, displacements x {factor:.3g}")
+        times = f"{factor:.0f}" if factor >= 10.0 else f"{factor:.3g}"
+        axes.set_title(f"{load_label(history, step)}, displacements x {times}")
         keys = [
             Line2D([], [], color=colour, linestyle=line, linewidth=3.0, label=name)
             for name, (colour, line) in STATES.items()
         ]
-        axes.legend(handles=keys, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
+        below(axes, keys)
     return axes
+
+
+def visible_scale(history: LoadPath) -> float:
+    """Factor of the displacements with which the largest of a path is seen."""
+    members = _members(history)
+    return _visible([_faces(fields, up) for fields, up in members], members[0][1])
+
+
+def _members(history: LoadPath) -> list[tuple[NDArray[np.float64], float]]:
+    """Fields (steps, n, m) of each member, and the height of its outer face over the contact."""
+    scene = history.scene
+    members = [(_since_pressing(history, history.fields), 2.0 * float(scene.strip.half_height))]
+    if history.member is not None:
+        below = -2.0 * float(scene.member.beside(scene.strip).half_height)
+        members.append((_since_pressing(history, history.member), below))
+    return members
+
+
+def _since_pressing(history: LoadPath, fields: Array) -> NDArray[np.float64]:
+    """Fields of a member, with v counted from the pressed member where loads follow."""
+    counted, pressed = np.array(fields), history.pressed
+    if pressed + 1 < counted.shape[0]:
+        counted[pressed:, :, 0] -= counted[pressed, :, 0].copy()
+    return counted
 
 
 def _faces(
@@ -251,6 +280,22 @@ def _draw_pressures(
 def _at(x: NDArray[np.float64], table: NDArray[np.float64]) -> NDArray[np.float64]:
     """Pressure of a table at positions; its end values go on beyond it."""
     return np.interp(x, table[:, 0], table[:, 1])
+
+
+def _draw_sections(
+    axes: Axes,
+    history: LoadPath,
+    step: int,
+    ends: tuple[NDArray[np.float64], NDArray[np.float64]],
+    count: int,
+) -> None:
+    """Cross-sections between two faces at evenly spaced nodes, dark where the contact slips."""
+    x = np.asarray(history.x)
+    nodes = np.unique(np.abs(x[:, None] - np.linspace(x[0], x[-1], count)).argmin(axis=0))
+    slips = np.asarray(history.slipping[step])[nodes]
+    lines = np.stack([end[nodes] for end in ends], axis=1)
+    widths, shades = np.where(slips, 1.2, 0.6), np.where(slips, DATA, FAINT)
+    axes.add_collection(LineCollection(list(lines), colors=list(shades), linewidths=widths))
 
 
 def _draw_contact(axes: Axes, history: LoadPath, step: int, points: NDArray[np.float64]) -> None:

@@ -5,17 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import scipy.signal
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jbeamshell.plotting.protocols import ModalProperties, RingDownComparison, Vibration
-from jbeamshell.plotting.style import DATA, DISPLACEMENT, PALETTE, mark_decades, single, style
+from jbeamshell.plotting.style import (
+    DATA,
+    DISPLACEMENT,
+    PALETTE,
+    mark_decades,
+    panels,
+    single,
+    style,
+)
 
 TIME, AMPLITUDE = "$t$  [time]", "amplitude of $u(L)$  [length]"
-FREQUENCY, DAMPING = "frequency  [1/time]", r"damping ratio $\zeta$  [1]"
+FREQUENCY, DAMPING = "frequency  [1/time]", r"damping ratio $\zeta$  [dimensionless]"
 LEDGER = {
     "kinetic": "kinetic",
     "stored": "stored",
@@ -57,7 +64,8 @@ def energies(motion: Vibration, axes: Axes | None = None) -> Axes:
             list(parts.values()),
             labels=[LEDGER[name] for name in parts],
             colors=[PALETTE[0], PALETTE[5], PALETTE[1], PALETTE[4]],
-            linewidth=0.0,
+            linewidth=0.6,
+            edgecolor="white",
         )
         whole = parts["kinetic"][0] + parts["stored"][0] + np.asarray(motion.external_work)
         axes.plot(time, whole, color=DATA, linestyle="--", linewidth=1.0, label="supplied")
@@ -129,7 +137,7 @@ def spectrogram(motion: Vibration, axes: Axes | None = None) -> Axes:
 def ring_down_sheet(study: RingDownComparison) -> Figure:
     """Draw motion, energies, frequency and damping of a ring-down, beside the prediction."""
     with style():
-        figure, axes = plt.subplots(2, 2, figsize=(10.0, 7.0))
+        axes = panels(2, 2)
         vibration(study.motion, axes[0, 0])
         energies(study.motion, axes[0, 1])
         ring_down(study.found, axes=axes[1])
@@ -143,7 +151,7 @@ def ring_down_sheet(study: RingDownComparison) -> Figure:
             below.set_xlim(0.9 * reach.min(), 1.1 * reach.max())
             mark_decades(below.xaxis)
             below.set_ylim(known.min() / room, known.max() * room)
-    return figure
+    return axes[0, 0].figure
 
 
 def _pair(
@@ -154,7 +162,7 @@ def _pair(
     line: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 3.0, "label": label}
     line["linestyle"] = "" if marker else "-"
     with style():
-        pair = plt.subplots(1, 2, figsize=(10.0, 3.6))[1] if axes is None else axes
+        pair = panels(1, 2)[0] if axes is None else axes
         pair[0].plot(amplitude, frequency, **line)
         shown = damping > 0.0
         pair[1].plot(amplitude[shown], damping[shown], **line)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -22,7 +21,8 @@ from jbeamshell.plotting.style import (
     PALETTE,
     POSITION,
     ROTATION,
-    colours,
+    looks,
+    panels,
     single,
     style,
 )
@@ -103,28 +103,28 @@ def profiles(
         grid = _four(axes)
         slip, rotation, traction, reaction = grid.ravel()
         x = np.asarray(history.x)
-        for step, colour in zip(chosen, colours(len(chosen)), strict=True):
-            slip.plot(x, np.asarray(history.slip[step]), color=colour)
-            rotation.plot(x, np.asarray(history.beta[step]), color=colour)
+        for step, look in zip(chosen, looks(len(chosen)), strict=True):
+            slip.plot(x, np.asarray(history.slip[step]), **look)
+            rotation.plot(x, np.asarray(history.beta[step]), **look)
             if squeezes:
                 change = np.asarray(history.psi[step] - history.psi[history.pressed])
-                rotation.plot(x, change, color=colour, linestyle="--", linewidth=1.1)
+                rotation.plot(x, change, **look, linewidth=0.7)
             moving, share = np.asarray(history.slipping[step]), np.asarray(history.traction[step])
             share = share / cap if cap > 0.0 else share
-            traction.plot(x, share, color=colour, label=load_label(history, step))
-            traction.plot(x[moving], share[moving], "o", color=colour, markersize=3.2)
-            reaction.plot(x, np.asarray(history.reaction[step]) / pressure, color=colour)
+            traction.plot(x, share, **look, label=load_label(history, step))
+            traction.plot(x[moving], share[moving], "o", color=look["color"], markersize=3.2)
+            reaction.plot(x, np.asarray(history.reaction[step]) / pressure, **look)
         varies = contact.pressure.ndim > 0
         over = r"\max F_N" if varies else "F_N"
         slip.set(title="slip", ylabel="$v - v_p$  [length]")
         rotation.set(title="rotation", ylabel=r"$\beta$  [rad]")
-        share_of = rf"$t\,/\,\mu {over}$  [1]" if cap > 0.0 else "$t$  [stress]"
+        share_of = rf"$t\,/\,\mu {over}$" if cap > 0.0 else "$t$  [stress]"
         traction.set(title="friction traction", ylabel=share_of)
-        reaction.set(title="normal reaction", ylabel=rf"$R\,/\,{over}$  [1]")
+        reaction.set(title="normal reaction", ylabel=rf"$R\,/\,{over}$")
         if squeezes:
             rotation.set(title="rotation and squeeze strain")
-            rotation.set_ylabel(r"$\beta$  [rad],  $\psi - \psi_p$  [1]")
-            kinds = [Line2D([], [], color=DATA), Line2D([], [], color=DATA, linestyle="--")]
+            rotation.set_ylabel(r"$\beta$  [rad],  $\psi - \psi_p$")
+            kinds = [Line2D([], [], color=DATA), Line2D([], [], color=DATA, linewidth=0.7)]
             rotation.legend(kinds, [r"$\beta$", r"$\psi - \psi_p$"], loc="best")
         for panel in grid.ravel():
             panel.set(xlabel=POSITION)
@@ -167,12 +167,14 @@ def contact_lines(
         grid = _four(axes)
         for panel, (name, title) in zip(grid.ravel(), names.items(), strict=True):
             values = np.asarray(getattr(history, name))
-            for step, colour in zip(chosen, colours(len(chosen)), strict=True):
+            for step, look in zip(chosen, looks(len(chosen)), strict=True):
                 label = f"$F = {float(history.force[step]):.4g}$" if step else "pressed"
-                panel.plot(x, values[step], color=colour, label=label)
+                panel.plot(x, values[step], **look, label=label)
                 moving = np.asarray(history.slipping[step])
                 if name == "traction":
-                    panel.plot(x[moving], values[step][moving], "o", color=colour, markersize=3.2)
+                    panel.plot(
+                        x[moving], values[step][moving], "o", color=look["color"], markersize=3.2
+                    )
             panel.set(title=title, xlabel=POSITION)
         dot = Line2D([], [], color=DATA, marker="o", linestyle="", markersize=3.2)
         handles, labels = grid.ravel()[2].get_legend_handles_labels()
@@ -183,7 +185,7 @@ def contact_lines(
 def _four(axes: ArrayLike | None) -> np.ndarray:
     """Four axes, new ones unless given."""
     if axes is None:
-        return plt.subplots(2, 2, figsize=(9.0, 6.0), sharex=True)[1]
+        return panels(2, 2, sharex=True)
     grid = np.asarray(axes, dtype=object)
     if grid.size != 4:
         raise InputError(f"axes: profiles need four, not {grid.size}: give four")

@@ -44,11 +44,13 @@ class ContactPath(LoopPath, Protocol):
     x : (n,) places of the contact nodes
     slip, gap, traction, reaction : (steps+1, n) tangential displacement, height, friction traction
         and normal reaction
-    slipping : (steps+1, n) True where a node slips
+    slipping, touching : (steps+1, n) True where a node slips, or is in contact
     """
 
     @property
     def x(self) -> Array: ...
+    @property
+    def touching(self) -> Array: ...
     @property
     def slip(self) -> Array: ...
     @property

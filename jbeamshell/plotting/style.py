@@ -1,4 +1,8 @@
-"""Style of all pictures, and how they are saved."""
+"""Style of all pictures, and how they are saved.
+
+A panel is as wide as a column of a journal, where its letters have their printed size.  Curves of a
+family differ in colour and in line, so that they are told apart in grey too.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import base64
 import contextlib
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,24 +31,31 @@ STYLE: dict[Any, Any] = {
     "axes.formatter.limits": (-3, 4),
     "axes.formatter.use_mathtext": True,
     "axes.grid": True,
-    "axes.labelsize": 10,
+    "axes.labelsize": 9,
     "axes.spines.right": False,
     "axes.spines.top": False,
-    "axes.titlesize": 10,
+    "axes.titlesize": 9,
     "figure.constrained_layout.use": True,
-    "figure.dpi": 90,
+    "figure.dpi": 130,
     "grid.color": "0.9",
     "grid.linewidth": 0.7,
-    "legend.fontsize": 9,
-    "legend.frameon": False,
-    "lines.linewidth": 1.6,
+    "legend.fontsize": 8,
+    "legend.edgecolor": "none",
+    "legend.framealpha": 0.75,
+    "legend.frameon": True,
+    "legend.handlelength": 2.4,
+    "lines.linewidth": 1.4,
     "xtick.color": "0.3",
-    "xtick.labelsize": 9,
+    "xtick.labelsize": 8,
     "ytick.color": "0.3",
-    "ytick.labelsize": 9,
+    "ytick.labelsize": 8,
 }
+PANEL = (3.4, 2.7)  # inches: a column of a journal
 # Palette of Okabe and Ito, told apart by colour-blind readers too.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)), (0, (3, 2)))
+MARKS = "os^vDx"
+STICKS, SLIPS, LIFTED = "#7FC4EE", "#A63D00", "0.93"  # states of a contact: light, dark, pale
 DATA = "0.15"
 FAINT = "0.65"
 DOTS: dict[str, Any] = {
@@ -98,6 +109,46 @@ def colours(count: int) -> list[Any]:
     return list(plt.get_cmap("viridis")(np.linspace(0.0, 0.92, count)))
 
 
+def looks(count: int) -> list[dict[str, Any]]:
+    """Colours and lines of a family of curves, in the order of its parameter.
+
+    A few curves differ in both; of many, the later is the lighter, in grey too.
+
+    Parameters
+    ----------
+    count : int
+        Number of curves, at least 0.
+
+    Returns
+    -------
+    list of dict
+        Options of `matplotlib.axes.Axes.plot`: ``color`` and ``linestyle``.
+    """
+    lines = LINES if count <= len(PALETTE) else ("-",) * count
+    pairs = zip(colours(count), lines, strict=False)
+    return [{"color": colour, "linestyle": line} for colour, line in pairs]
+
+
+def in_units(axes: Any, units: Mapping[str, str]) -> None:
+    """Name the units of a scene in the labels of axes, which only say length, stress and so on.
+
+    Parameters
+    ----------
+    axes : axes, or an array or list of axes
+    units : names of units by the words in brackets; their numbers are not converted
+
+    Examples
+    --------
+    >>> plotting.in_units(history.plot(), {"length": "mm", "force/width": "N/mm"})
+    """
+    for panel in np.ravel(axes):
+        for axis in (panel.xaxis, panel.yaxis):
+            text = axis.get_label_text()
+            for word, unit in units.items():
+                text = text.replace(f"[{word}]", f"[{unit}]")
+            axis.set_label_text(text)
+
+
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure to a file, whole or not at all.
 
@@ -118,12 +169,24 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     if suffix not in formats:
         raise InputError(f"{path}: end the name in .{' or .'.join(formats)}")
     with written_whole(path) as draft:
-        figure.savefig(draft, format=suffix, dpi=200)
+        figure.savefig(draft, format=suffix, dpi=300)
 
 
 def single(axes: Axes | None) -> Axes:
     """Axes as given, or new ones."""
-    return plt.subplots(figsize=(5.6, 4.0))[1] if axes is None else axes
+    return panels(1, 1)[0, 0] if axes is None else axes
+
+
+def panels(rows: int, columns: int, **options: Any) -> np.ndarray:
+    """Axes (rows, columns) of a new figure, each of the size of a panel."""
+    size = (columns * PANEL[0], rows * PANEL[1])
+    return np.asarray(plt.subplots(rows, columns, figsize=size, squeeze=False, **options)[1])
+
+
+def below(axes: Axes, keys: Sequence[Any]) -> None:
+    """Put a legend of one or two rows below the axes, where it covers nothing."""
+    columns = len(keys) if len(keys) <= 3 else 2
+    axes.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=columns)
 
 
 def mark_decades(*axes_of_one: Axis) -> None:
@@ -149,7 +212,7 @@ def thumbnail(drawn: Any) -> str:
     drawn : axes, or an array or list of axes of one figure
     """
     figure, image = np.ravel(drawn)[0].figure, io.BytesIO()
-    figure.savefig(image, format="png", dpi=60)
+    figure.savefig(image, format="png", dpi=90)
     close(figure)
     return f'<img src="data:image/png;base64,{base64.b64encode(image.getvalue()).decode()}">'
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -19,14 +18,14 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.measured.form import DISSIPATION, SECANT_STIFFNESS
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.plotting.protocols import SweptFigures
-from jbeamshell.plotting.style import DATA, PALETTE, colours, mark_decades, single, style
+from jbeamshell.plotting.style import DATA, PALETTE, looks, mark_decades, panels, single, style
 from jbeamshell.scene.keys import TABLE, unit_of
 
 FIGURES = {
     "dissipation": DISSIPATION.label,
-    "dissipation_ratio": "$D\\,/\\,D_{bar}$  [1]",
+    "dissipation_ratio": "$D\\,/\\,D_{bar}$",
     "secant_stiffness": SECANT_STIFFNESS.label,
-    "loss_factor": "loss factor  [1]",
+    "loss_factor": "loss factor  [dimensionless]",
 }
 WIDE = 20.0  # ratio of largest to smallest value above which an axis is logarithmic
 NAMED = 10  # most curves that the legend names
@@ -82,17 +81,17 @@ def sweep(
             order = np.argsort(x)
             names: list[Any] = [None] if per is None else result.axes[per].tolist()
             every = -(-len(names) // NAMED)
-            curves = zip(table, names, colours(len(names)), strict=True)
-            for number, (row, value, colour) in enumerate(curves):
+            curves = zip(table, names, looks(len(names)), strict=True)
+            for number, (row, value, look) in enumerate(curves):
                 named = value is not None and number % every == 0
                 label = f"{_symbol(per)} = {value:.3g}" if named else None
-                axes.plot(x[order], row[order], color=colour, label=label, marker=".", markersize=4)
+                axes.plot(x[order], row[order], **look, label=label, marker=".", markersize=4)
             axes.set_title(rest)
         _cubic_law(result, axes, figure, along)
         axes.set(xlabel=_label(along, result), ylabel=FIGURES.get(figure, figure.replace("_", " ")))
         _scales(axes, x, values)
         if axes.get_legend_handles_labels()[1]:
-            axes.legend(fontsize=8)
+            axes.legend()
     return axes
 
 
@@ -129,7 +128,7 @@ def master_curve(
         _dots(axes, x[good], y[good], eta[good], key and _label(key, result))
         axes.axhline(1.0, color=DATA, linestyle="--", linewidth=0.8)
         axes.set(
-            xlabel=r"$A\,/\,(\mu F_N L/2)\,/\,\eta$  [1]",
+            xlabel=r"$A\,/\,(\mu F_N L/2)\,/\,\eta$",
             ylabel=FIGURES.get(figure, figure.replace("_", " ")),
             xscale="log",
         )
@@ -152,13 +151,11 @@ def sweep_sheet(result: SweptFigures) -> Figure:
     ratio, scaled = "dissipation_ratio", result.lanes.amplitude_over_height
     both = ratio in result.values and bool(np.any(np.isfinite(scaled + result.values[ratio])))
     with style():
-        sheet, panels = plt.subplots(
-            1, 1 + both, figsize=(5.6 * (1 + both), 4.0), squeeze=False, layout="constrained"
-        )
-        sweep(result, panels[0, 0], figure=next(iter(result.values)))
+        row = panels(1, 1 + both)[0]
+        sweep(result, row[0], figure=next(iter(result.values)))
         if both:
-            master_curve(result, panels[0, 1])
-    return sheet
+            master_curve(result, row[1])
+    return row[0].figure
 
 
 def _keys(result: SweptFigures, along: str | None, per: str | None) -> tuple[str, str | None]:
@@ -244,4 +241,5 @@ def _symbol(key: str | None) -> str:
 
 def _label(key: str, result: SweptFigures) -> str:
     """Label of an axis: symbol and unit of a key."""
-    return f"{_symbol(key)}  [{unit_of(key, result.scene.load)}]"
+    unit = unit_of(key, result.scene.load)
+    return f"{_symbol(key)}  [{'dimensionless' if unit == '1' else unit}]"

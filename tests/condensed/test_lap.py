@@ -140,6 +140,7 @@ class TestBalance:
         n = history.x.size
         rise = float(axes.get_title().rpartition(" ")[2]) * np.asarray(history.w[-1])
         np.testing.assert_allclose(upper[:n, 1], rise, atol=1e-12)
+        assert len(history.animate([0, -1]).still(1).axes[0].patches) == len(axes.patches)
         assert np.all(upper[:n, 1] - lower[:n, 1] >= -1e-12)
         assert np.all(upper[:n, 1] <= upper[n:, 1][::-1])
         # The clamped face, and equilibrium of the upper member along X.

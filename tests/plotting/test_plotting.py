@@ -6,12 +6,15 @@ import jax
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
+from PIL import Image
 from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import plotting
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.profile_likelihood import Profile
+from jbeamshell.plotting.style import LIFTED, SLIPS, STICKS
 
 COARSE = {
     "model.nodes": 21,
@@ -69,6 +72,10 @@ def with_scene(history, **values):
 def _closed_figures():
     yield
     plt.close("all")
+
+
+def luminance(colour):
+    return float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114)))
 
 
 def labels(axes):
@@ -176,7 +183,7 @@ class TestContact:
 
     def test_takes_the_pressed_strip_and_the_turns_of_the_last_cycle(self, clamped):
         gap = plotting.contact(clamped, panels=["gap"])[0]
-        shown = [line.get_ydata() for line in gap.get_lines() if line.get_linestyle() == "-"]
+        shown = [line.get_ydata() for line in gap.get_lines() if len(line.get_xdata()) == 61]
         np.testing.assert_array_equal(shown, clamped.gap[np.array([3, 12, 18])])
         legend = [text.get_text() for text in gap.get_legend().get_texts()]
         assert legend == ["$F = 0$", "$F = -30$", "$F = 30$", "contact ends"]
@@ -356,6 +363,58 @@ class TestStyle:
     @pytest.mark.parametrize("count", [1, 6, 7, 20])
     def test_colours_differ(self, count):
         assert len({tuple(colour) for colour in plotting.colours(count)}) == count
+
+    def test_families_are_told_apart_in_grey(self):
+        few = plotting.looks(6)
+        assert len({str(look["linestyle"]) for look in few}) == 6
+        many = [luminance(look["color"]) for look in plotting.looks(20)]
+        assert np.all(np.diff(many) > 0.0)
+
+    def test_states_of_a_contact_are_told_apart_in_grey(self):
+        shades = [luminance(state) for state in (SLIPS, STICKS, LIFTED)]
+        assert np.all(np.diff(shades) > 0.2)
+
+    def test_units_take_the_place_of_words(self, history):
+        axes = plotting.loop(history)
+        plotting.in_units(axes, {"length": "mm", "force/width": "N/mm"})
+        assert labels(axes) == ["$u(L)$  [mm]", "$F$  [N/mm]"]
+
+
+class TestFilm:
+    def test_shows_every_step_on_the_loop(self, history, tmp_path):
+        film = history.animate([15, 21], seconds=0.4)
+        film.save(tmp_path / "cycle.gif")
+        with Image.open(tmp_path / "cycle.gif") as gif:
+            assert (gif.n_frames, gif.info["duration"]) == (2, 200)
+        body, path = film.still(1).axes
+        point = path.get_lines()[-1]
+        assert point.get_xydata().tolist() == [[history.displacement[21], history.force[21]]]
+        assert body.get_title().startswith(f"$F = {float(history.force[21]):.4g}$")
+
+    def test_takes_the_last_cycle(self, history):
+        assert history.animate().frames == list(range(15, 28))
+
+    def test_draws_all_steps_to_one_scale_from_the_pressed_strip(self, history):
+        scales = {history.animate([step]).still().axes[0].get_title()[-8:] for step in (0, 15, 21)}
+        assert len(scales) == 1
+        face = history.plot_deformed(0).patches[0].get_xy()[:21]
+        np.testing.assert_allclose(face[:, 0], history.x, atol=1e-12)
+
+    def test_draws_the_traction_of_bodies_without_a_shape(self, history):
+        names = [field.name for field in dataclasses.fields(jb.ContactHistory)]
+        held = {name: getattr(history, name, None) for name in names}
+        settled = np.ones(history.force.size, dtype=bool)
+        film = jb.ContactHistory(**held | {"settled": settled}).animate([21])
+        traction = film.still().axes[0]
+        slips = {line.get_label(): line for line in traction.get_lines()}["slips"]
+        np.testing.assert_array_equal(slips.get_xdata(), history.x[history.slipping[21]])
+
+    def test_refuses_another_format(self, history, tmp_path):
+        with pytest.raises(InputError, match=r"end the name in \.gif"):
+            history.animate([0]).save(tmp_path / "cycle.mp4")
+
+    def test_shows_itself_in_a_notebook(self, history):
+        assert history.animate([0])._repr_html_().startswith("<img")
 
 
 class TestSave:
