@@ -145,15 +145,14 @@ def animate(
     with style():
         figure = plt.figure(figsize=(2.2 * PANEL[0], PANEL[1]))
         left, right = figure.subplots(1, 2, width_ratios=(1.8, 1.0))
-        loop(history, right).legend().remove()
+        if hasattr(history, "fields"):  # a strip or a lap joint
+            joint = cast(LoadPath, history)
+            turns, draw_left = joint.scene.load.kind == "moment", _members(joint, scale)
+        else:
+            turns, draw_left = False, _traction(cast(ContactPath, history))
+        loop(history, right, moment=turns).legend().remove()
         look = {"color": SLIPS, "markeredgecolor": DATA, "markersize": 7}
         point = right.plot([], [], "o", zorder=4, **look)[0]
-    shaped = hasattr(history, "fields")  # a strip or a lap joint
-    draw_left = (
-        _members(cast(LoadPath, history), scale)
-        if shaped
-        else _traction(cast(ContactPath, history))
-    )
 
     def draw(step: int) -> None:
         point.set_data([history.displacement[step]], [history.force[step]])
