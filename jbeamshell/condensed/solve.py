@@ -15,6 +15,7 @@ from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import Status
 from jbeamshell.common.precision import in_double
 from jbeamshell.common.small import Small
+from jbeamshell.condensed.bearings import bearing_energy, with_bearings, with_gaps
 from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import (
     driven_by_displacement,
@@ -161,30 +162,35 @@ def _walk(
 def _levels(
     scene: Scene, strip: Strip, targets: Array, turns: Turns, by: Search, soft: bool
 ) -> Level:
-    """Levels after the pressing."""
-    body, friction = strip.body, scene.contact.friction
-    lift = None if stays_flat(scene) else strip.lift
+    """Levels after the pressing; the last contact nodes are bearings, if the scene has any."""
+    body, contact, friction = strip.body, scene.contact, scene.contact.friction
+    lift, bearing = strip.lift, contact.bearing_stiffness
+    if bearing is not None:
+        share = (strip.load / jnp.sum(strip.load))[::-1]
+        body = with_bearings(body, bearing, share)
+        lift = with_gaps(lift, 0.0 if contact.clearance is None else contact.clearance)
     if soft:
         body, springs = with_springs(body, spring_stiffness(scene, strip))
     if scene.load.control == "displacement":
         body = driven_by_displacement(body)
     start = pressed(body)
-    if by == "factors" or not targets.size:
+    if (by == "factors" and bearing is None) or not targets.size:
         found, sound = nested_levels(body, friction, start, targets, turns)
     else:
         # Factors overflow in single precision.
-        if by == "either" and body.f_t.dtype == np.float64:
-            found = levels(body, friction, start, targets, turns, lift)
+        flat = None if stays_flat(scene) else lift
+        if by == "either" and bearing is None and body.f_t.dtype == np.float64:
+            found = levels(body, friction, start, targets, turns, flat)
         else:
             lifting = math.ceil(LIFTING * strip.x.size) if by == "near events" else None
             turned = jnp.asarray(turns)
-            found = walk(body, friction, start, targets, turned, lift, lifting=lifting)
+            found = walk(body, friction, start, targets, turned, flat, lifting=lifting)
         sound = jnp.all(jnp.isfinite(strip.lift))
     state = found.state
     if scene.load.control == "displacement":
         state = jax.vmap(exchanged)(state)
     if soft:
-        risen = found.lift - strip.lift
+        risen = found.lift - lift
         state = state._replace(v=jax.vmap(springs.slip)(state.v, risen, state.force))
     return found._replace(state=state, settled=found.settled & sound)
 
@@ -206,7 +212,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     settled, held = (jnp.pad(each[::-1], (n - k, 0)) for each in (strip.settled, body.t_0))
     driven = state.displacement if scene.load.control == "displacement" else state.force
     v = along(state.v) + part[:, None] * settled
-    w = along(levels.lift) + pressing * strip.lift[::-1]
+    w = along(levels.lift[:, :n]) + pressing * strip.lift[::-1]
     force = every(state.force)
     sides = jnp.stack([v, w], axis=2).reshape(steps, 2 * n)
     given = jnp.concatenate([sides, force[:, None], part[:, None]], axis=1)
@@ -214,7 +220,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     moved = fields(strip.elimination, own)[:, :n]
     further, sections = _sections(strip, moved)
     below = None if strip.pair is None else _fields_below(strip.pair, given)
-    reaction = along(state.r_n) / strip.tributary
+    reaction = along(state.r_n[:, :n]) / strip.tributary
     reaction = reaction + pressing * body.r_0[::-1] / strip.tributary
     traction = -along(state.r_t) / strip.tributary
     traction = traction - pressing * held / strip.tributary
@@ -223,6 +229,8 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     energy = 0.5 * jnp.sum(forces * given, axis=1) - forces[:, -2] * given[:, -2]
     if soft:
         energy = energy + every(spring_energy(spring_stiffness(scene, strip), state.r_t))
+    if scene.contact.bearing_stiffness is not None:
+        energy = energy + every(bearing_energy(scene.contact.bearing_stiffness, state.r_n[:, n:]))
     status = jnp.where(levels.settled, Status.CONVERGED, Status.MAX_ITERATIONS)
     sound = jnp.append(jnp.ones(before, bool), levels.settled)
 

@@ -31,6 +31,7 @@ from jbeamshell.scene.scene import Scene
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
 PLANE_GROWTH = 0.3  # of the element size over the distance from there
 PLANE_FAR_SIZE = 0.15  # of L, elements away from it
+HOLE_DEPTH = 0.1  # of H, a gap that nothing closes
 STEP_SIZE = 0.05  # of H, elements at a step of the pressure
 RULE = elements.element_rule("finite-difference")
 
@@ -79,7 +80,7 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         upper, lower = _members(scene, form, x, down, up)
         elimination = upper.elimination
         pair, hessian = joined(upper, lower)
-    gap = None if scene.contact.gap is None else initial_gap(scene.contact.gap, x)
+    gap = initial_gap(scene, x)
     last = 2 * x.size - 2
     v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
     w = slice(last + 1, None, -2)
@@ -118,8 +119,24 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     return Strip(body, form, elimination, hessian, x, tributary, down, settled, lift, pair)
 
 
-def initial_gap(gap: Array, x: Array) -> Array:
-    """Distance (n,) of the members at their stations, from a number or a table."""
+def initial_gap(scene: Scene, x: Array) -> Array | None:
+    """Distance (n,) of the members at their stations before anything presses; None if they touch.
+
+    A hole is a gap that nothing closes.
+    """
+    given, holes = scene.contact.gap, scene.contact.holes
+    if given is None and holes is None:
+        return None
+    gap = jnp.zeros_like(x) if given is None else _on_stations(given, x)
+    if holes is None:
+        return gap
+    begin, end = scene.contact.hole_edges.T
+    inside = jnp.any((x[:, None] > begin) & (x[:, None] < end), axis=1)
+    return gap + jnp.where(inside, HOLE_DEPTH * scene.strip.half_height, 0.0)
+
+
+def _on_stations(gap: Array, x: Array) -> Array:
+    """Values (n,) of a number or a table at the stations."""
     return jnp.interp(x, gap[:, 0], gap[:, 1]) if gap.ndim else jnp.broadcast_to(gap, x.shape)
 
 

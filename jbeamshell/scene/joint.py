@@ -41,6 +41,9 @@ def check_joint(scene: Parts) -> None:
     fix = "must be 'condensed' or 'plane' in a lap joint: leave it out, or take model.rung = plane"
     require("model.solution", model.solution, model.condensed, fix)
     _check_section(strip, member)
+    fix = "needs contact.bearing_stiffness"
+    bears = contact.clearance is None or contact.bearing_stiffness is not None
+    require("contact.clearance", contact.clearance, bears, fix)
     load = scene.load
     fix = "is for a force: leave it out with load.kind = moment"
     require("load.arm", load.arm, load.arm is None or load.kind == "force", fix)
@@ -88,9 +91,10 @@ def _check_alone(scene: Parts) -> None:
     require("load.kind", load.kind, load.kind == "force", fix)
     fix = "needs a second member: leave it out, or give member.support"
     require("load.arm", load.arm, load.arm is None, fix)
-    stiffness = scene.contact.bolt_stiffness
     fix = "needs a second member: leave it out, or give member.support"
-    require("contact.bolt_stiffness", stiffness, stiffness is None, fix)
+    for name in ("bolt_stiffness", "bearing_stiffness", "clearance", "holes"):
+        value = getattr(scene.contact, name)
+        require(f"contact.{name}", value, value is None, fix)
     fix = "needs a second member: take 'frictionless', or give member.support"
     assembly = scene.contact.assembly
     require("contact.assembly", assembly, assembly == "frictionless", fix)

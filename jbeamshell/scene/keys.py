@@ -39,6 +39,7 @@ FINEST = 1e-4  # tolerance below which the finest mesh may not reach
 LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 PRESSURE = "give a number or a table of [X, pressure] rows"
 BOLTS = "give rows of numbers [X, force, width of the patch]"
+HOLES = "give rows of numbers [X, diameter]"
 GAP = "give a number or a table of [X, gap] rows"
 WIDTH = 96  # characters of a line of the printed table
 
@@ -167,6 +168,28 @@ class ContactKeys(Part):
         "pressure (lap joints only); none is none.",
         symbol="k_b",
         unit="stress",
+    )
+    bearing_stiffness: Array | None = number(
+        None,
+        "Stiffness of the bolts' shanks on their holes, once the bolts' mean slip exceeds the "
+        "clearance (lap joints only); none is none.",
+        symbol="k_c",
+        unit="stress",
+    )
+    clearance: Array | None = number(
+        None,
+        "Slip after the pressing at which the shanks bear on their holes, either way; none is zero.",
+        symbol="c",
+        unit="length",
+        closed=True,
+    )
+    holes: Array | None = number(
+        None,
+        "Rows [X, diameter] of holes, in which the members do not touch (lap joints only); none is "
+        "none.",
+        unit="length",
+        table=True,
+        fix=HOLES,
     )
     normal_stiffness: Array = number(
         50.0, "Stiffness of the compliant foundation, in units of E'/H.", symbol="k_n", unit="E'/H"

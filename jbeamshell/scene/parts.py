@@ -34,7 +34,7 @@ from jbeamshell.scene.keys import (
     key_table,
 )
 from jbeamshell.scene.layers import check_layers
-from jbeamshell.scene.pressure import check_gap, check_pressure, pressure_values
+from jbeamshell.scene.pressure import check_gap, check_holes, check_pressure, pressure_values
 from jbeamshell.scene.rungs import CONDENSED, name_of
 
 MODELS = (
@@ -169,6 +169,8 @@ class Contact(ContactKeys):
                 check_pressure(f"contact.{key}", np.asarray(pressure))
         if self.gap is not None and not isinstance(self.gap, jax.core.Tracer):
             check_gap(np.asarray(self.gap))
+        if self.holes is not None:
+            check_holes(self.holes, self.bolts)
         if not isinstance(self.pressure, jax.core.Tracer):
             presses = bool(np.any(pressure_values(np.asarray(self.pressure)) > 0.0))
             require("contact.pressure", self.pressure, presses, "must press somewhere")
@@ -204,18 +206,28 @@ class Contact(ContactKeys):
 
     @property
     def jumps(self) -> int:
-        """Number of rows of the pressures' tables at which they may jump; 0 if they are uniform."""
-        return sum(p.shape[0] - 1 for p in (self.pressure, self.bottom_pressure) if p.ndim == 2)
+        """Number of rows of the pressures' tables at which they may jump, and of holes' edges."""
+        tables = (self.pressure, self.bottom_pressure)
+        edges = 0 if self.holes is None else 2 * self.holes.shape[0]
+        return sum(p.shape[0] - 1 for p in tables if p.ndim == 2) + edges
 
     def steps(self, length: Array) -> Array | None:
-        """Positions X at which a pressure jumps, rising; None if both pressures are uniform.
+        """Positions X at which a pressure jumps or a hole ends, rising; None if there are none.
 
         Rows of a table between which it does not jump give L.
         """
         tables = [p for p in (self.pressure, self.bottom_pressure) if p.ndim == 2]
-        if not tables:
-            return None
-        return jnp.sort(jnp.concatenate([table_steps(table, length) for table in tables]))
+        found = [table_steps(table, length) for table in tables]
+        if self.holes is not None:
+            found.append(self.hole_edges.ravel())
+        return jnp.sort(jnp.concatenate(found)) if found else None
+
+    @property
+    def hole_edges(self) -> Array:
+        """Positions X (k, 2) at which each hole begins and ends."""
+        assert self.holes is not None
+        middle, diameter = self.holes.T
+        return jnp.stack([middle - 0.5 * diameter, middle + 0.5 * diameter], axis=1)
 
 
 class Load(LoadKeys):

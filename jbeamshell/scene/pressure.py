@@ -14,7 +14,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require
-from jbeamshell.scene.keys import BOLTS, GAP, PRESSURE
+from jbeamshell.scene.keys import BOLTS, GAP, HOLES, PRESSURE
 
 
 def is_table(pressure: Any) -> bool:
@@ -127,3 +127,29 @@ def check_gap(gap: np.ndarray) -> None:
     require("contact.gap", gap, good, "must be finite and nowhere negative")
     rises = not table or bool(np.all(np.diff(gap[:, 0]) > 0.0))
     require("contact.gap", gap, rises, "its X must rise from row to row")
+
+
+def check_holes(holes: Array, bolts: Array | None) -> None:
+    """Raise `InputError` unless holes are rows [X, diameter], each within a patch of the bolts.
+
+    Parameters
+    ----------
+    holes : (k, 2)
+    bolts : (m, 3) rows of X, force and width of the patch; None for another pressure
+    """
+    key = "contact.holes"
+    require(key, "traced", not is_traced(holes), "knows no derivatives: give plain numbers")
+    rows = np.asarray(holes)
+    require(key, rows, rows.ndim == 2 and rows.shape[1] == 2, HOLES)
+    good = bool(np.all(np.isfinite(rows)) and np.all(rows[:, 1] > 0.0))
+    require(key, rows, good, "diameters must be positive numbers")
+    begin, end = rows[:, 0] - 0.5 * rows[:, 1], rows[:, 0] + 0.5 * rows[:, 1]
+    apart = bool(np.all(begin[1:] >= end[:-1]))
+    require(key, rows, apart, "overlap, or X falls: sort the rows and narrow them")
+    if bolts is None or is_traced(bolts):
+        return
+    middle, _, width = np.asarray(bolts).T
+    inside = (begin[:, None] >= middle - 0.5 * width) & (end[:, None] <= middle + 0.5 * width)
+    for hole in np.flatnonzero(~inside.any(axis=1)):
+        fix = "lies in no bolt's patch: narrow the hole, or widen the patch"
+        require(f"{key}[{hole}]", rows[hole], False, fix)

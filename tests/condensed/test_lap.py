@@ -177,6 +177,58 @@ def test_shanks_hold_a_joint_beyond_gross_slip():
     assert float(jnp.max(jnp.abs(history.energy_imbalance))) < 1e-5 * float(history.dissipation)
 
 
+class TestBearings:
+    def test_rigid_blocks_bear_after_the_clearance(self):
+        bears = {"contact.bearing_stiffness": 5e3, "contact.clearance": 2e-4}
+        rigid = {"strip.axial_stiffness": 3.4e9, "model.nodes": 25, "load.amplitude": 6e-4}
+        rigid |= {"load.control": "displacement", "load.steps_per_half_cycle": 12}
+        history = jb.solve(SQUEEZE.replace(rigid | bears), throw=False)
+        assert history.converged
+        assert float(history.force.max()) == pytest.approx(2.0 + 5e3 * (6e-4 - 2e-4), rel=1e-5)
+        assert float(history.dissipation) == pytest.approx(4.0 * 2.0 * 6e-4, rel=1e-5)
+        held = np.asarray(history.traction @ history.tributary)
+        beyond = np.clip(np.abs(np.asarray(history.displacement)) - 2e-4, 0.0, None)
+        carried = held + 5e3 * beyond * np.sign(history.displacement)
+        np.testing.assert_allclose(history.force, carried, atol=1e-4)
+
+    @pytest.mark.slow
+    def test_a_bearing_stores_what_friction_does_not_lose(self):
+        bears = {"contact.bearing_stiffness": 2e5, "contact.clearance": 2e-6}
+        bears |= {"load.amplitude": 1.9, "load.steps_per_half_cycle": 400}
+        history = jb.solve(library.single_lap().replace(bears))
+        free = jb.solve(library.single_lap().replace({"load.amplitude": 1.9}))
+        assert float(history.peak_displacement) < 0.99 * float(free.peak_displacement)
+        work = float(history.dissipation)
+        assert float(history.dissipation_loop) == pytest.approx(work, rel=1e-5)
+        assert float(jnp.max(jnp.abs(history.energy_imbalance))) < 1e-4 * work
+
+
+class TestHoles:
+    def test_nothing_touches_in_a_hole(self):
+        values = {"model.rung": "shell", "model.nodes": 65, "contact.holes": [[1.0, 0.2]]}
+        history = jb.solve(library.single_lap().replace(values), throw=False)
+        assert history.converged
+        inside = np.abs(np.asarray(history.x) - 1.0) < 0.1
+        assert inside.any()
+        assert not np.any(np.asarray(history.touching)[:, inside])
+        pressed = np.asarray(history.reaction @ history.tributary)
+        np.testing.assert_allclose(pressed, 20.0, rtol=0.01)  # the ends' supports carry some
+
+    @pytest.mark.parametrize(
+        ("values", "said"),
+        [
+            ({"contact.holes": [[1.0, 0.6]]}, r"holes\[0\] = .* lies in no bolt's patch"),
+            ({"contact.holes": [[1.0, -0.1]]}, "must be positive"),
+            ({"contact.holes": [[1.0, 0.2], [1.1, 0.2]]}, "overlap"),
+            ({"contact.holes": [1.0, 0.2]}, "give rows"),
+            ({"contact.clearance": 1e-4}, "contact.clearance = .* needs contact.bearing"),
+        ],
+    )
+    def test_holes_that_make_no_sense_are_refused(self, values, said):
+        with pytest.raises(jb.InputError, match=said):
+            library.single_lap().replace(values)
+
+
 def moments(amplitude, **values):
     """Single lap under a moment on its end."""
     values = {"load.kind": "moment", "load.amplitude": amplitude} | values

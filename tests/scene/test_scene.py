@@ -35,6 +35,7 @@ LIFTING = ["v", "w", "beta", "psi"]
 positive = st.floats(1e-90, 1e90)
 OF_JOINT = {key for key in KEYS if key.startswith("member.")}
 OF_JOINT |= {"strip.overhang", "contact.gap", "contact.bolt_stiffness", "load.kind", "load.arm"}
+OF_JOINT |= {f"contact.{name}" for name in ("bearing_stiffness", "clearance", "holes")}
 OPTIONAL = {"strip.axial_stiffness", "strip.poisson_ratio", "strip.layers", "strip.curvature"}
 OPTIONAL |= OF_JOINT - {"member.support", "load.kind"}
 JOINT = {"member.support": "rolling", "strip.far_end": "free", "model.rung": "plane"}
@@ -605,11 +606,12 @@ FULL = {
 }
 
 
-@pytest.mark.parametrize("key", NUMBERS)
+@pytest.mark.parametrize("key", [key for key in NUMBERS if key != "contact.holes"])
 def test_gradients_and_batches_reach_every_number(key):
     layers = {key: LAYERS} if key.endswith(".layers") else {}
     bolts = np.array([[0.5, 8.0, 0.4], [1.5, 6.0, 0.3]])
     beside = {} if layers else {key: bolts if key == "contact.bolts" else 0.2}
+    beside |= {"contact.bearing_stiffness": 1.0} if key == "contact.clearance" else {}
     scene = Scene().replace(
         JOINT | layers | beside if key in {*OF_JOINT, "contact.bolts"} else FULL | layers
     )
@@ -625,6 +627,12 @@ def test_gradients_and_batches_reach_every_number(key):
     slope = jax.grad(weight)(1.0)
     np.testing.assert_allclose(slope, (above - below) / 2e-6, rtol=1e-7)
     assert abs(slope) > 0.5
+
+
+def test_holes_refuse_derivatives():
+    scene = Scene().replace(JOINT)
+    with pytest.raises(InputError, match="holes = 'traced': knows no derivatives"):
+        jax.jit(lambda holes: scene.replace({"contact.holes": holes}))(jnp.array([[1.0, 0.2]]))
 
 
 def test_gradients_reach_a_pressure_table():

@@ -34,7 +34,7 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array,
 
     The points are the means of the thresholds, and the force; those beyond are laid evenly on the
     straight line from the last one below it.  The displacements are NaN where the slip zones are
-    not nested.
+    not nested, and for a joint with bearings.
     """
     network = Network.of(scene, soft)
     ways = jnp.asarray([1.0, -1.0])
@@ -54,7 +54,8 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array,
     f, u = points(levels, last, force), jax.vmap(line)(sides)
     nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
     rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
-    return network, jnp.where(jnp.all(nested) & rising, u, jnp.nan), f, count
+    series = scene.contact.bearing_stiffness is None  # a bearing is no slider
+    return network, jnp.where(jnp.all(nested) & rising & series, u, jnp.nan), f, count
 
 
 slider_line_once = jax.jit(slider_line, static_argnums=2, compiler_options=ONCE)
