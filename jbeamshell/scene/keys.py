@@ -178,7 +178,7 @@ class ContactKeys(Part):
     )
     clearance: Array | None = number(
         None,
-        "Slip after the pressing at which the shanks bear on their holes, either way; none is zero.",
+        "Slip after the pressing beyond which the shanks bear on their holes; none is zero.",
         symbol="c",
         unit="length",
         closed=True,
