@@ -1,0 +1,297 @@
+"""Tables made from the recorded figures in calibration and tests/benchmarks."""
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from calibration.charts.failures import OUTCOMES, outcome
+
+Rows = Iterable[Sequence[Any]]
+HEIGHTS = (0.01, 0.0511, 0.1126, 0.2358, 0.4)
+LOADS = (0.3247, 0.7855, 1.6)
+NAMES = {  # of programs in the record of the speed
+    "dissipation": "jbeamshell, dissipation alone",
+    "loop": "jbeamshell, loop",
+    "exact kinematics": "jbeamshell, exact kinematics",
+    "with lift": "jbeamshell, contact may open",
+    "m = 16": "jbeamshell, smooth friction",
+    "History": "jbeamshell, whole history",
+    "patterns in NumPy": "the same algorithm in NumPy",
+    "peer 40 x 4": "condensed finite elements of another group",
+    "Iwan's network": "Iwan's network, fitted before",
+}
+
+
+def tables(root: Path) -> dict[str, str]:
+    """Included pages by their file names."""
+    benchmarks, studies = root / "tests" / "benchmarks", root / "calibration"
+    speed = _read(benchmarks / "speed.json")
+    return {
+        "table_single.md": single(speed["one"]),
+        "table_batches.md": batches(speed),
+        "table_gradients.md": gradients(speed["gradient"]),
+        "table_starting.md": starting(speed["start"]),
+        "table_condensed.md": condensed(_read(benchmarks / "condensed.json")),
+        "table_peer.md": peer(_read(benchmarks / "condensed.json")["peer"]),
+        "table_rungs.md": rungs(_read(benchmarks / "ladder.json")["map"]),
+        "table_identification.md": identification(_read(benchmarks / "identification.json")),
+        "table_motion.md": motion(_read(benchmarks / "dynamics.json")),
+        "table_laws.md": laws(_read(studies / "laws_of_a_strip.json")),
+        "table_squeeze.md": squeeze(_read(studies / "ladder_squeeze.json")),
+        "table_random.md": random_strips(_read(studies / "failure_map.json")),
+        "table_corners.md": corners(_read(studies / "corners_map.json")),
+        "table_defaults.md": defaults(_read(studies / "default_settings.json")),
+        "table_solvers.md": solvers(_read(studies / "methods.json")["solvers"]),
+        "table_friction.md": friction(_read(studies / "methods.json")["laws"]),
+    }
+
+
+def single(record: dict) -> str:
+    """Cost and error of one cycle by several programs."""
+    rows = (
+        (NAMES.get(what := row["what"].split(",")[0], what), row["steps"], time(row["median_us"]),
+         percent(row["error"]), percent(row["error_to_elements"]), row["returns"].split(";")[0])
+        for row in record["rows"] if "no flag" not in row["what"]
+    )  # fmt: skip
+    heads = ("what", "steps per half cycle", "time", "error of D", "to elements", "returns")
+    return table(heads, rows) + machine(record)
+
+
+def batches(record: dict) -> str:
+    """Strips a second, and their errors."""
+    batch = record["batch"]
+    rows = [
+        (row["nodes"], row["steps"], f"{row['end_size']:.4f}", f"{row['lanes_per_s']:,.0f}",
+         percent(row["error_median"]), percent(row["error_p90"]), percent(row["error_worst"]))
+        for row in batch["rows"]
+    ]  # fmt: skip
+    heads = ("`model.nodes`", "steps per half cycle", "`model.end_size`", "strips a second",
+             "error, median", "nine in ten below", "worst")  # fmt: skip
+    several = [(row["what"], f"{row['lanes_per_s']:,.0f}") for row in record["processes"]["rows"]]
+    return (
+        table(heads, rows)
+        + machine(batch)
+        + "\n"
+        + table(("33 nodes, one step", "strips a second"), several)
+    )
+
+
+def gradients(record: dict) -> str:
+    """Cost of derivatives over that of the run."""
+    rows = [
+        (
+            row["what"],
+            time(row["median_us"]),
+            f"{row['median_runs']:.1f}",
+            f"{row['compile_s']:.0f} s",
+        )
+        for row in record["rows"]
+    ]
+    return table(("derivative by 4 numbers", "time", "runs", "compiled in"), rows) + machine(record)
+
+
+def starting(record: dict) -> str:
+    """Seconds until the first result."""
+    rows = [
+        (row["what"], f"{row['cold_s']:.1f} s", f"{row['warm_s']:.1f} s") for row in record["rows"]
+    ]
+    heads = ("new process, with the import", "nothing compiled yet", "compiled programs kept")
+    return table(heads, rows) + machine(record)
+
+
+def condensed(record: dict) -> str:
+    """Error of the rung plane over its nodes, and its cost."""
+    times = {row["nodes"]: row for row in record["peer"]["ours"]}
+    rows = [
+        (row["nodes"], percent(row["above_tenth"]), percent(row["above_ten_thousandth"]),
+         time(times[row["nodes"]]["kept_us"]), time(times[row["nodes"]]["built_us"]))
+        for row in record["error"]
+    ]  # fmt: skip
+    heads = ("contact nodes", "largest error of D where D exceeds .1 of the bar's",
+             "1e-4 of the bar's", "a cycle, factors kept", "a cycle, all built")  # fmt: skip
+    return table(heads, rows) + machine(record)
+
+
+def peer(record: dict) -> str:
+    """Time at equal error, beside condensed finite elements in load steps."""
+    rows = []
+    for row in record["at_equal_error"]:
+        for cost, words in (("kept_us", "prepared once"), ("built_us", "from nothing")):
+            ours, theirs = row["ours"][cost], row["theirs"][cost]
+            rows.append((percent(row["error"]), words, time(ours[cost]), time(theirs[cost]),
+                         f"{row['times'][cost]:,.0f}"))  # fmt: skip
+    heads = ("error of D up to", "cycle", "jbeamshell, plane", "condensed elements", "times faster")
+    return table(heads, rows)
+
+
+def rungs(record: dict) -> str:
+    """Dissipation of each rung over that of finite elements."""
+    cells = {(cell["eta"], cell["A"]): cell for cell in record["cells"]}
+    rows = [
+        (
+            eta,
+            load,
+            f"{load / eta:.1f}",
+            *(f"{cells[eta, load][rung]:.3g}" for rung in record["rungs"]),
+        )
+        for eta in HEIGHTS
+        for load in LOADS
+    ]
+    heads = ("height ratio", "A", "A over height ratio", *(f"`{rung}`" for rung in record["rungs"]))
+    return table(heads, rows)
+
+
+def identification(record: dict) -> str:
+    """Cost of a fit of four parameters to five loops."""
+    rows = [
+        (name, method, found["model_runs"], f"{found['wall_s']:.1f} s")
+        for name, methods in record["scenes"].items()
+        for method, found in methods.items()
+        if "model_runs" in found
+    ]
+    return table(("model", "search", "runs of the model", "time, compiled"), rows) + machine(record)
+
+
+def motion(record: dict) -> str:
+    """Cost and error of time steppers."""
+    rows = [
+        (row["method"], row["steps"], f"{row['seconds']:.2f} s", percent(row["error"]))
+        for row in record["solvers"]
+    ]
+    return table(("method", "time steps", "time", "error of the motion"), rows)
+
+
+def laws(record: dict) -> str:
+    """Error of the dissipation by laws of a joint fitted to a strip."""
+    names = list(next(iter(record["heights"].values()))["models"])
+    rows = []
+    for name in names:
+        errors = [height["models"][name]["error"] for height in record["heights"].values()]
+        cells = (
+            f"{percent(median(map(abs, row)), 2)}, {percent(max(map(abs, row)), 2)}"
+            for row in errors
+        )
+        rows.append((f"`{name}`", *cells))
+    heads = ("D: median, worst", *(f"height ratio {height}" for height in record["heights"]))
+    return table(heads, rows)
+
+
+def squeeze(record: dict) -> str:
+    """Receding contact and Filon's tension over the order of the section."""
+    exact = record["finite_elements"]
+    finest = {
+        row["order"]: row
+        for row in sorted(record["rungs"], key=lambda row: row["nodes"])
+        if row["kinematics"] == "linear"
+    }
+    rows = [
+        (order, f"{row['receding']['contact_end_mm']:.3f}",
+         f"{row['receding']['reaction_max_MPa']:.2f}", f"{row['receding']['lift_slope']:.4g}",
+         f"{row['squeezed']['tension_MPa']:.2f}")
+        for order, row in sorted(finest.items())
+    ]  # fmt: skip
+    rows.append(
+        ("finite elements", exact["contact_end_mm"], exact["reaction_max_MPa"],
+         f"{exact['lift_slope']:.4g}", f"{exact['tension_MPa']:.2f}")
+    )  # fmt: skip
+    heads = ("order of the section", "contact ends beyond the load, mm", "largest reaction, MPa",
+             "slope of the lifted end", "Filon's tension, MPa")  # fmt: skip
+    return table(heads, rows)
+
+
+def random_strips(record: dict) -> str:
+    """Outcomes of random strips in load steps."""
+    kinds = {"2,000 strips": "scenes", "300 fresh strips": "fresh scenes"}
+    found = {words: Counter(map(outcome, record[key])) for words, key in kinds.items()}
+    return outcomes(found)
+
+
+def corners(record: dict) -> str:
+    """Outcomes of unusual scenes by their kind."""
+    found = {
+        name: Counter(scene["outcome"] for scene in kind["scenes"])
+        for name, kind in record["kinds"].items()
+    }
+    total: Counter = sum(found.values(), Counter())
+    return outcomes(found | {"all": total})
+
+
+def outcomes(found: dict[str, Counter]) -> str:
+    """Table of counts, without columns that hold none."""
+    shown = [name for name in OUTCOMES if any(counts[name] for counts in found.values())]
+    rows = [
+        (name, sum(counts.values()), *(counts[word] or "" for word in shown))
+        for name, counts in found.items()
+    ]
+    return table(("scenes", "number", *shown), rows)
+
+
+def defaults(record: dict) -> str:
+    """Errors of the default settings by kind of scene."""
+    kinds = dict.fromkeys(row["kind"] for row in record["kinds"])
+    rows = []
+    for kind in kinds:
+        errors = [abs(row["dissipation"]) for row in record["kinds"] if row["kind"] == kind]
+        within = sum(error <= 0.005 for error in errors)
+        rows.append((kind, len(errors), within, percent(median(errors)), percent(max(errors))))
+    return table(("scenes", "number", "within .5 % in D", "median error", "worst"), rows)
+
+
+def solvers(record: dict) -> str:
+    """Newton's methods on the same random strips."""
+    rows = [
+        (
+            row["method"],
+            percent(row["found"], 3),
+            percent(row["wrong"], 3),
+            f"{row['iterations']:.1f}",
+        )
+        for row in record["rows"]
+    ]
+    return table(("method", "strips solved", "wrong by more than 2 %", "iterations a step"), rows)
+
+
+def friction(record: dict) -> str:
+    """Dissipation of friction laws over the number of load steps."""
+    rows = [
+        (row["law"], *(f"{value:.4g}" for value in row["dissipation"]), f"{row['drift']:.1g}")
+        for row in record["rows"]
+        if row["scene"] == "standard"
+    ]
+    steps = next(row["steps"] for row in record["rows"] if row["scene"] == "standard")
+    heads = ("law", *(f"D, {count} steps" for count in steps), "creep of u per cycle")
+    return table(heads, rows)
+
+
+def table(heads: Sequence[str], rows: Rows) -> str:
+    """Table in Markdown."""
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines) + "\n"
+
+
+def machine(record: dict) -> str:
+    """Line that says where and when figures were taken."""
+    about = record["about"]
+    words = [about.get("cpu"), about["machine"], f"jax {about['jax']}", about.get("date")]
+    return f"\n*{', '.join(word for word in words if word)}*\n"
+
+
+def time(microseconds: float) -> str:
+    """Time with a unit that suits it."""
+    for unit, size in (("s", 1e6), ("ms", 1e3)):
+        if microseconds >= size:
+            return f"{microseconds / size:.3g} {unit}"
+    return f"{microseconds:.3g} us"
+
+
+def percent(share: float, digits: int = 2) -> str:
+    """Share in per cent; two digits, or as many as asked."""
+    shown = 100.0 * share
+    return f"{shown:.0f} %" if abs(shown) >= 100.0 else f"{shown:.{digits}g} %"
+
+
+def _read(path: Path) -> dict:
+    return json.loads(path.read_text("utf-8"))
