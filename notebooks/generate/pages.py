@@ -136,7 +136,7 @@ def described(face: str, name: str, kind: str) -> list[str]:
     if kind != "data":
         return [f".. auto{kind}:: {face}.{name}", *options(kind)]
     value = textwrap.shorten(repr(getattr(importlib.import_module(face), name)), 200)
-    return [f".. py:data:: {face}.{name}", "", f"   ``{value}``"]
+    return [f".. py:data:: {name}", f"   :module: {face}", "", f"   ``{value}``"]
 
 
 def options(kind: str) -> list[str]:
