@@ -18,9 +18,10 @@ from PIL import Image
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
-from jbeamshell.plotting.joints import deformed, visible_scale
+from jbeamshell.plotting.joints import deformed
 from jbeamshell.plotting.paths import loop
 from jbeamshell.plotting.protocols import ContactPath, LoadPath
+from jbeamshell.plotting.shapes import visible_scale
 from jbeamshell.plotting.steps import checked_steps
 from jbeamshell.plotting.style import (
     DATA,
