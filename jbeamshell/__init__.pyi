@@ -19,6 +19,7 @@ from .condensed.contact import solve_contact as solve_contact
 from .condensed.contact_file import read_contact as read_contact
 from .condensed.stiffness_model import StiffnessModel as StiffnessModel
 from .condensed.substructure import Substructure as Substructure
+from .explorer import explore as explore
 from .history.contact_history import ContactHistory as ContactHistory
 from .history.history import History as History
 from .ladder.advice import Advice as Advice, advise as advise

@@ -29,6 +29,7 @@ ORDER = [
     "sweeping",
     "identify",
     "dynamics",
+    "explorer",
     "cli",
 ]
 # Imports that point up all the same: (importer, imported), with the reason beside it.
@@ -43,6 +44,8 @@ HOMES = {
     "optax": "identify/search.py",
     "pint": "measured/columns.py",
     "distributed": "cli/sweep.py",
+    "panel": "explorer/",
+    "bokeh": "explorer/",
     "tqdm": "common/progress.py",
     "lazy_loader": ("__init__.py", "dynamics/__init__.py", "scene/__init__.py"),
 }

@@ -14,13 +14,25 @@ from types import FrameType
 
 import jax
 
-from jbeamshell.cli import advise, bodies, export, fit, inspect, keys, ringdown, run, scenes, sweep
+from jbeamshell.cli import (
+    advise,
+    bodies,
+    explore,
+    export,
+    fit,
+    inspect,
+    keys,
+    ringdown,
+    run,
+    scenes,
+    sweep,
+)
 from jbeamshell.cli.terminal import BAD_INPUT, INTERRUPTED, UNCONVERGED, complain
 from jbeamshell.common import jax_options
 from jbeamshell.common.errors import InputError, UnconvergedError
 
 # Each module is one command and adds itself to the parser.
-COMMANDS = (run, scenes, keys, advise, inspect, fit, sweep, ringdown, export, bodies)
+COMMANDS = (run, explore, scenes, keys, advise, inspect, fit, sweep, ringdown, export, bodies)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
