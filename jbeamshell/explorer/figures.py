@@ -19,8 +19,9 @@ from jbeamshell.explorer.views import Curve, Numbers, View
 from jbeamshell.history.history import History
 from jbeamshell.measured.loops import Loop
 from jbeamshell.plotting.shapes import KINDS, pressure_arrows, reach_of, shape_of
+from jbeamshell.plotting.style import SLIPS, STICKS
 
-COLOURS = ("#56B4E9", "#D55E00", "#D9D9D9")  # of KINDS: sticks, slips, is lifted
+COLOURS = (STICKS, SLIPS, "#E4E4E4")  # of KINDS
 INK, MODEL, MEASURED, KEPT = "#222222", "#0072B2", "#222222", "#A8A8A8"
 FILL = ("#E8EEF4", "#F4EFE6")  # upper and lower member
 PIXELS = 240  # of the contact map along X
@@ -237,7 +238,7 @@ class Figures:
         x, head, tail = pressure_arrows(history, shape).T
         self.put("arrows", x=x, y=head, tail=tail, way=np.where(tail > head, np.pi, 0.0))
         founded = history.scene.contact.normal != "none"
-        xs, ys, kinds = _runs(shape.contact, shape.kinds) if founded else ([], [], [])
+        xs, ys, kinds = _runs(shape.inner[0], shape.kinds) if founded else ([], [], [])
         self.put("line", xs=xs, ys=ys, colour=[COLOURS[kind] for kind in kinds])
         force = float(view.force[moment])
         pulled = [shape.tip[0] + 0.03 * float(history.x[-1])] if force else []
