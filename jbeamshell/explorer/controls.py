@@ -67,7 +67,7 @@ def _controls(scene: Scene) -> Iterator[Control]:
 def _load(scene: Scene) -> Control:
     """Control of the amplitude, below gross slip where a force is controlled."""
     key, amplitude = "load.amplitude", float(scene.load.amplitude)
-    label = f"Load amplitude A [{unit_of(key, scene.load.control)}]"
+    label = f"Load amplitude A [{unit_of(key, scene.load)}]"
     limit = gross_slip(scene)
     if scene.load.control != "force" or not math.isfinite(limit):
         return _around(key, label, amplitude)
@@ -85,9 +85,10 @@ def _pressure(scene: Scene) -> Iterator[Control]:
             label = f"{name}: force [force/width]"
             yield _around(BOLT.format(number, "force"), label, force)
             low, high = 0.5 * width, length - 0.5 * width
-            label = f"{name}: place X [length]"
-            step = _nice((high - low) / STEPS)
-            yield Control(BOLT.format(number, "place"), label, place, low, high, step)
+            if contact.holes is None and high > low:  # holes stay where they are
+                label = f"{name}: place X [length]"
+                step = _nice((high - low) / STEPS)
+                yield Control(BOLT.format(number, "place"), label, place, low, high, step)
     elif contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0:
         label = "Pressure F_N [stress]"
         yield _around("contact.pressure", label, float(contact.pressure))
@@ -107,8 +108,8 @@ def bolts_of(scene: Scene) -> np.ndarray | None:
 
 
 def gross_slip(scene: Scene) -> float:
-    """Force mu F_N L at which all of the contact slides; infinite where bolts hold beyond."""
-    if scene.contact.bolt_stiffness is not None:
+    """Force mu F_N L at which all of the contact slides; infinite where something else holds."""
+    if scene.contact.bolt_stiffness is not None or scene.load.kind == "moment":
         return math.inf
     top, bottom = scene.number("contact.pressure"), scene.number("contact.bottom_pressure")
     length = scene.number("strip.length")

@@ -20,10 +20,15 @@ from jbeamshell.history.history import History
 from jbeamshell.measured.loops import Loop
 from jbeamshell.plotting.shapes import KINDS, pressure_arrows, reach_of, shape_of
 from jbeamshell.plotting.style import SLIPS, STICKS
+from jbeamshell.scene.parts import Load
 
 COLOURS = (STICKS, SLIPS, "#E4E4E4")  # of KINDS
 INK, MODEL, MEASURED, KEPT = "#222222", "#0072B2", "#222222", "#A8A8A8"
 FILL = ("#E8EEF4", "#F4EFE6")  # upper and lower member
+LABELS = {  # of the load and of what it moves, by load.kind
+    "force": ("F  [force/width]", "u(L)  [length]"),
+    "moment": ("M  [force length/width]", "rotation  [rad]"),
+}
 PIXELS = 240  # of the contact map along X
 LOOSE = 0.45  # part of a range below which the data are shown larger
 MARGIN = 0.06
@@ -34,20 +39,23 @@ GREY = 0.35  # opacity of a picture that is out of date
 class Figures:
     """Four figures of a scene, and the data in them.
 
+    A scene without a load cycle has profiles of its contact in place of loop and dissipation.
+
     Parameters
     ----------
-    cyclic : True if the scene has a load cycle; otherwise profiles of its contact are drawn
+    load : load of the scene, for what the figures hold and their labels
     """
 
-    def __init__(self, cyclic: bool) -> None:
-        self.cyclic = cyclic
+    def __init__(self, load: Load) -> None:
+        self.cyclic, self._turns = bool(load.cycles), load.kind == "moment"
+        self._load, self._moved = LABELS[load.kind]
         self._sources: dict[str, ColumnDataSource] = {}
         self._factor = 0.0
         self._view: View | None = None
-        self.contact = self._contact_figure() if cyclic else self._profile_figure()
+        self.contact = self._contact_figure() if self.cyclic else self._profile_figure()
         self.deformed = self._deformed_figure()
-        self.loop = self._loop_figure() if cyclic else self._gap_figure()
-        self.curve = self._curve_figure() if cyclic else None
+        self.loop = self._loop_figure() if self.cyclic else self._gap_figure()
+        self.curve = self._curve_figure() if self.cyclic else None
 
     @property
     def all(self) -> list[Any]:
@@ -93,8 +101,7 @@ class Figures:
         return {"x_range": Range1d(0.0, 1.0), "y_range": Range1d(0.0, 1.0)}
 
     def _loop_figure(self) -> Any:
-        words = "Hysteresis loop", "u(L)  [length]", "F  [force/width]"
-        made = self._new(*words, **self._own_ranges())
+        made = self._new("Hysteresis loop", self._moved, self._load, **self._own_ranges())
         look = {"line_color": KEPT, "line_width": 2, "line_dash": "dashed"}
         made.line("u", "F", source=self._empty("kept", u=[], F=[]), **look)
         dots = {"size": 4, "color": MEASURED, "alpha": 0.8}
@@ -241,12 +248,13 @@ class Figures:
         xs, ys, kinds = _runs(shape.inner[0], shape.kinds) if founded else ([], [], [])
         self.put("line", xs=xs, ys=ys, colour=[COLOURS[kind] for kind in kinds])
         force = float(view.force[moment])
-        pulled = [shape.tip[0] + 0.03 * float(history.x[-1])] if force else []
+        pulled = [shape.tip[0] + 0.03 * float(history.x[-1])] if force and not self._turns else []
         angle = [-np.sign(force) * np.pi / 2.0] * len(pulled)
         middle = [float(shape.tip[1]) - 0.5 * shape.heights[0]] * len(pulled)
         self.put("pull", x=pulled, y=middle, angle=angle)
         times = f"displacements x {self._factor:g}"
-        self.deformed.title.text = f"Deformed at F = {force:.4g}, {times}" if self.cyclic else times
+        load = f"Deformed at {self._load[0]} = {force:.4g}, {times}"
+        self.deformed.title.text = load if self.cyclic else f"Deformed, {times}"
         if self.cyclic:
             self.put("here", u=view.displacement[[moment]], F=view.force[[moment]])
             self._now.location = moment

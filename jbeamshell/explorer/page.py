@@ -137,7 +137,7 @@ class Page:
         self._controls = controls_of(self._start)
         self._values = {control.name: control.value for control in self._controls}
         self.scene, self.view, self.message = scene, None, ""
-        self._figures = Figures(bool(scene.load.cycles))
+        self._figures = Figures(scene.load)
         self._moment.visible = self._keep.visible = bool(scene.load.cycles)
         self._keep.value = False
         self.sliders = {

@@ -150,7 +150,7 @@ def animate(
             joint = cast(LoadPath, history)
             turns, draw_left = joint.scene.load.kind == "moment", _members(joint, scale)
         else:
-            turns, draw_left = False, _traction(cast(ContactPath, history))
+            turns, draw_left = False, _traction(history)
         loop(history, right, moment=turns).legend().remove()
         look = {"color": SLIPS, "markeredgecolor": DATA, "markersize": 7}
         point = right.plot([], [], "o", zorder=4, **look)[0]
