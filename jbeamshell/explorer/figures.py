@@ -252,9 +252,9 @@ class Figures:
         angle = [-np.sign(force) * np.pi / 2.0] * len(pulled)
         middle = [float(shape.tip[1]) - 0.5 * shape.heights[0]] * len(pulled)
         self.put("pull", x=pulled, y=middle, angle=angle)
-        times = f"displacements x {self._factor:g}"
-        load = f"Deformed at {self._load[0]} = {force:.4g}, {times}"
-        self.deformed.title.text = load if self.cyclic else f"Deformed, {times}"
+        times = f"Displacements x {self._factor:g}"
+        load = f"{times} at {self._load[0]} = {force:.4g}"
+        self.deformed.title.text = load if self.cyclic else times
         if self.cyclic:
             self.put("here", u=view.displacement[[moment]], F=view.force[[moment]])
             self._now.location = moment

@@ -83,14 +83,14 @@ class Page:
     def _make_widgets(self, name: str) -> None:
         wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
         names = list(library.NAMES) if name in library.NAMES else [OWN, *library.NAMES]
-        self._scenes = pn.widgets.Select(name="Scene", options=names, value=name, **wide)
+        self._scenes = pn.widgets.Select(label="Scene", options=names, value=name, **wide)
         self._scenes.param.watch(self._choose, "value")
-        self._reset = pn.widgets.Button(name="Reset", **wide)
+        self._reset = pn.widgets.Button(label="Reset", **wide)
         self._reset.on_click(lambda _: self.reset())
-        self._keep = pn.widgets.Toggle(name="Keep this curve", **wide)
+        self._keep = pn.widgets.Toggle(label="Keep this curve", **wide)
         self._keep.param.watch(lambda event: self._figures.keep(event.new), "value")
         self._moment = pn.widgets.Player(
-            name="Moment of the cycle",
+            label="Moment of the cycle",
             start=0,
             end=1,
             interval=80,
@@ -142,7 +142,7 @@ class Page:
         self._keep.value = False
         self.sliders = {
             control.name: pn.widgets.EditableFloatSlider(
-                name=control.label,
+                label=control.label,
                 value=control.value,
                 start=control.low,
                 end=control.high,

@@ -106,7 +106,7 @@ def view_of(scene: Scene) -> View:
 
 
 def curve_of(scene: Scene) -> Curve:
-    """Dissipation over amplitude, along one path of cycles that grow.
+    """Dissipation over amplitude: of the first cycle at each, along one path that grows.
 
     Amplitudes go up to gross slip where a force is controlled.  A step without equilibrium ends the
     curve.

@@ -1,0 +1,117 @@
+"""Page without a browser: sliders move numbers, figures follow, failures are one line."""
+
+import re
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.explorer.views import curve_of, drawable, view_of
+from jbeamshell.measured.example import example_loops
+from jbeamshell.scene.toml import read_scene
+
+pytest.importorskip("panel", reason="the explorer needs panel: pip install 'jbeamshell[explore]'")
+
+from jbeamshell.explorer.page import Page
+
+COARSE = {"model.nodes": 33, "load.steps_per_half_cycle": 8}
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return jb.Scene().replace(COARSE)
+
+
+@pytest.fixture
+def page(scene):
+    return Page(scene, example_loops(amplitudes=(0.5851, 1.0)))
+
+
+def drawn(page, name):
+    return {k: np.asarray(v) for k, v in page._figures.source(name).data.items()}
+
+
+def test_the_curve_holds_the_work_of_the_first_cycle_at_each_amplitude(scene):
+    curve = curve_of(scene)
+    amplitude = float(curve.amplitude[5])
+    own = view_of(scene.replace({"load.amplitude": amplitude, "load.cycles": 1}))
+    assert curve.dissipation[5] == pytest.approx(own.figures["dissipation"], rel=1e-12)
+    assert np.all(np.diff(curve.dissipation) > 0.0)
+
+
+@pytest.mark.doubtful("few nodes do the slipping")
+def test_a_slider_redraws_the_loop_in_place(page):
+    before, source = drawn(page, "loop"), page._figures.source("loop")
+    page.sliders["contact.friction"].value = 0.3
+    assert page._figures.source("loop") is source
+    after = drawn(page, "loop")
+    history = jb.solve(page.scene)
+    assert float(page.scene.contact.friction) == 0.3
+    assert np.array_equal(after["F"], before["F"])
+    assert np.array_equal(after["u"], history.loop[1])
+    assert drawn(page, "point")["D"] == pytest.approx([float(history.dissipation)])
+    assert f"{float(history.dissipation):.6g}" in page._cards.object
+
+
+def test_a_load_beyond_gross_slip_is_one_line_and_the_picture_stays(page):
+    before = drawn(page, "loop")
+    page.sliders["contact.pressure"].value = 3.0
+    assert re.fullmatch(r"load\.amplitude = 0\.7855: must stay below gross slip.*", page.message)
+    assert 'role="alert"' in page._head.object
+    assert np.array_equal(drawn(page, "loop")["u"], before["u"])
+    assert page._figures.loop.background_fill_color != "white"
+    page.reset()
+    assert page.message == ""
+    assert page._figures.loop.background_fill_color == "white"
+
+
+def test_the_moment_moves_the_point_and_the_members(page):
+    page._moment.value = 4
+    here, loop = drawn(page, "here"), drawn(page, "loop")
+    assert here["u"] == pytest.approx(loop["u"][[4]])
+    assert page.view.force[4] == pytest.approx(0.0, abs=1e-12)
+    assert drawn(page, "pull")["x"].size == 0  # no force, no arrow
+    states = drawn(page, "states")["image"][0]
+    assert states.shape[0] == page.view.steps.size
+    assert set(np.unique(states)) == {0, 1}
+
+
+def test_measured_loops_and_kept_curves_lie_over_the_loop(page):
+    measured = drawn(page, "measured")
+    assert np.isnan(measured["u"]).sum() == 3  # around and between two loops
+    assert drawn(page, "measured works")["A"] == pytest.approx([0.5851, 1.0])
+    loop = drawn(page, "loop")
+    page._keep.value = True
+    page.sliders["strip.height_ratio"].value = 0.3
+    assert np.array_equal(drawn(page, "kept")["u"], loop["u"])
+    assert not np.array_equal(drawn(page, "loop")["u"], loop["u"])
+    page._keep.value = False
+    assert drawn(page, "kept")["u"].size == 0
+
+
+def test_a_file_that_is_no_table_is_one_line(page):
+    page._file.param.update(value=b"\x00\x01 no table", filename="odd.csv")
+    assert re.search(r'role="alert".*odd\.csv', page._head.object)
+    assert "/tmp" not in page._head.object
+    good = b"displacement,force\n" + b"".join(b"%g,%g\n" % (i, i % 3) for i in range(9))
+    page._file.param.update(value=good, filename="good.csv")
+    assert "good.csv: 1 loop" in page._head.object
+
+
+def test_the_text_is_the_scene_of_the_sliders(page, tmp_path):
+    page.sliders["strip.poisson_ratio"].value = 0.2
+    (tmp_path / "scene.toml").write_text(page.text, encoding="utf-8")
+    scene = read_scene(tmp_path / "scene.toml")
+    assert float(scene.strip.poisson_ratio) == 0.2
+    assert (
+        float(view_of(drawable(scene)).figures["dissipation"]) == page.view.figures["dissipation"]
+    )
+
+
+def test_settings_stay_as_they_were_chosen():
+    scene = jb.Scene()
+    fixed = drawable(scene)
+    moved = fixed.replace({"strip.height_ratio": 0.012, "load.amplitude": 1.9})
+    assert moved.model.solution == "condensed"
+    assert drawable(jb.library.single_lap()).model.nodes == 65
+    assert drawable(jb.library.single_lap().replace({"model.nodes": 97})).model.nodes == 97
