@@ -45,13 +45,12 @@ def test_the_curve_holds_the_work_of_the_first_cycle_at_each_amplitude(scene):
     assert np.all(np.diff(curve.dissipation) > 0.0)
 
 
-@pytest.mark.doubtful("few nodes do the slipping")
 def test_a_slider_redraws_the_loop_in_place(page):
     before, source = drawn(page, "loop"), page._figures.source("loop")
     page.sliders["contact.friction"].value = 0.3
     assert page._figures.source("loop") is source
     after = drawn(page, "loop")
-    history = jb.solve(page.scene)
+    history = jb.solve(page.scene, throw=False)
     assert float(page.scene.contact.friction) == 0.3
     assert np.array_equal(after["F"], before["F"])
     assert np.array_equal(after["u"], history.loop[1])
