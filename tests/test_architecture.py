@@ -27,8 +27,8 @@ ORDER = [
     "quasistatic",
     "ladder",
     "sweeping",
-    "identify",
     "dynamics",
+    "identify",
     "explorer",
     "cli",
 ]

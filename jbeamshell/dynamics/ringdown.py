@@ -12,11 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import require, require_choice
-from jbeamshell.measured.curves import DissipationCurve, StiffnessCurve
+from jbeamshell.measured.curves import (
+    DampingCurve,
+    DissipationCurve,
+    FrequencyCurve,
+    StiffnessCurve,
+)
 
 METHODS = ("turning-points", "hilbert")
 SIGNAL = "give as many evenly spaced times as finite values, at least {} of both"
 EDGE = 0.05  # part of the signal left out at both ends, where the Hilbert transform is inaccurate
+KINDS = ("displacement", "velocity", "acceleration")  # powers of i omega
+ORDER = 3  # of the filter of a band
+FEWEST = 4  # points of a bin that tell its scatter
 SHORTEST = 0.2  # shortest time between two extrema, in periods
 
 
@@ -76,6 +84,52 @@ class RingDown(NamedTuple):
         )
         return loss, StiffnessCurve(force, force / u, label="ring-down, frequency")
 
+    def modal_curves(
+        self, points: int = 20, *, low: float = 0.0, high: float = np.inf, label: str = "ring-down"
+    ) -> tuple[FrequencyCurve, DampingCurve]:
+        """Frequency and damping of a structure over the amplitude, with their noise.
+
+        Each point is the mean of a bin, evenly wide in the logarithm of the amplitude.  Its noise
+        is that of the mean: the scatter about a straight line in the bin, over the root of its
+        independent points, whose number follows from the correlation of neighbours.
+
+        Parameters
+        ----------
+        points : number of bins; those without enough points are left out
+        low, high : amplitudes between which the vibration is taken
+        label : label of the curves
+
+        Returns
+        -------
+        FrequencyCurve, DampingCurve
+            observations of a structure for `jbeamshell.identify.fit`
+
+        Raises
+        ------
+        InputError
+            for a signal that does not decay between these amplitudes
+        """
+        kept = (self.amplitude >= low) & (self.amplitude <= high)
+        size, bins = np.log(self.amplitude[kept]), []
+        fix = "leaves no vibration: take wider bounds"
+        require("low, high", (low, high), size.size >= FEWEST, fix)
+        edges = np.linspace(size.min(), size.max() + 1e-9, points + 1)
+        for place in range(points):
+            inside = (size >= edges[place]) & (size < edges[place + 1])
+            if np.count_nonzero(inside) < FEWEST:
+                continue
+            columns = (self.frequency[kept][inside], self.damping[kept][inside])
+            means = [_mean_and_noise(size[inside], column) for column in columns]
+            if means[1][0] > 0.0:
+                bins.append((np.exp(np.mean(size[inside])), *means[0], *means[1]))
+        fix = "has no bin that decays: take fewer points, or more of the vibration"
+        require("points", points, len(bins) > 1, fix)
+        u, frequency, scatter, damping, spread = np.array(bins).T
+        return (
+            FrequencyCurve(u, frequency, f"{label}, frequency", scatter),
+            DampingCurve(u, damping, f"{label}, damping", spread),
+        )
+
     def plot(self, axes: Any = None) -> Any:
         """Draw frequency and damping over amplitude; see `jbeamshell.plotting.ring_down`."""
         from jbeamshell import plotting
@@ -84,23 +138,34 @@ class RingDown(NamedTuple):
 
 
 def ring_down(
-    time: ArrayLike, values: ArrayLike, *, method: str = "turning-points", smoothing: float = 1.0
+    time: ArrayLike,
+    values: ArrayLike,
+    *,
+    method: str = "turning-points",
+    smoothing: float = 1.0,
+    band: tuple[float, float] | None = None,
+    kind: str = KINDS[0],
 ) -> RingDown:
     """Amplitude, frequency and damping of one decaying vibration.
 
     Parameters
     ----------
     time : (T,) evenly spaced times
-    values : (T,) displacements
+    values : (T,) displacements, or what ``kind`` names
     method : "turning-points" measures the length and the decrease of every swing; "hilbert" fits
         straight lines to the logarithm and the phase of the analytic signal over a moving window
         (Feldman 2011)
     smoothing : length of that window, in periods
+    band : lowest and highest frequency of a band-pass filter without phase shift, which leaves one
+        mode of several; it disturbs some periods at both ends
+    kind : "displacement", "velocity" or "acceleration" of an accelerometer; the amplitude is that
+        of the displacement, by the frequency found
 
     Raises
     ------
     InputError
-        for a signal that is not finite or evenly spaced, or has fewer than four extrema
+        for a signal that is not finite or evenly spaced, or has fewer than four extrema; for a band
+        that the times do not resolve
 
     Examples
     --------
@@ -116,12 +181,42 @@ def ring_down(
     steps = np.diff(times)
     even = bool(np.all(np.isfinite(signal)) and np.allclose(steps, steps[0]) and steps[0] > 0.0)
     require("time", times[:3], even, SIGNAL.format(8))
+    require_choice("kind", kind, KINDS)
+    signal = signal if band is None else _within(signal, float(np.mean(steps)), band)
     at, reached = extrema(times, signal)
     fix = "must be at least 4: follow the motion for longer"
     require("extrema of values", at.size, at.size >= 4, fix)
     if method == "turning-points":
-        return _from_swings(at, reached)
-    return _from_envelope(times, signal, 2.0 * float(np.mean(np.diff(at))), smoothing)
+        found = _from_swings(at, reached)
+    else:
+        found = _from_envelope(times, signal, 2.0 * float(np.mean(np.diff(at))), smoothing)
+    omega = 2.0 * np.pi * found.frequency
+    return found._replace(amplitude=found.amplitude / omega ** KINDS.index(kind))
+
+
+def _within(
+    signal: NDArray[np.float64], step: float, band: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Part of a signal in a band of frequencies, by a Butterworth filter run both ways."""
+    from scipy.signal import butter, sosfiltfilt
+
+    known = len(band) == 2 and 0.0 < band[0] < band[1] < 0.5 / step
+    require("band", tuple(band), known, f"give two rising frequencies below {0.5 / step:.6g}")
+    sections = butter(ORDER, band, "bandpass", fs=1.0 / step, output="sos")
+    return np.asarray(sosfiltfilt(sections, signal))
+
+
+def _mean_and_noise(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+    """Mean of a column, and the noise of that mean beside a straight trend over x."""
+    along, left = x - np.mean(x), y - np.mean(y)
+    left = left - along * (along @ left) / max(float(along @ along), np.finfo(float).tiny)
+    scatter = float(np.std(left, ddof=2))
+    square = float(left @ left)
+    after = float(left[1:] @ left[:-1]) / square if square > 0.0 else 0.0
+    # n points of a first-order process with correlation rho tell as much as n (1-rho)/(1+rho).
+    share = np.clip((1.0 - after) / (1.0 + after), 1.0 / x.size, 1.0)
+    least = np.finfo(float).eps * float(np.max(np.abs(y)))
+    return float(np.mean(y)), max(scatter / float(np.sqrt(x.size * share)), least)
 
 
 def extrema(time: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], ...]:

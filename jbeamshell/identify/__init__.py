@@ -4,8 +4,11 @@
 confidence interval of one parameter by running the model.  `posterior` is a density for samplers
 of other libraries.  `read_plan` reads a study from a file.  `compare` fits several laws of a joint
 to one target; `Driven` is such a law in place of a scene, driven by force or displacement.
+`Assembly` is a structure with joints in place of a scene; `jointed` makes one of plain numbers.
 """
 
+from jbeamshell.identify.assembly import Assembly as Assembly
+from jbeamshell.identify.assembly import jointed as jointed
 from jbeamshell.identify.comparison import Comparison as Comparison
 from jbeamshell.identify.comparison import compare as compare
 from jbeamshell.identify.fitting import MAX_ITERATIONS as MAX_ITERATIONS

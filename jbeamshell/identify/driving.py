@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.identify.assembly import Assembly
 from jbeamshell.identify.models import Drive, Driven, Model
 from jbeamshell.laws import Law, MasingLaw, law_named
 from jbeamshell.measured.curves import (
@@ -49,14 +50,14 @@ class Figures(NamedTuple):
 
 
 def as_model(model: Any, measurements: Sequence[Any], control: str | None = None) -> Model:
-    """Model of a fit from a scene, a law, or a law's name.
+    """Model of a fit from a scene, a structure, a law, or a law's name.
 
     A law is driven by the displacement, as it has a force for each; by the force where curves over
     amplitude are all there is, or where loops know the noise of their displacement alone.
 
     Parameters
     ----------
-    model : scene, law, or name of a law
+    model : scene, structure, law, or name of a law
     measurements : what was measured
     control : column that drives a law; None chooses as above
 
@@ -65,14 +66,14 @@ def as_model(model: Any, measurements: Sequence[Any], control: str | None = None
     InputError
         for anything else, or an unknown name
     """
-    if isinstance(model, Scene | Driven):
+    if isinstance(model, Scene | Driven | Assembly):
         return model
     if isinstance(model, str):
         model = law_named(model).started(*figures_of(measurements, control or "force"))
     if not isinstance(model, Law):
         raise InputError(
             f"scene = {model!r}: give a jbeamshell.Scene, a law such as jbeamshell.laws.Iwan4(), "
-            "or its name, such as 'iwan4'"
+            "or its name, such as 'iwan4', or a jbeamshell.identify.Assembly"
         )
     pulls = [item for item in measurements if isinstance(item, Loop | Backbone)]
     by_force = [getattr(pull, "driver", None) == "force" for pull in pulls]
@@ -111,8 +112,8 @@ def figures_of(measurements: Sequence[Any], control: str = "force") -> Figures:
 
 
 def feature_doubts(model: Model, loops: Sequence[Loop]) -> list[str]:
-    """Sentences on what loops show and a law cannot follow; none for a strip."""
-    if isinstance(model, Scene):
+    """Sentences on what loops show and a law cannot follow; none for other models."""
+    if not isinstance(model, Driven):
         return []
     name, doubts = model.law.heading, []
     for loop in loops:

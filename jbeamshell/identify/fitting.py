@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require, require_choice, require_count
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.progress import bar
+from jbeamshell.identify.assembly import Assembly
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.models import Driven
 from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
@@ -71,7 +72,7 @@ class FitProgress(NamedTuple):
 
 def fit(
     data: Measurement | Specimen | Sequence[Measurement] | Sequence[Specimen],
-    scene: Scene | Law | Driven | str | None = None,
+    scene: Scene | Law | Driven | Assembly | str | None = None,
     free: Sequence[str | Parameter] = (),
     *,
     weights: Sequence[float] = (),
@@ -101,10 +102,11 @@ def fit(
         which bring their own scenes
     scene : start values, and all values that stay fixed; None with specimens.  Or a law of a joint
         in place of the strip: a `jbeamshell.laws.Law`, or its name, such as "iwan4", to start it
-        from the data
-    free : what to fit: keys such as "contact.friction", or `Parameter` with bounds, scale, prior,
-        and whether every specimen has a value of its own; if empty, the numbers of a law that loops
-        tell
+        from the data.  Or a structure with joints, see `Assembly` and `jointed`, for its frequency
+        and damping over amplitude and its forced responses
+    free : what to fit: keys such as "contact.friction" or "structure.damping_ratio", or `Parameter`
+        with bounds, scale, prior, and whether every specimen has a value of its own; if empty, the
+        numbers of a law that loops tell
     weights : factors of the measurements' residuals, besides the curves' own; all 1 if empty
     method : "levenberg-marquardt"; "l-bfgs-b", which may end on a bound; or "adam", which starts
         from all points at once and finishes the best by Levenberg-Marquardt
@@ -159,8 +161,8 @@ def fit(
     require_choice("unchecked", unchecked, (False, True))
     specimens = as_specimens(data, scene, weights)
     if max_iterations is None:
-        of_strip = isinstance(specimens[0].scene, Scene)
-        max_iterations = MAX_ITERATIONS if of_strip else OF_LAWS * MAX_ITERATIONS
+        of_law = isinstance(specimens[0].scene, Driven)
+        max_iterations = OF_LAWS * MAX_ITERATIONS if of_law else MAX_ITERATIONS
     require_count("max_iterations", max_iterations, 1)
     chosen = not isinstance(free, list | tuple) or len(free) > 0
     parameters = as_parameters(free if chosen else free_of(specimens))
@@ -173,7 +175,7 @@ def fit(
     problem = Problem(experiment, space, solver or Newton(), save)
     if starts is None:
         bounded = all(parameter.bounded for parameter in parameters)
-        of_law = not isinstance(specimens[0].scene, Scene)
+        of_law = isinstance(specimens[0].scene, Driven)
         few = LAW_STARTS if of_law else STARTS if bounded else 1
         starts = ADAM_STARTS if method == "adam" else few
     noise_cost = experiment.weight.size if experiment.noisy else 0

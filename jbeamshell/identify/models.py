@@ -1,9 +1,9 @@
-"""Models that a fit runs: a strip, or a law of a joint that is driven by force or displacement."""
+"""Models that a fit runs: a strip, a law of a joint, or a structure with joints."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,6 +13,8 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import require, require_choice
 from jbeamshell.common.errors import InputError
+from jbeamshell.identify.assembly import Assembly
+from jbeamshell.identify.drive import Drive as Drive
 from jbeamshell.laws import Law, MasingLaw, PowerLaw
 from jbeamshell.measured.curves import AmplitudeCurve, DissipationCurve, StiffnessCurve
 from jbeamshell.numerics.newton import Newton
@@ -26,17 +28,6 @@ FIGURES: dict[type[AmplitudeCurve], str] = {
     DissipationCurve: "dissipation",
     StiffnessCurve: "secant_stiffness",
 }
-
-
-class Drive(NamedTuple):
-    """Column that drives a law.
-
-    Attributes
-    ----------
-    control : "force" or "displacement"
-    """
-
-    control: str = "displacement"
 
 
 class Driven(eqx.Module):
@@ -69,7 +60,7 @@ class Driven(eqx.Module):
         return type(self)(self.law.replace(values), self.load)
 
 
-Model = Scene | Driven
+Model = Scene | Driven | Assembly
 
 
 def check_path(model: Model, path: ArrayLike) -> None:
@@ -77,20 +68,23 @@ def check_path(model: Model, path: ArrayLike) -> None:
     if isinstance(model, Scene):
         check(model, path)
         return
-    law = model.law
+    driven = of_law("loop or backbone", model)
+    law = driven.law
     _ = law.stiffness  # raises for a law without loops
-    if model.load.control == "force":
+    if driven.load.control == "force":
         fix = f"{law.heading} is driven by the displacement alone: take 'displacement'"
         require("load.control", "force", isinstance(law, MasingLaw), fix)
-        check_forces(model, path)
+        check_forces(driven, path)
 
 
 def check_amplitudes(model: Model, amplitude: ArrayLike) -> None:
     """Raise `InputError` if a model has no steady cycle of one of the amplitudes."""
     if isinstance(model, Scene):
         check(model, np.sort(np.asarray(amplitude)))
-    elif model.load.control == "force":
-        check_forces(model, amplitude)
+        return
+    driven = of_law("work or stiffness of a cycle", model)
+    if driven.load.control == "force":
+        check_forces(driven, amplitude)
 
 
 def check_forces(model: Driven, force: ArrayLike) -> None:
@@ -107,7 +101,7 @@ def response_along(model: Model, path: Array, solver: Newton) -> tuple[Array, Ar
         history = solve(model, path, solver=solver, throw=False)
         response = history.displacement if by_force else history.force
         return response[history.pressed + 1 :], jnp.all(history.status == 0)
-    law = model.law
+    law = of_law("loop", model).law
     if by_force and isinstance(law, MasingLaw):
         response = law.path_displacements(path)
     else:
@@ -137,7 +131,7 @@ def cycle_figures(
             return lax.select_n(point[1], *figures), jnp.all(history.status == 0)
 
         return lax.map(one, (amplitude, figure))
-    law = model.law
+    law = of_law("cycle", model).law
     if isinstance(law, PowerLaw):
         values = jnp.where(figure == 0, law.dissipation_at_force(amplitude), jnp.nan)
     else:
@@ -147,7 +141,29 @@ def cycle_figures(
 
 
 def of_strips_alone(what: str, model: Model) -> Scene:
-    """Scene of a model; raises `InputError` for a law, which has nothing of the kind."""
+    """Scene of a model; raises `InputError` for others, which have nothing of the kind."""
     if isinstance(model, Scene):
         return model
-    raise InputError(f"{what}: a law of a joint has none; give a Scene")
+    other = "a law of a joint" if isinstance(model, Driven) else "a structure"
+    raise InputError(f"{what}: {other} has none; give a Scene")
+
+
+def of_law(what: str, model: Model) -> Driven:
+    """Driven law of a model that is no scene; raises `InputError` for a structure."""
+    if isinstance(model, Driven):
+        return model
+    raise InputError(f"{what}: a structure has none; give a Scene or a law")
+
+
+def of_structures_alone(what: str, model: Model) -> Assembly:
+    """Structure of a model; raises `InputError` for a strip or a law."""
+    if isinstance(model, Assembly):
+        return model
+    raise InputError(f"{what}: is that of a structure; give a jbeamshell.identify.Assembly")
+
+
+def require_point(label: str, model: Assembly) -> None:
+    """Raise `InputError` unless a structure knows where a force drives it."""
+    place = model.point if model.driven is None else model.driven
+    fix = "is driven nowhere: give the assembly driven=, a degree of freedom"
+    require(label, "force", place is not None, fix)

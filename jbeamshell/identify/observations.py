@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, lax
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
@@ -25,9 +25,19 @@ from jbeamshell.identify.models import (
     check_path,
     cycle_figures,
     of_strips_alone,
+    of_structures_alone,
+    require_point,
     response_along,
 )
-from jbeamshell.measured.curves import AmplitudeCurve, Backbone, SqueezeCurve, noise_of
+from jbeamshell.measured.curves import (
+    AmplitudeCurve,
+    Backbone,
+    DampingCurve,
+    ForcedResponse,
+    FrequencyCurve,
+    SqueezeCurve,
+    noise_of,
+)
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.solver import solve
@@ -37,6 +47,7 @@ APPROACH = 8  # load steps from zero to the first point of a loop
 RUN_IN = 32  # approximate load steps of a closed loop's first, uncompared pass
 POSITION_ROUNDING = 1e-6  # distance over L by which tables may round a position off the strip
 UNSOLVED_RESIDUAL = 10.0  # residual over the range of a trial without equilibrium: never accepted
+MODAL: tuple[type[AmplitudeCurve], ...] = (FrequencyCurve, DampingCurve, ForcedResponse)
 NEGLIGIBLE = 1e-6  # least figure over the measured one, so that its logarithm exists
 
 
@@ -70,7 +81,7 @@ class Observation(eqx.Module):
 
         Parameters
         ----------
-        scene : strip with its load, or law; may hold traced leaves
+        scene : strip with its load, law or structure; may hold traced leaves
         solver : settings of Newton's method
 
         Returns
@@ -217,17 +228,8 @@ class SqueezeObservation(Observation):
         return stress, jnp.all(history.status == 0)
 
 
-class AmplitudeObservation(Observation):
-    """Logarithm of dissipation or secant stiffness of the steady cycle at several amplitudes.
-
-    Attributes
-    ----------
-    amplitude : (n,) amplitudes of the column that ``scene.load.control`` names
-    figure : (n,) index of the figure in `FIGURES`, so that all kinds share one compiled program
-    """
-
-    amplitude: Array
-    figure: Array
+class LogObservation(Observation):
+    """Observation whose logarithm is compared."""
 
     @property
     def span(self) -> float:
@@ -239,20 +241,86 @@ class AmplitudeObservation(Observation):
         """Figure from its logarithm."""
         return np.exp(prediction)
 
+    @staticmethod
+    def columns(curve: AmplitudeCurve) -> tuple[Array, Array]:
+        """Logarithms (n,) of a curve's figure, and their weights."""
+        values = getattr(curve, curve.form.y)
+        weight = np.ones(values.size) if curve.noise is None else values / curve.noise
+        return jnp.asarray(np.log(values)), jnp.asarray(weight)
+
+
+class AmplitudeObservation(LogObservation):
+    """Logarithm of dissipation or secant stiffness of the steady cycle at several amplitudes.
+
+    Attributes
+    ----------
+    amplitude : (n,) amplitudes of the column that ``scene.load.control`` names
+    figure : (n,) index of the figure in `FIGURES`, so that all kinds share one compiled program
+    """
+
+    amplitude: Array
+    figure: Array
+
     @classmethod
     def of(cls, curve: AmplitudeCurve, scene: Model) -> AmplitudeObservation:
         """Runs of a curve; raises `InputError` if a force exceeds gross slip."""
-        values = getattr(curve, curve.form.y)
         check_amplitudes(scene, curve.amplitude)
-        weight = np.ones(values.size) if curve.noise is None else values / curve.noise
-        figure = np.full(values.size, list(FIGURES).index(type(curve)), dtype=np.int32)
-        return cls(*map(jnp.asarray, (np.log(values), weight, curve.amplitude, figure)))
+        figure = np.full(curve.amplitude.size, list(FIGURES).index(type(curve)), dtype=np.int32)
+        return cls(*cls.columns(curve), *map(jnp.asarray, (curve.amplitude, figure)))
 
     def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
         """Logarithms (n,) of the figure, and whether every load step converged."""
         values, converged = cycle_figures(scene, self.amplitude, self.figure, solver)
-        least = NEGLIGIBLE * jnp.exp(self.measured)
-        return jnp.log(jnp.maximum(values, least)), jnp.all(converged)
+        return _logarithm(values, self.measured)[0], jnp.all(converged)
+
+
+class ModalObservation(LogObservation):
+    r"""Logarithm of a figure of one mode of a structure at several amplitudes.
+
+    The force of a response at omega is |omega_0^2 - omega^2 + 2 i zeta omega_0 omega| q / phi, with
+    frequency and damping at its amplitude.
+
+    Attributes
+    ----------
+    level : (m,) amplitudes of the displacement of a point, rising
+    place : (n,) level of each measured point
+    figure : index of the kind of curve in `MODAL`, so that all kinds share one compiled program
+    omega : (n,) angular frequencies of a force; zeros without one
+    """
+
+    level: Array
+    place: Array
+    figure: Array
+    omega: Array
+
+    @classmethod
+    def of(cls, curve: AmplitudeCurve, scene: Model) -> ModalObservation:
+        """Run of a curve; raises `InputError` if the model is no structure that vibrates so."""
+        model = of_structures_alone(curve.label, scene)
+        omega = np.zeros(curve.amplitude.size)
+        if isinstance(curve, ForcedResponse):
+            require_point(curve.label, model)
+            omega = 2.0 * np.pi * curve.frequency
+        level, place = np.unique(curve.amplitude, return_inverse=True)
+        model.curve(level)  # raises for wrong input
+        figure = MODAL.index(type(curve))
+        return cls(*cls.columns(curve), *map(jnp.asarray, (level, place, figure, omega)))
+
+    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
+        """Logarithms (n,) of the figure, and whether all static equilibria were found."""
+        curve, mobility = of_structures_alone("modal curve", scene).response(self.level)
+        natural, ratio = curve.frequency[self.place], curve.damping[self.place]
+        elastic = natural**2 - self.omega**2
+        size = jnp.hypot(elastic, 2.0 * ratio * natural * self.omega)
+        force = self.level[self.place] * size / mobility
+        values = lax.select_n(self.figure, natural / (2.0 * jnp.pi), ratio, force)
+        return _logarithm(values, self.measured)
+
+
+def _logarithm(values: Array, measured: Array) -> tuple[Array, Array]:
+    """Logarithms of values that are not far below the measured ones, and if all are numbers."""
+    least = NEGLIGIBLE * jnp.exp(measured)
+    return jnp.log(jnp.maximum(values, least)), jnp.all(jnp.isfinite(values))
 
 
 @functools.singledispatch
@@ -262,7 +330,7 @@ def observe(measurement: Any, scene: Model) -> Observation:
     Parameters
     ----------
     measurement : a `Loop`, or a curve of `jbeamshell.measured.curves`
-    scene : strip and load that were measured, or law
+    scene : strip and load that were measured, or law, or structure
 
     Raises
     ------
@@ -281,3 +349,5 @@ observe.register(SqueezeCurve, SqueezeObservation.of)
 observe.register(Backbone, LoopObservation.of_backbone)
 for _curve in FIGURES:
     observe.register(_curve, AmplitudeObservation.of)
+for _curve in MODAL:
+    observe.register(_curve, ModalObservation.of)

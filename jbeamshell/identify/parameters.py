@@ -12,7 +12,7 @@ import numpy as np
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.bijection import Bijection
-from jbeamshell.identify.rig_keys import RIG, fitted_row, law_of
+from jbeamshell.identify.rig_keys import RIG, fitted_row, is_of_structure, law_of
 from jbeamshell.scene.keys import NUMBERS
 
 SCALES = ("log", "linear")
@@ -20,7 +20,7 @@ SCALES = ("log", "linear")
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """Number of the scene, of a law or of the rig that a fit may change.
+    """Number of the scene, of a law, a structure or the rig that a fit may change.
 
     Attributes
     ----------
@@ -54,7 +54,8 @@ class Parameter:
 
     def __post_init__(self) -> None:
         row = fitted_row(self.key)
-        known = self.key in (*NUMBERS, *RIG) or law_of(self.key) is not None
+        other = law_of(self.key) is not None or is_of_structure(self.key)
+        known = other or self.key in (*NUMBERS, *RIG)
         if not known or self.key == "load.amplitude":
             raise InputError(
                 f"free {self.key!r}: is not a parameter of the strip or the contact; name one, "

@@ -6,6 +6,11 @@ The command line makes a plan of its options; larger studies are written in a TO
     model = "iwan4"                    # a law of a joint in place of a strip, without a scene
     noise = 0.01                       # over the range; leave it out if the data carry noise
 
+    [structure]                        # whose joint the scene is: see `jointed` for the entries
+    mass = [[1.0]]
+    stiffness = [[1e5]]
+    point = 0
+
     [set]                              # values of all specimens
     "load.control" = "displacement"
 
@@ -18,7 +23,8 @@ The command line makes a plan of its options; larger studies are written in a TO
     [[specimen]]
     label = "thin"
     data = ["thin-1.csv", "thin-2.csv"]
-    kind = "loop"                      # or backbone, dissipation, stiffness, squeeze
+    kind = "loop"                      # or backbone, dissipation, stiffness, squeeze; of a
+                                       # structure frequency, damping
     set = { "strip.length" = 12.0 }
     # or real dimensions, for data in units; a name is that of a TOML file with such entries
     # dimensions = { length = "120mm", thickness = "12mm", width = "50mm", modulus = "210GPa",
@@ -28,6 +34,7 @@ The command line makes a plan of its options; larger studies are written in a TO
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -37,6 +44,7 @@ import numpy as np
 from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, read_toml
+from jbeamshell.identify.assembly import jointed
 from jbeamshell.identify.choose_free import chosen_free
 from jbeamshell.identify.driving import as_model
 from jbeamshell.identify.models import Drive, Driven
@@ -53,6 +61,8 @@ from jbeamshell.scene import library
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.toml import overridden, scene_from_values
 
+OF_STRUCTURE = tuple(inspect.signature(jointed).parameters)[1:]
+TABLES = ("set", "free", "specimen")
 OPTIONS = ("method", "starts", "noise", "points", "max_iterations", "tolerance", "unchecked")
 
 
@@ -66,6 +76,7 @@ class Plan(NamedTuple):
     options : further arguments of `identify.fit`
     notes : sentences on what was done to the data, and what was chosen by default
     model : name of a law of a joint in place of a strip; empty for a strip
+    structure : arguments of `jointed` besides the scene; empty for a strip alone
     """
 
     specimens: list[Specimen]
@@ -73,6 +84,7 @@ class Plan(NamedTuple):
     options: dict[str, Any]
     notes: list[str]
     model: str = ""
+    structure: Mapping[str, Any] = {}
 
 
 def read_plan(path: str | Path, unchecked: bool = False) -> Plan:
@@ -147,8 +159,8 @@ def _without_specimens(
     values: Mapping[str, Any], folder: Path
 ) -> tuple[Plan, dict[str, Any], dict[str, Any]]:
     """Plan without specimens, and the values of scene and rig that all specimens share."""
-    _check_names("entry", values, ("scene", "model", "set", "free", "specimen", *OPTIONS))
-    tables = {name: values.get(name, {}) for name in ("set", "free")}
+    _check_names("entry", values, ("scene", "model", "structure", *TABLES, *OPTIONS))
+    tables = {name: values.get(name, {}) for name in ("set", "free", "structure")}
     for name, table in tables.items():
         _check_table(name, table)
     free = [Parameter(key, **_parameter(key, table)) for key, table in tables["free"].items()]
@@ -161,7 +173,12 @@ def _without_specimens(
         require("scene", given, given is None, f"the law {model!r} takes its place: leave it out")
         return Plan([], free, options, [], model), dict(of_strip), of_rig
     common = overridden(_base(values.get("scene"), folder), of_strip)
-    return Plan([], free, options, []), common, of_rig
+    structure = tables["structure"]
+    _check_names("structure", structure, OF_STRUCTURE)
+    for name in ("mass", "stiffness") if structure else ():
+        require(f"structure.{name}", "missing", name in structure, "give a matrix")
+    require("free", "none", bool(free or not structure), "name what to fit of the structure")
+    return Plan([], free, options, [], structure=structure), common, of_rig
 
 
 def _without_rig(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -186,6 +203,10 @@ def _with_specimen(
     """
     if plan.model:
         return _with_law(plan, values, data, label, rig)
+    if plan.structure:
+        model = jointed(scene_from_values(values), **plan.structure)
+        specimen = Specimen(model, data, label, rig=rig)
+        return plan._replace(specimens=[*plan.specimens, specimen])
     own, notes = dict(values), list(plan.notes)
     loops = [item for item in data if isinstance(item, Loop)]
     if "load.control" not in own and loops:

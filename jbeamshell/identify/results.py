@@ -30,7 +30,7 @@ class Fit(NamedTuple):
     Attributes
     ----------
     scene : scene with the fitted values, ready to run; of several specimens the first.  For a law
-        a `Driven`, see `law`
+        a `Driven`, see `law`; for a structure an `Assembly`
     values, errors : fitted value and standard error (one sigma) by key, or by "key[specimen]" where
         every specimen has its own.  They count what the model leaves as so many independent points
         as its correlation along the curves allows
@@ -74,8 +74,8 @@ class Fit(NamedTuple):
 
     @property
     def law(self) -> Law:
-        """Fitted law of a joint, of several specimens the first; raises for a strip."""
-        require("law", "a strip", isinstance(self.scene, Driven), "read scene instead")
+        """Fitted law of a joint, of several specimens the first; raises for others."""
+        require("law", "none", isinstance(self.scene, Driven), "read scene instead")
         assert isinstance(self.scene, Driven)
         return self.scene.law
 

@@ -1,4 +1,4 @@
-"""Keys that a fit knows beside those of the scene: those of the rig, and of laws of a joint."""
+"""Keys that a fit knows beside those of the scene: of the rig, laws of a joint, structures."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from jbeamshell.scene.keys import TABLE, check_key
 from jbeamshell.scene.rows import Key
 
 PREFIX = "rig."
+OF_STRUCTURE = "structure."
 ANY = -math.inf  # lower bound of a number of any sign
 
 
@@ -43,12 +44,19 @@ def law_of(key: object) -> type[Law] | None:
 
 
 def fitted_row(key: str) -> Key:
-    """Row of a key of the scene, of the rig or of a law; raises `InputError` if there is none."""
+    """Row of a key of the scene, the rig, a law or a structure; raises `InputError` for others."""
     if law := law_of(key):
         return law.table()[key]
+    if is_of_structure(key):
+        return Key(key, "number", 1.0, "Number of a structure.", low=0.0, scale="log")
     of_rig = isinstance(key, str) and key.startswith(PREFIX)
     (check_rig_key if of_rig else check_key)(key)
     return RIG[key] if of_rig else TABLE[key]
+
+
+def is_of_structure(key: object) -> bool:
+    """True for a dotted key of a number of a structure, whose names users choose."""
+    return isinstance(key, str) and key.startswith(OF_STRUCTURE) and len(key) > len(OF_STRUCTURE)
 
 
 def check_rig_key(key: str) -> None:

@@ -127,5 +127,6 @@ def _fingerprint(experiment: Experiment, keys: tuple[str, ...], solver: Newton) 
             if isinstance(leaf, jax.Array | np.ndarray):
                 digest.update(f"{leaf.dtype}{leaf.shape}".encode() + np.asarray(leaf).tobytes())
             else:
-                digest.update(type(leaf).__name__.encode())
+                name = getattr(leaf, "__qualname__", type(leaf).__name__)
+                digest.update(name.encode())
     return digest.hexdigest()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.driving import as_model, feature_doubts
-from jbeamshell.identify.models import Model
+from jbeamshell.identify.models import Driven, Model
 from jbeamshell.identify.rig_keys import PREFIX
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.inspection import inspect
@@ -28,7 +28,7 @@ class Specimen(NamedTuple):
 
     Attributes
     ----------
-    scene : start values, and all values that stay fixed; or a law of a joint
+    scene : start values, and all values that stay fixed; or a law of a joint, or a structure
     data : one measurement or several
     label : name in messages and in the names of the specimen's own values
     weights : factors of the measurements' residuals, besides the curves' own; all 1 if empty
@@ -108,9 +108,9 @@ def as_specimens(data: Any, scene: Any, weights: Sequence[float]) -> list[Specim
 
 
 def free_of(specimens: Sequence[Specimen]) -> tuple[str, ...]:
-    """Keys of the numbers that loops tell of the first specimen's law; none of a strip."""
+    """Keys of the numbers that loops tell of the first specimen's law; none of other models."""
     first = specimens[0].scene
-    return () if isinstance(first, Scene) else first.law.free()
+    return first.law.free() if isinstance(first, Driven) else ()
 
 
 def inspected(

@@ -1,4 +1,4 @@
-"""Readers of curves: dissipation or stiffness over amplitude, squeeze stress along a strip."""
+"""Readers of curves: a figure over the amplitude, or squeeze stress along a strip."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def read_curves(
 ) -> list[tuple[Curve, tuple[str, ...]]]:
     """Read curves of one kind from files of the formats that `read_recordings` reads.
 
-    Columns are found by their names: "amplitude" and "dissipation", "amplitude" and "stiffness", or
-    "x" and "stress", with units or without.  All forces are per width.  A column "noise" holds the
+    Columns are found by their names: "amplitude" and the kind, such as "dissipation", or "x" and
+    "stress", with units or without.  All forces are per width.  A column "noise" holds the
     standard deviation of the second column, in its unit.
 
     Parameters
     ----------
     paths : one file or several; the files' names are the labels
-    kind : "dissipation", "stiffness" or "squeeze"
+    kind : "dissipation", "stiffness", "squeeze", "frequency" or "damping"
     columns : name of a column by quantity, such as {"stress": "sigma_y"}
     units : unit by quantity, such as {"x": "mm"}, which overrides the header
     decimal : decimal mark, "," or "."; None infers it from the numbers

@@ -19,7 +19,10 @@ from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.form import (
     AMPLITUDE,
+    DAMPING,
     DISSIPATION,
+    FREQUENCY,
+    HARMONIC_FORCE,
     LOOP,
     POSITION,
     SECANT_STIFFNESS,
@@ -251,7 +254,109 @@ class StiffnessCurve(AmplitudeCurve):
         self._hold(label, noise, weight, amplitude=amplitude, stiffness=stiffness)
 
 
-IN_FILES: tuple[type[Curve], ...] = (DissipationCurve, StiffnessCurve, SqueezeCurve)
+class FrequencyCurve(AmplitudeCurve):
+    """Frequency of a mode of a structure over its amplitude, compared by its logarithm.
+
+    Attributes
+    ----------
+    amplitude : (points,) amplitude of the displacement of one point of the structure
+    frequency : (points,) cycles per time
+    label, noise, weight : see `Curve`
+    """
+
+    form = _over_amplitude("frequency", FREQUENCY)
+
+    frequency: Floats
+
+    def __init__(
+        self,
+        amplitude: ArrayLike,
+        frequency: ArrayLike,
+        label: str = "frequency",
+        noise: ArrayLike | None = None,
+        weight: float = 1.0,
+    ) -> None:
+        self._hold(label, noise, weight, amplitude=amplitude, frequency=frequency)
+
+
+class DampingCurve(AmplitudeCurve):
+    """Damping ratio of a mode of a structure over its amplitude, compared by its logarithm.
+
+    Attributes
+    ----------
+    amplitude : (points,) amplitude of the displacement of one point of the structure
+    damping : (points,) damping ratio
+    label, noise, weight : see `Curve`
+    """
+
+    form = _over_amplitude("damping", DAMPING)
+
+    damping: Floats
+
+    def __init__(
+        self,
+        amplitude: ArrayLike,
+        damping: ArrayLike,
+        label: str = "damping",
+        noise: ArrayLike | None = None,
+        weight: float = 1.0,
+    ) -> None:
+        self._hold(label, noise, weight, amplitude=amplitude, damping=damping)
+
+
+class ForcedResponse(AmplitudeCurve):
+    """Steady response of a structure to a harmonic force near the resonance of one mode.
+
+    The model answers the force that a measured amplitude needs at its frequency: it is one number
+    where the response of a softening structure may be three.  It is compared by its logarithm.
+
+    Attributes
+    ----------
+    frequency : (points,) cycles per time of the force
+    force : (points,) its amplitude
+    amplitude : (points,) amplitude of the displacement of one point of the structure
+    label, noise, weight : see `Curve`; the noise is that of the force
+    """
+
+    form = Form(
+        "forced",
+        {"frequency": FREQUENCY, "force": HARMONIC_FORCE},
+        "frequency",
+        "force",
+        ("force",),
+        scale="log",
+    )
+
+    frequency: Floats
+    force: Floats
+
+    def __init__(
+        self,
+        frequency: ArrayLike,
+        force: ArrayLike,
+        amplitude: ArrayLike,
+        label: str = "forced response",
+        noise: ArrayLike | None = None,
+        weight: float = 1.0,
+    ) -> None:
+        self._hold(label, noise, weight, frequency=frequency, force=force, amplitude=amplitude)
+
+    def _check_columns(self, columns: dict[str, Floats]) -> None:
+        super()._check_columns(columns | {"amplitude": self.amplitude})
+        if self.amplitude.shape != self.force.shape:
+            raise InputError(
+                f"{self.label}: amplitude has shape {self.amplitude.shape}: give one for each of "
+                f"the {self.force.size} forces"
+            )
+
+
+IN_FILES: tuple[type[Curve], ...] = (
+    DissipationCurve,
+    StiffnessCurve,
+    SqueezeCurve,
+    FrequencyCurve,
+    DampingCurve,
+)
 
 Measurement = Loop | Curve
 

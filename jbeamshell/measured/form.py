@@ -68,6 +68,9 @@ SQUEEZE_STRESS = Column(r"$\chi\,/\,2H$  [stress]", ("N/m^2",))
 AMPLITUDE = Column("amplitude of $F$ or $u(L)$  [force/width or length]", ("N/m", "m"))
 DISSIPATION = Column("$D$, work per cycle  [force]", ("J/m",))
 SECANT_STIFFNESS = Column("secant stiffness  [force/width/length]", ("N/m^2",))
+FREQUENCY = Column("frequency  [1/time]", ("Hz",))
+DAMPING = Column(r"damping ratio $\zeta$", NUMBER)
+HARMONIC_FORCE = Column("amplitude of the force  [force]", ("N",))
 
 LOOP = Form(
     "overlay",

@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import UnconvergedError
@@ -219,8 +219,10 @@ def _refined(amplitude: Array) -> Array:
     return (ends[:-1, None] + jnp.diff(ends)[:, None] * parts).ravel()
 
 
-def _checked(amplitudes: ArrayLike) -> NDArray[np.float64]:
-    """Amplitudes as an array; raises `InputError`."""
+def _checked(amplitudes: ArrayLike) -> Any:
+    """Amplitudes as an array, of which traced ones are not checked; raises `InputError`."""
+    if is_traced(amplitudes):
+        return jnp.atleast_1d(jnp.asarray(amplitudes))
     amplitude = np.atleast_1d(np.asarray(amplitudes, float))
     rising = amplitude.ndim == 1 and bool(np.all(np.diff(amplitude, prepend=0.0) > 0.0))
     require("amplitudes", amplitude, rising and bool(np.all(np.isfinite(amplitude))), AMPLITUDES)

@@ -1,0 +1,204 @@
+"""Structures with joints, fitted to frequency and damping over amplitude and forced responses."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import dynamics
+from jbeamshell.dynamics.structure.joint import Joint
+from jbeamshell.dynamics.structure.matrices import Attachment, Structure
+from jbeamshell.identify import Assembly, Parameter, fit, jointed
+from jbeamshell.identify.plan import plan_from_values
+from jbeamshell.measured import DampingCurve, ForcedResponse, FrequencyCurve, SqueezeCurve
+
+SIZE = np.geomspace(0.02, 1.0, 16)
+FORCE = np.geomspace(0.02, 0.9, 12)
+MASS, STIFFNESS = np.diag([1.0, 0.5]), np.array([[3.0, -3.0], [-3.0, 4.0]])
+TRUTH = {"structure.limit": 1.2, "structure.spring": 2.0, "structure.damping_ratio": 0.004}
+
+
+def build(scene, numbers):
+    """Two masses, the first on a joint whose slip grows with the square of the force."""
+    force = FORCE * numbers["limit"]
+    joint = Joint(force + 0.4 * force**2 / numbers["limit"], force)
+    joint = joint.in_series(numbers["spring"])
+    ratio = numbers["damping_ratio"]
+    return Structure(MASS, STIFFNESS, [Attachment(joint, 0)], damping_ratio=ratio)
+
+
+START = Assembly(
+    build, numbers={"limit": 1.0, "spring": 3.0, "damping_ratio": 0.002}, point=0, driven=1
+)
+
+
+def curves(model, random, noise=(1e-4, 0.02)):
+    """Frequency and damping of a model, with noise that they know."""
+    true = model.curve(SIZE)
+    frequency = true.frequency / (2.0 * np.pi) * (1.0 + noise[0] * random.standard_normal(16))
+    damping = true.damping * (1.0 + noise[1] * random.standard_normal(16))
+    return [
+        FrequencyCurve(SIZE, frequency, noise=noise[0] * frequency),
+        DampingCurve(SIZE, damping, noise=noise[1] * damping),
+    ]
+
+
+def forced(model, random, noise=0.02):
+    """Steady responses about the resonance, with noise of the force that they know.
+
+    The force is that of x = |(K_n - omega^2 + i 2 zeta omega_n omega)^-1 phi f phi| of one mode.
+    """
+    curve, _ = model.response(SIZE)
+    _, shapes = model.structure().modes(1)
+    omega = curve.frequency * (1.0 + 0.02 * random.uniform(-1.0, 1.0, SIZE.size))
+    q = SIZE / abs(shapes[0, 0])
+    dynamic = curve.frequency**2 - omega**2 + 2j * curve.damping * curve.frequency * omega
+    force = np.abs(dynamic * q / shapes[1, 0]) * (1.0 + noise * random.standard_normal(16))
+    return ForcedResponse(omega / (2.0 * np.pi), force, SIZE, noise=noise * force)
+
+
+def test_planted_numbers_are_recovered_within_their_intervals():
+    model, random = START.replace(TRUTH), np.random.default_rng(0)
+    found = fit([*curves(model, random), forced(model, random)], START, list(TRUTH))
+    assert found.status == "converged"
+    for key, truth in TRUTH.items():
+        low, high = found.intervals[key]
+        assert low < truth < high
+        assert high - low < 0.1 * truth
+    assert 0.7 < found.uncertainty.scatter < 1.3
+    assert isinstance(found.scene, Assembly)
+    again = found.scene.curve(SIZE).damping
+    np.testing.assert_allclose(again, found.model[1].damping, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_strip_in_a_structure_is_recovered_with_honest_intervals():
+    """Of 24 fits of three numbers each, the errors are as large as the fits say."""
+    truth = {
+        "contact.friction": 0.12,
+        "structure.stiffness": 1.1,
+        "structure.damping_ratio": 2e-3,
+    }
+    scene = jb.Scene().replace({"model.rung": "plane", "model.nodes": 17})
+    stiffness = np.array([[1.0, -1.0], [-1.0, 1.5]]) * 1e5
+    start = jointed(scene, np.diag([1.0, 0.3]), stiffness, point=1, damping_ratio=1e-3)
+    true, size, errors = start.replace(truth), np.geomspace(1e-6, 1.5e-5, 24), []
+    curve = true.curve(size)
+    for seed in range(24):
+        random = np.random.default_rng(seed)
+        frequency = curve.frequency / (2.0 * np.pi) * (1.0 + 1e-3 * random.standard_normal(24))
+        damping = curve.damping * (1.0 + 0.03 * random.standard_normal(24))
+        data = [
+            FrequencyCurve(size, frequency, noise=1e-3 * frequency),
+            DampingCurve(size, damping, noise=0.03 * damping),
+        ]
+        found = fit(data, start, list(truth))
+        errors.append([(found.values[k] - v) / found.errors[k] for k, v in truth.items()])
+    assert 0.75 < np.sqrt(np.mean(np.square(errors))) < 1.3
+    assert np.mean(np.abs(errors) < 1.96) > 0.88
+
+
+def test_a_plan_names_the_structure(tmp_path):
+    rows = "amplitude [m],damping,noise\n" + "".join(f"{1e-6 * n},0.01,1e-4\n" for n in (1, 2, 3))
+    (tmp_path / "d.csv").write_text(rows)
+    values = {
+        "structure": {"mass": [[2.0]], "stiffness": [[1e4]], "point": 0, "damping_ratio": 0.01},
+        "set": {"model.rung": "plane", "model.nodes": 17},
+        "free": {"contact.friction": {}, "structure.damping_ratio": {"high": 0.1}},
+        "specimen": [{"data": ["d.csv"], "kind": "damping"}],
+    }
+    plan = plan_from_values(values, tmp_path)
+    (specimen,) = plan.specimens
+    assert float(specimen.scene.get("structure.damping_ratio")) == 0.01
+    assert specimen.scene.point == 0
+    assert specimen.measurements[0].amplitude.tolist() == [1e-6, 2e-6, 3e-6]
+    with pytest.raises(jb.InputError, match="structure: 'masses' is unknown"):
+        plan_from_values(values | {"structure": {"masses": 1.0}}, tmp_path)
+    with pytest.raises(jb.InputError, match="free"):
+        plan_from_values(values | {"free": {}}, tmp_path)
+
+
+class TestRingDown:
+    TIME = np.linspace(0.0, 6.0, 12001)
+
+    def test_an_accelerometer_among_other_modes_tells_the_displacement(self):
+        """The first of two modes, whose damping grows: an amplitude a/(1 + c t)."""
+        size, omega = 1e-4 / (1.0 + 0.5 * self.TIME), 2.0 * np.pi * 30.0
+        other = 3e-5 * np.exp(-2.0 * self.TIME) * np.sin(2.0 * np.pi * 180.0 * self.TIME)
+        acceleration = -(omega**2) * size * np.sin(omega * self.TIME) - (6.0 * omega) ** 2 * other
+        noise = 0.01 * np.random.default_rng(0).standard_normal(self.TIME.size)
+        found = dynamics.ring_down(
+            self.TIME,
+            acceleration + noise,
+            method="hilbert",
+            smoothing=6.0,
+            band=(15.0, 60.0),
+            kind="acceleration",
+        )
+        frequency, damping = found.modal_curves(12, low=3e-5, high=8e-5)
+        expected = 0.5 * damping.amplitude / 1e-4 / omega
+        assert np.allclose(frequency.frequency, 30.0, rtol=1e-3)
+        off = np.abs(damping.damping - expected)
+        assert np.all(off < 4.0 * damping.noise + 0.01 * expected)
+        assert np.all(damping.noise < 0.05 * damping.damping)
+
+    def test_noise_of_a_bin_is_that_of_its_mean(self):
+        random = np.random.default_rng(1)
+        size = np.repeat(np.geomspace(1.0, 2.0, 10), 100)
+        known = np.full(size.size, 0.01) + 1e-3 * random.standard_normal(size.size)
+        found = dynamics.RingDown(size, size, 1.0 + known, known)
+        _, damping = found.modal_curves(10)
+        assert np.allclose(damping.noise, 1e-4, rtol=0.4)
+        assert np.std((damping.damping - 0.01) / damping.noise) < 2.0
+
+
+def plain(**changed):
+    return jointed(jb.Scene(), **({"mass": [[1.0]], "stiffness": [[1.0]]} | changed))
+
+
+SQUEEZE = SqueezeCurve(SIZE, -SIZE)
+DAMPING = DampingCurve([0.1, 0.2], [0.01, 0.02])
+FORCED = ForcedResponse([1.0, 1.1], [1.0, 1.0], [0.1, 0.2])
+REFUSED = {
+    "strip": (lambda: fit(DAMPING, jb.Scene(), ["contact.friction"]), "Assembly"),
+    "law": (lambda: fit(DAMPING, jb.laws.Iwan4(), ["iwan4.chi"]), "Assembly"),
+    "squeeze": (lambda: fit(SQUEEZE, START, ["structure.limit"]), "give a Scene"),
+    "unknown": (lambda: fit(DAMPING, START, ["structure.limits"]), "structure.limits.*limit"),
+    "no scene": (lambda: fit(DAMPING, START, ["contact.friction"]), "give the assembly a scene"),
+    "nothing free": (lambda: fit(DAMPING, START), "free: name"),
+    "no name": (lambda: Parameter("structure."), "unknown key 'structure.'"),
+    "undriven": (
+        lambda: fit(FORCED, Assembly(build, numbers=START.numbers), ["structure.limit"]),
+        "driven=",
+    ),
+    "no function": (lambda: Assembly(3.0), "build = 3.0"),
+    "no structure": (lambda: Assembly(lambda scene, numbers: 1.0).structure(), "must return"),
+    "numbers": (lambda: Assembly(build, numbers={"limit": "much"}), "limit = 'much'"),
+    "place": (lambda: Assembly(build, point=-1), "point = -1"),
+    "beyond": (lambda: Assembly(build, numbers=START.numbers, point=7).structure(), "from 0 to 1"),
+    "reach": (lambda: plain(reach=1.2), "reach = 1.2"),
+    "joint": (lambda: plain(joint=[None]), "joint"),
+    "forces": (lambda: ForcedResponse([1.0], [1.0], [1.0, 2.0]), "amplitude has shape"),
+    "band": (
+        lambda: dynamics.ring_down(np.arange(9.0), np.ones(9), band=(0.1, 3.0)),
+        "band = .*below 0.5",
+    ),
+    "kind": (lambda: dynamics.ring_down(np.arange(9.0), np.ones(9), kind="jerk"), "kind"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_input_is_one_clear_line(name):
+    call, message = REFUSED[name]
+    with pytest.raises(jb.InputError, match=message) as refusal:
+        call()
+    assert "\n" not in str(refusal.value)
+
+
+def test_traced_sliders_stay_rigid():
+    """A fit traces the whole scene, which cannot tell then that its sliders do not yield."""
+    scene = jb.Scene().replace({"model.rung": "plane", "model.nodes": 17})
+    assert jointed(scene, [[1.0]], [[1e5]]).ideal
+    soft = jointed(scene, [[1.0]], [[1e5]]).replace({"contact.stick_stiffness": 50.0})
+    assert not soft.ideal
+    assert jnp.asarray(soft.get("contact.stick_stiffness")) == 50.0
