@@ -28,6 +28,7 @@ from jbeamshell.plotting.motions import vibration as vibration
 from jbeamshell.plotting.paths import contact_lines as contact_lines
 from jbeamshell.plotting.paths import loop as loop
 from jbeamshell.plotting.paths import profiles as profiles
+from jbeamshell.plotting.responses import forced_response as forced_response
 from jbeamshell.plotting.style import DATA as DATA
 from jbeamshell.plotting.style import DISPLACEMENT as DISPLACEMENT
 from jbeamshell.plotting.style import DOTS as DOTS

@@ -159,6 +159,31 @@ class ModalProperties(Protocol):
     def damping(self) -> np.ndarray: ...
 
 
+class ResponseCurve(Protocol):
+    """Steady responses along a curve of k points.
+
+    Attributes
+    ----------
+    frequency, level : (k,) angular frequency and factor of the force; one of them varies
+    harmonic, harmonics : (H,) numbers of the harmonics, and their (k, H) amplitudes
+    stable : (k,) True where small deviations do not grow
+    folds : (f,) numbers of the points at which the curve turns back
+    """
+
+    @property
+    def frequency(self) -> np.ndarray: ...
+    @property
+    def level(self) -> np.ndarray: ...
+    @property
+    def harmonic(self) -> np.ndarray: ...
+    @property
+    def harmonics(self) -> np.ndarray: ...
+    @property
+    def stable(self) -> np.ndarray: ...
+    @property
+    def folds(self) -> np.ndarray: ...
+
+
 class RingDownComparison(Protocol):
     """Ring-down beside its quasi-static prediction.
 

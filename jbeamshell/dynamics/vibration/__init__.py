@@ -1,0 +1,1 @@
+"""Harmonic balance of structures with joints: forced responses and nonlinear modes."""

@@ -1,0 +1,153 @@
+r"""Steady forces of elements on periodic displacements.
+
+A slider's force after a displacement d is clip(s + k d, -L, L), exactly, as long as the motion does
+not turn within d.  Steps end at the samples and at the turning points between them, which cubic
+Hermite interpolation finds.  From rest, every slider has its steady force after one (half) cycle.
+
+The onset of slip between two samples is a kink of slope J at the part theta of the interval h.  The
+sum of samples differs there from the integral by (Euler-Maclaurin)
+
+    integral - h sum = J h^2 B_2(theta)/2,     B_2 = theta^2 - theta + 1/6,
+
+which is added to the two samples; harmonics are then exact to the third order in h.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+from numpy.typing import NDArray
+
+from jbeamshell.dynamics.vibration.elements import Laws
+
+
+class Wave:
+    """Signals of odd harmonics over half a cycle, or of any over a whole one.
+
+    A constant table, which compiled programs contain.
+
+    Attributes
+    ----------
+    harmonics : (H,) numbers of the harmonics
+    value, rate : (P, H) factors exp(i h theta) and i h exp(i h theta) at theta_1 ... theta_P
+    step : distance of two samples
+    sign : -1 for half a cycle, whose end is the start with the other sign; 1 for a whole one
+    """
+
+    def __init__(self, harmonics: NDArray[np.int64], samples: int) -> None:
+        half = bool(np.all(harmonics % 2 == 1))
+        self.harmonics = harmonics
+        self.sign = -1.0 if half else 1.0
+        count = samples // 2 if half else samples
+        self.step = (np.pi if half else 2.0 * np.pi) / count
+        angle = self.step * np.arange(1, count + 1)
+        self.value = np.exp(1j * np.outer(angle, harmonics))
+        self.rate = 1j * harmonics * self.value
+
+    def samples(self, coefficients: Array) -> tuple[Array, Array]:
+        """Samples (P, ...) of a signal and of its rate from complex coefficients (H, ...).
+
+        There may be fewer coefficients than harmonics.
+        """
+        count = coefficients.shape[0]
+        value, rate = self.value[:, :count], self.rate[:, :count]
+        return (
+            jnp.real(jnp.tensordot(value, coefficients, 1)),
+            jnp.real(jnp.tensordot(rate, coefficients, 1)),
+        )
+
+    def coefficients(self, samples: Array) -> Array:
+        """Coefficients (H, ...), complex, of samples (P, ...)."""
+        part = np.where(self.harmonics == 0, 1.0, 2.0)[:, None] / self.value.shape[0]
+        return jnp.tensordot(part * self.value.conj().T, samples, 1)
+
+
+def lost_forces(laws: Laws, wave: Wave, u: Array, rate: Array) -> Array:
+    """Steady forces of all elements minus those of the stuck ones, (P, J).
+
+    Parameters
+    ----------
+    u, rate : (P, J) displacements and their derivatives to theta at theta_1 ... theta_P
+    """
+    return jax.vmap(partial(_lost, wave), in_axes=(0, 1, 1), out_axes=1)(laws, u, rate)
+
+
+def _lost(wave: Wave, law: Laws, u: Array, rate: Array) -> Array:
+    """Forces (P,) of one element minus those of the stuck one."""
+    elastic = law.cubic * u**3
+    if not law.springs.size:
+        return elastic
+    before = jnp.roll(u, 1).at[0].multiply(wave.sign)
+    slope = wave.step * jnp.roll(rate, 1).at[0].multiply(wave.sign)
+    turning, turns = _turning_points(before, u, slope, wave.step * rate)
+    return elastic + jnp.sum(_slid(law, u, before, turning, turns, wave), axis=0)
+
+
+def _turning_points(u0: Array, u1: Array, m0: Array, m1: Array) -> tuple[Array, Array]:
+    """Extreme values between samples, their ends where there is none, and where there is one.
+
+    Values and slopes per interval at both ends of an interval make a cubic.
+    """
+    turns = m0 * m1 < 0.0
+    rise = u1 - u0
+    a, b = 3.0 * (m0 + m1 - 2.0 * rise), 6.0 * rise - 4.0 * m0 - 2.0 * m1  # a t^2 + b t + m0 = 0
+    root = jnp.sqrt(jnp.maximum(b**2 - 4.0 * a * m0, 0.0))
+    below = jnp.where(turns, -b + jnp.sign(m0) * root, 1.0)
+    t = lax.stop_gradient(2.0 * m0 / jnp.where(below == 0.0, 1.0, below))  # flat there
+    extreme = u0 + t * (m0 + t * (0.5 * b + t * a / 3.0))
+    return jnp.where(turns, extreme, u1), turns
+
+
+def _slid(law: Laws, u: Array, before: Array, turning: Array, turns: Array, wave: Wave) -> Array:
+    """Forces (s, P) that sliders lose by slip, with the corrections of their kinks."""
+    spring, limit = law.springs[:, None], law.limits[:, None]
+    points = jnp.stack([turning, u], axis=1).ravel()  # (2P,)
+    steps = points - jnp.concatenate([before[:1], points[:-1]])
+    slips, side, ref, carry = lax.stop_gradient(
+        _history(law.springs, law.limits, before[0], steps, wave.sign)
+    )
+    # Force since the last slip, which may have been in the cycle before.
+    since = limit * side + spring * (points - carry * points[ref])
+    force = jnp.where(carry == 0.0, spring * points, since)
+    at_sample, at_start = force[:, 1::2], jnp.roll(force[:, 1::2], 1, axis=1)
+    at_start = at_start.at[:, 0].multiply(wave.sign)
+    # Onset of slip within an interval without a turning point.
+    way, rise = jnp.sign(u - before), spring * (u - before)
+    part = (way * limit - at_start) / jnp.where(rise == 0.0, 1.0, rise)
+    onset = slips[:, 0::2] & ~turns & (part > 0.0) & (part < 1.0)
+    jump = jnp.where(onset, -0.5 * rise * (part * (part - 1.0) + 1.0 / 6.0), 0.0)
+    at_first = jnp.roll((1.0 - part) * jump, -1, axis=1).at[:, -1].multiply(wave.sign)
+    return at_sample + part * jump + at_first - spring * u
+
+
+def _history(
+    springs: Array, limits: Array, start: Array, steps: Array, sign: float
+) -> tuple[Array, Array, Array, Array]:
+    """Steady history of sliders, (s, 2P) each, over steps (2P,).
+
+    Returns
+    -------
+    where a slider slips; the sign of its last slip; the point of it; and the factor of that point,
+    `sign` if it was in the (half) cycle before, 0 if the slider never slips
+    """
+
+    def walk(state: tuple[Array, ...], step: tuple[Array, Array]) -> Any:
+        force, ref, side, carry = state
+        trial = force + springs * step[1]
+        slips = jnp.abs(trial) > limits
+        side = jnp.where(slips, jnp.sign(trial), side)
+        last = (jnp.where(slips, step[0], ref), side, jnp.where(slips, 1.0, carry))
+        return (jnp.clip(trial, -limits, limits), *last), (slips, *last)
+
+    numbered, never = (jnp.arange(steps.size), steps), jnp.zeros_like(springs)
+    first = jnp.clip(springs * start, -limits, limits)
+    begin = (first, jnp.zeros(springs.shape, int), never, never)
+    (force, ref, side, carry), _ = lax.scan(walk, begin, numbered)
+    _, found = lax.scan(walk, (sign * force, ref, sign * side, sign * carry), numbered)
+    slips, ref, side, carry = (row.T for row in found)
+    return slips, side, ref, carry

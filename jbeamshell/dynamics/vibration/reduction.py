@@ -1,0 +1,87 @@
+"""Structures of few coordinates for harmonic balance: modes and static displacements."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+import scipy.sparse
+from jax import Array, lax
+
+from jbeamshell.common.checks import is_traced
+from jbeamshell.common.precision import doubled
+from jbeamshell.dynamics.structure.matrices import Structure
+from jbeamshell.dynamics.vibration.elements import Laws, laws_of
+
+SMALL = 40  # largest number of degrees of freedom that are kept
+MODES = 24  # of a larger structure
+DEPENDENT = 1e-12  # squared size of a static displacement that the others contain
+
+
+class Reduced(NamedTuple):
+    """Structure of r coordinates with J force elements.
+
+    Attributes
+    ----------
+    mass, damping, stiffness : (r, r); the stiffness is that with all elements stuck
+    directions : (r, J) directions of the elements
+    drive : (r,) forces
+    laws : force elements
+    """
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    directions: Array
+    drive: Array
+    laws: Laws
+
+
+def reduced(structure: Structure, force: Any, mode: int = 0) -> tuple[Reduced, Any]:
+    """Structure of few coordinates, and its basis (n, r).
+
+    Small structures keep their degrees of freedom.  Others move in their lowest modes and in the
+    static displacements of forces and elements (Rubin 1975): the dynamic compliance there is then
+    exact to the fourth power of the frequency over that of the next mode.  The basis of traced
+    structures is held fixed in their derivatives.  The modes go beyond the given one.
+    """
+    own = structure.directions
+    matrices = (structure.mass, structure.damping, structure.stuck_stiffness)
+    traced = structure.traced or is_traced(force)
+    if structure.size <= SMALL:
+        basis: Any = np.eye(structure.size)
+        projected = [jnp.asarray(_dense(matrix)) for matrix in matrices]
+    else:
+        xp: Any = jnp if traced else np
+        basis = _basis(structure, xp.column_stack([own, force]), MODES + mode, xp)
+        basis = lax.stop_gradient(basis) if traced else basis
+        projected = [jnp.asarray(basis.T @ (matrix @ basis)) for matrix in matrices]
+    mass, damping, stiffness = projected
+    unused = jnp.all(jnp.asarray(basis) == 0.0, axis=0)
+    stiffness = stiffness + jnp.diag(jnp.where(unused, 1.0, 0.0))
+    elements: Any = [attached.joint for attached in structure.attachments]
+    laws = laws_of(elements if traced else doubled(elements))
+    drive = jnp.asarray(basis.T @ force)
+    return Reduced(mass, damping, stiffness, jnp.asarray(basis.T @ own), drive, laws), basis
+
+
+def _basis(structure: Structure, loads: Any, count: int, xp: Any) -> Any:
+    """Modes, and static displacements (n, r) independent of them, orthogonal in the mass.
+
+    Static displacements that the others contain become zero.
+    """
+    _, modes = structure.modes(count)
+    static = structure.static_displacements(loads)
+    for _ in range(2):  # the second time for rounding
+        static = static - modes @ (modes.T @ (structure.mass @ static))
+    size = xp.sqrt(xp.sum(static * (structure.mass @ static), axis=0))
+    static = static / xp.where(size > 0.0, size, 1.0)
+    values, vectors = xp.linalg.eigh(static.T @ (structure.mass @ static))
+    kept = values > DEPENDENT
+    scale = xp.where(kept, 1.0 / xp.sqrt(xp.where(kept, values, 1.0)), 0.0)
+    return xp.column_stack([modes, static @ (vectors * scale)])
+
+
+def _dense(matrix: Any) -> Any:
+    return matrix.toarray() if scipy.sparse.issparse(matrix) else matrix

@@ -1,0 +1,156 @@
+"""Input of harmonic balance: checks, reduced structures, doubts."""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from jbeamshell.common.checks import (
+    as_leaf,
+    in_transformation,
+    is_traced,
+    require,
+    require_count,
+    require_number,
+)
+from jbeamshell.common.errors import DoubtfulWarning, InputError
+from jbeamshell.dynamics.structure.joint import Joint
+from jbeamshell.dynamics.structure.matrices import Structure
+from jbeamshell.dynamics.vibration.balance import Balance, Found
+from jbeamshell.dynamics.vibration.results import over_a_cycle
+
+HARMONICS = 9  # highest one, unless told otherwise
+PER_HARMONIC = 16  # samples of a period of the highest harmonic
+FEWEST = 128  # samples of a cycle
+DOUBTED = 1e-3  # displacement in the next harmonic over that in the first
+RANGE = "give two different positive angular frequencies, (from, to)"
+LEVELS = "give two different positive factors of the force, (from, to)"
+AMPLITUDES = "give positive modal displacements that rise"
+
+
+def precise(traced: bool) -> Any:
+    """Context of double precision; within a transformation the precision stays as it is."""
+    plain = traced or in_transformation()
+    return contextlib.nullcontext() if plain else jax.enable_x64(True)
+
+
+def checked_balance(harmonics: Any, samples: Any) -> Balance:
+    """Odd harmonics up to the highest one, and samples of a cycle; raises `InputError`."""
+    require_count("harmonics", harmonics, 1, 99)
+    odd = harmonics % 2 == 1
+    require("harmonics", harmonics, odd, "must be odd: joints have no even ones")
+    if samples is None:
+        samples = max(FEWEST, PER_HARMONIC * harmonics)
+    require_count("samples", samples, 4 * harmonics + 4)
+    require("samples", samples, samples % 2 == 0, "must be even")
+    return Balance(tuple(range(1, harmonics + 1, 2)), int(samples))
+
+
+def checked_force(structure: Structure, force: Any) -> Any:
+    """Forces (n,); raises `InputError`."""
+    known = as_leaf(force, "force", f"give {structure.size} numbers")
+    fix = f"give {structure.size} numbers, one for each degree of freedom"
+    require("force", known.shape, known.shape == (structure.size,), fix)
+    if is_traced(known):
+        return known
+    values = np.asarray(known, float)
+    moves = bool(np.all(np.isfinite(values)) and np.any(values))
+    require("force", values, moves, "must hold finite numbers, not all of them zero")
+    return values
+
+
+def checked_place(structure: Structure, place: Any, force: Any) -> int:
+    """Degree of freedom of the result; None is that of the largest force."""
+    if place is None:
+        fix = "name the degree of freedom of the result, as the force is traced"
+        require("place", place, not is_traced(force), fix)
+        return int(np.argmax(np.abs(force)))
+    require_count("place", place, 0, structure.size - 1)
+    return int(place)
+
+
+def checked_pair(key: str, pair: Any, fix: str) -> tuple[float, float]:
+    """Two different positive numbers; raises `InputError`."""
+    values = np.asarray(as_leaf(pair, key, fix), float)
+    good = values.shape == (2,) and bool(np.all(np.isfinite(values) & (values > 0.0)))
+    require(key, pair, good and values[0] != values[1], fix)
+    return float(values[0]), float(values[1])
+
+
+def checked_rising(key: str, values: Any, fix: str, rising: bool = True) -> Any:
+    """Positive numbers (k,), rising if asked; raises `InputError`."""
+    known = jnp.atleast_1d(as_leaf(values, key, fix))
+    require(key, known.shape, known.ndim == 1 and known.size > 0, fix)
+    if is_traced(known):
+        return known
+    numbers = np.asarray(known, float)
+    good = bool(np.all(np.isfinite(numbers) & (numbers > 0.0)))
+    require(key, numbers, good and (not rising or bool(np.all(np.diff(numbers) > 0.0))), fix)
+    return numbers
+
+
+class Reach:
+    """Largest displacements up to which the joints are known.
+
+    A joint of a strip ends with its backbone, below gross slip; the last slope of a backbone that
+    was given by hand goes on.
+    """
+
+    def __init__(self, structure: Structure, harmonics: Sequence[int]) -> None:
+        self.harmonics = np.array(harmonics)
+        self.directions = structure.directions
+        self.ends = np.array([_end(a.joint) for a in structure.attachments])
+
+    def check(self, motion: Any, directions: Any, what: str) -> NDArray[np.float64]:
+        """Largest displacements (k, J) of motions (k, H, r); raises `InputError`."""
+        peaks = np.max(np.abs(over_a_cycle(motion @ directions, self.harmonics)), axis=1)
+        for place, end in enumerate(self.ends):
+            most = float(np.max(peaks[:, place], initial=0.0))
+            if most > end:
+                raise InputError(
+                    f"{what} moves the joint of attachments[{place}] by {most:.4g}, beyond its "
+                    f"backbone, which ends at {end:.4g}: take less, or give Joint.of more force, "
+                    "below gross slip"
+                )
+        return np.asarray(peaks)
+
+
+def _end(element: Any) -> float:
+    known = isinstance(element, Joint) and bool(np.isfinite(element.capacity))
+    return float(element.displacement[-1]) if known else np.inf
+
+
+def dissipation(found: Found, directions: Any, harmonics: Sequence[int], xp: Any = np) -> Any:
+    """Energy (k,) lost in the elements per cycle; ``xp`` is NumPy, or JAX for traced numbers."""
+    u = found.point.x @ directions
+    parts = xp.imag(found.lost[:, :-1] * xp.conj(u)) * np.array(harmonics)[:, None]
+    return np.pi * xp.sum(parts, axis=(-2, -1))
+
+
+def doubt_harmonics(truncation: Any, harmonics: Sequence[int]) -> None:
+    """Warn if the next harmonic is not small."""
+    most = float(np.max(truncation, initial=0.0))
+    if most > DOUBTED:
+        warnings.warn(
+            f"doubtful: harmonic {harmonics[-1] + 2}, which is left out, moves the joints by "
+            f"{most:.2g} of the first one: give more harmonics",
+            DoubtfulWarning,
+            stacklevel=3,
+        )
+
+
+def check_mode(structure: Structure, mode: Any) -> None:
+    """Raise `InputError` unless a mode exists."""
+    require_count("mode", mode, 0, structure.size - 1)
+
+
+def check_frequency(frequency: Any) -> None:
+    """Raise `InputError` unless an angular frequency is positive."""
+    require_number("frequency", frequency, "must be a positive angular frequency")

@@ -1,0 +1,65 @@
+"""Pictures of steady responses: amplitude around folds, and superharmonics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from jbeamshell.plotting.protocols import ResponseCurve
+from jbeamshell.plotting.style import DATA, PALETTE, colours, style
+
+AMPLITUDE = "amplitude  [length]"
+FREQUENCY, LEVEL = "frequency  [1/time]", "level of the force  [1]"
+DEPTH = 1e-6  # smallest superharmonic shown, over the largest amplitude
+
+
+def forced_response(
+    response: ResponseCurve, *, label: str = "", axes: Sequence[Axes] | None = None
+) -> Any:
+    """Draw the amplitude over frequency or level, and all harmonics beside it, on two axes.
+
+    Unstable parts are dashed, folds are dots.
+
+    Parameters
+    ----------
+    response : result of `jbeamshell.dynamics.forced_response` or `level_response`
+    label : words of the legend, such as the level of the force
+    axes : two axes; a new figure when not given
+    """
+    level, frequency = np.asarray(response.level), np.asarray(response.frequency)
+    over_level = np.ptp(frequency) == 0.0
+    x = level if over_level else frequency / (2.0 * np.pi)
+    amplitudes, stable = np.asarray(response.harmonics), np.asarray(response.stable)
+    with style():
+        pair = plt.subplots(1, 2, figsize=(10.0, 3.6))[1] if axes is None else axes
+        first = amplitudes[:, 0]
+        colour = PALETTE[len(pair[0].lines) % len(PALETTE)] if label else PALETTE[0]
+        both = np.ones(stable.size, bool)
+        parts = ((stable, "-", label), (~stable, "--", ""))
+        for shown, line, name in parts if not np.all(stable) else ((both, "-", label),):
+            y = np.where(_with_neighbours(shown), first, np.nan)
+            pair[0].plot(x, y, color=colour, linestyle=line, label=name or None)
+        folds = np.asarray(response.folds)
+        pair[0].plot(x[folds], first[folds], "o", color=DATA, markersize=4.0)
+        shades = colours(amplitudes.shape[1])
+        for number, row, shade in zip(response.harmonic, amplitudes.T, shades, strict=True):
+            pair[1].plot(x, row, color=shade, linewidth=1.2, label=f"harmonic {number}")
+        top = float(first.max())
+        along = LEVEL if over_level else FREQUENCY
+        pair[0].set(xlabel=along, ylabel=AMPLITUDE)
+        pair[1].set(xlabel=along, ylabel=AMPLITUDE, yscale="log", ylim=(DEPTH * top, 2.0 * top))
+        if label:
+            pair[0].legend()
+        if len(pair[1].get_lines()) == amplitudes.shape[1]:
+            pair[1].legend(ncols=2)
+    return pair
+
+
+def _with_neighbours(shown: np.ndarray) -> np.ndarray:
+    """Points that are shown, and those beside them, so that parts of a line meet."""
+    wide = np.pad(shown, 1)
+    return np.asarray(wide[:-2] | wide[1:-1] | wide[2:])

@@ -1,0 +1,191 @@
+"""Harmonic balance: closed forms, energy, folds, stability, derivatives, bad input."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import dynamics
+from jbeamshell.dynamics import Attachment, CubicSpring, Joint, Structure
+
+U = np.geomspace(0.05, 4.0, 8)
+SLIDERS = (U, np.tanh(U))
+FORCE = [0.0, 0.3]
+SETTING = {"harmonics": 7, "samples": 256}
+SPRING = np.array([[3.0, -3.0], [-3.0, 3.0]])
+
+
+def two_masses(joint, damping=0.02):
+    return Structure(np.eye(2), SPRING, [Attachment(joint, 0)], damping=damping * np.eye(2))
+
+
+JOINT = Joint(*SLIDERS)
+HELD = two_masses(JOINT)
+
+
+@pytest.fixture(scope="module")
+def response():
+    return dynamics.forced_response(HELD, FORCE, (0.3, 1.2), **SETTING)
+
+
+@pytest.fixture(scope="module")
+def mode():
+    return dynamics.nonlinear_mode(two_masses(JOINT, 0.0), np.geomspace(0.2, 2.0, 5), **SETTING)
+
+
+class TestForcedResponse:
+    @pytest.mark.slow
+    def test_one_harmonic_of_one_mass_is_the_describing_function(self):
+        structure = Structure([[1.0]], [[0.3]], [Attachment(JOINT, 0)], damping=[[0.05]])
+        with pytest.warns(jb.DoubtfulWarning, match=r"harmonic 3.*more harmonics"):
+            found = dynamics.forced_response(structure, [0.4], (0.4, 2.0), harmonics=1, samples=256)
+        a, omega = found.amplitude, found.frequency
+        stiffness = np.asarray(JOINT.first_harmonic(jnp.asarray(a))) + 0.3
+        force = a * np.abs(stiffness - omega**2 + 0.05j * omega)
+        np.testing.assert_allclose(force, 0.4, rtol=2e-6)
+        assert omega[0] == 0.4
+        assert omega[-1] == pytest.approx(2.0, rel=1e-12)
+
+    def test_it_passes_its_peak_in_small_steps_and_is_stable(self, response):
+        assert np.all(np.diff(response.frequency) > 0.0)
+        assert response.folds.size == 0
+        assert np.all(response.stable)
+        assert np.all(np.abs(np.diff(np.log(response.amplitude))) < 0.2)
+        assert response.phase[0] > -0.3
+        assert response.phase[-1] < -2.8
+        assert np.all(response.truncation < 1e-3)
+        assert 1e-3 < np.max(response.harmonics[:, 1] / response.amplitude) < 0.1
+
+    def test_the_force_supplies_what_joints_and_dampers_lose(self, response):
+        harmonic, omega = response.harmonic, response.frequency
+        x = np.stack([response.at(0), response.at(1)])
+        supplied = -np.pi * FORCE[1] * x[1, :, 0].imag
+        lost = np.pi * 0.02 * omega * np.sum(harmonic**2 * np.abs(x) ** 2, axis=(0, 2))
+        np.testing.assert_allclose(supplied, lost + response.dissipation, rtol=1e-9)
+
+    @pytest.mark.slow
+    def test_given_frequencies_lie_on_the_curve(self, response):
+        pick = [0, 20, -1]
+        found = dynamics.steady_response(HELD, FORCE, response.frequency[pick], **SETTING)
+        np.testing.assert_allclose(found.amplitude, response.amplitude[pick], rtol=1e-9)
+        np.testing.assert_allclose(found.phase, response.phase[pick], rtol=1e-8)
+
+    def test_a_growing_force_ends_on_the_curve(self, response):
+        omega = float(response.frequency[20])
+        over = dynamics.level_response(HELD, FORCE, omega, (0.1, 1.0), **SETTING)
+        assert over.amplitude[-1] == pytest.approx(response.amplitude[20], rel=1e-9)
+        assert np.all(np.diff(over.level) > 0.0)
+
+    def test_it_is_drawn(self, response):
+        left, right = response.plot()
+        assert left.get_xlabel().startswith("frequency")
+        assert len(right.get_lines()) == 4
+
+
+class TestFolds:
+    def test_a_cubic_spring_folds_and_is_unstable_between(self):
+        """One harmonic of a cubic spring has the stiffness k + 3/4 c a^2."""
+        structure = Structure(
+            [[1.0]], [[0.0]], [Attachment(CubicSpring(1.0, 0.05), 0)], damping=[[0.04]]
+        )
+        found = dynamics.forced_response(structure, [0.1], (0.7, 1.5), harmonics=3)
+        assert found.folds.size == 2
+        high, low = found.folds
+        between = np.arange(found.frequency.size)
+        inside = (between > high) & (between < low)
+        apart = ~np.isin(between, found.folds)
+        np.testing.assert_array_equal(found.stable[apart], ~inside[apart])
+        omega, a = found.frequency, found.amplitude
+        one_harmonic = a * np.abs(1.0 + 0.0375 * a**2 - omega**2 + 0.04j * omega)
+        np.testing.assert_allclose(one_harmonic, 0.1, rtol=0.05)
+        assert len(found.plot()[0].get_lines()) == 3
+
+
+class TestNonlinearMode:
+    def test_its_damping_is_the_energy_that_the_joint_loses(self, mode):
+        np.testing.assert_allclose(
+            mode.dissipation, JOINT.dissipation(mode.joints[:, 0]), rtol=3e-5
+        )
+        speed = sum(mode.harmonic**2 * np.abs(mode.at(place)) ** 2 for place in (0, 1))
+        sustained = 2.0 * mode.damping * mode.frequency**2 * np.pi * np.sum(speed, axis=1)
+        np.testing.assert_allclose(sustained, mode.dissipation, rtol=1e-9)
+
+    def test_statics_agree_at_small_amplitudes(self, mode):
+        static = dynamics.modal_curve(two_masses(JOINT, 0.0), mode.amplitude[:3])
+        np.testing.assert_allclose(mode.frequency[:3], static.frequency, rtol=5e-3)
+        np.testing.assert_allclose(mode.damping[:3], static.damping, rtol=0.02)
+
+    def test_small_motion_is_linear_and_has_the_dampers(self):
+        found = dynamics.nonlinear_mode(HELD, np.geomspace(1e-4, 1e-3, 5), **SETTING)
+        assert found.frequency[0] == pytest.approx(HELD.modes()[0][0], rel=1e-9)
+        assert found.damping[0] == pytest.approx(0.01 / found.frequency[0], rel=1e-9)
+
+
+def varied(values):
+    """Structure whose joint, mass and damping are varied."""
+    stretch, mass, damping = values
+    joint = Joint(SLIDERS[0] * stretch, jnp.asarray(SLIDERS[1]))
+    masses = jnp.diag(jnp.stack([1.0 + 0.0 * mass, mass]))
+    return Structure(masses, SPRING, [Attachment(joint, 0)], damping=damping * jnp.eye(2))
+
+
+def assert_slope_two(figures):
+    """Assert that what a derivative leaves falls with the square of the step."""
+    at, way = jnp.array([1.0, 1.0, 0.02]), jnp.array([0.05, 0.01, 0.002])
+    value, slope = jax.jvp(figures, (at,), (way,))
+    steps = 0.1 * 0.5 ** np.arange(3)
+    left = [np.abs(figures(at + h * way) - value - h * slope) for h in steps]
+    np.testing.assert_allclose(np.diff(np.log2(left), axis=0), -2.0, atol=0.15)
+
+
+@pytest.mark.slow
+def test_frequency_and_damping_at_an_amplitude_have_derivatives():
+    @jax.jit
+    def figures(values):
+        found = dynamics.nonlinear_mode(varied(values), [1.0], **SETTING)
+        return jnp.concatenate([found.frequency, found.damping])
+
+    assert_slope_two(figures)
+
+
+@pytest.mark.slow
+def test_forced_amplitudes_have_derivatives():
+    @jax.jit
+    def figures(values):
+        omegas = [0.45, 0.5, 0.6]
+        return dynamics.steady_response(varied(values), FORCE, omegas, place=1, **SETTING).amplitude
+
+    assert_slope_two(figures)
+
+
+CAPPED = two_masses(Joint(*SLIDERS, capacity=1.0))
+REFUSED = {
+    "force": (lambda: dynamics.forced_response(HELD, [1.0], (0.3, 1.0)), "force.*2 numbers"),
+    "no force": (lambda: dynamics.forced_response(HELD, [0.0, 0.0], (0.3, 1.0)), "force.*zero"),
+    "range": (lambda: dynamics.forced_response(HELD, FORCE, (0.3, -1.0)), "frequencies.*positive"),
+    "levels": (lambda: dynamics.level_response(HELD, FORCE, 0.5, (1.0, 1.0)), "levels"),
+    "even": (lambda: dynamics.nonlinear_mode(HELD, [0.1], harmonics=4), "harmonics = 4.*odd"),
+    "place": (lambda: dynamics.forced_response(HELD, FORCE, (0.3, 1.0), place=2), "place = 2"),
+    "falling": (lambda: dynamics.nonlinear_mode(HELD, [0.2, 0.1]), "amplitudes.*rise"),
+    "mode": (lambda: dynamics.nonlinear_mode(HELD, [0.1], mode=2), "mode = 2"),
+    "spring": (lambda: CubicSpring(-1.0, 1.0), "spring.stiffness"),
+    "gross slip": (
+        lambda: dynamics.nonlinear_mode(CAPPED, np.linspace(1.0, 9.0, 5), **SETTING),
+        r"attachments\[0\].*beyond its backbone.*ends at 4",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_input_is_one_clear_line(name):
+    call, message = REFUSED[name]
+    with pytest.raises(jb.InputError, match=message) as refusal:
+        call()
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_curve_that_stalls_keeps_its_part():
+    with pytest.raises(dynamics.StalledContinuationError, match="more than 9 points") as stalled:
+        dynamics.forced_response(HELD, FORCE, (0.3, 1.2), **SETTING, most_points=9)
+    assert stalled.value.response.frequency.size == 9
