@@ -64,7 +64,9 @@ class Figures:
 
     def source(self, name: str) -> ColumnDataSource:
         """Data of a name; made empty on first use."""
-        return self._sources.setdefault(name, ColumnDataSource(name=name))
+        if name not in self._sources:
+            self._sources[name] = ColumnDataSource(name=name)
+        return self._sources[name]
 
     def put(self, name: str, **columns: Any) -> None:
         """Replace the data of a name."""
@@ -206,6 +208,7 @@ class Figures:
         x = np.asarray(history.x)
         if self.cyclic:
             self.put("loop", u=view.displacement, F=view.force)
+            self.loop.title.text = f"Hysteresis loop: D = {view.figures['dissipation']:.4g}"
             self._fit_loop()
             self._show_states(view, x)
             amplitude = float(scene.load.amplitude)

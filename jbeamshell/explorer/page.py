@@ -43,6 +43,18 @@ LINE = "font-size: 13px; padding: 6px 10px; border-radius: 4px; margin: 0; min-h
 TONES = {"": "color: #666", "busy": "background: #EEF4FA", "error": "background: #FDECE4"}
 
 
+class _Handle(pn.widgets.FloatSlider):
+    """Slider that tells its moves at once; Panel's own waits 50 ms, but `Page` gathers them."""
+
+    _debounce = SOON
+
+
+class _Slider(pn.widgets.EditableFloatSlider):
+    """Slider beside a field for its number."""
+
+    _slider_widget = _Handle
+
+
 class Page:
     """Sliders and figures of one scene.
 
@@ -141,7 +153,7 @@ class Page:
         self._moment.visible = self._keep.visible = bool(scene.load.cycles)
         self._keep.value = False
         self.sliders = {
-            control.name: pn.widgets.EditableFloatSlider(
+            control.name: _Slider(
                 label=control.label,
                 value=control.value,
                 start=control.low,
@@ -167,7 +179,7 @@ class Page:
         def begin() -> None:
             self._begin(self._own if event.new == OWN else library.named(event.new))
 
-        self._later(begin, 50)
+        self._soon("scene", begin, 50)
 
     def reset(self) -> None:
         """Put all sliders back."""
@@ -176,7 +188,7 @@ class Page:
 
     def _move(self, name: str, value: float) -> None:
         self._values[name] = value
-        self._later(self.redraw, SOON)
+        self._soon("figures", self.redraw)
 
     # --- drawing ----------------------------------------------------------------------------------
 
@@ -192,7 +204,7 @@ class Page:
             self._fail(error)
             return
         begin = time.perf_counter()
-        self.view, self.message = view, ""
+        failed, self.view, self.message = bool(self.message), view, ""
         last = view.steps.size - 1
         if self._moment.end != last:
             self._moment.end, at_end = last, True
@@ -200,9 +212,17 @@ class Page:
             self._moment.value = last
         self._figures.show(view, self._moment.value)
         self._figures.grey(False)
-        self._show_numbers(view)
         self._follow(scene, moved)
-        self._say(view, time.perf_counter() - begin)
+        drawing = time.perf_counter() - begin
+
+        def write() -> None:
+            self._show_numbers(view)
+            self._say(view, drawing)
+
+        if failed:
+            write()
+        else:  # words take the browser longer than the figures
+            self._when_at_rest("words", write)
 
     def _follow(self, scene: Scene, moved: dict[str, float]) -> None:
         """Draw the curve of dissipation now if it is quick, else when the sliders rest."""
@@ -223,16 +243,14 @@ class Page:
             draw()
         else:
             self._figures.show_curve(None)
-            self._later(draw, LATER, "curve")
+            self._when_at_rest("curve", draw)
 
-    def _later(self, action: Callable[[], None], wait: int, name: str = "") -> None:
+    def _soon(self, name: str, action: Callable[[], None], wait: int = SOON) -> None:
         """Do something soon, and once: while it waits, calls of the same name change nothing."""
-        document = pn.state.curdoc
-        if document is None or document.session_context is None:  # in a notebook
+        document = _served_document()
+        if document is None:
             action()
             return
-        if (name := name or action.__name__) == "curve" and name in self._waiting:
-            document.remove_timeout_callback(self._waiting.pop(name))
         if name in self._waiting:
             return
 
@@ -241,6 +259,13 @@ class Page:
             action()
 
         self._waiting[name] = document.add_timeout_callback(run, wait)
+
+    def _when_at_rest(self, name: str, action: Callable[[], None]) -> None:
+        """Do something after the last call of a name."""
+        document = _served_document()
+        if document is not None and name in self._waiting:
+            document.remove_timeout_callback(self._waiting.pop(name))
+        self._soon(name, action, LATER)
 
     # --- words ------------------------------------------------------------------------------------
 
@@ -302,6 +327,12 @@ class Page:
         self._figures.show_loops(self._loops)
         points = sum(loop.force.size for loop in self._loops)
         self._tell(f"{name}: {len(self._loops)} loops of {points} points")
+
+
+def _served_document() -> Any:
+    """Document of the server's session; None in a notebook or a script, which draw at once."""
+    document = pn.state.curdoc
+    return None if document is None or document.session_context is None else document
 
 
 def _one_line(error: Exception) -> str:
