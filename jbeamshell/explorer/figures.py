@@ -114,12 +114,8 @@ class Figures:
         return made
 
     def _contact_figure(self) -> Any:
-        made = self._new(
-            "Contact along the cycle, from bottom to top",
-            "X  [length]",
-            "F  [force/width]",
-            **self._own_ranges(),
-        )
+        words = "Contact over the cycle", "X  [length]", f"{self._load}, time upwards"
+        made = self._new(*words, **self._own_ranges())
         mapper = LinearColorMapper(palette=list(COLOURS), low=-0.5, high=2.5)
         source = self._empty("states", image=[], x=[], y=[], dw=[], dh=[])
         made.image("image", "x", "y", "dw", "dh", source=source, color_mapper=mapper)

@@ -33,9 +33,11 @@ CARDS = """
 PAGE = """
 :host {display: grid !important; grid-template-columns: minmax(240px, 320px) minmax(0, 1fr);
 gap: 8px 24px; padding: 8px 16px; box-sizing: border-box}
+.scroll-button {display: none}
 @media (max-width: 760px) {:host {grid-template-columns: minmax(0, 1fr)}}
 """
 PLOTS = """
+.scroll-button {display: none}
 :host {display: grid !important; gap: 12px 16px;
 grid-template-columns: repeat(auto-fit, minmax(min(420px, 100%), 1fr))}
 """
@@ -116,6 +118,8 @@ class Page:
         self._moment.param.watch(lambda event: self._figures.at(event.new), "value")
         self._file = pn.widgets.FileInput(accept=".csv,.txt,.tsv,.npz,.mat", **wide)
         self._file.param.watch(lambda _: self._read_file(), "value")
+        words = pn.pane.HTML("<b>Your own loops</b> (CSV with columns force and displacement)")
+        self._data = pn.Column(words, self._file, margin=0, **wide)
         self._take = pn.widgets.FileDownload(
             callback=lambda: io.StringIO(self.text),
             filename="scene.toml",
@@ -129,8 +133,7 @@ class Page:
             self._sliders,
             pn.Row(self._reset, self._keep, sizing_mode="stretch_width"),
             self._moment,
-            pn.pane.HTML("<b>Your own loops</b> (CSV with columns force and displacement)"),
-            self._file,
+            self._data,
             self._take,
             sizing_mode="stretch_width",
             margin=0,
@@ -150,7 +153,8 @@ class Page:
         self._values = {control.name: control.value for control in self._controls}
         self.scene, self.view, self.message = scene, None, ""
         self._figures = Figures(scene.load)
-        self._moment.visible = self._keep.visible = bool(scene.load.cycles)
+        for each in (self._moment, self._keep, self._data):
+            each.visible = bool(scene.load.cycles)
         self._keep.value = False
         self.sliders = {
             control.name: _Slider(

@@ -151,7 +151,7 @@ def test_another_scene_has_its_own_sliders(page):
     choice.click()
     next(o for o in deep(page, "option") if o.text == "single-lap").click()
     until(lambda: len(deep(page, ".noUi-handle")) == 7)
-    until(lambda: words(page) and "preparing" not in words(page))
+    until(lambda: words(page) and "preparing" not in words(page), 180.0)
     assert "Bolt: place X" in words(page, "div")
     errors = [line for line in page.get_log("browser") if line["level"] == "SEVERE"]
     assert not errors
