@@ -29,7 +29,10 @@ exclude_patterns = ["generate", "pictures", "**.ipynb_checkpoints", "_build"]
 html_theme = "furo"
 html_title = "jbeamshell"
 html_theme_options = {"navigation_with_keys": True}
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 pygments_style = "friendly"
+smartquotes = False  # options of the command line begin with two dashes
 
 nb_execution_mode = "off"  # notebooks are shown with the outputs that they keep
 nb_merge_streams = True

@@ -2,6 +2,7 @@
 
 import contextlib
 import doctest
+import functools
 import importlib
 import io
 import json
@@ -127,6 +128,11 @@ def names_of_examples():
     return own | libraries | parts | {"scene": jb.Scene(), "structure": structure}
 
 
+@functools.cache
+def a_history():
+    return jb.solve(jb.Scene())
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
 def test_examples_of_docstrings_run(path, tmp_path, monkeypatch):
@@ -139,6 +145,8 @@ def test_examples_of_docstrings_run(path, tmp_path, monkeypatch):
         source = "".join(example.source for example in test.examples)
         if not any(words in source for words in OF_A_USER):
             test.globs = names_of_examples() | test.globs
+            if "history" in source and "history =" not in source:
+                test.globs["history"] = a_history()
             runner.run(test, out=said.write)
     plt.close("all")
     assert not runner.failures, said.getvalue()

@@ -284,7 +284,7 @@ def time(microseconds: float) -> str:
     for unit, size in (("s", 1e6), ("ms", 1e3)):
         if microseconds >= size:
             return f"{microseconds / size:.3g} {unit}"
-    return f"{microseconds:.3g} us"
+    return f"{microseconds:.3g} µs"
 
 
 def percent(share: float, digits: int = 2) -> str:
