@@ -1,6 +1,8 @@
 """Page without a browser: sliders move numbers, figures follow, failures are one line."""
 
 import re
+import socket
+import sys
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from jbeamshell.scene.toml import read_scene
 pytest.importorskip("panel", reason="the explorer needs panel: pip install 'jbeamshell[explore]'")
 
 from jbeamshell.explorer.page import Page
+from jbeamshell.explorer.serve import _free
 
 COARSE = {"model.nodes": 33, "load.steps_per_half_cycle": 8, "load.cycles": 1}
 
@@ -120,3 +123,24 @@ def test_settings_stay_as_they_were_chosen():
     assert moved.model.solution == "condensed"
     assert drawable(jb.library.single_lap()).model.nodes == 65
     assert drawable(jb.library.single_lap().replace({"model.nodes": 97})).model.nodes == 97
+
+
+def test_without_panel_there_is_one_clear_line(monkeypatch):
+    monkeypatch.setitem(sys.modules, "panel", None)
+    with pytest.raises(jb.InputError, match=r"pip install 'jbeamshell\[explore\]'"):
+        jb.explore()
+
+
+def test_a_port_that_is_taken_is_refused():
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        with pytest.raises(jb.InputError, match="take another port"):
+            _free(other.getsockname()[1])
+    assert _free(0) > 0
+
+
+def test_a_notebook_gets_the_page_as_an_object(scene):
+    assert "jbeamshell" not in type(jb.explore(scene)).__module__
+    with pytest.raises(jb.InputError, match=r"scene = 'standard': give a jbeamshell\.Scene"):
+        jb.explore("standard")
