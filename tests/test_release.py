@@ -57,6 +57,10 @@ def test_the_wheel_holds_the_package_its_data_and_their_licence(wheel):
     data = {name for name in names if name.startswith("jbeamshell/finite_elements/")}
     assert "jbeamshell/finite_elements/loops_eta0.1126.csv" in data
     assert "MIT" in zipfile.ZipFile(wheel).read("jbeamshell/finite_elements/README.md").decode()
+    (about,) = (name for name in names if name.endswith("/METADATA"))
+    words = zipfile.ZipFile(wheel).read(about).decode()
+    assert "# jbeamshell" in words
+    assert not re.findall(r"\]\((?!https?:)", words)  # an index has no files beside the README
     others = {name for name in names - package - data if ".dist-info/" not in name}
     assert not others
 
