@@ -11,7 +11,7 @@ import jbeamshell
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
-LONG = tuple(f"{number:02d}_" for number in range(2, 12))  # half a minute or more each
+LONG = tuple(f"{number:02d}_" for number in range(2, 13))  # half a minute or more each
 RUNS = [
     pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * path.stem.startswith(LONG))
     for path in NOTEBOOKS
@@ -36,7 +36,7 @@ def test_a_notebook_runs(path, monkeypatch):
         cell.outputs, cell.execution_count = [], None
     NotebookClient(
         notebook,
-        timeout=120,
+        timeout=300,
         kernel_name="python3",
         resources={"metadata": {"path": str(FOLDER)}},
     ).execute()

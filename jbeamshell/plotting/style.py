@@ -25,6 +25,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
 from jbeamshell.measured import form
 
+# Palette of Okabe and Ito, told apart by colour-blind readers too.
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": "0.4",
@@ -32,6 +34,7 @@ STYLE: dict[Any, Any] = {
     "axes.formatter.use_mathtext": True,
     "axes.grid": True,
     "axes.labelsize": 9,
+    "axes.prop_cycle": plt.cycler(color=PALETTE),
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlesize": 9,
@@ -51,8 +54,6 @@ STYLE: dict[Any, Any] = {
     "ytick.labelsize": 8,
 }
 PANEL = (3.4, 2.7)  # inches: a column of a journal
-# Palette of Okabe and Ito, told apart by colour-blind readers too.
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (6, 1, 1, 1, 1, 1)), (0, (3, 2)))
 MARKS = "os^vDx"
 STICKS, SLIPS, LIFTED = "#7FC4EE", "#A63D00", "0.93"  # states of a contact: light, dark, pale
