@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
 from jbeamshell.plotting.protocols import ResponseCurve
-from jbeamshell.plotting.style import DATA, PALETTE, colours, style
+from jbeamshell.plotting.style import DATA, PALETTE, looks, panels, style
 
 AMPLITUDE = "amplitude  [length]"
-FREQUENCY, LEVEL = "frequency  [1/time]", "level of the force  [1]"
+FREQUENCY, LEVEL = "frequency  [1/time]", "level of the force"
 DEPTH = 1e-6  # smallest superharmonic shown, over the largest amplitude
 
 
@@ -35,7 +34,7 @@ def forced_response(
     x = level if over_level else frequency / (2.0 * np.pi)
     amplitudes, stable = np.asarray(response.harmonics), np.asarray(response.stable)
     with style():
-        pair = plt.subplots(1, 2, figsize=(10.0, 3.6))[1] if axes is None else axes
+        pair = panels(1, 2)[0] if axes is None else axes
         first = amplitudes[:, 0]
         colour = PALETTE[len(pair[0].lines) % len(PALETTE)] if label else PALETTE[0]
         both = np.ones(stable.size, bool)
@@ -45,9 +44,9 @@ def forced_response(
             pair[0].plot(x, y, color=colour, linestyle=line, label=name or None)
         folds = np.asarray(response.folds)
         pair[0].plot(x[folds], first[folds], "o", color=DATA, markersize=4.0)
-        shades = colours(amplitudes.shape[1])
-        for number, row, shade in zip(response.harmonic, amplitudes.T, shades, strict=True):
-            pair[1].plot(x, row, color=shade, linewidth=1.2, label=f"harmonic {number}")
+        kinds = looks(amplitudes.shape[1])
+        for number, row, look in zip(response.harmonic, amplitudes.T, kinds, strict=True):
+            pair[1].plot(x, row, **look, label=f"harmonic {number}")
         top = float(first.max())
         along = LEVEL if over_level else FREQUENCY
         pair[0].set(xlabel=along, ylabel=AMPLITUDE)
