@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.errors import InputError
@@ -60,6 +61,7 @@ def loop(history: LoopPath, axes: Axes | None = None, *, moment: bool = False) -
             axes.plot(displacement, force, color=PALETTE[0], linewidth=2.0, label="last cycle")
         labels = (ROTATION, MOMENT) if moment else (DISPLACEMENT, FORCE)
         axes.set(xlabel=labels[0], ylabel=labels[1])
+        axes.xaxis.set_major_locator(MaxNLocator(5))  # their numbers may be long
         axes.legend(loc="upper left")
     return axes
 
