@@ -42,6 +42,7 @@ from jbeamshell.plotting.style import close as close
 from jbeamshell.plotting.style import colours as colours
 from jbeamshell.plotting.style import in_units as in_units
 from jbeamshell.plotting.style import looks as looks
+from jbeamshell.plotting.style import mark_decades as mark_decades
 from jbeamshell.plotting.style import panels as panels
 from jbeamshell.plotting.style import save as save
 from jbeamshell.plotting.style import style as style
