@@ -82,7 +82,7 @@ def place(scene: Scene) -> np.ndarray | str:
         "a pressure that varies": contact.pressure.ndim > 0,
         "a pressure from below": contact.bottom_pressure.ndim > 0 or contact.bottom_pressure != 0,
         "a contact that is not rigid": contact.normal != "rigid",
-        "a strip that may lift off": "w" in scene.model.given("fields"),
+        "a strip that may lift off": "w" in scene.model.fields,
         "displacement control": load.control != "force",
         "fewer than two cycles": load.cycles < 2,
         "a smooth friction law": not sharp,

@@ -111,13 +111,6 @@ def test_thin_bars_need_no_more_than_the_bar_and_corners_need_plane_elasticity()
     assert jb.solve(thick, tolerance=0.2).scene.model.rung == "plane"
 
 
-def test_scenes_at_the_defaults_are_on_the_map():
-    advice = jb.advise(jb.Scene(), 0.05)
-    assert advice.basis.startswith("map")
-    lifting = jb.Scene().replace({"model.fields": ["v", "w", "beta", "psi"]})
-    assert "lift off" in error_map.place(lifting)
-
-
 def test_solve_takes_the_advice():
     scene = STRIP.replace({"strip.height_ratio": 0.02, "load.amplitude": 1.0})
     advice = jb.advise(scene, 0.2)
