@@ -12,18 +12,29 @@ import numpy as np
 
 from jbeamshell.common.checks import in_transformation
 
-KNOWN = (0, 10)  # release of JAX from which on the options below are known to exist
+QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
 
 
+@functools.cache
 def quick_options() -> dict[str, Any] | None:
     """Compiler options for a small program: half the time to compile, the same time to run.
 
-    None where the whole process compiles with fewer optimisations anyway.
+    None where the whole process compiles with fewer optimisations anyway.  Options that this
+    release of JAX does not know are left out.
     """
     config: Any = jax.config
-    if config.values["jax_disable_most_optimizations"] or jax.__version_info__ < KNOWN:
+    if config.values["jax_disable_most_optimizations"]:
         return None
-    return {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
+    return {name: value for name, value in QUICK.items() if _is_known(name, value)}
+
+
+def _is_known(name: str, value: Any) -> bool:
+    """True if the compiler takes an option; it is asked by a program of no operation."""
+    try:
+        jax.jit(lambda: 0.0, compiler_options={name: value}).lower().compile()
+    except jax.errors.JaxRuntimeError:
+        return False
+    return True
 
 
 class Small:

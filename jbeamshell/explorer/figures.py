@@ -106,8 +106,8 @@ class Figures:
         made = self._new("Hysteresis loop", self._moved, self._load, **self._own_ranges())
         look = {"line_color": KEPT, "line_width": 2, "line_dash": "dashed"}
         made.line("u", "F", source=self._empty("kept", u=[], F=[]), **look)
-        dots = {"size": 4, "color": MEASURED, "alpha": 0.8}
-        made.scatter("u", "F", source=self._empty("measured", u=[], F=[]), **dots)
+        look = {"line_color": MEASURED, "line_alpha": 0.7}
+        made.line("u", "F", source=self._empty("measured", u=[], F=[]), **look)
         made.line("u", "F", source=self._empty("loop", u=[], F=[]), line_color=MODEL, line_width=2)
         here = self._empty("here", u=[], F=[])
         made.scatter("u", "F", source=here, size=10, color=MODEL, line_color="white")

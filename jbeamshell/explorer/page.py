@@ -220,8 +220,9 @@ class Page:
         drawing = time.perf_counter() - begin
 
         def write() -> None:
-            self._show_numbers(view)
-            self._say(view, drawing)
+            if not self.message:  # of a move since then
+                self._show_numbers(view)
+                self._say(view, drawing)
 
         if failed:
             write()
