@@ -1,15 +1,19 @@
-"""Drawings of the strip and of the lap joint, as the README and the site show them.
+"""Drawings of the strip and of the lap joint, and the first results of the pages.
 
-Run ``python notebooks/pictures/draw.py``: it writes strip.svg and lap_joint.svg beside itself.
+Run ``python notebooks/pictures/draw.py``: it writes its pictures beside itself.
 """
 
 from pathlib import Path
 
+import jax
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
+
+import jbeamshell as jb
+from jbeamshell import plotting
 
 FOLDER = Path(__file__).parent
 INK, STEEL, PALE, SLIP, LOAD = "0.15", "#b9cbdc", "#dfe6ec", "#D55E00", "#0072B2"
@@ -99,10 +103,10 @@ def lap_joint() -> None:
     axes.text(
         2.0, height + 0.52, "bolt: a patch of pressure on both faces", color=LOAD, ha="center"
     )
-    for a, b in ((0, 0.75), (3.25, length)):
+    for a, b in ((0.9, 1.35), (2.65, 3.1)):
         axes.plot([a, b], [0, 0], color=SLIP, lw=5, solid_capstyle="butt")
-    axes.text(0.36, 0.13, "slips", color=SLIP, ha="center")
-    axes.text(3.64, 0.13, "slips", color=SLIP, ha="center")
+    axes.text(1.05, 0.13, "slips", color=SLIP, ha="center")
+    axes.text(2.95, 0.13, "slips", color=SLIP, ha="center")
     axes.text(2.0, 0.13, "sticks", ha="center")
     axes.text(length + over / 2, height / 2, "strip", ha="center", va="center")
     axes.text(-over / 2, -height / 2, "second\nmember", ha="center", va="center")
@@ -128,6 +132,20 @@ def lap_joint() -> None:
     write(figure, "lap_joint.svg")
 
 
+def first_results() -> None:
+    """Loop of the page "Start here", and deformed members of the page of lap joints."""
+    jax.config.update("jax_enable_x64", True)
+    strip = {"strip.length": 120.0, "strip.half_height": 6.0, "strip.youngs_modulus": 210e3}
+    contact = {"contact.friction": 0.2, "contact.pressure": 10.0, "load.amplitude": 120.0}
+    axes = jb.solve(jb.Scene().replace(strip | contact)).plot()
+    names = {"length": "mm", "force/width": "N/mm"}
+    plotting.in_units(axes, names)
+    axes.figure.savefig(FOLDER / "first_loop.png", dpi=110)
+    axes = jb.solve(jb.library.single_lap()).plot_deformed()
+    axes.figure.savefig(FOLDER / "first_lap_joint.png", dpi=110)
+
+
 if __name__ == "__main__":
     strip()
     lap_joint()
+    first_results()
