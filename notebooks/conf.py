@@ -32,7 +32,6 @@ html_theme_options = {"navigation_with_keys": True}
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 pygments_style = "friendly"
-smartquotes = False  # options of the command line begin with two dashes
 
 nb_execution_mode = "off"  # notebooks are shown with the outputs that they keep
 nb_merge_streams = True
@@ -46,6 +45,7 @@ add_module_names = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 autosummary_generate = False
+napoleon_attr_annotations = False
 napoleon_google_docstring = False
 napoleon_custom_sections = [("Attributes", "params_style")]
 napoleon_use_param = False

@@ -2,6 +2,7 @@
 
 import argparse
 import importlib
+import re
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
@@ -74,7 +75,8 @@ def commands() -> str:
         "",
     ]
     for name, child in known.choices.items():
-        lines += [f"## jbeamshell {name}", "", child.description or "", ""]
+        description = re.sub(r"(?<!`)(--\w+)", r"`\1`", child.description or "")
+        lines += [f"## jbeamshell {name}", "", description, ""]
         rows = list(option_rows(child))
         if rows:
             lines += ["| option | meaning |", "|---|---|", *rows, ""]
