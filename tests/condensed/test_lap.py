@@ -1,6 +1,7 @@
 """Lap joints: two members on their contact line, beside elements, closed forms and limits."""
 
 import csv
+import json
 from pathlib import Path
 
 import jax
@@ -9,12 +10,14 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from calibration.finite_elements import lap
 from jbeamshell.condensed import strip
 from jbeamshell.condensed.strip import stations
 from jbeamshell.dynamics import Joint
 from jbeamshell.mechanics.bar import lap_backbone, lap_cubic_law
 from jbeamshell.scene import library
 
+BOLTED = Path(lap.__file__).with_name("lap.json")
 ELEMENTS = Path(__file__).parents[2] / "calibration/data/lap_joints.csv"
 JOINT = {"strip.far_end": "free", "member.support": "rolling", "load.amplitude": 1.0}
 SQUEEZE = jb.Scene().replace(JOINT | {"model.rung": "squeeze"})
@@ -58,6 +61,16 @@ class TestElements:
             ends += [float(touching[0]), float(touching[-1])]
         assert ends == pytest.approx([0.6702, 1.3248, 0.6502, 1.3548], rel=0.02)
         assert float(jnp.max(history.gap)) == pytest.approx(2.419e-4, rel=0.01)
+
+    @pytest.mark.slow
+    def test_two_bolts(self):
+        record = json.loads(BOLTED.read_text("utf-8"))["joint"]
+        elements = record["CalculiX, refinement 1"]
+        found = lap.on_contact_line(lap.joint()).figures()
+        assert found["dissipation"] == pytest.approx(elements["dissipation"], rel=0.01)
+        assert found["secant_stiffness"] == pytest.approx(elements["secant_stiffness"], rel=0.001)
+        for name in ("open_at_pull", "open_at_push"):
+            assert found[name] == pytest.approx(elements[name], rel=0.03)
 
     @pytest.mark.slow
     def test_sections_of_higher_order_climb_to_them(self):
