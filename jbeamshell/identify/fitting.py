@@ -293,6 +293,10 @@ def _check_start(problem: Problem, space: SearchSpace) -> None:
         )
     data = start.jacobian[: start.prediction.size]
     for name, column in zip(space.names, data.T, strict=True):
+        if not np.all(np.isfinite(column)):
+            raise UnconvergedError(
+                f"free {name!r}: the response has no derivative at its start: start elsewhere"
+            )
         if not np.any(np.abs(column) > NO_INFLUENCE):
             raise InputError(
                 f"free {name!r}: the data do not depend on it at its start; leave it out"

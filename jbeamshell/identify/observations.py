@@ -33,7 +33,7 @@ from jbeamshell.measured.curves import (
     AmplitudeCurve,
     Backbone,
     DampingCurve,
-    ForcedResponse,
+    ForcedCurve,
     FrequencyCurve,
     SqueezeCurve,
     noise_of,
@@ -47,7 +47,7 @@ APPROACH = 8  # load steps from zero to the first point of a loop
 RUN_IN = 32  # approximate load steps of a closed loop's first, uncompared pass
 POSITION_ROUNDING = 1e-6  # distance over L by which tables may round a position off the strip
 UNSOLVED_RESIDUAL = 10.0  # residual over the range of a trial without equilibrium: never accepted
-MODAL: tuple[type[AmplitudeCurve], ...] = (FrequencyCurve, DampingCurve, ForcedResponse)
+MODAL: tuple[type[AmplitudeCurve], ...] = (FrequencyCurve, DampingCurve, ForcedCurve)
 NEGLIGIBLE = 1e-6  # least figure over the measured one, so that its logarithm exists
 
 
@@ -298,7 +298,7 @@ class ModalObservation(LogObservation):
         """Run of a curve; raises `InputError` if the model is no structure that vibrates so."""
         model = of_structures_alone(curve.label, scene)
         omega = np.zeros(curve.amplitude.size)
-        if isinstance(curve, ForcedResponse):
+        if isinstance(curve, ForcedCurve):
             require_point(curve.label, model)
             omega = 2.0 * np.pi * curve.frequency
         level, place = np.unique(curve.amplitude, return_inverse=True)

@@ -4,14 +4,14 @@
 `read_loops` reads the loops of a file unchanged.  `read_recordings` and `steady_loops` average the
 cycles of a noisy recording.  `jbeamshell.identify` compares a strip or a law with a `Loop`,
 `Backbone`, `DissipationCurve`, `StiffnessCurve` or `SqueezeCurve`, and a structure with a
-`FrequencyCurve`, `DampingCurve` or `ForcedResponse`.
+`FrequencyCurve`, `DampingCurve` or `ForcedCurve`.
 """
 
 from jbeamshell.measured.curve_files import read_curves as read_curves
 from jbeamshell.measured.curves import Backbone as Backbone
 from jbeamshell.measured.curves import DampingCurve as DampingCurve
 from jbeamshell.measured.curves import DissipationCurve as DissipationCurve
-from jbeamshell.measured.curves import ForcedResponse as ForcedResponse
+from jbeamshell.measured.curves import ForcedCurve as ForcedCurve
 from jbeamshell.measured.curves import FrequencyCurve as FrequencyCurve
 from jbeamshell.measured.curves import Measurement as Measurement
 from jbeamshell.measured.curves import SqueezeCurve as SqueezeCurve

@@ -304,7 +304,7 @@ class DampingCurve(AmplitudeCurve):
         self._hold(label, noise, weight, amplitude=amplitude, damping=damping)
 
 
-class ForcedResponse(AmplitudeCurve):
+class ForcedCurve(AmplitudeCurve):
     """Steady response of a structure to a harmonic force near the resonance of one mode.
 
     The model answers the force that a measured amplitude needs at its frequency: it is one number

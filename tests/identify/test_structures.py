@@ -10,7 +10,7 @@ from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.identify import Assembly, Parameter, fit, jointed
 from jbeamshell.identify.plan import plan_from_values
-from jbeamshell.measured import DampingCurve, ForcedResponse, FrequencyCurve, SqueezeCurve
+from jbeamshell.measured import DampingCurve, ForcedCurve, FrequencyCurve, SqueezeCurve
 
 SIZE = np.geomspace(0.02, 1.0, 16)
 FORCE = np.geomspace(0.02, 0.9, 12)
@@ -54,7 +54,7 @@ def forced(model, random, noise=0.02):
     q = SIZE / abs(shapes[0, 0])
     dynamic = curve.frequency**2 - omega**2 + 2j * curve.damping * curve.frequency * omega
     force = np.abs(dynamic * q / shapes[1, 0]) * (1.0 + noise * random.standard_normal(16))
-    return ForcedResponse(omega / (2.0 * np.pi), force, SIZE, noise=noise * force)
+    return ForcedCurve(omega / (2.0 * np.pi), force, SIZE, noise=noise * force)
 
 
 def test_planted_numbers_are_recovered_within_their_intervals():
@@ -158,7 +158,7 @@ def plain(**changed):
 
 SQUEEZE = SqueezeCurve(SIZE, -SIZE)
 DAMPING = DampingCurve([0.1, 0.2], [0.01, 0.02])
-FORCED = ForcedResponse([1.0, 1.1], [1.0, 1.0], [0.1, 0.2])
+FORCED = ForcedCurve([1.0, 1.1], [1.0, 1.0], [0.1, 0.2])
 REFUSED = {
     "strip": (lambda: fit(DAMPING, jb.Scene(), ["contact.friction"]), "Assembly"),
     "law": (lambda: fit(DAMPING, jb.laws.Iwan4(), ["iwan4.chi"]), "Assembly"),
@@ -178,7 +178,7 @@ REFUSED = {
     "beyond": (lambda: Assembly(build, numbers=START.numbers, point=7).structure(), "from 0 to 1"),
     "reach": (lambda: plain(reach=1.2), "reach = 1.2"),
     "joint": (lambda: plain(joint=[None]), "joint"),
-    "forces": (lambda: ForcedResponse([1.0], [1.0], [1.0, 2.0]), "amplitude has shape"),
+    "forces": (lambda: ForcedCurve([1.0], [1.0], [1.0, 2.0]), "amplitude has shape"),
     "band": (
         lambda: dynamics.ring_down(np.arange(9.0), np.ones(9), band=(0.1, 3.0)),
         "band = .*below 0.5",

@@ -66,14 +66,15 @@ def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, A
 
     A slider in series with compliance c_i and threshold F_i adds c_i (F - F_i) to the displacement
     at an amplitude F, and 4 c_i F_i (F - F_i) to the energy of a cycle.  The c_i >= 0 that are
-    nearest to both at all amplitudes, in relative squares, need no further condition.
+    nearest to both at all amplitudes, in relative squares, need no further condition.  Derivatives
+    take the amplitudes as fixed: they sample the backbone, and it is the same for others.
 
     Returns
     -------
     (k,) displacements and forces, the asymmetry of first loading, and the displacements (2, k) of
     pull and push in it; NaN where a traced scene has no equilibrium
     """
-    levels = force * jnp.asarray(AMPLITUDES)
+    levels = lax.stop_gradient(force) * jnp.asarray(AMPLITUDES)
     throw = not is_traced(scene, force, jnp.zeros(()))
     ways = (1.0, -1.0)
     sides = [way * solve(scene, way * levels, throw=throw).displacement for way in ways]
