@@ -63,7 +63,7 @@ def nonlinear_mode(
     >>> joint = Joint(displacement=[1.0, 3.0], force=[1.0, 2.0])
     >>> structure = Structure([[1.0]], [[0.0]], [Attachment(joint, 0)])
     >>> nonlinear_mode(structure, [0.5, 2.0]).frequency.round(2).tolist()
-    [1.0, 0.86]
+    [1.0, 0.87]
     """
     amplitude = setup.checked_rising("amplitudes", amplitudes, setup.AMPLITUDES)
     setup.check_mode(structure, mode)
