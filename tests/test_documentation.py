@@ -155,7 +155,6 @@ def test_examples_of_docstrings_run(path, tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """Folder of the built site."""
-    pytest.importorskip("sphinx", reason="the site is built where '.[docs]' is installed")
     folder = tmp_path_factory.mktemp("site")
     line = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", str(SITE), str(folder)]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
