@@ -107,12 +107,14 @@ def test_a_key_on_a_slider_moves_the_loop_within_a_tenth_of_a_second(page, recor
     friction = deep(page, ".noUi-handle")[1]
     friction.click()
     seen = []
-    while len(seen) < MOVES and sum(time < SOON for time in seen) < QUICK:
+    while len(seen) < MOVES and sum(each < SOON for each in seen) < QUICK:
+        time.sleep(0.3)  # until the move before is over
+        page.execute_script("moves.length = 0")
         before = page.execute_script(FORCE, "loop", "u")
         press(page, webdriver.Keys.ARROW_RIGHT)
-        until(lambda: len(page.execute_script("return moves")) > len(seen))  # noqa: B023
-        seen = page.execute_script("return moves")
-        assert page.execute_script(FORCE, "loop", "u") != before
+        until(lambda old=before: page.execute_script(FORCE, "loop", "u") != old)
+        until(lambda: page.execute_script("return moves"))
+        seen.append(page.execute_script("return moves")[-1])
     until(lambda: "computed in" in words(page))
     print(f"key to picture {np.round(seen)} ms; {words(page)}")
     record_property("milliseconds", min(seen))
@@ -120,7 +122,7 @@ def test_a_key_on_a_slider_moves_the_loop_within_a_tenth_of_a_second(page, recor
         pytest.skip(
             f"this machine has other work: the quickest of {len(seen)} took {min(seen):.0f} ms"
         )
-    assert sum(time < SOON for time in seen) >= QUICK
+    assert sum(each < SOON for each in seen) >= QUICK
 
 
 def test_a_load_beyond_gross_slip_is_one_line_and_reset_mends_it(page):
