@@ -195,7 +195,7 @@ def _steady(model: Reduced, balance: Balance, omegas: Array, differentiable: boo
             found = polished(model, balance, found, rows, whole)
         return jax.tree.map(lambda a: a[0], found)
 
-    return jax.vmap(one)(omegas)
+    return lax.map(one, omegas)
 
 
 @partial(jax.jit, static_argnums=1)

@@ -59,7 +59,8 @@ def reduced(structure: Structure, force: Any, mode: int = 0) -> tuple[Reduced, A
         projected = [jnp.asarray(basis.T @ (matrix @ basis)) for matrix in matrices]
     mass, damping, stiffness = projected
     unused = jnp.all(jnp.asarray(basis) == 0.0, axis=0)
-    stiffness = stiffness + jnp.diag(jnp.where(unused, 1.0, 0.0))
+    mass = mass + jnp.diag(jnp.where(unused, 1.0, 0.0))
+    stiffness = stiffness + jnp.diag(jnp.where(unused, jnp.max(stiffness), 0.0))
     elements: Any = [attached.joint for attached in structure.attachments]
     laws = laws_of(elements if traced else doubled(elements))
     drive = jnp.asarray(basis.T @ force)
