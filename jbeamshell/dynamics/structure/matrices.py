@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import TINY, as_leaf, is_traced, require, require_number
 from jbeamshell.dynamics.structure.joint import Joint
+from jbeamshell.dynamics.vibration.elements import CubicSpring
 
 SQUARE = "give a square matrix of numbers, dense or scipy sparse, as large as the mass matrix"
 SYMMETRIC = "must be symmetric; take (A + A.T)/2 if only rounding makes it unsymmetric"
@@ -36,7 +37,7 @@ class Attachment(NamedTuple):
     first, second : degrees of freedom, counted from 0; None is the ground
     """
 
-    joint: Joint
+    joint: Joint | CubicSpring
     first: int
     second: int | None = None
 

@@ -26,6 +26,7 @@ from jbeamshell.common.precision import in_double
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Structure
 
+SLIDING = "must be joints: take nonlinear_mode for cubic springs"
 AMPLITUDES = "give rising positive modal displacements"
 MAX_ITERATIONS = 100
 SUBSTEPS = 8  # load steps between two amplitudes
@@ -101,7 +102,10 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
         directions.T @ displacements[:, 1:],
         structure.modal_damping(shape, omega[mode], mode),
     )
-    backbones = tuple((a.joint.displacement, a.joint.force) for a in structure.attachments)
+    joints = [a.joint for a in structure.attachments if isinstance(a.joint, Joint)]
+    sliding = len(joints) == len(structure.attachments)
+    require("attachments", structure.attachments, sliding, SLIDING)
+    backbones = tuple((joint.displacement, joint.force) for joint in joints)
     curve, sound = _curve(backbones, statics, jnp.asarray(amplitude))
     if is_traced(curve):
         return jax.tree.map(lambda column: jnp.where(sound, column.T, jnp.nan).T, curve)

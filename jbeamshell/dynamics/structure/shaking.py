@@ -19,6 +19,7 @@ from jbeamshell.common.progress import watched
 from jbeamshell.dynamics.strip import rate_friction
 from jbeamshell.dynamics.strip.motion import doubts_of_balance, warn_of_doubts
 from jbeamshell.dynamics.structure.matrices import Structure, dense
+from jbeamshell.dynamics.vibration.elements import CubicSpring
 
 SOLVERS: dict[str, Callable[[], Any]] = {
     "kvaerno3": diffrax.Kvaerno3,
@@ -91,7 +92,8 @@ class _State(NamedTuple):
 class _Model(NamedTuple):
     """Matrices (n, n), directions (n, joints), and stiffness, limit and joint of s sliders.
 
-    The stiffness matrix has the springs that remain when all sliders slip.
+    ``cubic`` are the coefficients (joints,) of cubic springs.  The stiffness matrix has the springs
+    that remain when all sliders slip.
     """
 
     inverse_mass: Array
@@ -102,6 +104,7 @@ class _Model(NamedTuple):
     springs: Array
     limits: Array
     joint: Array
+    cubic: Array
 
 
 def shake(
@@ -198,7 +201,10 @@ def _model(structure: Structure, displacement: np.ndarray) -> tuple[_Model, Arra
         stiffness = stiffness + remaining * np.outer(directions[:, place], directions[:, place])
     spring, limit, index = np.array(springs), np.array(limits), np.array(joint, int)
     sliders = np.clip(spring * (directions.T @ displacement)[index], -limit, limit)
-    arrays = (np.linalg.inv(mass), mass, damping, stiffness, directions, spring, limit, index)
+    elements = [attached.joint for attached in structure.attachments]
+    cubic = np.array([float(e.cubic) if isinstance(e, CubicSpring) else 0.0 for e in elements])
+    sizes = (spring, limit, index, cubic)
+    arrays = (np.linalg.inv(mass), mass, damping, stiffness, directions, *sizes)
     return _Model(*map(jnp.asarray, arrays)), jnp.asarray(sliders)
 
 
@@ -219,11 +225,13 @@ def _run(
 
     def rates(time: Any, y: _State) -> _State:
         speed = (model.directions.T @ y.v)[model.joint]
+        stiffening = model.cubic * (model.directions.T @ y.x) ** 3
         slider_rates = rate_friction.traction_rate(
             y.sliders, speed, model.limits, model.springs, jnp.asarray(smoothing), floor
         )
         external = jnp.zeros_like(y.x) if force is None else force(time)
-        joints = model.directions @ jax.ops.segment_sum(y.sliders, model.joint, count)
+        sliding = jax.ops.segment_sum(y.sliders, model.joint, count)
+        joints = model.directions @ (sliding + stiffening)
         damping = model.damping @ y.v
         acceleration = model.inverse_mass @ (external - model.stiffness @ y.x - damping - joints)
         friction_power = jnp.sum(y.sliders * (speed - slider_rates / springs))
@@ -254,7 +262,8 @@ def _run(
     y = jax.tree.map(lambda a: jnp.where(jnp.isfinite(a), a, jnp.nan), y)
     kinetic = 0.5 * jnp.einsum("ti,ij,tj->t", y.v, model.mass, y.v)
     sliders = 0.5 * jnp.sum(y.sliders**2 / springs, axis=1)
-    stored = 0.5 * jnp.einsum("ti,ij,tj->t", y.x, model.stiffness, y.x) + sliders
+    stretched = 0.25 * jnp.sum(model.cubic * (y.x @ model.directions) ** 4, axis=1)
+    stored = 0.5 * jnp.einsum("ti,ij,tj->t", y.x, model.stiffness, y.x) + sliders + stretched
     complete = (solution.result == diffrax.RESULTS.successful) & jnp.all(jnp.isfinite(kinetic))
     external, friction, damping = y.work.T
     return StructureMotion(times, y.x, y.v, kinetic, stored, external, friction, damping, complete)

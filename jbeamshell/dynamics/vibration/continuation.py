@@ -15,6 +15,7 @@ SPAN = 0.2  # part of the range that counts as much as the size of the motion
 LEAST_STEP = 1e-7
 WIDEST = 2.0  # distance of two points, over the step that was wanted
 STRAIGHT = 0.8  # least cosine of the angle between two tangents
+CORNER = 0.01  # step below which they may have any angle: a slider's first slip makes a corner
 GROWTH = 1.4  # of the step after each success
 MOST_POINTS = 3000
 BISECTIONS = 30
@@ -115,10 +116,8 @@ def follow(
         found, new_way, distance = path.stepped(at, way, step)
         size = float(np.linalg.norm(found.point.x))
         near = bool(found.converged) and distance < WIDEST * step
-        if (
-            not near
-            or path.inner(way, new_way, size) < STRAIGHT * path.inner(way, way, size) ** 0.5
-        ):
+        turn = path.inner(way, new_way, size) / path.inner(way, way, size) ** 0.5
+        if not near or (turn < STRAIGHT and step > CORNER):
             step *= 0.5
             if step < LEAST_STEP:
                 return Curve(points, folds, "no step is small enough for Newton's method")

@@ -40,6 +40,16 @@ class CubicSpring(eqx.Module):
         self.cubic = as_leaf(cubic, "spring.cubic")
         require_number("spring.stiffness", self.stiffness, "must not be negative", low=-TINY)
 
+    @property
+    def springs(self) -> Array:
+        """Stiffness (1,) of the spring that remains without sliders."""
+        return self.stiffness[None]
+
+    @property
+    def limits(self) -> Array:
+        """Forces (0,) at which sliders slip; none."""
+        return jnp.zeros(0)
+
     def backbone(self, u: ArrayLike) -> Array:
         """Force; any shape."""
         size = jnp.asarray(u)
@@ -81,9 +91,7 @@ def laws_of(elements: list[Joint | CubicSpring]) -> Laws:
 
 def _row(element: Joint | CubicSpring) -> tuple[Array, Array, Array, Array, Array]:
     """Springs and limits of the sliders, stuck stiffness, remaining spring, cubic coefficient."""
-    if isinstance(element, CubicSpring):
-        none = jnp.zeros(0)
-        return none, none, element.stiffness, element.stiffness, element.cubic
+    cubic = element.cubic if isinstance(element, CubicSpring) else jnp.zeros(())
     springs = element.springs
     # Their sum, not the first slope, so that r = f - k u is zero where nothing slips.
-    return springs[:-1], element.limits, jnp.sum(springs), springs[-1], jnp.zeros(())
+    return springs[:-1], element.limits, jnp.sum(springs), springs[-1], cubic

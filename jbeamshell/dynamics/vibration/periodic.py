@@ -9,7 +9,8 @@ sum of samples differs there from the integral by (Euler-Maclaurin)
 
     integral - h sum = J h^2 B_2(theta)/2,     B_2 = theta^2 - theta + 1/6,
 
-which is added to the two samples; harmonics are then exact to the third order in h.
+which is added to the two samples; harmonics are then exact to the third order in h.  It fades out
+at turning points, so that forces are continuous in the motion.
 """
 
 from __future__ import annotations
@@ -82,14 +83,18 @@ def _lost(wave: Wave, law: Laws, u: Array, rate: Array) -> Array:
     elastic = law.cubic * u**3
     if not law.springs.size:
         return elastic
-    before = jnp.roll(u, 1).at[0].multiply(wave.sign)
-    slope = wave.step * jnp.roll(rate, 1).at[0].multiply(wave.sign)
-    turning, turns = _turning_points(before, u, slope, wave.step * rate)
-    return elastic + jnp.sum(_slid(law, u, before, turning, turns, wave), axis=0)
+    return elastic + jnp.sum(_slid(law, u, wave.step * rate, wave.sign), axis=0)
 
 
-def _turning_points(u0: Array, u1: Array, m0: Array, m1: Array) -> tuple[Array, Array]:
-    """Extreme values between samples, their ends where there is none, and where there is one.
+def _shifted(values: Array, places: int, sign: float) -> Array:
+    """Values (..., P) at samples so many places before, or after if negative."""
+    moved = jnp.roll(values, places, axis=-1)
+    wrapped = slice(None, places) if places > 0 else slice(places, None)
+    return moved.at[..., wrapped].multiply(sign)
+
+
+def _turning_points(u0: Array, u1: Array, m0: Array, m1: Array) -> Array:
+    """Extreme values between samples; their ends where there is none.
 
     Values and slopes per interval at both ends of an interval make a cubic.
     """
@@ -100,29 +105,52 @@ def _turning_points(u0: Array, u1: Array, m0: Array, m1: Array) -> tuple[Array, 
     below = jnp.where(turns, -b + jnp.sign(m0) * root, 1.0)
     t = lax.stop_gradient(2.0 * m0 / jnp.where(below == 0.0, 1.0, below))  # flat there
     extreme = u0 + t * (m0 + t * (0.5 * b + t * a / 3.0))
-    return jnp.where(turns, extreme, u1), turns
+    return jnp.where(turns, extreme, u1)
 
 
-def _slid(law: Laws, u: Array, before: Array, turning: Array, turns: Array, wave: Wave) -> Array:
-    """Forces (s, P) that sliders lose by slip, with the corrections of their kinks."""
+def _slid(law: Laws, u: Array, slope: Array, sign: float) -> Array:
+    """Forces (s, P) that sliders lose by slip, with the corrections of their kinks.
+
+    ``slope`` (P,) is the derivative of u per interval.
+    """
     spring, limit = law.springs[:, None], law.limits[:, None]
+    before, slope_before = _shifted(u, 1, sign), _shifted(slope, 1, sign)
+    turning = _turning_points(before, u, slope_before, slope)
     points = jnp.stack([turning, u], axis=1).ravel()  # (2P,)
     steps = points - jnp.concatenate([before[:1], points[:-1]])
     slips, side, ref, carry = lax.stop_gradient(
-        _history(law.springs, law.limits, before[0], steps, wave.sign)
+        _history(law.springs, law.limits, before[0], steps, sign)
     )
     # Force since the last slip, which may have been in the cycle before.
     since = limit * side + spring * (points - carry * points[ref])
-    force = jnp.where(carry == 0.0, spring * points, since)
-    at_sample, at_start = force[:, 1::2], jnp.roll(force[:, 1::2], 1, axis=1)
-    at_start = at_start.at[:, 0].multiply(wave.sign)
-    # Onset of slip within an interval without a turning point.
+    at_sample = jnp.where(carry == 0.0, spring * points, since)[:, 1::2]
+    # Onset of slip within an interval.
     way, rise = jnp.sign(u - before), spring * (u - before)
-    part = (way * limit - at_start) / jnp.where(rise == 0.0, 1.0, rise)
-    onset = slips[:, 0::2] & ~turns & (part > 0.0) & (part < 1.0)
-    jump = jnp.where(onset, -0.5 * rise * (part * (part - 1.0) + 1.0 / 6.0), 0.0)
-    at_first = jnp.roll((1.0 - part) * jump, -1, axis=1).at[:, -1].multiply(wave.sign)
-    return at_sample + part * jump + at_first - spring * u
+    part = (way * limit - _shifted(at_sample, 1, sign)) / jnp.where(rise == 0.0, 1.0, rise)
+    onset = slips[:, 0::2] & (part > 0.0) & (part < 1.0)
+    first, last = _weights(slope, way, sign)
+    kink = spring * (slope_before + part * (slope - slope_before))
+    kink *= first + part * (last - first)
+    jump = jnp.where(onset, -0.5 * kink * (part * (part - 1.0) + 1.0 / 6.0), 0.0)
+    return at_sample + part * jump + _shifted((1.0 - part) * jump, -1, sign) - spring * u
+
+
+def _weights(slope: Array, way: Array, sign: float) -> tuple[Array, Array]:
+    """Weights (P,) of corrections at both ends of intervals in which u goes one way.
+
+    They fall from 1 to 0 within two samples of a turning point, where the kinks are small.  So the
+    forces are continuous when an onset or a turning point passes from one interval to the next, and
+    Newton's method finds the onset of slip.
+    """
+    slopes = [_shifted(slope, places, sign) for places in (2, 1)]
+    slopes += [slope, _shifted(slope, -1, sign)]
+    rates = [jnp.maximum(way * each, 0.0) for each in slopes]
+
+    def weight(before: Array, here: Array, after: Array) -> Array:
+        least = 2.0 * jnp.minimum(before, after)
+        return jnp.minimum(least / jnp.where(here > 0.0, here, 1.0), 1.0)
+
+    return weight(*rates[:3]), weight(*rates[1:])
 
 
 def _history(
