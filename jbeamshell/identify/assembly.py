@@ -165,11 +165,11 @@ class _Plain(eqx.Module):
     stiffness: Array
     ends: tuple[int, int | None] = eqx.field(static=True)
     reach: float = eqx.field(static=True)
-    force: float | None = eqx.field(static=True)  # None follows gross slip
 
     def __call__(self, scene: Scene | None, numbers: Mapping[str, Array]) -> Structure:
         assert scene is not None
-        force = self.reach * gross_slip(scene) if self.force is None else self.force
+        forced = scene.load.kind == "force"
+        force = self.reach * gross_slip(scene) if forced else scene.load.amplitude
         joint = Joint.of(scene, force, width=numbers["width"])
         if "series_stiffness" in numbers:
             joint = joint.in_series(numbers["series_stiffness"])
@@ -209,8 +209,8 @@ def jointed(
     width : width of the strip
     damping_ratio : of all modes, besides that of the joint
     series_stiffness : stiffness of a spring in series with the joint; None is rigid
-    reach : force up to which the joint is computed, over its gross slip; of a lap joint over that
-        at the start.  A moment is the scene's own
+    reach : force up to which the joint is computed, over its gross slip; a moment is the scene's
+        own
     mode, point, driven : see `Assembly`
 
     Raises
@@ -234,11 +234,6 @@ def jointed(
     numbers = {"mass": 1.0, "stiffness": 1.0, "width": width, "damping_ratio": damping_ratio}
     if series_stiffness is not None:
         numbers["series_stiffness"] = series_stiffness
-    force: float | None = None
-    if scene.load.kind == "moment":
-        force = float(scene.load.amplitude)
-    elif scene.member.support != "none":
-        force = reach * float(gross_slip(scene))
     matrices = as_leaf(mass, "mass"), as_leaf(stiffness, "stiffness")
-    plain = _Plain(*matrices, (first, second), float(reach), force)
+    plain = _Plain(*matrices, (first, second), float(reach))
     return Assembly(plain, scene, numbers, mode=mode, point=point, driven=driven)

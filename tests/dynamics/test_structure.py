@@ -103,7 +103,8 @@ class TestJoint:
 
         @jax.jit
         def loss(mu):
-            joint = Joint.of(scene.replace({"contact.friction": mu}), 0.8)
+            force = 0.8 * mu / scene.contact.friction
+            joint = Joint.of(scene.replace({"contact.friction": mu}), force)
             return joint.dissipation(u) / plain.dissipation(u)
 
         mu = float(scene.contact.friction)

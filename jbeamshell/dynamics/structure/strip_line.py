@@ -20,6 +20,7 @@ from jbeamshell.scene.scene import Scene
 # Amplitudes of steady cycles, over the largest
 AMPLITUDES = np.append(np.geomspace(0.05, 0.4, 16), np.linspace(0.4, 1.0, 17)[1:])
 LEAST = 1e-7  # energy of a cycle that matters, over F u
+ROUNDING = 10.0  # slope of the squares below which another entry is not tried, over rounding
 BELOW = 1.0 - 1e-6  # thresholds nearer to the largest force are left out
 
 
@@ -41,7 +42,8 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array,
     sides = jax.vmap(lambda way: network.sliders(network.rest, way))(ways)
     levels = jnp.mean(sides.force, axis=0)[1:]
     below = levels < BELOW * force
-    count, last = jnp.sum(below), jnp.max(jnp.where(below, levels, 0.0), initial=0.0)
+    count = jnp.sum(below)
+    last = jnp.where(count > 0, levels[jnp.maximum(count - 1, 0)], 0.0)
     number = jnp.arange(levels.size)
     part = (number + 1 - count) / (levels.size + 1 - count)
 
@@ -66,15 +68,14 @@ def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, A
 
     A slider in series with compliance c_i and threshold F_i adds c_i (F - F_i) to the displacement
     at an amplitude F, and 4 c_i F_i (F - F_i) to the energy of a cycle.  The c_i >= 0 that are
-    nearest to both at all amplitudes, in relative squares, need no further condition.  Derivatives
-    take the amplitudes as fixed: they sample the backbone, and it is the same for others.
+    nearest to both at all amplitudes, in relative squares, need no further condition.
 
     Returns
     -------
     (k,) displacements and forces, the asymmetry of first loading, and the displacements (2, k) of
     pull and push in it; NaN where a traced scene has no equilibrium
     """
-    levels = lax.stop_gradient(force) * jnp.asarray(AMPLITUDES)
+    levels = force * jnp.asarray(AMPLITUDES)
     throw = not is_traced(scene, force, jnp.zeros(()))
     ways = (1.0, -1.0)
     sides = [way * solve(scene, way * levels, throw=throw).displacement for way in ways]
@@ -85,7 +86,8 @@ def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, A
     thresholds = jnp.append(0.0, levels[:-1])
     beyond = jnp.maximum(levels[:, None] - thresholds, 0.0)
     rows = jnp.vstack([beyond / u[:, None], 4.0 * thresholds * beyond / d[:, None]])
-    scale = jnp.max(rows, axis=0)
+    # Compiled twice, a largest number may differ by rounding from all, and its derivative is NaN.
+    scale = lax.stop_gradient(jnp.max(rows, axis=0))
     parts = not_negative(rows / scale, jnp.append(jnp.ones(u.size), loss / d))
     return beyond @ (parts / scale), width * levels, mean_of(*sides)[1], jnp.stack(sides)
 
@@ -98,23 +100,61 @@ def not_negative(matrix: Array, target: Array) -> Array:
     matrix : (rows, k) of full rank
     target : (rows,)
     """
-    count, given = matrix.shape[1], map(lax.stop_gradient, (matrix, target))
-    shape = jax.ShapeDtypeStruct((count,), bool)
-    active = jax.pure_callback(_active, shape, *given, vmap_method="sequential")
+    fixed, wanted = lax.stop_gradient((matrix, target))
+    active = _active if is_traced(matrix, target, jnp.zeros(())) else _active_once
+    return _among(matrix, target, active(fixed, wanted))
+
+
+def _among(matrix: Array, target: Array, active: Array) -> Array:
+    """Least-squares solution (k,) whose other entries than the active ones are zero."""
+    count = matrix.shape[1]
     # The others are zero, each by a row of its own, so that the factorisation keeps its rank.
     whole = jnp.vstack([jnp.where(active, matrix, 0.0), jnp.diag(jnp.where(active, 0.0, 1.0))])
     q, r = jnp.linalg.qr(whole)
     return jax.scipy.linalg.solve_triangular(r, q.T @ jnp.append(target, jnp.zeros(count)))
 
 
-def _active(matrix: Any, target: Any) -> NDArray[np.bool_]:
-    """True for the positive entries of the solution, by Lawson and Hanson's method."""
-    from scipy.optimize import nnls  # slow to import
+def _active(matrix: Array, target: Array) -> Array:
+    """True for the positive entries (k,) of the solution, by Lawson and Hanson's method (1974)."""
+    count = matrix.shape[1]
+    least = ROUNDING * jnp.finfo(matrix.dtype).eps * jnp.linalg.norm(target)
+    State = tuple[Array, Array, Array]
 
-    rows, wanted = np.asarray(matrix, float), np.asarray(target, float)
-    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(wanted))):
-        return np.ones(rows.shape[1], bool)
-    return np.asarray(nnls(rows, wanted)[0] > 0.0)
+    def pull(x: Array) -> Array:
+        return matrix.T @ (target - matrix @ x)
+
+    def open_(state: State) -> Array:
+        x, active, turn = state
+        wanted = jnp.any(jnp.where(active, 0.0, pull(x)) > least)
+        return wanted & (turn < 3 * count)
+
+    def more(state: State) -> State:
+        x, active, turn = state
+        active = active.at[jnp.argmax(jnp.where(active, -jnp.inf, pull(x)))].set(True)
+
+        def negative(inner: State) -> Array:
+            _, active, s = inner
+            return jnp.any(active & (s <= 0.0))
+
+        def less(inner: State) -> State:
+            x, active, s = inner
+            out = active & (s <= 0.0)
+            parts = jnp.where(out, x / jnp.where(out, x - s, 1.0), jnp.inf)
+            part = jnp.min(parts)
+            x = x + part * (s - x)
+            active = active & ~(out & (parts <= part))
+            x = jnp.where(active, x, 0.0)
+            return x, active, _among(matrix, target, active)
+
+        begin = x, active, _among(matrix, target, active)
+        _, active, x = lax.while_loop(negative, less, begin)
+        return x, active, turn + 1
+
+    start = jnp.zeros(count, matrix.dtype), jnp.zeros(count, bool), jnp.zeros((), int)
+    return lax.while_loop(open_, more, start)[1]
+
+
+_active_once = jax.jit(_active)
 
 
 def walked_forces(scene: Scene, path: NDArray[np.float64]) -> Array:
