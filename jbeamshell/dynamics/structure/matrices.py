@@ -206,10 +206,12 @@ class Structure:
         stable = _is_positive(self.stuck_stiffness, SYMMETRY_ROUNDING)
         fix = "has a negative mode with all joints stuck: the structure is unstable"
         require("stiffness", self.stiffness.shape, stable, fix)
-        frequency, _ = self.modes(1)
+        frequency, shapes = self.modes(1)
         scale = float(abs(self.stuck_stiffness).max() / abs(self.mass).max())
         held = frequency[0] ** 2 > SYMMETRY_ROUNDING * scale
-        fix = "leaves a rigid mode: hold the structure by a spring or a joint"
+        most = int(np.argmax(abs(shapes[:, 0])))
+        fix = f"leaves a rigid mode, in which degree of freedom {most} moves most: hold the "
+        fix += "structure by a spring or a joint"
         require("stiffness", self.stiffness.shape, held, fix)
 
 
