@@ -13,7 +13,7 @@ U = np.geomspace(0.05, 4.0, 8)
 SPRING = np.array([[3.0, -3.0], [-3.0, 3.0]])
 FORCE = 0.3
 CASES = 20
-FOLDED = 3
+FOLDED = (0, 1, 2, 7, 10, 13)  # seeds; of the last three points lie close to a fold
 STEPS = 400  # of a period
 
 
@@ -98,7 +98,7 @@ def integrated(structure, force, response, points, periods):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(FOLDED))
+@pytest.mark.parametrize("seed", FOLDED)
 def test_folds_part_stable_from_unstable(seed):
     structure, force = random_structure(seed)
     first = structure.modes(1)[0][0]

@@ -267,6 +267,7 @@ def _response(
     found: Found = jax.tree.map(lambda *rows: np.stack(rows), *curve.points)
     directions = np.asarray(model.directions)
     omega, u = found.point.p[:, OMEGA], found.point.x @ directions
+    folds = np.array(curve.folds, int)
     return ForcedResponse(
         frequency=np.asarray(omega),
         level=np.asarray(found.point.p[:, LEVEL]),
@@ -276,7 +277,7 @@ def _response(
         place=place,
         joints=np.max(np.abs(over_a_cycle(u, balance.harmonics)), axis=1),
         dissipation=np.asarray(setup.dissipation(found, directions, balance.harmonics)),
-        stable=are_stable(model, balance, found.point),
-        folds=np.array(curve.folds, int),
+        stable=are_stable(model, balance, found.point, folds),
+        folds=folds,
         truncation=np.asarray(left_out(model, balance, omega, u, found.lost)),
     )

@@ -10,7 +10,8 @@ does not grow.  Every steady motion of such a structure is stable, the only one 
 its response curve has no folds.  Cubic springs have folds.  Small deviations
 exp(s t) sum_k p_k exp(i k omega t) then satisfy an eigenvalue problem in s (von Groll & Ewins
 2001); s with a positive real part is unstable.  The force of sliders in a deviation is that of a
-periodic one, which is exact at folds, s = 0.
+periodic one, which is exact at folds, s = 0.  One real s changes its sign at each fold, so that
+beyond an odd number of them a curve that began stable is unstable.
 """
 
 from __future__ import annotations
@@ -33,12 +34,17 @@ MORE = 2  # harmonics of deviations beyond those of the motion
 MARGIN = 1e-7  # growth that counts, over the frequency
 
 
-def are_stable(model: Reduced, balance: Balance, points: Point) -> NDArray[np.bool_]:
-    """True where small deviations from the points (k, ...) do not grow, (k,)."""
+def are_stable(
+    model: Reduced, balance: Balance, points: Point, folds: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """True where small deviations from the points (k, ...) of a curve do not grow, (k,)."""
+    count = points.p.shape[0]
     if not np.any(np.asarray(model.laws.cubic)):
-        return np.ones(points.p.shape[0], bool)
+        return np.ones(count, bool)
     growth = np.array([_growth(a) for a in np.asarray(_matrices(model, balance, points))])
-    return growth <= MARGIN
+    stable = growth <= MARGIN
+    passed = np.searchsorted(folds, np.arange(count))
+    return stable & ~(stable[0] & (passed % 2 == 1))
 
 
 @partial(jax.jit, static_argnums=1)
