@@ -249,12 +249,15 @@ def moments(amplitude, **values):
 
 
 class TestMoments:
-    @pytest.mark.parametrize("rung", ["squeeze", "p3", "plane"])
+    @pytest.mark.parametrize(
+        "rung", ["squeeze", *(pytest.param(r, marks=pytest.mark.slow) for r in ("p3", "plane"))]
+    )
     def test_an_arm_adds_the_rotation_of_the_end(self, rung):
         scene = library.single_lap().replace({"model.rung": rung, "model.nodes": 25})
+        of_body = jax.jit(lambda scene: strip.condensed(scene, 25).body.c)
 
         def compliance(values):
-            return float(strip.condensed(scene.replace(values), 25).body.c)
+            return float(of_body(scene.replace(values)))
 
         middle, above, below = (compliance({"load.arm": arm}) for arm in (0.0, 0.1, -0.1))
         turning = compliance({"load.kind": "moment", "load.amplitude": 1.0})

@@ -115,6 +115,7 @@ class TestJoint:
             float(loss(mu + h) - loss(mu - h)) / (2.0 * h), rel=1e-4
         )
 
+    @pytest.mark.slow
     def test_a_bar_of_load_steps_has_goodmans_energy(self):
         bar = STRIP.replace({"model.rung": "stepwise-bar", "model.nodes": 101})
         joint = Joint.of(bar, 1.2)

@@ -28,15 +28,6 @@ def test_the_record_holds_no_silent_failure(kind):
         assert (worst > 0.02) == row["outcome"].startswith("wrong")
 
 
-def test_readme_says_what_was_recorded():
-    ends = [row["outcome"] for kind in RECORD.values() for row in kind["scenes"]]
-    vain = ends.count("right, but doubted")
-    text = " ".join((CALIBRATION.parent / "README.md").read_text(encoding="utf-8").split())
-    assert f"Of {len(ends)} random scenes of unusual kinds" in text
-    assert f"{sum(end.startswith('wrong') for end in ends)} are off by more than 2 % in D" in text
-    assert f"doubted, and so are {vain} that are right" in text
-
-
 @pytest.mark.parametrize("kind", list(RECORD))
 def test_the_scenes_of_the_record_are_drawn_again(kind, script):
     make, _ = script.KINDS[kind]

@@ -1,4 +1,4 @@
-"""Record of the study of four parameters: README's figures, and its charts."""
+"""Record of the study of four parameters: figures of its page, and its charts."""
 
 import json
 import re
@@ -20,10 +20,10 @@ def errors(patch, name):
     return np.median(pairs[:, 0]), np.max(pairs[:, 1])
 
 
-def test_the_readme_has_the_figures_of_the_record():
-    readme = (ROOT / "README.md").read_text("utf-8")
+def test_the_page_has_the_figures_of_the_record():
+    page = (ROOT / "notebooks" / "pages" / "drawing.md").read_text("utf-8")
     for words, patch in (("single lap, one bolt", "single lap"), ("middle half of", "middle")):
-        row = next(line for line in readme.splitlines() if line.startswith(f"| {words}"))
+        row = next(line for line in page.splitlines() if line.startswith(f"| {words}"))
         told = [float(number) / 100.0 for number in re.findall(r"(\d+) %", row)]
         found = [*errors(patch, "fitted_errors")]
         if patch == "middle":
