@@ -28,6 +28,7 @@ PER_CENT = "(model - data) / range  [%]"
 LOG_PER_CENT = r"$\ln$(model / data)  [%]"
 BAND = 0.95
 FEW = 30  # points that are drawn as larger dots
+MOST_NAMED = 6  # measurements whose names fit into a panel
 
 
 def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
@@ -50,7 +51,7 @@ def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
         for form, places, panel in drawn:
             for place, look in zip(places, looks(len(places)), strict=True):
                 data, model = fit.data[place], fit.model[place]
-                panel.plot(*_xy(form, model), **look, label=f"model, {data.label}")
+                panel.plot(*_xy(form, model), **look, label=_name(places, place, data.label))
                 first = "data" if place == places[0] else "_nolegend_"
                 x, y = _xy(form, data)
                 size = {"markersize": 5.0} if x.size < FEW else {}
@@ -63,7 +64,7 @@ def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
             panel.set(xscale=form.scale, yscale=form.scale)
             if form.scale == "log":
                 mark_decades(panel.xaxis, panel.yaxis)
-            panel.legend(loc="best")
+            panel.legend(loc="best").set_in_layout(False)  # however long the names are
     return [panel for _, _, panel in drawn]
 
 
@@ -91,15 +92,24 @@ def residuals(fit: ModelOverData, axes: Any = None) -> list[Axes]:
                 places, colours(len(places)), cycle(MARKS), strict=False
             ):
                 data = fit.data[place]
-                look = {"color": colour, "label": data.label, "markersize": 3.0}
+                named = data.label if len(places) <= MOST_NAMED else "_nolegend_"
+                look = {"color": colour, "label": named, "markersize": 3.0}
                 panel.plot(getattr(data, along), 100.0 * left[place], mark, **look)
             panel.axhline(0.0, color=FAINT, linewidth=1.0, zorder=1.0)
             panel.set(xlabel=form.columns[along].label, xscale=form.scale)
             if form.scale == "log":
                 mark_decades(panel.xaxis)
             panel.set(ylabel=LOG_PER_CENT if form.scale == "log" else PER_CENT)
-            panel.legend(loc="best")
+            if len(places) <= MOST_NAMED:
+                panel.legend(loc="best").set_in_layout(False)
     return [panel for _, _, panel in drawn]
+
+
+def _name(places: Sequence[int], place: int, label: str) -> str:
+    """Label of a model's line; of many lines only the first has one."""
+    if len(places) <= MOST_NAMED:
+        return f"model, {label}"
+    return f"model of {len(places)} measurements" if place == places[0] else "_nolegend_"
 
 
 def _xy(form: Form, measurement: Any) -> tuple[np.ndarray, np.ndarray]:
