@@ -11,11 +11,6 @@ import jbeamshell
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
-LONG = tuple(f"{number:02d}_" for number in range(2, 13))  # half a minute or more each
-RUNS = [
-    pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * path.stem.startswith(LONG))
-    for path in NOTEBOOKS
-]
 
 
 def code_cells(notebook):
@@ -26,7 +21,8 @@ def test_there_are_notebooks():
     assert NOTEBOOKS
 
 
-@pytest.mark.parametrize("path", RUNS)
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs(path, monkeypatch):
     places = [str(Path(jbeamshell.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, places)))

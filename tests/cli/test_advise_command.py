@@ -55,6 +55,7 @@ def test_none_of_these(cli):
     assert err.startswith("jbeamshell: tolerance = 0.05: none of these: use finite elements")
 
 
+@pytest.mark.slow
 def test_run_takes_the_model_advised(cli):
     code, out, _ = cli("run", "--tol", "0.2", "--json", "--set", "strip.height_ratio=0.02")
     told = json.loads(out)

@@ -342,6 +342,7 @@ def test_bad_input_is_one_clear_line(name):
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.slow
 def test_an_interrupted_motion_keeps_the_part_computed():
     strip = scene(model__nodes=11)
     common = {"released": 0.5, "samples": 101, "attached": dynamics.AttachedMasses(heavy(strip))}

@@ -89,6 +89,7 @@ def test_the_band_is_the_stiffness_that_derivatives_say():
         np.testing.assert_allclose(found, force, rtol=0.0, atol=1e-12 * float(np.abs(force).max()))
 
 
+@pytest.mark.slow
 def test_lanes_side_by_side_answer_as_one_by_one():
     """Also for numbers that no lane varies, and lanes that need different numbers of guesses."""
     keys = ("load.amplitude", "strip.height_ratio")
