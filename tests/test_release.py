@@ -1,4 +1,4 @@
-"""What is released: one version, and a wheel that works alone in a bare environment."""
+"""Release: one version, and a wheel that works alone in a bare environment."""
 
 import os
 import re

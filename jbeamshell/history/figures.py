@@ -18,6 +18,7 @@ UNITS = {  # of the figures that are no pure numbers, in words
     "squeeze_stress_max": "stress",
     "curvature": "1/length",
 }
+TURNED_UNITS = {"peak_displacement": "rad", "secant_stiffness": "force"}  # under a moment
 
 
 class CycleFigures(Record, LoopFigures):

@@ -13,7 +13,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
-from jbeamshell.history.figures import UNITS, CycleFigures
+from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
 from jbeamshell.history.profiles import Profiles
 from jbeamshell.history.reliability import doubts_of_run
 from jbeamshell.history.saved import write_history
@@ -78,7 +78,9 @@ class History(Profiles, ContactLine, CycleFigures):
             worst status, and the doubts.
         """
         worst = Status(int(np.max(np.asarray(self.status))))
-        names = (*(FIGURES if self.cycles else ()), *self._contact_figures)
+        turned = self.scene.load.kind == "moment"  # which no bar can be
+        of_cycle = [name for name in FIGURES if not (turned and name == "dissipation_ratio")]
+        names = (*(of_cycle if self.cycles else ()), *self._contact_figures)
         values = {name: float(value) for name, value in _last_values(self, names).items()}
         figures: dict[str, Any] = {k: v if np.isfinite(v) else None for k, v in values.items()}
         figures["newton_iterations"] = int(np.sum(np.asarray(self.iterations)))
@@ -113,10 +115,12 @@ class History(Profiles, ContactLine, CycleFigures):
         chosen = choice.in_words(self.scene)
         figures = self.figures()
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
+        turned = self.scene.load.kind == "moment"
+        units = UNITS | TURNED_UNITS if turned else UNITS
         rows = [
             (
                 name.replace("_", " "),
-                in_words(value) + (f"  [{UNITS[name]}]" if name in UNITS else ""),
+                in_words(value) + (f"  [{units[name]}]" if name in units else ""),
             )
             for name, value in figures.items()
         ]

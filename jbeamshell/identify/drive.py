@@ -1,4 +1,4 @@
-"""What drives a law of a joint or a structure in place of a strip's load."""
+"""Drive of a law of a joint or a structure, in place of a strip's load."""
 
 from __future__ import annotations
 

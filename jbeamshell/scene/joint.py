@@ -44,6 +44,11 @@ def check_joint(scene: Parts) -> None:
     fix = "needs contact.bearing_stiffness"
     bears = contact.clearance is None or contact.bearing_stiffness is not None
     require("contact.clearance", contact.clearance, bears, fix)
+    if contact.holes is not None and not is_traced(strip.length):
+        edges, length = np.asarray(contact.hole_edges), float(strip.length)
+        fix = f"lies off the overlap, X from 0 to {length:g}: move it or narrow it"
+        inside = bool(np.all(edges >= 0.0) and np.all(edges <= length))
+        require("contact.holes", contact.holes, inside, fix)
     load = scene.load
     fix = "is for a force: leave it out with load.kind = moment"
     require("load.arm", load.arm, load.arm is None or load.kind == "force", fix)

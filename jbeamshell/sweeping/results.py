@@ -16,6 +16,7 @@ from jbeamshell.common.checks import require_choice
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
 from jbeamshell.common.summary import Summary
+from jbeamshell.history.figures import TURNED_UNITS
 from jbeamshell.history.reliability import TOLERANCE
 from jbeamshell.scene.keys import unit_of
 from jbeamshell.scene.load_path import check
@@ -161,8 +162,9 @@ class Sweep:
         """
         xarray, load = _library("xarray"), self.scene.load
         dims = ["lane"] if self.paired else list(self.axes)
+        units = UNITS | (TURNED_UNITS if load.kind == "moment" else {})
         variables: dict[str, Any] = {
-            name: (dims, values, {"units": UNITS[name]} if name in UNITS else {})
+            name: (dims, values, {"units": units[name]} if name in units else {})
             for name, values in self.values.items()
         }
         words = " ".join(outcome.name.lower() for outcome in Outcome)

@@ -141,6 +141,8 @@ def _lanes_of(
 ) -> tuple[tuple[str, ...], Lanes]:
     """Names of the figures, and lanes with the settings that serve all of them."""
     names = (figures,) if isinstance(figures, str) else figures
+    if names is FIGURES and isinstance(scene, Scene) and scene.load.kind == "moment":
+        names = tuple(name for name in FIGURES if name != "dissipation_ratio")  # no bar beside it
     check_words("figures", names)
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     lanes = lanes_of(scene, over, paired)

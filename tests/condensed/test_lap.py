@@ -234,6 +234,7 @@ class TestHoles:
             ({"contact.holes": [[1.0, -0.1]]}, "must be positive"),
             ({"contact.holes": [[1.0, 0.2], [1.1, 0.2]]}, "overlap"),
             ({"contact.holes": [1.0, 0.2]}, "give rows"),
+            ({"contact.holes": [[2.5, 0.2]], "contact.pressure": 10.0}, "off the overlap"),
             ({"contact.clearance": 1e-4}, "contact.clearance = .* needs contact.bearing"),
         ],
     )
@@ -287,6 +288,8 @@ class TestMoments:
         open_ends = [float(history.x[history.touching[at]][-1]) for at in (turn, stop)]
         assert open_ends[1] < open_ends[0]  # a positive moment opens
         assert history.plot().get_xlabel() == "rotation of the end  [rad]"
+        assert "dissipation_ratio" not in history.figures()
+        assert f"{float(history.peak_displacement):.6g}  [rad]" in str(history)
         joint = Joint.of(moments(0.3))
         assert np.isinf(joint.capacity)
         assert float(joint.dissipation(joint.displacement[-1])) == pytest.approx(

@@ -173,7 +173,7 @@ class TestModes:
         assert np.allclose(more, np.ravel(ratio)[0] * slower)
 
     def test_they_have_derivatives_to_every_number(self):
-        """Of scene and joint, mass, stiffness and damping, in a jit of its own."""
+        """Numbers of scene and joint, mass, stiffness and damping, in a jit of its own."""
         strip = PLANE.replace({"model.nodes": 17})
 
         @jax.jit

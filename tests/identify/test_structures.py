@@ -73,7 +73,7 @@ def test_planted_numbers_are_recovered_within_their_intervals():
 
 @pytest.mark.slow
 def test_a_strip_in_a_structure_is_recovered_with_honest_intervals():
-    """Of 24 fits of three numbers each, the errors are as large as the fits say."""
+    """Errors of 24 fits of three numbers each are as large as the fits say."""
     truth = {
         "contact.friction": 0.12,
         "structure.stiffness": 1.1,
