@@ -16,6 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import hypothesis
 import jax
 import pytest
+import slow_sample
 
 os.environ["MPLBACKEND"] = "Agg"  # children of the tests inherit it
 # Workers and children share what they compile; the run's own folder, so nothing stale is used.
@@ -46,6 +47,24 @@ hypothesis.settings.load_profile("repeatable")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--part", help="K/N: the K-th of N parts of the tests, K from 0")
+    parser.addoption(
+        "--slow-sample",
+        metavar="SEED",
+        help="a tenth of the slow tests too, drawn by SEED; HEAD takes the commit, or the date",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Turn HEAD into the seed of a sample, which workers then share."""
+    if given := config.option.slow_sample:
+        config.option.slow_sample = slow_sample.seed_of(given)
+        if config.option.markexpr == "not slow":
+            config.option.markexpr = ""
+
+
+def pytest_report_header(config: pytest.Config) -> list[str]:
+    seed = config.option.slow_sample
+    return [f"slow sample: repeat it by --slow-sample {seed}"] if seed else []
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
@@ -57,12 +76,25 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep one part of the tests, the same on all machines, so that N runs do all of them."""
+    """Keep one part of the tests, the same on all machines, and of the slow ones the sample.
+
+    The sample comes first: what is left for the end is short, so that no worker waits long.
+    """
+    kept = list(items)
     if given := config.getoption("--part"):
         part, parts = (int(number) for number in given.split("/"))
-        kept = [item for item in items if zlib.crc32(item.nodeid.encode()) % parts == part % parts]
-        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
-        items[:] = kept
+        kept = [item for item in kept if zlib.crc32(item.nodeid.encode()) % parts == part % parts]
+    if seed := config.getoption("--slow-sample"):
+        minutes = {
+            item: max(mark.kwargs.get("minutes", 0.0) for mark in item.iter_markers("slow"))
+            for item in kept
+            if item.get_closest_marker("slow")
+        }
+        sample = [x for x in minutes if slow_sample.drawn(x.nodeid, minutes[x], seed)]
+        kept = sample + [item for item in kept if item not in minutes]
+    left = set(kept)
+    config.hook.pytest_deselected(items=[item for item in items if item not in left])
+    items[:] = kept
 
 
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:

@@ -83,7 +83,7 @@ def test_no_random_scene_is_wrong_silently():
     check_random_scenes(60, COARSE | {"model.nodes": 81}, 0.4)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=17)
 def test_no_scene_of_two_thousand_is_wrong_silently():
     check_random_scenes(2000, {}, 0.2)
 

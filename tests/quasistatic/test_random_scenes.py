@@ -49,7 +49,7 @@ def test_random_strips_converge_and_obey_friction(smoothing):
             check(history)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=5)
 @pytest.mark.parametrize("smoothing", ["sharp", 16.0])
 def test_hundreds_of_random_strips_converge_without_recovery(smoothing):
     random = np.random.default_rng(3)
@@ -101,7 +101,7 @@ def test_a_contact_that_goes_round_in_circles_is_found_node_by_node():
     assert float(jnp.min(history.reaction)) > -1e-6 * float(jnp.max(history.reaction))
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=2)
 def test_random_clamps_lift_and_touch_again_and_balance_their_energy():
     random = np.random.default_rng(1)
     base = library.receding_rough().replace({"model.nodes": 201})
