@@ -27,7 +27,7 @@ if OWNER:
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.5"
 # The tests compile more than they run: a third of the time for code that is slower by half.
 os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = "true"  # for children; for this process below
-FLAGS = "--xla_cpu_use_fusion_emitters=false"
+FLAGS = "--xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
 if OWNER and "XLA_FLAGS" not in os.environ:
     # A release that does not know the flag would abort.
     trial = [sys.executable, "-c", "import jax; jax.devices()"]

@@ -241,12 +241,18 @@ def of_other_laws() -> Iterator[Case]:
         yield Case(name, text(columns), ALONE, HONEST, doubts.get(name, ""))
     falling = functools.partial(strip, (0.8, 0.6, 0.4), 1)
     yield Case("falling amplitudes.csv", text(falling), KNOWN, HONEST)
-    loading = [column[:20] for column in strip()]
-    yield Case("first loading.csv", text(lambda: loading), KNOWN, HONEST)
-    random = np.random.default_rng(1)
-    noise = [*strip()[:1], *random.standard_normal((2, strip()[0].size))]
+
+    def loading() -> list[np.ndarray]:
+        return [column[:20] for column in strip()]
+
+    yield Case("first loading.csv", text(loading), KNOWN, HONEST)
+
+    def noise() -> list[np.ndarray]:
+        time, _, _ = strip()
+        return [time, *np.random.default_rng(1).standard_normal((2, time.size))]
+
     told = "noise|describe|cycle"
-    yield Case("only noise.csv", text(lambda: noise), ALONE, ("refused", "not this model"), told)
+    yield Case("only noise.csv", text(noise), ALONE, ("refused", "not this model"), told)
 
 
 def wrong() -> Iterator[Case]:

@@ -1,5 +1,6 @@
 """Bodies of any origin: matrices in files, their condensation, and their contact."""
 
+import functools
 import json
 import shutil
 from pathlib import Path
@@ -34,22 +35,37 @@ SCENE = jb.Scene().replace(
 LOAD = {"amplitude": 1.0, "steps_per_half_cycle": 8, "assembly": "frictionless"}
 
 
-def as_body(member, x, signs):
+def as_body(hessian, fixed, x, signs):
     whole = np.append(np.tile(signs, x.size), [1.0, 1.0])
-    hessian = np.asarray(member.hessian) * whole[:, None] * whole
-    return jb.Substructure(
-        x, hessian[:-2, :-2], -hessian[:-2, -2:], -hessian[-2:, -2:], fixed=member.fixed
-    )
+    hessian = np.asarray(hessian) * whole[:, None] * whole
+    held = np.asarray(fixed).tolist()
+    return jb.Substructure(x, hessian[:-2, :-2], -hessian[:-2, -2:], -hessian[-2:, -2:], fixed=held)
 
 
-def members(scene):
-    """Both members of a lap joint as bodies of a user's own."""
+@jax.jit
+def potentials(scene):
+    """Stations, and of both members of a lap joint the Hessian and what is held."""
     x = stations(scene, scene.model.nodes)
     down, up = pressing(scene, x)
     upper = upper_member(section_form(scene), x, None, down, False)
     clamped = scene.member.support == "clamped"
     lower = lower_member(section_form(scene.of_member()), x, None, up, clamped)
-    return as_body(upper, x, [1.0, 1.0]), as_body(lower, x, [1.0, -1.0])
+    return x, (upper.hessian, upper.fixed), (lower.hessian, lower.fixed)
+
+
+@functools.cache
+def members():
+    """Both members of the lap joint as bodies of a user's own."""
+    x, upper, lower = potentials(SCENE)
+    return as_body(*upper, x, [1.0, 1.0]), as_body(*lower, x, [1.0, -1.0])
+
+
+def upper():
+    return members()[0]
+
+
+def lower():
+    return members()[1]
 
 
 def moved(body, signs):
@@ -66,9 +82,6 @@ def moved(body, signs):
     )
 
 
-UPPER, LOWER = members(SCENE)
-
-
 def slice_of(nodes=6, rows=3):
     return calculix.strip_slice(jb.Scene(), nodes, rows)
 
@@ -81,7 +94,7 @@ def strip_body():
 
 class TestContact:
     def test_two_members_are_a_lap_joint(self):
-        joint, found = jb.solve(SCENE, throw=False), jb.solve_contact(UPPER, LOWER, **LOAD)
+        joint, found = jb.solve(SCENE, throw=False), jb.solve_contact(upper(), lower(), **LOAD)
         assert found.converged
         for name in ("dissipation", "dissipation_loop", "secant_stiffness", "slip_length"):
             assert float(getattr(found, name)) == pytest.approx(
@@ -91,18 +104,18 @@ class TestContact:
         np.testing.assert_allclose(found.traction, joint.traction, atol=1e-9)
 
     def test_displacements_that_forces_caused_cause_them(self):
-        forces = jb.solve_contact(UPPER, LOWER, **LOAD)
+        forces = jb.solve_contact(upper(), lower(), **LOAD)
         load = {"path": forces.displacement[1:], "assembly": "frictionless"}
-        found = jb.solve_contact(UPPER, LOWER, control="displacement", **load)
+        found = jb.solve_contact(upper(), lower(), control="displacement", **load)
         np.testing.assert_allclose(found.force, forces.force, atol=1e-8)
         np.testing.assert_allclose(found.gap, forces.gap, atol=1e-12)
         assert float(jnp.sum(found.slip_work)) == pytest.approx(float(jnp.sum(forces.slip_work)))
 
     def test_a_mirrored_joint_under_a_mirrored_load_answers_alike(self):
-        joint = jb.solve_contact(UPPER, LOWER, **LOAD)
-        mirrored = jb.solve_contact(*(moved(body, [-1.0, 1.0]) for body in (UPPER, LOWER)), **LOAD)
+        joint = jb.solve_contact(upper(), lower(), **LOAD)
+        mirrored = jb.solve_contact(*(moved(body, [-1.0, 1.0]) for body in members()), **LOAD)
         # Turned by 180 degrees the pulled body is the one below.
-        turned = jb.solve_contact(*(moved(body, [-1.0, -1.0]) for body in (LOWER, UPPER)), **LOAD)
+        turned = jb.solve_contact(*(moved(body, [-1.0, -1.0]) for body in members()[::-1]), **LOAD)
         for other, sign in ((mirrored, -1.0), (turned, 1.0)):
             for name in ("dissipation", "secant_stiffness"):
                 assert float(getattr(other, name)) == pytest.approx(
@@ -112,26 +125,26 @@ class TestContact:
             np.testing.assert_allclose(other.slip[:, ::-1], sign * joint.slip, atol=1e-14)
 
     def test_pressing_follows_the_bolts_and_friction_work_fills_the_loop(self):
-        once = jb.solve_contact(UPPER, LOWER, **LOAD)
-        twice = jb.solve_contact(UPPER, LOWER, **LOAD | {"amplitude": 2.0}, bolts=2.0)
+        once = jb.solve_contact(upper(), lower(), **LOAD)
+        twice = jb.solve_contact(upper(), lower(), **LOAD | {"amplitude": 2.0}, bolts=2.0)
         assert float(twice.dissipation) == pytest.approx(4.0 * float(once.dissipation), rel=1e-9)
         assert float(once.dissipation_loop) == pytest.approx(float(once.dissipation), rel=0.02)
 
     def test_an_even_gap_costs_nothing_to_a_body_that_nothing_holds_up(self):
-        flat = jb.solve_contact(UPPER, LOWER, **LOAD)
-        above = jb.solve_contact(UPPER, LOWER, **LOAD, gap=1e-4)
+        flat = jb.solve_contact(upper(), lower(), **LOAD)
+        above = jb.solve_contact(upper(), lower(), **LOAD, gap=1e-4)
         assert float(above.dissipation) == pytest.approx(float(flat.dissipation), rel=1e-7)
 
     @pytest.mark.parametrize("assembly", ["frictional", "frictionless"])
     def test_a_curved_body_stands_off_where_the_pressure_does_not_flatten_it(self, assembly):
-        gap = 5e-3 * (np.asarray(UPPER.x) / 2.0) ** 2
+        gap = 5e-3 * (np.asarray(upper().x) / 2.0) ** 2
         load = LOAD | {"assembly": assembly, "amplitude": 0.2}
-        found = jb.solve_contact(UPPER, LOWER, **load, gap=gap)
+        found = jb.solve_contact(upper(), lower(), **load, gap=gap)
         pressed = np.asarray(found.reaction[0])
         assert 0.0 < float(found.gap[0, -1]) < gap[-1]
         assert pressed[-1] == 0.0
         assert not np.any(found.gap[0][pressed > 0.0])
-        total = float(np.asarray(UPPER.tributary) @ pressed)
+        total = float(np.asarray(upper().tributary) @ pressed)
         assert total == pytest.approx(20.0, rel=1e-9)  # what presses is carried
 
     @pytest.mark.slow
@@ -145,20 +158,20 @@ class TestContact:
         assert float(jax.jvp(work, (1.0,), (1.0,))[0]) == pytest.approx(float(work(1.0)), rel=1e-9)
 
         def of_stiffness(k):
-            upper = changed(UPPER, stiffness=k * UPPER.stiffness)
-            return jb.solve_contact(upper, LOWER, **LOAD).dissipation
+            stiffer = changed(upper(), stiffness=k * upper().stiffness)
+            return jb.solve_contact(stiffer, lower(), **LOAD).dissipation
 
         with pytest.raises(jb.InputError, match="take 'frictional' where they are traced"):
             jax.jit(of_stiffness)(1.0)
 
     @pytest.mark.slow
     def test_derivatives_have_slope_two(self):
-        gap = jnp.asarray(1e-5 * (np.asarray(UPPER.x) / 2.0) ** 2)
+        gap = jnp.asarray(1e-5 * (np.asarray(upper().x) / 2.0) ** 2)
 
         def work(numbers):
             friction, bolt, height = numbers
             load = LOAD | {"friction": friction, "bolts": bolt, "gap": height * gap}
-            return jb.solve_contact(UPPER, LOWER, **load).dissipation
+            return jb.solve_contact(upper(), lower(), **load).dissipation
 
         at, way = jnp.array([0.1, 1.0, 1.0]), jnp.array([0.02, 0.1, 0.5])
         value, slope = jax.jvp(work, (at,), (way,))
@@ -223,11 +236,11 @@ class TestMatrices:
         np.testing.assert_array_equal(model.dofs, [[7, 1], [9, 1]])
 
     def test_a_saved_body_is_read_again(self, tmp_path):
-        LOWER.save(tmp_path / "lower.npz")
+        lower().save(tmp_path / "lower.npz")
         again = jb.Substructure.read(tmp_path / "lower.npz")
-        assert again.fixed == LOWER.fixed
+        assert again.fixed == lower().fixed
         for name in ("x", "stiffness", "forces", "flexibility", "tributary"):
-            np.testing.assert_array_equal(getattr(again, name), getattr(LOWER, name))
+            np.testing.assert_array_equal(getattr(again, name), getattr(lower(), name))
 
     @pytest.mark.slow
     @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
@@ -286,14 +299,17 @@ def changed(body, **arrays):
 @pytest.mark.parametrize(
     ("what", "said"),
     [
-        (lambda: jb.solve_contact(UPPER, changed(LOWER, x=LOWER.x * 1.01)), "lower.x\\[24\\]"),
-        (lambda: jb.solve_contact(UPPER, UPPER), "moves along X with the other one: hold"),
-        (lambda: changed(UPPER, stiffness=-UPPER.stiffness), "has a negative mode"),
-        (lambda: changed(UPPER, stiffness=jnp.triu(UPPER.stiffness)), "is not symmetric"),
-        (lambda: changed(UPPER, forces=UPPER.forces[:-1]), "forces.shape"),
-        (lambda: jb.solve_contact(changed(UPPER, forces=UPPER.forces[:, :1])), "flexibility"),
-        (lambda: jb.solve_contact(UPPER, LOWER, bolts=[1.0, 2.0]), "bolts"),
-        (lambda: jb.solve_contact(UPPER, LOWER, gap=-1.0), "gap = -1.0"),
+        (
+            lambda: jb.solve_contact(upper(), changed(lower(), x=lower().x * 1.01)),
+            "lower.x\\[24\\]",
+        ),
+        (lambda: jb.solve_contact(upper(), upper()), "with the other one: hold"),
+        (lambda: changed(upper(), stiffness=-upper().stiffness), "has a negative mode"),
+        (lambda: changed(upper(), stiffness=jnp.triu(upper().stiffness)), "is not symmetric"),
+        (lambda: changed(upper(), forces=upper().forces[:-1]), "forces.shape"),
+        (lambda: jb.solve_contact(changed(upper(), forces=upper().forces[:, :1])), "flexibility"),
+        (lambda: jb.solve_contact(upper(), lower(), bolts=[1.0, 2.0]), "bolts"),
+        (lambda: jb.solve_contact(upper(), lower(), gap=-1.0), "gap = -1.0"),
         (lambda: jb.solve_contact("upper"), "give a jbeamshell.Substructure"),
         (lambda: jb.StiffnessModel(np.eye(3)[:2], [[1, 1], [1, 2]]), "must be square"),
         (lambda: jb.StiffnessModel(np.eye(2), [[1, 1]]), "each of its 2 rows"),
@@ -322,7 +338,7 @@ def test_tables_that_do_not_fit_the_model_are_refused():
 
 def test_gross_slip_is_told():
     with pytest.raises(jb.UnconvergedError, match="all of the contact slides"):
-        jb.solve_contact(UPPER, LOWER, **LOAD | {"amplitude": 3.0})
+        jb.solve_contact(upper(), lower(), **LOAD | {"amplitude": 3.0})
 
 
 def test_bodies_need_double_precision():
