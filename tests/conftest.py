@@ -1,5 +1,6 @@
 """Settings of the whole test run."""
 
+import ctypes
 import gc
 import math
 import os
@@ -38,7 +39,7 @@ jax.config.update("jax_compilation_cache_dir", os.environ[CACHE])
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
 jax.config.update("jax_disable_most_optimizations", True)
 jax.config.update("jax_enable_x64", True)
-MOST_MEMORY = 1.5e9  # bytes of a worker beyond which it forgets after every module
+MOST_MEMORY = 2.5e9  # bytes of a worker beyond which it forgets after every module
 gc.set_threshold(100_000, 20, 20)  # tracing makes millions of objects that live on
 
 hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
@@ -105,8 +106,15 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
     if nextitem is not None and nextitem.path == item.path:
         return
     if nextitem is None or nextitem.path.parent != item.path.parent or memory_used() > MOST_MEMORY:
-        jax.clear_caches()
-        gc.collect()
+        forget()
+
+
+def forget() -> None:
+    """Drop compiled programs, and give their memory back, so that what is used can be told."""
+    jax.clear_caches()
+    gc.collect()
+    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "malloc_trim"):
+        libc.malloc_trim(0)
 
 
 def memory_used() -> float:
