@@ -30,7 +30,6 @@ from tqdm import tqdm  # noqa: E402
 import jbeamshell as jb  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.ladder.candidates import CANDIDATES, Candidate  # noqa: E402
-from jbeamshell.ladder.climb import PLANE  # noqa: E402
 
 HERE = Path(__file__).parent
 RECORD = HERE / "ladder_map.json"
@@ -44,6 +43,8 @@ KEYS = (
     "load.amplitude",
 )
 QUANTITIES = ("dissipation", "secant_stiffness")
+DOUBT = "dissipation_error"  # by which a run doubts itself
+DOUBTS = (1e-4, 10.0)  # range within which it matters
 # Below these the elements of the table, 4e-4 to 1e-3 H at the corner, see too little slip: part of
 # the bar's dissipation, and A over mu F_N L/2, which is the slip zone over half the length.
 UNSEEN, SHORT = 0.3, 0.3
@@ -78,15 +79,21 @@ def scene_of(candidate: Candidate, eta=0.1, amplitude=1.0, mu=0.1, nu=0.3) -> jb
 
 
 def answers(candidate: Candidate, points: np.ndarray) -> np.ndarray:
-    """Dissipation and secant stiffness of (n, 4) strips, (n, 2), in the table's units."""
-    ask = jb.response(scene_of(candidate), KEYS, QUANTITIES)
-    found = np.empty((len(points), 2))
+    """Dissipation, secant stiffness and doubt of (n, 4) strips, (n, 3), in the table's units."""
+    names = (*QUANTITIES, DOUBT)
+    ask = jb.response(scene_of(candidate), KEYS, names)
+    found = np.empty((len(points), 3))
     for own, (eta, amplitude, mu, nu) in zip(found, points, strict=True):
         figures = ask(eta, nu, mu, 1.0 / mu, amplitude)
         if int(figures["status"]) != 0:  # alone, a failed step is mended
-            figures = jb.solve(scene_of(candidate, eta, amplitude, mu, nu)).figures()
-        own[:] = [figures[name] for name in QUANTITIES]
-    return found * [STIFFNESS, 1.0 / STIFFNESS]
+            figures = vars_of(jb.solve(scene_of(candidate, eta, amplitude, mu, nu)), names)
+        own[:] = [figures[name] for name in names]
+    return found * [STIFFNESS, 1.0 / STIFFNESS, 1.0]
+
+
+def vars_of(history: jb.History, names: tuple[str, ...]) -> dict[str, float]:
+    """Figures of a history by name."""
+    return {name: float(getattr(history, name)) for name in names}
 
 
 def milliseconds(candidate: Candidate, kinematics: str) -> float:
@@ -119,14 +126,21 @@ def reference(table: dict[str, np.ndarray]) -> np.ndarray:
     return found
 
 
-def measure(candidate: Candidate, table: dict[str, np.ndarray], truth: np.ndarray) -> dict:
-    """Ratios of a candidate's figures to the reference."""
+def measure(
+    candidate: Candidate, table: dict[str, np.ndarray], truth: np.ndarray
+) -> tuple[dict[str, list[float]], list[float]]:
+    """Ratios of a candidate's figures to the reference, and its doubts on the map's strips."""
     points = np.stack([table[key] for key in NUMBERS], axis=1)
-    work, stiffness = answers(candidate, points).T
+    work, stiffness, doubt = answers(candidate, points).T
     nothing = NOTHING * bars(table)
     ratios = (work + nothing) / (truth + nothing), stiffness * table["u"] / table["A"]
-    rounded = [[float(f"{r:.5g}") for r in np.clip(column, *WIDEST)] for column in ratios]
-    return dict(zip(QUANTITIES, rounded, strict=True))
+    own = dict(zip(QUANTITIES, (rounded(np.clip(r, *WIDEST), 5) for r in ratios), strict=True))
+    return own, rounded(np.clip(doubt, *DOUBTS)[table["set"] == "map"], 2)
+
+
+def rounded(values: np.ndarray, digits: int) -> list[float]:
+    """Values with so many digits."""
+    return [float(f"{value:.{digits}g}") for value in values]
 
 
 def ship(record: dict, table: dict[str, np.ndarray]) -> None:
@@ -143,20 +157,22 @@ def ship(record: dict, table: dict[str, np.ndarray]) -> None:
 def main() -> None:
     """Measure, write the record after every candidate, and write the table of `advise`."""
     table, chosen = strips(), [name for name in sys.argv[1:] if name != "--times"]
-    record = json.loads(RECORD.read_text()) if RECORD.exists() else {"ratios": {}}
+    record = json.loads(RECORD.read_text()) if RECORD.exists() else {"ratios": {}, "doubts": {}}
     record["provenance"] = provenance()
     if "reference" not in record:
         record["reference"] = reference(table).tolist()
     if "--times" not in sys.argv:
         for name in tqdm(chosen or list(CANDIDATES), disable=None, unit="candidate"):
-            record["ratios"][name] = measure(CANDIDATES[name], table, np.array(record["reference"]))
+            truth = np.array(record["reference"])
+            record["ratios"][name], record["doubts"][name] = measure(CANDIDATES[name], table, truth)
             write_text(RECORD, json.dumps(record) + "\n")
     record["linear_ms"] = {
         name: milliseconds(candidate, "linear")
         for name, candidate in tqdm(CANDIDATES.items(), desc="linear", disable=None)
     }
     # Exact kinematics cost a rung the same factor on all its grids, near enough.
-    coarsest = {c.rung: c for c in reversed(CANDIDATES.values()) if c.rung != PLANE}
+    stepwise = [c for c in CANDIDATES.values() if not c.on_contact_line]
+    coarsest = {c.rung: c for c in reversed(stepwise)}
     record["exact_over_linear"] = {
         rung: milliseconds(c, "exact") / record["linear_ms"][c.name]
         for rung, c in tqdm(coarsest.items(), desc="exact", disable=None)

@@ -41,19 +41,23 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run a scene, report and write; returns the exit code."""
     from jbeamshell.common import files
-    from jbeamshell.history import report
-    from jbeamshell.ladder import advice
-    from jbeamshell.plotting.folder import check_folder
     from jbeamshell.quasistatic import solver
     from jbeamshell.scene import load_path
 
     scene = scene_of(options)
     load_path.check(scene)
     if options.tol is not None:
+        from jbeamshell.ladder import advice
+
         advised = advice.advise(scene, options.tol, tell=tell_rung)
         say(str(advised))
         scene = advised.applied(scene)
-    folder = None if options.out is None else check_folder(options.out)
+    folder = None
+    if options.out is not None:  # pictures take long to import
+        from jbeamshell.history import report
+        from jbeamshell.plotting.folder import check_folder
+
+        folder = check_folder(options.out)
     say("compiling ...")
     begin = time.perf_counter()
     solver.compile_for(scene)

@@ -104,7 +104,6 @@ def run(options: argparse.Namespace) -> int:
 
 def _report(options: argparse.Namespace, result: Any) -> int:
     """Print and draw the sweep; returns the exit code."""
-    from jbeamshell import plotting
     from jbeamshell.common import files
 
     put(files.as_json(result.figures()) if options.json else f"{result}\n")
@@ -119,6 +118,8 @@ def _report(options: argparse.Namespace, result: Any) -> int:
         )
     written = [options.out] if options.out else []
     if options.plot:
+        from jbeamshell import plotting
+
         sheet = plotting.sweep_sheet(result)
         plotting.save(sheet, options.plot)
         plotting.close(sheet)

@@ -102,12 +102,12 @@ class History(Profiles, ContactLine, CycleFigures):
     @property
     def _summary(self) -> Summary:
         strip, control = self.scene.strip, self.scene.load.control
-        driver = self.force if control == "force" else self.displacement
+        driver = np.asarray(self.force if control == "force" else self.displacement)
         if self.scene.load.kind == "moment":
             control = "moment" if control == "force" else "rotation"
-        what = f"{control} amplitude {float(jnp.max(jnp.abs(driver))):.4g}"
-        if not self.cycles and not jnp.any(driver):
-            what = f"pressed by {float(jnp.sum(self.load)):.4g}"
+        what = f"{control} amplitude {float(np.max(np.abs(driver))):.4g}"
+        if not self.cycles and not np.any(driver):
+            what = f"pressed by {float(np.sum(self.load)):.4g}"
         title = (
             f"{self.force.size} levels of {' '.join(self.scene.model.fields)} on "
             f"{self.x.size} nodes, eta = {float(strip.height_ratio):.4g}, {what}"

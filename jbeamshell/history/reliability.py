@@ -28,7 +28,7 @@ NEGLIGIBLE = 1e-9  # slip over the sticking range, or tension over the pressure,
 CLOSES = 1e-3  # distance between the ends of a steady loop, over its width
 SAFETY = 1.2  # factor on the estimated error of the corner
 RESTING = 2.0  # error of the dissipation over the part of the load that single sliders hold
-TOLERANCE = 0.02  # relative error of the dissipation below which there is no doubt
+TOLERANCE = 0.02  # relative error of the dissipation below which there is never a doubt
 LOCKS = 0.491  # nu beyond which the midpoint rule is off by more than 1 % of the dissipation
 FINER = "take a smaller model.end_size or more model.nodes"
 
@@ -146,6 +146,15 @@ def slider_error(cycle: SlipCycle) -> Array:
     return numbers.where(elastic_slip & (load > 0.0), error, 0.0)
 
 
+def doubted_from(tolerance: float) -> float:
+    """Estimated error of the dissipation from which on a run is doubted, for its model.tolerance.
+
+    Estimates are rather too large than too small, so that one above a tolerance finer than
+    `TOLERANCE` is no doubt yet; a coarser tolerance allows for as much.
+    """
+    return max(TOLERANCE, tolerance)
+
+
 def estimates(scene: Scene, cycle: SlipCycle) -> tuple[Array, ...]:
     """Estimated relative errors of a scene's dissipation: of grid, loaded corner and single nodes.
 
@@ -177,7 +186,7 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
     model, strip, found = scene.model, scene.strip, []
     error = linear_error(scene) + sway(scene) if model.kinematics == "linear" else 0.0
-    if error > TOLERANCE:
+    if error > doubted_from(model.tolerance):
         found.append(f"{_off(error)}: kinematics are linear; {_exact(scene)}")
     found += _buckling(scene)
     beamshell = "psi" in model.fields and model.order == 0 and model.solution != "plane"
@@ -243,15 +252,15 @@ def _resolution(history: Run) -> tuple[str, ...]:
             "nothing slips in the last cycle: slip that is smaller than the elements would not be "
             f"seen; {finer}",
         )
-    found = []
-    if grid > TOLERANCE:
+    found, allowed = [], doubted_from(history.scene.model.tolerance)
+    if grid > allowed:
         found.append(f"{_off(grid)}: few nodes do the slipping; {finer}")
-    if corner > TOLERANCE:
+    if corner > allowed:
         fix = "compare with more model.nodes" if plane else "compare with a smaller model.end_size"
         if "w" not in history.scene.model.fields:
             fix = "add w to model.fields and " + fix
         found.append(f"{_off(corner)}: the reaction gathers in the corner at the loaded end; {fix}")
-    if slider > TOLERANCE:
+    if slider > allowed:
         found.append(
             f"{_off(slider)}: the strip rests on single nodes, whose elastic sliders are the "
             "softer, the shorter the elements; take model.rung = plane, or "

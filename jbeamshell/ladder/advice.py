@@ -7,6 +7,7 @@ solves the scene on one rung after the other.  ``solve(scene, tolerance=0.05)`` 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Callable
 from typing import Any
@@ -15,9 +16,12 @@ import numpy as np
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import InputError, UnconvergedError
+from jbeamshell.common.progress import patience
+from jbeamshell.history.reliability import doubted_from
 from jbeamshell.ladder import error_map
-from jbeamshell.ladder.candidates import CANDIDATES, ORDERED
-from jbeamshell.ladder.climb import PLANE, Option, climb
+from jbeamshell.ladder.candidates import CANDIDATES
+from jbeamshell.ladder.climb import Option, climb
+from jbeamshell.scene.keys import COARSEST
 from jbeamshell.scene.linearisation import linear_error
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
@@ -78,16 +82,19 @@ def advise(
     tolerance: float,
     *,
     quantity: str = "dissipation",
-    tell: Callable[[str], None] = lambda text: None,
+    tell: Callable[[str], None] | None = None,
 ) -> Advice:
     """Name the cheapest rung, grid and load path whose estimated error is within a tolerance.
 
     Errors are relative to plane elasticity with ideal Coulomb friction.  For a homogeneous strip
     that is held at the far end, under one pressure and an end force, they come from a map of 512
     strips that were solved by finite elements and by every rung (eta .008 to .45, A .08 to 1.95
-    mu F_N a, mu .05 to .5, nu up to .45), within milliseconds.  Other scenes are solved as plane
-    elasticity and on the cheaper rungs, or, where plane elasticity has no such scene, on one rung
-    after the other, which takes as long as compiling these does.
+    mu F_N a, mu .05 to .5, nu up to .45), within milliseconds.  Other scenes, such as lap joints,
+    are solved as plane elasticity and on the cheaper rungs, or, where plane elasticity has no such
+    scene, on one rung after the other.  That takes as long as compiling these does: some 20 s.
+
+    What is advised runs without doubts, unless nothing else is accurate enough: its settings hold
+    the tolerance as ``model.tolerance``, up to .1, which doubts know.
 
     Parameters
     ----------
@@ -95,7 +102,7 @@ def advise(
     tolerance : largest relative error, .005 to 1
     quantity : "dissipation", "secant_stiffness" or "loss_factor"; off the map, any figure of
         `History.figures`
-    tell : called with the name of each rung that is solved
+    tell : called with the name of each rung that is solved; None shows the seconds that pass
 
     Returns
     -------
@@ -122,13 +129,15 @@ def advise(
     fix = f"must be a number from {SMALLEST} to 1; for a smaller error use finite elements"
     require("tolerance", tolerance, number and SMALLEST <= tolerance <= 1.0, fix)
     check(scene)
+    allowed = min(float(tolerance), COARSEST)  # for doubts
     place = error_map.place(scene)
     if isinstance(place, str) or quantity not in error_map.QUANTITIES:
         reason = place if isinstance(place, str) else f"{quantity} instead of a loop's figures"
-        options, note = climb(scene, tolerance, quantity, tell)
+        with contextlib.nullcontext() if tell else patience("comparing models"):
+            options, note = climb(scene, tolerance, allowed, quantity, tell or (lambda text: None))
         basis = f"off the map for {reason}; {note}"
     else:
-        options, basis = _from_map(scene, place, tolerance, quantity)
+        options, basis = _from_map(scene, place, tolerance, allowed, quantity)
     options = sorted(options, key=lambda option: option.ms)
     enough = [option for option in options if option.error <= tolerance]
     asked = (quantity, float(tolerance), basis, tuple(options))
@@ -140,7 +149,8 @@ def advise(
                 "load.steps_per_half_cycle, a lower contact.stick_stiffness, or finite elements"
             )
         return Advice("none", best.error, best.ms, {}, *asked)
-    chosen = enough[0]
+    # The finest of those that doubt themselves, if no other is left: its doubt is told by its run.
+    chosen = next((option for option in enough if not option.doubted), enough[-1])
     return Advice(chosen.rung, chosen.error, chosen.ms, chosen.settings, *asked)
 
 
@@ -149,24 +159,28 @@ def _shown(value: Any) -> str:
 
 
 def _from_map(
-    scene: Scene, place: np.ndarray, tolerance: float, quantity: str
+    scene: Scene, place: np.ndarray, tolerance: float, allowed: float, quantity: str
 ) -> tuple[list[Option], str]:
     """Options of the map at a place, and their basis."""
     known, errors = error_map.load(), error_map.estimates(place, quantity)
+    doubts, doubted = error_map.doubts(place), doubted_from(allowed)
     sections = ("squeeze", "p2")
     kinematic = {name: linear_error(scene.replace({"model.rung": name})) for name in sections}
     options = []
     for name, error in errors.items():
         candidate = CANDIDATES[name]
         rotation_error = kinematic["p2" if candidate.section.startswith("p") else "squeeze"]
-        linear = rotation_error <= KINEMATIC_SHARE * tolerance or candidate.rung == PLANE
-        # A bar does not rotate, so it has linear kinematics only, as plane elasticity has.
-        # Sections of order p are for rotations that matter: else plane elasticity is as cheap.
-        idle = candidate.rung == "bar" if not linear else candidate.section in ORDERED
+        small = rotation_error <= KINEMATIC_SHARE * tolerance
+        # Bars do not rotate.  Load steps are for rotations that matter: where these do not, the
+        # contact line is solved as soon without error in time, and plane elasticity beats order p.
+        linear = small or candidate.on_contact_line
+        idle = not small if candidate.rung == "bar" else small and not candidate.on_contact_line
         if idle or not error_map.suits(candidate, scene):
             continue
         settings = candidate.settings | {"model.kinematics": "linear" if linear else "exact"}
+        settings |= {"model.tolerance": allowed}
         total = error + (rotation_error if linear else 0.0)
         slowdown = 1.0 if linear else known.exact_over_linear[candidate.rung]
-        options.append(Option(candidate.rung, settings, total, slowdown * known.linear_ms[name]))
+        ms = slowdown * known.linear_ms[name]
+        options.append(Option(candidate.rung, settings, total, ms, doubts[name] > doubted))
     return options, f"map of {len(known.strips)} strips"

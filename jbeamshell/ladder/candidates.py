@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from jbeamshell.scene.choice import CONTACT_LINE
+
 
 class Candidate(NamedTuple):
     """Rung with its resolution.
@@ -26,15 +28,26 @@ class Candidate(NamedTuple):
 
     @property
     def section(self) -> str:
-        """Rung with the same section: "squeeze" for "masing", "p3" for "masing-p3"."""
+        """Rung with the same section: "squeeze" for "masing", "p3" for "condensed-p3"."""
         last = self.rung.rpartition("-")[2]
         return "squeeze" if last in ("masing", "pull") else last
 
     @property
+    def on_contact_line(self) -> bool:
+        """True for linear kinematics, exact in time: load steps make no error."""
+        return self.rung == "plane" or self.rung.startswith("condensed-")
+
+    @property
     def resolution(self) -> dict[str, Any]:
         """Dotted values of the grid and the load path."""
-        if self.rung == "plane":  # it has a grid of its own, and load steps make no error
+        if self.rung == "plane":  # it has a grid of its own
             return {"model.nodes": self.nodes, "load.steps_per_half_cycle": self.steps}
+        if self.on_contact_line:
+            return {
+                "model.nodes": self.nodes,
+                "model.end_size": CONTACT_LINE.end_size,
+                "load.steps_per_half_cycle": self.steps,
+            }
         # Coarse grids need their nodes at the loaded end.  On finer elements than these the
         # beamshell's point reaction there turns into tension.
         fine = self.nodes <= 41 or self.section.startswith("p")
@@ -52,10 +65,11 @@ class Candidate(NamedTuple):
         return {"model.rung": self.rung} | self.resolution | stepwise
 
 
-ORDERED = ("p4", "p6")  # sections of order p
 _COARSE, _MIDDLE = [(41, 4), (41, 10)], [(81, 10)]
 _RESOLUTIONS = {
     "bar": [(41, 4)],
+    "condensed-shell": [(33, 4), (65, 4)],
+    "condensed-squeeze": [(33, 4), (65, 4), (129, 4)],
     "masing": _COARSE + _MIDDLE,
     "shell": _COARSE + _MIDDLE,
     "squeeze": [*_COARSE, *_MIDDLE, (161, 20)],

@@ -41,16 +41,18 @@ class Option(NamedTuple):
     settings : dotted values of the model for `Scene.replace`
     error : estimated relative error
     ms : time of a warm run [ms]
+    doubted : True if its run doubts itself, see `jbeamshell.History.doubts`
     """
 
     rung: str
     settings: dict[str, Any]
     error: float
     ms: float
+    doubted: bool = False
 
 
 def climb(
-    scene: Scene, tolerance: float, quantity: str, tell: Callable[[str], None]
+    scene: Scene, tolerance: float, allowed: float, quantity: str, tell: Callable[[str], None]
 ) -> tuple[list[Option], str]:
     """Options for a scene, from solving it on one rung after the other.
 
@@ -58,6 +60,7 @@ def climb(
     ----------
     scene : scene whose kinematics, grid family and finest resolution are kept
     tolerance : relative error at which the climb may stop
+    allowed : ``model.tolerance`` of the runs, for their doubts
     quantity : name of a figure of `History.figures`
     tell : called with the name and the nodes of each rung that is solved
 
@@ -66,9 +69,9 @@ def climb(
     options : rungs with their errors and times, the lowest rungs first
     note : rungs that were solved, and errors that are not included
     """
-    runs = _Runs(scene, quantity, tell)
+    runs = _Runs(scene, allowed, quantity, tell)
     if runs.has(PLANE):
-        return _against_elasticity(runs), "solved as plane elasticity"
+        return _against_elasticity(runs, tolerance), "solved as plane elasticity"
     climbed, change = _climbed(runs, tolerance)
     lowest, highest = climbed[0], climbed[-1]
     note = f"solved on {', '.join(climbed)}"
@@ -77,45 +80,55 @@ def climb(
         note += "; the scene has no rung above, so the section's own error is not in the estimate"
     best = runs.value(highest)
     # The error of grid and path is about the same on every rung: take that of the cheapest.
-    grid = _off(runs.value(lowest), runs.value(lowest, finely=True))
+    grid = _off(runs.value(lowest), runs.value(lowest, 1))
     options = []
     for rung in (*CHEAP, *climbed):
         if rung in climbed or runs.has(rung):
             own = _off(runs.value(rung), best) + change
-            for finely, grids in ((False, 2.0), (True, 1.0)):
-                error, ms = own + grids * grid, runs.ms(rung, finely)
-                options.append(Option(rung, runs.settings(rung, finely), error, ms))
+            for fine, grids in ((0, 2.0), (1, 1.0)):
+                options.append(runs.option(rung, fine, own + grids * grid))
     return options, note
 
 
-def _against_elasticity(runs: _Runs) -> list[Option]:
+def _against_elasticity(runs: _Runs, tolerance: float) -> list[Option]:
     """Options of a scene that can be solved as plane elasticity."""
-    best = runs.value(PLANE, finely=True)
-    grid = _off(runs.value(PLANE), best)  # the error falls at least as the nodes double
     linear = linear_error(runs.scene_on(PLANE))
-    options = []
-    for rung in filter(runs.has, ("bar", "shell", "squeeze")):
+    for coarse, fine in ((0, 1), (1, 2)):
+        best = runs.value(PLANE, fine)
+        grid = _off(runs.value(PLANE, coarse), best)  # the error falls at least as the nodes double
+        if grid + linear <= tolerance:
+            break
+    options = [
+        runs.option(PLANE, coarse, 2.0 * grid + linear),
+        runs.option(PLANE, fine, grid + linear),
+    ]
+    for rung in filter(runs.has, ("bar", "squeeze", "shell")):
         error = _off(runs.value(rung), best) + grid
-        options.append(Option(rung, runs.settings(rung), error, runs.ms(rung, False)))
-    for finely, grids in ((False, 2.0), (True, 1.0)):
-        error, ms = grids * grid + linear, runs.ms(PLANE, finely)
-        options.append(Option(PLANE, runs.settings(PLANE, finely), error, ms))
+        options.append(runs.option(rung, 0, error))
+        if error > tolerance and rung != "bar":
+            break  # a section without squeeze is further off
     return options
 
 
 class _Runs:
-    """Runs of a scene on rungs with a coarse or a fine grid, each solved when it is first used."""
+    """Runs of a scene on rungs with a coarse grid (0) or a finer one, solved when first used."""
 
-    def __init__(self, scene: Scene, quantity: str, tell: Callable[[str], None]) -> None:
-        self._scene, self._quantity, self._tell = scene, quantity, tell
+    def __init__(
+        self, scene: Scene, allowed: float, quantity: str, tell: Callable[[str], None]
+    ) -> None:
+        self._scene, self._allowed, self._quantity, self._tell = scene, allowed, quantity, tell
         self._resolutions = _resolution(scene, 2), _resolution(scene, 1)
-        self._runs: dict[tuple[str, bool], tuple[dict[str, Any], float]] = {}
+        self._runs: dict[tuple[str, int], tuple[dict[str, Any], float]] = {}
 
-    def settings(self, rung: str, finely: bool = False) -> dict[str, Any]:
+    def settings(self, rung: str, grid: int = 0) -> dict[str, Any]:
         """Dotted values of the model."""
         if rung == PLANE:
-            return {"model.rung": rung, "model.nodes": PLANE_NODES * (2 if finely else 1)}
-        return {"model.rung": rung} | self._resolutions[finely]
+            nodes = {"model.nodes": (PLANE_NODES - 1) // 2 * 2**grid + 1}
+        else:
+            nodes = self._resolutions[grid]
+        own = {"model.rung": rung} | nodes
+        kinematics = self._scene.replace(own).model.kinematics  # for the scene's own tolerance
+        return own | {"model.kinematics": kinematics, "model.tolerance": self._allowed}
 
     def scene_on(self, rung: str) -> Scene:
         """Scene on a rung."""
@@ -129,7 +142,7 @@ class _Runs:
             return False
         return True
 
-    def value(self, rung: str, finely: bool = False) -> float:
+    def value(self, rung: str, grid: int = 0) -> float:
         """Figure of the scene; NaN if it has no equilibrium.
 
         Raises
@@ -137,20 +150,26 @@ class _Runs:
         InputError
             if the first run has no such figure
         """
-        if (rung, finely) not in self._runs:
-            settings = self.settings(rung, finely)
+        if (rung, grid) not in self._runs:
+            settings = self.settings(rung, grid)
             self._tell(f"{rung} on {settings['model.nodes']} nodes")
-            run = self._runs[rung, finely] = _solved(self._scene.replace(settings))
+            run = self._runs[rung, grid] = _solved(self._scene.replace(settings))
             if len(self._runs) == 1:
                 _check_quantity(self._quantity, run[0])
-        value = self._runs[rung, finely][0].get(self._quantity)
+        value = self._runs[rung, grid][0].get(self._quantity)
         return np.nan if value is None else value
 
-    def ms(self, rung: str, finely: bool) -> float:
+    def option(self, rung: str, grid: int, error: float) -> Option:
+        """Option with an error; on a grid that was not solved it has no doubts."""
+        run = self._runs.get((rung, grid))
+        doubted = run is not None and bool(run[0].get("doubts"))
+        return Option(rung, self.settings(rung, grid), error, self.ms(rung, grid), doubted)
+
+    def ms(self, rung: str, grid: int) -> float:
         """Time of a warm run [ms]; on a fine grid that was not solved, from that on the coarse."""
-        if finely and (rung, True) not in self._runs:
-            return FINER * self._runs[rung, False][1]
-        return self._runs[rung, finely][1]
+        if (rung, grid) not in self._runs:
+            return FINER * self._runs[rung, grid - 1][1]
+        return self._runs[rung, grid][1]
 
 
 def _climbed(runs: _Runs, tolerance: float) -> tuple[list[str], float]:

@@ -22,7 +22,7 @@ from jbeamshell.scene.scene import Scene
 # Distances of log(A/eta), A, log(mu) and nu over which errors change by about as much.
 SCALES = np.array([0.15, 0.5, 0.7, 0.3])
 NEIGHBOURS = 14
-CAUTION = 2.5  # multiple of the scatter that is added to an error
+CAUTION = 2.5  # multiple of the scatter that is added to an error or to a doubt
 RANGES = {
     "eta": (0.008, 0.45),
     "A/(mu F_N a)": (0.08, 1.95),
@@ -30,6 +30,7 @@ RANGES = {
     "nu": (0.0, 0.455),
 }
 KAPPA_S = (0.4, 0.48)  # range of kappa_s for which the map, measured at .44, holds
+DOUBTS = (1e-4, 10.0)  # range within which estimated errors matter
 LEAST_STIFFNESS, LEAST_SMOOTHING = 200.0, 16.0  # alpha, m below which the contact is too soft
 QUANTITIES = {
     "dissipation": {"dissipation": 1},
@@ -45,12 +46,14 @@ class ErrorMap(NamedTuple):
     ----------
     strips : (n, 4) eta, A/(mu F_N a), mu and nu of the strips
     ratios : (n,) ratios to finite elements, by candidate and quantity
+    doubts : (n,) errors of the dissipation by which runs doubt themselves, by candidate
     linear_ms : time of a warm run with linear kinematics [ms], by candidate
     exact_over_linear : ratio of the times with exact and linear kinematics, by rung
     """
 
     strips: np.ndarray
     ratios: dict[str, dict[str, np.ndarray]]
+    doubts: dict[str, np.ndarray]
     linear_ms: dict[str, float]
     exact_over_linear: dict[str, float]
 
@@ -64,7 +67,8 @@ def load() -> ErrorMap:
         name: {quantity: np.array(values) for quantity, values in own.items()}
         for name, own in record["ratios"].items()
     }
-    return ErrorMap(strips, ratios, record["linear_ms"], record["exact_over_linear"])
+    doubts = {name: np.clip(values, *DOUBTS) for name, values in record["doubts"].items()}
+    return ErrorMap(strips, ratios, doubts, record["linear_ms"], record["exact_over_linear"])
 
 
 def place(scene: Scene) -> np.ndarray | str:
@@ -82,7 +86,7 @@ def place(scene: Scene) -> np.ndarray | str:
         "a pressure that varies": contact.pressure.ndim > 0,
         "a pressure from below": contact.bottom_pressure.ndim > 0 or contact.bottom_pressure != 0,
         "a contact that is not rigid": contact.normal != "rigid",
-        "a strip that may lift off": "w" in scene.model.fields,
+        "a strip that may lift off": "w" in scene.model.given("fields"),
         "displacement control": load.control != "force",
         "fewer than two cycles": load.cycles < 2,
         "a smooth friction law": not sharp,
@@ -107,24 +111,34 @@ def place(scene: Scene) -> np.ndarray | str:
 
 def estimates(coordinates: np.ndarray, quantity: str) -> dict[str, float]:
     """Estimated relative error of every candidate at coordinates (4,) of the map."""
+    known, powers = load(), QUANTITIES[quantity]
+    logs = [sum(np.log(own[q]) * p for q, p in powers.items()) for own in known.ratios.values()]
+    value, scatter = _at(coordinates, np.column_stack(logs))
+    errors = np.abs(np.expm1(value)) + CAUTION * scatter
+    return dict(zip(known.ratios, map(float, errors), strict=True))
+
+
+def doubts(coordinates: np.ndarray) -> dict[str, float]:
+    """Error by which a run of every candidate is likely to doubt itself, at coordinates (4,)."""
     known = load()
-    at, strips = _scaled(coordinates[None])[0], _scaled(known.strips)
+    value, scatter = _at(coordinates, np.log(np.column_stack(list(known.doubts.values()))))
+    return dict(zip(known.doubts, map(float, np.exp(value + CAUTION * scatter)), strict=True))
+
+
+def _at(coordinates: np.ndarray, logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values at coordinates (4,) of quantities (n, m) known on the map's strips, and scatter."""
+    at, strips = _scaled(coordinates[None])[0], _scaled(load().strips)
     distance = np.linalg.norm(strips - at, axis=1)
     near = np.argsort(distance)[:NEIGHBOURS]
     reach = distance[near]
     weight = np.maximum(1.0 - (reach / reach[-1]) ** 2, 1e-3)
     design = np.column_stack([np.ones(NEIGHBOURS), strips[near] - at])
     root = np.sqrt(weight)[:, None]
-    powers = QUANTITIES[quantity]
-    logs = np.column_stack(
-        [sum(np.log(own[q][near]) * p for q, p in powers.items()) for own in known.ratios.values()]
-    )
-    planes, *_ = np.linalg.lstsq(root * design, root * logs, rcond=1e-6)
-    residual = logs - design @ planes
+    planes, *_ = np.linalg.lstsq(root * design, root * logs[near], rcond=1e-6)
+    residual = logs[near] - design @ planes
     freedom = NEIGHBOURS / (NEIGHBOURS - design.shape[1])
     scatter = np.sqrt(freedom * np.sum(weight[:, None] * residual**2, axis=0) / np.sum(weight))
-    errors = np.abs(np.expm1(planes[0])) + CAUTION * scatter
-    return dict(zip(known.ratios, map(float, errors), strict=True))
+    return planes[0], scatter
 
 
 def suits(candidate: Candidate, scene: Scene) -> bool:

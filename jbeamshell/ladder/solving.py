@@ -59,7 +59,6 @@ def solve(
     if tolerance is not None:
         fix = "a tolerance is for the scene's own cycles; leave the path out"
         require("path", "given", path is None, fix)
-        with patience("choosing a model"):
-            scene = advise(scene, tolerance).applied(scene)
+        scene = advise(scene, tolerance).applied(scene)
     with patience("solving"):
         return quasistatic.solve(scene, path, contact=contact, solver=solver, throw=throw)

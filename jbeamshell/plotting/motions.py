@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import scipy.signal
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -111,6 +110,8 @@ def modal_curve(
 
 def spectrogram(motion: Vibration, axes: Axes | None = None) -> Axes:
     """Draw the spectrum of the velocity over time, in dB of its largest value."""
+    import scipy.signal  # takes longer to import than other pictures take to draw
+
     time, velocity = np.asarray(motion.time), np.asarray(motion.velocity)
     length = max(16, 2 * time.size // WINDOWS)
     frequency, at, power = scipy.signal.spectrogram(

@@ -35,7 +35,7 @@ MEMBERS = ("none", "rolling", "clamped")
 SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form", *CONDENSED)
 
 TOLERANCE = 0.005
-FINEST = 1e-4  # tolerance below which the finest mesh may not reach
+FINEST, COARSEST = 1e-4, 0.1  # tolerance: below, the finest mesh may not reach it
 LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 PRESSURE = "give a number or a table of [X, pressure] rows"
 BOLTS = "give rows of numbers [X, force, width of the patch]"
@@ -272,7 +272,7 @@ class ModelKeys(Part):
         "Relative error of the dissipation and of the loop, to the same model on a fine mesh, for "
         "which settings that are auto are chosen.",
         low=FINEST,
-        high=0.1,
+        high=COARSEST,
         closed=True,
     )
 

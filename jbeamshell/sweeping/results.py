@@ -17,7 +17,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
 from jbeamshell.common.summary import Summary
 from jbeamshell.history.figures import TURNED_UNITS
-from jbeamshell.history.reliability import TOLERANCE
+from jbeamshell.history.reliability import doubted_from
 from jbeamshell.scene.keys import unit_of
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
@@ -132,11 +132,11 @@ class Sweep:
         """True for lanes not to rely on, an array of the lanes' shape.
 
         They have no equilibrium, or were not run; or the dissipation's estimated error is above
-        `TOLERANCE`, which is known if ``"dissipation_error"`` is among the figures.
+        2 % and ``model.tolerance``, which is known if ``"dissipation_error"`` is among the figures.
         """
         solved = np.isin(self.status, (Outcome.CONVERGED, Outcome.UNDEFINED))
         errors = self.values.get("dissipation_error", np.zeros(self.shape))
-        return ~solved | (errors > TOLERANCE)
+        return ~solved | (errors > doubted_from(self.scene.model.tolerance))
 
     def to_dataframe(self) -> Any:
         """Table as a `pandas.DataFrame`: a row for every lane, with the column ``doubtful``."""

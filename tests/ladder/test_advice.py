@@ -47,14 +47,17 @@ def scene_of(row):
 
 def name_of(advice):
     """The candidate whose settings an advice holds."""
-    settings = {k: v for k, v in advice.settings.items() if k != "model.kinematics"}
+    chosen = ("model.kinematics", "model.tolerance")
+    settings = {k: v for k, v in advice.settings.items() if k not in chosen}
     return next(name for name, c in CANDIDATES.items() if c.settings == settings)
 
 
 def test_every_candidate_is_on_the_map():
     known = error_map.load()
     assert set(CANDIDATES) == set(known.ratios) == set(known.linear_ms)
-    assert {c.rung for c in CANDIDATES.values()} - {"plane"} == set(known.exact_over_linear)
+    assert set(CANDIDATES) == set(known.doubts)
+    walked = {c.rung for c in CANDIDATES.values() if not c.on_contact_line}
+    assert walked == set(known.exact_over_linear)
     for name, candidate in CANDIDATES.items():
         assert candidate.name == name
         assert STRIP.replace(candidate.settings).model.rung == candidate.rung
@@ -81,13 +84,13 @@ def test_the_error_is_within_the_tolerance(others, tolerance):
         assert np.median(costs) <= record["linear_ms"][MOST_ACCURATE] / 20.0
 
 
-def test_masing_is_not_advised_where_it_fails(others):
+def test_a_section_is_not_advised_where_it_fails(others):
     """It is wrong by more than 20 % on some of these strips, and by 5 % on many."""
     picked, all_of_them = [], []
     for row, ratios in others[0]:
         advice = jb.advise(scene_of(row), 0.05)
-        all_of_them.append(abs(ratios["masing@41x4"] - 1.0))
-        if advice.rung.startswith("masing"):
+        all_of_them.append(abs(ratios["condensed-squeeze@33x4"] - 1.0))
+        if advice.rung == "condensed-squeeze":
             picked.append(abs(ratios[name_of(advice)] - 1.0))
     assert np.mean(np.array(all_of_them) > 0.05) > 0.3
     assert np.mean(np.array(picked) <= 0.05) >= 0.95
@@ -101,7 +104,6 @@ def test_a_coarser_tolerance_is_never_dearer():
     assert times[-1] < times[0]
 
 
-@pytest.mark.doubtful("in the corner")
 def test_thin_bars_need_no_more_than_the_bar_and_corners_need_plane_elasticity():
     thin = STRIP.replace({"strip.height_ratio": 0.01, "load.amplitude": 1.5})
     assert jb.advise(thin, 0.01).rung == "bar"
@@ -109,6 +111,25 @@ def test_thin_bars_need_no_more_than_the_bar_and_corners_need_plane_elasticity()
     advice = jb.advise(thick, 0.2)
     assert advice.rung == "plane"
     assert jb.solve(thick, tolerance=0.2).scene.model.rung == "plane"
+
+
+def test_the_default_scene_is_on_the_map():
+    """Its strip may lift off because it is solved on its contact line, not because it was asked."""
+    assert "w" in jb.Scene().model.fields
+    advice = jb.advise(jb.Scene(), 0.05)
+    assert advice.basis.startswith("map of 512 strips")
+    assert advice.rung == "condensed-squeeze"
+
+
+def test_what_is_advised_is_not_doubted_within_the_tolerance():
+    """Any doubt is an error here; one of 3.2 % on 17 nodes is within what a user of 5 % allows."""
+    advice = jb.advise(jb.Scene(), 0.05)
+    scene = advice.applied(jb.Scene())
+    assert scene.model.tolerance == 0.05
+    jb.solve(scene)
+    coarse = scene.replace({"model.nodes": 17})
+    jb.solve(coarse)
+    assert "3.2 %" in jb.solve(coarse.replace({"model.tolerance": 0.02}), throw=False).doubts[0]
 
 
 def test_solve_takes_the_advice():
