@@ -9,8 +9,8 @@ import json
 import os
 import re
 import stat
-import tempfile
 import tomllib
+import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -60,21 +60,62 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
         with written_whole("numbers.txt") as draft:
             draft.write_text("1 2 3")
     """
-    target, draft = as_path(path), None
+    target = as_path(path)
+    draft = target.parent / f".{uuid.uuid4().hex}{target.suffix}"
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=".", suffix=target.suffix)
-        os.close(handle)
-        draft = Path(name)
+        draft.touch(exist_ok=False)
         yield draft
-        draft.chmod(0o666 & ~_umask())
         draft.replace(target)
     except OSError as error:  # no folder, no permission, a full disk
         raise InputError(f"{target}: cannot be written ({error.strerror or error})") from None
     except UnicodeEncodeError as error:  # a file name with half a character
         raise InputError(f"{target}: cannot be written ({error})") from None
     finally:
-        if draft is not None:
+        with contextlib.suppress(OSError, UnicodeEncodeError):
             draft.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def locked(path: Path) -> Iterator[bool]:
+    """Context with True if this is the only one, of all processes and threads, with the file.
+
+    A process that dies lets go of its files.  Where the system has no such locks, nobody is told.
+    """
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        alone = _lock(handle)
+        if not alone or _is_at(handle, path):
+            break
+        os.close(handle)  # the one before has removed the file since it was opened
+    try:
+        yield alone
+    finally:
+        if alone:
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+        os.close(handle)
+
+
+def _lock(handle: int) -> bool:
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return True
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
+
+
+def _is_at(handle: int, path: Path) -> bool:
+    """True if an open file is the one at a path."""
+    try:
+        return os.path.samestat(os.fstat(handle), path.stat())
+    except FileNotFoundError:
+        return False
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
@@ -111,12 +152,6 @@ def parsed_toml(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError:
         raise ValueError("its lists are nested too deeply") from None
-
-
-def _umask() -> int:
-    current = os.umask(0)
-    os.umask(current)
-    return current
 
 
 def as_json(figures: Mapping[str, Any]) -> str:

@@ -35,9 +35,12 @@ def bar(what: str, unit: str = "step", **options: Any) -> Iterator[Any]:
     unit : name of what is counted
     options : further arguments of ``tqdm``
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a notebook without widgets, where the bar is text
-        from tqdm.auto import tqdm
+    if in_notebook():
+        with warnings.catch_warnings():  # changes the filters of all threads
+            warnings.simplefilter("ignore")  # without widgets, where the bar is text
+            from tqdm.auto import tqdm
+    else:
+        from tqdm import tqdm
     if not watched():
         options["disable"] = True  # else as the environment says: TQDM_DISABLE=1
     looks = {"desc": what, "unit": unit, "file": sys.stderr, "leave": False, "delay": DELAY}

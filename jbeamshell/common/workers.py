@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.connection import Connection
 
+_script = threading.RLock()  # of the entry of modules that is exchanged
 ONE_THREAD = {"PJRT_NPROC": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 """Environment of a worker: the threads of several workers would take turns on the cores."""
 
@@ -44,12 +45,13 @@ def without_main() -> Iterator[None]:
     A spawned process imports the script that started it.  One without ``if __name__ ==
     "__main__":`` would start over in each of them.
     """
-    script = sys.modules["__main__"]
-    sys.modules["__main__"] = types.ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = script
+    with _script:
+        script = sys.modules["__main__"]
+        sys.modules["__main__"] = types.ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = script
 
 
 def begin(end: Connection, environment: Mapping[str, str]) -> None:

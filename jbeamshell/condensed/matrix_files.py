@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.io
 import scipy.sparse
 from numpy.typing import NDArray
 
@@ -68,7 +67,9 @@ def read_matrix(path: str | os.PathLike[str]) -> Rows:
 def _archive(data: bytes, _: Path) -> Rows:
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         if "indptr" in archive.files:
-            return Rows(scipy.sparse.csc_array(scipy.sparse.load_npz(io.BytesIO(data))))
+            matrix = scipy.sparse.load_npz(io.BytesIO(data))
+            matrix.check_format(full_check=True)  # places beyond the matrix would end the process
+            return Rows(scipy.sparse.csc_array(matrix))
         named = {name: archive[name] for name in archive.files}
     dofs = named.pop("dofs", None)
     return Rows(_the_matrix(named, ARRAYS), None if dofs is None else dofs.astype(np.int64))
@@ -108,8 +109,46 @@ def _the_matrix(named: dict[str, Any], fix: str) -> scipy.sparse.csc_array:
 
 def _text(data: bytes, path: Path) -> Rows:
     if data.lstrip()[:2] == b"%%":
-        return Rows(scipy.sparse.csc_array(scipy.io.mmread(io.BytesIO(data))))
+        return Rows(_market(data.decode("ascii").lower()))
     return _substructure(data.decode("ascii"))
+
+
+def _market(text: str) -> scipy.sparse.csc_array:
+    """Real matrix of a Matrix Market file; SciPy's reader may end the process at a damaged one."""
+    head, *lines = text.splitlines()
+    _, what, form, kind, symmetry = head.split()
+    known = {"matrix", "coordinate", "array", "real", "double", "integer", "general", "symmetric"}
+    if not {what, form, kind, symmetry} <= known:
+        raise InputError(f"{head}: give a matrix of real numbers, general or symmetric")
+    sizes, *rows = (line for line in lines if line.strip() and line[0] != "%")
+    size, *others = (int(word) for word in sizes.split())
+    values = np.array(" ".join(rows).split(), float)
+    half = symmetry == "symmetric"
+    if form == "coordinate":
+        row, column, value = values.reshape(others[-1], 3).T
+        return _placed(row - 1, column - 1, value, size, half)
+    if values.size != (size * (size + 1) // 2 if half else size**2):
+        raise InputError(f"holds {values.size} numbers for {size} rows: write it again")
+    column, row = np.indices((size, size))
+    kept = row >= column if half else row >= 0
+    return _placed(row[kept], column[kept], values, size, half)
+
+
+def _placed(
+    row: NDArray[Any], column: NDArray[Any], value: NDArray[Any], size: int, half: bool
+) -> scipy.sparse.csc_array:
+    """Matrix of entries by row and column from 0; of one half, the other is mirrored."""
+    places = np.stack([row, column]).astype(np.int64)
+    twice = np.unique(places, axis=1).shape[1] < value.size
+    lost = size > value.size or np.setdiff1d(np.arange(size), places[0, row == column]).size
+    if twice or lost or np.any(places != [row, column]):
+        raise InputError("lacks entries, or has some twice: copy the whole file again")
+    found = scipy.sparse.coo_array((value, tuple(places)), shape=(size, size))
+    if half:
+        found = found + scipy.sparse.coo_array(
+            (np.where(row == column, 0.0, value), tuple(places[::-1])), shape=(size, size)
+        )
+    return scipy.sparse.csc_array(found)
 
 
 def _substructure(text: str) -> Rows:
@@ -149,10 +188,10 @@ def _stored(data: bytes, path: Path) -> Rows:
     words = read_bytes(named).decode("ascii").split()
     dofs = np.array([[int(part) for part in word.split(".")] for word in words])
     table = np.array(data.split(), float).reshape(-1, 3)
-    row, column = table[:, :2].astype(int).T - 1
-    half = scipy.sparse.coo_array((table[:, 2], (row, column)), shape=(len(dofs), len(dofs)))
-    beyond = scipy.sparse.triu(half, 1)
-    return Rows(scipy.sparse.csc_array(half + beyond.T), dofs)
+    if not data.endswith(b"\n"):
+        raise InputError("ends within a line: copy the whole file again")
+    row, column, value = table.T
+    return Rows(_placed(row - 1, column - 1, value, len(dofs), True), dofs)
 
 
 def _nastran(_: bytes, path: Path) -> Rows:

@@ -11,7 +11,6 @@ with d the displacements conjugate to the loads.  Load 0 pulls to and fro, the o
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Sequence
 from typing import Any
@@ -21,10 +20,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.arrays import read_arrays, write_arrays
 from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.errors import InputError
-from jbeamshell.common.files import as_path, written_whole
-from jbeamshell.measured.tables import read_bytes
+from jbeamshell.common.files import as_path, check_regular
 
 LOOSE = 1e-11  # of the largest eigenvalue: below it a mode costs no energy
 MODES = ("moves along X", "moves along the normal", "turns")
@@ -124,27 +123,28 @@ class Substructure(eqx.Module):
         target = as_path(path)
         require("path", str(path), target.suffix == ".npz", "end the name in .npz")
         names = ("x", "tributary", "stiffness", "forces", "flexibility", "fixed")
-        arrays: dict[str, Any] = {name: np.asarray(getattr(self, name)) for name in names}
-        with written_whole(target) as draft:
-            np.savez(draft, **arrays)
+        write_arrays(target, {name: np.asarray(getattr(self, name)) for name in names})
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Substructure:
         """Substructure in an .npz file of its arrays by name.
 
-        ``flexibility``, ``tributary`` and ``fixed`` may be left out.
+        ``flexibility``, ``tributary`` and ``fixed`` may be left out.  A file of `save` carries a
+        check sum, by which changed numbers are noticed.
 
         Raises
         ------
         InputError
             if the file cannot be read, or holds no substructure
         """
-        data = read_bytes(path)
+        check_regular(path)
         try:
-            with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-                found = {name: np.asarray(archive[name]) for name in archive.files}
+            found = read_arrays(as_path(path), signed=False)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
         except Exception as error:  # NumPy may raise anything for a broken file
-            raise InputError(f"{path}: is no .npz file of NumPy ({error})") from None
+            reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
+            raise InputError(f"{path}: is no .npz file of numbers ({reason})") from None
         missing = [name for name in ("x", "stiffness", "forces") if name not in found]
         fix = "give numpy.savez x=, stiffness= and forces=, or read a jbeamshell.StiffnessModel"
         require(str(path), f"without {', '.join(missing)}", not missing, fix)

@@ -2,7 +2,7 @@
 
 A file is an .npz of NumPy without pickled objects.  It holds the arrays of a history by name,
 including the state of the strip after the last step, and as ``about`` one line of JSON: the
-format, the scene as TOML, the data type and the cycles.
+format, the scene as TOML, the data type and the cycles.  A check sum covers all of them.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ from typing import Any
 import jax
 import numpy as np
 
+from jbeamshell.common.arrays import write_arrays
 from jbeamshell.common.checks import require
-from jbeamshell.common.files import as_path, written_whole
+from jbeamshell.common.files import as_path
 from jbeamshell.scene.toml import scene_to_toml
 
-FORMAT = "jbeamshell history 3"
+FORMAT = "jbeamshell history 4"
 
 
 def write_history(history: Any, path: str | os.PathLike[str]) -> None:
@@ -43,9 +44,8 @@ def write_history(history: Any, path: str | os.PathLike[str]) -> None:
     }
     target = as_path(path)
     require("path", str(path), target.suffix == ".npz", "end the name in .npz")
-    arrays: dict[str, Any] = {name: np.asarray(leaf) for name, leaf in named_arrays(history)}
-    with written_whole(target) as draft:
-        np.savez(draft, about=np.array(json.dumps(about)), **arrays)
+    arrays = {name: np.asarray(leaf) for name, leaf in named_arrays(history)}
+    write_arrays(target, {"about": np.array(json.dumps(about)), **arrays})
 
 
 def named_arrays(history: Any) -> list[tuple[str, Any]]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.summary import Summary
+from jbeamshell.identify.contradictions import contradiction
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.model_error import LIMITS, model_misfit
 from jbeamshell.identify.models import Driven, Model
@@ -264,7 +265,11 @@ def fit_at(
         labels=experiment.labels,
         scenes=scenes,
         intervals={k: (low, high) for k, (low, high) in zip(space.names, ends, strict=True)},
-        warnings=[*undescribed, *_warnings(problem, uncertainty, values, left, minima)],
+        warnings=[
+            *undescribed,
+            *_contradiction(problem, space, point),
+            *_warnings(problem, uncertainty, values, left, minima),
+        ],
         left=left,
         describes=not undescribed,
         minima=[(space.named(own), cost) for own, cost in minima],
@@ -283,6 +288,24 @@ def _undescribed(experiment: Experiment, left: Sequence[float]) -> list[str]:
     return [
         f"this model does not describe these data: it leaves {100.0 * left[worst]:.3g} % {of} of "
         f"{experiment.labels[worst]} that is no white noise, more than {100.0 * limits[worst]:g} %"
+    ]
+
+
+def _contradiction(problem: Problem, space: SearchSpace, point: NDArray[np.float64]) -> list[str]:
+    """Sentence on two measurements that contradict each other; none if they agree."""
+    experiment, best = problem.experiment, problem(space, point)
+    found = contradiction(best.residual, best.jacobian, experiment.slices)
+    if found is None:
+        return []
+    axis, *places = found[:3]
+    said = []
+    for place, step in zip(places, found[3:], strict=True):
+        moved = np.where(np.arange(point.size) == axis, point + step, point)
+        said.append(f"{experiment.labels[place]} about {space.values(moved)[axis]:.3g}")
+    return [
+        f"the measurements contradict each other: alone, {' and '.join(said)} would have for "
+        f"{space.names[axis]}, and each would be described at least twice as well: the values lie "
+        "between them and describe none; fit them apart"
     ]
 
 

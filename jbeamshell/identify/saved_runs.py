@@ -1,6 +1,7 @@
 """File of a fit's model runs, from which an interrupted fit continues.
 
-Its first line is JSON that names the fit; every further line holds one run.
+Its first line is JSON that names the fit; every further line holds one run and its check
+sum.  A run that was changed, or is of another fit, is left out and made again.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from jbeamshell.identify.experiment import Experiment, Prediction
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.numerics.newton import Newton
 
-FORMAT = "jbeamshell fit 2"
+FORMAT = "jbeamshell fit 3"
 LONGEST_HEADER = 1000  # characters
 FIX = "delete it, or save to another file"
 
@@ -62,15 +63,13 @@ class SavedRuns:
         if not os.path.exists(self.path):  # false also where there can be no such name
             write_text(self.path, self._header + "\n")
             return []
-        runs: list[Run] = []
         try:
-            with self.path.open(encoding="utf-8") as file:
+            with self.path.open(encoding="utf-8", errors="replace") as file:
                 # The file may be gigabytes of anything: read no more than a header first.
                 header = file.readline(LONGEST_HEADER).rstrip("\n")
                 valid = json.loads(header)["format"] == FORMAT
                 # The last line has no newline if the power went while it was written.
                 lines = file.read().split("\n")[:-1] if header == self._header else []
-            runs = [_from_line(line, *self._sizes) for line in lines]
         except OSError as error:
             raise InputError(f"save {self.path}: cannot be read ({error.strerror})") from None
         except (ValueError, KeyError, TypeError, RecursionError):
@@ -79,12 +78,13 @@ class SavedRuns:
             raise InputError(f"save {self.path}: is no state of a fit: {FIX}")
         if header != self._header:
             raise InputError(f"save {self.path}: is the state of another fit: {FIX}")
-        write_text(self.path, "\n".join([header, *lines, ""]))
-        return runs
+        found = [(line, self._run(line)) for line in lines]
+        write_text(self.path, "\n".join([header, *(line for line, run in found if run), ""]))
+        return [run for _, run in found if run]
 
     def append(self, runs: Sequence[Run]) -> None:
         """Add runs to the file; raises `InputError` if it cannot be written."""
-        lines = "".join(_as_line(*run) for run in runs)
+        lines = "".join(self._line(*run) for run in runs)
         try:
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(lines)
@@ -92,22 +92,30 @@ class SavedRuns:
             reason = error.strerror or error
             raise InputError(f"save {self.path}: cannot be written ({reason})") from None
 
+    def _line(self, values: NDArray[np.float64], run: Prediction) -> str:
+        arrays = {"values": values} | {name: getattr(run, name) for name in Prediction._fields[:3]}
+        packed: dict[str, Any] = {name: _packed(array) for name, array in arrays.items()}
+        packed["converged"] = bool(run.converged)
+        return json.dumps(packed | {"check_sum": self._check_sum(packed)}) + "\n"
 
-def _as_line(values: NDArray[np.float64], run: Prediction) -> str:
-    arrays = {"values": values} | {name: getattr(run, name) for name in Prediction._fields[:3]}
-    packed: dict[str, Any] = {name: _packed(array) for name, array in arrays.items()}
-    return json.dumps(packed | {"converged": run.converged}) + "\n"
+    def _run(self, line: str) -> Run | None:
+        """Run in a line; None if the line is not as it was written."""
+        try:
+            packed = json.loads(line)
+            if packed.pop("check_sum") != self._check_sum(packed):
+                return None
+            rows, keys, axes = self._sizes
+            values = _unpacked(packed["values"]).reshape(axes)
+            residual, prediction = (
+                _unpacked(packed[name]).reshape(rows) for name in ("residual", "prediction")
+            )
+            jacobian = _unpacked(packed["jacobian"]).reshape(rows, keys)
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            return None
+        return values, Prediction(residual, jacobian, prediction, packed["converged"])
 
-
-def _from_line(line: str, rows: int, keys: int, axes: int) -> Run:
-    run = json.loads(line)
-    residual, prediction = (
-        _unpacked(run[name]).reshape(rows) for name in ("residual", "prediction")
-    )
-    jacobian = _unpacked(run["jacobian"]).reshape(rows, keys)
-    return _unpacked(run["values"]).reshape(axes), Prediction(
-        residual, jacobian, prediction, bool(run["converged"])
-    )
+    def _check_sum(self, packed: dict[str, Any]) -> str:
+        return hashlib.sha256((self._header + json.dumps(packed)).encode()).hexdigest()
 
 
 def _packed(array: NDArray[np.float64]) -> str:

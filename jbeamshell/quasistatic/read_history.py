@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jbeamshell.common.arrays import read_arrays
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.files import as_path, check_regular
 from jbeamshell.history.history import History
@@ -45,12 +46,10 @@ def read_history(path: str | os.PathLike[str]) -> History:
     """
     check_regular(path)
     try:
-        # The file is opened here because NumPy leaves its own handle open if the file is damaged.
-        with as_path(path).open("rb") as handle, np.load(handle, allow_pickle=False) as file:
-            about = json.loads(str(file["about"]))
-            if about["format"] != FORMAT:
-                raise ValueError("of another format")
-            arrays = {name: file[name] for name in file.files if name != "about"}
+        arrays = read_arrays(as_path(path))
+        about = json.loads(str(arrays.pop("about")))
+        if about["format"] != FORMAT:
+            raise ValueError("of another format")
         precise = about["dtype"] != "float64" or jax.config.read("jax_enable_x64")
         blank = _blank(about, arrays) if precise else None
     except OSError as error:

@@ -150,6 +150,10 @@ def _finished(
     x64, fast_loops = cast(Any, jax.config).jax_enable_x64, FAST_LOOPS in os.getenv("XLA_FLAGS", "")
     arithmetic = Arithmetic(bool(x64), fast_loops)
     left = list(numbers)
+
+    def sizes(number: int) -> tuple[int, int]:
+        return len(job.figures), job.blocks[number].size
+
     while left or waiting:
         with without_main():  # processes start when they get their first block
             for number in left:
@@ -166,6 +170,9 @@ def _finished(
             except Exception as error:
                 failed.append(error)
             else:
+                if not (isinstance(block, Block) and block.fits(*sizes(number))):
+                    said = f"executor: a worker answered {type(block).__name__}, no block of lanes"
+                    raise UnconvergedError(f"{said}: give an executor that returns what it is told")
                 losses.in_a_row = 0
                 yield number, block
         if failed:

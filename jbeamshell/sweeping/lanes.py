@@ -36,7 +36,7 @@ class Outcome(enum.IntEnum):
     NOT_RUN = 6  # the sweep was interrupted before
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Lanes:
     """Lanes of a sweep: strips that differ in some numbers.
 

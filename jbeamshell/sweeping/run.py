@@ -128,11 +128,13 @@ def sweep(
         check_place(processes, executor, devices)
         table = None if out is None else _check_out(out)
         store = None if table is None else Store(f"{table}{PARTS}")
+        if store is not None:
+            stack.enter_context(store.opened(job.description(), lanes.axes))
         told = stack.enter_context(counting(progress, "sweep", "lane"))
         result = _run(job, store, place, _Watch(begun, told))
-    if store is not None and table is not None:
-        store.publish(result, table)
-        store.remove()
+        if store is not None and table is not None:
+            store.publish(result, table)
+            store.remove()
     return result
 
 
@@ -234,7 +236,6 @@ class _Place:
 def _run(job: Job, store: Store | None, place: _Place, watch: _Watch) -> Sweep:
     found: dict[int, Block] = {}
     if store is not None:
-        store.open(job.description(), job.lanes.axes)
         found = job.stored(store)
     before, losses = _lanes(found), Losses()
     notes = [f"{before:,} lanes were done before"] if before else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -39,6 +40,7 @@ OF_A_CYCLE = {*FIGURES, "dissipation_error"}  # figures that are numbers
 
 Answers = Callable[..., dict[str, Array]]
 _known: dict[str, Answers] = {}
+_knowing = threading.Lock()
 
 
 class Block(NamedTuple):
@@ -52,6 +54,12 @@ class Block(NamedTuple):
 
     values: np.ndarray
     status: np.ndarray
+
+    def fits(self, figures: int, lanes: int) -> bool:
+        """True if the arrays are numbers of so many figures and lanes."""
+        sizes = np.shape(self.values), np.shape(self.status)
+        kinds = np.asarray(self.values).dtype.kind, np.asarray(self.status).dtype
+        return sizes == ((figures, lanes), (lanes,)) and kinds == ("f", np.int8)
 
 
 def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
@@ -222,11 +230,12 @@ def _ask(
         name = f"{scene_to_toml(scene)} {scene.strip.length.dtype} {keys} {figures} {solver}"
     except InputError:  # a function of the user's own has no text
         return response(scene, keys, figures, solver=solver, method=method)
-    if name not in _known:
-        while len(_known) >= KEPT:
-            del _known[next(iter(_known))]
-        _known[name] = response(scene, keys, figures, solver=solver, method=method)
-    return _known[name]
+    with _knowing:
+        if name not in _known:
+            while len(_known) >= KEPT:
+                del _known[next(iter(_known))]
+            _known[name] = response(scene, keys, figures, solver=solver, method=method)
+        return _known[name]
 
 
 def _spread(mesh: Mesh) -> NamedSharding:

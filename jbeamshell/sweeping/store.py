@@ -5,20 +5,22 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from jbeamshell.common.arrays import check_sum, read_arrays, write_arrays
 from jbeamshell.common.errors import InputError
-from jbeamshell.common.files import written_whole
+from jbeamshell.common.files import locked
 from jbeamshell.sweeping.runner import Block
 
 if TYPE_CHECKING:
     from jbeamshell.sweeping.results import Sweep
 
 DESCRIPTION = "sweep.npz"
+LOCK = ".lock"
 FINISHED = re.compile(r"block-(\d+)\.npz$")
 OURS = re.compile(r"(sweep|block-\d+)\.npz$|table\.csv$|\.")  # with their drafts
 
@@ -27,13 +29,17 @@ class Store:
     """Folder with a sweep's description and one file for every finished block.
 
     Only the process that sweeps writes to it, and files whole: a block is there or it is not.
+    Blocks carry a check sum of their numbers, of their own number and of the sweep: one that was
+    changed, or belongs elsewhere, is computed again.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
+        self._sweep = ""
 
-    def open(self, description: str, axes: Mapping[str, np.ndarray]) -> None:
-        """Make the folder, or continue with the one that is there.
+    @contextlib.contextmanager
+    def opened(self, description: str, axes: Mapping[str, np.ndarray]) -> Iterator[None]:
+        """Context in which no other sweep uses the folder, which is made or continued with.
 
         Parameters
         ----------
@@ -43,22 +49,37 @@ class Store:
         Raises
         ------
         InputError
-            if the folder cannot be made, or holds anything but this sweep
+            if the folder cannot be made, or holds anything but this sweep, or if another process
+            or thread is at it
         """
+        with contextlib.ExitStack() as stack:
+            try:
+                self.folder.mkdir(exist_ok=True)
+                strange = [path for path in self.folder.iterdir() if not OURS.match(path.name)]
+                alone = not strange and stack.enter_context(locked(self.folder / LOCK))
+            except OSError as error:
+                raise InputError(f"{self.folder}: cannot be made ({error.strerror})") from None
+            if strange:
+                raise InputError(
+                    f"{self.folder}: is no unfinished sweep: rename the folder, or give another "
+                    "name"
+                )
+            if not alone:
+                raise InputError(
+                    f"{self.folder}: another sweep writes to it now: wait for it, or give another "
+                    "name"
+                )
+            self._begin(description, axes)
+            yield
+
+    def _begin(self, description: str, axes: Mapping[str, np.ndarray]) -> None:
+        """Write the description, or raise `InputError` if the folder has another one."""
         place = self.folder / DESCRIPTION
-        try:
-            self.folder.mkdir(exist_ok=True)
-            strange = [path for path in self.folder.iterdir() if not OURS.match(path.name)]
-        except OSError as error:
-            raise InputError(f"{self.folder}: cannot be made ({error.strerror})") from None
-        if strange:
-            raise InputError(
-                f"{self.folder}: is no unfinished sweep: rename the folder, or give another name"
-            )
+        named = {"description": np.array(description)}
+        named |= {f"axis_{i}": np.asarray(v) for i, v in enumerate(axes.values())}
+        self._sweep = check_sum(named)
         if not place.exists() and not self.done():
-            with written_whole(place) as draft:
-                numbers: dict[str, Any] = {f"axis_{i}": v for i, v in enumerate(axes.values())}
-                np.savez(draft, description=np.array(description), **numbers)
+            write_arrays(place, named)
         held, values = self.read()
         ours = list(axes.values())
         same = held == description and len(values) == len(ours)
@@ -71,7 +92,7 @@ class Store:
     def read(self) -> tuple[str, list[np.ndarray]]:
         """Description and values of the axes."""
         try:
-            held = _arrays(self.folder / DESCRIPTION)
+            held = read_arrays(self.folder / DESCRIPTION)
             axes = [held[f"axis_{i}"] for i in range(len(held) - 1)]
             return str(held["description"]), axes
         except Exception:  # a damaged file can raise anything
@@ -88,16 +109,13 @@ class Store:
 
     def save(self, number: int, block: Block) -> None:
         """Write a finished block."""
-        with written_whole(self._place(number)) as draft:
-            np.savez(draft, values=block.values, status=block.status)
+        write_arrays(self._place(number), block._asdict(), self._about(number))
 
     def load(self, number: int, figures: int, lanes: int) -> Block | None:
         """Block with these numbers of figures and lanes; None if damaged, and its file removed."""
         with contextlib.suppress(Exception):  # a damaged file can raise anything
-            block = Block(**_arrays(self._place(number)))
-            sizes = block.values.shape, block.status.shape
-            kinds = block.values.dtype.kind, block.status.dtype
-            if sizes == ((figures, lanes), (lanes,)) and kinds == ("f", np.int8):
+            block = Block(**read_arrays(self._place(number), self._about(number)))
+            if block.fits(figures, lanes):
                 return block
         self._place(number).unlink(missing_ok=True)
         return None
@@ -123,8 +141,5 @@ class Store:
     def _place(self, number: int) -> Path:
         return self.folder / f"block-{number:06d}.npz"
 
-
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    # NumPy leaves a handle of its own open if the file is damaged.
-    with path.open("rb") as handle, np.load(handle, allow_pickle=False) as file:
-        return dict(file)
+    def _about(self, number: int) -> str:
+        return f"block {number} of {self._sweep}"

@@ -26,6 +26,7 @@ from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.sweeping import executors, run
 from jbeamshell.sweeping.job import Job, runner_of
 from jbeamshell.sweeping.lanes import lanes_of
+from jbeamshell.sweeping.runner import Block
 
 TINY = {
     "model.nodes": 9,
@@ -138,6 +139,18 @@ def test_workers_that_cannot_go_on_are_told_and_what_is_done_is_kept(
     same(alone, rest)
     assert rest.computed < alone.computed
     assert [path.name for path in tmp_path.iterdir()] == ["sweep.csv"]
+
+
+@pytest.mark.parametrize("answer", [None, (1, 2), Block(np.zeros((4, 3)), np.zeros(3, np.int8))])
+def test_a_worker_that_answers_something_else_is_told(answer):
+    class Wrong(Here):
+        def submit(self, function, *arguments):
+            future = Future()
+            future.set_result(answer)
+            return future
+
+    with pytest.raises(UnconvergedError, match="give an executor that returns what it is told"):
+        jb.sweep(SCENE, over(SMALL), FIGURES, executor=Wrong())
 
 
 def test_an_executor_that_takes_no_blocks_is_told():

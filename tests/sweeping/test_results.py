@@ -1,5 +1,8 @@
 """Results of a sweep as others read them: tables, sets of arrays, HTML; and what is interrupted."""
 
+import copy
+import dataclasses
+import pickle
 import sys
 
 import numpy as np
@@ -69,6 +72,19 @@ def test_the_frame_holds_the_numbers_of_the_set():
     for name in (*AXES, "dissipation", "doubtful"):
         np.testing.assert_array_equal(stacked[name], frame[name])
     assert frame["status"].tolist()[3:] == ["max_iterations", "outside", "undefined"]
+
+
+def test_a_sweep_equals_its_copies_and_no_other():
+    swept = made_up()
+    for copied in (pickle.loads(pickle.dumps(swept)), copy.copy(swept), copy.deepcopy(swept)):
+        assert copied == swept
+        assert str(copied) == str(swept)
+    assert dataclasses.replace(swept, wall_s=9.0) == swept
+    swept.values["dissipation"][0, 0] = np.nextafter(swept["dissipation"][0, 0], 9.0)
+    assert swept != made_up()
+    assert made_up(paired=True) != made_up()
+    assert made_up(**{"contact.friction": 0.3}) != made_up()
+    assert made_up() != "a sweep"
 
 
 def test_lanes_are_doubtful_without_a_result_and_with_a_large_error():

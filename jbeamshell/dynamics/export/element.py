@@ -18,7 +18,7 @@ from jbeamshell.dynamics.four_parameters import FourParameters
 NEGLIGIBLE = 1e-13  # stiffness of a slider that is left out, over that of all
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Element:
     """Numbers of a joint, and what they mean.
 

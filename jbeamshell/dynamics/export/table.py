@@ -59,4 +59,6 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArray[np.
     places = [table.titles.index(name) for name in wanted]
     table.units(places)
     u, f = table.numbers(places).T
+    whole = bool(np.all(np.isfinite([u, f])))
+    require(str(path), "a number is missing", whole, "export the joint again")
     return u, f

@@ -1,0 +1,125 @@
+"""Stores of sweeps and fits: a number that was changed is never taken for one that was computed."""
+
+import json
+import os
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.common import files
+from jbeamshell.identify.experiment import Prediction
+from jbeamshell.identify.saved_runs import SavedRuns
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.sweeping.runner import Block
+from jbeamshell.sweeping.store import Store
+
+AXES = {"load.amplitude": np.linspace(0.1, 0.9, 7)}
+BLOCK = Block(np.linspace(0.0, 1.0, 21).reshape(3, 7), np.zeros(7, np.int8))
+FLIPS = 300
+
+
+def flipped(content, random):
+    """Content with a bit changed, or a few bytes of it elsewhere."""
+    changed, at = bytearray(content), int(random.integers(len(content)))
+    if random.integers(4):
+        changed[at] ^= 1 << int(random.integers(8))
+    else:
+        changed[at : at + 8] = random.bytes(8)
+    return bytes(changed)
+
+
+def test_a_block_that_was_changed_or_belongs_elsewhere_is_computed_again(tmp_path):
+    random, store, taken = np.random.default_rng(22), Store(tmp_path / "parts"), 0
+    with store.opened("a sweep", AXES):
+        store.save(3, BLOCK)
+        place = store.folder / "block-000003.npz"
+        good = place.read_bytes()
+        for _ in range(FLIPS):
+            place.write_bytes(flipped(good, random))
+            found = store.load(3, 3, 7)
+            taken += found is not None
+            assert found is None or all(map(np.array_equal, found, BLOCK))
+            assert place.exists() == (found is not None)
+        assert taken < FLIPS // 2  # bytes that mean nothing, such as dates
+        for number, content in ((2, good), (3, good)):
+            (store.folder / f"block-{number:06d}.npz").write_bytes(content)
+        assert store.load(2, 3, 7) is None
+        assert store.load(3, 3, 7) is not None
+        store.save(3, BLOCK)
+    other = Store(tmp_path / "other")
+    for axes, same in ((AXES, True), ({"load.amplitude": AXES["load.amplitude"] + 1e-16}, False)):
+        with other.opened("a sweep", axes):
+            (other.folder / place.name).write_bytes(good)
+            assert (other.load(3, 3, 7) is not None) == same
+            other.remove()
+
+
+def test_two_sweeps_do_not_write_into_one_folder(tmp_path):
+    one, two = Store(tmp_path / "parts"), Store(tmp_path / "parts")
+    with one.opened("a sweep", AXES):
+        with pytest.raises(jb.InputError, match="another sweep writes to it now"):
+            two.opened("a sweep", AXES).__enter__()
+        one.save(0, BLOCK)
+    with two.opened("a sweep", AXES):
+        assert two.done() == {0}
+        two.remove()
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(ZeroDivisionError), one.opened("a sweep", AXES):
+        raise ZeroDivisionError
+    with two.opened("a sweep", AXES), pytest.raises(jb.InputError, match="holds another"):
+        two._begin("another sweep", AXES)
+
+
+def test_a_lock_ends_with_the_process_that_holds_it(tmp_path):
+    path = tmp_path / ".lock"
+    program = (
+        f"import pathlib, time; from jbeamshell.common.files import locked\n"
+        f"with locked(pathlib.Path({str(path)!r})) as alone:\n"
+        "    print(alone, flush=True)\n"
+        "    time.sleep(60)"
+    )
+    environment = os.environ | {"PYTHONPATH": str(Path(jb.__file__).parents[1])}
+    words = [sys.executable, "-c", program]
+    with subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout.readline() == "True\n"
+        with files.locked(path) as alone:
+            assert not alone
+        holder.kill()
+        holder.wait()
+    with files.locked(path) as alone:
+        assert alone
+
+
+def test_a_run_of_a_fit_that_was_changed_is_made_again(tmp_path):
+    random, path = np.random.default_rng(23), tmp_path / "state"
+    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), scenes=(), observations=())
+    space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
+    runs = SavedRuns(path, experiment, space, Newton())
+    assert runs.read() == []
+    made = [
+        (random.random(2), Prediction(random.random(4), random.random((4, 2)), random.random(4), c))
+        for c in (True, False, True)
+    ]
+    runs.append(made)
+    good = path.read_bytes()
+    known = {values.tobytes(): run for values, run in made}
+    header = good.index(b"\n") + 1
+    for _ in range(FLIPS):
+        path.write_bytes(good[:header] + flipped(good[header:], random))
+        found = runs.read()
+        assert len(found) >= 1
+        for values, run in found:
+            right = known[values.tobytes()]
+            assert all(map(np.array_equal, run, right))
+    assert path.read_bytes().count(b"\n") == len(found) + 1
+    _, *rest = good.splitlines(keepends=True)
+    other = SavedRuns(path, experiment, space, Newton(tolerance=1e-9))
+    path.write_bytes(json.dumps(json.loads(other._header)).encode() + b"\n" + b"".join(rest))
+    assert other.read() == []
+    path.write_bytes(good)
+    assert len(runs.read()) == 3
