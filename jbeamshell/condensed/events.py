@@ -185,7 +185,10 @@ def _differentiable(
         return (lax.stop_gradient(at), origin, level), level
 
     carry = (empty(k, n, lifting), lax.stop_gradient(start), first)
-    return lax.scan(go, carry, (forces, turns))[1]
+    found = lax.scan(go, carry, (forces, turns))[1]
+    moved = jnp.concatenate([found.state.v - start.v, found.lift - lift], axis=1)
+    displacement = start.displacement + body.c * (forces - start.force) + moved @ pull
+    return found._replace(state=found.state._replace(displacement=displacement))
 
 
 @jax.custom_batching.sequential_vmap

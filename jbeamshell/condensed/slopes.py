@@ -214,7 +214,6 @@ def level_slopes(
     dw = jnp.where(at.opened, answer[k:], 0.0)
     dq = jnp.concatenate([dv, dw])
     dr = pushed + system.matrix @ dq
-    du = change.c * last.force + system.c * load_change + change.pull @ fields + system.pull @ dq
 
     impulse = (
         jnp.vdot(trace.on_matrix, change.matrix)
@@ -230,7 +229,8 @@ def level_slopes(
 
     work = energy(fields, last.force) - last.r_t @ dv - impulse
     work = work - energy(start, first.force) + first.r_t @ slip_change
-    state = ContactState(dv, dr[:k], jnp.where(at.opened, 0.0, dr[k:]), load_change, du)
+    none = jnp.zeros_like(load_change)  # a path's displacement follows from its fields
+    state = ContactState(dv, dr[:k], jnp.where(at.opened, 0.0, dr[k:]), load_change, none)
     return Slopes(state, dw, work)
 
 

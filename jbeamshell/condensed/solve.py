@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from typing import Literal
@@ -94,7 +95,8 @@ def solve(
     known = isinstance(turns, tuple)
     given = (scene, strip, targets, () if known else turns)
     history: History = _walk(given, turns if known else (), cycles, by, soft)
-    return history
+    # Numbers that come back from a compiled function are traced, and no longer tell ideal sliders.
+    return dataclasses.replace(history, scene=scene)
 
 
 def quickest(scene: Scene) -> Search:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, lax
 from jax.typing import ArrayLike
 
 ORDER = {"finite-difference": 1, "collocation": 2}
@@ -173,12 +173,17 @@ def nodal_loads(rule: Rule, ends: Array, load: Array) -> Array:
     """
     if load.ndim == 0:
         return load * tributary_lengths(rule, ends)
-    table = jnp.concatenate([load[:1], load, load[-1:]])  # end values go on beyond the table
-    x, value = table[:, 0].at[0].min(ends[0]).at[-1].max(ends[-1]), table[:, 1]
+    value = jnp.concatenate([load[:1, 1], load[:, 1], load[-1:, 1]])  # end values go on beyond
+    before = jnp.minimum(load[0, 0], ends[0]) + ends[0] - ends[-1]
+    after = jnp.maximum(load[-1, 0], ends[-1]) + ends[-1] - ends[0]
+    outer = lax.stop_gradient(jnp.stack([before, after]))  # wherever they are
+    x = jnp.concatenate([outer[:1], load[:, 0], outer[1:]])
     run = jnp.where(jnp.diff(x) > 0.0, jnp.diff(x), 1.0)
-    begin, size = ends[:-1, None], jnp.diff(ends)[:, None]
-    low = jnp.maximum(begin, x[:-1])
-    cut = jnp.maximum(jnp.minimum(begin + size, x[1:]) - low, 0.0)  # (elements, rows + 1)
+    begin, end, size = ends[:-1, None], ends[1:, None], jnp.diff(ends)[:, None]
+    # A row at the end of two elements lies in the second one, so that derivatives are one-sided.
+    low = jnp.where(x[:-1] >= begin, x[:-1], begin)
+    high = jnp.where(x[1:] < end, x[1:], end)
+    cut = jnp.where((high >= low) & (low < end), high - low, 0.0)  # (elements, rows + 1)
     total = jnp.zeros((ends.size - 1, rule.nodes.size), ends.dtype)
     for point, weight in zip(*_gauss(2), strict=True):  # exact for linear times quadratic
         at = low + point * cut

@@ -1,5 +1,7 @@
 """Levels of load paths: factors or events by themselves, in batches, and their slopes."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -25,10 +27,17 @@ def laminate_body(soft=1.0):
     return STRIP(PLANE.replace({"strip.layers": LAYERS * [[1.0, soft, 1.0], [1.0, 1.0, 1.0]]}))
 
 
+def open_body(eta):
+    """Strip whose last nodes are off the base before any load."""
+    body = strip_body(eta)
+    return dataclasses.replace(body, r_0=body.r_0.at[:3].set(0.0))
+
+
 def path(body, friction, amplitude):
     start = branches.pressed(body)
+    lift = jnp.where(body.r_0 > 0.0, 0.0, 1e-5 * body.x)
     # Gross slip of the standard pressure is at 20 mu.
-    return levels.levels(body, friction, start, 20.0 * amplitude * TURNS, TURNED)
+    return levels.levels(body, friction, start, 20.0 * amplitude * TURNS, TURNED, lift)
 
 
 def figures(body, friction, amplitude):
@@ -45,6 +54,7 @@ CASES = {
     "nested": (lambda: (strip_body(0.1), strip_body(0.11)), 0.1, 0.05),
     "lifting": (lambda: (strip_body(0.3), strip_body(0.31, 0.28)), 0.3, 0.2),
     "lifting far": (lambda: (strip_body(0.2), strip_body(0.21, 0.32)), 0.5, 0.3),
+    "open before": (lambda: (open_body(0.2), open_body(0.21)), 0.3, 0.1),
     "steep": (lambda: (strip_body(0.4), strip_body(0.38, 0.31)), 0.8, 0.35),
     "laminate": (lambda: (laminate_body(), laminate_body(1.05)), 0.4, 0.3),
 }

@@ -297,3 +297,17 @@ def test_loads_are_differentiable_in_where_they_step(name, at):
     # Moving the step adds load of the height 3 - 1 at X = at.
     x = grid.nodes(element_rule(name), jnp.asarray(NODES))
     np.testing.assert_allclose([slope.sum(), slope @ x], [2.0, 2.0 * at], rtol=1e-12)
+
+
+@rules
+@pytest.mark.parametrize("row", [0, 1, 2])
+def test_rows_on_nodes_and_ends_have_their_slopes(name, row):
+    """No kink is there: the slopes from both sides are one, and the force's is in closed form."""
+    table = jnp.array([[0.0, 3.0], [0.5, 7.0], [2.0, 4.0]])
+    way = jnp.zeros_like(table).at[row, 0].set(1.0)
+    slope = jax.jvp(lambda t: loads(name, NODES, t), (table,), (way,))[1]
+    forth, back = (loads(name, NODES, table + h * way) for h in (1e-6, -1e-6))
+    np.testing.assert_allclose(slope, (forth - back) / 2e-6, atol=5e-5)
+    # The force is the area of two trapezoids, between end values that go on.
+    force = [0.5 * (3.0 - 7.0), 0.5 * (3.0 - 4.0), 0.5 * (7.0 - 4.0)]
+    assert float(slope.sum()) == pytest.approx(force[row], abs=1e-12)
