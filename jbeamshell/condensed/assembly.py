@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.events import walk
@@ -76,6 +77,6 @@ def press_roughly(
         body = eqx.tree_at(lambda b: (b.f_t, b.f_n), body, closed)
     once = jnp.ones(1, bool)
     levels = walk(body, friction, pressed(body), jnp.ones_like(press_n[:1]), once)
-    at = jax.tree.map(lambda part: jnp.where(levels.settled[0], part[0], jnp.nan), levels.state)
-    lift = jnp.where(levels.settled[0], levels.lift[0], jnp.nan)
+    first = jax.tree.map(lambda part: part[0], (levels.state, levels.lift))
+    at, lift = nan_unless(levels.settled[0], first)
     return Assembly(lift, at.v, at.r_n, at.r_t)

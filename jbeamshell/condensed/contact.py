@@ -23,6 +23,7 @@ from jbeamshell.common.checks import (
     require_number,
 )
 from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.body import Body
@@ -302,7 +303,7 @@ def _history(
         return sound(jnp.pad(values, missing)[:, places])
 
     def sound(values: Array) -> Array:
-        return jnp.where(levels.settled.reshape(-1, *[1] * (values.ndim - 1)), values, jnp.nan)
+        return nan_unless(levels.settled, values)
 
     state = levels.state
     return ContactHistory(

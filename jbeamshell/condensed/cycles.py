@@ -28,6 +28,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.condensed.body import Body
 from jbeamshell.numerics.factors import lower_upper
 
@@ -90,7 +91,7 @@ class SteadyCycles(NamedTuple):
         push = z[0] @ (reach * p_3 - square_3 / y_g[0])
         inside = jnp.all(low <= jnp.where(part < 1.0, LITTLE * reach * y_g[1], jnp.inf))
         valid = inside & self._valid(amplitude, reach - p_3 / y_g[0], reach - y / y_g[1])
-        return jnp.where(valid, 0.5 * (pull + push), jnp.nan)
+        return nan_unless(valid, 0.5 * (pull + push))
 
     def _valid(self, amplitude: Array, push: Array, pull: Array) -> Array:
         """True if events rise from reversal to reversal and reactions stay positive.

@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array, lax
 
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import ContactState, Factors, factorise, follow, path, pressed
 from jbeamshell.condensed.cycles import STEADY
@@ -136,7 +137,7 @@ class Network(eqx.Module):
         reach = 0.5 * jnp.abs(found.at.displacement[-1] - found.at.displacement[-2])
         nested = jnp.all(found.valid)
         work = jnp.sum(found.slip_work[-2:])
-        return jnp.where(nested, reach, jnp.nan), jnp.where(nested, work, jnp.nan)
+        return nan_unless(nested, (reach, work))
 
     def along(self, displacements: Array) -> Response:
         """Response at the points of a path (T,) of end displacements, from the pressed state."""

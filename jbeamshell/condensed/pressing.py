@@ -17,6 +17,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array, lax
 
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.condensed.tableau import exchanged_rows
 from jbeamshell.numerics.factors import solve
 
@@ -71,7 +72,7 @@ def press(
     both = opened[:, None] & opened
     matrix = jnp.where(both, stiffness, jnp.diag(jnp.diag(stiffness)))
     lift = jnp.where(opened, solve(matrix, jnp.where(opened, -r_0, 0.0)), 0.0)
-    lift = jnp.where(found, lift, jnp.nan)
+    lift = nan_unless(found, lift)
     reaction = jnp.where(opened | (not foundation), 0.0, r_0 + stiffness @ lift)
     return Pressing(lift, -known[:, -1] - known[:, :-1] @ (lift - away), reaction)
 

@@ -245,4 +245,5 @@ def _held_again(change: System, slip_change: Array, trace: Trace) -> Array:
     known = known + jnp.sum(trace.held.forces * given, axis=1)
     # Each depends on those of earlier events only.
     order = jnp.eye(k) - trace.held.held[:, k:]
-    return jnp.where(trace.sticks > k, jnp.nan, inverse_unit_lower(order) @ known)
+    recorded = jnp.where(trace.sticks > k, jnp.nan, 1.0)
+    return recorded * (inverse_unit_lower(order) @ known)

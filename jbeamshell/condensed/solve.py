@@ -14,6 +14,7 @@ from jax import Array
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import Status
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.bearings import bearing_energy, with_bearings, with_gaps
@@ -237,7 +238,7 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     sound = jnp.append(jnp.ones(before, bool), levels.settled)
 
     def masked(values: Array) -> Array:
-        return jnp.where(sound.reshape(-1, *[1] * (values.ndim - 1)), values, jnp.nan)
+        return nan_unless(sound, values)
 
     return History(
         scene=scene,

@@ -11,6 +11,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.errors import Status
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
@@ -49,9 +50,9 @@ class SteadyCycles(NamedTuple):
             each[-size:].reshape(levels.size, -1)
             for each in (history.displacement, history.slip_work)
         )
-        sound = jnp.where(jnp.all(history.status == Status.CONVERGED), 1.0, jnp.nan)
         half = 0.5 * jnp.abs(u[:, -1] - u[:, -2])
-        return cls(levels, sound * half, sound * jnp.sum(work[:, -2:], axis=1))
+        sound = jnp.all(history.status == Status.CONVERGED)
+        return cls(levels, *nan_unless(sound, (half, jnp.sum(work[:, -2:], axis=1))))
 
 
 def gross_slip(scene: Scene) -> Any:

@@ -14,6 +14,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.scene.rows import Key, Part, rows
 
 BISECTIONS = 64  # halvings of the logarithm of a displacement
@@ -138,7 +139,7 @@ class Law(Part):
             largest = float(np.max(size, initial=0.0))
             fix = f"{BEYOND} {float(self.capacity):.6g}"
             require(f"force of {self.heading}", largest, not beyond.any(), fix)
-        return jnp.where(size < self.capacity, size, jnp.nan)
+        return nan_unless(size < self.capacity, size)
 
     def _inverse(self, rising: Any, force: Array) -> Array:
         """Displacement at which a rising function has a value, with its derivatives."""

@@ -6,12 +6,12 @@ import warnings
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.path_state import StepResults
@@ -67,7 +67,7 @@ def history_of(scene: Scene, steps: StepResults, pressure: Array) -> History:
     converged, level = steps.state.converged, steps.state.level
 
     def masked(values: Array) -> Array:
-        return jnp.where(converged.reshape(-1, *[1] * (values.ndim - 1)), values, jnp.nan)
+        return nan_unless(converged, values)
 
     return History(
         scene=scene,

@@ -11,6 +11,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_traced, require
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.jax_options import memory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.domain import bar_rule, gross_slip_rule, stays_below
@@ -95,7 +96,7 @@ def _below_gross_slip(scene: Scene, targets: Array, pressures: Array) -> Array:
     if contact.bolt_stiffness is not None or scene.load.kind == "moment":  # nothing slides off
         return targets
     below = stays_below(jnp.abs(targets), contact.friction * force, pressures)
-    return jnp.where(below, targets, jnp.nan)
+    return nan_unless(below, targets)
 
 
 def check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:

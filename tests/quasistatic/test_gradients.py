@@ -86,6 +86,31 @@ def test_a_traced_force_beyond_gross_slip_has_no_result(rung):
     assert np.isnan(both["dissipation"]).tolist() == [False, True]
 
 
+def test_a_lane_that_fails_has_no_derivative():
+    few = {"model.nodes": 9, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
+    keys = ["contact.friction", "load.amplitude", "strip.axial_stiffness"]
+    ask = jb.response(STRIP.replace({"model.rung": "bar"} | few), keys)
+
+    def dissipation(*values):
+        return ask(*values)["dissipation"]
+
+    mu = jnp.array([0.1, 0.03])
+    slopes = jax.jit(jax.vmap(jax.grad(dissipation, (0, 1, 2)), (0, None, None)))(mu, 0.7, 3e4)
+    assert np.isnan(slopes).tolist() == [[False, True]] * 3
+
+
+def test_sliders_stay_ideal_within_a_transformation():
+    scene, seen = jb.Scene().replace({"model.nodes": 9, "load.cycles": 1}), []
+
+    def dissipation(height):
+        history = jb.solve(scene.replace({"strip.height_ratio": height}), throw=False)
+        seen.append(history.scene.ideal_friction)
+        return history.dissipation
+
+    jax.eval_shape(jax.grad(dissipation), 0.1)
+    assert seen == [True]
+
+
 def test_a_response_takes_one_number_of_each_key():
     ask = jb.response(STRIP, ["contact.friction", "load.amplitude"])
     with pytest.raises(jb.InputError, match=r"contact.friction: is an array of shape \(2,\): give"):

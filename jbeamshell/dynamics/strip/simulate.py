@@ -16,6 +16,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import POSITIVE, is_traced, require, require_choice, require_number
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.progress import watched
 from jbeamshell.dynamics.strip import rate_friction
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
@@ -244,10 +245,7 @@ def _motion(
     """Motion from its states; times that were not reached hold NaN."""
     reached = jnp.isfinite(states.work[:, 0])
 
-    def masked(values: Array) -> Array:
-        return jnp.where(reached.reshape(-1, *[1] * (values.ndim - 1)), values, jnp.nan)
-
-    states = jax.tree.map(masked, states)
+    states = nan_unless(reached, states)
 
     def quantities(pair: tuple[Array, MotionState]) -> tuple[Array, ...]:
         time, state = pair
@@ -271,7 +269,7 @@ def _motion(
         fields=q,
         rates=p,
         traction=has_contact * states.t[:, :n],
-        reaction=masked(reaction),
+        reaction=nan_unless(reached, reaction),
         displacement=displacement,
         velocity=velocity,
         chain=states.q[:, n:, 0],

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Structure
@@ -108,7 +109,7 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
     backbones = tuple((joint.displacement, joint.force) for joint in joints)
     curve, sound = _curve(backbones, statics, jnp.asarray(amplitude))
     if is_traced(curve):
-        return jax.tree.map(lambda column: jnp.where(sound, column.T, jnp.nan).T, curve)
+        return nan_unless(sound, curve)
     if not np.all(sound):
         raise UnconvergedError(
             "no equilibrium of the joints at the modal displacement "

@@ -11,6 +11,7 @@ from jax import Array, lax
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.jax_options import ONCE
 from jbeamshell.condensed.network import Network, Response, Sliders
 from jbeamshell.dynamics.steady_cycles import SteadyCycles
@@ -57,7 +58,7 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array,
     nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
     rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
     series = scene.contact.bearing_stiffness is None  # a bearing is no slider
-    return network, jnp.where(jnp.all(nested) & rising & series, u, jnp.nan), f, count
+    return network, nan_unless(jnp.all(nested) & rising & series, u), f, count
 
 
 slider_line_once = jax.jit(slider_line, static_argnums=2, compiler_options=ONCE)

@@ -13,6 +13,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration import setup
 from jbeamshell.dynamics.vibration.balance import (
@@ -161,7 +162,7 @@ def steady_response(
     with setup.precise(traced):
         model, basis = reduced(structure, force)
         found = _steady(model, balance, jnp.asarray(omega), traced)
-        x = jnp.where(found.converged[:, None, None], found.point.x, jnp.nan)
+        x = nan_unless(found.converged, found.point.x)
         harmonic = x @ basis[place]
         first = harmonic[:, 0]
         after = left_out(model, balance, omega, x @ model.directions, found.lost)
