@@ -12,6 +12,7 @@ import pytest
 import jbeamshell as jb
 from calibration.finite_elements import lap
 from jbeamshell.condensed import strip
+from jbeamshell.condensed.section import section_form
 from jbeamshell.condensed.strip import stations
 from jbeamshell.dynamics import Joint
 from jbeamshell.mechanics.bar import lap_backbone, lap_cubic_law
@@ -263,6 +264,14 @@ class TestMoments:
         middle, above, below = (compliance({"load.arm": arm}) for arm in (0.0, 0.1, -0.1))
         turning = compliance({"load.kind": "moment", "load.amplitude": 1.0})
         assert above - 2.0 * middle + below == pytest.approx(2.0 * 0.1**2 * turning, rel=1e-9)
+
+    def test_a_moment_turns_and_a_force_pulls(self):
+        @jax.jit
+        def ends(scene):  # work of both loads on a unit stretch and a unit rotation
+            form = section_form(scene)
+            return jnp.stack([form.pull, form.turn]) @ form.modes[jnp.array([0, 2]), 1].T
+
+        np.testing.assert_allclose(ends(SQUEEZE.pinned()), np.eye(2), atol=1e-12)
 
     @pytest.mark.slow
     def test_stuck_thin_members_bend_as_one_beam(self):
