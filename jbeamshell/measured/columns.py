@@ -49,6 +49,7 @@ NORMAL = (
     *("vorspann", "klemm", "schraubenkraft", "serrage", "precharge", "serraggio", "precarico"),
 )
 # A load step is no force, and a rate no displacement.
+EXPONENT = re.compile(r"(?<=[\d.,])[eE](?=[+-]?\d)")  # of a number
 COUNTERS = {"step", "number", "no", "case", "cycle", "cycles", "rate", "time", "speed", "velocity"}
 COUNTERS |= {"nr", "nummer", "schritt", "zyklus", "zyklen", "numero", "ciclo", "cicli"}
 COUNTERS |= {"rapporto", "vitesse", "velocita", "geschwindigkeit"}
@@ -153,8 +154,8 @@ def _instead(
 
 def is_header(titles: Sequence[str], chosen: Mapping[str, str]) -> bool:
     """True if a row of cells holds a title for the force and another for the displacement."""
-    if not any(re.search(r"[^\W\d_]", title) for title in titles):
-        return False
+    if not any(re.search(r"[^\W\d_]", EXPONENT.sub("", title)) for title in titles):
+        return False  # numbers, of which tables have many rows
     try:
         find_columns(titles, chosen, "", "")
     except InputError:

@@ -12,6 +12,7 @@ import pytest
 import jbeamshell as jb
 from calibration.finite_elements import lap
 from jbeamshell.condensed import strip
+from jbeamshell.condensed.pair import Pair, over_gap
 from jbeamshell.condensed.section import section_form
 from jbeamshell.condensed.strip import stations
 from jbeamshell.dynamics import Joint
@@ -264,6 +265,7 @@ class TestMoments:
         middle, above, below = (compliance({"load.arm": arm}) for arm in (0.0, 0.1, -0.1))
         turning = compliance({"load.kind": "moment", "load.amplitude": 1.0})
         assert above - 2.0 * middle + below == pytest.approx(2.0 * 0.1**2 * turning, rel=1e-9)
+        assert above > below  # away from the contact it tilts the section more
 
     def test_a_moment_turns_and_a_force_pulls(self):
         @jax.jit
@@ -310,6 +312,17 @@ BEND = [[0.0, 0.0], [1.0, 2e-5], [2.0, 8e-5]]  # of a member that is curved
 
 
 class TestGap:
+    def test_what_is_open_is_lifted_and_the_gap_besides(self):
+        random, gap = np.random.default_rng(0), np.array([0.1, 0.0, 0.3])
+        hessian, upper, lower = random.standard_normal((3, 8, 8))
+        moved, found = over_gap(Pair(None, None, upper, lower), hessian, jnp.asarray(gap))
+        opening = np.append(random.standard_normal(7), 1.0)  # v, w + gap, load, pressure
+        lift = opening.copy()
+        lift[1:6:2] -= gap
+        assert float(opening @ found @ opening) == pytest.approx(lift @ hessian @ lift, rel=1e-12)
+        np.testing.assert_allclose(moved.upper @ opening, upper @ lift, rtol=1e-12)
+        np.testing.assert_allclose(moved.lower @ opening, lower @ lift, rtol=1e-12)
+
     @pytest.mark.slow
     def test_a_member_that_is_free_settles_over_an_even_gap(self):
         flat, above = (jb.solve(SQUEEZE.replace({"contact.gap": g})) for g in (None, 1e-3))
@@ -398,6 +411,7 @@ def test_derivatives_have_slope_two():
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
 
 
+@pytest.mark.slow
 def test_a_sweep_runs_over_both_heights():
     sweep = jb.sweep(
         SQUEEZE, {"strip.height_ratio": [0.05, 0.1], "member.height_ratio": [0.05, 0.2]}

@@ -147,12 +147,14 @@ class TestBranches:
         body = STRIP(scene_of(0.1126, mu=0.5)).body
         assert not np.any(by_factors(body, 0.5, 1.0).valid)
 
+    @pytest.mark.slow
     def test_what_is_not_nested_is_walked_event_by_event(self):
         steady = {"load.steps_per_half_cycle": 1}
         history = plane(scene_of(0.1126, mu=0.5), **steady)
         found = condensed.dissipation(history.scene, [1.0], nodes=33)
         np.testing.assert_allclose(found, [history.dissipation], rtol=1e-12)
 
+    @pytest.mark.slow
     def test_the_gradient_has_taylor_slope_two(self):
         scene = scene_of(0.1126)
         keys = ("contact.friction", "strip.height_ratio", "strip.poisson_ratio")
@@ -272,7 +274,7 @@ class TestHistory:
 
 
 class TestRung:
-    @pytest.mark.doubtful("in the corner", "few nodes")
+    @pytest.mark.slow
     def test_a_response_is_what_a_run_says(self):
         scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 33})
         one_step = scene.replace({"load.steps_per_half_cycle": 1})
@@ -326,7 +328,7 @@ class TestRung:
             imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
             assert imbalance < 0.05  # trapezoids of the work over 8 steps a branch
 
-    @pytest.mark.doubtful("few nodes")
+    @pytest.mark.slow
     def test_a_traced_path_is_the_path(self):
         scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 17})
         loads = np.array([0.5, 1.0, 0.4, -0.3, -0.8, -0.8, 0.1, 1.0])

@@ -1,6 +1,7 @@
 """Inertia, vibrations and friction as a rate law, against closed forms."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -157,16 +158,17 @@ def test_the_rate_law_walks_the_quasi_static_loop(m):
     path = lambda s: 3.0 * np.sin(s) + 0.5 * np.sin(3.0 * s)  # noqa: E731
     speed = lambda s: 3.0 * np.cos(s) + 1.5 * np.cos(3.0 * s)  # noqa: E731
     law, steps = ElasticSlip(m), np.linspace(0.0, 4.0 * np.pi, 801)
-    walked, t = [], jnp.asarray(0.0)
-    for a, b in zip(path(steps[:-1]), path(steps[1:]), strict=True):
-        t = law.traction(jnp.asarray(b - a), t, jnp.asarray(1.0), jnp.asarray(1.0))
-        walked.append(float(t))
+    one = jnp.asarray(1.0)
+
+    def step(t, dv):
+        t = law.traction(dv, t, one, one)
+        return t, t
+
+    _, walked = jax.jit(lambda dv: jax.lax.scan(step, 0.0 * one, dv))(np.diff(path(steps)))
+    of_speed = jax.jit(lambda t, v: rate_friction.traction_rate(t, v, one, 1.0, m * one, 1e-9))
 
     def rate(s, t):
-        found = rate_friction.traction_rate(
-            jnp.asarray(t[0]), jnp.asarray(speed(s)), jnp.asarray(1.0), 1.0, jnp.asarray(m), 1e-9
-        )
-        return [float(found)]
+        return [float(of_speed(t[0], speed(s)))]
 
     coarse = steps[::8]
     solved = scipy.integrate.solve_ivp(

@@ -300,7 +300,7 @@ def test_a_thousand_cycles_neither_drift_nor_lose_energy():
     assert float(history.dissipation_loop) == pytest.approx(float(history.dissipation), rel=0.02)
 
 
-@pytest.mark.doubtful("few nodes")
+@pytest.mark.slow
 def test_single_precision_holds_what_it_can_and_refuses_the_rest():
     shell = COARSE | {"model.fields": ["v", "beta"], "model.solution": "stepwise"}
     code = f"""

@@ -70,13 +70,8 @@ def test_smoothing_does_not_change_the_dissipation(smoothing):
     assert float(jb.solve(scene).dissipation_ratio) == pytest.approx(0.7695, abs=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("grid", "order"),
-    [
-        ("finite-difference", 2.0),
-        pytest.param("collocation", 4.0, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("grid", "order"), [("finite-difference", 2.0), ("collocation", 4.0)])
 def test_order_of_convergence_in_the_grid(grid, order):
     """A stuck strip on its elastic foundation is smooth: no slip front spoils the order."""
 
@@ -127,7 +122,7 @@ def test_inside_a_transformation_the_failure_is_loud_too():
         jax.block_until_ready(run(0.1))
 
 
-@pytest.mark.doubtful("few nodes")
+@pytest.mark.slow
 def test_a_failed_step_is_walked_in_pieces():
     """The recovered path ends where a path with small steps ends."""
     # So smooth that large steps take more iterations than small ones.
