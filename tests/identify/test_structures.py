@@ -57,6 +57,22 @@ def forced(model, random, noise=0.02):
     return ForcedCurve(omega / (2.0 * np.pi), force, SIZE, noise=noise * force)
 
 
+def test_amplitudes_are_those_of_the_point():
+    """One mass m swings with omega^2 = F(u)/(u m), u its own displacement, not the modal one."""
+    joint = Joint(FORCE + 0.4 * FORCE**2, FORCE)
+    alone = Assembly(
+        lambda scene, numbers: Structure(
+            4.0 * np.eye(1), numbers["spring"] * np.eye(1), [Attachment(joint, 0)]
+        ),
+        numbers={"spring": 0.5},
+        point=0,
+    )
+    curve, per_force = alone.response(SIZE)
+    secant = joint.backbone(SIZE) / SIZE + 0.5
+    np.testing.assert_allclose(curve.frequency, np.sqrt(secant / 4.0), rtol=1e-6)
+    assert float(per_force) == pytest.approx(0.25)  # 1/m
+
+
 def test_planted_numbers_are_recovered_within_their_intervals():
     model, random = START.replace(TRUTH), np.random.default_rng(0)
     found = fit([*curves(model, random), forced(model, random)], START, list(TRUTH))
