@@ -127,6 +127,16 @@ class TestTurns:
             loads = np.cumsum(moves).astype(float)
             assert _known_turns(loads) == tuple(np.asarray(traced(loads)).tolist())
 
+    def test_traced_turns_are_walked_as_known_ones(self):
+        body = strip_body(0.1)
+        given = body, 0.1, branches.pressed(body), 1.2 * TURNS
+        known, sound = jax.jit(levels.nested_levels, static_argnums=4)(*given, TURNED)
+        traced, also = jax.jit(levels.nested_levels)(*given, jnp.asarray(TURNED))
+        assert sound
+        assert also
+        np.testing.assert_allclose(traced.slip_work, known.slip_work, rtol=1e-9)
+        np.testing.assert_allclose(traced.state.displacement, known.state.displacement, rtol=1e-9)
+
     @pytest.mark.slow
     @pytest.mark.parametrize("rung", ["plane", "condensed-squeeze"])
     def test_a_rest_changes_nothing(self, rung):
