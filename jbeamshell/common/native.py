@@ -8,6 +8,8 @@ from typing import Any
 import jax
 from jax.experimental.xla_metadata import set_xla_metadata
 
+from jbeamshell.common.checks import in_transformation
+
 # The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
 MARK = {"inlineable": "false", "xla_cpu_small_call": "true"}
 REFUSED = ("custom_call", "stablehlo.sort", "stablehlo.fft")  # operations that need the runtime
@@ -45,15 +47,21 @@ class Native:
         """Value for numbers; None if a JAX transformation asks with traced values."""
         if any(isinstance(each, jax.core.Tracer) for each in given):
             return None
-        with jax.ensure_compile_time_eval():  # now, even while another function is traced
-            if self.fits is None:
-                self.fits = _may_fit(self.whole, given)
-            if self.fits:
-                try:
-                    return self.whole(*given)
-                except jax.errors.JaxRuntimeError:  # the compiler refuses an operation
-                    self.fits = False
-            return self.ordinary(*given)
+        if not in_transformation():
+            return self._value(*given)
+        # Elsewhere each operation on constants would be compiled and run by itself.
+        with jax.ensure_compile_time_eval():  # now, while another function is traced
+            return self._value(*given)
+
+    def _value(self, *given: Any) -> Any:
+        if self.fits is None:
+            self.fits = _may_fit(self.whole, given)
+        if self.fits:
+            try:
+                return self.whole(*given)
+            except jax.errors.JaxRuntimeError:  # the compiler refuses an operation
+                self.fits = False
+        return self.ordinary(*given)
 
 
 def _may_fit(whole: Any, given: tuple[Any, ...]) -> bool:

@@ -1,0 +1,53 @@
+"""Programs that are compiled: numbers are no reason to compile again."""
+
+import logging
+
+import jax
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.scene.keys import NUMBERS
+
+
+@pytest.fixture
+def compiled(caplog):
+    """Function that names the programs which were compiled since it was called last."""
+    loggers = [logging.getLogger(f"jax._src.{name}") for name in ("interpreters.pxla", "dispatch")]
+    before = [logger.propagate for logger in loggers]
+
+    def names():
+        told = [r.getMessage() for r in caplog.records if r.getMessage().startswith("Compiling")]
+        caplog.clear()
+        return [text.split()[1] for text in told]
+
+    with jax.log_compiles(), caplog.at_level(logging.WARNING):
+        yield names
+    for logger, kept in zip(loggers, before, strict=True):
+        logger.propagate = kept
+
+
+@pytest.mark.doubtful("kinematics are linear", "may buckle", "few nodes", "in the corner")
+def test_solve_compiles_once_for_all_numbers_of_a_scene(compiled):
+    scene = jb.Scene()
+    jb.solve(scene).figures()
+    compiled()
+    varied = {key: np.asarray(scene.get(key)) for key in NUMBERS if scene.get(key) is not None}
+    varied = {key: float(value) for key, value in varied.items() if value.ndim == 0 and value > 0.0}
+    assert len(varied) >= 10
+    for key, value in varied.items():
+        history = jb.solve(scene.replace({key: 1.03 * value}))
+        assert history.figures()["dissipation"] > 0.0
+    # Single operations, such as the products that make E' of E, are compiled at their first use.
+    assert [name for name in compiled() if name.startswith("jit(_")] == []
+
+
+def test_a_response_is_compiled_as_a_whole(compiled):
+    """Not operation by operation, also of constants, which took 180 programs."""
+    ask = jb.response(jb.Scene().replace({"model.rung": "bar"}), ["load.amplitude"])
+    compiled()
+    first = float(ask(0.5)["dissipation"])
+    assert "jit(_marked)" in (names := compiled())
+    assert len(names) <= 6, names
+    assert float(ask(0.6)["dissipation"]) == pytest.approx(first * 1.2**3, rel=1e-12)
+    assert compiled() == []
