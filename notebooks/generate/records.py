@@ -42,6 +42,7 @@ def tables(root: Path) -> dict[str, str]:
         "table_laws.md": laws(_read(studies / "laws_of_a_strip.json")),
         "table_squeeze.md": squeeze(_read(studies / "ladder_squeeze.json")),
         "table_random.md": random_strips(_read(studies / "failure_map.json")),
+        "table_derivatives.md": derivatives(_read(studies / "gradients.json")),
         "table_corners.md": corners(_read(studies / "corners_map.json")),
         "table_defaults.md": defaults(_read(studies / "default_settings.json")),
         "table_solvers.md": solvers(_read(studies / "methods.json")["solvers"]),
@@ -91,6 +92,21 @@ def gradients(record: dict) -> str:
         for row in record["rows"]
     ]
     return table(("derivative by 4 numbers", "time", "runs", "compiled in"), rows) + machine(record)
+
+
+def derivatives(record: dict) -> str:
+    """Verdicts on derivatives by the kind of scene."""
+    kinds = ("right", "kink", "jump", "wrong")
+    rows = [
+        (
+            name,
+            len(kind["numbers"]),
+            len(kind["figures"]),
+            *(kind["counts"].get(k, 0) for k in kinds),
+        )
+        for name, kind in record["settings"].items()
+    ]
+    return table(("scene", "numbers", "figures", *kinds), rows)
 
 
 def starting(record: dict) -> str:
