@@ -134,15 +134,6 @@ SETTINGS: dict[str, Values] = {
         "load.kind": "moment",
         "load.amplitude": 0.3,
     },
-    "lap of layers, tightened": FEW
-    | SINGLE
-    | LAYERS
-    | {
-        "member.axial_stiffness": None,
-        "member.poisson_ratio": None,
-        "member.layers": [[0.08, 2e5, 0.2], [0.1, 1e5, 0.3]],
-        "contact.assembly": "frictional",
-    },
     "plane lap": FEW | DOUBLE | {"model.rung": "plane"},
 }
 # Distances for numbers that are zero, or small beside what they are added to.
