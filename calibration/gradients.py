@@ -341,8 +341,7 @@ def judged(setting: Setting, vector: np.ndarray, slopes: np.ndarray, way: int) -
         right, "right", np.where(jumps, "jump", np.where(apart & between, "kink", "wrong"))
     )
     verdicts = np.where(np.isfinite(slopes), verdicts, "wrong")
-    undefined = np.isnan(setting.figures(vector))
-    verdicts = np.where(undefined & np.isnan(slopes), "undefined", verdicts)
+    verdicts = np.where(np.isnan(setting.figures(vector)), "undefined", verdicts)
     return [
         {
             "number": walk.names[way],

@@ -39,7 +39,7 @@ class CycleFigures(Record, LoopFigures):
         """
         scene, force = self.scene, self.loop[0]
         if scene.load.kind == "moment":
-            return jnp.nan * self.dissipation  # its derivatives are NaN too
+            return jnp.full_like(self.dissipation, jnp.nan)
         stiffness, friction = scene.strip.stretching_stiffness, self.friction_per_length
         amplitude = 0.5 * (jnp.max(force) - jnp.min(force))
         if scene.member.support == "none":

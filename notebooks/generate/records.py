@@ -96,7 +96,7 @@ def gradients(record: dict) -> str:
 
 def derivatives(record: dict) -> str:
     """Verdicts on derivatives by the kind of scene."""
-    kinds = ("right", "kink", "jump", "wrong")
+    kinds = ("right", "kink", "jump", "undefined", "wrong")
     rows = [
         (
             name,
