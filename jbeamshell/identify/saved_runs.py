@@ -78,7 +78,8 @@ class SavedRuns:
             raise InputError(f"save {self.path}: is no state of a fit: {FIX}")
         if header != self._header:
             raise InputError(f"save {self.path}: is the state of another fit: {FIX}")
-        found = [(line, self._run(line)) for line in lines]
+        # Two fits at once may both have made a run.
+        found = [(line, self._run(line)) for line in dict.fromkeys(lines)]
         write_text(self.path, "\n".join([header, *(line for line, run in found if run), ""]))
         return [run for _, run in found if run]
 

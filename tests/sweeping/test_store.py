@@ -121,5 +121,6 @@ def test_a_run_of_a_fit_that_was_changed_is_made_again(tmp_path):
     other = SavedRuns(path, experiment, space, Newton(tolerance=1e-9))
     path.write_bytes(json.dumps(json.loads(other._header)).encode() + b"\n" + b"".join(rest))
     assert other.read() == []
-    path.write_bytes(good)
+    path.write_bytes(good + b"".join(rest))
     assert len(runs.read()) == 3
+    assert path.read_bytes() == good
