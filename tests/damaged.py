@@ -1,71 +1,286 @@
 """Damaged files of all formats, read one after the other; run as a program that must survive.
 
-    python tests/damaged.py FOLDER SEED COUNT
+    python tests/damaged.py SEED COUNT [RECORD.json]
 
-damages good files of ``FOLDER`` at random: bytes set, cut, doubled, swapped or appended.  It prints
-a line of JSON for each, in the order of their numbers: file, damage, outcome and seconds of the
-processor.
+makes a good file of each format and damages them in turn, in ways drawn at random.  It prints a
+line of JSON for each: file, damage, outcome and seconds of the processor, children's included.
 """
 
+import collections
+import importlib.util
 import json
+import os
+import shutil
 import sys
-import time
+import tempfile
+import types
 import warnings
 from pathlib import Path
 
+import jax
 import numpy as np
+import scipy.io
+import scipy.sparse
 
 import jbeamshell as jb
+from jbeamshell.condensed.matrix_files import read_matrix
+from jbeamshell.dynamics.export import table
+from jbeamshell.identify.experiment import Prediction
+from jbeamshell.identify.plan import read_plan
+from jbeamshell.identify.saved_runs import SavedRuns
+from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.recordings import read_recordings
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.sweeping.runner import Block
+from jbeamshell.sweeping.store import Store
 
-CHECKED = (".npz", ".squeezed.mat")  # files whose numbers carry check sums
+TESTS = Path(__file__).parent
+OURS = ("history.npz", "body.npz", "block-000000.npz", "sweep.npz", "fit.state")  # check sums
+CHECKED = (*OURS, "loop.npz", "loop.squeezed.mat")  # sums of the archive too
+SCARCE = 6  # a MATLAB file, which is read in a process of its own, for so many of each other
+TINY = {"model.nodes": 9, "load.steps_per_half_cycle": 2, "load.cycles": 1}
+BLOCK = Block(np.linspace(0.0, 1.0, 21).reshape(3, 7), np.zeros(7, np.int8))
+PLAN = """noise = 0.01
+[free."contact.friction"]
+low = 0.01
+high = 0.5
+[[specimen]]
+data = ["loop.csv"]
+set = { "strip.length" = 12.0 }
+"""
+JOINT = """friction = 0.1
+amplitude = 0.5
+[upper]
+file = "matrix.sti"
+contact = "contact.csv"
+held = [[3, 1], [3, 2]]
+pull = [[9, 1, 1.0]]
+[lower]
+file = "body.npz"
+"""
 
 
-def damage(good: bytes, random: np.random.Generator) -> tuple[str, bytes]:
-    """Name of a damage, and the damaged content."""
+# --- good files -----------------------------------------------------------------------------------
+
+
+def good_files(folder):
+    """A file of each format."""
+    from measured.test_laboratory import COLUMNS, WRITERS
+
+    columns = {name: np.asarray(column) for name, column in COLUMNS.items()}
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(folder / "loop.csv", rows, "%.9g", ",", header="force,displacement", comments="")
+    german = "Kraft [kN];Weg [mm]\n" + "\n".join(f"{f:.9g};{u:.9g}" for f, u in rows)
+    (folder / "german.csv").write_text(german.replace(".", ","))
+    np.savetxt(
+        folder / "curve.csv",
+        np.column_stack([np.arange(1.0, 20.0), np.arange(1.0, 20.0) ** 3]),
+        delimiter=",",
+        header="amplitude,dissipation",
+        comments="",
+    )
+    np.savez(folder / "loop.npz", **columns)
+    both = np.rec.fromarrays(list(columns.values()), names=list(columns))
+    np.save(folder / "loop.npy", np.asarray(both))
+    for name, squeezed in (("loop.mat", False), ("loop.squeezed.mat", True)):
+        scipy.io.savemat(folder / name, columns, do_compression=squeezed)
+    for name, write in WRITERS.items():
+        write(folder / name)
+    scene = jb.Scene().replace(TINY)
+    jb.write_scene(scene, folder / "scene.toml")
+    jb.solve(scene).save(folder / "history.npz")
+    jb.dynamics.Joint.of(scene).export("table", folder / "table.csv")
+    _stores(folder)
+    _bodies(folder)
+    (folder / "plan.toml").write_text(PLAN)
+    (folder / "joint.toml").write_text(JOINT)
+
+
+def _stores(folder):
+    """Block and description of a sweep, and the state of a fit."""
+    with Store(folder / "parts").opened("a sweep", {"load.amplitude": np.linspace(0.1, 0.9, 7)}):
+        shutil.copy(folder / "parts" / "sweep.npz", folder)
+    shutil.rmtree(folder / "parts")
+    Store(folder).save(0, BLOCK)
+    random = np.random.default_rng(0)
+    runs = _runs(folder / "fit.state")
+    runs.read()
+    for _ in range(4):
+        numbers = random.random(4), random.random((4, 2)), random.random(4)
+        runs.append([(random.random(2), Prediction(*numbers, True))])
+
+
+def _runs(path):
+    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), scenes=(), observations=())
+    space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
+    return SavedRuns(path, experiment, space, Newton())
+
+
+def _bodies(folder):
+    """Matrices of stiffness in all formats, a substructure, and the nodes of a contact."""
+    calculix = TESTS / "condensed" / "calculix"
+    shutil.copy(calculix / "strip.sti", folder / "matrix.sti")
+    shutil.copy(calculix / "strip.dof", folder / "matrix.dof")
+    random = np.random.default_rng(1)
+    half = random.random((14, 14))
+    stiffness = half @ half.T + np.eye(14)
+    jb.Substructure(np.arange(7.0), stiffness, random.random((14, 2))).save(folder / "body.npz")
+    kept = (stiffness > 4.0) | np.eye(14, dtype=bool)
+    sparse = scipy.sparse.csc_array(np.where(kept, stiffness, 0.0))
+    scipy.sparse.save_npz(folder / "matrix.npz", sparse)
+    scipy.io.savemat(folder / "matrix.mat", {"K": sparse})
+    scipy.io.mmwrite(folder / "matrix.mtx", sparse)
+    if importlib.util.find_spec("pyyeti"):
+        from pyyeti.nastran import op4
+
+        op4.write(str(folder / "matrix.op4"), {"KAA": stiffness})
+    np.savetxt(folder / "contact.csv", [[4, 0.0], [5, 0.1], [6, 0.2]], delimiter=",")
+
+
+# --- damage ---------------------------------------------------------------------------------------
+
+
+def damage(good, others, random):
+    """Name of a damage, and the damaged content.
+
+    Parameters
+    ----------
+    good : content of a file
+    others : contents of files of other formats
+    """
     content, size = bytearray(good), len(good)
     at, to = np.sort(random.integers(0, size, 2))
-    kind = str(random.choice(["byte", "bytes", "cut", "lost", "doubled", "swapped", "longer"]))
-    if kind == "byte":
+    few = 1 + random.integers(0, 64)
+    other = others[random.integers(len(others))]
+    kind = str(random.choice(KINDS))
+    if kind == "bit":
+        content[at] ^= 1 << random.integers(8)
+    elif kind == "byte":
         content[at] = random.integers(0, 256)
     elif kind == "bytes":
         for place in random.integers(0, size, random.integers(2, 30)):
             content[place] = random.integers(0, 256)
     elif kind == "cut":
         del content[at:]
+    elif kind == "without a head":
+        del content[:at]
     elif kind == "lost":
-        del content[at : at + 1 + random.integers(0, 64)]
+        del content[at : at + few]
     elif kind == "doubled":
-        content[at:at] = content[at : at + 1 + random.integers(0, 64)]
+        content[at:at] = content[at : at + few]
     elif kind == "swapped":
         half = min(int(to - at) // 2, 64)
         content[at : at + half], content[to - half : to] = (
             content[to - half : to],
             content[at : at + half],
         )
-    else:
+    elif kind == "longer":
         content += random.bytes(int(random.integers(1, 200)))
+    elif kind == "zeros":  # as a crash leaves them in a block of a disk
+        content[at : at + 8 * few] = bytes(len(content[at : at + 8 * few]))
+    elif kind == "large":  # a count or a size without end
+        content[at : at + 4] = b"\xff\xff\xff\x7f"[: size - at]
+    elif kind == "digits":
+        places = [i for i, byte in enumerate(content) if byte in b"0123456789"] or [at]
+        for place in random.choice(places, 3):
+            content[place] = random.choice(list(b"0123456789-.eE"))
+    elif kind == "lines":
+        lines = good.split(b"\n")
+        random.shuffle(lines)
+        content = bytearray(b"\n".join(lines))
+    elif kind == "ends of lines":
+        content = bytearray(good.replace(b"\n", random.choice([b"\r\n", b"\r", b"\n\n", b"\0"])))
+    elif kind == "encoded anew":
+        content = bytearray(good.decode("latin-1").encode(random.choice(["utf-16", "utf-8"])))
+    elif kind == "twice":
+        content += good
+    elif kind == "spliced":
+        content = content[:at] + other[min(at, len(other) // 2) :]
+    else:  # another format under this name
+        content = bytearray(other)
     return kind, bytes(content)
 
 
-def numbers_of(path: Path) -> list[np.ndarray]:
+KINDS = (
+    *("bit", "byte", "bytes", "cut", "without a head", "lost", "doubled", "swapped", "longer"),
+    *("zeros", "large", "digits", "lines", "ends of lines", "encoded anew", "twice", "spliced"),
+    "of another format",
+)
+
+
+# --- reading --------------------------------------------------------------------------------------
+
+
+def _state(path):
+    runs = _runs(path).read()
+    if len(runs) < 4:
+        raise jb.InputError("a run is left out")
+    return [array for values, run in runs for array in (values, *run)]
+
+
+def _block(path):
+    block = Store(path.parent).load(0, *BLOCK.values.shape)
+    if block is None:
+        raise jb.InputError("a block is left out")
+    return list(block)
+
+
+def _history(path):
+    history = jb.read_history(path)
+    return [history.force, history.displacement, history.fields, history.traction]
+
+
+def _plan(path):
+    loops = [loop for specimen in read_plan(path).specimens for loop in specimen.data]
+    return [column for loop in loops for column in (loop.force, loop.displacement)]
+
+
+def _contact(path):
+    leaves = jax.tree.leaves(jb.read_contact(path))
+    return [np.asarray(leaf) for leaf in leaves if not isinstance(leaf, str)]
+
+
+def _curve(path):
+    ((curve, _),) = read_curves(path, "dissipation")
+    return [column for column in vars(curve).values() if isinstance(column, np.ndarray)]
+
+
+def _matrix(path):
+    return [read_matrix(path.with_suffix(".sti") if path.suffix == ".dof" else path).matrix.data]
+
+
+def _recording(path):
+    return [column for one in read_recordings(path) for column in (one.force, one.displacement)]
+
+
+READERS = {
+    "scene": lambda path: jax.tree.leaves(jb.read_scene(path)),
+    "plan": _plan,
+    "joint": _contact,
+    "contact": lambda path: _contact(path.with_name("joint.toml")),
+    "history": _history,
+    "body": lambda path: jax.tree.leaves(jb.Substructure.read(path)),
+    "matrix": _matrix,
+    "block-000000": _block,
+    "sweep": lambda path: Store(path.parent).read()[1],
+    "fit": _state,
+    "table": lambda path: list(table.read(path)),
+    "curve": _curve,
+}
+
+
+def numbers_of(path):
     """Numbers that a reader takes from a file."""
-    if path.suffix == ".toml":
-        scene = jb.read_scene(path)
-        return [np.asarray(scene.get("load.amplitude"))]
-    if path.name.startswith("history"):
-        history = jb.read_history(path)
-        return [np.asarray(history.force), np.asarray(history.displacement)]
-    found = read_recordings(path)
-    return [column for one in found for column in (one.force, one.displacement)]
+    read = READERS.get(path.name.partition(".")[0], _recording)
+    return [np.asarray(array) for array in read(path)]
 
 
-def same(one: list[np.ndarray], other: list[np.ndarray]) -> bool:
+def same(one, other):
     """True if all numbers are the same."""
     return len(one) == len(other) and all(map(np.array_equal, one, other))
 
 
-def outcome(path: Path, good: list[np.ndarray]) -> str:
+def outcome(path, good):
     """Outcome of reading a file: refused in a line, the same, changed, or what it raised."""
     try:
         found = numbers_of(path)
@@ -78,25 +293,71 @@ def outcome(path: Path, good: list[np.ndarray]) -> str:
     return "same" if same(found, good) else "changed"
 
 
-def main(folder: Path, seed: int, count: int) -> None:
-    """Damage and read files."""
+def judged(row):
+    """Fault of a row of the program's output; empty if there is none."""
+    if row["outcome"] not in ("refused", "same", "changed"):
+        return row["outcome"]
+    if row["seconds"] >= SLOWEST:
+        return f"takes {row['seconds']} s"
+    foreign = row["damage"] in ("of another format", "spliced")
+    checked = row["file"] in (OURS if foreign else CHECKED)
+    return "changed numbers are accepted" if checked and row["outcome"] == "changed" else ""
+
+
+SLOWEST = 10.0  # seconds for a file
+
+
+def processor():
+    """Seconds of the processor that this process and its ended children took."""
+    return sum(os.times()[:4])
+
+
+def main(folder, seed, count):
+    """Damage and read files; yields the rows."""
     warnings.simplefilter("ignore")
-    names = sorted(path.name for path in folder.iterdir() if path.is_file())
+    good_files(folder)
+    names = sorted(path.name for path in folder.iterdir())
+    quick = [name for name in names if not name.endswith(".mat")]
+    turns = quick * (SCARCE - 1) + names
     content = {name: (folder / name).read_bytes() for name in names}
     good = {name: numbers_of(folder / name) for name in names}
-    work = folder / "damaged"
-    work.mkdir(exist_ok=True)
     random = np.random.default_rng(seed)
     for number in range(count):
-        name = names[number % len(names)]
-        kind, damaged = damage(content[name], random)
-        path = work / name
-        path.write_bytes(damaged)
-        begin = time.process_time()
-        row = {"file": name, "damage": kind, "outcome": outcome(path, good[name])}
-        row["seconds"] = round(time.process_time() - begin, 4)
-        print(json.dumps(row), flush=True)
+        name = turns[number % len(turns)]
+        others = [content[other] for other in names if other != name]
+        kind, damaged = damage(content[name], others, random)
+        (folder / name).write_bytes(damaged)
+        begin = processor()
+        row = {"file": name, "damage": kind, "outcome": outcome(folder / name, good[name])}
+        row["seconds"] = round(processor() - begin, 4)
+        (folder / name).write_bytes(content[name])
+        yield row
+
+
+def counted(rows, seed):
+    """Record of a run: outcomes by file and by damage, and the longest time."""
+
+    def by(what):
+        counts = collections.defaultdict(collections.Counter)
+        for row in rows:
+            counts[row[what]][row["outcome"]] += 1
+        return {key: dict(sorted(counts[key].items())) for key in sorted(counts)}
+
+    return {
+        "seed": seed,
+        "files": len(rows),
+        "faults": [row for row in rows if judged(row)],
+        "slowest_s": max(row["seconds"] for row in rows),
+        "by_file": by("file"),
+        "by_damage": by("damage"),
+    }
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
+    seed, rows = int(sys.argv[1]), []
+    with tempfile.TemporaryDirectory() as place:
+        for row in main(Path(place), seed, int(sys.argv[2])):
+            rows.append(row)
+            print(json.dumps(row), flush=True)
+    for path in sys.argv[3:]:
+        Path(path).write_text(json.dumps(counted(rows, seed), indent=1) + "\n", encoding="utf-8")

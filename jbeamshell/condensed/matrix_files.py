@@ -56,7 +56,10 @@ def read_matrix(path: str | os.PathLike[str]) -> Rows:
         raise InputError(f"{name}: is no file of a matrix: it must end in {', '.join(READERS)}")
     data = read_bytes(path)
     try:
-        return READERS[suffix](data, Path(path))
+        found = READERS[suffix](data, Path(path))
+        if not np.all(np.isfinite(found.matrix.data)):
+            raise InputError("holds numbers that are not finite: write it again")
+        return found
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     except Exception as error:  # a parser may raise anything for a broken file
