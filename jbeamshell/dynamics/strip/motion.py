@@ -16,7 +16,7 @@ from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.scene.scene import Scene
 
-OPEN = 1e-2  # part of the energy that moved by which a balance may be open without a doubt
+OPEN = 1e-3  # part of the energy that moved by which a balance may be open without a doubt
 
 
 class Balance(Protocol):
