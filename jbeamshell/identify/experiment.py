@@ -20,6 +20,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.small import Small
 from jbeamshell.identify.models import Model
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.rig import rigged, with_rig
@@ -28,6 +29,7 @@ from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Measurement, noise_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.scene import Scene
 
 
 class Prediction(NamedTuple):
@@ -269,7 +271,29 @@ def _response(
     return rows, jacobian, prediction, converged
 
 
-_respond = eqx.filter_jit(_response)
+@Small
+def _respond_small(
+    given: tuple[Array, Observation, Model, Newton], keys: tuple[str, ...]
+) -> tuple[Array, Array, Array, Array]:
+    values, observation, scene, solver = given
+    return _response(values, observation, scene, keys, solver)
+
+
+_respond_whole = eqx.filter_jit(_response)
+
+
+def _respond(
+    values: Array, observation: Observation, scene: Model, keys: tuple[str, ...], solver: Newton
+) -> tuple[Array, Array, Array, Array]:
+    """Compiled response; that of a strip on its contact line is a small program."""
+    if isinstance(scene, Scene) and scene.model.condensed:
+        found: tuple[Array, Array, Array, Array] = _respond_small(
+            (values, observation, scene, solver), keys
+        )
+        return found
+    return _respond_whole(values, observation, scene, keys, solver)
+
+
 _respond_batch = eqx.filter_jit(eqx.filter_vmap(_response, in_axes=(0, None, None, None, None)))
 
 
