@@ -110,11 +110,12 @@ def derivatives(record: dict) -> str:
 
 
 def starting(record: dict) -> str:
-    """Seconds until the first result."""
+    """Processor time until the first result."""
     rows = [
-        (row["what"], f"{row['cold_s']:.1f} s", f"{row['warm_s']:.1f} s") for row in record["rows"]
+        (row["what"], f"{row['cold_cpu_s']:.1f} s", f"{row['warm_cpu_s']:.1f} s")
+        for row in record["rows"]
     ]
-    heads = ("new process, with the import", "nothing compiled yet", "compiled programs kept")
+    heads = ("processor time of a new process", "nothing compiled yet", "compiled programs kept")
     return table(heads, rows) + machine(record)
 
 

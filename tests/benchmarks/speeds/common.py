@@ -61,7 +61,7 @@ class Plan(NamedTuple):
     studied: tuple[int, ...] = (41, 81, 161, 321)
     unsettled: int = 65536
     unsettled_sample: int = 200
-    starts: int = 5
+    starts: int = 1
     calculix: bool = True
     peer: str | None = None
 

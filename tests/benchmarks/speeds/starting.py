@@ -1,6 +1,10 @@
-"""Time of a fresh process until its first result."""
+"""Fresh processes until their result, with and without compiled programs at hand.
 
-import json
+Programs of one thread take as much time on an idle machine as they take of its processors, which
+other programs do not change; so that is what is recorded, beside the time by the clock.
+"""
+
+import os
 import statistics
 import subprocess
 import sys
@@ -11,48 +15,61 @@ from typing import Any
 from . import machine
 from .common import Plan
 
-RUN = (sys.executable, "-m", "jbeamshell", "run", "--json")
-SMALL = {
-    "model.nodes": "41",
-    "load.steps_per_half_cycle": "4",
-    "load.cycles": "1",
-    "model.kinematics": "linear",
+COMMANDS = {
+    "jbeamshell run": ("run",),
+    "jbeamshell run --out": ("run", "--out", "out"),
+    "jbeamshell advise": ("advise",),
+    "jbeamshell sweep, 1,000 strips": ("sweep", "--over", "load.amplitude=0.3:0.9:1000"),
+    "jbeamshell ringdown": ("ringdown",),
 }
+RESULTS = {
+    "jb.solve(jb.Scene())": "float(jb.solve(jb.Scene()).dissipation)",
+    "jb.response, first figure": "jb.response(jb.Scene(), ['load.amplitude'])(.5)",
+    "jb.solve, rung plane": (
+        "float(jb.solve(jb.Scene().replace({'model.rung': 'plane'})).dissipation)"
+    ),
+    "jb.solve in load steps": (
+        "float(jb.solve(jb.Scene().replace({'model.solution': 'stepwise'})).dissipation)"
+    ),
+}
+BEGIN = (
+    "import os, jax; jax.config.update('jax_enable_x64', True); import jbeamshell as jb; "
+    "jb.configure(cache=os.environ['XDG_CACHE_HOME']); "
+)
 
 
 def start(plan: Plan) -> dict[str, Any]:
-    """Seconds to import, to a first result, and to one whose programs are found compiled."""
-    words = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
-    imports = [
-        _wall([sys.executable, "-c", "import jbeamshell"], machine.environment())[0]
-        for _ in range(plan.starts)
-    ]
+    """Seconds of fresh processes: to import, and to a result without and with a cache."""
+    python = sys.executable
+    imports = [_seconds((python, "-c", "import jbeamshell"), ".") for _ in range(plan.starts)]
+    cases = {what: (python, "-m", "jbeamshell", *words) for what, words in COMMANDS.items()}
+    cases |= {what: (python, "-c", BEGIN + code) for what, code in RESULTS.items()}
     rows = []
-    for what, command in (("standard strip", RUN), ("41 nodes, 4 steps", (*RUN, *words))):
+    for what, command in cases.items():
         with tempfile.TemporaryDirectory(prefix="jbeamshell-speed-") as folder:
-            environment = machine.environment(XDG_CACHE_HOME=folder)
-            cold, first = _wall(command, environment)
-            warm = [_wall(command, environment) for _ in range(plan.starts)]
+            cold_cpu, cold = _seconds(command, folder)
+            warm = [_seconds(command, folder) for _ in range(plan.starts)]
+        cpu, clock = (statistics.median(column) for column in zip(*warm, strict=True))
         rows.append(
             {
                 "what": what,
+                "cold_cpu_s": cold_cpu,
+                "warm_cpu_s": cpu,
                 "cold_s": cold,
-                "cold_compile_s": json.loads(first)["compile_s"],
-                "warm_s": statistics.median(seconds for seconds, _ in warm),
-                "warm_compile_s": statistics.median(_said(warm, "compile_s")),
-                "wall_s": statistics.median(_said(warm, "wall_s")),
+                "warm_s": clock,
             }
         )
-    return {"import_s": statistics.median(imports), "starts": plan.starts, "rows": rows}
+        print(rows[-1], file=sys.stderr, flush=True)
+    import_cpu = statistics.median(cpu for cpu, _ in imports)
+    load = os.getloadavg()[0]
+    return {"import_cpu_s": import_cpu, "starts": plan.starts, "load": load, "rows": rows}
 
 
-def _wall(command: Any, environment: dict[str, str]) -> tuple[float, str]:
-    begin = time.perf_counter()
-    answer = subprocess.run(
-        command, env=environment, cwd=machine.ROOT, capture_output=True, text=True, check=True
-    )
-    return time.perf_counter() - begin, answer.stdout
-
-
-def _said(runs: list[tuple[float, str]], key: str) -> list[float]:
-    return [json.loads(text)[key] for _, text in runs]
+def _seconds(command: tuple[str, ...], folder: str) -> tuple[float, float]:
+    """Seconds of the processors and of the clock that a process takes in a folder."""
+    environment = machine.environment(XDG_CACHE_HOME=folder, PYTHONPATH=str(machine.ROOT))
+    before, begin = os.times(), time.perf_counter()
+    subprocess.run(command, env=environment, cwd=folder, capture_output=True, check=True)
+    after = os.times()
+    own = after.children_user - before.children_user
+    return own + after.children_system - before.children_system, time.perf_counter() - begin
