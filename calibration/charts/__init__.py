@@ -6,6 +6,7 @@ They draw the JSON that a benchmark or a study leaves behind. A checkout that is
 >>> charts.methods.draw(json.loads(Path("calibration/methods.json").read_text()), "steps")
 """
 
+from calibration.charts import campaign as campaign
 from calibration.charts import failures as failures
 from calibration.charts import ladder as ladder
 from calibration.charts import methods as methods

@@ -1,4 +1,6 @@
-"""Charts of the record of calibration/default_settings.py: what a scene chooses for itself.
+"""Charts of what a scene chooses for itself: errors of random scenes, and error against cost.
+
+The records are those of calibration/campaign.py and calibration/default_settings.py.
 
 python -m calibration.charts.settings
 """
@@ -14,24 +16,30 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
+from calibration.charts.campaign import chosen, read
 from calibration.charts.table import OFF, Chart, Curve, Record
 from calibration.charts.table import draw as draw_one
 from jbeamshell.plotting.style import close, save, style
 
 TOLERANCE = 0.005
-SMALLEST = 1e-5  # error that is drawn as the smallest
+SMALLEST, LARGEST = 1e-5, 1.0  # errors that are drawn
+
+
+def _by_solution(rows: list[dict[str, Any]]) -> Iterable[Curve]:
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        rung = row.get("rung", "")
+        line = rung.startswith("condensed") or rung == "plane"
+        groups.setdefault("on the contact line" if line else "in load steps", []).append(row)
+    for words, group in groups.items():
+        errors = np.sort([choice.error for choice in chosen(group)])
+        part = np.arange(1, errors.size + 1) / errors.size
+        yield Curve(words, np.clip(errors, SMALLEST, LARGEST), part, look={"marker": ""})
 
 
 def solved(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Rows of scenes that were solved on both meshes, and slip."""
-    return [row for row in rows if row.get("converged") and np.isfinite(row["dissipation"])]
-
-
-def _by_kind(rows: list[dict[str, Any]]) -> Iterable[Curve]:
-    for kind in dict.fromkeys(row["kind"] for row in rows):
-        errors = np.sort([row["dissipation"] for row in solved(rows) if row["kind"] == kind])
-        part = np.arange(1, errors.size + 1) / max(errors.size, 1)
-        yield Curve(kind, np.maximum(errors, SMALLEST), part, look={"marker": ""})
+    """Rows of scenes that were solved for a tolerance and on a fine mesh."""
+    return [row for row in rows if row["converged"]]
 
 
 def _by_tolerance(rows: list[dict[str, Any]]) -> Iterable[Curve]:
@@ -52,7 +60,7 @@ def _limit(axes: Axes, rows: Any) -> None:
 
 
 CHARTS = {
-    "kinds": Chart("kinds", OFF, "part of the scenes", "", _by_kind, "x", extra=_limit),
+    "kinds": Chart("kinds", OFF, "part of the scenes", "", _by_solution, "x", extra=_limit),
     "tolerances": Chart("tolerances", "time of a run  [ms]", OFF, "", _by_tolerance, "xy"),
 }
 
@@ -66,6 +74,7 @@ def main() -> None:
     """Draw the charts beside the other pictures of the studies."""
     folder = Path(__file__).parents[1]
     record = json.loads((folder / "default_settings.json").read_text(encoding="utf-8"))
+    record["kinds"] = read(folder)
     with style():
         figure, panels = plt.subplots(1, len(CHARTS), figsize=(9.0, 3.6), layout="constrained")
         for name, axes in zip(CHARTS, panels, strict=True):

@@ -1,7 +1,7 @@
 """Choice of the settings that a scene leaves open: kinematics, solution, grid and load steps.
 
 A setting whose value is `AUTO` is chosen when a scene is made, for its ``model.tolerance``.  The
-rules were measured (calibration/default_settings.py).
+rules were measured (calibration/campaign.py, calibration/default_settings.py).
 
 * Rotations are linear where the bound on what that leaves out is a small part of the tolerance,
   see `jbeamshell.scene.linearisation`.
@@ -25,7 +25,7 @@ from jbeamshell.mechanics.elements import END_SIZE
 from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.scene.buckling import weakest_column
 from jbeamshell.scene.domain import Numbers
-from jbeamshell.scene.keys import CONTROLS
+from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS
 from jbeamshell.scene.linearisation import Parts, linear_errors
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.rungs import CONDENSED, PLANE_NODES
@@ -58,6 +58,7 @@ PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
 STEPWISE = Grid(161, END_SIZE, 1.5, 40)
+ARC_STEPS = 80  # load steps per half cycle, whose chords are shorter than a bending path
 
 
 def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any], ...]:
@@ -89,7 +90,8 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
         found["end_size"] = grid.end_size
     if "nodes" in open_model:
         found["nodes"] = _nodes(grid, model.tolerance, scene.contact.jumps)
-    steps = {"steps_per_half_cycle": grid.steps} if "steps_per_half_cycle" in open_load else {}
+    many = ARC_STEPS if load.control == ARC_LENGTH else grid.steps
+    steps = {"steps_per_half_cycle": many} if "steps_per_half_cycle" in open_load else {}
     return tuple(
         {name: value for name, value in values.items() if getattr(part, name) != value}
         for part, values in ((load, steps), (model, found))

@@ -7,6 +7,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from calibration.charts.campaign import chosen, counts, read
 from calibration.charts.failures import OUTCOMES, outcome
 
 Rows = Iterable[Sequence[Any]]
@@ -43,8 +44,9 @@ def tables(root: Path) -> dict[str, str]:
         "table_squeeze.md": squeeze(_read(studies / "ladder_squeeze.json")),
         "table_random.md": random_strips(_read(studies / "failure_map.json")),
         "table_derivatives.md": derivatives(_read(studies / "gradients.json")),
-        "table_corners.md": corners(_read(studies / "corners_map.json")),
-        "table_defaults.md": defaults(_read(studies / "default_settings.json")),
+        "table_campaign.md": campaign(read(studies)),
+        "table_defaults.md": defaults(read(studies)),
+        "table_balance.md": balance(_read(studies / "balance_in_time.json")),
         "table_solvers.md": solvers(_read(studies / "methods.json")["solvers"]),
         "table_friction.md": friction(_read(studies / "methods.json")["laws"]),
     }
@@ -226,14 +228,15 @@ def random_strips(record: dict) -> str:
     return outcomes(found)
 
 
-def corners(record: dict) -> str:
-    """Outcomes of unusual scenes by their kind."""
-    found = {
-        name: Counter(scene["outcome"] for scene in kind["scenes"])
-        for name, kind in record["kinds"].items()
-    }
-    total: Counter = sum(found.values(), Counter())
-    return outcomes(found | {"all": total})
+def campaign(rows: list[dict]) -> str:
+    """Outcomes of random scenes of all kinds, and of fresh ones of another seed."""
+    first, fresh = dict.fromkeys(row["seed"] for row in rows)
+    begun = [row for row in rows if row["seed"] == first]
+    kinds = dict.fromkeys(row["kind"] for row in begun)
+    found = {kind: counts(row for row in begun if row["kind"] == kind) for kind in kinds}
+    found["all"] = counts(begun)
+    found["all, fresh"] = counts(row for row in rows if row["seed"] == fresh)
+    return outcomes(found)
 
 
 def outcomes(found: dict[str, Counter]) -> str:
@@ -246,15 +249,33 @@ def outcomes(found: dict[str, Counter]) -> str:
     return table(("scenes", "number", *shown), rows)
 
 
-def defaults(record: dict) -> str:
-    """Errors of the default settings by kind of scene."""
-    kinds = dict.fromkeys(row["kind"] for row in record["kinds"])
-    rows = []
-    for kind in kinds:
-        errors = [abs(row["dissipation"]) for row in record["kinds"] if row["kind"] == kind]
-        within = sum(error <= 0.005 for error in errors)
-        rows.append((kind, len(errors), within, percent(median(errors)), percent(max(errors))))
-    return table(("scenes", "number", "within .5 % in D", "median error", "worst"), rows)
+def defaults(rows: list[dict]) -> str:
+    """Errors of the settings that scenes chose, by kind."""
+    found, lines = chosen(rows), []
+    for kind in (*dict.fromkeys(run.kind for run in found), "all"):
+        runs = [run for run in found if kind in (run.kind, "all")]
+        errors = [run.error for run in runs]
+        within = sum(run.error <= 0.005 for run in runs)
+        doubted = sum(run.error > 0.005 and run.doubted for run in runs)
+        beyond = max((run.error for run in runs if not run.doubted), default=0.0)
+        lines.append(
+            (kind, len(runs), within, doubted, len(runs) - within - doubted,
+             percent(median(errors)), percent(beyond))
+        )  # fmt: skip
+    heads = ("scenes", "number", "within .5 % in D and loop", "beyond, doubted",
+             "beyond, undoubted", "median error", "largest undoubted")  # fmt: skip
+    return table(heads, lines)
+
+
+def balance(record: dict) -> str:
+    """Difference of harmonic balance and time integration, below, at and above the resonance."""
+    columns = zip(*(row["error"] for row in record["rows"]), strict=True)
+    lines = [
+        (f"{beside:g}", len(errors), percent(median(errors)), percent(max(errors)))
+        for beside, errors in zip(record["beside"], columns, strict=True)
+    ]
+    heads = ("frequency over the first natural one", "structures", "median", "largest")
+    return table(heads, lines)
 
 
 def solvers(record: dict) -> str:

@@ -139,6 +139,37 @@ def test_where_nothing_slips_the_estimate_is_infinite(rung):
     assert np.max(reliability.estimates(scene, even_cycle(64))) == pytest.approx(64**-1.5)
 
 
+def test_the_corner_of_a_contact_line_counts_where_friction_is_elastic():
+    even = even_cycle(4)
+    rigid = even._replace(
+        reaction=even.reaction + 2.0 * (even.x == 4),
+        v=even.v * np.where(even.x < 4, 0.5, 1.0),
+    )
+    line, steps = jb.Scene(), jb.Scene().replace({"model.solution": "stepwise"})
+    elastic = rigid._replace(slip_stiffness=np.asarray(1e6))
+    assert reliability.estimates(line, rigid)[1] == 0.0
+    assert reliability.estimates(line, elastic)[1] == reliability.estimates(steps, elastic)[1] > 0.0
+
+
+@pytest.mark.parametrize(("steps", "doubted"), [(40, True), (80, False), ("auto", False)])
+def test_few_steps_along_an_arc_are_doubted(steps, doubted):
+    arc = {"load.control": "arc-length", "load.amplitude": 1e-4}
+    scene = jb.Scene().replace(arc | {"load.steps_per_half_cycle": steps})
+    assert ("arc length" in str(reliability.doubts_of_scene(scene))) == doubted
+
+
+@pytest.mark.parametrize(("nu", "eta", "doubted"), [(0.49, 0.02, True), (0.49, 0.1, False)])
+def test_thin_strips_lock_at_a_smaller_poisson_ratio(nu, eta, doubted):
+    scene = jb.Scene().replace({"strip.poisson_ratio": nu, "strip.height_ratio": eta})
+    assert ("nearly incompressible" in str(reliability.doubts_of_scene(scene))) == doubted
+
+
+def test_the_error_of_the_grid_is_larger_where_the_pressure_has_steps():
+    even, part = even_cycle(64), [[0.0, 0.0], [0.5, 0.0], [0.5, 9.0], [2.0, 9.0]]
+    stepped = reliability.estimates(jb.Scene().replace({"contact.pressure": part}), even)
+    assert stepped[0] == pytest.approx(reliability.STEPS * 64**-1.5)
+
+
 @pytest.mark.doubtful("in the corner")
 def test_a_doubtful_run_warns_with_the_fix():
     scene = STRIP.replace(LITTLE | COARSE)
