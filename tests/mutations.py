@@ -56,6 +56,11 @@ def faults() -> Iterator[Fault]:
             yield Fault(file, right, wrong, tuple(f"tests/{one}" for one in tests))
 
 
+def text_of(fault: Fault, project: Path = ROOT) -> str:
+    """Text of the file of a fault."""
+    return (project / "jbeamshell" / fault.file).read_text(encoding="utf-8")
+
+
 def sample(count: int, seed: int) -> list[Fault]:
     """Random faults of the list."""
     return random.Random(seed).sample(list(faults()), count)
@@ -72,8 +77,7 @@ def copied(folder: Path) -> Path:
 
 def killed(fault: Fault, project: Path) -> str:
     """First test that finds a fault planted in a copy of the project; empty if none does."""
-    place = project / "jbeamshell" / fault.file
-    text = place.read_text(encoding="utf-8")
+    place, text = project / "jbeamshell" / fault.file, text_of(fault, project)
     assert fault.right in text, f"{fault.name}: is not in the file any more"
     place.write_text(text.replace(fault.right, fault.wrong), encoding="utf-8")
     command = [sys.executable, "-m", "pytest", *OPTIONS, *fault.tests]

@@ -73,6 +73,22 @@ def test_amplitudes_are_those_of_the_point():
     assert float(per_force) == pytest.approx(0.25)  # 1/m
 
 
+def test_a_wider_strip_and_more_mass_are_what_they_say(monkeypatch):
+    def of(scene, force, width):  # any joint; those of scenes are tested elsewhere
+        return Joint(FORCE, width * FORCE)
+
+    monkeypatch.setattr(Joint, "of", of)
+    model = jointed(jb.Scene(), [[2.0]], [[1e4]], width=3.0)
+    one = model.structure()
+    more = {"structure.mass": 1.5, "structure.stiffness": 0.5, "structure.width": 6.0}
+    other = model.replace(more).structure()
+    np.testing.assert_allclose(other.mass, 1.5 * np.asarray(one.mass))
+    np.testing.assert_allclose(other.stiffness, 0.5 * np.asarray(one.stiffness))
+    narrow, wide = (each.attachments[0].joint for each in (one, other))
+    np.testing.assert_allclose(wide.force, 2.0 * np.asarray(narrow.force), rtol=1e-12)
+    np.testing.assert_allclose(wide.displacement, narrow.displacement, rtol=1e-12)
+
+
 def test_planted_numbers_are_recovered_within_their_intervals():
     model, random = START.replace(TRUTH), np.random.default_rng(0)
     found = fit([*curves(model, random), forced(model, random)], START, list(TRUTH))

@@ -1,11 +1,13 @@
 """Files of laboratory software give the columns and units that were written into them."""
 
+import io
 import sys
 
 import numpy as np
 import pytest
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.measured import laboratory
 from jbeamshell.measured.recordings import read_recordings
 from tests import rig
 
@@ -164,3 +166,13 @@ def test_a_rate_or_a_count_in_any_language_is_no_column(tmp_path):
     path.write_text("Lastwechsel;Zyklus Last;Kraft [kN];Weg [mm]\n" + "1;2;3;4\n" * 9, "utf-8")
     with pytest.raises(InputError, match="force is constant"):
         read_recordings(path)
+
+
+def test_a_matrix_of_matlab_has_its_own_rows_and_columns():
+    h5py, file = pytest.importorskip("h5py"), io.BytesIO()
+    with h5py.File(file, "w") as written:  # MATLAB writes column by column
+        written["rig"] = np.arange(6.0).reshape(2, 3)
+        written["rig"].attrs["MATLAB_class"] = np.bytes_("double")
+    ((name, array),) = laboratory.hdf5(file.getvalue())
+    assert name == "rig"
+    assert array.tolist() == [[0.0, 3.0], [1.0, 4.0], [2.0, 5.0]]
