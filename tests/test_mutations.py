@@ -7,7 +7,7 @@ import pytest
 
 # Two survive that change no result: from how evenly pressing starts, and a margin of a check that
 # others of the same branch imply on all strips tried.  One is found by the slow tests alone: the
-# energies to which a strip of load steps is fitted (`test_a_bar_of_load_steps_has_goodmans_energy`).
+# energies to which a strip of load steps is fitted (TestJoint in `dynamics/test_structure.py`).
 FOUND = json.loads(mutations.RECORD.read_text(encoding="utf-8"))
 
 
