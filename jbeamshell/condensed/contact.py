@@ -29,10 +29,11 @@ from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import driven_by_displacement, exchanged
-from jbeamshell.condensed.events import Level, walk
+from jbeamshell.condensed.events import walk
 from jbeamshell.condensed.levels import turns_of
 from jbeamshell.condensed.pair import together
 from jbeamshell.condensed.pressing import press
+from jbeamshell.condensed.stretch import Level
 from jbeamshell.condensed.substructure import Substructure, loose_mode, potential
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles

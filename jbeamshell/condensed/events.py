@@ -19,40 +19,12 @@ from jax.typing import ArrayLike
 from jaxtyping import PyTree
 
 from jbeamshell.condensed import slopes
+from jbeamshell.condensed.abreast import walk_abreast
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import ContactState
 from jbeamshell.condensed.slopes import Trace
-from jbeamshell.condensed.tableau import OPEN, System, Tableau, changed, empty, reversed_at
-
-MOST_EVENTS = 40  # of a load branch, times the nodes
-SLIDES = 1e6  # compliance over that of the clamped contact at which a body slides as a whole
-
-
-class Level(NamedTuple):
-    """A load level of a path: the contact, its lift, and what happened since the level before.
-
-    Attributes
-    ----------
-    state : contact
-    lift : (n,) lift w
-    slip_work : work of friction in the step
-    slipping : (k,) True for closed nodes that slip at its end
-    settled : True if all events up to here were found, and the body does not slide as a whole
-    """
-
-    state: ContactState
-    lift: Array
-    slip_work: Array
-    slipping: Array
-    settled: Array
-
-
-class Event(NamedTuple):
-    """Next event: its tau, kind and node."""
-
-    tau: Array
-    kind: Array
-    node: Array
+from jbeamshell.condensed.stretch import Event, Level, ended, goes_on, moved, next_event
+from jbeamshell.condensed.tableau import System, Tableau, changed, empty, reversed_at
 
 
 class Walk(NamedTuple):
@@ -84,7 +56,8 @@ def walk(
     friction : mu
     start : contact at the path's start
     forces : (levels,) end loads
-    turns : (levels,) True where the load has turned since the level before; so is the first
+    turns : (levels,) True where the load has turned since the level before; so is the first.  Many
+        loads on one body (`jax.vmap`) share events if it is a tuple, see `abreast`
     lift : (n,) lift at the start; None is none
     needed : False to leave out the walk at no cost; its levels mean nothing then
     lifting : number of nodes that may lift off, from the loaded end, which is quicker if few do;
@@ -96,9 +69,8 @@ def walk(
         with the axis of the levels first
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    turns, needed = jnp.asarray(turns), jnp.asarray(needed)
     given = body, jnp.asarray(friction), start, forces, lift
-    return _walk(*given, turns=turns, needed=needed, lifting=lifting)
+    return _walk(*given, turns=turns, needed=jnp.asarray(needed), lifting=lifting)
 
 
 @eqx.filter_custom_jvp
@@ -109,11 +81,13 @@ def _walk(
     forces: Array,
     lift: Array,
     *,
-    turns: Array,
+    turns: ArrayLike | tuple[bool, ...],
     needed: Array,
     lifting: int | None,
 ) -> Level:
-    return _lane_by_lane(lifting)(body, friction, start, forces, lift, turns, needed)
+    known = turns if isinstance(turns, tuple) else None
+    given = body, friction, start, forces, lift, jnp.asarray(turns), needed
+    return _one_or_many(known, lifting)(*given)
 
 
 @_walk.def_jvp
@@ -121,33 +95,72 @@ def _walk_jvp(
     primals: tuple[PyTree, ...],
     tangents: tuple[PyTree, ...],
     *,
-    turns: Array,
+    turns: ArrayLike | tuple[bool, ...],
     needed: Array,
     lifting: int | None,
 ) -> tuple[Level, Level]:
     changes = tuple(jax.tree.map(_full, *both) for both in zip(primals, tangents, strict=True))
-    path = functools.partial(_differentiable, turns=turns, needed=needed)
+    path = functools.partial(_differentiable, turns=jnp.asarray(turns), needed=needed)
     return jax.jvp(path, primals, changes)
 
 
 @functools.cache
-def _lane_by_lane(lifting: int | None) -> Callable[..., Level]:
-    """Levels of a path; in a batch one lane after the other, which a loop in step is slower than.
+def _one_or_many(known: tuple[bool, ...] | None, lifting: int | None) -> Callable[..., Level]:
+    """Levels of a path.
 
-    Lanes that need no walk cost nothing.
+    Loads on one body walk together, if their turns are known.  Other lanes of a batch run one after
+    the other, which a loop in step is slower than.  Lanes that need no walk cost nothing.
     """
     path = functools.partial(_differentiable, lifting=lifting)
 
-    @jax.custom_batching.sequential_vmap
-    def lane(*given: PyTree) -> Level:
-        def nothing() -> Level:
-            shapes = jax.eval_shape(path, *given)
-            return jax.tree.map(lambda like: jnp.zeros(like.shape, like.dtype), shapes)
+    def together(*given: PyTree) -> Level:
+        assert known is not None
+        body, friction, start, forces, lift, _, needed = given
+        system = _system(body, friction, jnp.zeros(()))
+        return _if_needed(needed, lambda: walk_abreast(system, start, forces, lift, known, lifting))
 
-        needed = given[-1]
-        return lax.cond(needed, lambda: path(*given), nothing)
+    @jax.custom_batching.custom_vmap
+    def lane(*given: PyTree) -> Level:
+        if known is None or not all(known):
+            return _if_needed(given[-1], lambda: path(*given))
+        body, friction, *at, turns, needed = given
+        one = jax.tree.map(lambda a: a[None], at)
+        return jax.tree.map(lambda a: a[0], together(body, friction, *one, turns, needed))
+
+    @lane.def_vmap
+    def lanes(size: int, batched: list[PyTree], *given: PyTree) -> tuple[Level, Level]:
+        own_body, own_friction, *_, own_turns, own_need = (_any(each) for each in batched)
+        if known is None or own_body or own_friction or own_turns or own_need:
+            mapped, shared = eqx.partition(list(given), batched)
+            found = lax.map(lambda some: lane(*eqx.combine(some, shared)), mapped)
+        else:
+            at = jax.tree.map(
+                lambda a, own: a if own else jnp.broadcast_to(a, (size, *a.shape)),
+                list(given[2:5]),
+                batched[2:5],
+            )
+            found = together(*given[:2], *at, *given[5:])
+        return found, jax.tree.map(lambda _: True, found)
 
     return lane
+
+
+def _any(batched: PyTree) -> bool:
+    return any(jax.tree.leaves(batched))
+
+
+def _if_needed(needed: Array, path: Callable[[], Level]) -> Level:
+    """Levels of a path, or zeros at no cost."""
+
+    def nothing() -> Level:
+        return jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), jax.eval_shape(path))
+
+    return lax.cond(needed, path, nothing)
+
+
+def _system(body: Body, friction: Array, reference: Array) -> System:
+    matrix = jnp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
+    return System(matrix, jnp.concatenate([body.f_t, body.f_n]), body.c, friction, reference)
 
 
 def _differentiable(
@@ -163,11 +176,10 @@ def _differentiable(
     """Levels of a path, level by level differentiable; see `walk`."""
     k, n = start.v.size, lift.size
     lifting = n if lifting is None else lifting
-    matrix = jnp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
-    pull = jnp.concatenate([body.f_t, body.f_n])
-    forces_then = jnp.concatenate([start.r_t, start.r_n]) + pull * start.force
-    reference = forces_then - matrix @ jnp.concatenate([start.v, lift])
-    system = System(matrix, pull, body.c, friction, reference)
+    system = _system(body, friction, start.force)
+    forces_then = jnp.concatenate([start.r_t, start.r_n]) + system.pull * start.force
+    reference = forces_then - system.matrix @ jnp.concatenate([start.v, lift])
+    system = system._replace(reference=reference)
     none = jnp.zeros_like(start.v, bool)
     down = jnp.all(lift[lifting:] <= 0.0)
     first = Level(start, lift, jnp.zeros_like(body.c), none, down)
@@ -207,38 +219,34 @@ def _run(
     tau = jnp.abs(force - origin.force)
 
     def turn(both: tuple[Tableau, Array]) -> tuple[Tableau, Array]:
-        return reversed_at(system, last.state, last.lift, sense, at.lifting), jnp.asarray(False)
+        wanted = last.lift > 0.0
+        given = last.state, last.lift, wanted, sense
+        return reversed_at(system, *given, at.lifting), jnp.asarray(False)
 
     # Loops that run once: in a batch they cost nothing where no lane needs them.
     at, _ = lax.while_loop(lambda both: both[1], turn, (at, turned & needed))
     done = at.work
 
     def unfinished(now: Walk) -> Array:
-        few = now.at.events < MOST_EVENTS * now.at.opened.size
-        able = (now.event.kind != OPEN) | (now.event.node < now.at.lifting)
-        return needed & (now.event.tau < tau) & few & able
+        return needed & (now.event.tau < tau) & goes_on(now.at, now.event)
 
     def go(now: Walk) -> Walk:
         event, trace = now.event, now.trace
         if trace is not None:
             trace = slopes.along(trace, system, now.at, event.tau, origin, sense)
-        at = _moved(now.at, system.friction, event.tau)
+        at = moved(now.at, system.friction, event.tau)
         if trace is not None:
             trace = slopes.at_event(trace, system, at, event.kind, event.node, origin, sense)
         at = changed(at, event.kind, event.node, system.friction)
-        return Walk(at, _next_event(at, system.friction), trace)
+        return Walk(at, next_event(at, system.friction), trace)
 
     at, event, trace = lax.while_loop(
-        unfinished, go, Walk(at, _next_event(at, system.friction), trace)
+        unfinished, go, Walk(at, next_event(at, system.friction), trace)
     )
     if trace is not None:
         trace = slopes.along(trace, system, at, tau, origin, sense)
-    at = _moved(at, system.friction, tau)
-    state, lift = _state(at, system.friction, origin, force)
-    held = jnp.abs(at.rate[-1]) < SLIDES * jnp.abs(system.c)
-    settled = last.settled & (event.tau >= tau) & held
-    slipping = (at.sigma != 0.0) & ~at.opened[: at.sigma.size]
-    return at, Level(state, lift, at.work - done, slipping, settled), trace
+    at, level = ended(system, at, event.tau, last, origin, force)
+    return at, level._replace(slip_work=level.slip_work - done), trace
 
 
 @eqx.filter_custom_jvp
@@ -291,53 +299,3 @@ def _next_level_jvp(
 
 def _full(like: Array, change: Array | None) -> Array:
     return jnp.zeros_like(like) if change is None else change
-
-
-def _moved(at: Tableau, friction: Array, tau: Array) -> Tableau:
-    """Tableau at a later tau without an event between."""
-    k = at.sigma.size
-    step = tau - at.tau
-    middle = at.at(at.tau + 0.5 * step)
-    closed = (at.sigma != 0.0) & ~at.opened[:k]
-    power = jnp.where(closed, at.sigma * friction * middle[k : 2 * k] * at.rate[:k], 0.0)
-    return at._replace(work=at.work + jnp.sum(power) * step, tau=tau)
-
-
-def _state(
-    at: Tableau, friction: Array, origin: ContactState, force: Array
-) -> tuple[ContactState, Array]:
-    """Contact and lift at a tableau's tau; ``origin`` is the contact at the reversal."""
-    k = at.sigma.size
-    fields, reaction = at.fields(at.tau, origin.v)
-    now = at.at(at.tau)
-    traction = jnp.where(at.sigma == 0.0, now[:k], -at.sigma * friction * reaction[:k])
-    return ContactState(fields[:k], traction, reaction, force, now[-1]), fields[k:]
-
-
-def _next_event(at: Tableau, friction: Array) -> Event:
-    """Next event of a stretch."""
-    k, n = at.sigma.size, at.opened.size
-    now, rate = at.at(at.tau), at.rate
-    force, force_rate = now[:k], rate[:k]  # slip where a node slips
-    normal, normal_rate = now[k : k + n], rate[k : k + n]
-
-    def until(room: Array, change: Array, counts: Array) -> Array:
-        falling = counts & (change < 0.0)
-        wait = jnp.maximum(room, 0.0) / jnp.where(falling, -change, 1.0)
-        return jnp.where(falling, wait, jnp.inf)
-
-    sticks = (at.sigma == 0.0) & ~at.opened[:k]
-    slips = (at.sigma != 0.0) & ~at.opened[:k]
-    cap, cap_rate = friction * normal[:k], friction * normal_rate[:k]
-    loose = ~at.opened & jnp.append(at.sigma != 0.0, jnp.ones(n - k, bool))
-    waits = [  # in the order of the kinds
-        until(cap + force, cap_rate + force_rate, sticks),
-        until(cap - force, cap_rate - force_rate, sticks),
-        jnp.where(slips & (at.sigma * force_rate < 0.0), 0.0, jnp.inf),
-        until(normal, normal_rate, loose),
-        until(normal, normal_rate, at.opened),
-    ]
-    first = jnp.stack([jnp.min(wait) for wait in waits])
-    kind = jnp.argmin(first)
-    node = jnp.stack([jnp.argmin(wait) for wait in waits])[kind]
-    return Event(at.tau + first[kind], kind, node)

@@ -11,7 +11,8 @@ from jax import Array, lax
 
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import ContactState, Factors, factorise, follow
-from jbeamshell.condensed.events import Level, walk
+from jbeamshell.condensed.events import walk
+from jbeamshell.condensed.stretch import Level
 
 Turns = tuple[bool, ...] | Array
 
@@ -43,7 +44,7 @@ def levels(
     nested, valid = nested_levels(body, friction, start, forces, turns)
 
     def by_events() -> Level:
-        return walk(body, friction, start, forces, jnp.asarray(turns), lift, ~valid)
+        return walk(body, friction, start, forces, turns, lift, ~valid)
 
     return lax.cond(valid, lambda: nested, by_events)
 

@@ -97,7 +97,7 @@ def along(
     step, middle = sense * (tau - at.tau), 0.5 * (at.tau + tau)
     load = origin.force + sense * middle
     fields, reactions = at.fields(middle, origin.v)
-    row = _answer(trace, system, at, at.rows.shape[0] - 1, reactions)
+    row = _answer(trace, system, at, at.rate.size - 1, reactions)
     forces = step * row.forces
     return trace._replace(
         on_matrix=trace.on_matrix + forces[:, None] * fields,
@@ -154,8 +154,8 @@ def _answer(
     trace: Trace, system: System, at: Tableau, number: Array | int, reactions: Array
 ) -> Row:
     """Row of an answer, without what a change of forces adds to it directly."""
-    k, n = at.sigma.size, at.opened.size
-    row = at.rows[number, : k + n]
+    k = at.sigma.size
+    row = at.matrix[number]
     slips = jnp.where(at.sigma == 0.0, 0.0, row[:k])
     sticks = jnp.where(at.sigma == 0.0, row[:k], 0.0)
     normal = jnp.where(at.opened, -row[k:], 0.0).at[:k].add(-at.sigma * system.friction * slips)
@@ -209,7 +209,7 @@ def level_slopes(
     held = jnp.concatenate(
         [jnp.where(at.sigma == 0.0, stuck, -sum_of_both), jnp.where(at.opened, -pushed[k:], 0.0)]
     )
-    answer = at.rows[:-1, :-2] @ held
+    answer = at.matrix[:-1] @ held
     dv = jnp.where(at.sigma == 0.0, stuck, answer[:k])
     dw = jnp.where(at.opened, answer[k:], 0.0)
     dq = jnp.concatenate([dv, dw])

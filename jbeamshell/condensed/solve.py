@@ -25,9 +25,10 @@ from jbeamshell.condensed.drives import (
     spring_energy,
     with_springs,
 )
-from jbeamshell.condensed.events import Level, walk
+from jbeamshell.condensed.events import walk
 from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
 from jbeamshell.condensed.pair import Pair
+from jbeamshell.condensed.stretch import Level
 from jbeamshell.condensed.strip import Strip, condensed, fields, spring_stiffness, stays_flat
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
@@ -186,8 +187,7 @@ def _levels(
             found = levels(body, friction, start, targets, turns, flat)
         else:
             lifting = math.ceil(LIFTING * strip.x.size) if by == "near events" else None
-            turned = jnp.asarray(turns)
-            found = walk(body, friction, start, targets, turned, flat, lifting=lifting)
+            found = walk(body, friction, start, targets, turns, flat, lifting=lifting)
         sound = jnp.all(jnp.isfinite(strip.lift))
     state = found.state
     if scene.load.control == "displacement":

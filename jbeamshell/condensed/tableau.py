@@ -46,11 +46,13 @@ class Tableau(NamedTuple):
     """Contact between two events; k of n nodes may slip, and the first m may lift.
 
     Rows are the k tangential and the n normal ones, and the displacement of the loaded end.
-    Columns are the k tangential and the first m normal ones, the value at tau = 0 and the rate.
+    Columns are the k tangential and the first m normal ones.  Loads of one body that have met the
+    same events share all but the value, what is held, tau and the work.
 
     Attributes
     ----------
-    rows : (k + n + 1, k + m + 2)
+    matrix : (k + n + 1, k + m)
+    value, rate : (k + n + 1,) answers at tau = 0, and their rates over tau
     sigma : (k,) 1 and -1 for nodes that slip along and against v, 0 for those that stick
     opened : (n,) True for open nodes
     held : (k,) slip at which sticking nodes are held, since the reversal
@@ -59,7 +61,9 @@ class Tableau(NamedTuple):
     events : count since the reversal
     """
 
-    rows: Array
+    matrix: Array
+    value: Array
+    rate: Array
     sigma: Array
     opened: Array
     held: Array
@@ -70,16 +74,11 @@ class Tableau(NamedTuple):
     @property
     def lifting(self) -> int:
         """Number m of nodes that may lift."""
-        return int(self.rows.shape[1] - 2 - self.sigma.size)
-
-    @property
-    def rate(self) -> Array:
-        """Rates of all answers over tau."""
-        return self.rows[:, -1]
+        return int(self.matrix.shape[1] - self.sigma.size)
 
     def at(self, tau: Array) -> Array:
         """All answers at a tau of this stretch."""
-        return self.rows[:, -2] + self.rows[:, -1] * tau
+        return self.value + self.rate * tau
 
     def fields(self, tau: Array, origin: Array) -> tuple[Array, Array]:
         """Fields q = (v, w) and reactions r_n at a tau; ``origin`` is v at the reversal."""
@@ -93,9 +92,11 @@ class Tableau(NamedTuple):
 
 def empty(k: int, n: int, lifting: int) -> Tableau:
     """Tableau of no contact, to be filled at the first reversal."""
-    zero = jnp.zeros(())
+    zero, rows = jnp.zeros(()), jnp.zeros(k + n + 1)
     return Tableau(
-        rows=jnp.zeros((k + n + 1, k + lifting + 2)),
+        matrix=jnp.zeros((k + n + 1, k + lifting)),
+        value=rows,
+        rate=rows,
         sigma=jnp.zeros(k),
         opened=jnp.zeros(n, bool),
         held=jnp.zeros(k),
@@ -106,16 +107,15 @@ def empty(k: int, n: int, lifting: int) -> Tableau:
 
 
 def reversed_at(
-    system: System, state: ContactState, lift: Array, sense: Array, lifting: int
+    system: System, state: ContactState, lift: Array, wanted: Array, sense: Array, lifting: int
 ) -> Tableau:
-    """Tableau at a reversal: all closed nodes stick, open ones stay open."""
+    """Tableau at a reversal: all closed nodes stick, the ``wanted`` ones (n,) stay open."""
     k, n = state.v.size, lift.size
-    value = jnp.concatenate([state.r_t, state.r_n, state.displacement[None]])
-    rate = sense * jnp.append(-system.pull, system.c)
-    rows = jnp.concatenate([system.matrix, system.pull[None]])[:, : k + lifting]
-    rows = jnp.concatenate([rows, value[:, None], rate[:, None]], axis=1)
-    start = empty(k, n, lifting)._replace(rows=rows)
-    wanted = lift > 0.0
+    start = empty(k, n, lifting)._replace(
+        matrix=jnp.concatenate([system.matrix, system.pull[None]])[:, : k + lifting],
+        value=jnp.concatenate([state.r_t, state.r_n, state.displacement[None]]),
+        rate=sense * jnp.append(-system.pull, system.c),
+    )
 
     def open_next(at: Tableau) -> Tableau:
         i = jnp.argmax(wanted & ~at.opened)
@@ -123,8 +123,8 @@ def reversed_at(
         return changed(at, OPEN, i, system.friction)
 
     found = lax.while_loop(lambda at: jnp.any(wanted & ~at.opened), open_next, start)
-    rows = found.rows.at[k : k + n, -2].add(jnp.where(wanted, lift, 0.0))
-    return found._replace(rows=rows, events=jnp.asarray(0))
+    value = found.value.at[k : k + n].add(jnp.where(wanted, lift, 0.0))
+    return found._replace(value=value, events=jnp.asarray(0))
 
 
 def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tableau:
@@ -137,16 +137,24 @@ def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tab
     # A slipping node holds r_t + sigma mu r_n: before it slips its row becomes that sum, and after
     # it sticks again the sum is taken apart.  Slip is counted from where the node was held.
     sigma = jnp.where(kind == ALONG, 1.0, -1.0)
-    slip = at.rows[tangential, -2] + at.rows[tangential, -1] * at.tau
+    slip = at.value[tangential] + at.rate[tangential] * at.tau
     held = at.held[tangential]
-    row = at.rows[i] + jnp.where(slips, sigma * friction, 0.0) * at.rows[normal]
-    row = row.at[-2].add(jnp.where(sticks, -slip, 0.0))
+    added = jnp.where(slips, sigma * friction, 0.0)
     rest = jnp.where(sticks, -at.sigma[tangential] * friction, 0.0)
-    rows = exchanged_rows(at.rows, i, row, rest, normal, jnp.where(slips, held, 0.0))
+    row = at.matrix[i] + added * at.matrix[normal]
+    share = at.matrix[:, i] / row[i]
+
+    def column(old: Array, less: Array | float, more: Array | float) -> Array:
+        entry = old[i] + added * old[normal] - less
+        beside = old[normal] - share[normal] * entry
+        return (old - share * entry).at[i].set(rest * beside - entry / row[i] + more)
+
     now = jnp.where(slips, sigma, jnp.where(sticks, 0.0, at.sigma[tangential]))
     opened = jnp.where(kind < OPEN, at.opened[node], kind == OPEN)
     return at._replace(
-        rows=rows,
+        matrix=exchanged_rows(at.matrix, i, row, rest, normal),
+        value=column(at.value, jnp.where(sticks, slip, 0.0), jnp.where(slips, held, 0.0)),
+        rate=column(at.rate, 0.0, 0.0),
         sigma=at.sigma.at[tangential].set(now),
         opened=at.opened.at[node].set(opened),
         held=at.held.at[tangential].set(jnp.where(sticks, slip, jnp.where(slips, 0.0, held))),
@@ -154,17 +162,14 @@ def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tab
     )
 
 
-def exchanged_rows(
-    rows: Array, i: Array, row: Array, rest: Array, other: Array, more: Array | float = 0.0
-) -> Array:
+def exchanged_rows(rows: Array, i: Array, row: Array, rest: Array, other: Array) -> Array:
     """Rows with row and column ``i`` exchanged.
 
-    ``row`` stands for row ``i``, and ``rest`` times the new row ``other`` is added to the new one,
-    whose value at tau = 0 rises by ``more``.
+    ``row`` stands for row ``i``, and ``rest`` times the new row ``other`` is added to the new one.
     """
     pivot = row[i]
     share = rows[:, i] / pivot
     beside = (rows[other] - share[other] * row).at[i].set(share[other])
-    new = ((-row / pivot).at[i].set(1.0 / pivot) + rest * beside).at[-2].add(more)
+    new = (-row / pivot).at[i].set(1.0 / pivot) + rest * beside
     swept = rows - share[:, None] * row
     return swept.at[:, i].set(share).at[i].set(new)

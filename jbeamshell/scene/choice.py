@@ -31,7 +31,7 @@ from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.rungs import CONDENSED, PLANE_NODES
 
 LINEAR_PART = 0.2  # of the tolerance that linear rotations may take
-FEW_STEPS = 2  # load steps per half cycle where only figures of a cycle are asked of exact events
+FEW_STEPS = 1  # load steps per half cycle where only figures of a cycle are asked of exact events
 
 
 class Grid(NamedTuple):

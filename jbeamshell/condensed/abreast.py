@@ -1,0 +1,216 @@
+"""Load paths of many loads on one body, which share the events that they have in common.
+
+What a tableau answers with depends on who sticks, slips and is open, not on the load: two loads
+that meet the same events in the same order share its matrix and differ in one column.  So the
+loads of a branch set out together.  The one that goes farthest leads: its next event is that of
+all whose own next event it is.  Those with another one are left behind and set out again, led by
+one of their own; when a round brings few loads home, the others go alone.
+
+A branch that starts where the branch before the last one did, to the same loads, is copied: a
+closed loop is walked once.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+from jaxtyping import PyTree
+
+from jbeamshell.condensed.branches import ContactState
+from jbeamshell.condensed.stretch import Event, Level, ended, goes_on, moved, next_event, waits_of
+from jbeamshell.condensed.tableau import System, Tableau, changed, reversed_at
+
+SAME = 1e-12  # of a branch, within which events come at the same load
+FEW = 8  # part of the loads, below which those that a round brings home are too few
+CLOSED = 1e-10  # of the largest slip, force or lift, within which a loop is closed
+OWN: Any = Tableau(None, 0, None, None, None, 0, 0, 0, None)  # type: ignore[arg-type]
+"""Axes of the loads in a tableau: each has its own value, held slips, tau and work."""
+
+
+class Group(NamedTuple):
+    """Loads on their way along a branch.
+
+    Attributes
+    ----------
+    at : tableau of those that walk together, of which each load has the parts `OWN`
+    walking, waiting : (loads,) True for them, and for all that have not arrived
+    found : levels of those that have, (loads, ...)
+    """
+
+    at: Tableau
+    walking: Array
+    waiting: Array
+    found: Level
+
+
+class Branch(NamedTuple):
+    """Branch of many loads: levels (loads, ...) at its start, end loads and levels along it."""
+
+    start: Level
+    targets: Array
+    found: Level
+
+    def starts_at(self, start: Level, targets: Array) -> Array:
+        """True if another one with this start and these end loads is the same, in a closed loop."""
+        one, other = ((level.state, level.lift) for level in (self.start, start))
+
+        def close(a: Array, b: Array) -> Array:
+            return jnp.max(jnp.abs(a - b)) <= CLOSED * jnp.max(jnp.abs(a))
+
+        parts = [close(*both) for both in zip(*map(jax.tree.leaves, (one, other)), strict=True)]
+        return jnp.all(self.targets == targets) & jnp.all(jnp.stack(parts))
+
+
+def walk_abreast(
+    system: System,
+    start: ContactState,
+    forces: Array,
+    lift: Array,
+    turns: tuple[bool, ...],
+    lifting: int | None,
+) -> Level:
+    """Levels (loads, levels, ...) of the paths of many loads on one body; see `events.walk`.
+
+    Parameters
+    ----------
+    system : equations of the body, whose reference is of no use here
+    start, forces, lift : contact at the start (loads, ...), end loads (loads, levels), lift at the
+        start (loads, n)
+    turns : True where the loads have turned since the level before
+    lifting : number of nodes that may lift; None is all
+    """
+    loads, lifting = forces.shape[0], lift.shape[1] if lifting is None else lifting
+    first = np.flatnonzero(turns)
+    sizes = np.diff(first, append=len(turns))
+    longest = int(sizes.max())
+    inside = np.minimum(np.arange(longest), sizes[:, None] - 1)  # the last level fills a branch up
+
+    none = jnp.zeros(start.v.shape, bool)
+    down = jnp.all(lift[:, lifting:] <= 0.0, axis=1)
+    begin = Level(start, lift, jnp.zeros_like(start.force), none, down)
+    branches = jnp.moveaxis(forces[:, first[:, None] + inside], 1, 0)  # (branches, loads, longest)
+
+    def go(carry: tuple[Level, Branch, Branch], targets: Array) -> tuple[PyTree, Level]:
+        origin, before, older = carry
+
+        def anew() -> Level:
+            each = jax.tree.map(lambda a: jnp.repeat(a, longest, axis=0), origin)
+            found = _branch(system, each, targets.ravel(), lifting)
+            found = jax.tree.map(lambda a: a.reshape(loads, longest, *a.shape[1:]), found)
+            work = jnp.diff(found.slip_work, axis=1, prepend=0.0)
+            return found._replace(slip_work=work)
+
+        found = lax.cond(older.starts_at(origin, targets), lambda: older.found, anew)
+        last = jax.tree.map(lambda a: a[:, -1], found)
+        return (last, Branch(origin, targets, found), before), found
+
+    unlike = jax.tree.map(lambda a: jnp.repeat(a[:, None], longest, axis=1), begin)
+    nowhere = Branch(begin, jnp.full_like(branches[0], jnp.nan), unlike)
+    found = lax.scan(go, (begin, nowhere, nowhere), branches)[1]
+    real = np.flatnonzero((np.arange(longest) < sizes[:, None]).ravel())
+
+    def in_order(a: Array) -> Array:
+        a = jnp.moveaxis(a, 0, 1)
+        return a.reshape(loads, -1, *a.shape[3:])[:, real]
+
+    return jax.tree.map(in_order, found)
+
+
+class Left(NamedTuple):
+    """Loads that have not arrived, levels of those that have, and how many the last round took."""
+
+    waiting: Array
+    found: Level
+    took: Array
+
+
+def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
+    """Levels (loads, ...) at the end of one branch, with the work along it."""
+    if forces.size == 1:
+        only = _alone(system, jax.tree.map(lambda a: a[0], last), forces[0], lifting)
+        level: Level = jax.tree.map(lambda a: a[None], only)
+        return level
+    friction, n = system.friction, last.lift.shape[1]
+    sense = jnp.where(forces >= last.state.force, 1.0, -1.0)
+    reach, opened = jnp.abs(forces - last.state.force), last.lift > 0.0
+
+    def leader(among: Array) -> Array:
+        return jnp.argmax(jnp.where(among, reach, -1.0))
+
+    def set_out(left: Left) -> Left:
+        first = leader(left.waiting)
+
+        def begin(state: ContactState, lift: Array) -> Tableau:
+            return reversed_at(system, state, lift, opened[first], sense[first], lifting)
+
+        at = jax.vmap(begin, out_axes=OWN)(last.state, last.lift)
+        alike = (sense == sense[first]) & jnp.all(opened == opened[first], axis=1)
+        group = Group(at, left.waiting & alike, left.waiting, left.found)
+        group = lax.while_loop(lambda now: jnp.any(now.walking), on, group)
+        return Left(group.waiting, group.found, jnp.sum(left.waiting) - jnp.sum(group.waiting))
+
+    def on(now: Group) -> Group:
+        at, walking, waiting, found = now
+        waits = jax.vmap(waits_of, (OWN, None))(at, friction).reshape(reach.size, -1)
+        own = jnp.min(waits, axis=1)
+        comes = at.tau + own
+        first = leader(walking)
+        number = jnp.argmin(waits[first])
+        event = Event(comes[first], *jnp.divmod(number, n))
+        follows = walking & (waits[:, number] <= own + SAME * reach)
+        arrives = walking & ((comes >= reach) | (follows & ~goes_on(at, event)))
+        # A loop that runs once, if at all: unlike a condition it copies nothing.
+        found, _ = lax.while_loop(
+            lambda both: both[1],
+            lambda both: (arrive(at, comes, arrives, both[0]), jnp.asarray(False)),
+            (found, jnp.any(arrives)),
+        )
+        walking = follows & ~arrives
+        to = at.tau + jnp.where(walking, waits[:, number], 0.0)
+        at = jax.vmap(moved, (OWN, None, 0), OWN)(at, friction, to)
+        at = jax.vmap(changed, (OWN, None, None, None), OWN)(at, event.kind, event.node, friction)
+        return Group(at, walking, waiting & ~arrives, found)
+
+    def arrive(at: Tableau, comes: Array, arrives: Array, found: Level) -> Level:
+        axes = (None, OWN, 0, 0, 0, 0)
+        each = jax.vmap(ended, axes, (OWN, 0))(system, at, comes, last, last.state, forces)[1]
+
+        def put(new: Array, old: Array) -> Array:
+            return jnp.where(arrives.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+
+        return jax.tree.map(put, each, found)
+
+    def alone(left: Left) -> Left:
+        one = jnp.argmax(left.waiting)
+        level = _alone(system, jax.tree.map(lambda a: a[one], last), forces[one], lifting)
+        found = jax.tree.map(lambda old, new: old.at[one].set(new), left.found, level)
+        return Left(left.waiting.at[one].set(False), found, left.took)
+
+    def pays(left: Left) -> Array:
+        return jnp.any(left.waiting) & (left.took * FEW >= reach.size)
+
+    left = Left(jnp.ones_like(sense, bool), last, jnp.asarray(reach.size))
+    left = lax.while_loop(pays, set_out, left)
+    return lax.while_loop(lambda left: jnp.any(left.waiting), alone, left).found
+
+
+def _alone(system: System, last: Level, force: Array, lifting: int) -> Level:
+    """Level at the end of a branch of one load."""
+    friction, start = system.friction, last.state
+    sense, tau = jnp.where(force >= start.force, 1.0, -1.0), jnp.abs(force - start.force)
+    at = reversed_at(system, start, last.lift, last.lift > 0.0, sense, lifting)
+
+    def unfinished(now: tuple[Tableau, Event]) -> Array:
+        return (now[1].tau < tau) & goes_on(*now)
+
+    def go(now: tuple[Tableau, Event]) -> tuple[Tableau, Event]:
+        at, event = now
+        at = changed(moved(at, friction, event.tau), event.kind, event.node, friction)
+        return at, next_event(at, friction)
+
+    at, event = lax.while_loop(unfinished, go, (at, next_event(at, friction)))
+    return ended(system, at, event.tau, last, start, force)[1]

@@ -1,0 +1,124 @@
+"""Stretch of a load path between two events: what waits, what comes next, and where it ends."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from jbeamshell.condensed.branches import ContactState
+from jbeamshell.condensed.tableau import OPEN, System, Tableau
+
+MOST_EVENTS = 40  # of a load branch, times the nodes
+SLIDES = 1e6  # compliance over that of the clamped contact at which a body slides as a whole
+
+
+class Level(NamedTuple):
+    """A load level of a path: the contact, its lift, and what happened since the level before.
+
+    Attributes
+    ----------
+    state : contact
+    lift : (n,) lift w
+    slip_work : work of friction in the step
+    slipping : (k,) True for closed nodes that slip at its end
+    settled : True if all events up to here were found, and the body does not slide as a whole
+    """
+
+    state: ContactState
+    lift: Array
+    slip_work: Array
+    slipping: Array
+    settled: Array
+
+
+class Event(NamedTuple):
+    """Next event: its tau, kind and node."""
+
+    tau: Array
+    kind: Array
+    node: Array
+
+
+def moved(at: Tableau, friction: Array, tau: Array) -> Tableau:
+    """Tableau at a later tau without an event between."""
+    k = at.sigma.size
+    step = tau - at.tau
+    middle = at.at(at.tau + 0.5 * step)
+    closed = (at.sigma != 0.0) & ~at.opened[:k]
+    power = jnp.where(closed, at.sigma * friction * middle[k : 2 * k] * at.rate[:k], 0.0)
+    return at._replace(work=at.work + jnp.sum(power) * step, tau=tau)
+
+
+def state_of(
+    at: Tableau, friction: Array, origin: ContactState, force: Array
+) -> tuple[ContactState, Array]:
+    """Contact and lift at a tableau's tau; ``origin`` is the contact at the reversal."""
+    k = at.sigma.size
+    fields, reaction = at.fields(at.tau, origin.v)
+    now = at.at(at.tau)
+    traction = jnp.where(at.sigma == 0.0, now[:k], -at.sigma * friction * reaction[:k])
+    return ContactState(fields[:k], traction, reaction, force, now[-1]), fields[k:]
+
+
+def ended(
+    system: System, at: Tableau, event: Array, last: Level, start: ContactState, force: Array
+) -> tuple[Tableau, Level]:
+    """Tableau and level at a load; its work is that since the reversal.
+
+    Parameters
+    ----------
+    at : tableau after the last event before the load
+    event : tau of the next one, which comes before the load if no more events were found
+    last : level before
+    start : contact at the reversal
+    force : the load
+    """
+    tau = jnp.abs(force - start.force)
+    at = moved(at, system.friction, tau)
+    state, lift = state_of(at, system.friction, start, force)
+    held = jnp.abs(at.rate[-1]) < SLIDES * jnp.abs(system.c)
+    slipping = (at.sigma != 0.0) & ~at.opened[: at.sigma.size]
+    return at, Level(state, lift, at.work, slipping, last.settled & (event >= tau) & held)
+
+
+def goes_on(at: Tableau, event: Event) -> Array:
+    """True if an event can be followed: there were not too many, and its node may lift off."""
+    few = at.events < MOST_EVENTS * at.opened.size
+    return few & ((event.kind != OPEN) | (event.node < at.lifting))
+
+
+def next_event(at: Tableau, friction: Array) -> Event:
+    """Next event of a stretch; of those at the same tau the one of the first kind and node."""
+    waits = waits_of(at, friction)
+    first = jnp.argmin(waits)
+    return Event(at.tau + waits.ravel()[first], *jnp.divmod(first, at.opened.size))
+
+
+def waits_of(at: Tableau, friction: Array) -> Array:
+    """Load until the events of a stretch, (kinds, n), infinite for those that do not come."""
+    k, n = at.sigma.size, at.opened.size
+    now, rate = at.at(at.tau), at.rate
+    force, force_rate = now[:k], rate[:k]  # slip where a node slips
+    normal, normal_rate = now[k : k + n], rate[k : k + n]
+
+    def until(room: Array, change: Array, counts: Array) -> Array:
+        falling = counts & (change < 0.0)
+        inverse = jnp.where(falling, -1.0 / jnp.where(falling, change, 1.0), 0.0)
+        wait = jnp.where(falling, jnp.maximum(room, 0.0) * inverse, jnp.inf)
+        return jnp.pad(wait, (0, n - wait.size), constant_values=jnp.inf)
+
+    sticks = (at.sigma == 0.0) & ~at.opened[:k]
+    slips = (at.sigma != 0.0) & ~at.opened[:k]
+    cap, cap_rate = friction * normal[:k], friction * normal_rate[:k]
+    loose = ~at.opened & jnp.append(at.sigma != 0.0, jnp.ones(n - k, bool))
+    back = jnp.where(slips & (at.sigma * force_rate < 0.0), 0.0, jnp.inf)
+    waits = [  # in the order of the kinds
+        until(cap + force, cap_rate + force_rate, sticks),
+        until(cap - force, cap_rate - force_rate, sticks),
+        jnp.pad(back, (0, n - k), constant_values=jnp.inf),
+        until(normal, normal_rate, loose),
+        until(normal, normal_rate, at.opened),
+    ]
+    return jnp.stack(waits)
