@@ -12,11 +12,11 @@ closed loop is walked once.
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array, lax
 from jaxtyping import PyTree
 
@@ -84,25 +84,26 @@ def walk_abreast(
     lifting : number of nodes that may lift; None is all
     """
     loads, lifting = forces.shape[0], lift.shape[1] if lifting is None else lifting
-    first = np.flatnonzero(turns)
-    sizes = np.diff(first, append=len(turns))
-    longest = int(sizes.max())
-    inside = np.minimum(np.arange(longest), sizes[:, None] - 1)  # the last level fills a branch up
+    bounds = [*(place for place, turned in enumerate(turns) if turned), len(turns)]
+    longest = max(b - a for a, b in itertools.pairwise(bounds))
 
     none = jnp.zeros(start.v.shape, bool)
     down = jnp.all(lift[:, lifting:] <= 0.0, axis=1)
     begin = Level(start, lift, jnp.zeros_like(start.force), none, down)
-    branches = jnp.moveaxis(forces[:, first[:, None] + inside], 1, 0)  # (branches, loads, longest)
+    parts = [forces[:, a:b] for a, b in itertools.pairwise(bounds)]
+    branches = jnp.stack([_filled(part, longest) for part in parts])
 
     def go(carry: tuple[Level, Branch, Branch], targets: Array) -> tuple[PyTree, Level]:
         origin, before, older = carry
 
         def anew() -> Level:
+            if loads == 1:
+                only = _alone(system, jax.tree.map(lambda a: a[0], origin), targets[0], lifting)
+                return jax.tree.map(lambda a: a[None], only._replace(slip_work=_steps(only)))
             each = jax.tree.map(lambda a: jnp.repeat(a, longest, axis=0), origin)
             found = _branch(system, each, targets.ravel(), lifting)
             found = jax.tree.map(lambda a: a.reshape(loads, longest, *a.shape[1:]), found)
-            work = jnp.diff(found.slip_work, axis=1, prepend=0.0)
-            return found._replace(slip_work=work)
+            return found._replace(slip_work=_steps(found))
 
         found = lax.cond(older.starts_at(origin, targets), lambda: older.found, anew)
         last = jax.tree.map(lambda a: a[:, -1], found)
@@ -111,13 +112,16 @@ def walk_abreast(
     unlike = jax.tree.map(lambda a: jnp.repeat(a[:, None], longest, axis=1), begin)
     nowhere = Branch(begin, jnp.full_like(branches[0], jnp.nan), unlike)
     found = lax.scan(go, (begin, nowhere, nowhere), branches)[1]
-    real = np.flatnonzero((np.arange(longest) < sizes[:, None]).ravel())
 
     def in_order(a: Array) -> Array:
-        a = jnp.moveaxis(a, 0, 1)
-        return a.reshape(loads, -1, *a.shape[3:])[:, real]
+        return jnp.concatenate([a[i, :, : part.shape[1]] for i, part in enumerate(parts)], axis=1)
 
     return jax.tree.map(in_order, found)
+
+
+def _filled(forces: Array, longest: int) -> Array:
+    """End loads (loads, longest) of a branch that may be shorter; the last one fills it up."""
+    return jnp.pad(forces, ((0, 0), (0, longest - forces.shape[1])), mode="edge")
 
 
 class Left(NamedTuple):
@@ -130,10 +134,6 @@ class Left(NamedTuple):
 
 def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
     """Levels (loads, ...) at the end of one branch, with the work along it."""
-    if forces.size == 1:
-        only = _alone(system, jax.tree.map(lambda a: a[0], last), forces[0], lifting)
-        level: Level = jax.tree.map(lambda a: a[None], only)
-        return level
     friction, n = system.friction, last.lift.shape[1]
     sense = jnp.where(forces >= last.state.force, 1.0, -1.0)
     reach, opened = jnp.abs(forces - last.state.force), last.lift > 0.0
@@ -186,8 +186,8 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
 
     def alone(left: Left) -> Left:
         one = jnp.argmax(left.waiting)
-        level = _alone(system, jax.tree.map(lambda a: a[one], last), forces[one], lifting)
-        found = jax.tree.map(lambda old, new: old.at[one].set(new), left.found, level)
+        level = _alone(system, jax.tree.map(lambda a: a[one], last), forces[one][None], lifting)
+        found = jax.tree.map(lambda old, new: old.at[one].set(new[0]), left.found, level)
         return Left(left.waiting.at[one].set(False), found, left.took)
 
     def pays(left: Left) -> Array:
@@ -198,19 +198,29 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
     return lax.while_loop(lambda left: jnp.any(left.waiting), alone, left).found
 
 
-def _alone(system: System, last: Level, force: Array, lifting: int) -> Level:
-    """Level at the end of a branch of one load."""
+def _alone(system: System, last: Level, forces: Array, lifting: int) -> Level:
+    """Levels (levels, ...) along a branch of one load, each with the work since its start."""
     friction, start = system.friction, last.state
-    sense, tau = jnp.where(force >= start.force, 1.0, -1.0), jnp.abs(force - start.force)
-    at = reversed_at(system, start, last.lift, last.lift > 0.0, sense, lifting)
+    sense = jnp.where(forces[-1] >= start.force, 1.0, -1.0)
 
-    def unfinished(now: tuple[Tableau, Event]) -> Array:
-        return (now[1].tau < tau) & goes_on(*now)
-
-    def go(now: tuple[Tableau, Event]) -> tuple[Tableau, Event]:
+    def on(now: tuple[Tableau, Event]) -> tuple[Tableau, Event]:
         at, event = now
         at = changed(moved(at, friction, event.tau), event.kind, event.node, friction)
         return at, next_event(at, friction)
 
-    at, event = lax.while_loop(unfinished, go, (at, next_event(at, friction)))
-    return ended(system, at, event.tau, last, start, force)[1]
+    def to(at: Tableau, force: Array) -> tuple[Tableau, Level]:
+        tau = jnp.abs(force - start.force)
+
+        def unfinished(now: tuple[Tableau, Event]) -> Array:
+            return (now[1].tau < tau) & goes_on(*now)
+
+        at, event = lax.while_loop(unfinished, on, (at, next_event(at, friction)))
+        return ended(system, at, event.tau, last, start, force)
+
+    at = reversed_at(system, start, last.lift, last.lift > 0.0, sense, lifting)
+    return lax.scan(to, at, forces)[1]
+
+
+def _steps(levels: Level) -> Array:
+    """Works of the steps between levels, from those since the start of their branch."""
+    return jnp.diff(levels.slip_work, axis=-1, prepend=0.0)

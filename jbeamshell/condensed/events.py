@@ -121,7 +121,7 @@ def _one_or_many(known: tuple[bool, ...] | None, lifting: int | None) -> Callabl
 
     @jax.custom_batching.custom_vmap
     def lane(*given: PyTree) -> Level:
-        if known is None or not all(known):
+        if known is None:
             return _if_needed(given[-1], lambda: path(*given))
         body, friction, *at, turns, needed = given
         one = jax.tree.map(lambda a: a[None], at)
@@ -198,8 +198,8 @@ def _differentiable(
 
     carry = (empty(k, n, lifting), lax.stop_gradient(start), first)
     found = lax.scan(go, carry, (forces, turns))[1]
-    moved = jnp.concatenate([found.state.v - start.v, found.lift - lift], axis=1)
-    displacement = start.displacement + body.c * (forces - start.force) + moved @ pull
+    change = jnp.concatenate([found.state.v - start.v, found.lift - lift], axis=1)
+    displacement = start.displacement + body.c * (forces - start.force) + change @ system.pull
     return found._replace(state=found.state._replace(displacement=displacement))
 
 

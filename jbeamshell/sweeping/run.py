@@ -69,7 +69,8 @@ def sweep(
     """Figures of the last cycle of many strips that differ in some numbers; each is a lane.
 
     Lanes are sorted by their estimated cost and dealt into blocks of equal cost.  On a core they
-    run one after the other, in one compiled loop.  A lane that fails is solved again alone, with
+    run one after the other, in one compiled loop.  On the contact line, lanes that differ in their
+    amplitude or pressure only share a body, and what their load paths have in common.  A lane that fails is solved again alone, with
     its long load steps divided.  A lane outside the model's domain is marked and not run.  Neither
     disturbs the others.
 

@@ -1,0 +1,74 @@
+"""Many loads on one body beside each load by itself."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.condensed import branches, events, strip
+
+SCENE = jb.Scene().replace(
+    {
+        "model.rung": "condensed-squeeze",
+        "strip.height_ratio": 0.3,
+        "strip.far_end": "free",
+        "contact.friction": 0.3,
+    }
+)
+UNIT = jnp.asarray([1.0, 0.0, -1.0, 0.0, 1.0, -1.0, 1.0])
+TURNED = (True, True, False, True, False, True, True)
+GROSS = 6.0
+
+
+@pytest.fixture(scope="module")
+def body():
+    return jax.jit(lambda scene: strip.condensed(scene, 21).body)(SCENE)
+
+
+def walked(body, amplitude, turns):
+    return events.walk(body, jnp.asarray(0.3), branches.pressed(body), amplitude * UNIT, turns)
+
+
+@pytest.fixture(scope="module")
+def together(body):
+    loads = jnp.asarray([0.9, 5.0, 2.1, 0.0, 5.1, 5.6, 3.6, 1.1 * GROSS, -2.7])
+    many = jax.jit(jax.vmap(lambda amplitude: walked(body, amplitude, TURNED)))
+    alone = jax.jit(lambda amplitude: walked(body, amplitude, jnp.asarray(TURNED)))
+    return many(loads), [alone(amplitude) for amplitude in loads]
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, 3, 4, 5, 6, 8])
+def test_a_load_among_many_is_the_load_by_itself(together, number):
+    many, alone = together
+    found, expected = jax.tree.map(lambda a: a[number], many), alone[number]
+    assert np.all(expected.settled)
+    for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * (1e-12 + np.max(abs(other))))
+
+
+def test_loads_lift_off_at_different_events(together):
+    many, _ = together
+    opened = np.sum(np.asarray(many.lift) > 0.0, axis=2)
+    assert len({tuple(row) for row in opened}) > 2
+
+
+def test_a_load_that_slides_is_told_and_spoils_no_other(together):
+    many, alone = together
+    np.testing.assert_array_equal(many.settled[7], alone[7].settled)
+    assert not many.settled[7].all()
+    assert many.settled[np.arange(9) != 7].all()
+
+
+def test_a_closed_loop_is_walked_once_and_its_copy_is_exact(body):
+    path = jnp.asarray([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+
+    @jax.jit
+    def both(amplitude):
+        given = body, jnp.asarray(0.3), branches.pressed(body), amplitude * path
+        return events.walk(*given, (True,) * 7), events.walk(*given, jnp.ones(7, bool))
+
+    copied, walked_again = both(3.0)
+    assert copied.slip_work[5] == copied.slip_work[3]
+    np.testing.assert_allclose(copied.slip_work, walked_again.slip_work, rtol=1e-9)
+    np.testing.assert_allclose(copied.state.r_n, walked_again.state.r_n, atol=1e-9)
