@@ -70,9 +70,9 @@ def sweep(
 
     Lanes are sorted by their estimated cost and dealt into blocks of equal cost.  On a core they
     run one after the other, in one compiled loop.  On the contact line, lanes that differ in their
-    amplitude or pressure only share a body, and what their load paths have in common.  A lane that fails is solved again alone, with
-    its long load steps divided.  A lane outside the model's domain is marked and not run.  Neither
-    disturbs the others.
+    amplitude or pressure only share a body, and what their load paths have in common.  A lane that
+    fails is solved again alone, with its long load steps divided.  A lane outside the model's
+    domain is marked and not run.  Neither disturbs the others.
 
     Blocks run in this process.  If the rest takes long enough, they go on in one process for each
     core; or they run where ``processes`` or ``executor`` says.  The numbers are the same to the
