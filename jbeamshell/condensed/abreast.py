@@ -26,6 +26,7 @@ from jbeamshell.condensed.tableau import System, Tableau, changed, reversed_at
 
 SAME = 1e-12  # of a branch, within which events come at the same load
 FEW = 8  # part of the loads, below which those that a round brings home are too few
+FEW_LEVELS = 2  # of a branch, up to which loads walk together
 CLOSED = 1e-10  # of the largest slip, force or lift, within which a loop is closed
 OWN: Any = Tableau(None, 0, None, None, None, 0, 0, 0, None)  # type: ignore[arg-type]
 """Axes of the loads in a tableau: each has its own value, held slips, tau and work."""
@@ -65,6 +66,11 @@ class Branch(NamedTuple):
         return jnp.all(self.targets == targets) & jnp.all(jnp.stack(parts))
 
 
+def pays(turns: tuple[bool, ...]) -> bool:
+    """True if many loads are quicker together: each level is a load of its own there."""
+    return _longest(_bounds(turns)) <= FEW_LEVELS
+
+
 def walk_abreast(
     system: System,
     start: ContactState,
@@ -84,8 +90,8 @@ def walk_abreast(
     lifting : number of nodes that may lift; None is all
     """
     loads, lifting = forces.shape[0], lift.shape[1] if lifting is None else lifting
-    bounds = [*(place for place, turned in enumerate(turns) if turned), len(turns)]
-    longest = max(b - a for a, b in itertools.pairwise(bounds))
+    bounds = _bounds(turns)
+    longest = _longest(bounds)
 
     none = jnp.zeros(start.v.shape, bool)
     down = jnp.all(lift[:, lifting:] <= 0.0, axis=1)
@@ -117,6 +123,15 @@ def walk_abreast(
         return jnp.concatenate([a[i, :, : part.shape[1]] for i, part in enumerate(parts)], axis=1)
 
     return jax.tree.map(in_order, found)
+
+
+def _bounds(turns: tuple[bool, ...]) -> list[int]:
+    """First levels of the branches, and the number of all levels."""
+    return [*(place for place, turned in enumerate(turns) if turned), len(turns)]
+
+
+def _longest(bounds: list[int]) -> int:
+    return max(b - a for a, b in itertools.pairwise(bounds))
 
 
 def _filled(forces: Array, longest: int) -> Array:
@@ -190,11 +205,11 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
         found = jax.tree.map(lambda old, new: old.at[one].set(new[0]), left.found, level)
         return Left(left.waiting.at[one].set(False), found, left.took)
 
-    def pays(left: Left) -> Array:
+    def many(left: Left) -> Array:
         return jnp.any(left.waiting) & (left.took * FEW >= reach.size)
 
     left = Left(jnp.ones_like(sense, bool), last, jnp.asarray(reach.size))
-    left = lax.while_loop(pays, set_out, left)
+    left = lax.while_loop(many, set_out, left)
     return lax.while_loop(lambda left: jnp.any(left.waiting), alone, left).found
 
 

@@ -18,8 +18,7 @@ from jax import Array, lax
 from jax.typing import ArrayLike
 from jaxtyping import PyTree
 
-from jbeamshell.condensed import slopes
-from jbeamshell.condensed.abreast import walk_abreast
+from jbeamshell.condensed import abreast, slopes
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import ContactState
 from jbeamshell.condensed.slopes import Trace
@@ -108,8 +107,9 @@ def _walk_jvp(
 def _one_or_many(known: tuple[bool, ...] | None, lifting: int | None) -> Callable[..., Level]:
     """Levels of a path.
 
-    Loads on one body walk together, if their turns are known.  Other lanes of a batch run one after
-    the other, which a loop in step is slower than.  Lanes that need no walk cost nothing.
+    Loads on one body walk together, if their turns are known and that pays.  Other lanes of a batch
+    run one after the other, which a loop in step is slower than.  Lanes that need no walk cost
+    nothing.
     """
     path = functools.partial(_differentiable, lifting=lifting)
 
@@ -117,7 +117,9 @@ def _one_or_many(known: tuple[bool, ...] | None, lifting: int | None) -> Callabl
         assert known is not None
         body, friction, start, forces, lift, _, needed = given
         system = _system(body, friction, jnp.zeros(()))
-        return _if_needed(needed, lambda: walk_abreast(system, start, forces, lift, known, lifting))
+        return _if_needed(
+            needed, lambda: abreast.walk_abreast(system, start, forces, lift, known, lifting)
+        )
 
     @jax.custom_batching.custom_vmap
     def lane(*given: PyTree) -> Level:
@@ -130,7 +132,8 @@ def _one_or_many(known: tuple[bool, ...] | None, lifting: int | None) -> Callabl
     @lane.def_vmap
     def lanes(size: int, batched: list[PyTree], *given: PyTree) -> tuple[Level, Level]:
         own_body, own_friction, *_, own_turns, own_need = (_any(each) for each in batched)
-        if known is None or own_body or own_friction or own_turns or own_need:
+        own = own_body or own_friction or own_turns or own_need
+        if known is None or own or not abreast.pays(known):
             mapped, shared = eqx.partition(list(given), batched)
             found = lax.map(lambda some: lane(*eqx.combine(some, shared)), mapped)
         else:
