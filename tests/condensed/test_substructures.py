@@ -157,9 +157,11 @@ class TestContact:
 
         assert float(jax.jvp(work, (1.0,), (1.0,))[0]) == pytest.approx(float(work(1.0)), rel=1e-9)
 
+        one, other = members()
+
         def of_stiffness(k):
-            stiffer = changed(upper(), stiffness=k * upper().stiffness)
-            return jb.solve_contact(stiffer, lower(), **LOAD).dissipation
+            stiffer = changed(one, stiffness=k * one.stiffness)
+            return jb.solve_contact(stiffer, other, **LOAD).dissipation
 
         with pytest.raises(jb.InputError, match="take 'frictional' where they are traced"):
             jax.jit(of_stiffness)(1.0)
