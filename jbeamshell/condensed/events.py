@@ -99,7 +99,8 @@ def _walk_jvp(
     lifting: int | None,
 ) -> tuple[Level, Level]:
     changes = tuple(jax.tree.map(_full, *both) for both in zip(primals, tangents, strict=True))
-    path = functools.partial(_differentiable, turns=jnp.asarray(turns), needed=needed)
+    turns = jnp.asarray(turns)
+    path = functools.partial(_differentiable, turns=turns, needed=needed, lifting=lifting)
     return jax.jvp(path, primals, changes)
 
 

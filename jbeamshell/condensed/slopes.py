@@ -20,7 +20,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jax import Array
+from jax import Array, lax
 
 from jbeamshell.condensed.branches import ContactState
 from jbeamshell.condensed.tableau import AGAINST, ALONG, CLOSE, STICK, System, Tableau
@@ -158,7 +158,8 @@ def _answer(
     row = at.matrix[number]
     slips = jnp.where(at.sigma == 0.0, 0.0, row[:k])
     sticks = jnp.where(at.sigma == 0.0, row[:k], 0.0)
-    normal = jnp.where(at.opened, -row[k:], 0.0).at[:k].add(-at.sigma * system.friction * slips)
+    lifts = jnp.pad(row[k:], (0, at.opened.size - at.lifting))
+    normal = jnp.where(at.opened, -lifts, 0.0).at[:k].add(-at.sigma * system.friction * slips)
     return Row(
         held=jnp.zeros(2 * k).at[trace.instance].add(sticks),
         forces=jnp.concatenate([-slips, normal]),
@@ -198,7 +199,10 @@ def level_slopes(
     (first, first_lift), (last, lift) = before, after
     start = jnp.concatenate([first.v, first_lift])
     fields = jnp.concatenate([last.v, lift])
-    slips = jnp.concatenate([slip_change, _held_again(change, slip_change, trace)])
+    held_again = lax.cond(
+        trace.sticks > 0, _held_again, lambda _, slips, __: 0.0 * slips, change, slip_change, trace
+    )
+    slips = jnp.concatenate([slip_change, held_again])
 
     given = change.matrix @ fields - change.pull * last.force + change.reference
     pushed = given - system.pull * load_change
@@ -206,9 +210,8 @@ def level_slopes(
     sum_of_both = pushed[:k] + at.sigma * (
         change.friction * last.r_n[:k] + system.friction * pushed[k : 2 * k]
     )
-    held = jnp.concatenate(
-        [jnp.where(at.sigma == 0.0, stuck, -sum_of_both), jnp.where(at.opened, -pushed[k:], 0.0)]
-    )
+    free = jnp.where(at.opened, -pushed[k:], 0.0)[: at.lifting]
+    held = jnp.concatenate([jnp.where(at.sigma == 0.0, stuck, -sum_of_both), free])
     answer = at.matrix[:-1] @ held
     dv = jnp.where(at.sigma == 0.0, stuck, answer[:k])
     dw = jnp.where(at.opened, answer[k:], 0.0)

@@ -81,6 +81,21 @@ class TestSlopes:
         back = sum(float(jnp.vdot(a, b)) for a, b in pairs)
         assert back == pytest.approx(float(slope[4]), rel=1e-9)
 
+    def test_few_columns_give_the_slopes_of_all(self):
+        body, friction = strip_body(0.3), jnp.asarray(0.3)
+        start, forces = branches.pressed(body), 20.0 * 0.2 * TURNS
+
+        def work(friction, lifting):
+            found = events.walk(body, friction, start, forces, jnp.asarray(TURNED), lifting=lifting)
+            return found.slip_work[4], (found.settled, found.lift)
+
+        few = jax.jit(jax.value_and_grad(lambda mu: work(mu, 6), has_aux=True))(friction)
+        every = jax.jit(jax.value_and_grad(lambda mu: work(mu, None), has_aux=True))(friction)
+        (settled, lift), slope = few[0][1], few[1]
+        assert np.all(settled)
+        assert np.any(lift > 0.0)
+        assert float(slope) == pytest.approx(float(every[1]), rel=1e-9)
+
     def test_lift_and_sticking_again_are_among_the_cases(self):
         body = strip_body(0.2)
         found = jax.jit(path)(body, 0.5, 0.3)
