@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import jaxopt
 import numpy as np
@@ -95,6 +94,9 @@ def minimise(
 ) -> SearchResult:
     """Run one Levenberg-Marquardt search.
 
+    The damping follows Nielsen (1999), Damping parameter in Marquardt's method.  In NumPy, because
+    a search in JAX compiles some eighty small programs, which take longer than the runs.
+
     Parameters
     ----------
     evaluate : function that returns residual and Jacobian at a point (n,)
@@ -103,47 +105,34 @@ def minimise(
     report : called after every step with its number, the point and the cost
     """
     # One damping for all axes is too strong for those with little influence: scale by influence.
-    influence = np.linalg.norm(evaluate(start).jacobian, axis=0)
+    current, here = start, evaluate(start)
+    influence = np.linalg.norm(here.jacobian, axis=0)
     scale = np.where(influence > 0.0, influence, 1.0)
-    current = start
-
-    def limited(params: Any) -> Vector:
-        """Trial point, at most `MAX_STEP` from the current one along every axis."""
-        return current + np.clip(np.asarray(params) / scale - current, -MAX_STEP, MAX_STEP)
-
-    # The last release of jaxopt ignores a given Jacobian where it materialises one, so the residual
-    # brings its own derivative.
-    @jax.custom_jvp
-    def residual(params: Array) -> Array:
-        return jnp.asarray(evaluate(limited(params)).residual)
-
-    @residual.defjvp
-    def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
-        (params,), (tangent,) = primals, tangents
-        evaluation = evaluate(limited(params))
-        return jnp.asarray(evaluation.residual), jnp.asarray(evaluation.jacobian / scale) @ tangent
-
-    method = jaxopt.LevenbergMarquardt(
-        residual_fun=residual,
-        materialize_jac=True,
-        solver="qr",  # the normal equations would square the condition number
-        damping_parameter=DAMPING,
-        jit=False,
-    )
-    params: Any = jnp.asarray(start * scale)
-    state = method.init_state(params)
+    cost = 0.5 * float(here.residual @ here.residual)
+    damping = DAMPING * float(np.max(np.sum((here.jacobian / scale) ** 2, axis=0), initial=0.0))
+    growth = 2.0
     for step in range(1, stopping.max_iterations + 1):
-        before = float(state.value)
-        params, state = method.update(params, state)
-        gain = before - float(state.value)  # zero if the step was refused
-        if gain > 0.0:
-            current = limited(params)
-            params = jnp.asarray(current * scale)
+        # The normal equations would square the condition number.
+        jacobian = here.jacobian / scale
+        rows = np.vstack([jacobian, np.sqrt(damping) * np.eye(start.size)])
+        wanted = np.linalg.lstsq(rows, -np.append(here.residual, np.zeros(start.size)))[0]
+        trial = current + np.clip(wanted / scale, -MAX_STEP, MAX_STEP)
+        there = evaluate(trial)
+        before, after = cost, 0.5 * float(there.residual @ there.residual)
+        foreseen = 0.5 * wanted @ (damping * wanted - jacobian.T @ here.residual)
+        gain = before - after
+        taken = gain > 0.0
+        if taken:
+            current, here, cost = trial, there, after
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain / foreseen - 1.0) ** 3)
+            growth = 2.0
+        else:
+            damping, growth = damping * growth, 2.0 * growth
         if report:
-            report(step, current, 2.0 * float(state.value))
-        change = np.max(np.abs(np.asarray(state.delta) / scale), initial=0.0)
+            report(step, current, 2.0 * cost)
+        change = np.max(np.abs(wanted / scale), initial=0.0)
         flat = FLAT * max(before, 0.5 * stopping.noise_cost)
-        if change < stopping.tolerance or 0.0 < gain < flat:
+        if change < stopping.tolerance or (taken and gain < flat):
             return SearchResult(current, "converged")
     return SearchResult(current, "max_iterations")
 
