@@ -142,7 +142,7 @@ def compared(values: Values, other: Values | None, before: Row | None = None) ->
         return {"outcome": "fails, and says so", "reason": str(error)}
     if not found.converged:
         return {"outcome": "fails, and says so"}
-    load, model = scene.load, scene.model
+    load, model = found.scene.load, found.scene.model
     row: Row = {
         "dissipation": float(found.dissipation),
         "bar_ratio": float(found.dissipation_ratio),

@@ -81,7 +81,8 @@ class CycleFigures(Record, LoopFigures):
     def dissipation_error(self) -> Array:
         """Estimated relative error of the dissipation that the grid at the loaded end makes.
 
-        Rather too large than too small; infinite if nothing slips.  See `History.doubts`.
+        Rather too large than too small; infinite if nothing slips.  Of a refined grid it is at
+        least the change by the last halving of the elements.  See `History.doubts`.
         """
-        errors = estimates(self.scene, self.slip_cycle)
+        errors = estimates(self.scene, self.slip_cycle, self.change)
         return jnp.max(jnp.stack(errors))

@@ -95,6 +95,8 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     }
     if scene.member.support != "none":
         shapes["member"] = number((steps, nodes, arrays["member"].shape[-1]))
+    if "change" in arrays:
+        shapes["change"] = number(())
     cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])
     stepwise = scene.model.solution == "stepwise"
     end: Any = PathEnd(eqx.filter_eval_shape(initial_state, scene)) if stepwise else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
@@ -30,6 +31,7 @@ from jbeamshell.quasistatic.outcome import (
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import Method, march
+from jbeamshell.scene.choice import refinements
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
 from jbeamshell.scene.scene import Scene
 
@@ -145,20 +147,44 @@ def _condensed(
         by = "either" if traced and by == "factors" else "events"
     if traced and not _precise(scene):
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
-    history = solve_condensed(scene, path, cycles, by=by, own=own)
-    history = dataclasses.replace(history, end=WholePath())
+
+    def walked(scene: Scene) -> History:
+        history = solve_condensed(scene, path, cycles, by=by, own=own)
+        if not traced and by != "events" and not history.converged:
+            history = solve_condensed(scene, path, cycles, own=own)
+        return dataclasses.replace(history, end=WholePath())
+
+    history = walked(scene)
     if traced:
         failed = history.status[-1] != Status.CONVERGED
         return eqx.error_if(history, failed, f"a load step has {NO_END}") if throw else history
-    if by != "events" and not history.converged:
-        again = solve_condensed(scene, path, cycles, own=own)
-        history = dataclasses.replace(again, end=history.end)
+    if cycles and history.converged:
+        history = _refined(history, walked)
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
         load = float(path.target[step])
         raise UnconvergedError(f"load step {step} (load {load:.6g}) has {NO_END}")
     if throw:
         warn_of_doubts(history, stacklevel=STACK + 1)
+    return history
+
+
+def _refined(history: History, walked: Callable[[Scene], History]) -> History:
+    """History on the first grid whose estimated error keeps the tolerance, or on the finest.
+
+    Parameters
+    ----------
+    history : converged run on the grid that was chosen
+    walked : function that gives the same run of a scene on another grid
+    """
+    for _ in range(refinements(history.scene)):
+        if history.dissipation_error <= history.scene.model.tolerance:
+            break
+        finer = walked(history.scene.refined())
+        if not finer.converged:
+            break
+        change = abs(history.dissipation / finer.dissipation - 1.0)
+        history = dataclasses.replace(finer, change=change)
     return history
 
 

@@ -27,6 +27,7 @@ from jbeamshell.scene.buckling import weakest_column
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS
 from jbeamshell.scene.linearisation import Parts, linear_errors
+from jbeamshell.scene.parts import Model
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.rungs import CONDENSED, PLANE_NODES
 
@@ -54,6 +55,8 @@ class Grid(NamedTuple):
 KNOWN = 0.005  # tolerance for which the grids were measured
 MOST_CONDENSED = 129  # nodes that are given, beyond which events cost more than load steps
 CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20)
+FINEST = 2  # times that elements are halved, at most
+MOST_REFINED = 513  # nodes of a grid that was refined
 PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
@@ -104,6 +107,24 @@ def _nodes(grid: Grid, tolerance: float, jumps: int) -> int:
     if grid is CONTACT_LINE:
         elements *= 1.0 + PER_STEP * min(jumps, MOST_JUMPS)
     return 2 * int(np.ceil(elements / 2.0)) + 1
+
+
+def refinements(scene: Parts) -> int:
+    """How many times a scene's elements may be halved, for an estimated error over its tolerance.
+
+    The grid must be open and the contact line a section's: a finer one of plane elasticity takes
+    longer than what it leaves is worth.
+    """
+    model = scene.model
+    if "nodes" not in model.open or model.solution != "condensed":
+        return 0
+    return sum(2**times * (model.nodes - 1) < MOST_REFINED for times in range(1, FINEST + 1))
+
+
+def finer(model: Model) -> dict[str, Any]:
+    """Values for a model with elements half as large."""
+    ends = {"end_size": 0.5 * model.end_size} if "end_size" in model.open else {}
+    return {"nodes": 2 * model.nodes - 1, **ends}
 
 
 def _kinematics(scene: Parts, numbers: Numbers | None) -> str:

@@ -30,7 +30,7 @@ from jbeamshell.mechanics.friction import (
 )
 from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
-from jbeamshell.scene.choice import choose
+from jbeamshell.scene.choice import choose, finer
 from jbeamshell.scene.domain import Numbers, support_rules
 from jbeamshell.scene.joint import check_joint
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
@@ -328,9 +328,15 @@ class Scene(Tree):
         numbers : values by dotted key of many scenes, all of which the settings are to serve; None
             is those of this scene
         """
-        of_load, of_model = choose(self, numbers)
+        of_load, of_model = ({}, {}) if numbers is None else choose(self, numbers)
         load, model = self.load.chosen(**of_load), self.model.chosen(**of_model)
         return dataclasses.replace(self, load=load.pinned(), model=model.pinned())
+
+    def refined(self) -> Scene:
+        """Copy on elements half as large, from which any change goes back to the chosen grid."""
+        model = self.model.chosen(**finer(self.model))
+        scene: Scene = eqx.tree_at(lambda scene: scene.model, self, model)
+        return scene
 
     def by_load_steps(self) -> Scene:
         """Copy that is solved in load steps, if how it is solved was left open."""

@@ -191,6 +191,46 @@ def test_the_standard_strip_is_beyond_doubt():
     assert 1e-3 < float(history.dissipation_error) < TOLERANCE
 
 
+def relative_error(run, times=6):
+    """Relative error of a run's dissipation, to the same model on elements of 1/times the size."""
+    coarse = jb.Scene().model
+    mesh = {
+        "model.nodes": times * (coarse.nodes - 1) + 1,
+        "model.end_size": coarse.end_size / times,
+    }
+    fine = jb.solve(run.scene.pinned().replace(mesh), throw=False)
+    return abs(float(run.dissipation / fine.dissipation) - 1.0)
+
+
+@pytest.mark.parametrize(("load", "nodes"), [(1.0, 65), (0.1, 129), (0.02, 257)])
+def test_elements_are_halved_until_the_tolerance_is_kept(load, nodes):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", jb.DoubtfulWarning)
+        run = jb.solve(jb.Scene().replace({"load.amplitude": load}))
+    assert run.x.size == run.scene.model.nodes == nodes
+    assert relative_error(run) <= float(run.dissipation_error) < run.scene.model.tolerance
+    assert ("halving the elements" in str(run)) == (nodes > 65)
+    # Only this run is on the finer grid: any change of its scene goes back to the chosen one.
+    assert run.scene.replace({"load.amplitude": 1.0}).model == jb.Scene().model
+    assert run.scene.pinned().model.nodes == nodes
+
+
+def test_a_given_grid_is_never_refined():
+    given = {"load.amplitude": 0.1, "model.nodes": 65, "model.tolerance": 0.1}
+    assert jb.solve(jb.Scene().replace(given)).change is None
+
+
+@pytest.mark.doubtful("few nodes do the slipping")
+def test_a_refined_run_that_misses_its_tolerance_is_doubted(tmp_path):
+    run = jb.solve(jb.Scene().replace({"load.amplitude": 0.006}))
+    assert run.scene.model.tolerance < float(run.change) <= float(run.dissipation_error)
+    assert relative_error(run) < float(run.change)
+    run.save(tmp_path / "run.npz")
+    again = jb.read_history(tmp_path / "run.npz")
+    assert again.dissipation_error == run.dissipation_error
+    assert len(again.doubts) == len(run.doubts) == 1
+
+
 @pytest.mark.slow
 def test_the_estimate_falls_with_the_elements():
     scene = STRIP.replace({"load.amplitude": 0.3} | COARSE)
