@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 import jbeamshell as jb
 
-jb.configure()
+jb.configure(cache=False)
 jax.config.update("jax_enable_x64", True)
 
 from calibration import charts  # noqa: E402

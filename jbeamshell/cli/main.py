@@ -39,7 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     options = _parser().parse_args(arguments)
     jax.config.update("jax_enable_x64", True)
-    jax_options.start_of_a_command()
+    if not jax_options.started():
+        jax_options.configure()
     try:
         return options.run(options)
     except InputError as error:

@@ -22,7 +22,7 @@ def configure(
     *,
     fast_loops: bool = True,
     asynchronous: bool = False,
-    cache: str | os.PathLike[str] | None = None,
+    cache: str | os.PathLike[str] | bool = True,
 ) -> None:
     """Choose how JAX compiles and calls in this process.
 
@@ -37,7 +37,8 @@ def configure(
     asynchronous : True to compute calls on a CPU in another thread, which is JAX's own default.
         Handing over to that thread takes as long as a cycle of a small strip.
     cache : folder in which compiled programs are kept, so that the next process need not compile
-        them again; None leaves JAX's setting as it is
+        them again; True is ``~/.cache/jbeamshell``, or JAX's own folder if it has one; False
+        leaves JAX's setting as it is
 
     Raises
     ------
@@ -46,7 +47,7 @@ def configure(
 
     Notes
     -----
-    The command line calls this by itself, with the folder of `default_cache`.
+    The command line calls this by itself.
 
     Examples
     --------
@@ -54,12 +55,13 @@ def configure(
 
         import jbeamshell as jb
 
-        jb.configure(cache="compiled")  # before anything is computed
+        jb.configure()  # before anything is computed
     """
     # Matrices here are small: threads of LAPACK would wait for each other longer than they work.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # SciPy reads it when JAX first needs it
-    if cache is not None:
-        jax.config.update("jax_compilation_cache_dir", str(cache))
+    folder = _default_cache() if cache is True else cache
+    if folder:
+        jax.config.update("jax_compilation_cache_dir", str(folder))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", WORTH_KEEPING)
     if is_asynchronous() != asynchronous:
         _check_not_started(f"asynchronous = {asynchronous}")
@@ -102,20 +104,14 @@ def memory() -> float:
         return math.inf
 
 
-def start_of_a_command() -> None:
-    """Configure JAX for a command: fast loops, and a cache unless the user has one."""
-    if started():
-        return
-    cache = None
-    if not os.environ.get("JAX_COMPILATION_CACHE_DIR"):
-        try:
-            cache = default_cache()
-            cache.mkdir(parents=True, exist_ok=True)
-        except (OSError, RuntimeError):  # no home folder to write to: it works without a cache
-            cache = None
-    configure(cache=cache)
-
-
-def default_cache() -> Path:
-    """Folder in which the command line keeps compiled programs."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "jbeamshell"
+def _default_cache() -> Path | None:
+    """Folder for compiled programs; None if JAX has one already, or if none can be made."""
+    config: Any = jax.config
+    if config.jax_compilation_cache_dir:
+        return None
+    try:
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "jbeamshell"
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, RuntimeError):  # no home folder to write to: it works without a cache
+        return None
+    return folder

@@ -75,7 +75,7 @@ def run_block(about: str, arithmetic: Arithmetic, columns: np.ndarray) -> Block:
     """
     with _compiling:  # the threads of a worker share one program
         if not started():
-            configure(fast_loops=arithmetic.fast_loops)
+            configure(fast_loops=arithmetic.fast_loops, cache=False)
         with jax.enable_x64(arithmetic.x64):
             runner = _runner(about, arithmetic.x64)
     with jax.enable_x64(arithmetic.x64):

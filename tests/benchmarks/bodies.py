@@ -29,7 +29,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=1.0, help="of each repeated call")
     parser.add_argument("--rungs", nargs="+", default=["shell", "squeeze", "p4"])
     options = parser.parse_args()
-    jb.configure()
+    jb.configure(cache=False)
     eta, amplitude = jnp.asarray(ETA), jnp.asarray([AMPLITUDE])
     for rung in options.rungs:
         scene = jb.Scene().replace(

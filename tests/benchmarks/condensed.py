@@ -265,7 +265,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="little of everything, no record")
     parser.add_argument("--peer", metavar="SCRIPT", help="condensed elements to be timed beside")
     options = parser.parse_args()
-    jb.configure()
+    jb.configure(cache=False)
     jax.config.update("jax_enable_compilation_cache", False)
     budget, lanes = (0.1, 64) if options.quick else (BUDGET, 4096)
     counts = (NODES,) if options.quick else COUNTS

@@ -24,7 +24,7 @@ import numpy as np  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 
-jb.configure()
+jb.configure(cache=False)
 
 from jbeamshell import dynamics, plotting  # noqa: E402
 from jbeamshell.dynamics.release import HEAVY, let_go  # noqa: E402

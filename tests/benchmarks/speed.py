@@ -112,10 +112,10 @@ def main() -> None:
     jax.config.update("jax_enable_compilation_cache", options.quick)
     if options.child:
         name, *rest = options.child
-        jb.configure(fast_loops=name != "unflagged")
+        jb.configure(fast_loops=name != "unflagged", cache=False)
         CHILDREN[name](*map(int, rest))
         return
-    jb.configure()
+    jb.configure(cache=False)
     target = RECORD
     if options.quick and not options.draw:
         target = Path(tempfile.mkdtemp(prefix="jbeamshell-speed-")) / RECORD.name

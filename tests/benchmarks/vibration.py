@@ -208,7 +208,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="little of everything, no record")
     options = parser.parse_args()
-    jb.configure()
+    jb.configure(cache=False)
     jax.config.update("jax_enable_compilation_cache", False)
     record: dict[str, Any] = {"about": machine.about(), "peer": peer()}
     if not options.quick:

@@ -9,13 +9,15 @@ import pytest
 from jbeamshell.common import jax_options
 from jbeamshell.common.errors import InputError
 
+CACHE = "JAX_COMPILATION_CACHE_DIR"
 FAST = f"{jax_options.EXTRA}{jax_options.FAST_LOOPS}"
 
 
-def flags_after(flags, call="jbeamshell.configure()"):
-    """XLA_FLAGS after a call in a process that was started with some."""
+def flags_after(flags, call="jbeamshell.configure()", without=()):
+    """What a call prints and then XLA_FLAGS, in a process that was started with some variables."""
     code = f"import os, jbeamshell; {call}; print(os.environ.get('XLA_FLAGS', ''))"
-    given = {k: v for k, v in os.environ.items() if k != "XLA_FLAGS"} | flags
+    kept = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", *without)}
+    given = kept | flags
     done = subprocess.run([sys.executable, "-c", code], env=given, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
@@ -43,6 +45,33 @@ def test_calls_wait_unless_told_otherwise():
     look = f"print(jax.config.values[{jax_options.ASYNCHRONOUS!r}])"
     assert flags_after({}, f"import jax; {look}") == "True"
     assert flags_after({}, f"import jax; jbeamshell.configure(fast_loops=False); {look}") == "False"
+
+
+FOLDER = "print(jax.config.jax_compilation_cache_dir)"
+
+
+@pytest.mark.parametrize(
+    ("jax_has", "asked", "folder"),
+    [
+        ("", "", "{home}/jbeamshell"),
+        ("{home}/own", "", "{home}/own"),
+        ("{home}/own", "cache='{home}/other'", "{home}/other"),
+        ("", "cache=False", "None"),
+    ],
+)
+def test_compiled_programs_are_kept(tmp_path, jax_has, asked, folder):
+    jax_has, asked, folder = (text.format(home=tmp_path) for text in (jax_has, asked, folder))
+    given = {CACHE: jax_has} if jax_has else {}
+    call = f"jbeamshell.configure({asked}); import jax; {FOLDER}"
+    found = flags_after(given | {"XDG_CACHE_HOME": str(tmp_path)}, call, without=(CACHE,))
+    assert found.splitlines()[0] == folder
+
+
+def test_without_a_folder_to_write_to_nothing_is_kept(tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    nowhere = {"XDG_CACHE_HOME": str(tmp_path / "file")}
+    call = f"jbeamshell.configure(); import jax; {FOLDER}"
+    assert flags_after(nowhere, call, without=(CACHE,)).splitlines()[0] == "None"
 
 
 def test_too_late_is_said(monkeypatch):

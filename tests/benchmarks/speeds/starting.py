@@ -33,8 +33,8 @@ RESULTS = {
     ),
 }
 BEGIN = (
-    "import os, jax; jax.config.update('jax_enable_x64', True); import jbeamshell as jb; "
-    "jb.configure(cache=os.environ['XDG_CACHE_HOME']); "
+    "import jax; jax.config.update('jax_enable_x64', True); import jbeamshell as jb; "
+    "jb.configure(); "
 )
 
 
