@@ -112,6 +112,7 @@ def walk_abreast(
             return found._replace(slip_work=_steps(found))
 
         found = lax.cond(older.starts_at(origin, targets), lambda: older.found, anew)
+        found = found._replace(settled=found.settled & origin.settled[:, None])
         last = jax.tree.map(lambda a: a[:, -1], found)
         return (last, Branch(origin, targets, found), before), found
 
