@@ -42,6 +42,24 @@ def test_solve_compiles_once_for_all_numbers_of_a_scene(compiled):
     assert [name for name in compiled() if name.startswith("jit(_")] == []
 
 
+def test_sweeps_share_a_program_whatever_the_scene_s_other_numbers(compiled):
+    over = {"load.amplitude": [0.4, 0.8]}
+    scenes = [
+        jb.Scene().replace({"contact.friction": mu, "strip.height_ratio": eta})
+        for mu, eta in [(0.1, 0.11), (0.12, 0.13)]
+    ]
+    first = jb.sweep(scenes[0], over)["dissipation"]
+    compiled()
+    found = jb.sweep(scenes[1], over)["dissipation"]
+    assert compiled() == []
+    alone = [
+        float(jb.solve(scenes[1].pinned().replace({"load.amplitude": load})).dissipation)
+        for load in over["load.amplitude"]
+    ]
+    assert found == pytest.approx(alone, rel=1e-10)
+    assert np.all(found != first)
+
+
 def test_a_response_is_compiled_as_a_whole(compiled):
     """Not operation by operation, also of constants, which took 180 programs."""
     ask = jb.response(jb.Scene().replace({"model.rung": "bar"}), ["load.amplitude"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -21,16 +20,15 @@ from jbeamshell.common.small import quick_options
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
-from jbeamshell.quasistatic.response import response
+from jbeamshell.quasistatic.response import Response, response
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.scene.scene import Scene
-from jbeamshell.scene.toml import scene_to_toml
 from jbeamshell.sweeping.lanes import Outcome
 
 ABREAST = 32  # lanes of a chunk on a core, if slip patterns are iterated side by side
 BLOCK = 1024  # lanes of the largest block, for which the program is compiled
-KEPT = 4  # compiled models of scenes that are kept
+KEPT = 4  # compiled models that are kept
 PER_LANE = ("load.amplitude", "contact.pressure")
 """Numbers in which lanes of one chunk may differ on a condensed rung: the body and its factors are
 the same for all of them."""
@@ -38,9 +36,42 @@ BODY = 8.0  # lanes that take as long as a condensed body and its factors
 
 OF_A_CYCLE = {*FIGURES, "dissipation_error"}  # figures that are numbers
 
-Answers = Callable[..., dict[str, Array]]
-_known: dict[str, Answers] = {}
-_knowing = threading.Lock()
+
+class Model(NamedTuple):
+    """Scene without the numbers that one compiled program takes.
+
+    Attributes
+    ----------
+    tree : structure of the scene
+    tables : numbers that stay in the program, by their places: tables, whose rows may have a
+        meaning, and the stick stiffness, which may be that of rigid sliders
+    """
+
+    tree: Any
+    tables: tuple[tuple[int, str, tuple[int, ...], bytes], ...]
+
+    @staticmethod
+    def of(scene: Scene) -> tuple[Model, list[Array]]:
+        """Model of a scene, and the numbers that it takes."""
+        leaves, tree = jax.tree.flatten(scene)
+        stick, dtype = scene.contact.stick_stiffness, scene.strip.length.dtype
+        tables, numbers = [], []
+        for place, leaf in enumerate(leaves):
+            number = np.ndim(leaf) == 0 and getattr(leaf, "dtype", None) == dtype
+            if number and leaf is not stick:
+                numbers.append(leaf)
+            else:
+                table = np.asarray(leaf)
+                tables.append((place, table.dtype.name, table.shape, table.tobytes()))
+        return Model(tree, tuple(tables)), numbers
+
+    def scene(self, numbers: Sequence[Any]) -> Scene:
+        """Scene of the model with some numbers."""
+        leaves: list[Any] = list(numbers)
+        for place, dtype, shape, data in self.tables:
+            leaves.insert(place, np.frombuffer(data, dtype).reshape(shape))
+        scene: Scene = jax.tree.unflatten(self.tree, leaves)
+        return scene
 
 
 class Block(NamedTuple):
@@ -113,11 +144,11 @@ def check_figures(
     require("figures", list(figures), len(figures) > 0, "name at least one")
     require("figures", list(figures), len(set(figures)) == len(figures), "names one twice")
     number = jax.ShapeDtypeStruct((), scene.strip.length.dtype)
-    ask = _ask(scene, tuple(keys), tuple(figures), solver)  # that of the lanes: traced once
     if OF_A_CYCLE.issuperset(figures) and scene.load.cycles > 0:  # numbers, without a trace
         jax.eval_shape(lambda at: scene.replace(at).strip, dict.fromkeys(keys, number))
         return
     try:
+        ask = response(scene, keys, figures, solver=solver)
         shapes = jax.eval_shape(ask, *[number] * len(keys))
     except (jax.errors.ConcretizationTypeError, TypeError) as error:
         name = ", ".join(figures)
@@ -154,11 +185,11 @@ class Runner:
         self.devices = list(devices or jax.local_devices())
         self.width = width
         self._mesh = Mesh(np.array(self.devices), "lanes")
-        ask = _ask(scene, self.keys, self.figures, solver)
+        model, self._numbers = Model.of(scene)
         self._shared = shared_keys(scene, self.keys) if width > 1 else []
         axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
-        small = scene.model.condensed
-        self._about = ask, axes, self.figures, self._shape, self.dtype, self._mesh, small
+        asked = self.keys, axes, self.figures, solver
+        self._about = model, asked, self._shape, self.dtype, self._mesh
 
     def compile(self) -> float:
         """Compile the model without running a lane; returns the seconds it took, now or before."""
@@ -189,7 +220,8 @@ class Runner:
             repeated = columns[:, last].reshape(len(self.keys), -1, self.width)
             filled[device, :, : counts[device]] = repeated
         program, _ = _compiled(*self._about)
-        return program(*jax.device_put((filled, counts), _spread(self._mesh)))
+        given = jax.device_put((filled, counts), _spread(self._mesh))
+        return program(jax.device_put(self._numbers, _everywhere(self._mesh)), *given)
 
     def _mend(self, columns: np.ndarray, block: Block) -> None:
         """Solve failed lanes alone, where long load steps are divided; mark what still fails."""
@@ -218,78 +250,66 @@ class Runner:
         return values, Outcome.UNDEFINED if np.any(np.isnan(values)) else status
 
 
-def _ask(
-    scene: Scene,
-    keys: tuple[str, ...],
-    figures: tuple[str, ...],
-    solver: Newton | None,
-) -> Answers:
-    """Response of a scene; the same function for the same scene, so that it compiles once."""
-    method = Method.UNCHECKED_STATUS_ITERATION
-    try:
-        name = f"{scene_to_toml(scene)} {scene.strip.length.dtype} {keys} {figures} {solver}"
-    except InputError:  # a function of the user's own has no text
-        return response(scene, keys, figures, solver=solver, method=method)
-    with _knowing:
-        if name not in _known:
-            while len(_known) >= KEPT:
-                del _known[next(iter(_known))]
-            _known[name] = response(scene, keys, figures, solver=solver, method=method)
-        return _known[name]
-
-
 def _spread(mesh: Mesh) -> NamedSharding:
     return NamedSharding(mesh, PartitionSpec("lanes"))
 
 
+def _everywhere(mesh: Mesh) -> NamedSharding:
+    return NamedSharding(mesh, PartitionSpec())
+
+
 @functools.lru_cache(KEPT)
 def _compiled(
-    ask: Answers,
-    axes: tuple[int | None, ...],
-    figures: tuple[str, ...],
+    model: Model,
+    asked: tuple[tuple[str, ...], tuple[int | None, ...], tuple[str, ...], Newton | None],
     shape: tuple[int, ...],
     dtype: np.dtype,
     mesh: Mesh,
-    small: bool,
 ) -> tuple[Callable[..., tuple[Array, Array]], float]:
     """Compiled program that runs one block on every device, and the seconds of its compilation.
 
-    It takes the numbers (devices, keys, chunks, width) and the count of filled chunks of each
-    device.  Only filled chunks run, one after the other, so that one shape serves sweeps of all
-    sizes.
+    It takes the scene's numbers, those of the lanes (devices, keys, chunks, width) and the count of
+    filled chunks of each device.  Only filled chunks run, one after the other, so that one shape
+    serves sweeps of all sizes.
     """
     begun = time.perf_counter()
+    keys, axes, figures, solver = asked
+    method = Method.UNCHECKED_STATUS_ITERATION
 
-    def chunk(lanes: Array) -> tuple[Array, Array]:
+    def chunk(ask: Response, lanes: Array) -> tuple[Array, Array]:
         width = lanes.shape[-1]
         numbers = [row if axis == 0 else row[0] for row, axis in zip(lanes, axes, strict=True)]
         answer = jax.vmap(ask, axes)(*numbers) if width > 1 else ask(*lanes[:, 0])
         last = [answer[name].reshape(width, -1)[:, -1] for name in figures]
         return jnp.stack(last), answer["status"].astype(jnp.int32)
 
-    def block(lanes: Array, count: Array) -> tuple[Array, Array]:
+    def block(fixed: list[Array], lanes: Array, count: Array) -> tuple[Array, Array]:
         _, chunks, width = lanes.shape
+        ask = response(model.scene(fixed), keys, figures, solver=solver, method=method)
 
         def step(i: Array, found: tuple[Array, Array]) -> tuple[Array, Array]:
-            values, status = chunk(lanes[:, i])
+            values, status = chunk(ask, lanes[:, i])
             return found[0].at[:, i].set(values), found[1].at[i].set(status)
 
         nothing = jnp.full((len(figures), chunks, width), jnp.nan, lanes.dtype)
         return lax.fori_loop(0, count, step, (nothing, jnp.zeros((chunks, width), jnp.int32)))
 
-    def each(lanes: Array, counts: Array) -> tuple[Array, Array]:
-        values, status = block(lanes[0], counts[0])
+    def each(fixed: list[Array], lanes: Array, counts: Array) -> tuple[Array, Array]:
+        values, status = block(fixed, lanes[0], counts[0])
         return values[None], status[None]
 
     spread = PartitionSpec("lanes")
     run: Callable[..., Any] = each
     if mesh.size > 1:
-        run = jax.shard_map(each, mesh=mesh, in_specs=spread, out_specs=spread, check_vma=False)
+        specs = (PartitionSpec(), spread, spread)
+        run = jax.shard_map(each, mesh=mesh, in_specs=specs, out_specs=spread, check_vma=False)
     kinds = ((shape, dtype), (shape[:1], np.int32))
     given = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
-    program = (
-        jax.jit(run, compiler_options=quick_options() if small else None).lower(*given).compile()
-    )
+    count = model.tree.num_leaves - len(model.tables)
+    fixed = [jax.ShapeDtypeStruct((), dtype, sharding=_everywhere(mesh))] * count
+    small = model.scene(fixed).model.condensed
+    options = quick_options() if small else None
+    program = jax.jit(run, compiler_options=options).lower(fixed, *given).compile()
     return program, time.perf_counter() - begun
 
 

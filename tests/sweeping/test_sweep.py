@@ -367,7 +367,6 @@ def test_a_model_of_ones_own_is_not_kept_on_disk():
     scene = jb.Scene(energy=lambda e, g, k, psi, dpsi: e**2)
     with pytest.raises(InputError, match="without them and write the table with to_csv"):
         job.Job(lanes_of(scene, OVER), FIGURES).description()
-    assert runner._ask(scene, tuple(OVER), FIGURES, None) not in runner._known.values()
 
 
 def test_chunks_hold_lanes_that_share_what_they_must():
