@@ -48,7 +48,13 @@ CLOSE = 1e-4  # relative difference that still agrees
 LITTLE = 1e-3  # of a figure per relative change of a number, below which slopes count as this
 NOISE = 1e-10  # of a figure, by round-off
 # Sizes of figures that are zero but for round-off; that of the closure is the width of the loop.
-LEAST = {"closure": 1.0, "error": 1.0, "energy_imbalance": 1e-6, "curvature": 1e-3}
+LEAST = {
+    "closure": 1.0,
+    "error": 1.0,
+    "energy_imbalance": 1e-6,
+    "curvature": 1e-3,
+    "tip_deflection": 1e-7,
+}
 STEPPED = ("reaction_max_at",)  # places of nodes, which jump from one node to another
 Values = dict[str, Any]
 

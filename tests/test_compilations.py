@@ -69,3 +69,15 @@ def test_a_response_is_compiled_as_a_whole(compiled):
     assert len(names) <= 6, names
     assert float(ask(0.6)["dissipation"]) == pytest.approx(first * 1.2**3, rel=1e-12)
     assert compiled() == []
+
+
+def test_responses_share_programs_and_derivatives_whatever_the_scene_s_other_numbers(compiled):
+    def slope(mu):
+        scene = jb.Scene().replace({"model.rung": "bar", "contact.friction": mu})
+        ask = jb.response(scene, ["load.amplitude"])
+        return float(ask(0.5)["dissipation"]), float(jax.grad(lambda a: ask(a)["dissipation"])(0.5))
+
+    first = np.array(slope(0.1))
+    compiled()
+    np.testing.assert_allclose(slope(0.125), first / 1.25, rtol=1e-12)  # D = (2/3) A^3/(E'2H mu p)
+    assert compiled() == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable, Sequence
 
@@ -24,11 +25,13 @@ from jbeamshell.scene.choice import FEW_STEPS
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
 from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.template import Template
 
 Response = Callable[..., dict[str, Array]]
 
 # Figures of a cycle that condensed strips know from its turning points alone.
 EXACT = {*FIGURES, "dissipation_error"} - {"dissipation_loop"}
+KEPT = 16  # compiled functions that are kept for scenes of other numbers
 FEW = 200  # number of nodes beyond which the arithmetic takes longer than the calls
 RESPONSES = (
     "force",
@@ -106,25 +109,9 @@ def _response(
     method: Method | None,
 ) -> Response:
     """Response of a scene with its settings as they were chosen; see `response`."""
-
-    def solved_by(method: Method) -> Response:
-        def figures_of(*values: Array) -> dict[str, Array]:
-            varied = scene.replace(dict(zip(over, values, strict=True)))
-            history = solve(varied, throw=False, solver=solver, method=method)
-            found = {name: getattr(history, name) for name in figures}
-            return found | {"status": jnp.max(history.status)}
-
-        return figures_of
-
-    compiled = jax.jit(solved_by(method or Method.NEWTON))
-    if is_traced(scene):
-        return compiled
-    staged = slip_patterns.applies(scene)
-    staged = staged or (scene.model.condensed and quickest(scene) != "events")
-    again = method is None and staged  # what does not settle, by Newton or by events
-    first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
-    first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)
-
+    template, numbers = Template.of(scene)
+    fixed = jnp.stack(numbers) if is_traced(numbers) else np.array(numbers)
+    programs = _programs(template, tuple(over), tuple(figures), solver, method)
     tables = tuple(TABLE[key].table or np.ndim(scene.get(key)) > 0 for key in over)
 
     def ask(*values: Array) -> dict[str, Array]:
@@ -134,9 +121,44 @@ def _response(
             if np.ndim(value) and not table:
                 fix = "give one number, and many by jax.vmap or jbeamshell.sweep"
                 raise InputError(f"{key}: is an array of shape {np.shape(value)}: {fix}")
-        found: dict[str, Array] | None = first.now(*values)
+        return programs(fixed, *values)
+
+    return ask
+
+
+@functools.lru_cache(KEPT)
+def _programs(
+    template: Template,
+    over: tuple[str, ...],
+    figures: tuple[str, ...],
+    solver: Newton | None,
+    method: Method | None,
+) -> Response:
+    """Function of the scene's numbers and of the values that vary, compiled at its first call."""
+
+    def solved_by(method: Method) -> Response:
+        def figures_of(fixed: Array, *values: Array) -> dict[str, Array]:
+            scene = template.scene(list(fixed))
+            varied = scene.replace(dict(zip(over, values, strict=True)))
+            history = solve(varied, throw=False, solver=solver, method=method)
+            found = {name: getattr(history, name) for name in figures}
+            return found | {"status": jnp.max(history.status)}
+
+        return figures_of
+
+    shape = jax.ShapeDtypeStruct((), template.dtype)
+    scene = template.scene([shape] * template.numbers)
+    staged = slip_patterns.applies(scene)
+    staged = staged or (scene.model.condensed and quickest(scene) != "events")
+    again = method is None and staged  # what does not settle, by Newton or by events
+    first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
+    first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)
+    compiled = jax.jit(solved_by(method or Method.NEWTON))
+
+    def ask(*given: Array) -> dict[str, Array]:
+        found: dict[str, Array] | None = first.now(*given)
         if found is None or (again and np.asarray(found["status"]).item() != Status.CONVERGED):
-            return compiled(*values)
+            return compiled(*given)
         return found
 
     return ask

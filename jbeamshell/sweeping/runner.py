@@ -24,6 +24,7 @@ from jbeamshell.quasistatic.response import Response, response
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.template import Template
 from jbeamshell.sweeping.lanes import Outcome
 
 ABREAST = 32  # lanes of a chunk on a core, if slip patterns are iterated side by side
@@ -35,43 +36,6 @@ the same for all of them."""
 BODY = 8.0  # lanes that take as long as a condensed body and its factors
 
 OF_A_CYCLE = {*FIGURES, "dissipation_error"}  # figures that are numbers
-
-
-class Model(NamedTuple):
-    """Scene without the numbers that one compiled program takes.
-
-    Attributes
-    ----------
-    tree : structure of the scene
-    tables : numbers that stay in the program, by their places: tables, whose rows may have a
-        meaning, and the stick stiffness, which may be that of rigid sliders
-    """
-
-    tree: Any
-    tables: tuple[tuple[int, str, tuple[int, ...], bytes], ...]
-
-    @staticmethod
-    def of(scene: Scene) -> tuple[Model, list[Array]]:
-        """Model of a scene, and the numbers that it takes."""
-        leaves, tree = jax.tree.flatten(scene)
-        stick, dtype = scene.contact.stick_stiffness, scene.strip.length.dtype
-        tables, numbers = [], []
-        for place, leaf in enumerate(leaves):
-            number = np.ndim(leaf) == 0 and getattr(leaf, "dtype", None) == dtype
-            if number and leaf is not stick:
-                numbers.append(leaf)
-            else:
-                table = np.asarray(leaf)
-                tables.append((place, table.dtype.name, table.shape, table.tobytes()))
-        return Model(tree, tuple(tables)), numbers
-
-    def scene(self, numbers: Sequence[Any]) -> Scene:
-        """Scene of the model with some numbers."""
-        leaves: list[Any] = list(numbers)
-        for place, dtype, shape, data in self.tables:
-            leaves.insert(place, np.frombuffer(data, dtype).reshape(shape))
-        scene: Scene = jax.tree.unflatten(self.tree, leaves)
-        return scene
 
 
 class Block(NamedTuple):
@@ -185,11 +149,11 @@ class Runner:
         self.devices = list(devices or jax.local_devices())
         self.width = width
         self._mesh = Mesh(np.array(self.devices), "lanes")
-        model, self._numbers = Model.of(scene)
+        template, self._numbers = Template.of(scene)
         self._shared = shared_keys(scene, self.keys) if width > 1 else []
         axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
         asked = self.keys, axes, self.figures, solver
-        self._about = model, asked, self._shape, self.dtype, self._mesh
+        self._about = template, asked, self._shape, self.dtype, self._mesh
 
     def compile(self) -> float:
         """Compile the model without running a lane; returns the seconds it took, now or before."""
@@ -260,7 +224,7 @@ def _everywhere(mesh: Mesh) -> NamedSharding:
 
 @functools.lru_cache(KEPT)
 def _compiled(
-    model: Model,
+    template: Template,
     asked: tuple[tuple[str, ...], tuple[int | None, ...], tuple[str, ...], Newton | None],
     shape: tuple[int, ...],
     dtype: np.dtype,
@@ -285,7 +249,7 @@ def _compiled(
 
     def block(fixed: list[Array], lanes: Array, count: Array) -> tuple[Array, Array]:
         _, chunks, width = lanes.shape
-        ask = response(model.scene(fixed), keys, figures, solver=solver, method=method)
+        ask = response(template.scene(fixed), keys, figures, solver=solver, method=method)
 
         def step(i: Array, found: tuple[Array, Array]) -> tuple[Array, Array]:
             values, status = chunk(ask, lanes[:, i])
@@ -305,9 +269,8 @@ def _compiled(
         run = jax.shard_map(each, mesh=mesh, in_specs=specs, out_specs=spread, check_vma=False)
     kinds = ((shape, dtype), (shape[:1], np.int32))
     given = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
-    count = model.tree.num_leaves - len(model.tables)
-    fixed = [jax.ShapeDtypeStruct((), dtype, sharding=_everywhere(mesh))] * count
-    small = model.scene(fixed).model.condensed
+    fixed = [jax.ShapeDtypeStruct((), dtype, sharding=_everywhere(mesh))] * template.numbers
+    small = template.scene(fixed).model.condensed
     options = quick_options() if small else None
     program = jax.jit(run, compiler_options=options).lower(fixed, *given).compile()
     return program, time.perf_counter() - begun
