@@ -183,6 +183,14 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     return grid, corner, slider_error(cycle)
 
 
+def misses_tolerance(history: Run) -> bool:
+    """True if the estimated error of a run exceeds what its model allows."""
+    plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
+    with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
+        errors = estimates(plain.scene, plain.slip_cycle, plain.change)
+    return bool(max(errors) > plain.scene.model.tolerance)
+
+
 def doubts_of_run(history: Run) -> tuple[str, ...]:
     """Doubts about a run that was solved."""
     plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled

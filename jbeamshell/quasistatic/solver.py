@@ -18,6 +18,7 @@ from jbeamshell.common.precision import is_single
 from jbeamshell.condensed.solve import Cycles, quickest
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.history.history import History
+from jbeamshell.history.reliability import misses_tolerance
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.continuation import further_path, with_end
 from jbeamshell.quasistatic.masing import bar_cycles, masing
@@ -178,7 +179,7 @@ def _refined(history: History, walked: Callable[[Scene], History]) -> History:
     walked : function that gives the same run of a scene on another grid
     """
     for _ in range(refinements(history.scene)):
-        if history.dissipation_error <= history.scene.model.tolerance:
+        if not misses_tolerance(history):
             break
         finer = walked(history.scene.refined())
         if not finer.converged:
