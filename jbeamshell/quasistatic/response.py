@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -92,26 +93,51 @@ def response(
     for name in figures:
         require_choice("figures", name, RESPONSES)
 
-    scene = pinned(scene, figures)
-    ask = _response(scene, over, figures, solver, method)
-    if not scene.model.condensed or is_traced(scene) or not is_single(scene):
-        return ask
-    with jax.enable_x64(True):
-        precise = _response(doubled(scene), over, figures, solver, method)
-    return in_double(precise, within=ask)
+    return Answers(pinned(scene, figures), tuple(over), tuple(figures), solver, method)
+
+
+class Answers:
+    """Function that `response` makes; pickled, it is made again where it is read.
+
+    Parameters
+    ----------
+    scene : scene with its settings as they were chosen
+    over, figures, solver, method : see `response`
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        over: tuple[str, ...],
+        figures: tuple[str, ...],
+        solver: Newton | None,
+        method: Method | None,
+    ) -> None:
+        self._given = scene, over, figures, solver, method
+        self._ask = _response(*self._given)
+        if scene.model.condensed and not is_traced(scene) and is_single(scene):
+            with jax.enable_x64(True):
+                precise = _response(doubled(scene), over, figures, solver, method)
+            self._ask = in_double(precise, within=self._ask)
+
+    def __call__(self, *values: Array) -> dict[str, Array]:
+        return self._ask(*values)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), self._given
 
 
 def _response(
     scene: Scene,
-    over: Sequence[str],
-    figures: Sequence[str],
+    over: tuple[str, ...],
+    figures: tuple[str, ...],
     solver: Newton | None,
     method: Method | None,
 ) -> Response:
     """Response of a scene with its settings as they were chosen; see `response`."""
     template, numbers = Template.of(scene)
     fixed = jnp.stack(numbers) if is_traced(numbers) else np.array(numbers)
-    programs = _programs(template, tuple(over), tuple(figures), solver, method)
+    programs = _programs(template, over, figures, solver, method)
     tables = tuple(TABLE[key].table or np.ndim(scene.get(key)) > 0 for key in over)
 
     def ask(*values: Array) -> dict[str, Array]:

@@ -1,0 +1,37 @@
+"""Pickles and copies: scenes, results and responses go to other processes and come back equal."""
+
+import copy
+import pickle
+
+import jax
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+
+COPIES = {
+    "pickle": lambda made: pickle.loads(pickle.dumps(made)),
+    "deep copy": copy.deepcopy,
+}
+
+
+@pytest.mark.parametrize("how", COPIES)
+def test_scenes_histories_and_sweeps_are_copied_whole(how):
+    scene = jb.Scene().replace({"contact.pressure": [[0, 8], [1, 8], [1, 0], [2, 0]]})
+    history = jb.solve(scene, throw=False)
+    for made in (scene, history):
+        again = COPIES[how](made)
+        assert jax.tree.structure(again) == jax.tree.structure(made)
+        jax.tree.map(np.testing.assert_array_equal, again, made)
+    sweep = jb.sweep(jb.Scene(), {"load.amplitude": [0.5, 1.0]})
+    again = COPIES[how](sweep)
+    assert again.scene.model == sweep.scene.model
+    np.testing.assert_array_equal(again["dissipation"], sweep["dissipation"])
+
+
+@pytest.mark.parametrize("how", COPIES)
+def test_a_response_is_copied_whole(how):
+    ask = jb.response(jb.Scene(), ["load.amplitude"], ["dissipation", "loss_factor"])
+    again = COPIES[how](ask)
+    assert again is not ask
+    np.testing.assert_equal(again(0.7), ask(0.7))
