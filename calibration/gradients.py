@@ -6,7 +6,7 @@ solves scenes of all kinds of models, laws, kinematics, supports and loads at ra
 number that a scene holds, each entry of its tables included, is changed alone; rows of a table that
 make a step are moved together.  The derivative of each figure by JAX, in reverse, stands
 beside central differences at two distances, extrapolated (Richardson).  Where they differ, the
-distance is made smaller, and the slopes from both sides are compared: a figure with a kink there
+distances are made smaller, and the slopes from both sides are compared: a figure with a kink there
 has no derivative, and JAX must give one that lies between the two.
 
 It writes gradients.json beside this file after every setting: counts of right and wrong ones, and
@@ -43,18 +43,13 @@ from jbeamshell.scene.rungs import IDEAL  # noqa: E402
 RECORD = Path(__file__).parent / "gradients.json"
 SEED = 22
 STEP = 1e-4  # relative distance of the differences
-SMALLER = (1.0, 0.1, 0.01)  # times the distance, until they agree
+DISTANCES = (10.0, 1.0, 0.1, 0.01)  # times that, until they agree; round-off asks for the largest
 CLOSE = 1e-4  # relative difference that still agrees
 LITTLE = 1e-3  # of a figure per relative change of a number, below which slopes count as this
 NOISE = 1e-10  # of a figure, by round-off
-# Sizes of figures that are zero but for round-off; that of the closure is the width of the loop.
-LEAST = {
-    "closure": 1.0,
-    "error": 1.0,
-    "energy_imbalance": 1e-6,
-    "curvature": 1e-3,
-    "tip_deflection": 1e-7,
-}
+# Sizes of figures that are zero but for round-off, or small differences of larger numbers; that of
+# the closure is the width of the loop, that of the energy's imbalance the work of the load.
+LEAST = {"closure": 1.0, "error": 1.0, "curvature": 0.05, "tip_deflection": 1e-7}
 STEPPED = ("reaction_max_at",)  # places of nodes, which jump from one node to another
 Values = dict[str, Any]
 
@@ -323,12 +318,15 @@ def differences(
 def judged(setting: Setting, vector: np.ndarray, slopes: np.ndarray, way: int) -> list[Values]:
     """Verdicts on the derivatives of all figures by one number, with what they rest on."""
     walk, size = setting.walk, setting.walk.sizes[way]
-    floor = [LEAST.get(name, 0.0) for name in setting.names]
-    scale = np.maximum(np.abs(setting.figures(vector)), floor)
+    values = np.abs(setting.figures(vector))
+    found = dict(zip(setting.names, values, strict=True))
+    work = found["secant_stiffness"] * found["peak_displacement"] ** 2
+    floor = [(LEAST | {"energy_imbalance": work}).get(name, 0.0) for name in setting.names]
+    scale = np.maximum(values, floor)
     least = np.maximum(LITTLE * scale / size, 1e-300)
     right, all_found = np.zeros(slopes.size, bool), []
-    for smaller in SMALLER:
-        at = differences(setting, vector, walk.ways[way], STEP * smaller * size, scale)
+    for distance in DISTANCES:
+        at = differences(setting, vector, walk.ways[way], STEP * distance * size, scale)
         all_found.append(at)
         room = CLOSE * np.maximum(np.maximum(np.abs(at.best), np.abs(slopes)), least) + at.noise
         right |= np.abs(slopes - at.best) <= room

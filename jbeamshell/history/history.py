@@ -115,7 +115,7 @@ class History(Profiles, ContactLine, CycleFigures):
         chosen = choice.in_words(self.scene)
         if self.change is not None:
             percent = 100.0 * float(self.change)
-            chosen += f"; halving the elements changed the dissipation by {percent:.2g} %"
+            chosen += f"; halving the elements changed the loop by {percent:.2g} %"
         figures = self.figures()
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
         turned = self.scene.load.kind == "moment"

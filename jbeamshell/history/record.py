@@ -45,8 +45,8 @@ class Record(Tree):
     target : (steps+1,) prescribed value of the controlled load
     member : (steps+1, n, m) fields v, w, beta, psi, ... of the second member of a lap joint, up and
         along X as those of the strip; None on a rigid base
-    change : relative change of the dissipation when the elements were last halved; None for a grid
-        that was not refined
+    change : relative change of the dissipation or the secant stiffness, the larger one, when the
+        elements were last halved; None for a grid that was not refined
     end : end of the path, for `continued`; None for Masing's rule and the bar's closed form
     """
 

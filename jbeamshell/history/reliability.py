@@ -51,6 +51,10 @@ class Run(Protocol):
     @property
     def converged(self) -> bool: ...
     @property
+    def dissipation(self) -> Array: ...
+    @property
+    def secant_stiffness(self) -> Array: ...
+    @property
     def closure(self) -> Array: ...
     @property
     def slip_cycle(self) -> SlipCycle: ...
@@ -183,6 +187,16 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     return grid, corner, slider_error(cycle)
 
 
+def change_of(coarse: Run, fine: Run) -> Array:
+    """Relative change of dissipation or secant stiffness between two grids, the larger one.
+
+    Where much of a strip lifts off, two grids may agree in one of them by chance.
+    """
+    one, other = (np.array([run.dissipation, run.secant_stiffness]) for run in (coarse, fine))
+    with np.errstate(divide="ignore", invalid="ignore"):  # nothing slips on either
+        return jax.numpy.max(np.nan_to_num(np.abs(one / other - 1.0), nan=np.inf))
+
+
 def misses_tolerance(history: Run) -> bool:
     """True if the estimated error of a run exceeds what its model allows."""
     plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
@@ -288,7 +302,9 @@ def _resolution(history: Run) -> tuple[str, ...]:
     tolerance = history.scene.model.tolerance
     found, allowed = [], doubted_from(tolerance) if history.change is None else tolerance
     if grid > allowed:
-        found.append(f"{_off(grid)}: few nodes do the slipping; {finer}")
+        refined = history.change is not None
+        halved = ", and halving the elements changed the loop by as much" * refined
+        found.append(f"{_off(grid)}: few nodes do the slipping{halved}; {finer}")
     if corner > allowed:
         fix = "compare with more model.nodes" if plane else "compare with a smaller model.end_size"
         if "w" not in history.scene.model.fields:

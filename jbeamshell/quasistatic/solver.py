@@ -18,7 +18,7 @@ from jbeamshell.common.precision import is_single
 from jbeamshell.condensed.solve import Cycles, quickest
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.history.history import History
-from jbeamshell.history.reliability import misses_tolerance
+from jbeamshell.history.reliability import change_of, misses_tolerance
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.continuation import further_path, with_end
 from jbeamshell.quasistatic.masing import bar_cycles, masing
@@ -184,8 +184,7 @@ def _refined(history: History, walked: Callable[[Scene], History]) -> History:
         finer = walked(history.scene.refined())
         if not finer.converged:
             break
-        change = abs(history.dissipation / finer.dissipation - 1.0)
-        history = dataclasses.replace(finer, change=change)
+        history = dataclasses.replace(finer, change=change_of(history, finer))
     return history
 
 

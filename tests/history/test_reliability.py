@@ -220,7 +220,7 @@ def test_a_given_grid_is_never_refined():
     assert jb.solve(jb.Scene().replace(given)).change is None
 
 
-@pytest.mark.doubtful("few nodes do the slipping")
+@pytest.mark.doubtful("few nodes do the slipping, and halving the elements changed the loop")
 def test_a_refined_run_that_misses_its_tolerance_is_doubted(tmp_path):
     run = jb.solve(jb.Scene().replace({"load.amplitude": 0.006}))
     assert run.scene.model.tolerance < float(run.change) <= float(run.dissipation_error)
