@@ -32,6 +32,7 @@ jax.config.update("jax_disable_most_optimizations", True)  # few runs of many pr
 
 import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
+from gradient_scenes import SETTINGS, SIZES, Values  # noqa: E402
 from provenance import provenance  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -46,104 +47,12 @@ STEP = 1e-4  # relative distance of the differences
 DISTANCES = (10.0, 1.0, 0.1, 0.01)  # times that, until they agree; round-off asks for the largest
 CLOSE = 1e-4  # relative difference that still agrees
 LITTLE = 1e-3  # of a figure per relative change of a number, below which slopes count as this
-NOISE = 1e-10  # of a figure, by round-off
+NOISE = 1e-10  # of a figure, by round-off, if no more was measured
+TINY, TRIES = 1e-13, 5  # relative changes of all numbers by which round-off is measured
 # Sizes of figures that are zero but for round-off, or small differences of larger numbers; that of
 # the closure is the width of the loop, that of the energy's imbalance the work of the load.
 LEAST = {"closure": 1.0, "error": 1.0, "curvature": 0.05, "tip_deflection": 1e-7}
 STEPPED = ("reaction_max_at",)  # places of nodes, which jump from one node to another
-Values = dict[str, Any]
-
-FEW = {"model.nodes": 17, "load.steps_per_half_cycle": 4, "load.cycles": 1}
-STEPWISE = FEW | {"model.solution": "stepwise", "model.kinematics": "linear"}
-EXACT = STEPWISE | {"model.kinematics": "exact"}
-LIFT = {"model.fields": ["v", "w", "beta", "psi"]}
-SMOOTH = {"contact.smoothing": 8.0}
-SOFT = {"contact.stick_stiffness": 100.0}
-TABLE_OF_STEPS = {
-    "contact.pressure": [[0.0, 0.0], [0.3, 0.0], [0.3, 12.0], [1.3, 8.0], [1.3, 0.0], [2.0, 0.0]],
-    "load.amplitude": 0.3,
-}
-BOTH_FACES = {
-    "contact.pressure": [[0.0, 8.0], [1.0, 12.0], [2.0, 9.0]],
-    "contact.bottom_pressure": [[0.0, 1.0], [1.2, 3.0], [2.0, 1.5]],
-}
-LAYERS = {
-    "strip.layers": [[0.05, 2e5, 0.2], [0.1, 1e5, 0.35], [0.0752, 3e5, 0.25]],
-    "strip.deviation": 0.01,
-}
-DISPLACED = {"load.control": "displacement", "load.amplitude": 1.5e-5}
-DOUBLE = {
-    "member.support": "rolling",
-    "strip.far_end": "free",
-    "member.height_ratio": 0.09,
-    "member.axial_stiffness": 3e4,
-    "member.poisson_ratio": 0.25,
-}
-SINGLE = DOUBLE | {
-    "member.support": "clamped",
-    "strip.loaded_end": "guided",
-    "strip.overhang": 0.5,
-    "member.overhang": 0.4,
-}
-BOLTS = {"contact.bolts": [[0.5, 5.0, 0.4], [1.4, 6.0, 0.5]], "load.amplitude": 0.3}
-SETTINGS: dict[str, Values] = {
-    "condensed squeeze": FEW,
-    "condensed shell": FEW | {"model.rung": "condensed-shell"},
-    "condensed p2": FEW | {"model.rung": "condensed-p2"},
-    "condensed, soft sliders": FEW | SOFT,
-    "condensed, displacement": FEW | DISPLACED,
-    "condensed, steps of pressure": FEW | TABLE_OF_STEPS,
-    "condensed, both faces": FEW | BOTH_FACES | SOFT,
-    "condensed, layers": FEW | LAYERS | SOFT,
-    "plane": FEW | {"model.rung": "plane"},
-    "bar": FEW | {"model.rung": "bar"},
-    "masing": FEW | {"model.rung": "masing"},
-    "masing of a pull": FEW | {"model.rung": "masing-pull"},
-    "stepwise sharp": STEPWISE,
-    "stepwise smooth": STEPWISE | SMOOTH,
-    "stepwise shell": STEPWISE | {"model.rung": "shell"},
-    "exact sharp": EXACT,
-    "exact smooth that lifts": EXACT | SMOOTH | LIFT,
-    "exact sharp that lifts": EXACT | LIFT,
-    "lift, steps of pressure": STEPWISE | LIFT | TABLE_OF_STEPS,
-    "lift, both faces, curved": EXACT | LIFT | BOTH_FACES | {"strip.curvature": 1e-4},
-    "exact, layers": EXACT | LAYERS,
-    "stepwise, displacement": STEPWISE | DISPLACED,
-    "exact, arc length": EXACT | DISPLACED | {"load.control": "arc-length"},
-    "stepwise p2": STEPWISE | {"model.rung": "p2"},
-    "stepwise p3, exact": EXACT | {"model.rung": "p3"},
-    "collocation": EXACT | {"model.grid": "collocation"},
-    "assumed squeeze": EXACT | LIFT | {"model.squeeze": "assumed"},
-    "printed constants": STEPWISE | {"model.constants": "printed"},
-    "compliant base": EXACT | LIFT | {"contact.normal": "compliant"},
-    "pinned": FEW | SOFT | {"strip.far_end": "pinned"},
-    "plane stress, free": STEPWISE | {"strip.far_end": "free", "strip.plane": "stress"},
-    "double shear": FEW | DOUBLE,
-    "single lap with bolts": FEW
-    | SINGLE
-    | BOLTS
-    | {
-        "contact.bearing_stiffness": 2.0,
-        "contact.clearance": 2e-6,
-        "contact.bolt_stiffness": 1.0,
-        "load.arm": 0.05,
-    },
-    "lap with a gap, moment": FEW
-    | SINGLE
-    | {
-        "contact.gap": [[0.0, 0.0], [1.0, 2e-6], [2.0, 0.0]],
-        "load.kind": "moment",
-        "load.amplitude": 0.3,
-    },
-    "plane lap": FEW | DOUBLE | {"model.rung": "plane"},
-}
-# Distances for numbers that are zero, or small beside what they are added to.
-SIZES = {
-    "strip.deviation": 0.1,
-    "strip.curvature": 1e-4,
-    "contact.bottom_pressure": 1.0,
-    "contact.gap": 1e-6,
-}
 
 
 class Walk(NamedTuple):
@@ -304,18 +213,30 @@ class Differences(NamedTuple):
 
 
 def differences(
-    setting: Setting, vector: np.ndarray, way: np.ndarray, h: float, scale: np.ndarray
+    setting: Setting, vector: np.ndarray, way: np.ndarray, h: float, noise: np.ndarray
 ) -> Differences:
-    """Differences along a way; ``scale`` are the sizes of the figures."""
+    """Differences along a way; ``noise`` is the round-off of the figures."""
     at = setting.figures
     middle, half = at(vector), 0.5 * h
     far, near = ([at(vector + sign * d * way) for sign in (1, -1)] for d in (h, half))
     wide, close = (far[0] - far[1]) / (2.0 * h), (near[0] - near[1]) / h
     up, down = (near[0] - middle) / half, (middle - near[1]) / half
-    return Differences((4.0 * close - wide) / 3.0, up, down, NOISE * scale / h)
+    return Differences((4.0 * close - wide) / 3.0, up, down, noise / h)
 
 
-def judged(setting: Setting, vector: np.ndarray, slopes: np.ndarray, way: int) -> list[Values]:
+def round_off(setting: Setting, vector: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Largest changes (figures,) by changes of all numbers in their last digits."""
+    walk, middle = setting.walk, setting.figures(vector)
+    found = []
+    for _ in range(TRIES):
+        changes = TINY * walk.sizes * random.uniform(-1.0, 1.0, walk.sizes.size)
+        found.append(np.abs(setting.figures(vector + changes @ walk.ways) - middle))
+    return np.max(found, axis=0)
+
+
+def judged(
+    setting: Setting, vector: np.ndarray, slopes: np.ndarray, way: int, noise: np.ndarray
+) -> list[Values]:
     """Verdicts on the derivatives of all figures by one number, with what they rest on."""
     walk, size = setting.walk, setting.walk.sizes[way]
     values = np.abs(setting.figures(vector))
@@ -324,9 +245,10 @@ def judged(setting: Setting, vector: np.ndarray, slopes: np.ndarray, way: int) -
     floor = [(LEAST | {"energy_imbalance": work}).get(name, 0.0) for name in setting.names]
     scale = np.maximum(values, floor)
     least = np.maximum(LITTLE * scale / size, 1e-300)
+    noise = np.maximum(NOISE * scale, 2.0 * noise)
     right, all_found = np.zeros(slopes.size, bool), []
     for distance in DISTANCES:
-        at = differences(setting, vector, walk.ways[way], STEP * distance * size, scale)
+        at = differences(setting, vector, walk.ways[way], STEP * distance * size, noise)
         all_found.append(at)
         room = CLOSE * np.maximum(np.maximum(np.abs(at.best), np.abs(slopes)), least) + at.noise
         right |= np.abs(slopes - at.best) <= room
@@ -374,10 +296,10 @@ def study(given: Values, points: int, seed: list[int]) -> Values:
         # The first point is the scene itself, where rows lie on nodes and ends.
         factors = random.uniform(-0.05, 0.05, len(walk.names)) * (point > 0)
         vector = walk.start + (factors * walk.sizes) @ walk.ways * (walk.start != 0.0)
-        slopes = setting.slopes(vector)
+        slopes, noise = setting.slopes(vector), round_off(setting, vector, random)
         for way in range(len(walk.names)):
             try:
-                found = judged(setting, vector, slopes[:, way], way)
+                found = judged(setting, vector, slopes[:, way], way, noise)
             except FloatingPointError as error:
                 found = [{"number": walk.names[way], "verdict": "no result", "why": str(error)}]
             rows += [row | {"point": point} for row in found]
