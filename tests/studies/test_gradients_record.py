@@ -29,6 +29,10 @@ def test_the_record_holds_no_wrong_derivative(setting):
         assert abs(row["jax"]) < float("inf")
 
 
+def test_the_record_holds_all_settings(script):
+    assert set(RECORD) == set(script.SETTINGS)
+
+
 @pytest.mark.slow
 def test_a_setting_of_the_record(script):
     name = "condensed, steps of pressure"
