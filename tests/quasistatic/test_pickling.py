@@ -1,6 +1,7 @@
 """Pickles and copies: scenes, results and responses go to other processes and come back equal."""
 
 import copy
+import multiprocessing
 import pickle
 
 import jax
@@ -35,3 +36,18 @@ def test_a_response_is_copied_whole(how):
     again = COPIES[how](ask)
     assert again is not ask
     np.testing.assert_equal(again(0.7), ask(0.7))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", ["spawn", "forkserver"])
+def test_a_process_started_anew_gives_the_same(start, monkeypatch):
+    monkeypatch.setenv("JAX_ENABLE_X64", "1")
+    ask = jb.response(jb.Scene(), ["load.amplitude"], ["dissipation", "loss_factor"])
+    with multiprocessing.get_context(start).Pool(1) as pool:
+        there = pool.apply(ask, (0.7,))
+        history = pool.apply(jb.solve, (jb.Scene(),))
+    for name, value in ask(0.7).items():
+        np.testing.assert_allclose(there[name], value, rtol=1e-12)
+    assert float(history.dissipation) == pytest.approx(
+        float(jb.solve(jb.Scene()).dissipation), rel=1e-12
+    )
