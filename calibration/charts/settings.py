@@ -22,6 +22,7 @@ from calibration.charts.table import draw as draw_one
 from jbeamshell.plotting.style import close, save, style
 
 TOLERANCE = 0.005
+TIMES = (3, 5, 10, 20, 50)  # ms, with a label
 SMALLEST, LARGEST = 1e-5, 1.0  # errors that are drawn
 
 
@@ -59,9 +60,16 @@ def _limit(axes: Axes, rows: Any) -> None:
     axes.axvline(TOLERANCE, color="0.5", linestyle="--", linewidth=0.8)
 
 
+def _plain_times(axes: Axes, rows: Any) -> None:
+    axes.set_xticks(TIMES, map(str, TIMES))
+    axes.minorticks_off()
+
+
 CHARTS = {
     "kinds": Chart("kinds", OFF, "part of the scenes", "", _by_solution, "x", extra=_limit),
-    "tolerances": Chart("tolerances", "time of a run  [ms]", OFF, "", _by_tolerance, "xy"),
+    "tolerances": Chart(
+        "tolerances", "time of a run  [ms]", OFF, "", _by_tolerance, "xy", extra=_plain_times
+    ),
 }
 
 
