@@ -81,3 +81,15 @@ def test_responses_share_programs_and_derivatives_whatever_the_scene_s_other_num
     compiled()
     np.testing.assert_allclose(slope(0.125), first / 1.25, rtol=1e-12)  # D = (2/3) A^3/(E'2H mu p)
     assert compiled() == []
+
+
+def test_a_response_is_made_of_traced_numbers_and_tables():
+    table = np.array([[0.0, 8.0], [1.0, 8.0], [1.0, 0.0], [2.0, 0.0]])
+    few = {"model.nodes": 17, "load.amplitude": 0.3, "contact.stick_stiffness": 1e4}
+
+    def dissipation(friction, table):
+        scene = jb.Scene().replace(few | {"contact.friction": friction, "contact.pressure": table})
+        return jb.response(scene, ["load.amplitude"])(0.2)["dissipation"]
+
+    found = jax.jit(dissipation)(0.12, table)
+    assert float(found) == pytest.approx(float(dissipation(0.12, table)), rel=1e-9)

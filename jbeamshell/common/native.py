@@ -8,7 +8,7 @@ from typing import Any
 import jax
 from jax.experimental.xla_metadata import set_xla_metadata
 
-from jbeamshell.common.checks import in_transformation
+from jbeamshell.common.checks import in_transformation, is_traced
 
 # The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
 MARK = {"inlineable": "false", "xla_cpu_small_call": "true"}
@@ -45,7 +45,7 @@ class Native:
 
     def now(self, *given: Any) -> Any | None:
         """Value for numbers; None if a JAX transformation asks with traced values."""
-        if any(isinstance(each, jax.core.Tracer) for each in given):
+        if is_traced(given):
             return None
         if not in_transformation():
             return self._value(*given)

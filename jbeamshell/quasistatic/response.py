@@ -136,7 +136,7 @@ def _response(
 ) -> Response:
     """Response of a scene with its settings as they were chosen; see `response`."""
     template, numbers = Template.of(scene)
-    fixed = jnp.stack(numbers) if is_traced(numbers) else np.array(numbers)
+    fixed: Any = numbers if is_traced(numbers) else np.array(numbers)  # tables may be traced too
     programs = _programs(template, over, figures, solver, method)
     tables = tuple(TABLE[key].table or np.ndim(scene.get(key)) > 0 for key in over)
 
@@ -163,7 +163,7 @@ def _programs(
     """Function of the scene's numbers and of the values that vary, compiled at its first call."""
 
     def solved_by(method: Method) -> Response:
-        def figures_of(fixed: Array, *values: Array) -> dict[str, Array]:
+        def figures_of(fixed: Sequence[Array], *values: Array) -> dict[str, Array]:
             scene = template.scene(list(fixed))
             varied = scene.replace(dict(zip(over, values, strict=True)))
             history = solve(varied, throw=False, solver=solver, method=method)
@@ -181,7 +181,7 @@ def _programs(
     first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)
     compiled = jax.jit(solved_by(method or Method.NEWTON))
 
-    def ask(*given: Array) -> dict[str, Array]:
+    def ask(*given: Any) -> dict[str, Array]:
         found: dict[str, Array] | None = first.now(*given)
         if found is None or (again and np.asarray(found["status"]).item() != Status.CONVERGED):
             return compiled(*given)
