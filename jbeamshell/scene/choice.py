@@ -110,7 +110,7 @@ def _nodes(grid: Grid, tolerance: float, jumps: int) -> int:
 
 
 def refinements(scene: Parts) -> int:
-    """How many times a scene's elements may be halved, for an estimated error over its tolerance.
+    """Number of times that a scene's elements may be halved to keep its tolerance.
 
     The grid must be open and the contact line a section's: a finer one of plane elasticity takes
     longer than what it leaves is worth.

@@ -44,7 +44,7 @@ class Template(NamedTuple):
 
     @property
     def numbers(self) -> int:
-        """How many it takes."""
+        """Count of the numbers that it takes."""
         return int(self.tree.num_leaves) - len(self.tables)
 
     def scene(self, numbers: Sequence[Any]) -> Scene:

@@ -14,7 +14,7 @@ FAST = f"{jax_options.EXTRA}{jax_options.FAST_LOOPS}"
 
 
 def flags_after(flags, call="jbeamshell.configure()", without=()):
-    """What a call prints and then XLA_FLAGS, in a process that was started with some variables."""
+    """Output of a call and then XLA_FLAGS, in a process that was started with some variables."""
     code = f"import os, jbeamshell; {call}; print(os.environ.get('XLA_FLAGS', ''))"
     kept = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", *without)}
     given = kept | flags

@@ -220,6 +220,10 @@ def test_a_given_grid_is_never_refined():
     assert jb.solve(jb.Scene().replace(given)).change is None
 
 
+def test_without_friction_nothing_is_refined():
+    assert jb.solve(jb.Scene().replace({"contact.friction": 0.0}), throw=False).change is None
+
+
 @pytest.mark.doubtful("few nodes do the slipping, and halving the elements changed the loop")
 def test_a_refined_run_that_misses_its_tolerance_is_doubted(tmp_path):
     run = jb.solve(jb.Scene().replace({"load.amplitude": 0.006}))
