@@ -4,6 +4,10 @@ A strip whose section stores a quadratic energy in its fields and their slopes c
 along X to the next one only.  All fields but the contact's (tangential displacement v, lift w) are
 eliminated station by station from the far end, with the contact's fields and the end load as
 right-hand sides.  What is left are dense matrices over the contact nodes.
+
+The unknowns of a station are the steps of its fields from the next station.  An element stretched
+by a step is stiff in proportion to 1 / length, and one that moves as a whole is not: with the fields
+themselves as unknowns the short elements at a corner would cancel, and amplify round-off.
 """
 
 from __future__ import annotations
@@ -58,13 +62,14 @@ class Body(Tree):
 class Elimination(NamedTuple):
     """Elimination of the fields between the contact's, station by station, to find them again.
 
-    The right-hand sides are v and w of all stations, the end load, and the pressure.
+    The unknowns are the steps of the fields to a station from the next one, and at the two ends the
+    fields.  The right-hand sides are v and w of all stations, the end load, and the pressure.
 
     Attributes
     ----------
     inverse : (n, m-2, m-2) inverses of the Cholesky factors
     known : (n, m-2, 2n+2) right-hand sides, reduced
-    onwards : (n-1, m-2, m-2) coupling to the next station, reduced
+    onwards : (n-1, m-2, m-2) coupling to the fields of the next station, reduced
     """
 
     inverse: Array
@@ -74,14 +79,17 @@ class Elimination(NamedTuple):
     def recovered(self, given: Array) -> Array:
         """Fields (n, m-2, levels) from the right-hand sides' factors (2n+2, levels)."""
 
-        def back(after: Array, station: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            inverse, known, onwards = station
-            here = -(inverse.T @ (known @ given + onwards @ after))
+        def back(after: Array, station: tuple[Array, ...]) -> tuple[Array, Array]:
+            first, inverse, known, onwards = station
+            step = -(inverse.T @ (known @ given + onwards @ after))
+            here = jnp.where(first, step, after + step)
             return here, here
 
         none = jnp.zeros((self.inverse.shape[1], given.shape[1]), given.dtype)
         onwards = jnp.pad(self.onwards, ((0, 1), (0, 0), (0, 0)))
-        return lax.scan(back, none, (self.inverse, self.known, onwards), reverse=True)[1]
+        first = np.arange(len(self.inverse)) == 0
+        stations = (first, self.inverse, self.known, onwards)
+        return lax.scan(back, none, stations, reverse=True)[1]
 
 
 def eliminate(
@@ -109,20 +117,26 @@ def eliminate(
     def go(
         carry: tuple[Array, Array], station: tuple[Array, ...]
     ) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
-        matrix, sides = carry
+        before, forces = carry
         i, load, length = station
         start, end, across = (part[0] for part in form.element(length[None]))
-        mask = jnp.where(i == 0, free, 1.0)
+        stays, follows = form.moved(length)
+        forces = forces + load * _in_last_column(form.press[2:], forces)
+        # Of the first station the fields are the unknowns, some of which are held.
+        first = i == 0
+        mask = jnp.where(first, free, 1.0)
         contacts = jnp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
-        sides = _add(sides, contacts, 2 * i) + load * _in_last_column(form.press[2:], sides)
-        sides = sides * mask[:, None]
-        matrix = (matrix + start[2:, 2:]) * mask[:, None] * mask + jnp.diag(1.0 - mask)
+        sides = _add(forces, contacts, 2 * i) * mask[:, None]
+        matrix = (before + start[2:, 2:]) * mask[:, None] * mask + jnp.diag(1.0 - mask)
         inverse = inverse_cholesky(matrix)
-        onwards = inverse @ (across[2:, 2:] * mask[:, None])
+        coupling = jnp.where(first, across[2:, 2:], before + stays.T[2:, 2:])
+        onwards = inverse @ (coupling * mask[:, None])
         known = inverse @ sides
-        contacts = jnp.concatenate([across[:2, 2:].T, end[2:, :2]], axis=1)
-        sides = _add(-(onwards.T @ known), contacts, 2 * i)
-        return (end[2:, 2:] - onwards.T @ onwards, sides), (inverse, known, onwards)
+        next_to = jnp.where(first, across[:2, 2:].T, stays[2:, :2])
+        contacts = jnp.concatenate([next_to, jnp.where(first, end, follows)[2:, :2]], axis=1)
+        forces = _add(jnp.where(first, 0.0, forces) - onwards.T @ known, contacts, 2 * i)
+        own = jnp.where(first, end, stays + follows)[2:, 2:]
+        return (before + own - onwards.T @ onwards, forces), (inverse, known, onwards)
 
     carry = (jnp.zeros((inner, inner), x.dtype), jnp.zeros((inner, 2), x.dtype))
     parts, total = [], jnp.zeros((columns, columns), x.dtype)

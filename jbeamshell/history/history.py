@@ -113,7 +113,7 @@ class History(Profiles, ContactLine, CycleFigures):
             f"{self.x.size} nodes, eta = {float(strip.height_ratio):.4g}, {what}"
         )
         chosen = choice.in_words(self.scene)
-        if self.change is not None:
+        if self.change is not None and np.isfinite(self.change):  # something slips
             percent = 100.0 * float(self.change)
             chosen += f"; halving the elements changed the loop by {percent:.2g} %"
         figures = self.figures()

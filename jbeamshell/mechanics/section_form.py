@@ -61,6 +61,14 @@ class SectionForm(NamedTuple):
         own = mean + slope + spread
         return own - even, own + even, mean - slope - spread + odd
 
+    def moved(self, length: Array) -> tuple[Array, Array]:
+        """Forces (m, m) from fields at an element's start and end to both ends together.
+
+        They are sums of the matrices of `element`, in which the slopes cancel.
+        """
+        mean = 0.5 * length * self.values
+        return mean - self.mixed, mean + self.mixed
+
 
 def section_stiffness(energy: Callable[[Section, Section], Array], like: Array) -> Array:
     """Second derivatives (2, m, 2, m) of a section's energy in its fields and slopes, at zero.

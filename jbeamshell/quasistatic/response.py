@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -93,7 +93,16 @@ def response(
     for name in figures:
         require_choice("figures", name, RESPONSES)
 
-    return Answers(pinned(scene, figures), tuple(over), tuple(figures), solver, method)
+    return Answers(pinned(scene, figures), _Asked(tuple(over), tuple(figures), solver, method))
+
+
+class _Asked(NamedTuple):
+    """What is asked of a scene; see `response`."""
+
+    over: tuple[str, ...]
+    figures: tuple[str, ...]
+    solver: Newton | None
+    method: Method | None
 
 
 class Answers:
@@ -102,22 +111,15 @@ class Answers:
     Parameters
     ----------
     scene : scene with its settings as they were chosen
-    over, figures, solver, method : see `response`
+    asked : see `response`
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        over: tuple[str, ...],
-        figures: tuple[str, ...],
-        solver: Newton | None,
-        method: Method | None,
-    ) -> None:
-        self._given = scene, over, figures, solver, method
-        self._ask = _response(*self._given)
+    def __init__(self, scene: Scene, asked: _Asked) -> None:
+        self._given = scene, asked
+        self._ask = _response(scene, asked)
         if scene.model.condensed and not is_traced(scene) and is_single(scene):
             with jax.enable_x64(True):
-                precise = _response(doubled(scene), over, figures, solver, method)
+                precise = _response(doubled(scene), asked)
             self._ask = in_double(precise, within=self._ask)
 
     def __call__(self, *values: Array) -> dict[str, Array]:
@@ -127,17 +129,12 @@ class Answers:
         return type(self), self._given
 
 
-def _response(
-    scene: Scene,
-    over: tuple[str, ...],
-    figures: tuple[str, ...],
-    solver: Newton | None,
-    method: Method | None,
-) -> Response:
-    """Response of a scene with its settings as they were chosen; see `response`."""
+def _response(scene: Scene, asked: _Asked) -> Response:
+    """Response of a scene with its settings as they were chosen."""
+    over = asked.over
     template, numbers = Template.of(scene)
     fixed: Any = numbers if is_traced(numbers) else np.array(numbers)  # tables may be traced too
-    programs = _programs(template, over, figures, solver, method)
+    programs = _programs(template, asked)
     tables = tuple(TABLE[key].table or np.ndim(scene.get(key)) > 0 for key in over)
 
     def ask(*values: Array) -> dict[str, Array]:
@@ -153,14 +150,9 @@ def _response(
 
 
 @functools.lru_cache(KEPT)
-def _programs(
-    template: Template,
-    over: tuple[str, ...],
-    figures: tuple[str, ...],
-    solver: Newton | None,
-    method: Method | None,
-) -> Response:
+def _programs(template: Template, asked: _Asked) -> Response:
     """Function of the scene's numbers and of the values that vary, compiled at its first call."""
+    over, figures, solver, method = asked
 
     def solved_by(method: Method) -> Response:
         def figures_of(fixed: Sequence[Array], *values: Array) -> dict[str, Array]:
