@@ -5,9 +5,9 @@ along X to the next one only.  All fields but the contact's (tangential displace
 eliminated station by station from the far end, with the contact's fields and the end load as
 right-hand sides.  What is left are dense matrices over the contact nodes.
 
-The unknowns of a station are the steps of its fields from the next station.  An element stretched
-by a step is stiff in proportion to 1 / length, and one that moves as a whole is not: with the fields
-themselves as unknowns the short elements at a corner would cancel, and amplify round-off.
+The unknowns of a station are the steps of its fields from the next station.  A short element is
+stiff against a step over its length, and soft if it moves as a whole.  With the fields themselves
+as unknowns these two would have to cancel, and round-off would grow.
 """
 
 from __future__ import annotations
