@@ -61,8 +61,10 @@ def _double(leaf: Any) -> Any:
 
 
 def _rounded(leaf: Any) -> Any:
-    single = _is_array(leaf) and leaf.dtype == np.float64
-    return jnp.asarray(leaf, np.float32 if single else None) if _is_array(leaf) else leaf
+    if not _is_array(leaf):
+        return leaf
+    # Rounded by NumPy and put as it is: JAX would compile a program for every shape.
+    return jax.device_put(leaf.astype(np.float32) if leaf.dtype == np.float64 else leaf)
 
 
 def _is_array(leaf: Any) -> bool:

@@ -80,15 +80,15 @@ class Elimination(NamedTuple):
         """Fields (n, m-2, levels) from the right-hand sides' factors (2n+2, levels)."""
 
         def back(after: Array, station: tuple[Array, ...]) -> tuple[Array, Array]:
-            first, inverse, known, onwards = station
-            step = -(inverse.T @ (known @ given + onwards @ after))
+            first, inverse, sides, onwards = station
+            step = -(inverse.T @ (sides + onwards @ after))
             here = jnp.where(first, step, after + step)
             return here, here
 
         none = jnp.zeros((self.inverse.shape[1], given.shape[1]), given.dtype)
         onwards = jnp.pad(self.onwards, ((0, 1), (0, 0), (0, 0)))
         first = np.arange(len(self.inverse)) == 0
-        stations = (first, self.inverse, self.known, onwards)
+        stations = (first, self.inverse, self.known @ given, onwards)
         return lax.scan(back, none, stations, reverse=True)[1]
 
 

@@ -41,7 +41,7 @@ def walk(
     forces: Array,
     turns: ArrayLike | tuple[bool, ...],
     lift: Array | None = None,
-    needed: Array | bool = True,
+    needed: Array | None = None,
     *,
     lifting: int | None = None,
 ) -> Level:
@@ -58,7 +58,8 @@ def walk(
     turns : (levels,) True where the load has turned since the level before; so is the first.  Many
         loads on one body (`jax.vmap`) share events if it is a tuple, see `abreast`
     lift : (n,) lift at the start; None is none
-    needed : False to leave out the walk at no cost; its levels mean nothing then
+    needed : False to leave out the walk at no cost; its levels mean nothing then.  None is True,
+        and compiles quicker
     lifting : number of nodes that may lift off, from the loaded end, which is quicker if few do;
         from where another one opens levels are not settled; None is all
 
@@ -69,7 +70,7 @@ def walk(
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
     given = body, jnp.asarray(friction), start, forces, lift
-    return _walk(*given, turns=turns, needed=jnp.asarray(needed), lifting=lifting)
+    return _walk(*given, turns=turns, needed=needed, lifting=lifting)
 
 
 @eqx.filter_custom_jvp
@@ -81,7 +82,7 @@ def _walk(
     lift: Array,
     *,
     turns: ArrayLike | tuple[bool, ...],
-    needed: Array,
+    needed: Array | None,
     lifting: int | None,
 ) -> Level:
     known = turns if isinstance(turns, tuple) else None
@@ -95,7 +96,7 @@ def _walk_jvp(
     tangents: tuple[PyTree, ...],
     *,
     turns: ArrayLike | tuple[bool, ...],
-    needed: Array,
+    needed: Array | None,
     lifting: int | None,
 ) -> tuple[Level, Level]:
     changes = tuple(jax.tree.map(_full, *both) for both in zip(primals, tangents, strict=True))
@@ -153,8 +154,10 @@ def _any(batched: PyTree) -> bool:
     return any(jax.tree.leaves(batched))
 
 
-def _if_needed(needed: Array, path: Callable[[], Level]) -> Level:
+def _if_needed(needed: Array | None, path: Callable[[], Level]) -> Level:
     """Levels of a path, or zeros at no cost."""
+    if needed is None:
+        return path()
 
     def nothing() -> Level:
         return jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), jax.eval_shape(path))
@@ -174,10 +177,11 @@ def _differentiable(
     forces: Array,
     lift: Array,
     turns: Array,
-    needed: Array,
+    needed: Array | None,
     lifting: int | None = None,
 ) -> Level:
     """Levels of a path, level by level differentiable; see `walk`."""
+    needed = jnp.asarray(True) if needed is None else needed
     k, n = start.v.size, lift.size
     lifting = n if lifting is None else lifting
     system = _system(body, friction, start.force)

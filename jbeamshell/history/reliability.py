@@ -199,9 +199,9 @@ def change_of(coarse: Run, fine: Run) -> Array:
 
 def misses_tolerance(history: Run) -> bool:
     """True if the estimated error of a run exceeds its tolerance; never without friction."""
-    if not history.scene.contact.friction > 0.0:
-        return False
     plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
+    if not plain.scene.contact.friction > 0.0:
+        return False
     with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
         errors = estimates(plain.scene, plain.slip_cycle, plain.change)
     return bool(max(errors) > plain.scene.model.tolerance)
