@@ -13,6 +13,7 @@ from jbeamshell.common.checks import in_transformation, is_traced
 # The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
 MARK = {"inlineable": "false", "xla_cpu_small_call": "true"}
 REFUSED = ("custom_call", "stablehlo.sort", "stablehlo.fft")  # operations that need the runtime
+MOST_ARRAYS = 16  # that are given to a native function: some twenty end the process (jaxlib 0.10)
 
 
 class Native:
@@ -65,8 +66,8 @@ class Native:
 
 
 def _may_fit(whole: Any, given: tuple[Any, ...]) -> bool:
-    """True if the program runs on a CPU and has no operation that needs the runtime."""
-    if jax.default_backend() != "cpu":
+    """True if the program runs on a CPU, is given few arrays, and needs no runtime."""
+    if jax.default_backend() != "cpu" or len(jax.tree.leaves(given)) > MOST_ARRAYS:
         return False
     text = whole.lower(*given).as_text()
     return not any(word in text for word in REFUSED)

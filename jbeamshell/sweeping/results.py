@@ -16,7 +16,7 @@ from jbeamshell.common.checks import require_choice
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
 from jbeamshell.common.summary import Summary
-from jbeamshell.history.figures import TURNED_UNITS
+from jbeamshell.history.figures import TURNED_UNITS, UNITS
 from jbeamshell.history.reliability import doubted_from
 from jbeamshell.scene.keys import unit_of
 from jbeamshell.scene.load_path import check
@@ -24,13 +24,7 @@ from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 
-UNITS = {
-    "dissipation": "force",
-    "dissipation_ratio": "1",
-    "dissipation_error": "1",
-    "loss_factor": "1",
-    "secant_stiffness": "force/width/length",
-}
+PURE = dict.fromkeys(("dissipation_ratio", "dissipation_error", "loss_factor"), "1")
 ROWS = 4096  # rows of a table that are turned into text at a time
 
 
@@ -179,7 +173,7 @@ class Sweep:
         """
         xarray, load = _library("xarray"), self.scene.load
         dims = ["lane"] if self.paired else list(self.axes)
-        units = UNITS | (TURNED_UNITS if load.kind == "moment" else {})
+        units = UNITS | PURE | (TURNED_UNITS if load.kind == "moment" else {})
         variables: dict[str, Any] = {
             name: (dims, values, {"units": units[name]} if name in units else {})
             for name, values in self.values.items()

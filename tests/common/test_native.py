@@ -55,6 +55,14 @@ def test_values_are_the_function_s(function, fits):
             np.testing.assert_allclose(value, expected[name], rtol=1e-14)
 
 
+def test_many_arrays_are_not_given_to_one_native_function():
+    """Some twenty end the process within the compiler."""
+    native, given = Native(lambda *given: looped(*given[-2:])), [jnp.asarray(0.3)] * 24
+    expected = jax.jit(looped)(*given[:2])["turned"]
+    np.testing.assert_allclose(native.now(*given)["turned"], expected, rtol=1e-14)
+    assert native.fits is False
+
+
 def test_it_is_for_numbers_only():
     native = Native(looped)
     assert jax.jit(native.now)(0.3, 0.4) is None
