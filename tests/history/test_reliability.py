@@ -254,6 +254,13 @@ def test_where_nothing_slips_the_dissipation_is_doubted():
     assert jb.solve(frictionless).doubts == ()
 
 
+@pytest.mark.doubtful("nothing slips")
+def test_where_nothing_slips_on_any_grid_no_change_is_told():
+    run = jb.solve(jb.Scene().replace({"load.amplitude": 1e-6}))
+    assert np.isinf(run.change)
+    assert "halving the elements" not in str(run)
+
+
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
