@@ -1,4 +1,4 @@
-"""Sample of the slow tests, drawn anew for each commit: so that none of them rots unseen."""
+"""Sample of the slow tests, drawn anew for each commit, so that none of them rots unseen."""
 
 import random
 import subprocess
@@ -10,7 +10,7 @@ LONG = 2.0  # minutes from which on a test is left to the whole slow suite
 
 
 def drawn(test: str, minutes: float, seed: str) -> bool:
-    """Whether a slow test of some minutes is of the sample of a seed.
+    """True if a slow test of some minutes belongs to the sample of a seed.
 
     Each test draws for itself: the others may come and go.
     """

@@ -21,7 +21,7 @@ LEAST = 1e-12  # eigenvalue over the largest, below which a measurement does not
 
 
 class Wish(NamedTuple):
-    """What a measurement alone would have.
+    """Step of the parameters that one measurement alone asks for.
 
     Attributes
     ----------

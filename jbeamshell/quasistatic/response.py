@@ -97,7 +97,7 @@ def response(
 
 
 class _Asked(NamedTuple):
-    """What is asked of a scene; see `response`."""
+    """Question to a scene; its parts are those of `response`."""
 
     over: tuple[str, ...]
     figures: tuple[str, ...]
