@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import Small
-from jbeamshell.identify.models import Model
+from jbeamshell.identify.models import Model, is_rigid
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.rig import rigged, with_rig
 from jbeamshell.identify.rig_keys import RIG
@@ -255,9 +255,16 @@ def _observed(measurement: Measurement, specimen: Specimen, rig: Sequence[str]) 
 
 
 def _response(
-    values: Array, observation: Observation, scene: Model, keys: tuple[str, ...], solver: Newton
+    values: Array,
+    observation: Observation,
+    scene: Model,
+    keys: tuple[str, ...],
+    solver: Newton,
+    rigid: bool,
 ) -> tuple[Array, Array, Array, Array]:
     """Residual (n,), its derivatives (n, k), prediction (n,) and convergence of a run."""
+    if rigid and isinstance(scene, Scene):
+        scene = scene.with_rigid_sliders()
 
     def residual(own: Array) -> tuple[Array, tuple[Array, Array, Array]]:
         given = dict(zip(keys, own, strict=True))
@@ -273,10 +280,10 @@ def _response(
 
 @Small
 def _respond_small(
-    given: tuple[Array, Observation, Model, Newton], keys: tuple[str, ...]
+    given: tuple[Array, Observation, Model, Newton], keys: tuple[str, ...], rigid: bool
 ) -> tuple[Array, Array, Array, Array]:
     values, observation, scene, solver = given
-    return _response(values, observation, scene, keys, solver)
+    return _response(values, observation, scene, keys, solver, rigid)
 
 
 _respond_whole = eqx.filter_jit(_response)
@@ -288,13 +295,22 @@ def _respond(
     """Compiled response; that of a strip on its contact line is a small program."""
     if isinstance(scene, Scene) and scene.model.condensed:
         found: tuple[Array, Array, Array, Array] = _respond_small(
-            (values, observation, scene, solver), keys
+            (values, observation, scene, solver), keys, is_rigid(scene)
         )
         return found
-    return _respond_whole(values, observation, scene, keys, solver)
+    return _respond_whole(values, observation, scene, keys, solver, False)
 
 
-_respond_batch = eqx.filter_jit(eqx.filter_vmap(_response, in_axes=(0, None, None, None, None)))
+def _respond_batch(
+    values: Array, observation: Observation, scene: Model, keys: tuple[str, ...], solver: Newton
+) -> tuple[Array, ...]:
+    """Compiled responses to several values (tables, k)."""
+    rigid = is_rigid(scene)
+    found: tuple[Array, ...] = _batch(values, observation, scene, keys, solver, rigid)
+    return found
+
+
+_batch = eqx.filter_jit(eqx.filter_vmap(_response, in_axes=(0, None, None, None, None, None)))
 
 
 def _shape(run: tuple[Observation, Model]) -> Any:

@@ -340,6 +340,12 @@ class Scene(Tree):
         scene: Scene = eqx.tree_at(lambda scene: scene.model, self, model)
         return scene
 
+    def with_rigid_sliders(self) -> Scene:
+        """Copy that knows that its sliders are rigid, which traced numbers do not tell."""
+        rigid = np.asarray(IDEAL, self.strip.length.dtype)
+        scene: Scene = eqx.tree_at(lambda scene: scene.contact.stick_stiffness, self, rigid)
+        return scene
+
     def by_load_steps(self) -> Scene:
         """Copy that is solved in load steps, if how it is solved was left open."""
         support = self.member.support

@@ -321,6 +321,14 @@ def test_planted_parameters_come_back(planted, tmp_path):
     assert jb.scene_to_toml(again) == jb.scene_to_toml(fit.scene)
 
 
+def test_planted_parameters_come_back_on_the_contact_line():
+    """The sliders of a fit are as rigid as those of the run."""
+    start = jb.Scene().replace({"model.nodes": 17, "load.amplitude": 0.6})
+    history = jb.solve(start.replace({MU: 0.27, ETA: 0.13}), throw=False)
+    fit = identify.fit(make_loop(*history.loop), start, FREE)
+    np.testing.assert_allclose(values_of(fit), [0.27, 0.13], rtol=1e-9)
+
+
 def test_the_jacobian_is_the_derivative_of_the_residual(planted):
     """Taylor: what is left of a linear prediction falls with the step squared."""
     history, start = planted
@@ -391,6 +399,23 @@ def test_a_mixture_of_everything(tmp_path):
     with pytest.raises(jb.InputError, match="there are 4 to draw, not 1"):
         fit.plot(plt.figure().subplots())
     plt.close("all")
+
+
+@pytest.mark.slow
+def test_planted_parameters_come_back_where_pairs_of_nodes_are_open():
+    """Loops of a lap joint that a gap keeps open beyond X = 1."""
+    gap = [[0.0, 0.0], [1.0, 0.0], [2.0, 1e-3]]
+    lap = {"strip.far_end": "free", "member.support": "rolling", "contact.gap": gap}
+    planted = {MU: 0.27, "strip.axial_stiffness": 1.3e5}
+    start = jb.Scene().replace(lap | {"model.nodes": 33})
+    loops = []
+    for amplitude in (0.6, 1.2):
+        drive = {"load.amplitude": amplitude, "load.steps_per_half_cycle": 100}
+        history = jb.solve(start.replace(planted | drive), throw=False)
+        assert np.any(history.gap[-1] > 0.0)
+        loops.append(make_loop(*history.loop))
+    fit = identify.fit(loops, start, list(planted), starts=1)
+    assert fit.values == pytest.approx(planted, rel=1e-4)
 
 
 @pytest.mark.slow

@@ -111,6 +111,18 @@ def test_sliders_stay_ideal_within_a_transformation():
     assert seen == [True]
 
 
+def test_sliders_of_a_traced_scene_are_ideal_where_that_is_told():
+    seen = []
+
+    def stiffness(scene):
+        told = scene.with_rigid_sliders().replace({"contact.friction": 0.1})
+        seen.extend([scene.ideal_friction, told.ideal_friction])
+        return told.slip_stiffness
+
+    assert jax.jit(stiffness)(jb.Scene()) == np.inf
+    assert seen == [False, True]
+
+
 def test_a_response_takes_one_number_of_each_key():
     ask = jb.response(STRIP, ["contact.friction", "load.amplitude"])
     with pytest.raises(jb.InputError, match=r"contact.friction: is an array of shape \(2,\): give"):

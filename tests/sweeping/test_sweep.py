@@ -136,6 +136,21 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
         assert np.all(np.isnan(hurt[name][~known]))
 
 
+def test_a_lane_that_is_solved_alone_has_the_estimate_of_its_run(monkeypatch):
+    """On the contact line that of rigid sliders, which its compiled figures have to be told."""
+    failing, scene = runner.Runner._answers, jb.Scene().replace({"model.nodes": 17})
+
+    def failed(self, batches):
+        values, status = map(np.array, failing(self, batches))
+        return values, np.full_like(status, jb.Status.MAX_ITERATIONS)
+
+    together = jb.sweep(scene, {"load.amplitude": [0.7]})
+    monkeypatch.setattr(runner.Runner, "_answers", failed)
+    alone = jb.sweep(scene, {"load.amplitude": [0.7]})
+    for name, values in together.values.items():
+        np.testing.assert_allclose(alone[name], values, rtol=1e-9, err_msg=name)
+
+
 @pytest.mark.doubtful("in the corner", "few nodes")
 def test_a_figure_of_nought_over_nought_is_told_from_a_failure(result, monkeypatch):
     batched = runner.Runner._answers
@@ -146,9 +161,7 @@ def test_a_figure_of_nought_over_nought_is_told_from_a_failure(result, monkeypat
         return values, status
 
     monkeypatch.setattr(runner.Runner, "_answers", undefined)
-    monkeypatch.setattr(
-        runner, "_figures", lambda history, names: np.array([1.0, np.inf, 2.0, 3.0])
-    )
+    monkeypatch.setattr(runner, "_figures", lambda *given: np.array([1.0, np.inf, 2.0, 3.0]))
     monkeypatch.setattr(runner, "solve", lambda scene, **settings: jb.solve(scene))
     odd = jb.sweep(SCENE, {"load.amplitude": [0.3, 1.9], **_eta([0.05])}, FIGURES)
     assert (odd.failed, odd.undefined) == (0, 2)
