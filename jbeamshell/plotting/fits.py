@@ -17,6 +17,7 @@ from jbeamshell.plotting.style import (
     FAINT,
     MARKS,
     PALETTE,
+    below,
     colours,
     looks,
     mark_decades,
@@ -29,6 +30,7 @@ LOG_PER_CENT = r"$\ln$(model / data)  [%]"
 BAND = 0.95
 FEW = 30  # points that are drawn as larger dots
 MOST_NAMED = 6  # measurements whose names fit into a panel
+SHORT = 14  # letters of a name of which two fit beside each other below a panel
 
 
 def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
@@ -64,7 +66,7 @@ def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
             panel.set(xscale=form.scale, yscale=form.scale)
             if form.scale == "log":
                 mark_decades(panel.xaxis, panel.yaxis)
-            panel.legend(loc="best").set_in_layout(False)  # however long the names are
+            below(panel, panel.get_legend_handles_labels()[0])
     return [panel for _, _, panel in drawn]
 
 
@@ -92,7 +94,7 @@ def residuals(fit: ModelOverData, axes: Any = None) -> list[Axes]:
                 places, colours(len(places)), cycle(MARKS), strict=False
             ):
                 data = fit.data[place]
-                named = data.label if len(places) <= MOST_NAMED else "_nolegend_"
+                named = _shortened(data.label) if len(places) <= MOST_NAMED else "_nolegend_"
                 look = {"color": colour, "label": named, "markersize": 3.0}
                 panel.plot(getattr(data, along), 100.0 * left[place], mark, **look)
             panel.axhline(0.0, color=FAINT, linewidth=1.0, zorder=1.0)
@@ -108,8 +110,14 @@ def residuals(fit: ModelOverData, axes: Any = None) -> list[Axes]:
 def _name(places: Sequence[int], place: int, label: str) -> str:
     """Label of a model's line; of many lines only the first has one."""
     if len(places) <= MOST_NAMED:
-        return f"model, {label}"
+        return f"model, {_shortened(label)}"
     return f"model of {len(places)} measurements" if place == places[0] else "_nolegend_"
+
+
+def _shortened(name: str) -> str:
+    """Name without the middle of a long one."""
+    half = SHORT // 2
+    return name if len(name) <= SHORT else f"{name[:half]}…{name[1 - half :]}"
 
 
 def _xy(form: Form, measurement: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -325,8 +325,16 @@ def test_planted_parameters_come_back_on_the_contact_line():
     """The sliders of a fit are as rigid as those of the run."""
     start = jb.Scene().replace({"model.nodes": 17, "load.amplitude": 0.6})
     history = jb.solve(start.replace({MU: 0.27, ETA: 0.13}), throw=False)
-    fit = identify.fit(make_loop(*history.loop), start, FREE)
+    loop = make_loop(*history.loop, "a long name of a loop: the first")
+    fit = identify.fit(loop, start, FREE)
     np.testing.assert_allclose(values_of(fit), [0.27, 0.13], rtol=1e-9)
+    # The legend of its picture covers no loop, and a long name loses its middle.
+    panel = fit.plot()
+    panel.figure.canvas.draw()
+    legend = panel.get_legend()
+    assert legend.get_window_extent().y1 < panel.get_window_extent().y0
+    assert legend.get_texts()[0].get_text() == "model, a long … first"
+    plt.close("all")
 
 
 def test_the_jacobian_is_the_derivative_of_the_residual(planted):
