@@ -18,7 +18,6 @@ from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.dynamics.structure.modal import ModalCurve, modal_curve
 from jbeamshell.identify.drive import Drive
 from jbeamshell.identify.rig_keys import OF_STRUCTURE
-from jbeamshell.scene.rungs import IDEAL
 from jbeamshell.scene.scene import Scene
 
 REACH = 0.9  # force up to which a joint is computed, over its gross slip
@@ -129,7 +128,7 @@ class Assembly(eqx.Module):
         """Structure with these numbers."""
         scene = self.scene
         if scene is not None and self.ideal and is_traced(scene):
-            scene = scene.replace({STICK: IDEAL})
+            scene = scene.with_rigid_sliders()
         built = self.build(scene, self.numbers)
         fix = "must return a jbeamshell.dynamics.Structure"
         require("build", built, isinstance(built, Structure), fix)

@@ -185,7 +185,7 @@ def panels(rows: int, columns: int, **options: Any) -> np.ndarray:
 
 
 def below(axes: Axes, keys: Sequence[Any]) -> None:
-    """Put a legend of one or two rows below the axes, where it covers nothing."""
+    """Put a legend below the axes, where it covers nothing."""
     columns = len(keys) if len(keys) <= 3 else 2
     axes.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=columns)
 

@@ -418,7 +418,7 @@ def test_planted_parameters_come_back_where_pairs_of_nodes_are_open():
     start = jb.Scene().replace(lap | {"model.nodes": 33})
     loops = []
     for amplitude in (0.6, 1.2):
-        drive = {"load.amplitude": amplitude, "load.steps_per_half_cycle": 100}
+        drive = {"load.amplitude": amplitude}
         history = jb.solve(start.replace(planted | drive), throw=False)
         assert np.any(history.gap[-1] > 0.0)
         loops.append(make_loop(*history.loop))
