@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -32,6 +34,10 @@ def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
     """
     if isinstance(value, jax.Array) and value.dtype in (jnp.float32, jnp.float64):
         return value
+    if type(value) is float:
+        config: Any = jax.config
+        sign = math.copysign(1.0, value)  # of zero, which is equal to minus zero
+        return _leaf_of(value, sign, jnp.result_type(float), config.jax_default_device)
     require(key, value, is_numeric(value), fix)
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value))
     # Inside jit, plain numbers stay concrete, so that they can be checked.
@@ -41,6 +47,13 @@ def as_leaf(value: Any, key: str = "value", fix: str = NUMBER) -> Array:
             return jnp.asarray(value, dtype=jnp.result_type(float))
     except (ValueError, OverflowError):  # rows of different length; whole numbers beyond any float
         raise InputError(f"{key} = {shown(value)}: {fix}") from None
+
+
+@functools.lru_cache(maxsize=1024)
+def _leaf_of(value: float, sign: float, dtype: Any, device: Any) -> Array:
+    """Leaf of a number; JAX takes longer to make one than most checks do."""
+    with jax.ensure_compile_time_eval():
+        return jnp.asarray(value, dtype=dtype)
 
 
 def is_numeric(value: Any) -> bool:

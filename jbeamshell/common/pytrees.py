@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, Self
+
 import equinox as eqx
 
 
@@ -14,3 +16,9 @@ class Tree(eqx.Module):
     """
 
     __getattribute__ = object.__getattribute__
+
+    def but(self, **values: Any) -> Self:
+        """Copy with other values of some fields, which are neither converted nor checked."""
+        copy = object.__new__(type(self))
+        vars(copy).update(vars(self) | values)
+        return copy

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from typing import Literal
@@ -98,7 +97,7 @@ def solve(
     given = (scene, strip, targets, () if known else turns)
     history: History = _walk(given, turns if known else (), cycles, by, soft)
     # Numbers that come back from a compiled function are traced, and no longer tell ideal sliders.
-    return dataclasses.replace(history, scene=scene)
+    return history.but(scene=scene)
 
 
 def quickest(scene: Scene) -> Search:

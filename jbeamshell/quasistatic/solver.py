@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 from collections.abc import Callable
 
@@ -110,7 +109,7 @@ def solve(
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
         history = eqx.error_if(history, ~converged, message) if throw else history
-        return dataclasses.replace(history, cycles=cycles)
+        return history.but(cycles=cycles)
     if not np.asarray(steps.state.converged)[-1]:  # indexing a JAX array would compile
         start = initial_state(scene, touching)
         if scene.model.solution == "stepwise":
@@ -120,7 +119,7 @@ def solve(
         if throw:
             raise_if_failed(scene, steps, whole)
         history = with_end(history_of(scene, steps, whole.pressure), steps)
-    history = dataclasses.replace(history, cycles=cycles)
+    history = history.but(cycles=cycles)
     if throw:
         warn_of_doubts(history, stacklevel=STACK)
     return history
@@ -153,7 +152,7 @@ def _condensed(
         history = solve_condensed(scene, path, cycles, by=by, own=own)
         if not traced and by != "events" and not history.converged:
             history = solve_condensed(scene, path, cycles, own=own)
-        return dataclasses.replace(history, end=WholePath())
+        return history.but(end=WholePath())
 
     history = walked(scene)
     if traced:
@@ -184,7 +183,7 @@ def _refined(history: History, walked: Callable[[Scene], History]) -> History:
         finer = walked(history.scene.refined())
         if not finer.converged:
             break
-        history = dataclasses.replace(finer, change=change_of(history, finer))
+        history = finer.but(change=change_of(history, finer))
     return history
 
 

@@ -192,6 +192,9 @@ class Part(Tree):
             key.check(value)
             setattr(self, name, value)
 
+    def __check_init__(self) -> None:
+        """Raise `InputError` for values that do not go together."""
+
     def given(self, name: str) -> Any:
         """Value of a field as it was given, `AUTO` where the scene is to choose it."""
         return dict(self.as_given).get(name, getattr(self, name))
@@ -218,7 +221,9 @@ class Part(Tree):
         given = dict(self.as_given)
         given |= {name: self.given(name) for name in values}
         kept = {name: value for name, value in given.items() if values.get(name) != value}
-        return dataclasses.replace(self, as_given=tuple(sorted(kept.items())), **values)
+        copy = self.but(as_given=tuple(sorted(kept.items())), **values)
+        copy.__check_init__()
+        return copy
 
 
 @functools.cache

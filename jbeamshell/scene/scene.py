@@ -8,6 +8,7 @@ the command line and among the free parameters of a fit.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from typing import Any
 
@@ -34,11 +35,25 @@ from jbeamshell.scene.choice import choose, finer
 from jbeamshell.scene.domain import Numbers, support_rules
 from jbeamshell.scene.joint import check_joint
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
-from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Strip
+from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Part, Strip
 from jbeamshell.scene.pressure import bolt_pressure
 from jbeamshell.scene.quadratic import check_quadratic
 from jbeamshell.scene.rungs import IDEAL, general_rung, spelled_out
 from jbeamshell.scene.text import summary
+
+
+def _standard(part: type[Part]) -> Any:
+    """Field whose default is a part of the standard strip, which all scenes share."""
+
+    @functools.cache
+    def made(precision: Any, device: Any) -> Part:
+        return part()
+
+    def shared() -> Part:
+        config: Any = jax.config
+        return made(jnp.result_type(float), config.jax_default_device)
+
+    return eqx.field(default_factory=shared)
 
 
 class Scene(Tree):
@@ -67,12 +82,12 @@ class Scene(Tree):
     0.05
     """
 
-    strip: Strip = eqx.field(default_factory=Strip)
-    contact: Contact = eqx.field(default_factory=Contact)
-    load: Load = eqx.field(default_factory=Load)
-    model: Model = eqx.field(default_factory=Model)
+    strip: Strip = _standard(Strip)
+    contact: Contact = _standard(Contact)
+    load: Load = _standard(Load)
+    model: Model = _standard(Model)
     energy: Energy | None = None
-    member: Member = eqx.field(default_factory=Member)
+    member: Member = _standard(Member)
 
     def __post_init__(self) -> None:
         for name, kind in SECTIONS.items():
