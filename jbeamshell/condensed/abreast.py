@@ -21,7 +21,16 @@ from jax import Array, lax
 from jaxtyping import PyTree
 
 from jbeamshell.condensed.branches import ContactState
-from jbeamshell.condensed.stretch import Event, Level, ended, goes_on, moved, next_event, waits_of
+from jbeamshell.condensed.stretch import (
+    Event,
+    Level,
+    ended,
+    first_of,
+    goes_on,
+    moved,
+    next_event,
+    waits_of,
+)
 from jbeamshell.condensed.tableau import System, Tableau, changed, reversed_at
 
 SAME = 1e-12  # of a branch, within which events come at the same load
@@ -150,7 +159,7 @@ class Left(NamedTuple):
 
 def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
     """Levels (loads, ...) at the end of one branch, with the work along it."""
-    friction, n = system.friction, last.lift.shape[1]
+    friction = system.friction
     sense = jnp.where(forces >= last.state.force, 1.0, -1.0)
     reach, opened = jnp.abs(forces - last.state.force), last.lift > 0.0
 
@@ -171,13 +180,13 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
 
     def on(now: Group) -> Group:
         at, walking, waiting, found = now
-        waits = jax.vmap(waits_of, (OWN, None))(at, friction).reshape(reach.size, -1)
-        own = jnp.min(waits, axis=1)
+        waits = jax.vmap(waits_of, (OWN, None))(at, friction)
+        own = jnp.min(waits, axis=(1, 2))
         comes = at.tau + own
         first = leader(walking)
-        number = jnp.argmin(waits[first])
-        event = Event(comes[first], *jnp.divmod(number, n))
-        follows = walking & (waits[:, number] <= own + SAME * reach)
+        _, kind, node = first_of(waits[first])
+        event, wait = Event(comes[first], kind, node), waits[:, kind, node]
+        follows = walking & (wait <= own + SAME * reach)
         arrives = walking & ((comes >= reach) | (follows & ~goes_on(at, event)))
         # A loop that runs once, if at all: unlike a condition it copies nothing.
         found, _ = lax.while_loop(
@@ -186,7 +195,7 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
             (found, jnp.any(arrives)),
         )
         walking = follows & ~arrives
-        to = at.tau + jnp.where(walking, waits[:, number], 0.0)
+        to = at.tau + jnp.where(walking, wait, 0.0)
         at = jax.vmap(moved, (OWN, None, 0), OWN)(at, friction, to)
         at = jax.vmap(changed, (OWN, None, None, None), OWN)(at, event.kind, event.node, friction)
         return Group(at, walking, waiting & ~arrives, found)

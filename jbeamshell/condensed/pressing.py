@@ -18,7 +18,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from jbeamshell.common.failed import nan_unless
-from jbeamshell.condensed.tableau import exchanged_rows
+from jbeamshell.condensed.tableau import exchanged, lines_of
 from jbeamshell.numerics.factors import solve
 
 MOST_EVENTS = 8  # times the nodes
@@ -101,7 +101,7 @@ def _open_nodes(stiffness: Array, r_0: Array, down: Array) -> tuple[Array, Array
 
     def go(now: Walk) -> Walk:
         at, node = next_event(now)
-        rows = exchanged_rows(now.rows, node, now.rows[node], jnp.zeros(()), node)
+        rows = exchanged(lines_of(now.rows, node), node)
         return Walk(rows, now.opened.at[node].set(~now.opened[node]), at, now.events + 1)
 
     start = Walk(rows, jnp.zeros(n, bool), jnp.zeros(()), jnp.asarray(0))

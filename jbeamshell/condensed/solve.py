@@ -96,7 +96,6 @@ def solve(
     known = isinstance(turns, tuple)
     given = (scene, strip, targets, () if known else turns)
     history: History = _walk(given, turns if known else (), cycles, by, soft)
-    # Numbers that come back from a compiled function are traced, and no longer tell ideal sliders.
     return history.but(scene=scene)
 
 
@@ -149,7 +148,7 @@ def _walk(
     by: Search,
     soft: bool,
 ) -> History:
-    """History of a strip pressed down and loaded along targets; see `solve`.
+    """History, without its scene, of a strip pressed down and loaded along targets; see `solve`.
 
     Parameters
     ----------
@@ -159,7 +158,8 @@ def _walk(
     scene, strip, targets, traced = given
     turns = known if isinstance(traced, tuple) else traced
     found = _levels(scene, strip, targets, turns, by, soft)
-    return _history(scene, strip, found, cycles, soft)
+    # The scene's numbers would be copied, and they would no longer tell ideal sliders.
+    return _history(scene, strip, found, cycles, soft).but(scene=None)
 
 
 def _levels(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jax import Array
+from jax import Array, lax
 
 from jbeamshell.condensed.branches import ContactState
 from jbeamshell.condensed.tableau import OPEN, System, Tableau
@@ -91,9 +91,28 @@ def goes_on(at: Tableau, event: Event) -> Array:
 
 def next_event(at: Tableau, friction: Array) -> Event:
     """Next event of a stretch; of those at the same tau the one of the first kind and node."""
-    waits = waits_of(at, friction)
-    first = jnp.argmin(waits)
-    return Event(at.tau + waits.ravel()[first], *jnp.divmod(first, at.opened.size))
+    wait, kind, node = first_of(waits_of(at, friction))
+    return Event(at.tau + wait, kind, node)
+
+
+def first_of(waits: Array) -> tuple[Array, Array, Array]:
+    """Least of the waits (kinds, n), its kind and its node; the first of equal ones."""
+    kinds, n = waits.shape
+    nodes = jnp.arange(n)
+    least, number = waits[0], nodes
+    for kind in range(1, kinds):  # the kinds side by side: a minimum with its place is slow
+        less = waits[kind] < least
+        least = jnp.where(less, waits[kind], least)
+        number = jnp.where(less, kind * n + nodes, number)
+
+    def earlier(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[Array, Array]:
+        before = (one[0] < other[0]) | ((one[0] == other[0]) & (one[1] < other[1]))
+        wait, place = (jnp.where(before, a, b) for a, b in zip(one, other, strict=True))
+        return wait, place
+
+    none = jnp.asarray(jnp.inf, least.dtype), jnp.asarray(waits.size, number.dtype)
+    wait, first = lax.reduce((least, number), none, earlier, (0,))
+    return wait, first // n, first % n
 
 
 def waits_of(at: Tableau, friction: Array) -> Array:

@@ -141,18 +141,19 @@ def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tab
     held = at.held[tangential]
     added = jnp.where(slips, sigma * friction, 0.0)
     rest = jnp.where(sticks, -at.sigma[tangential] * friction, 0.0)
-    row = at.matrix[i] + added * at.matrix[normal]
-    share = at.matrix[:, i] / row[i]
+    lines = lines_of(at.matrix, i, normal, added)
+    pivot = lines.row[i]
+    share = lines.column / pivot
 
     def column(old: Array, less: Array | float, more: Array | float) -> Array:
         entry = old[i] + added * old[normal] - less
         beside = old[normal] - share[normal] * entry
-        return (old - share * entry).at[i].set(rest * beside - entry / row[i] + more)
+        return (old - share * entry).at[i].set(rest * beside - entry / pivot + more)
 
     now = jnp.where(slips, sigma, jnp.where(sticks, 0.0, at.sigma[tangential]))
     opened = jnp.where(kind < OPEN, at.opened[node], kind == OPEN)
     return at._replace(
-        matrix=exchanged_rows(at.matrix, i, row, rest, normal),
+        matrix=exchanged(lines, i, normal, rest),
         value=column(at.value, jnp.where(sticks, slip, 0.0), jnp.where(slips, held, 0.0)),
         rate=column(at.rate, 0.0, 0.0),
         sigma=at.sigma.at[tangential].set(now),
@@ -162,14 +163,51 @@ def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tab
     )
 
 
-def exchanged_rows(rows: Array, i: Array, row: Array, rest: Array, other: Array) -> Array:
-    """Rows with row and column ``i`` exchanged.
+class Lines(NamedTuple):
+    """Matrix (rows, columns) and those of its lines that an exchange is made of.
 
-    ``row`` stands for row ``i``, and ``rest`` times the new row ``other`` is added to the new one.
+    Attributes
+    ----------
+    matrix : (rows, columns)
+    row, beside : (columns,) row that is exchanged, and another one
+    column : (rows,) column that is exchanged
     """
+
+    matrix: Array
+    row: Array
+    beside: Array
+    column: Array
+
+
+def lines_of(
+    matrix: Array, i: Array, other: Array | None = None, added: Array | float = 0.0
+) -> Lines:
+    """Lines to exchange row and column ``i``, to whose row ``added`` times the row ``other`` goes.
+
+    They are read in a loop that runs once.  Otherwise the compiler reads them from the matrix
+    whenever it needs them, and copies the whole matrix before it is overwritten.
+    """
+    other = i if other is None else other
+
+    def read(now: tuple[Lines, Array]) -> tuple[Lines, Array]:
+        whole = now[0].matrix
+        beside = whole[other]
+        row = whole[i] + added * beside
+        return Lines(whole, row, beside, whole[:, i]), jnp.asarray(False)
+
+    none = jnp.zeros(matrix.shape[1], matrix.dtype)
+    unread = Lines(matrix, none, none, jnp.zeros(matrix.shape[0], matrix.dtype))
+    return lax.while_loop(lambda now: now[1], read, (unread, jnp.asarray(True)))[0]
+
+
+def exchanged(
+    lines: Lines, i: Array, other: Array | None = None, rest: Array | float = 0.0
+) -> Array:
+    """Matrix with row and column ``i`` exchanged; ``rest`` times the new row ``other`` is added."""
+    other = i if other is None else other
+    matrix, row, beside, column = lines
     pivot = row[i]
-    share = rows[:, i] / pivot
-    beside = (rows[other] - share[other] * row).at[i].set(share[other])
+    share = column / pivot
+    beside = (beside - share[other] * row).at[i].set(share[other])
     new = (-row / pivot).at[i].set(1.0 / pivot) + rest * beside
-    swept = rows - share[:, None] * row
-    return swept.at[:, i].set(share).at[i].set(new)
+    return (matrix - share[:, None] * row).at[:, i].set(share).at[i].set(new)
