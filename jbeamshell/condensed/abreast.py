@@ -12,6 +12,7 @@ closed loop is walked once.
 
 from __future__ import annotations
 
+import functools
 import itertools
 from typing import Any, NamedTuple
 
@@ -37,7 +38,7 @@ SAME = 1e-12  # of a branch, within which events come at the same load
 FEW = 8  # part of the loads, below which those that a round brings home are too few
 FEW_LEVELS = 2  # of a branch, up to which loads walk together
 CLOSED = 1e-10  # of the largest slip, force or lift, within which a loop is closed
-OWN: Any = Tableau(None, 0, None, None, None, 0, 0, 0, None)  # type: ignore[arg-type]
+OWN: Any = Tableau(None, 1, None, None, None, 1, 0, 0, None)  # type: ignore[arg-type]
 """Axes of the loads in a tableau: each has its own value, held slips, tau and work."""
 
 
@@ -180,34 +181,33 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
 
     def on(now: Group) -> Group:
         at, walking, waiting, found = now
-        waits = jax.vmap(waits_of, (OWN, None))(at, friction)
-        own = jnp.min(waits, axis=(1, 2))
+        waits = waits_of(at, friction)
+        own = jnp.min(functools.reduce(jnp.minimum, waits), axis=0)
         comes = at.tau + own
         first = leader(walking)
-        _, kind, node = first_of(waits[first])
-        event, wait = Event(comes[first], kind, node), waits[:, kind, node]
+        _, kind, node = first_of([each[:, first] for each in waits])
+        event = Event(comes[first], kind, node)
+        wait = jnp.stack([each[node] for each in waits])[kind]
         follows = walking & (wait <= own + SAME * reach)
         arrives = walking & ((comes >= reach) | (follows & ~goes_on(at, event)))
-        # A loop that runs once, if at all: unlike a condition it copies nothing.
         found, _ = lax.while_loop(
-            lambda both: both[1],
-            lambda both: (arrive(at, comes, arrives, both[0]), jnp.asarray(False)),
-            (found, jnp.any(arrives)),
+            lambda both: jnp.any(both[1]), functools.partial(arrive, at, comes), (found, arrives)
         )
         walking = follows & ~arrives
-        to = at.tau + jnp.where(walking, wait, 0.0)
-        at = jax.vmap(moved, (OWN, None, 0), OWN)(at, friction, to)
-        at = jax.vmap(changed, (OWN, None, None, None), OWN)(at, event.kind, event.node, friction)
+        at = moved(at, friction, at.tau + jnp.where(walking, wait, 0.0))
+        at = changed(at, event.kind, event.node, friction)
         return Group(at, walking, waiting & ~arrives, found)
 
-    def arrive(at: Tableau, comes: Array, arrives: Array, found: Level) -> Level:
-        axes = (None, OWN, 0, 0, 0, 0)
-        each = jax.vmap(ended, axes, (OWN, 0))(system, at, comes, last, last.state, forces)[1]
-
-        def put(new: Array, old: Array) -> Array:
-            return jnp.where(arrives.reshape(-1, *[1] * (new.ndim - 1)), new, old)
-
-        return jax.tree.map(put, each, found)
+    def arrive(at: Tableau, comes: Array, now: tuple[Level, Array]) -> tuple[Level, Array]:
+        found, arrives = now
+        one = jnp.argmax(arrives)
+        own = at._replace(
+            value=at.value[:, one], held=at.held[:, one], tau=at.tau[one], work=at.work[one]
+        )
+        before = jax.tree.map(lambda a: a[one], last)
+        level = ended(system, own, comes[one], before, before.state, forces[one])[1]
+        found = jax.tree.map(lambda old, new: old.at[one].set(new), found, level)
+        return found, arrives.at[one].set(False)
 
     def alone(left: Left) -> Left:
         one = jnp.argmax(left.waiting)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from jbeamshell.condensed.branches import ContactState
-from jbeamshell.condensed.tableau import OPEN, System, Tableau
+from jbeamshell.condensed.tableau import KINDS, OPEN, System, Tableau
 
 MOST_EVENTS = 40  # of a load branch, times the nodes
 SLIDES = 1e6  # compliance over that of the clamped contact at which a body slides as a whole
@@ -47,8 +47,14 @@ def moved(at: Tableau, friction: Array, tau: Array) -> Tableau:
     step = tau - at.tau
     middle = at.at(at.tau + 0.5 * step)
     closed = (at.sigma != 0.0) & ~at.opened[:k]
-    power = jnp.where(closed, at.sigma * friction * middle[k : 2 * k] * at.rate[:k], 0.0)
-    return at._replace(work=at.work + jnp.sum(power) * step, tau=tau)
+    drive = jnp.where(closed, at.sigma * friction * at.rate[:k], 0.0)
+    power = jnp.sum(_beside(drive, middle) * middle[k : 2 * k], axis=0)
+    return at._replace(work=at.work + power * step, tau=tau)
+
+
+def _beside(values: Array, others: Array) -> Array:
+    """Values along the first axis, for products with others that have more axes."""
+    return values.reshape(-1, *[1] * (others.ndim - 1))
 
 
 def state_of(
@@ -95,14 +101,14 @@ def next_event(at: Tableau, friction: Array) -> Event:
     return Event(at.tau + wait, kind, node)
 
 
-def first_of(waits: Array) -> tuple[Array, Array, Array]:
-    """Least of the waits (kinds, n), its kind and its node; the first of equal ones."""
-    kinds, n = waits.shape
+def first_of(waits: list[Array]) -> tuple[Array, Array, Array]:
+    """Least of the waits (n,) of each kind, its kind and its node; the first of equal ones."""
+    n = waits[0].size
     nodes = jnp.arange(n)
     least, number = waits[0], nodes
-    for kind in range(1, kinds):  # the kinds side by side: a minimum with its place is slow
-        less = waits[kind] < least
-        least = jnp.where(less, waits[kind], least)
+    for kind, wait in enumerate(waits[1:], 1):  # side by side: a minimum with its place is slow
+        less = wait < least
+        least = jnp.where(less, wait, least)
         number = jnp.where(less, kind * n + nodes, number)
 
     def earlier(one: tuple[Array, Array], other: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -110,34 +116,43 @@ def first_of(waits: Array) -> tuple[Array, Array, Array]:
         wait, place = (jnp.where(before, a, b) for a, b in zip(one, other, strict=True))
         return wait, place
 
-    none = jnp.asarray(jnp.inf, least.dtype), jnp.asarray(waits.size, number.dtype)
+    none = jnp.asarray(jnp.inf, least.dtype), jnp.asarray(KINDS * n, number.dtype)
     wait, first = lax.reduce((least, number), none, earlier, (0,))
     return wait, first // n, first % n
 
 
-def waits_of(at: Tableau, friction: Array) -> Array:
-    """Load until the events of a stretch, (kinds, n), infinite for those that do not come."""
+def waits_of(at: Tableau, friction: Array) -> list[Array]:
+    """Load until the events of a stretch, infinite for those that do not come.
+
+    Returns
+    -------
+    list
+        (n,) of each kind; (n, loads) of many loads
+    """
     k, n = at.sigma.size, at.opened.size
-    now, rate = at.at(at.tau), at.rate
-    force, force_rate = now[:k], rate[:k]  # slip where a node slips
-    normal, normal_rate = now[k : k + n], rate[k : k + n]
+    now = at.at(at.tau)
+    force, force_rate = now[:k], at.rate[:k]  # slip where a node slips
+    normal, normal_rate = now[k : k + n], at.rate[k : k + n]
+
+    def to_nodes(wait: Array) -> Array:
+        rest = [(0, n - wait.shape[0]), *[(0, 0)] * (wait.ndim - 1)]
+        return jnp.pad(wait, rest, constant_values=jnp.inf)
 
     def until(room: Array, change: Array, counts: Array) -> Array:
         falling = counts & (change < 0.0)
         inverse = jnp.where(falling, -1.0 / jnp.where(falling, change, 1.0), 0.0)
-        wait = jnp.where(falling, jnp.maximum(room, 0.0) * inverse, jnp.inf)
-        return jnp.pad(wait, (0, n - wait.size), constant_values=jnp.inf)
+        wait = jnp.maximum(room, 0.0) * _beside(inverse, room)
+        return to_nodes(jnp.where(_beside(falling, room), wait, jnp.inf))
 
     sticks = (at.sigma == 0.0) & ~at.opened[:k]
     slips = (at.sigma != 0.0) & ~at.opened[:k]
     cap, cap_rate = friction * normal[:k], friction * normal_rate[:k]
     loose = ~at.opened & jnp.append(at.sigma != 0.0, jnp.ones(n - k, bool))
     back = jnp.where(slips & (at.sigma * force_rate < 0.0), 0.0, jnp.inf)
-    waits = [  # in the order of the kinds
+    return [  # in the order of the kinds
         until(cap + force, cap_rate + force_rate, sticks),
         until(cap - force, cap_rate - force_rate, sticks),
-        jnp.pad(back, (0, n - k), constant_values=jnp.inf),
+        to_nodes(_beside(back, now) + jnp.zeros_like(force)),
         until(normal, normal_rate, loose),
         until(normal, normal_rate, at.opened),
     ]
-    return jnp.stack(waits)

@@ -20,7 +20,8 @@ from jax import Array, lax
 
 from jbeamshell.condensed.branches import ContactState
 
-ALONG, AGAINST, STICK, OPEN, CLOSE = range(5)  # kinds of events
+KINDS = 5  # of events
+ALONG, AGAINST, STICK, OPEN, CLOSE = range(KINDS)
 
 
 class System(NamedTuple):
@@ -47,7 +48,8 @@ class Tableau(NamedTuple):
 
     Rows are the k tangential and the n normal ones, and the displacement of the loaded end.
     Columns are the k tangential and the first m normal ones.  Loads of one body that have met the
-    same events share all but the value, what is held, tau and the work.
+    same events share all but the value, what is held, tau and the work, which then have one more
+    axis, the last.
 
     Attributes
     ----------
@@ -77,8 +79,8 @@ class Tableau(NamedTuple):
         return int(self.matrix.shape[1] - self.sigma.size)
 
     def at(self, tau: Array) -> Array:
-        """All answers at a tau of this stretch."""
-        return self.value + self.rate * tau
+        """All answers at a tau of this stretch; (rows, loads) at those of many loads."""
+        return self.value + jnp.multiply.outer(self.rate, tau)
 
     def fields(self, tau: Array, origin: Array) -> tuple[Array, Array]:
         """Fields q = (v, w) and reactions r_n at a tau; ``origin`` is v at the reversal."""
@@ -119,8 +121,8 @@ def reversed_at(
 
     def open_next(at: Tableau) -> Tableau:
         i = jnp.argmax(wanted & ~at.opened)
-        at = lax.cond(i < k, lambda: changed(at, ALONG, i, system.friction), lambda: at)
-        return changed(at, OPEN, i, system.friction)
+        sticks = (i < k) & (at.sigma[jnp.minimum(i, k - 1)] == 0.0)  # it slips before it opens
+        return changed(at, jnp.where(sticks, ALONG, OPEN), i, system.friction)
 
     found = lax.while_loop(lambda at: jnp.any(wanted & ~at.opened), open_next, start)
     value = found.value.at[k : k + n].add(jnp.where(wanted, lift, 0.0))
@@ -148,7 +150,8 @@ def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tab
     def column(old: Array, less: Array | float, more: Array | float) -> Array:
         entry = old[i] + added * old[normal] - less
         beside = old[normal] - share[normal] * entry
-        return (old - share * entry).at[i].set(rest * beside - entry / pivot + more)
+        swept = old - jnp.multiply.outer(share, entry)
+        return swept.at[i].set(rest * beside - entry / pivot + more)
 
     now = jnp.where(slips, sigma, jnp.where(sticks, 0.0, at.sigma[tangential]))
     opened = jnp.where(kind < OPEN, at.opened[node], kind == OPEN)
@@ -210,4 +213,5 @@ def exchanged(
     share = column / pivot
     beside = (beside - share[other] * row).at[i].set(share[other])
     new = (-row / pivot).at[i].set(1.0 / pivot) + rest * beside
-    return (matrix - share[:, None] * row).at[:, i].set(share).at[i].set(new)
+    swept = matrix - share[:, None] * row
+    return swept.at[:, i].set(share).at[i].set(new)

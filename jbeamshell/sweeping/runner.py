@@ -272,7 +272,7 @@ def _compiled(
     given = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
     fixed = [jax.ShapeDtypeStruct((), dtype, sharding=_everywhere(mesh))] * template.numbers
     small = template.scene(fixed).model.condensed
-    options = quick_options() if small else None
+    options = quick_options(vectors=shape[-1] > 1) if small else None
     program = jax.jit(run, compiler_options=options).lower(fixed, *given).compile()
     return program, time.perf_counter() - begun
 
