@@ -15,7 +15,7 @@ EXTRA = "--xla_backend_extra_options="
 FAST_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
 ASYNCHRONOUS = "jax_cpu_enable_async_dispatch"
 ONCE = {"xla_backend_optimization_level": 0}  # compiler options for a program that runs few times
-WORTH_KEEPING = 0.2  # seconds of compilation, from which on a program is kept in the cache
+WORTH_KEEPING = 0.02  # seconds of compilation, from which on a program is kept in the cache
 
 
 def configure(

@@ -12,7 +12,6 @@ of gross slip, frequencies without the strip's inertia are too high by m_1/2m an
 
 from __future__ import annotations
 
-import functools
 from typing import Any, NamedTuple
 
 import jax
@@ -21,7 +20,7 @@ from jax import Array, lax
 
 from jbeamshell.common.checks import POSITIVE, require, require_number
 from jbeamshell.common.errors import InputError
-from jbeamshell.common.jax_options import ONCE
+from jbeamshell.common.small import Small
 from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.ringdown import RingDown, ring_down
@@ -176,7 +175,7 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
         known = np.asarray(joint.force)
         low = np.interp(smallest, np.asarray(joint.displacement), known)
         force = np.geomspace(low, known[-1], AMPLITUDES)
-        reach, loss = jax.device_get(_cycles(joint.network, force))
+        reach, loss = jax.device_get(_cycles((joint.network, force)))
         nested = np.isfinite(loss)
         force, reach, loss = force[nested], reach[nested], loss[nested]
     return ModalCurve(
@@ -188,9 +187,10 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
     )
 
 
-@functools.partial(jax.jit, compiler_options=ONCE)
-def _cycles(network: Network, forces: Array) -> tuple[Array, Array]:
-    """Displacements and work of steady cycles at the amplitudes (k,) of the force."""
+@Small
+def _cycles(given: tuple[Network, Array]) -> tuple[Array, Array]:
+    """Displacements and work of steady cycles of a network at the amplitudes (k,) of the force."""
+    network, forces = given
     return lax.map(network.cycle, forces)
 
 

@@ -22,6 +22,7 @@ from jbeamshell.sweeping.store import Store
 
 BLOCKS = 32  # least number of blocks of a large sweep, for equal shares of all processes
 LEAST = 8  # least lanes of a block that is worth a file
+MANY = 10_000  # lanes from which on seconds of compilation are worth it
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,6 +85,11 @@ class Job:
         return width_of_chunks(self.lanes.scene, np.unique(inside, return_counts=True)[1])
 
     @property
+    def many(self) -> bool:
+        """True if a program that takes longer to compile, and less to run, pays."""
+        return self.lanes.size > MANY
+
+    @property
     def _rank(self) -> np.ndarray:
         """Rank of every lane in the order in which chunks are cut, (lanes,)."""
         shares = self.lanes.scene.model.condensed and self.width > 1
@@ -100,7 +106,8 @@ class Job:
         """Runner with the model of this sweep, to be compiled."""
         lanes = self.lanes
         keys = tuple(lanes.axes)
-        return Runner(lanes.scene, keys, self.figures, self.width, self.solver, devices)
+        about = lanes.scene, keys, self.figures, self.width, self.solver, devices
+        return Runner(*about, many=self.many)
 
     def run(self, numbers: Sequence[int], runner: Runner) -> Iterator[tuple[int, Block]]:
         """Blocks by number, run in this process, one on each device at a time."""
@@ -145,7 +152,7 @@ class Job:
             "figures": list(self.figures),
             "dtype": self.dtype.name,
             "solver": None if self.solver is None else dataclasses.asdict(self.solver),
-            "layout": [BLOCKS, BLOCK, LEAST, self.width],
+            "layout": [BLOCKS, BLOCK, LEAST, self.width, self.many],
         }
         return json.dumps(about)
 
@@ -163,5 +170,5 @@ def runner_of(text: str, devices: Sequence[Any]) -> Runner:
     flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
     scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
     solver = None if about["solver"] is None else Newton(**about["solver"])
-    width = about["layout"][-1]
-    return Runner(scene, about["keys"], about["figures"], width, solver, devices)
+    *_, width, many = about["layout"]
+    return Runner(scene, about["keys"], about["figures"], width, solver, devices, many=many)

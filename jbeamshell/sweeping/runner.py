@@ -134,6 +134,7 @@ class Runner:
     ----------
     width : lanes of a chunk, see `width_of_chunks`
     devices : devices on which blocks run side by side
+    many : True for so many lanes that a program that takes longer to compile is worth it
     """
 
     def __init__(
@@ -144,6 +145,8 @@ class Runner:
         width: int,
         solver: Newton | None = None,
         devices: Sequence[Any] | None = None,
+        *,
+        many: bool = False,
     ) -> None:
         self.scene, self.keys, self.figures = scene, tuple(keys), tuple(figures)
         self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
@@ -154,7 +157,7 @@ class Runner:
         self._shared = shared_keys(scene, self.keys) if width > 1 else []
         axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
         asked = self.keys, axes, self.figures, solver
-        self._about = template, asked, self._shape, self.dtype, self._mesh
+        self._about = template, asked, self._shape, self.dtype, self._mesh, many
 
     def compile(self) -> float:
         """Compile the model without running a lane; returns the seconds it took, now or before."""
@@ -230,6 +233,7 @@ def _compiled(
     shape: tuple[int, ...],
     dtype: np.dtype,
     mesh: Mesh,
+    many: bool,
 ) -> tuple[Callable[..., tuple[Array, Array]], float]:
     """Compiled program that runs one block on every device, and the seconds of its compilation.
 
@@ -272,7 +276,7 @@ def _compiled(
     given = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
     fixed = [jax.ShapeDtypeStruct((), dtype, sharding=_everywhere(mesh))] * template.numbers
     small = template.scene(fixed).model.condensed
-    options = quick_options(vectors=shape[-1] > 1) if small else None
+    options = quick_options(vectors=many) if small else None
     program = jax.jit(run, compiler_options=options).lower(fixed, *given).compile()
     return program, time.perf_counter() - begun
 
