@@ -4,7 +4,7 @@ What a tableau answers with depends on who sticks, slips and is open, not on the
 that meet the same events in the same order share its matrix and differ in one column.  So the
 loads of a branch set out together.  The one that goes farthest leads: its next event is that of
 all whose own next event it is.  Those with another one are left behind and set out again, led by
-one of their own; when a round brings few loads home, the others go alone.
+one of their own.
 
 A branch that starts where the branch before the last one did, to the same loads, is copied: a
 closed loop is walked once.
@@ -34,9 +34,8 @@ from jbeamshell.condensed.stretch import (
 )
 from jbeamshell.condensed.tableau import System, Tableau, changed, reversed_at
 
-SAME = 1e-12  # of a branch, within which events come at the same load
-FEW = 8  # part of the loads, below which those that a round brings home are too few
 FEW_LEVELS = 2  # of a branch, up to which loads walk together
+SAME = 1e-12  # of a branch, within which events come at the same load
 CLOSED = 1e-10  # of the largest slip, force or lift, within which a loop is closed
 OWN: Any = Tableau(None, 1, None, None, None, 1, 0, 0, None)  # type: ignore[arg-type]
 """Axes of the loads in a tableau: each has its own value, held slips, tau and work."""
@@ -150,14 +149,6 @@ def _filled(forces: Array, longest: int) -> Array:
     return jnp.pad(forces, ((0, 0), (0, longest - forces.shape[1])), mode="edge")
 
 
-class Left(NamedTuple):
-    """Loads that have not arrived, levels of those that have, and how many the last round took."""
-
-    waiting: Array
-    found: Level
-    took: Array
-
-
 def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
     """Levels (loads, ...) at the end of one branch, with the work along it."""
     friction = system.friction
@@ -167,17 +158,18 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
     def leader(among: Array) -> Array:
         return jnp.argmax(jnp.where(among, reach, -1.0))
 
-    def set_out(left: Left) -> Left:
-        first = leader(left.waiting)
+    def set_out(left: tuple[Array, Level]) -> tuple[Array, Level]:
+        waiting, found = left
+        first = leader(waiting)
 
         def begin(state: ContactState, lift: Array) -> Tableau:
             return reversed_at(system, state, lift, opened[first], sense[first], lifting)
 
         at = jax.vmap(begin, out_axes=OWN)(last.state, last.lift)
         alike = (sense == sense[first]) & jnp.all(opened == opened[first], axis=1)
-        group = Group(at, left.waiting & alike, left.waiting, left.found)
+        group = Group(at, waiting & alike, waiting, found)
         group = lax.while_loop(lambda now: jnp.any(now.walking), on, group)
-        return Left(group.waiting, group.found, jnp.sum(left.waiting) - jnp.sum(group.waiting))
+        return group.waiting, group.found
 
     def on(now: Group) -> Group:
         at, walking, waiting, found = now
@@ -188,8 +180,9 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
         _, kind, node = first_of([each[:, first] for each in waits])
         event = Event(comes[first], kind, node)
         wait = jnp.stack([each[node] for each in waits])[kind]
-        follows = walking & (wait <= own + SAME * reach)
-        arrives = walking & ((comes >= reach) | (follows & ~goes_on(at, event)))
+        # Negations count loads without numbers in: the leader arrives in the end, whatever it is.
+        follows = walking & ~(wait > own + SAME * reach)
+        arrives = walking & (~(comes < reach) | (follows & ~goes_on(at, event)))
         found, _ = lax.while_loop(
             lambda both: jnp.any(both[1]), functools.partial(arrive, at, comes), (found, arrives)
         )
@@ -209,18 +202,8 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
         found = jax.tree.map(lambda old, new: old.at[one].set(new), found, level)
         return found, arrives.at[one].set(False)
 
-    def alone(left: Left) -> Left:
-        one = jnp.argmax(left.waiting)
-        level = _alone(system, jax.tree.map(lambda a: a[one], last), forces[one][None], lifting)
-        found = jax.tree.map(lambda old, new: old.at[one].set(new[0]), left.found, level)
-        return Left(left.waiting.at[one].set(False), found, left.took)
-
-    def many(left: Left) -> Array:
-        return jnp.any(left.waiting) & (left.took * FEW >= reach.size)
-
-    left = Left(jnp.ones_like(sense, bool), last, jnp.asarray(reach.size))
-    left = lax.while_loop(many, set_out, left)
-    return lax.while_loop(lambda left: jnp.any(left.waiting), alone, left).found
+    everyone = jnp.ones_like(sense, bool)
+    return lax.while_loop(lambda left: jnp.any(left[0]), set_out, (everyone, last))[1]
 
 
 def _alone(system: System, last: Level, forces: Array, lifting: int) -> Level:

@@ -30,12 +30,18 @@ def walked(body, amplitude, turns):
     return events.walk(body, jnp.asarray(0.3), branches.pressed(body), amplitude * UNIT, turns)
 
 
+LOADS = jnp.asarray([0.9, 5.0, 2.1, 0.0, 5.1, 5.6, 3.6, 1.1 * GROSS, -2.7, jnp.nan])
+
+
+@jax.jit
+def all_of(body):
+    return jax.vmap(lambda amplitude: walked(body, amplitude, TURNED))(LOADS)
+
+
 @pytest.fixture(scope="module")
 def together(body):
-    loads = jnp.asarray([0.9, 5.0, 2.1, 0.0, 5.1, 5.6, 3.6, 1.1 * GROSS, -2.7])
-    many = jax.jit(jax.vmap(lambda amplitude: walked(body, amplitude, TURNED)))
     alone = jax.jit(lambda amplitude: walked(body, amplitude, jnp.asarray(TURNED)))
-    return many(loads), [alone(amplitude) for amplitude in loads]
+    return all_of(body), [alone(amplitude) for amplitude in LOADS]
 
 
 @pytest.mark.parametrize("number", [0, 1, 2, 3, 4, 5, 6, 8])
@@ -43,6 +49,12 @@ def test_a_load_among_many_is_the_load_by_itself(together, number):
     many, alone = together
     found, expected = jax.tree.map(lambda a: a[number], many), alone[number]
     assert np.all(expected.settled)
+    # Where a node begins to slip at the very end of a branch, round-off says whether it slips yet.
+    step = np.abs(np.diff(np.asarray(expected.state.v), axis=0, prepend=0.0))
+    slips = step > 1e-9 * np.max(step)
+    found, expected = (
+        level._replace(slipping=level.slipping & slips) for level in (found, expected)
+    )
     for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * (1e-12 + np.max(abs(other))))
 
@@ -57,7 +69,16 @@ def test_a_load_that_slides_is_told_and_spoils_no_other(together):
     many, alone = together
     np.testing.assert_array_equal(many.settled[7], alone[7].settled)
     assert not many.settled[7].all()
-    assert many.settled[np.arange(9) != 7].all()
+    assert many.settled[:9][np.arange(9) != 7].all()
+
+
+def test_a_load_without_a_number_comes_to_an_end_and_is_told(together):
+    many, _ = together
+    assert not many.settled[9].any()
+
+
+def test_a_body_without_numbers_comes_to_an_end_and_is_told(body):
+    assert not all_of(jax.tree.map(lambda a: jnp.nan * a, body)).settled.any()
 
 
 def test_a_closed_loop_is_walked_once_and_its_copy_is_exact(body):
