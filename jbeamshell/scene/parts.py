@@ -35,6 +35,7 @@ from jbeamshell.scene.keys import (
 )
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.pressure import check_gap, check_holes, check_pressure, pressure_values
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.rungs import CONDENSED, name_of
 
 MODELS = (
@@ -252,7 +253,7 @@ class Load(LoadKeys):
 
     def __check_init__(self) -> None:
         half = self.steps_per_half_cycle
-        if "steps_per_half_cycle" in self.open:
+        if half == AUTO:
             return  # until a scene has chosen
         fix = "must be 1, or even, so that the path passes through zero"
         require("load.steps_per_half_cycle", half, half == 1 or half % 2 == 0, fix)
