@@ -18,6 +18,7 @@ import jax
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.checks import is_traced
 from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.keys import ARC_LENGTH
@@ -32,10 +33,11 @@ STEPS = 1.5  # factor on the estimated error of a grid that steps of the pressur
 REFINED = 0.15  # least error of a refined grid, over that of the rule: measured .02 to .13
 RESTING = 2.0  # error of the dissipation over the part of the load that single sliders hold
 TOLERANCE = 0.02  # relative error of the dissipation below which there is never a doubt
-LOCKS = 0.491  # nu beyond which the midpoint rule is off by more than 1 % of the dissipation
+LOCKING, LOCKING_NODES = (
+    2.1e-5,
+    65,
+)  # of the error of nearly incompressible strips, on so many nodes
 OVERSHOOT = 1.0  # error under arc-length control, times the load steps per half cycle
-# Beyond this nu, thin strips are off by 2.1e-5/((1 - 2 nu) eta) at the default grid.
-SOFTENS, THIN = 0.47, 1.2e-3
 FINER = "take a smaller model.end_size or more model.nodes"
 
 
@@ -159,6 +161,24 @@ def slider_error(cycle: SlipCycle) -> Array:
     return numbers.where(elastic_slip & (load > 0.0), error, 0.0)
 
 
+def locking_error(scene: Scene) -> Array:
+    """Estimated relative error of finite differences that lock where a strip keeps its volume.
+
+    It is 2.1e-5/((1 - 2 nu) eta) on 65 nodes, and falls with the size of the elements to the power
+    1.5.  Layers lock if all of them do.  A rule that was measured (calibration/campaign.py).
+    """
+    strip, model = scene.strip, scene.model
+    numbers: Any = jax.numpy if is_traced(strip) else np
+    beamshell = "psi" in model.fields and model.order == 0 and model.solution != "plane"
+    if not (beamshell and model.grid == "finite-difference" and strip.plane == "strain"):
+        return numbers.zeros(())
+    ratio = strip.poisson_ratio if strip.layers is None else numbers.min(strip.layers[:, 2])
+    room, height = 1.0 - 2.0 * numbers.asarray(ratio), numbers.asarray(strip.height_ratio)
+    size = (LOCKING_NODES - 1.0) / (model.nodes - 1.0)
+    error: Array = LOCKING * size**1.5 / (room * height)
+    return error
+
+
 def doubted_from(tolerance: float) -> float:
     """Estimated error of the dissipation from which on a run is doubted, for its model.tolerance.
 
@@ -169,24 +189,31 @@ def doubted_from(tolerance: float) -> float:
 
 
 def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tuple[Array, ...]:
-    """Estimated relative errors of a scene's dissipation: of grid, loaded corner and single nodes.
+    """Estimated relative errors of a scene's dissipation.
 
-    That of a grid that was refined is the change that this made, which is larger than what is left,
-    and not less than a part of the rule's, because two coarse grids may agree by chance.
+    They are those of the grid, of the loaded corner, of single nodes and of locking.  That of a
+    grid that was refined is the change that this made, which is larger than what is left, and not
+    less than a part of the rule's, because two coarse grids may agree by chance.  Locking is a part
+    of it.
+
     The corner has none on the contact line of a section or of a lap joint, where it opens exactly,
     unless friction is elastic: the point reaction then holds the last node by a slider that is the
-    softer, the shorter the elements.  Where the pressure has steps, small elements lie there too,
-    and the slip zone holds larger ones (both measured by calibration/campaign.py).
+    softer, the shorter the elements.  A refined grid has told what that makes.
+
+    Where the pressure has steps, small elements lie there too, and the slip zone holds larger ones
+    (measured by calibration/campaign.py).
     """
     grid, corner = dissipation_errors(cycle)
     numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
+    locking = locking_error(scene)
     if change is not None:
-        grid = numbers.maximum(change, REFINED * grid)
+        grid, locking = numbers.maximum(change, REFINED * grid), numbers.zeros(())
     elif scene.contact.jumps > 1:
         grid = STEPS * grid
     if scene.model.solution == "condensed" or scene.member.support != "none":
-        corner = numbers.where(numbers.isfinite(cycle.slip_stiffness), corner, 0.0)
-    return grid, corner, slider_error(cycle)
+        elastic = numbers.isfinite(cycle.slip_stiffness) & (change is None)
+        corner = numbers.where(elastic, corner, 0.0)
+    return grid, corner, slider_error(cycle), numbers.asarray(locking)
 
 
 def change_of(coarse: Run, fine: Run) -> Array:
@@ -227,7 +254,7 @@ def doubts_of_run(history: Run) -> tuple[str, ...]:
 
 def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
-    model, strip, found = scene.model, scene.strip, []
+    model, found = scene.model, []
     error = linear_error(scene) + sway(scene) if model.kinematics == "linear" else 0.0
     if error > doubted_from(model.tolerance):
         found.append(f"{_off(error)}: kinematics are linear; {_exact(scene)}")
@@ -237,17 +264,6 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
         found.append(
             f"{_off(bent)}: arc length is measured along the load steps, and goes too far where "
             "the path bends; take more load.steps_per_half_cycle"
-        )
-    beamshell = "psi" in model.fields and model.order == 0 and model.solution != "plane"
-    locks = beamshell and model.grid == "finite-difference" and strip.plane == "strain"
-    ratio = strip.poisson_ratio if strip.layers is None else strip.layers[:, 2]
-    largest = float(np.max(np.asarray(ratio)))
-    thin = largest > SOFTENS and (1.0 - 2.0 * largest) * float(strip.height_ratio) < THIN
-    if locks and (largest > LOCKS or thin):
-        other = "model.rung = plane" if model.condensed else "model.grid = collocation"
-        found.append(
-            f"nearly incompressible (nu = {largest:.4g}): finite differences may be "
-            f"off by several per cent; take {other}"
         )
     return tuple(found)
 
@@ -293,7 +309,8 @@ def _resolution(history: Run) -> tuple[str, ...]:
     """Doubts about the slip zone's resolution by the grid."""
     with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
         cycle = jax.tree.map(np.asarray, history.slip_cycle)
-        grid, corner, slider = map(float, estimates(history.scene, cycle, history.change))
+        errors = estimates(history.scene, cycle, history.change)
+        grid, corner, slider, locking = map(float, errors)
     plane = history.scene.model.solution == "plane"  # it has a grid of its own
     finer = "take more model.nodes" if plane else FINER
     if "nodes" in history.scene.model.open:  # given nodes may change how the scene is solved
@@ -319,6 +336,13 @@ def _resolution(history: Run) -> tuple[str, ...]:
             f"{_off(slider)}: the strip rests on single nodes, whose elastic sliders are the "
             "softer, the shorter the elements; take model.rung = plane, or "
             f"contact.stick_stiffness = {IDEAL:g} with a rung on the contact line"
+        )
+    if locking > allowed:
+        condensed = history.scene.model.condensed
+        other = "model.rung = plane" if condensed else "model.grid = collocation"
+        found.append(
+            f"{_off(locking)}: finite differences lock, because the strip is nearly "
+            f"incompressible; take {other}"
         )
     return tuple(found)
 

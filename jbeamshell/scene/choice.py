@@ -8,6 +8,8 @@ rules were measured (calibration/campaign.py, calibration/default_settings.py).
 * A lap joint is linear, and solved on its contact line.
 * A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
   in time and lets the strip lift off.  Any other strip is solved in load steps.
+* Elastic sliders have smaller elements at the loaded end.  The strip rests on its last node there,
+  and the slider of a single node is as stiff as the node is long: in the limit it holds nothing.
 
 In a JAX transformation numbers are unknown: settings stay as they were chosen for the scene that
 was changed.
@@ -29,7 +31,7 @@ from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS
 from jbeamshell.scene.linearisation import Parts, linear_errors
 from jbeamshell.scene.parts import Model
 from jbeamshell.scene.rows import AUTO
-from jbeamshell.scene.rungs import CONDENSED, PLANE_NODES
+from jbeamshell.scene.rungs import CONDENSED, IDEAL, PLANE_NODES
 
 LINEAR_PART = 0.2  # of the tolerance that linear rotations may take
 FEW_STEPS = 1  # load steps per half cycle where only figures of a cycle are asked of exact events
@@ -44,18 +46,20 @@ class Grid(NamedTuple):
     end_size : smallest elements before scaling, in units of H
     order : order of the error in the number of nodes
     steps : load steps per half cycle, which draw a loop; exact events need none of them
+    halvings : times that elements are halved to keep the tolerance, at most
     """
 
     nodes: int
     end_size: float
     order: float
     steps: int
+    halvings: int = 0
 
 
 KNOWN = 0.005  # tolerance for which the grids were measured
 MOST_CONDENSED = 129  # nodes that are given, beyond which events cost more than load steps
-CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20)
-FINEST = 2  # times that elements are halved, at most
+CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20, halvings=2)
+SOFT_CONTACT_LINE = Grid(129, 1.0 / 49152.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
 MOST_REFINED = 513  # nodes of a grid that was refined
 PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
 MOST_JUMPS = 4  # of the pressure that add nodes
@@ -88,7 +92,7 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
             fields = ("v", "w", *fields[1:])
     found["fields"] = fields
     solution = found.get("solution", model.solution)
-    grid = PLANE if solution == "plane" else CONTACT_LINE if solution in CONDENSED else STEPWISE
+    grid = _grid(solution, soft="nodes" in open_model and _is_soft(scene, numbers))
     if "end_size" in open_model:
         found["end_size"] = grid.end_size
     if "nodes" in open_model:
@@ -101,10 +105,28 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     )
 
 
+def _grid(solution: str, soft: bool) -> Grid:
+    """Grid of a kind of strip for the tolerance `KNOWN`."""
+    if solution == "plane":
+        return PLANE
+    if solution in CONDENSED:
+        return SOFT_CONTACT_LINE if soft else CONTACT_LINE
+    return STEPWISE
+
+
+def _is_soft(scene: Parts, numbers: Numbers | None) -> bool:
+    """True if sliders are known to yield before they slip, in any of many scenes."""
+    stiffness = scene.contact.stick_stiffness
+    if is_traced(stiffness):
+        return False
+    values = stiffness if numbers is None else numbers("contact.stick_stiffness")
+    return bool(np.min(np.asarray(values)) < IDEAL)
+
+
 def _nodes(grid: Grid, tolerance: float, jumps: int) -> int:
     """Odd number of nodes of a grid for a tolerance."""
     elements = (grid.nodes - 1) * (KNOWN / tolerance) ** (1.0 / grid.order)
-    if grid is CONTACT_LINE:
+    if grid in (CONTACT_LINE, SOFT_CONTACT_LINE):
         elements *= 1.0 + PER_STEP * min(jumps, MOST_JUMPS)
     return 2 * int(np.ceil(elements / 2.0)) + 1
 
@@ -116,9 +138,10 @@ def refinements(scene: Parts) -> int:
     longer than what it leaves is worth.
     """
     model = scene.model
-    if "nodes" not in model.open or model.solution != "condensed":
+    if "nodes" not in model.open:
         return 0
-    return sum(2**times * (model.nodes - 1) < MOST_REFINED for times in range(1, FINEST + 1))
+    halvings = range(1, _grid(model.solution, _is_soft(scene, None)).halvings + 1)
+    return sum(2**times * (model.nodes - 1) < MOST_REFINED for times in halvings)
 
 
 def finer(model: Model) -> dict[str, Any]:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.scene.choice import CONTACT_LINE
+from jbeamshell.scene.choice import CONTACT_LINE, SOFT_CONTACT_LINE
 
 LIFTS = {"model.fields": ["v", "w", "beta", "psi"]}
 ROTATING = {"contact.pressure": 500.0, "load.amplitude": 40.0}
@@ -73,6 +73,36 @@ def test_nodes_follow_the_tolerance():
     ramp = {"contact.pressure": [[0.0, 10.0], [2.0, 8.0]], "model.rung": "condensed-squeeze"}
     # Half as many more for each row at which the pressure may jump.
     assert jb.Scene().replace(ramp).model.nodes - 1 == 1.5 * (nodes(0.005) - 1)
+
+
+def test_elastic_sliders_have_smaller_elements_at_the_loaded_end():
+    def chosen(**values):
+        model = jb.Scene().replace(values).model
+        return model.nodes, model.end_size
+
+    def grid(known):
+        return known.nodes, known.end_size
+
+    assert chosen(**{"contact.stick_stiffness": 999.0}) == grid(SOFT_CONTACT_LINE)
+    assert chosen(**{"contact.stick_stiffness": 1000.0}) == grid(CONTACT_LINE)
+    given = {"contact.stick_stiffness": 999.0, "model.nodes": 41}
+    assert chosen(**given) == (41, CONTACT_LINE.end_size)
+    over = {"contact.stick_stiffness": [50.0, 1000.0]}
+    assert jb.Scene().pinned(_numbers(over)).model.nodes == SOFT_CONTACT_LINE.nodes
+
+
+def test_the_chosen_elements_resolve_the_slider_of_the_last_node():
+    soft = {"contact.stick_stiffness": 33.0, "contact.friction": 0.19, "load.amplitude": 1.74}
+    chosen = jb.Scene().replace(soft | {"strip.height_ratio": 0.25}).pinned()
+    end = chosen.model.end_size
+
+    def dissipation(end_size):
+        scene = chosen.replace({"model.end_size": end_size})
+        return float(jb.solve(scene, throw=False).dissipation)
+
+    found = dissipation(end)
+    assert abs(dissipation(0.25 * end) / found - 1.0) < 0.005
+    assert abs(dissipation(CONTACT_LINE.end_size) / found - 1.0) > 0.02
 
 
 def test_traced_numbers_keep_what_was_chosen():
