@@ -53,8 +53,8 @@ def band(system: System, section: Array, rough: bool) -> Band:
     active, supports, first = system.model.active, system.supports(rough), node(system.x, 0)
     (own, onward), (back, end) = _elements(system, section)
     none = jnp.zeros_like(own[:, :, :1])
-    diagonal = jnp.append(none, end, 2) + jnp.append(own, none, 2)
-    near = jnp.append(none, back, 2), diagonal, jnp.append(onward, none, 2)
+    middle = jnp.append(none, end, 2) + jnp.append(own, none, 2)
+    near = jnp.append(none, back, 2), middle, jnp.append(onward, none, 2)
 
     def blocks(rows: Array, held: bool) -> Blocks:
         """Blocks of active fields; ``held`` is True for those that have the supports."""
