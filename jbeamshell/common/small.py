@@ -53,10 +53,11 @@ class Small:
     Parameters
     ----------
     function : function of a pytree of arrays and of further arguments, which are static
+    vectors : see `quick_options`
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
+    def __init__(self, function: Callable[..., Any], *, vectors: bool = False) -> None:
+        self._function, self._vectors = function, vectors
         self._inside = eqx.filter_jit(function)
 
     def __call__(self, given: Any, *static: Hashable) -> Any:
@@ -72,7 +73,8 @@ class Small:
             return self._function(jax.tree.unflatten(tree, leaves), *static)
 
         flat.__name__ = self._function.__name__
-        return jax.jit(flat, static_argnums=(1, 2), compiler_options=quick_options())
+        options = quick_options(vectors=self._vectors)
+        return jax.jit(flat, static_argnums=(1, 2), compiler_options=options)
 
 
 def _is_number(leaf: Any) -> bool:

@@ -222,8 +222,8 @@ def linear_solve(linear: Callable[[Array], Array], rhs: Array) -> Array:
     return lax.custom_linear_solve(
         linear,
         rhs,
-        solve=lambda _, b: solve(matrix, b),
-        transpose_solve=lambda _, b: solve(matrix.transpose, b),
+        solve=lambda _, b: _solve_blocks(matrix, b),
+        transpose_solve=lambda _, b: _solve_blocks(matrix.transpose, b),
     )
 
 

@@ -94,8 +94,7 @@ class Newton(eqx.Module):
         ----------
         problem : residual and tangent
         guess : (n, m) unknowns to start from
-        stiffness : stiffness at the guess; None finds it by ``problem.refresh`` when it is needed,
-            which saves it where the guess is a root
+        stiffness : stiffness at the guess; None if ``problem.tangent`` needs none
         enabled : False skips the iteration
 
         Returns
@@ -104,7 +103,7 @@ class Newton(eqx.Module):
         iterations, error : number of iterations, and the largest residual left
         """
         # An iteration that approaches the root slowly goes on for once when it is close.
-        once_more = problem.refresh is not None and stiffness is not None
+        once_more = problem.refresh is not None
         tolerance = self.tolerance_for(guess.dtype)
         search = _Search(self, problem, tolerance, jnp.asarray(enabled), once_more)
 
@@ -162,16 +161,12 @@ class _Search(NamedTuple):
 
     def run(self, start: Array, stiffness: Any) -> _Iterate:
         """Iterate from unknowns ``start``."""
-        refresh, most = self.problem.refresh, self.settings.max_iterations
+        refresh = self.problem.refresh
         one, none = jnp.ones((), start.dtype), jnp.asarray(0)
         evaluated = self.problem.evaluate(start)
         first = _Iterate(start, *evaluated, one, jnp.asarray(False), none)
         if refresh is None:
-            return self._chords(first, stiffness, most)
-        if stiffness is None:
-            return lax.while_loop(
-                self._unfinished, lambda at: self._chords(at, refresh(at.x), most), first
-            )
+            return self._chords(first, stiffness, self.settings.max_iterations)
 
         def refreshed(state: tuple[_Iterate, Any]) -> tuple[_Iterate, Any]:
             at = self._chords(*state, state[0].tried + CHORDS)

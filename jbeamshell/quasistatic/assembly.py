@@ -16,8 +16,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
-from jax.typing import ArrayLike
+from jax import Array
 
 from jbeamshell.quasistatic.system import System, V, W
 
@@ -33,7 +32,6 @@ class Band(NamedTuple):
         the next one
     normal : (3, m) entries (n, ...): reaction per unknown, likewise
     rubbing : (n, ...) residual along v per traction
-    held : fields that are held at X = 0
     """
 
     lower: Blocks
@@ -41,7 +39,6 @@ class Band(NamedTuple):
     upper: Blocks
     normal: Blocks
     rubbing: Array
-    held: tuple[int, ...]
 
 
 def band(system: System, section: Array, rough: bool) -> Band:
@@ -53,78 +50,51 @@ def band(system: System, section: Array, rough: bool) -> Band:
     section : (2, m, 2, m, ...) stiffness of the section, see `System.section_stiffness`
     rough : True if there is friction
     """
-    h, supports = system.lengths, system.supports(rough)
-    none, one = jnp.zeros_like(h[:1]), jnp.ones_like(h)
-    powers = [h, one, 1.0 / h]
-    before, after = (
-        [jnp.append(*pair, 0) for pair in zip(a, b, strict=True)]
-        for a, b in (([none] * 3, powers), (powers, [none] * 3))
-    )
+    active, supports, first = system.model.active, system.supports(rough), node(system.x, 0)
+    (own, onward), (back, end) = _elements(system, section)
+    none = jnp.zeros_like(own[:, :, :1])
+    middle = jnp.append(none, end, 2) + jnp.append(own, none, 2)
+    near = jnp.append(none, back, 2), middle, jnp.append(onward, none, 2)
 
-    def rows(near: tuple[list[Array], list[Array], Array]) -> tuple[Blocks, ...]:
-        return _rows(system, section, supports, *near)
+    def blocks(rows: Array, held: bool) -> Blocks:
+        """Blocks of active fields; ``held`` is True for those that have the supports."""
+        found = []
+        for i in active:
+            scale = system.residual_scale(i)
+            row = [scale * rows[i, j] for j in active]
+            if i in supports:
+                fixed = [scale * supports[i] if held and i == j else 0.0 for j in active]
+                row = [jnp.where(first, a, b) for a, b in zip(fixed, row, strict=True)]
+            found.append(row)
+        return found
 
-    near = before, after, system.tributary
-    # For one strip its nodes form a vector; for several strips the lanes do, node by node.
-    lower, diagonal, upper, normal = rows(near) if h.ndim == 1 else lax.map(rows, near)
+    normal = [[rows[W, j] / system.tributary for j in active] for rows in near]
     rubbing = system.residual_scale(V) * system.tributary
     if V in supports:
-        rubbing = jnp.where(node(system.x, 0), 0.0, rubbing)
-    return Band(lower, diagonal, upper, normal, rubbing, tuple(supports))
+        rubbing = jnp.where(first, 0.0, rubbing)
+    lower, diagonal, upper = map(blocks, near, (False, True, False))
+    return Band(lower, diagonal, upper, normal, rubbing)
 
 
-def _rows(
-    system: System,
-    section: Array,
-    supports: dict[int, Array],
-    before: list[Array],
-    after: list[Array],
-    tributary: Array,
-) -> tuple[Blocks, Blocks, Blocks, Blocks]:
-    """Blocks of nodes from the powers 1, 0 and -1 of the lengths of the elements around them."""
-    active, rule = system.model.active, system.element_rule
+def _elements(system: System, section: Array) -> Array:
+    """Stiffness (2, 2, m, m, elements, ...) of the elements.
 
-    def integral(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return np.einsum("q,qa,qb->ab", rule.weights, a, b)
+    Its axes are the end at which a force acts, the end of the field that causes it, and the two
+    fields.
+    """
+    rule = system.element_rule
+    shapes = np.stack([system.shapes(i) for i in range(system.model.width)])
+    given = section[:, :, :, :, None]  # the axis of the elements
 
-    def element(i: int, j: int, powers: list[Array], a: int, b: int) -> Array:
-        """Force on field i of end a per field j of end b."""
-        own, other = system.shapes(i), system.shapes(j)
-        ss, sd = integral(own, other)[a, b], integral(own, rule.slopes)[a, b]
-        ds, dd = integral(rule.slopes, other)[a, b], integral(rule.slopes, rule.slopes)[a, b]
-        factors = (
-            ss * section[0, i, 0, j],
-            sd * section[0, i, 1, j] + ds * section[1, i, 0, j],
-            dd * section[1, i, 1, j],
-        )
-        parts = [factor * power for factor, power in zip(factors, powers, strict=True)]
-        return sum(parts[1:], parts[0])
+    def integral(paths: str, *factors: np.ndarray) -> np.ndarray:
+        found = np.einsum(paths, rule.weights, *factors).astype(section.dtype)
+        return found.reshape(*found.shape, *[1] * (given.ndim - 4))
 
-    def near(i: int, j: int) -> tuple[Array, Array, Array]:
-        own = element(i, j, before, 1, 1) + element(i, j, after, 0, 0)
-        return element(i, j, before, 1, 0), own, element(i, j, after, 0, 1)
-
-    first = before[1] == 0.0
-
-    def row(i: int) -> list[tuple[Array, ...]]:
-        scale = system.residual_scale(i)
-        entries = [tuple(scale * entry for entry in near(i, j)) for j in active]
-        if i not in supports:
-            return entries
-        held: tuple[ArrayLike, ...] = (0.0, scale * supports[i], 0.0)
-        return [
-            tuple(
-                jnp.where(first, jnp.asarray(own) if j == i else 0.0, entry)
-                for own, entry in zip(held, entry_of_j, strict=True)
-            )
-            for j, entry_of_j in zip(active, entries, strict=True)
-        ]
-
-    found = [row(i) for i in active]
-    lower, diagonal, upper = ([[entry[k] for entry in row] for row in found] for k in range(3))
-    above = [near(W, j) for j in active]
-    normal = [[entry[k] / tributary for entry in above] for k in range(3)]
-    return lower, diagonal, upper, normal
+    ss = integral("q,iqa,jqb->abij", shapes, shapes) * given[0, :, 0]
+    sd = integral("q,iqa,qb->abi", shapes, rule.slopes)[:, :, :, None] * given[0, :, 1]
+    ds = integral("q,qa,jqb->abj", rule.slopes, shapes)[:, :, None] * given[1, :, 0]
+    dd = integral("q,qa,qb->ab", rule.slopes, rule.slopes)[:, :, None, None] * given[1, :, 1]
+    return ss * system.lengths + (sd + ds) + dd * (1.0 / system.lengths)
 
 
 def node(x: Array, node: int) -> np.ndarray:
@@ -134,11 +104,11 @@ def node(x: Array, node: int) -> np.ndarray:
     return here.reshape(-1, *[1] * (x.ndim - 1))
 
 
-def unheld(system: System, band: Band, load: list[Array]) -> list[Array]:
-    """Load, m entries (n, ...), without the part that acts on held fields."""
-    first = node(system.x, 0)
+def unheld(system: System, rough: bool, load: list[Array]) -> list[Array]:
+    """Load, m entries (n, ...), without the part that acts on fields held at X = 0."""
+    first, supports = node(system.x, 0), system.supports(rough)
     return [
-        jnp.where(first, 0.0, each) if field in band.held else each
+        jnp.where(first, 0.0, each) if field in supports else each
         for field, each in zip(system.model.active, load, strict=True)
     ]
 

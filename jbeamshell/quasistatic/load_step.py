@@ -41,15 +41,12 @@ class StepGuess(NamedTuple):
     ----------
     reversal : last reversal of the load, which may be at the start of the step
     change : (blocks, size) increments of the unknowns
-    stiffness : tangent stiffness without the foundation's response; None if it is to be found only
-        where it is needed, because the guess is likely to be a root
-    iterations : number of iterations that the guess took
+    stiffness : tangent stiffness without the foundation's response
     """
 
     reversal: Reversal
     change: Array
-    stiffness: Stiffness | None
-    iterations: Array | int
+    stiffness: Stiffness
 
 
 class StepEquations(NamedTuple):
@@ -66,10 +63,9 @@ class StepEquations(NamedTuple):
     before: LoadLevel
     prescribed: Prescribed
 
-    def problem(self, stiffness: Stiffness | None) -> Problem:
-        """Problem for Newton's method, with the stiffness at the guess if that is known."""
-        constant = stiffness is not None and self.system.linear
-        refresh = None if constant else self.refresh
+    def problem(self) -> Problem:
+        """Problem for Newton's method."""
+        refresh = None if self.system.linear else self.refresh
         careful = self.careful if status_changes.applies(self.system) else None
         return Problem(self.residual, self.limit, self.tangent, refresh, careful)
 
@@ -127,7 +123,7 @@ def newton_step(
     if system.control == ARC_LENGTH:
         stiffness = initial_stiffness(system, prescribed.rough, prescribed.weights)
         guess = guess._replace(stiffness=stiffness)
-    problem = StepEquations(system, before, prescribed).problem(guess.stiffness)
+    problem = StepEquations(system, before, prescribed).problem()
     change, (iterations, error) = solver.solve(
         problem, guess.change, guess.stiffness, state.converged
     )
@@ -152,7 +148,7 @@ def newton_step(
         slip_work=to.rough * system.slip_work(before, after),
         stored_energy=system.stored_energy(after, to.pressure),
         sinking=system.sinking(after.q),
-        iterations=iterations + guess.iterations,
+        iterations=iterations,
         error=error,
         status=status_codes(converged, state.converged, error),
     )
@@ -171,7 +167,7 @@ def guess_from_bar(
     fields = jnp.zeros_like(level.q).at[:, V].set(slip)[:, list(system.model.active)]
     bar = in_blocks(fields, state.change)
     change = lax.stop_gradient(jnp.where(to.rough > 0.0, bar, state.change))
-    return StepGuess(reversal, change, stiffness, 0)
+    return StepGuess(reversal, change, stiffness)
 
 
 def _prescribed(system: System, state: PathState, to: LoadPath, reversal: Reversal) -> Prescribed:

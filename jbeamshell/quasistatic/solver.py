@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 from collections.abc import Callable
 
@@ -14,6 +15,7 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.common.precision import is_single
+from jbeamshell.common.small import Small
 from jbeamshell.condensed.solve import Cycles, quickest
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.history.history import History
@@ -104,7 +106,7 @@ def solve(
     solver = solver or Newton()
     touching = None if contact is None else check_contact(scene, contact)
     method = method or _first_method(scene, whole)
-    steps, history = _solve(scene, touching, whole, solver, method, np.asarray(True))
+    steps, history = _solve((scene, touching, whole, np.asarray(True)), solver, method)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
@@ -225,7 +227,7 @@ def compile_for(
         _condensed(scene, whole, cycles, False, None, path is None)
         return
     method = _first_method(scene, whole)
-    compiled = _solve(scene, None, whole, solver or Newton(), method, np.asarray(False))
+    compiled = _solve((scene, None, whole, np.asarray(False)), solver or Newton(), method)
     jax.block_until_ready(compiled)
 
 
@@ -235,15 +237,12 @@ def _first_method(scene: Scene, path: LoadPath) -> Method:
     return Method.NEWTON if traced else Method.STATUS_ITERATION
 
 
-@eqx.filter_jit
+@functools.partial(Small, vectors=True)
 def _solve(
-    scene: Scene,
-    touching: np.ndarray | None,
-    path: LoadPath,
-    solver: Newton,
-    method: Method,
-    enabled: ArrayLike,
+    given: tuple[Scene, np.ndarray | None, LoadPath, ArrayLike], solver: Newton, method: Method
 ) -> tuple[StepResults, History]:
+    """Results and history of a load path, from the nodes in contact and True to walk it."""
+    scene, touching, path, enabled = given
     start = initial_state(scene, touching)._replace(converged=jnp.asarray(enabled))
     if scene.model.solution == "closed-form":
         steps = bar_cycles(scene, path)

@@ -12,14 +12,14 @@ from jax import Array, lax
 
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
-from jbeamshell.quasistatic.load_step import StepGuess, guess_from_bar, newton_step
+from jbeamshell.quasistatic.load_step import guess_from_bar, newton_step
 from jbeamshell.quasistatic.path_state import (
     PathState,
     StepResults,
     slipping_nodes,
     status_codes,
 )
-from jbeamshell.quasistatic.slip_patterns import Memory
+from jbeamshell.quasistatic.slip_patterns import Memory, StatusSteps
 from jbeamshell.quasistatic.system import ContactResponse, LoadLevel, Prescribed, System
 from jbeamshell.quasistatic.tangent import in_blocks, initial_stiffness
 from jbeamshell.scene.load_path import LoadPath
@@ -31,12 +31,13 @@ class Method(enum.Enum):
 
     Attributes
     ----------
-    NEWTON : Newton's method, whose result has derivatives
+    NEWTON : Newton's method, whose result has derivatives.  Where status iteration applies it
+        starts from the result of that, and its out-of-balance forces are by the assembled stiffness
     STATUS_ITERATION : stick-slip status iteration alone where it applies, else Newton's method.
         Newton's method is then not compiled and derivatives do not pass; a step that does not
         settle is marked unconverged, to be walked again by Newton's method
     UNCHECKED_STATUS_ITERATION : the same with the out-of-balance forces by the assembled stiffness;
-        else the residual is evaluated as for Newton's method
+        else they come from the strip's energy
     """
 
     NEWTON = "Newton"
@@ -61,9 +62,11 @@ def march(
     if not slip_patterns.applies(scene):
         return _march_from_bar(system, start, path, solver)
     if method is Method.NEWTON:
-        return _march_from_statuses(system, start, path, solver)
+        found = slip_patterns.solve_path_by_newton(system, start, path, solver)
+    else:
+        found = slip_patterns.solve_path(system, start, path)
     checked = method is Method.STATUS_ITERATION
-    return _march_by_statuses(system, start, path, solver, checked)
+    return _results_of_statuses(system, start, path, solver, found, checked)
 
 
 compiled_march = eqx.filter_jit(march)
@@ -86,26 +89,15 @@ def _march_from_bar(
     return lax.scan(step, start, path)[1]
 
 
-def _march_from_statuses(
-    system: System, start: PathState, path: LoadPath, solver: Newton
+def _results_of_statuses(
+    system: System,
+    start: PathState,
+    path: LoadPath,
+    solver: Newton,
+    found: StatusSteps,
+    checked: bool,
 ) -> StepResults:
-    """Steps by Newton's method, from the result of the status iteration."""
-    strip = slip_patterns.linear_strip(system)
-
-    def step(state: PathState, to: LoadPath) -> tuple[PathState, StepResults]:
-        memory = slip_patterns.memory_of(state)
-        found = slip_patterns.step(strip, memory, lax.stop_gradient(to))
-        guess = StepGuess(found.memory.reversal, found.change.T, None, found.solves)
-        return newton_step(system, state, to, solver, guess)
-
-    return lax.scan(step, start, path)[1]
-
-
-def _march_by_statuses(
-    system: System, start: PathState, path: LoadPath, solver: Newton, checked: bool
-) -> StepResults:
-    """Steps by status iteration; from the first that does not settle, all are unconverged."""
-    found = slip_patterns.solve_path(system, start, path)
+    """Results of the steps; from the first that is not settled, all are unconverged."""
     memory = found.memory
     change = jnp.swapaxes(found.change, 1, 2)
 
