@@ -162,7 +162,7 @@ def slider_error(cycle: SlipCycle) -> Array:
 
 
 def locking_error(scene: Scene) -> Array:
-    """Estimated relative error of finite differences that lock where a strip keeps its volume.
+    """Estimated relative error of finite differences that lock in thin strips, as nu nears 1/2.
 
     It is 2.1e-5/((1 - 2 nu) eta) on 65 nodes, and falls with the size of the elements to the power
     1.5.  Layers lock if all of them do.  A rule that was measured (calibration/campaign.py).
@@ -341,8 +341,8 @@ def _resolution(history: Run) -> tuple[str, ...]:
         condensed = history.scene.model.condensed
         other = "model.rung = plane" if condensed else "model.grid = collocation"
         found.append(
-            f"{_off(locking)}: finite differences lock, because the strip is nearly "
-            f"incompressible; take {other}"
+            f"{_off(locking)}: finite differences lock where a strip is thin or nearly "
+            f"incompressible; take more model.nodes, or {other}"
         )
     return tuple(found)
 

@@ -192,7 +192,8 @@ def test_layers_lock_only_if_all_of_them_do():
 
 @pytest.mark.doubtful("lock")
 def test_a_given_grid_that_locks_is_doubted():
-    with pytest.warns(jb.DoubtfulWarning, match=r"finite differences lock.*rung = plane"):
+    fix = "take more model.nodes, or model.rung = plane"
+    with pytest.warns(jb.DoubtfulWarning, match=f"lock where a strip is thin.*; {fix}"):
         jb.solve(jb.Scene().replace(LOCKS | {"model.nodes": 49}))
 
 
