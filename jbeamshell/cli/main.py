@@ -58,6 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def program() -> None:
     """Run the command line as a program: ends this process with the exit code."""
     gc.set_threshold(100_000, 20, 20)  # tracing makes millions of objects that live on
+    jax.config.update("jax_traceback_in_locations_limit", 0)  # lines of Python that nobody reads
     signal.signal(signal.SIGINT, _interrupt)
     code = main()
     # Threads of JAX may be at work still; Python must not be taken down beneath them, which takes
