@@ -38,6 +38,7 @@ if OWNER and "XLA_FLAGS" not in os.environ:
 jax.config.update("jax_compilation_cache_dir", os.environ[CACHE])
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
 jax.config.update("jax_disable_most_optimizations", True)
+jax.config.update("jax_traceback_in_locations_limit", 0)  # no program carries its lines of Python
 jax.config.update("jax_enable_x64", True)
 MOST_MEMORY = 2.5e9  # bytes of a worker beyond which it forgets after every module
 gc.set_threshold(100_000, 20, 20)  # tracing makes millions of objects that live on

@@ -161,6 +161,7 @@ def test_scenes_are_listed_with_a_line_each(cli):
     assert json.loads(out) == {name: library.summary(name) for name in library.NAMES}
 
 
+@pytest.mark.slow
 def test_a_bent_laminate_by_name(cli):
     code, out, err = cli("run", "bimaterial", "--json", "--set", "model.nodes=41")
     assert (code, err) == (0, "")

@@ -104,7 +104,8 @@ class TestLimits:
     @pytest.mark.parametrize("ratio", [1.0, 3.0])
     def test_thin_members_are_bars_that_lap(self, ratio):
         thin = {"strip.height_ratio": 0.001, "member.height_ratio": 0.001}
-        thin |= {"member.axial_stiffness": 3.4e4 * ratio, "model.tolerance": 0.002}
+        thin |= {"member.axial_stiffness": 3.4e4 * ratio, "model.tolerance": 0.005}
+        thin |= {"load.cycles": 1}
         history = jb.solve(SQUEEZE.replace(thin))
         bars = 3.4e4, 3.4e4 * ratio
         u = float(lap_backbone(1.0, *bars, 2.0, 1.0))

@@ -235,7 +235,9 @@ def relative_error(run, times=6):
     return abs(float(run.dissipation / fine.dissipation) - 1.0)
 
 
-@pytest.mark.parametrize(("load", "nodes"), [(1.0, 65), (0.1, 129), (0.02, 257)])
+@pytest.mark.parametrize(
+    ("load", "nodes"), [(1.0, 65), pytest.param(0.1, 129, marks=pytest.mark.slow), (0.02, 257)]
+)
 def test_elements_are_halved_until_the_tolerance_is_kept(load, nodes):
     with warnings.catch_warnings():
         warnings.simplefilter("error", jb.DoubtfulWarning)

@@ -77,7 +77,7 @@ def test_gradient_reaches_every_number_of_a_scene():
     assert {path[-1].name for path, _ in names} - moved == {"deviation", "normal_stiffness"}
 
 
-@pytest.mark.parametrize("rung", ["bar", "squeeze"])
+@pytest.mark.parametrize("rung", ["bar", pytest.param("squeeze", marks=pytest.mark.slow)])
 def test_a_traced_force_beyond_gross_slip_has_no_result(rung):
     few = {"model.nodes": 9, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
     ask = jb.response(STRIP.replace({"model.rung": rung} | few), ["contact.friction"])

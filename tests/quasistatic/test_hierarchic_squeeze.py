@@ -31,7 +31,7 @@ def slow(order):
     return pytest.param(order, marks=pytest.mark.slow)
 
 
-@pytest.fixture(scope="module", params=[slow(0), 1, 3, slow(4)])
+@pytest.fixture(scope="module", params=[slow(0), slow(1), 3, slow(4)])
 def squeezed(request):
     return rung(library.squeezed(), request.param)
 

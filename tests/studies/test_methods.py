@@ -186,6 +186,7 @@ def test_the_librarys_element_is_the_one_that_is_compared():
 # --- control --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_beyond_gross_slip_a_free_strip_has_no_equilibrium_and_that_is_said():
     (force,) = controls.to_gross_slip("force", [1.2], "free", steps=6, nodes=21)
     assert force["unfound"] == 1

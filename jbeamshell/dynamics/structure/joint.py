@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -43,7 +44,6 @@ from jbeamshell.dynamics.four_parameters import (
 from jbeamshell.dynamics.steady_cycles import gross_slip
 from jbeamshell.dynamics.structure.strip_line import (
     cycled_line,
-    mean_of,
     network_forces,
     slider_line,
     slider_line_once,
@@ -173,14 +173,14 @@ class Joint(eqx.Module):
             soft = not scene.ideal_friction
             inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
             line = slider_line if inside else slider_line_once
-            network, sides, f, count = line(scene, as_leaf(force, "force"), soft)
-            u, asymmetry = mean_of(*sides)
+            network, found = line(scene, as_leaf(force, "force"), soft)
+            u, sides, f, asymmetry, count = found if is_traced(found) else jax.device_get(found)
             if is_traced(u):
                 return cls(u, width * f, network, width, asymmetry, capacity, sides)
             if np.all(np.isfinite(u)):
                 kept = np.append(np.arange(u.size - 1) < int(count), True)
-                sides = sides[:, kept]
-                return cls(u[kept], width * f[kept], network, width, asymmetry, capacity, sides)
+                u, sides, f = (jnp.asarray(each[..., kept]) for each in (u, sides, f))
+                return cls(u, width * f, network, width, asymmetry, capacity, sides)
         require("by", by, by != "sliders", UNLIKE)
         u, f, asymmetry, ways = cycled_line(scene, as_leaf(force, "force"), width)
         walked = scene if condensed and not traced else None

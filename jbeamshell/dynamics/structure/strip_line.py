@@ -31,17 +31,19 @@ def mean_of(pull: Any, push: Any) -> tuple[Any, Any]:
     return mean, jnp.max(jnp.abs(0.5 * (pull - push) / mean))
 
 
-def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array, Array, Array]:
-    """Network, backbones (2, k + 1) of pull and push, and their count of points below the force.
+def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, tuple[Array, ...]]:
+    """Network and backbone of a scene.
 
-    The points are the means of the thresholds, and the force; those beyond are laid evenly on the
-    straight line from the last one below it.  The displacements are NaN where the slip zones are
-    not nested, and for a joint with bearings.
+    The backbone is the mean displacements (k + 1,), those (2, k + 1) of pull and push, the forces
+    (k + 1,), the asymmetry, and the count of points below the force.  The points are the means of
+    the thresholds, and the force; those beyond are laid evenly on the straight line from the last
+    one below it.  The displacements are NaN where the slip zones are not nested, and for a joint
+    with bearings.
     """
     network = Network.of(scene, soft)
     ways = jnp.asarray([1.0, -1.0])
-    sides = jax.vmap(lambda way: network.sliders(network.rest, way))(ways)
-    levels = jnp.mean(sides.force, axis=0)[1:]
+    branches = jax.vmap(lambda way: network.sliders(network.rest, way))(ways)
+    levels = jnp.mean(branches.force, axis=0)[1:]
     below = levels < BELOW * force
     count = jnp.sum(below)
     last = jnp.where(count > 0, levels[jnp.maximum(count - 1, 0)], 0.0)
@@ -54,11 +56,13 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, Array,
     def line(side: Sliders) -> Array:
         return points(*map(side.displacement_after, (levels, last, force)))
 
-    f, u = points(levels, last, force), jax.vmap(line)(sides)
+    f, u = points(levels, last, force), jax.vmap(line)(branches)
     nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
     rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
     series = scene.contact.bearing_stiffness is None  # a bearing is no slider
-    return network, nan_unless(jnp.all(nested) & rising & series, u), f, count
+    sides = nan_unless(jnp.all(nested) & rising & series, u)
+    mean, asymmetry = mean_of(*sides)
+    return network, (mean, sides, f, asymmetry, count)
 
 
 slider_line_once = jax.jit(slider_line, static_argnums=2, compiler_options=ONCE)
