@@ -9,6 +9,7 @@ from toy import STRIP
 import jbeamshell as jb
 from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.assembly import band, times
+from jbeamshell.quasistatic.solver import solve
 from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.quasistatic.system import System
 from jbeamshell.quasistatic.tangent import initial_stiffness
@@ -57,7 +58,8 @@ def marked(case):
 def test_status_iteration_finds_what_newton_finds(case, monkeypatch):
     scene = SCENE.replace(CASES[case])
     assert slip_patterns.applies(scene)
-    found = jb.solve(scene, throw=False)
+    # Without the check by the strip's energy, after which Newton's method would mend the steps.
+    found = solve(scene, throw=False, method=Method.UNCHECKED_STATUS_ITERATION)
     assert found.converged
     assert int(np.max(np.asarray(found.iterations))) < slip_patterns.MOST
     monkeypatch.setattr(slip_patterns, "applies", lambda scene: False)
