@@ -35,7 +35,6 @@ from tqdm import tqdm  # noqa: E402
 import jbeamshell as jb  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.history.reliability import TOLERANCE  # noqa: E402
-from jbeamshell.scene.rungs import IDEAL  # noqa: E402
 
 RECORD = Path(__file__).parent / "campaign.jsonl"
 SEED = 22
@@ -75,7 +74,7 @@ def by_the_other(values: Values, scene: jb.Scene, other: Values) -> jb.Scene:
     """Scene with the same model and another solver; elastic sliders keep their last element."""
     given = {key: value for key, value in values.items() if key != "model.rung"}
     section: Values = {"model.fields": list(scene.model.fields), "model.order": scene.model.order}
-    if float(scene.contact.stick_stiffness) < IDEAL:
+    if scene.model.condensed and not scene.ideal_friction:
         section["model.end_size"] = scene.model.end_size
     return jb.Scene().replace(given | section | other)
 

@@ -33,10 +33,8 @@ STEPS = 1.5  # factor on the estimated error of a grid that steps of the pressur
 REFINED = 0.15  # least error of a refined grid, over that of the rule: measured .02 to .13
 RESTING = 2.0  # error of the dissipation over the part of the load that single sliders hold
 TOLERANCE = 0.02  # relative error of the dissipation below which there is never a doubt
-LOCKING, LOCKING_NODES = (
-    2.1e-5,
-    65,
-)  # of the error of nearly incompressible strips, on so many nodes
+LOCKING = 2.1e-5  # factor of the error by locking, measured on so many nodes:
+LOCKING_NODES = 65
 OVERSHOOT = 1.0  # error under arc-length control, times the load steps per half cycle
 FINER = "take a smaller model.end_size or more model.nodes"
 
@@ -338,11 +336,12 @@ def _resolution(history: Run) -> tuple[str, ...]:
             f"contact.stick_stiffness = {IDEAL:g} with a rung on the contact line"
         )
     if locking > allowed:
-        condensed = history.scene.model.condensed
-        other = "model.rung = plane" if condensed else "model.grid = collocation"
+        model = history.scene.model
+        more = finer if "nodes" in model.open else "take more model.nodes"  # smaller ends lock more
+        other = "model.rung = plane" if model.condensed else "model.grid = collocation"
         found.append(
             f"{_off(locking)}: finite differences lock where a strip is thin or nearly "
-            f"incompressible; take more model.nodes, or {other}"
+            f"incompressible; {more}, or {other}"
         )
     return tuple(found)
 

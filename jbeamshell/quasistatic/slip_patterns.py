@@ -297,7 +297,7 @@ def solve_path_by_newton(system: System, start: Any, path: Any, solver: Newton) 
 
 
 def _given(system: System, start: Any, path: Any) -> tuple[Any, ...]:
-    """What `_follow` is given: constants of the strip, the memory of a `PathState`, and a path.
+    """Arguments of `_follow`: constants of the strip, the memory of a `PathState`, and a path.
 
     The constants are the stiffness of the section, the derivatives of the end's displacement, and
     the forces of the pressure.
