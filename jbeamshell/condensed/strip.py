@@ -29,7 +29,7 @@ from jbeamshell.scene.parts import Load
 from jbeamshell.scene.scene import Scene
 
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
-PLANE_GROWTH = 0.3  # of the element size over the distance from there
+PLANE_GROWTH = 0.3  # of the element size over the distance from there, also of small elements
 PLANE_FAR_SIZE = 0.15  # of L, elements away from it
 HOLE_DEPTH = 0.1  # of H, a gap that nothing closes
 STEP_SIZE = 0.05  # of H, elements at a step of the pressure
@@ -193,12 +193,13 @@ def stations(scene: Scene, nodes: int) -> Array:
         grading = (model.end_size, steps, elements.GROWTH, model.far_size)
         return elements.vertices(nodes - 1, length, half_height, *grading)
     if steps is None:
-        grading = (PLANE_END_SIZE, None, PLANE_GROWTH, PLANE_FAR_SIZE)
+        grading = (PLANE_END_SIZE, None, PLANE_GROWTH, PLANE_FAR_SIZE, PLANE_GROWTH)
         return elements.vertices(nodes - 1, length, half_height, *grading)
     inside = jnp.append(steps < length, False)
     sizes = jnp.where(inside, STEP_SIZE, PLANE_END_SIZE)
     growths = jnp.where(inside, elements.GROWTH, PLANE_GROWTH)
-    return elements.vertices(nodes - 1, length, half_height, sizes, steps, growths, PLANE_FAR_SIZE)
+    grading = (sizes, steps, growths, PLANE_FAR_SIZE, PLANE_GROWTH)
+    return elements.vertices(nodes - 1, length, half_height, *grading)
 
 
 def _joint_stations(scene: Scene, nodes: int) -> Array:
@@ -215,7 +216,8 @@ def _joint_stations(scene: Scene, nodes: int) -> Array:
     ends = jnp.concatenate([jnp.array([True]), ~(none < length), jnp.array([True])])
     sizes = jnp.where(ends, PLANE_END_SIZE, STEP_SIZE)
     growths = jnp.where(ends, PLANE_GROWTH, elements.GROWTH)
-    return elements.vertices(nodes - 1, length, half_height, sizes, foci, growths, PLANE_FAR_SIZE)
+    grading = (sizes, foci, growths, PLANE_FAR_SIZE, PLANE_GROWTH)
+    return elements.vertices(nodes - 1, length, half_height, *grading)
 
 
 def spring_stiffness(scene: Scene, strip: Strip) -> Array:

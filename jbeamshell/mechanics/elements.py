@@ -11,8 +11,9 @@ friction, contact and pressure act at the nodes with Lobatto weights.
 
 Elements are graded towards the loaded end X = L, where the traction concentrates, and towards
 steps of the pressure.  Their size grows linearly with the distance from there (geometric grading),
-from a fraction of H to a fraction of L.  The number of nodes scales all sizes together: twice the
-nodes halve every element.
+from a fraction of H to a fraction of L.  Below H/48 it grows faster: elements so small are there
+for the last node alone, which the fields around it do not need.  The number of nodes scales all
+sizes together: twice the nodes halve every element.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ END_SIZE = 1.0 / 6.0  # of H, at the loaded end
 FAR_SIZE = 1.0 / 60.0  # of L, far from it
 CONTACT_LINE_FAR_SIZE = 1.0 / 15.0  # the same for sections on their contact line
 GROWTH = 0.08  # of the element size per distance
+SMALL = 1.0 / 48.0  # of H, below which elements grow faster:
+SMALL_GROWTH = 1.0
 
 
 class Rule(NamedTuple):
@@ -94,6 +97,7 @@ def vertices(
     steps: Array | None = None,
     growth: ArrayLike = GROWTH,
     far_size: float = FAR_SIZE,
+    small_growth: float = SMALL_GROWTH,
 ) -> Array:
     """End points of the elements, graded towards X = L and towards steps of the pressure.
 
@@ -107,6 +111,7 @@ def vertices(
     steps : (k,) increasing positions X of the steps, in [0, L]; nodes need not lie on them
     growth : growth of the element size with the distance from a focus, before scaling; or (k + 1,)
     far_size : size of the largest elements before scaling, over L
+    small_growth : growth of elements smaller than `SMALL` of H, before scaling
 
     Returns
     -------
@@ -120,24 +125,32 @@ def vertices(
     foci = length[None] if steps is None else jnp.append(steps, length)
     far = far_size * length
     end = jnp.asarray(end_size) * jnp.asarray(half_height)
+    small = jnp.maximum(end, jnp.minimum(SMALL * jnp.asarray(half_height), far))
     rate = jnp.where(far >= end, jnp.asarray(growth), -jnp.asarray(growth))
-    # The size is h(d) = end + rate d at the distance d from a focus, up to the size far.  So the
-    # number of elements within d, int dd/h(d), is a logarithm and then a straight line.
-    turn = (far - end) / rate
+    # At the distance d from a focus the size h(d) grows along a straight line from end to small, a
+    # flatter one to far, and stays so.  The number of elements within d, int dd/h(d), is a
+    # logarithm along each of the two, and then a straight line.
+    first, second = (small - end) / small_growth, (far - small) / rate
+    in_first = jnp.log1p(small_growth * first / end) / small_growth
+    in_second = jnp.log1p(rate * second / small) / rate
 
     def at(values: Array, i: ArrayLike) -> Array:
         # Where all foci are alike nothing is gathered: programs then agree on x to the last bit.
         return values[i] if values.ndim else values
 
     def count(distance: Array, i: ArrayLike) -> Array:
-        slope, near = at(rate, i), jnp.minimum(distance, at(turn, i))
-        return jnp.log1p(slope * near / at(end, i)) / slope + (distance - near) / far
-
-    at_turn = count(turn, np.arange(foci.size))
+        slope, near = at(rate, i), jnp.minimum(distance, at(first, i))
+        middle = jnp.minimum(distance - near, at(second, i))
+        elements = jnp.log1p(small_growth * near / at(end, i)) / small_growth
+        elements = elements + jnp.log1p(slope * middle / at(small, i)) / slope
+        return elements + (distance - near - middle) / far
 
     def reach(elements: Array, i: ArrayLike) -> Array:
-        slope, near = at(rate, i), jnp.minimum(elements, at(at_turn, i))
-        return at(end, i) * jnp.expm1(slope * near) / slope + far * (elements - near)
+        slope, near = at(rate, i), jnp.minimum(elements, at(in_first, i))
+        middle = jnp.minimum(elements - near, at(in_second, i))
+        distance = at(end, i) * jnp.expm1(small_growth * near) / small_growth
+        distance = distance + at(small, i) * jnp.expm1(slope * middle) / slope
+        return distance + far * (elements - near - middle)
 
     # Pieces run alternately towards a focus and away from one: from 0 to the first focus, from
     # there half way to the next focus, and so on.

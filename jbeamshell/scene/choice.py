@@ -59,7 +59,7 @@ class Grid(NamedTuple):
 KNOWN = 0.005  # tolerance for which the grids were measured
 MOST_CONDENSED = 129  # nodes that are given, beyond which events cost more than load steps
 CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20, halvings=2)
-SOFT_CONTACT_LINE = Grid(129, 1.0 / 49152.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
+SOFT_CONTACT_LINE = Grid(97, 2.0**-16 / 48.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
 MOST_REFINED = 513  # nodes of a grid that was refined
 PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
 MOST_JUMPS = 4  # of the pressure that add nodes
