@@ -11,7 +11,12 @@ from jbeamshell.mechanics import homogeneous
 from jbeamshell.mechanics.friction import FrictionLaw
 from jbeamshell.quasistatic.system import Prescribed, System
 
-SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
+SMALL = {
+    "model.nodes": 41,
+    "model.kinematics": "linear",  # compiles in half the time
+    "load.steps_per_half_cycle": 20,
+    "load.cycles": 1,
+}
 
 
 @pytest.mark.parametrize("grid", ["finite-difference", "collocation"])
@@ -54,7 +59,7 @@ def bottom(system):
 
 def test_turning_a_curved_strip_stores_no_energy_in_the_limit_of_fine_grids():
     strains = []
-    for nodes in (41, 81, 161):
+    for nodes in (81, 161):
         system = curved(0.8, nodes)
         x, y = bottom(system)
         sin, cos = jnp.sin(1.0), jnp.cos(1.0)
@@ -69,8 +74,7 @@ def test_turning_a_curved_strip_stores_no_energy_in_the_limit_of_fine_grids():
         ratio = energy(jnp.stack(turned, axis=1)) / energy(bent)
         strains.append(float(jnp.sqrt(ratio)))
     assert strains[-1] < 1e-2
-    slopes = np.log2(np.array(strains[:-1]) / strains[1:])
-    np.testing.assert_allclose(slopes, 2.0, atol=0.1)
+    assert np.log2(strains[0] / strains[1]) == pytest.approx(2.0, abs=0.1)
 
 
 def test_the_gap_under_a_curved_strip_is_that_of_its_bottom_face():
@@ -201,7 +205,7 @@ def test_unilateral_lift_cures_the_tension_at_the_loaded_end(fields):
 @pytest.mark.doubtful("in the corner", "few nodes")
 def test_frozen_lift_reports_tension_and_drifts_with_the_end_element():
     ratios, reactions = [], []
-    for nodes in (81, 321):
+    for nodes in (81, 161):
         history = jb.solve(frozen(nodes))
         ratios.append(float(history.dissipation_ratio))
         reactions.append(float(history.reaction_min))
@@ -275,6 +279,6 @@ def test_a_law_of_your_own_slides_in():
         def traction(self, dv, t_n, cap, k_t):
             return self.coefficient * dv
 
-    scene = jb.Scene(contact=jb.Contact(law=Viscous()), model=jb.Model(nodes=41))
+    scene = jb.Scene(contact=jb.Contact(law=Viscous()), model=jb.Model(nodes=9))
     history = jb.solve(scene, np.array([0.2, 0.4]))
     np.testing.assert_allclose(history.traction[1:], 1e5 * jnp.diff(history.v, axis=0))
