@@ -400,6 +400,7 @@ def test_a_saved_joint_is_read_again(tmp_path):
     assert again.figures() == history.figures()
 
 
+@pytest.mark.slow
 def test_derivatives_have_slope_two():
     keys = ("strip.height_ratio", "member.height_ratio", "contact.friction")
     scene = SQUEEZE.replace({"member.height_ratio": 0.12}).pinned()

@@ -56,7 +56,9 @@ def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing,
     assert float(jnp.sum(jnp.abs(history.slip_work))) / 100 < drift * 0.1 * peaks[0]
 
 
-@pytest.mark.parametrize(("smoothing", "drift"), [("sharp", 1e-13), (16.0, 1e-4)])
+@pytest.mark.parametrize(
+    ("smoothing", "drift"), [("sharp", 1e-13), pytest.param(16.0, 1e-4, marks=pytest.mark.slow)]
+)
 @pytest.mark.doubtful("few nodes", "nothing slips", "single nodes")
 def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
     scene = STRIP.replace(SMALL | {"contact.smoothing": smoothing})

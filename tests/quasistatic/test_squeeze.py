@@ -35,6 +35,7 @@ def test_a_squeezed_laminate_bends_as_the_closed_form_and_the_finite_elements(pl
         np.testing.assert_allclose(model, finite_elements, rtol=1e-4, err_msg=name)
 
 
+@pytest.mark.slow
 def test_one_squeeze_strain_shared_by_the_layers_cannot_bend():
     history = jb.solve(library.bimaterial().replace({"model.constants": "printed"}))
     consistent = reference.bimetal_curvature(PRESSURE, 2.0, SOFT, 100 * SOFT, 0.3, "stress")
