@@ -8,7 +8,6 @@ import jbeamshell as jb
 
 SMALL = {
     "model.nodes": 21,
-    "model.kinematics": "linear",
     "load.steps_per_half_cycle": 8,
     "load.cycles": 1,
 }
