@@ -308,7 +308,9 @@ def test_files_that_hold_no_loop_and_execute_nothing(folder, fault, monkeypatch)
     evil, faults = folder / "evil", []
     for name, content in hostile.data_files(evil).items():
         (folder / name).write_bytes(content)
-        faults += [fault("fit", name, *way) for way in WAYS.values()]
+        # Those of MATLAB are read in a process of their own, before their kind matters.
+        ways = [[]] if name.endswith(".mat") else WAYS.values()
+        faults += [fault("fit", name, *way) for way in ways]
         (folder / name).unlink()
     none_of(faults)
     assert not evil.exists()

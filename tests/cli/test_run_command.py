@@ -174,7 +174,8 @@ def test_a_bent_laminate_by_name(cli):
 
 
 def test_a_scene_without_cycles_by_name(cli, tmp_path):
-    code, out, err = cli("run", "block", "--json", "--set", "model.nodes=41", "--out", tmp_path)
+    few = {"model.nodes": 41, "model.kinematics": "linear"}
+    code, out, err = cli("run", "block", "--json", *options(few), "--out", tmp_path)
     assert code == 0
     assert "warning" not in err
     figures = json.loads(out)

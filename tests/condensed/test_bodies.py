@@ -119,7 +119,7 @@ def check_against_load_steps(exact, steps, tolerance=1e-9):
 class TestHistory:
     """Many load steps of the same section on the same nodes come to the same states."""
 
-    @pytest.mark.doubtful("few nodes")
+    @pytest.mark.slow
     def test_a_section_of_order_two(self, tmp_path):
         scene = BODIES["p2"].replace(SOFT)
         exact = jb.solve(scene)

@@ -104,7 +104,7 @@ class TestLimits:
     @pytest.mark.parametrize("ratio", [1.0, 3.0])
     def test_thin_members_are_bars_that_lap(self, ratio):
         thin = {"strip.height_ratio": 0.001, "member.height_ratio": 0.001}
-        thin |= {"member.axial_stiffness": 3.4e4 * ratio, "model.tolerance": 0.005}
+        thin |= {"member.axial_stiffness": 3.4e4 * ratio, "model.nodes": 129}
         thin |= {"load.cycles": 1}
         history = jb.solve(SQUEEZE.replace(thin))
         bars = 3.4e4, 3.4e4 * ratio
@@ -116,8 +116,10 @@ class TestLimits:
         assert float(history.dissipation_ratio) == pytest.approx(1.0, rel=0.01)
 
     def test_overhangs_are_springs_in_series(self):
-        joint = jb.solve(SQUEEZE)
-        longer = jb.solve(SQUEEZE.replace({"strip.overhang": 0.6, "member.overhang": 0.4}))
+        short = SQUEEZE.replace({"model.nodes": 33})
+        joint = jb.solve(short, throw=False)
+        longer = short.replace({"strip.overhang": 0.6, "member.overhang": 0.4})
+        longer = jb.solve(longer, throw=False)
         added = 1.0 / longer.secant_stiffness - 1.0 / joint.secant_stiffness
         assert float(added) == pytest.approx(1.0 / 3.4e4, rel=0.01)
         tips = []
@@ -165,9 +167,9 @@ class TestBalance:
         np.testing.assert_allclose(carried, history.force, atol=1e-9)
 
     def test_assembly_with_friction_locks_shear_in(self):
-        values = {"contact.assembly": "frictional", "member.axial_stiffness": 1e5}
-        smooth = jb.solve(SQUEEZE.replace({"member.axial_stiffness": 1e5}))
-        rough = jb.solve(SQUEEZE.replace(values))
+        values = {"member.axial_stiffness": 1e5, "model.nodes": 33}
+        smooth = jb.solve(SQUEEZE.replace(values), throw=False)
+        rough = jb.solve(SQUEEZE.replace(values | {"contact.assembly": "frictional"}), throw=False)
         held = np.abs(np.asarray(rough.traction[0]))
         assert held.max() > 0.01
         assert np.all(held <= 0.1 * np.asarray(rough.reaction[0]) * (1.0 + 1e-9))
@@ -398,6 +400,7 @@ def test_a_saved_joint_is_read_again(tmp_path):
     assert again.figures() == history.figures()
 
 
+@pytest.mark.slow
 def test_derivatives_have_slope_two():
     keys = ("strip.height_ratio", "member.height_ratio", "contact.friction")
     scene = SQUEEZE.replace({"member.height_ratio": 0.12}).pinned()

@@ -18,6 +18,7 @@ from jbeamshell.plotting.style import LIFTED, SLIPS, STICKS
 
 COARSE = {
     "model.nodes": 21,
+    "model.kinematics": "linear",
     "load.steps_per_half_cycle": 6,
     "load.cycles": 2,
     "contact.stick_stiffness": 100.0,

@@ -11,7 +11,13 @@ from jbeamshell.mechanics import homogeneous
 from jbeamshell.mechanics.friction import FrictionLaw
 from jbeamshell.quasistatic.system import Prescribed, System
 
-SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 20, "load.cycles": 1}
+SMALL = {
+    "model.nodes": 41,
+    "model.kinematics": "linear",  # compiles in half the time
+    "load.steps_per_half_cycle": 20,
+    "load.cycles": 1,
+}
+EXACT = SMALL | {"model.kinematics": "exact"}  # by Newton's method, where the system is the subject
 
 
 @pytest.mark.parametrize("grid", ["finite-difference", "collocation"])
@@ -54,7 +60,7 @@ def bottom(system):
 
 def test_turning_a_curved_strip_stores_no_energy_in_the_limit_of_fine_grids():
     strains = []
-    for nodes in (41, 81, 161):
+    for nodes in (81, 161):
         system = curved(0.8, nodes)
         x, y = bottom(system)
         sin, cos = jnp.sin(1.0), jnp.cos(1.0)
@@ -69,8 +75,7 @@ def test_turning_a_curved_strip_stores_no_energy_in_the_limit_of_fine_grids():
         ratio = energy(jnp.stack(turned, axis=1)) / energy(bent)
         strains.append(float(jnp.sqrt(ratio)))
     assert strains[-1] < 1e-2
-    slopes = np.log2(np.array(strains[:-1]) / strains[1:])
-    np.testing.assert_allclose(slopes, 2.0, atol=0.1)
+    assert np.log2(strains[0] / strains[1]) == pytest.approx(2.0, abs=0.1)
 
 
 def test_the_gap_under_a_curved_strip_is_that_of_its_bottom_face():
@@ -93,7 +98,7 @@ def test_a_curvature_that_vanishes_leaves_a_straight_strip(kinematics):
 
 @pytest.mark.doubtful("few nodes")
 def test_pressure_alone_squeezes_uniformly():
-    history = jb.solve(STRIP.replace(SMALL))
+    history = jb.solve(STRIP.replace(EXACT))
     plane_modulus = history.scene.strip.plane_modulus
     np.testing.assert_allclose(history.reaction[0], 10.0, rtol=1e-9)
     np.testing.assert_allclose(history.psi[0], -10.0 / plane_modulus, rtol=1e-9)
@@ -113,7 +118,7 @@ def test_reactions_carry_the_pressure_at_every_load(pressure):
 
 @pytest.mark.doubtful("few nodes")
 def test_tractions_balance_the_end_force_away_from_the_held_end():
-    history = jb.solve(STRIP.replace(SMALL))
+    history = jb.solve(STRIP.replace(EXACT))
     inner = history.traction[:, 1:] @ history.tributary[1:]
     # What the held node takes is small: the slip front is far from it.
     assert float(jnp.max(jnp.abs(inner - history.force))) < 0.02 * 0.7855
@@ -121,7 +126,7 @@ def test_tractions_balance_the_end_force_away_from_the_held_end():
 
 @pytest.mark.doubtful("few nodes")
 def test_pull_lowers_the_loaded_end_and_pull_and_push_differ():
-    history = jb.solve(STRIP.replace(SMALL))
+    history = jb.solve(STRIP.replace(EXACT))
     start, turn, _ = history.cycles[-1]
     assert float(history.beta[start, -1]) < 0.0 < float(history.beta[turn, -1])
     assert float(-history.displacement[turn]) > 1.02 * float(history.displacement[start])
@@ -129,7 +134,7 @@ def test_pull_lowers_the_loaded_end_and_pull_and_push_differ():
 
 def test_end_force_is_conjugate_to_the_mid_height():
     """In a stuck strip the work of F is the energy stored: only with the right conjugate."""
-    stuck = SMALL | {"contact.friction": 100.0, "contact.stick_stiffness": 10.0}
+    stuck = EXACT | {"contact.friction": 100.0, "contact.stick_stiffness": 10.0}
     # The tolerance is a part of mu F_N L, which is huge here.
     history = jb.solve(STRIP.replace(stuck), [0.5, 1.0], solver=jb.Newton(tolerance=1e-14))
     work = 0.5 * float(history.force[-1] * history.displacement[-1])
@@ -201,7 +206,7 @@ def test_unilateral_lift_cures_the_tension_at_the_loaded_end(fields):
 @pytest.mark.doubtful("in the corner", "few nodes")
 def test_frozen_lift_reports_tension_and_drifts_with_the_end_element():
     ratios, reactions = [], []
-    for nodes in (81, 321):
+    for nodes in (81, 161):
         history = jb.solve(frozen(nodes))
         ratios.append(float(history.dissipation_ratio))
         reactions.append(float(history.reaction_min))
@@ -275,6 +280,6 @@ def test_a_law_of_your_own_slides_in():
         def traction(self, dv, t_n, cap, k_t):
             return self.coefficient * dv
 
-    scene = jb.Scene(contact=jb.Contact(law=Viscous()), model=jb.Model(nodes=41))
+    scene = jb.Scene(contact=jb.Contact(law=Viscous()), model=jb.Model(nodes=9))
     history = jb.solve(scene, np.array([0.2, 0.4]))
     np.testing.assert_allclose(history.traction[1:], 1e5 * jnp.diff(history.v, axis=0))

@@ -70,7 +70,7 @@ def test_the_squeeze_against_finite_elements(squeezed):
     assert rms == pytest.approx(RMS[squeezed.scene.model.order], rel=0.05)
 
 
-@pytest.fixture(scope="module", params=[slow(2), 3])
+@pytest.fixture(scope="module", params=[slow(2), slow(3)])
 def receding(request):
     return rung(library.receding(), request.param)
 

@@ -91,6 +91,7 @@ def test_elastic_sliders_have_smaller_elements_at_the_loaded_end():
     assert jb.Scene().pinned(_numbers(over)).model.nodes == SOFT_CONTACT_LINE.nodes
 
 
+@pytest.mark.slow
 def test_the_chosen_elements_resolve_the_slider_of_the_last_node():
     soft = {"contact.stick_stiffness": 33.0, "contact.friction": 0.19, "load.amplitude": 1.74}
     chosen = jb.Scene().replace(soft | {"strip.height_ratio": 0.25}).pinned()

@@ -73,7 +73,9 @@ def test_loop_area_is_the_work_of_friction_over_the_standard_range(squeeze):
     assert steady.all()
 
 
-@pytest.mark.parametrize("fields", PROTOTYPE)
+@pytest.mark.parametrize(
+    "fields", [pytest.param(("v", "beta"), marks=pytest.mark.slow), ("v", "beta", "psi")]
+)
 def test_dissipation_reproduces_the_prototype(fields, squeeze):
     table = PROTOTYPE[fields]
     cells = [(eta, amplitude) for eta in table for amplitude in PROTOTYPE_AMPLITUDES]

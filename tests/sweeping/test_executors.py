@@ -37,7 +37,7 @@ TINY = {
 }
 FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "reaction_max")  # of test_sweep
 SCENE = STRIP.replace(TINY)
-SMALL, LARGE = (120, 80), (300, 200)  # lanes: of the large there is time to kill somebody
+SMALL, LARGE = (60, 60), (300, 200)  # lanes: of the large there is time to kill somebody
 SET = [word for key, value in TINY.items() for word in ("--set", f"{key}={value}")]
 SWEEP = [sys.executable, "-m", "jbeamshell", "sweep", *SET, "--figures", ",".join(FIGURES)]
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(jb.__file__).parents[1])}
