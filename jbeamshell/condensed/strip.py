@@ -193,13 +193,11 @@ def stations(scene: Scene, nodes: int) -> Array:
         grading = (model.end_size, steps, elements.GROWTH, model.far_size)
         return elements.vertices(nodes - 1, length, half_height, *grading)
     if steps is None:
-        grading = (PLANE_END_SIZE, None, PLANE_GROWTH, PLANE_FAR_SIZE, PLANE_GROWTH)
-        return elements.vertices(nodes - 1, length, half_height, *grading)
+        return _plane_vertices(scene, nodes, PLANE_END_SIZE, None, PLANE_GROWTH)
     inside = jnp.append(steps < length, False)
     sizes = jnp.where(inside, STEP_SIZE, PLANE_END_SIZE)
     growths = jnp.where(inside, elements.GROWTH, PLANE_GROWTH)
-    grading = (sizes, steps, growths, PLANE_FAR_SIZE, PLANE_GROWTH)
-    return elements.vertices(nodes - 1, length, half_height, *grading)
+    return _plane_vertices(scene, nodes, sizes, steps, growths)
 
 
 def _joint_stations(scene: Scene, nodes: int) -> Array:
@@ -216,7 +214,15 @@ def _joint_stations(scene: Scene, nodes: int) -> Array:
     ends = jnp.concatenate([jnp.array([True]), ~(none < length), jnp.array([True])])
     sizes = jnp.where(ends, PLANE_END_SIZE, STEP_SIZE)
     growths = jnp.where(ends, PLANE_GROWTH, elements.GROWTH)
+    return _plane_vertices(scene, nodes, sizes, foci, growths)
+
+
+def _plane_vertices(
+    scene: Scene, nodes: int, sizes: Array | float, foci: Array | None, growths: Array | float
+) -> Array:
+    """Stations of plane elasticity, whose singular stresses even the smallest elements resolve."""
     grading = (sizes, foci, growths, PLANE_FAR_SIZE, PLANE_GROWTH)
+    length, half_height = scene.strip.length, scene.strip.half_height
     return elements.vertices(nodes - 1, length, half_height, *grading)
 
 

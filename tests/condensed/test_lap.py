@@ -115,11 +115,11 @@ class TestLimits:
         assert 1.0 / float(history.secant_stiffness) == pytest.approx(u, rel=0.002)
         assert float(history.dissipation_ratio) == pytest.approx(1.0, rel=0.01)
 
+    @pytest.mark.doubtful("few nodes")
     def test_overhangs_are_springs_in_series(self):
         short = SQUEEZE.replace({"model.nodes": 33})
-        joint = jb.solve(short, throw=False)
-        longer = short.replace({"strip.overhang": 0.6, "member.overhang": 0.4})
-        longer = jb.solve(longer, throw=False)
+        joint = jb.solve(short)
+        longer = jb.solve(short.replace({"strip.overhang": 0.6, "member.overhang": 0.4}))
         added = 1.0 / longer.secant_stiffness - 1.0 / joint.secant_stiffness
         assert float(added) == pytest.approx(1.0 / 3.4e4, rel=0.01)
         tips = []
@@ -166,10 +166,11 @@ class TestBalance:
         carried = history.traction @ history.tributary
         np.testing.assert_allclose(carried, history.force, atol=1e-9)
 
+    @pytest.mark.doubtful("few nodes")
     def test_assembly_with_friction_locks_shear_in(self):
         values = {"member.axial_stiffness": 1e5, "model.nodes": 33}
-        smooth = jb.solve(SQUEEZE.replace(values), throw=False)
-        rough = jb.solve(SQUEEZE.replace(values | {"contact.assembly": "frictional"}), throw=False)
+        smooth = jb.solve(SQUEEZE.replace(values))
+        rough = jb.solve(SQUEEZE.replace(values | {"contact.assembly": "frictional"}))
         held = np.abs(np.asarray(rough.traction[0]))
         assert held.max() > 0.01
         assert np.all(held <= 0.1 * np.asarray(rough.reaction[0]) * (1.0 + 1e-9))
@@ -400,7 +401,6 @@ def test_a_saved_joint_is_read_again(tmp_path):
     assert again.figures() == history.figures()
 
 
-@pytest.mark.slow
 def test_derivatives_have_slope_two():
     keys = ("strip.height_ratio", "member.height_ratio", "contact.friction")
     scene = SQUEEZE.replace({"member.height_ratio": 0.12}).pinned()

@@ -173,6 +173,7 @@ class TestModes:
         slower = modal_curve(plain, small[:1]).frequency / modal_curve(plain, [1.0]).frequency
         assert np.allclose(more, np.ravel(ratio)[0] * slower)
 
+    @pytest.mark.slow
     def test_they_have_derivatives_to_every_number(self):
         """Numbers of scene and joint, mass, stiffness and damping, in a jit of its own."""
         strip = PLANE.replace({"model.nodes": 17})

@@ -107,6 +107,24 @@ def test_end_element_follows_the_height_at_the_design_count():
         assert x[1] - x[0] < 2.0 / 100
 
 
+def test_small_elements_grow_fast_up_to_where_others_begin():
+    eta, end = 0.1, 2.0**-16 / 48.0
+    x = np.asarray(grid.vertices(96, 2.0, eta, end, far_size=1.0 / 15.0))
+    sizes = np.diff(x)
+    assert (np.diff(sizes) < 1e-12).all()
+    # Before scaling, elements grow from the end to H/48 at SMALL_GROWTH per distance, and then at
+    # GROWTH to L/15: as many as two logarithms and a straight line say.
+    small, far = grid.SMALL * eta, 2.0 / 15.0
+    first = np.log(small / (end * eta)) / grid.SMALL_GROWTH
+    second = np.log(far / small) / grid.GROWTH
+    reach = (small - end * eta) / grid.SMALL_GROWTH + (far - small) / grid.GROWTH
+    before_scaling = first + second + (2.0 - reach) / far
+    within = np.count_nonzero(2.0 - x[:-1] <= (small - end * eta) / grid.SMALL_GROWTH)
+    assert within == int(first * 96 / before_scaling)
+    last = np.expm1(grid.SMALL_GROWTH * before_scaling / 96) / grid.SMALL_GROWTH
+    assert sizes[-1] == pytest.approx(end * eta * last, rel=1e-6)
+
+
 @rules
 @pytest.mark.parametrize("eta", ETAS)
 def test_tributary_lengths_fill_the_strip(name, eta):

@@ -18,7 +18,7 @@ COPIES = {
 
 @pytest.mark.parametrize("how", COPIES)
 def test_scenes_histories_and_sweeps_are_copied_whole(how):
-    scene = jb.Scene().replace({"contact.pressure": [[0, 8], [1, 8], [1, 0], [2, 0]]})
+    scene = jb.Scene().replace({"contact.pressure": [[0.0, 8.0], [2.0, 10.0]]})
     history = jb.solve(scene, throw=False)
     for made in (scene, history):
         again = COPIES[how](made)

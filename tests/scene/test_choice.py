@@ -166,7 +166,7 @@ def test_history_says_what_was_chosen():
 
 
 def test_a_doubt_about_chosen_nodes_names_the_tolerance():
-    little = {"strip.height_ratio": 0.4, "load.amplitude": 0.01}
+    little = {"strip.height_ratio": 0.4, "load.amplitude": 0.01, "model.tolerance": 0.02}
     chosen = jb.solve(jb.Scene().replace(little), throw=False)
     assert [doubt.partition("; ")[2] for doubt in chosen.doubts] == [
         "take a smaller model.tolerance"
