@@ -103,12 +103,14 @@ def quickest(scene: Scene) -> Search:
     """Search that most often does for a scene's cycles.
 
     Slip zones are nested where no point reaction at the loaded corner slips and opens out of turn,
-    as that of sections of low order does.  A lap joint slips and opens at both ends.
+    as that of sections of low order does.  A lap joint slips and opens at both ends, and elastic
+    sliders have many of their nodes where a strip lifts off.
     """
     if scene.member.support != "none":
         return "events"
-    nested = scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
-    return "factors" if nested else "near events"
+    if scene.model.solution == "plane" or scene.model.order >= NESTED_FROM:
+        return "factors"
+    return "near events" if scene.ideal_friction else "events"
 
 
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:

@@ -6,6 +6,7 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
+from jbeamshell.history import contact_line
 from jbeamshell.numerics.cycles import branch_work, closed_cycles, turning_points
 
 
@@ -76,3 +77,13 @@ def test_energy_balances_at_every_step():
         worst.append(float(jnp.max(jnp.abs(history.energy_imbalance)) / history.dissipation))
     assert worst[1] < 1e-3
     assert np.log2(worst[0] / worst[1]) > 1.7
+
+
+def test_the_contact_ends_where_the_force_of_its_last_node_is_used_up():
+    x, end = np.arange(8.0), 4.3
+    tributary = np.where((x == 0.0) | (x == 7.0), 0.5, 1.0)
+    reaction = np.where(x < 4.0, 10.0 - x, 0.0)  # it falls by 1 per length, and stops at the end
+    reaction[4] = 10.0 * (end - 3.5) - 0.5 * (end**2 - 3.5**2)  # node 4 has its share from 3.5 on
+    touching = reaction > 0.0
+    found = contact_line._contact_ends(x, tributary, touching[None], reaction[None])
+    assert float(found[0]) == pytest.approx(end, abs=1e-3)

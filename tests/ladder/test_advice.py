@@ -121,6 +121,7 @@ def test_the_default_scene_is_on_the_map():
     assert advice.rung == "condensed-squeeze"
 
 
+@pytest.mark.slow
 def test_what_is_advised_is_not_doubted_within_the_tolerance():
     """Any doubt is an error here; one of 3.2 % on 17 nodes is within what a user of 5 % allows."""
     advice = jb.advise(jb.Scene(), 0.05)

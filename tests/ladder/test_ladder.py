@@ -70,7 +70,10 @@ def test_the_bar_is_the_cubic_law():
     assert float(history.reaction_min) == 10.0
 
 
-@pytest.mark.parametrize(("control", "bottom"), [("force", 4.0), ("displacement", 0.0)])
+@pytest.mark.parametrize(
+    ("control", "bottom"),
+    [("force", 4.0), pytest.param("displacement", 0.0, marks=pytest.mark.slow)],
+)
 @pytest.mark.doubtful("few nodes")
 def test_the_closed_bar_is_the_limit_of_the_stepwise_one(control, bottom):
     amplitude = {"force": 0.8, "displacement": 1e-5}[control]

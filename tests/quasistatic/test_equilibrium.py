@@ -106,7 +106,10 @@ def test_pressure_alone_squeezes_uniformly():
     assert float(jnp.max(jnp.abs(history.beta[0]))) < 1e-15
 
 
-@pytest.mark.parametrize("pressure", [10.0, [[0.0, 4.0], [1.0, 12.0], [2.0, 9.0]]])
+@pytest.mark.parametrize(
+    "pressure",
+    [pytest.param(10.0, marks=pytest.mark.slow), [[0.0, 4.0], [1.0, 12.0], [2.0, 9.0]]],
+)
 @pytest.mark.doubtful("few nodes")
 def test_reactions_carry_the_pressure_at_every_load(pressure):
     history = jb.solve(STRIP.replace(SMALL | {"contact.pressure": pressure}))

@@ -165,6 +165,7 @@ def test_history_says_what_was_chosen():
     assert float(history.secant_stiffness) == pytest.approx(79670.76, rel=0.005)
 
 
+@pytest.mark.slow
 def test_a_doubt_about_chosen_nodes_names_the_tolerance():
     little = {"strip.height_ratio": 0.4, "load.amplitude": 0.01, "model.tolerance": 0.02}
     chosen = jb.solve(jb.Scene().replace(little), throw=False)
