@@ -103,8 +103,8 @@ def quickest(scene: Scene) -> Search:
     """Search that most often does for a scene's cycles.
 
     Slip zones are nested where no point reaction at the loaded corner slips and opens out of turn,
-    as that of sections of low order does.  A lap joint slips and opens at both ends, and elastic
-    sliders have many of their nodes where a strip lifts off.
+    as that of sections of low order does.  A lap joint slips and opens at both ends.  The grid of
+    elastic sliders has many nodes where a strip lifts off.
     """
     if scene.member.support != "none":
         return "events"

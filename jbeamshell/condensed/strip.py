@@ -220,7 +220,7 @@ def _joint_stations(scene: Scene, nodes: int) -> Array:
 def _plane_vertices(
     scene: Scene, nodes: int, sizes: Array | float, foci: Array | None, growths: Array | float
 ) -> Array:
-    """Stations of plane elasticity, whose singular stresses even the smallest elements resolve."""
+    """Stations of plane elasticity: small elements grow slowly too, as stresses are singular."""
     grading = (sizes, foci, growths, PLANE_FAR_SIZE, PLANE_GROWTH)
     length, half_height = scene.strip.length, scene.strip.half_height
     return elements.vertices(nodes - 1, length, half_height, *grading)

@@ -131,9 +131,9 @@ def slider_error(cycle: SlipCycle) -> Array:
 
     A node rests alone so far as its reaction R_i exceeds those of its neighbours,
     a_i = 1 - (R_(i-1) + R_(i+1))/R_i.  The stiffness of its slider is k_t l_i, so that on ever
-    finer grids it lets go of the friction T_i = max(a_i t_i l_i).  The dissipation and the secant
-    stiffness change by at most about twice the part of the load that is let go, a rule that was
-    measured on strips that rest on their corner (mostly .4 to .9 times, at most 2.3 times).
+    finer grids it lets go of the friction T_i = max(a_i t_i l_i).  The error is twice the part of
+    the load that is let go.  On strips that rest on their corner, the dissipation or the secant
+    stiffness was off by .4 to .9 times that part most often, and by 2.3 times at most.
 
     Returns
     -------
@@ -352,7 +352,7 @@ def _slider_fix(scene: Scene) -> str:
         return f"take {others}"
     if scene.model.kinematics == "linear" and may_condense(scene):
         return f"leave model.solution open, or take {others}"
-    return f"take a smaller model.end_size, {others}"
+    return f"take {others}, or a smaller model.end_size"
 
 
 def _off(error: float) -> str:

@@ -11,9 +11,9 @@ friction, contact and pressure act at the nodes with Lobatto weights.
 
 Elements are graded towards the loaded end X = L, where the traction concentrates, and towards
 steps of the pressure.  Their size grows linearly with the distance from there (geometric grading),
-from a fraction of H to a fraction of L.  Below H/48 it grows faster: elements so small are there
-for the last node alone, which the fields around it do not need.  The number of nodes scales all
-sizes together: twice the nodes halve every element.
+from a fraction of H to a fraction of L.  Below H/48 it grows faster: elements so small serve the
+last node alone, and the fields around it need few of them.  The number of nodes scales all sizes
+together: twice the nodes halve every element.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ END_SIZE = 1.0 / 6.0  # of H, at the loaded end
 FAR_SIZE = 1.0 / 60.0  # of L, far from it
 CONTACT_LINE_FAR_SIZE = 1.0 / 15.0  # the same for sections on their contact line
 GROWTH = 0.08  # of the element size per distance
-SMALL = 1.0 / 48.0  # of H, below which elements grow faster:
-SMALL_GROWTH = 1.0
+SMALL = 1.0 / 48.0  # of H, below which elements are small
+SMALL_GROWTH = 1.0  # of the size of small elements per distance
 
 
 class Rule(NamedTuple):
@@ -111,7 +111,7 @@ def vertices(
     steps : (k,) increasing positions X of the steps, in [0, L]; nodes need not lie on them
     growth : growth of the element size with the distance from a focus, before scaling; or (k + 1,)
     far_size : size of the largest elements before scaling, over L
-    small_growth : growth of elements smaller than `SMALL` of H, before scaling
+    small_growth : growth of elements smaller than H times `SMALL`, before scaling
 
     Returns
     -------

@@ -6,11 +6,7 @@ from toy import STRIP
 
 import jbeamshell as jb
 
-SMALL = {
-    "model.nodes": 21,
-    "load.steps_per_half_cycle": 8,
-    "load.cycles": 1,
-}
+SMALL = {"model.nodes": 21, "load.steps_per_half_cycle": 8, "load.cycles": 1}
 FREE = {"strip.far_end": "free", "load.control": "arc-length", "load.amplitude": 3e-4}
 
 
