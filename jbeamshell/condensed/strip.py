@@ -190,7 +190,7 @@ def stations(scene: Scene, nodes: int) -> Array:
     if scene.member.support != "none":
         return _joint_stations(scene, nodes)
     if model.solution == "condensed":
-        grading = (model.end_size, steps, elements.GROWTH, model.far_size)
+        grading = (model.end_size, steps, elements.GROWTH, model.far_size, model.small_growth)
         return elements.vertices(nodes - 1, length, half_height, *grading)
     if steps is None:
         return _plane_vertices(scene, nodes, PLANE_END_SIZE, None, PLANE_GROWTH)
@@ -207,7 +207,7 @@ def _joint_stations(scene: Scene, nodes: int) -> Array:
     if model.solution == "condensed":
         start = jnp.zeros_like(length)[None]
         foci = start if steps is None else jnp.append(start, steps)
-        grading = (model.end_size, foci, elements.GROWTH, model.far_size)
+        grading = (model.end_size, foci, elements.GROWTH, model.far_size, model.small_growth)
         return elements.vertices(nodes - 1, length, half_height, *grading)
     none = jnp.zeros((0,), length.dtype) if steps is None else steps
     foci = jnp.append(jnp.zeros_like(length), none)

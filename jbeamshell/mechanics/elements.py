@@ -11,9 +11,9 @@ friction, contact and pressure act at the nodes with Lobatto weights.
 
 Elements are graded towards the loaded end X = L, where the traction concentrates, and towards
 steps of the pressure.  Their size grows linearly with the distance from there (geometric grading),
-from a fraction of H to a fraction of L.  Below H/48 it grows faster: elements so small serve the
-last node alone, and the fields around it need few of them.  The number of nodes scales all sizes
-together: twice the nodes halve every element.
+from a fraction of H to a fraction of L.  If the smallest elements serve the last node alone, the
+size grows faster below H/48, because the fields around that node need few of them.  The number of
+nodes scales all sizes together: twice the nodes halve every element.
 """
 
 from __future__ import annotations
@@ -34,8 +34,9 @@ END_SIZE = 1.0 / 6.0  # of H, at the loaded end
 FAR_SIZE = 1.0 / 60.0  # of L, far from it
 CONTACT_LINE_FAR_SIZE = 1.0 / 15.0  # the same for sections on their contact line
 GROWTH = 0.08  # of the element size per distance
-SMALL = 1.0 / 48.0  # of H, below which elements are small
-SMALL_GROWTH = 1.0  # of the size of small elements per distance
+SMALL = 1.0 / 48.0  # of H, below which elements may grow faster:
+SMALL_GROWTH = 1.0  # of their size per distance, where they serve the last node alone
+TINY = 1e-4  # of H, below which the smallest elements do so
 
 
 class Rule(NamedTuple):
@@ -97,7 +98,7 @@ def vertices(
     steps: Array | None = None,
     growth: ArrayLike = GROWTH,
     far_size: float = FAR_SIZE,
-    small_growth: float = SMALL_GROWTH,
+    small_growth: float = GROWTH,
 ) -> Array:
     """End points of the elements, graded towards X = L and towards steps of the pressure.
 

@@ -71,6 +71,7 @@ class ElasticStrip(eqx.Module):
             self.model.end_size,
             contact.steps(strip.length),
             far_size=self.model.far_size,
+            small_growth=self.model.small_growth,
         )
         rule = self.element_rule
         self.x, self.lengths = elements.nodes(rule, ends), jnp.diff(ends)

@@ -18,7 +18,15 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import is_traced, require
-from jbeamshell.mechanics.elements import CONTACT_LINE_FAR_SIZE, FAR_SIZE, ORDER, table_steps
+from jbeamshell.mechanics.elements import (
+    CONTACT_LINE_FAR_SIZE,
+    FAR_SIZE,
+    GROWTH,
+    ORDER,
+    SMALL_GROWTH,
+    TINY,
+    table_steps,
+)
 from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
 from jbeamshell.mechanics.homogeneous import shear_modulus, youngs_modulus
 from jbeamshell.mechanics.kinematics import FIELDS
@@ -320,6 +328,11 @@ class Model(ModelKeys):
     def far_size(self) -> float:
         """Largest elements before the node count scales all, over L."""
         return CONTACT_LINE_FAR_SIZE if self.solution == "condensed" else FAR_SIZE
+
+    @property
+    def small_growth(self) -> float:
+        """Growth of elements below H/48: fast if the smallest ones serve the last node alone."""
+        return SMALL_GROWTH if self.end_size < TINY else GROWTH
 
     @property
     def walks(self) -> bool:
