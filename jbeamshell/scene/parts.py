@@ -289,7 +289,7 @@ class Model(ModelKeys):
     (Newton's method at every load level), "masing" (the loop is the mean backbone of a pull and a
     push, doubled), "masing-pull" (of a pull alone), "closed-form" (Goodman's bar), "condensed" or
     "plane" (see `jbeamshell.condensed`).  ``end_size`` is that before the node count scales all
-    elements.
+    elements; below 1e-4 it serves the last node alone, and elements below H/48 grow fast.
     """
 
     def __check_init__(self) -> None:
