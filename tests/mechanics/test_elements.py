@@ -112,8 +112,8 @@ def test_small_elements_grow_fast_up_to_where_others_begin():
     eta, end = 0.1, 2.0**-16 / 48.0
     model = jb.Model(nodes=97, end_size=end)
     assert model.small_growth == grid.SMALL_GROWTH > jb.Model(end_size=1e-3).small_growth
-    sizes = {"far_size": 1.0 / 15.0, "small_growth": model.small_growth}
-    x = np.asarray(grid.vertices(96, 2.0, eta, end, **sizes))
+    grading = {"far_size": 1.0 / 15.0, "small_growth": model.small_growth}
+    x = np.asarray(grid.vertices(96, 2.0, eta, end, **grading))
     sizes = np.diff(x)
     assert (np.diff(sizes) < 1e-12).all()
     # Before scaling, elements grow from the end to H/48 at SMALL_GROWTH per distance, and then at
