@@ -4,8 +4,9 @@ Linear elements of the four fields with linear kinematics, small enough to be de
 full quadrature (two Gauss points are exact for all products) thin strips lock: beta is linear and
 w' constant within an element, so g = w' - beta + H psi' vanishes throughout only if beta' does, and
 an element of length l bends 1 + (l/H)^2 kappa G/(2E') times too stiffly.  One point for all strains
-frees that, but does not see a psi that alternates from node to node; the energy H E' psi^2 is
-therefore taken at the nodes, which keeps the squeeze's matrix an M-matrix.
+frees that, but does not see a psi that alternates from node to node; psi is therefore taken at the
+nodes, which keeps the squeeze's matrix an M-matrix.  There e differs from its mean so that N does
+not vary with psi, or thin strips would lock as nu nears 1/2.
 """
 
 from __future__ import annotations
@@ -23,16 +24,20 @@ GAUSS = 0.5 + 0.5 / np.sqrt(3.0) * np.array([-1.0, 1.0])
 
 
 class Rule(NamedTuple):
-    """Points on [0, 1] of an element, two of weight 1/2 each: of psi itself, and of the others."""
+    """Points on [0, 1] of an element, two of weight 1/2 each: of psi itself, and of the others.
+
+    If ``even`` is True, e follows psi so that N is even.
+    """
 
     squeeze: np.ndarray
     others: np.ndarray
+    even: bool = False
 
 
 MIDDLE, NODES = np.array([0.5, 0.5]), np.array([0.0, 1.0])
 LIBRARY = "one point, squeeze at nodes"  # its finite differences
 RULES = {
-    LIBRARY: Rule(NODES, MIDDLE),
+    LIBRARY: Rule(NODES, MIDDLE, even=True),
     "one point": Rule(MIDDLE, MIDDLE),
     "full": Rule(GAUSS, GAUSS),
     "squeeze full, others one point": Rule(GAUSS, MIDDLE),
@@ -46,9 +51,11 @@ def stiffness(scene: jb.Scene, x: np.ndarray, rule: Rule) -> np.ndarray:
     first, last = np.eye(8)[:, None].reshape(2, 4, 8, 1)  # fields of both ends, per unknown
     slope = (last - first) / size
     parts = np.zeros((size.size, 8, 8))
-    for squeeze, other in zip(*rule, strict=True):
+    for squeeze, other in zip(rule.squeeze, rule.others, strict=True):
         at, inside = (first + place * (last - first) + 0.0 * slope for place in (other, squeeze))
         strains = np.array(linear_strains((*at[:3], inside[3]), tuple(slope), half_height))
+        if rule.even:
+            strains[0] -= section[0, 3] / section[0, 0] * (inside[3] - 0.5 * (first + last)[3])
         parts += np.einsum("s,iks,ij,jls->skl", 0.5 * size, strains, section, strains)
     whole = np.zeros([len(FIELDS) * x.size] * 2)
     places = len(FIELDS) * np.arange(x.size - 1)[:, None] + np.arange(8)

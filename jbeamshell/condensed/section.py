@@ -10,7 +10,7 @@ from jax import Array
 from jbeamshell.mechanics.homogeneous import plane_modulus, plane_stiffness, shear_modulus
 from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS, Section, linear_strains
 from jbeamshell.mechanics.layered import Material, layered_form
-from jbeamshell.mechanics.section_form import SectionForm, section_stiffness
+from jbeamshell.mechanics.section_form import SectionForm, section_stiffness, squeeze_at_even_force
 from jbeamshell.scene.scene import Scene
 
 V, W, BETA, PSI = range(len(FIELDS))
@@ -44,8 +44,7 @@ def _plane(scene: Scene) -> SectionForm:
 def _beam(scene: Scene) -> SectionForm:
     """Section of the beamshell (homogeneous, layered, or of a quadratic Phi), or of order p.
 
-    The elements are those of the finite differences of `jbeamshell.mechanics.elements`: strains in
-    the middle, but the squeeze strain of the beamshell at the nodes.
+    The elements are those of the finite differences of `jbeamshell.mechanics.elements`.
     """
     model, half_height = scene.model, scene.strip.half_height
     section, phi = scene.hierarchic_section(), scene.strain_energy()
@@ -72,9 +71,9 @@ def _beam(scene: Scene) -> SectionForm:
 
     parts = jax.jacfwd(moved)  # (2, m) displacements of a material point per field
     stiffness = section_stiffness(energy, still)
-    squeeze = stiffness[0, PSI, 0, PSI] if section is None else 0.0
-    # At the nodes psi^2 has the mean of its squares, beyond the square of its mean.
-    spread = jnp.zeros((still.size, still.size), still.dtype).at[PSI, PSI].set(0.25 * squeeze)
+    free = squeeze_at_even_force(stiffness) if section is None else 0.0
+    # The squares of psi at an element's nodes have another mean than the square of its mean.
+    spread = jnp.zeros((still.size, still.size), still.dtype).at[PSI, PSI].set(0.25 * free)
     held = np.isin(np.arange(still.size), [V, BETA, *range(len(FIELDS), still.size, 2)])
     modes = jnp.zeros((5, 2, still.size), still.dtype)
     modes = modes.at[[0, 1, 2, 3, 4], [1, 1, 1, 0, 1], [V, W, BETA, PSI, PSI]].set(1.0)

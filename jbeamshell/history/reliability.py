@@ -18,7 +18,6 @@ import jax
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import is_traced
 from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.choice import may_condense
@@ -34,8 +33,6 @@ STEPS = 1.5  # factor on the estimated error of a grid that steps of the pressur
 REFINED = 0.15  # least error of a refined grid, over that of the rule: measured .02 to .13
 RESTING = 2.0  # error of the dissipation over the part of the load that single sliders hold
 TOLERANCE = 0.02  # relative error of the dissipation below which there is never a doubt
-LOCKING = 2.1e-5  # factor of the error by locking, measured on so many nodes:
-LOCKING_NODES = 65
 OVERSHOOT = 1.0  # error under arc-length control, times the load steps per half cycle
 FINER = "take a smaller model.end_size or more model.nodes"
 
@@ -154,24 +151,6 @@ def slider_error(cycle: SlipCycle) -> Array:
     return numbers.where(numbers.isfinite(cycle.slip_stiffness) & (load > 0.0), error, 0.0)
 
 
-def locking_error(scene: Scene) -> Array:
-    """Estimated relative error of finite differences that lock in thin strips, as nu nears 1/2.
-
-    It is 2.1e-5/((1 - 2 nu) eta) on 65 nodes, and falls with the size of the elements to the power
-    1.5.  Layers lock if all of them do.  A rule that was measured (calibration/campaign.py).
-    """
-    strip, model = scene.strip, scene.model
-    numbers: Any = jax.numpy if is_traced(strip) else np
-    beamshell = "psi" in model.fields and model.order == 0 and model.solution != "plane"
-    if not (beamshell and model.grid == "finite-difference" and strip.plane == "strain"):
-        return numbers.zeros(())
-    ratio = strip.poisson_ratio if strip.layers is None else numbers.min(strip.layers[:, 2])
-    room, height = 1.0 - 2.0 * numbers.asarray(ratio), numbers.asarray(strip.height_ratio)
-    size = (LOCKING_NODES - 1.0) / (model.nodes - 1.0)
-    error: Array = LOCKING * size**1.5 / (room * height)
-    return error
-
-
 def doubted_from(tolerance: float) -> float:
     """Estimated error of the dissipation from which on a run is doubted, for its model.tolerance.
 
@@ -184,10 +163,9 @@ def doubted_from(tolerance: float) -> float:
 def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tuple[Array, ...]:
     """Estimated relative errors of a scene's dissipation.
 
-    They are those of the grid, of the loaded corner, of single nodes and of locking.  That of a
-    grid that was refined is the change that this made, which is larger than what is left, and not
-    less than a part of the rule's, because two coarse grids may agree by chance.  Locking is a part
-    of it.
+    They are those of the grid, of the loaded corner and of single nodes.  That of a grid that was
+    refined is the change that this made, which is larger than what is left, and not less than a
+    part of the rule's, because two coarse grids may agree by chance.
 
     The corner has none on the contact line of a section or of a lap joint, where it opens exactly,
     unless friction is elastic: the point reaction then holds the last node by a slider that is the
@@ -201,9 +179,8 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     """
     grid, corner = dissipation_errors(cycle)
     numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
-    locking = locking_error(scene)
     if change is not None:
-        grid, locking = numbers.maximum(change, REFINED * grid), numbers.zeros(())
+        grid = numbers.maximum(change, REFINED * grid)
     elif scene.contact.jumps > 1:
         grid = STEPS * grid
     if scene.model.solution == "condensed" or scene.member.support != "none":
@@ -211,7 +188,7 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
         corner = numbers.where(elastic, corner, 0.0)
     soft = numbers.asarray(scene.contact.stick_stiffness) < IDEAL
     slider = numbers.where(soft, slider_error(cycle), 0.0)
-    return grid, corner, slider, numbers.asarray(locking)
+    return grid, corner, slider
 
 
 def change_of(coarse: Run, fine: Run) -> Array:
@@ -308,7 +285,7 @@ def _resolution(history: Run) -> tuple[str, ...]:
     with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
         cycle = jax.tree.map(np.asarray, history.slip_cycle)
         errors = estimates(history.scene, cycle, history.change)
-        grid, corner, slider, locking = map(float, errors)
+        grid, corner, slider = map(float, errors)
     plane = history.scene.model.solution == "plane"  # it has a grid of its own
     finer = "take more model.nodes" if plane else FINER
     if "nodes" in history.scene.model.open:  # given nodes may change how the scene is solved
@@ -333,14 +310,6 @@ def _resolution(history: Run) -> tuple[str, ...]:
         found.append(
             f"{_off(slider)}: the strip rests on single nodes, whose elastic sliders are the "
             f"softer, the shorter the elements; {_slider_fix(history.scene)}"
-        )
-    if locking > allowed:
-        model = history.scene.model
-        more = finer if "nodes" in model.open else "take more model.nodes"  # smaller ends lock more
-        other = "model.rung = plane" if model.condensed else "model.grid = collocation"
-        found.append(
-            f"{_off(locking)}: finite differences lock where a strip is thin or nearly "
-            f"incompressible; {more}, or {other}"
         )
     return tuple(found)
 

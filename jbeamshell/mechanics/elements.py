@@ -6,7 +6,9 @@ friction, contact and pressure act at the nodes with Lobatto weights.
 * ``finite-difference``: p = 1, the midpoint (box) scheme, second order.  The squeeze strain itself
   (not its slope) is taken at the two nodes instead of the midpoint.  That keeps its matrix an
   M-matrix: psi does not oscillate at a load edge even if an element is longer than the decay
-  length of psi.
+  length of psi.  The extension e has the same mean, and differs at the two nodes by so much that
+  the normal force N does not vary with psi.  With an even e a thin strip would lock as nu nears
+  1/2 (enhanced assumed strains; Simo & Rifai 1990).
 * ``collocation``: p = 2, the two-point Gauss scheme, fourth order on smooth problems.
 
 Elements are graded towards the loaded end X = L, where the traction concentrates, and towards

@@ -155,6 +155,19 @@ def forces(energy: Energy, strains: Strains) -> Strains:
     return Strains(*jax.grad(lambda s: energy(*s))(strains))
 
 
+def contraction(energy: Energy, zero: Array) -> Array:
+    """Contraction -de/dpsi at constant N, Phi_epsi/Phi_ee of small strains.
+
+    Parameters
+    ----------
+    energy : Phi(e, g, k, psi, psi')
+    zero : scalar zero, for its precision
+    """
+    rest = Strains(zero, zero, zero, zero, zero)
+    stiffness = jax.jacfwd(lambda s: forces(energy, s).e)(rest)
+    return stiffness.psi / stiffness.e
+
+
 def shear_coefficient(nu: ArrayLike) -> Array:
     """Shear coefficient of a rectangular section, ``kappa = 10 (1 + nu) / (12 + 11 nu)``.
 

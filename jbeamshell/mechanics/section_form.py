@@ -15,7 +15,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.mechanics.kinematics import Section
+from jbeamshell.mechanics.kinematics import FIELDS, Section
+
+V, W, BETA, PSI = range(len(FIELDS))
 
 
 class SectionForm(NamedTuple):
@@ -81,6 +83,19 @@ def section_stiffness(energy: Callable[[Section, Section], Array], like: Array) 
     return jax.hessian(lambda both: energy(both[0], both[1]))(
         jnp.zeros((2, *like.shape), like.dtype)
     )
+
+
+def squeeze_at_even_force(stiffness: Array) -> Array:
+    """Stiffness of a beamshell against psi where e follows so that N stays as it is.
+
+    It is Phi_psipsi - Phi_epsi^2/Phi_ee, for a straight strip as for a curved one.
+
+    Parameters
+    ----------
+    stiffness : (2, m, 2, m, ...) second derivatives, see `section_stiffness`
+    """
+    coupling = stiffness[0, PSI, 1, V]
+    return stiffness[0, PSI, 0, PSI] - coupling**2 / stiffness[1, V, 1, V]
 
 
 def on_symmetry_plane(form: SectionForm) -> SectionForm:

@@ -5,8 +5,9 @@ An element of length h has, for the fields i and j of its ends a and b, the stif
     K = h c M_ss + c' M_sd + c'' M_ds + c''' M_dd/h,
 
 where M is the Hessian of the section's strain energy in its fields s and their slopes d, and the c
-are integrals of the element's shapes.  Each entry of a block is an array over the nodes; further
-axes are lanes: strips that are solved together.
+are integrals of the element's shapes.  The squeeze strain of the beamshell, which is taken at the
+nodes, adds what `squeeze_at_even_force` tells.  Each entry of a block is an array over the nodes;
+further axes are lanes: strips that are solved together.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.quasistatic.system import System, V, W
+from jbeamshell.mechanics.section_form import squeeze_at_even_force
+from jbeamshell.quasistatic.system import PSI, System, V, W
 
 Blocks = list[list[Array]]  # m x m entries, (n, ...) each
 
@@ -83,17 +85,20 @@ def _elements(system: System, section: Array) -> Array:
     fields.
     """
     rule = system.element_rule
-    shapes = np.stack([system.shapes(i) for i in range(system.model.width)])
     given = section[:, :, :, :, None]  # the axis of the elements
 
-    def integral(paths: str, *factors: np.ndarray) -> np.ndarray:
-        found = np.einsum(paths, rule.weights, *factors).astype(section.dtype)
-        return found.reshape(*found.shape, *[1] * (given.ndim - 4))
+    def integral(one: np.ndarray, other: np.ndarray) -> Array:
+        found = np.einsum("q,qa,qb->ab", rule.weights, one, other).astype(section.dtype)
+        return jnp.asarray(found.reshape(*found.shape, *[1] * (given.ndim - 2)))
 
-    ss = integral("q,iqa,jqb->abij", shapes, shapes) * given[0, :, 0]
-    sd = integral("q,iqa,qb->abi", shapes, rule.slopes)[:, :, :, None] * given[0, :, 1]
-    ds = integral("q,qa,jqb->abj", rule.slopes, shapes)[:, :, None] * given[1, :, 0]
-    dd = integral("q,qa,qb->ab", rule.slopes, rule.slopes)[:, :, None, None] * given[1, :, 1]
+    ss = integral(rule.values, rule.values) * given[0, :, 0]
+    sd = integral(rule.values, rule.slopes) * given[0, :, 1]
+    ds = integral(rule.slopes, rule.values) * given[1, :, 0]
+    dd = integral(rule.slopes, rule.slopes) * given[1, :, 1]
+    if system.section is None:
+        apart = rule.squeeze - rule.values
+        free = integral(apart, apart)[:, :, 0, 0] * squeeze_at_even_force(given)
+        ss = ss.at[:, :, PSI, PSI].add(free)
     return ss * system.lengths + (sd + ds) + dd * (1.0 / system.lengths)
 
 

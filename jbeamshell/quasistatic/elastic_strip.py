@@ -11,7 +11,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.mechanics import elements
 from jbeamshell.mechanics.hierarchic import Hierarchic
-from jbeamshell.mechanics.homogeneous import Energy, forces
+from jbeamshell.mechanics.homogeneous import Energy, contraction, forces
 from jbeamshell.mechanics.kinematics import (
     FIELDS,
     KINEMATICS,
@@ -44,6 +44,7 @@ class ElasticStrip(eqx.Module):
     curvature : alpha' before loading; None for a straight strip
     youngs_modulus : E; None for a laminate
     model : choices of the model
+    contraction : Phi_epsi/Phi_ee at rest, the fall of e per psi at which N stays
     quadratic_energy : True if the strain energy is a quadratic form of the strains
     """
 
@@ -57,12 +58,14 @@ class ElasticStrip(eqx.Module):
     half_height: Array
     curvature: Array | None
     youngs_modulus: Array | None
+    contraction: Array
     model: Model = eqx.field(static=True)
     quadratic_energy: bool = eqx.field(static=True)
 
     def __init__(self, scene: Scene) -> None:
         strip, contact, self.model = scene.strip, scene.contact, scene.model
         self.energy, self.section = scene.strain_energy(), scene.hierarchic_section()
+        self.contraction = contraction(self.energy, jnp.zeros_like(strip.half_height))
         self.quadratic_energy = scene.energy is None
         ends = elements.vertices(
             (self.model.nodes - 1) // self.element_order,
@@ -200,12 +203,6 @@ class ElasticStrip(eqx.Module):
 
         return section_stiffness(energy, jnp.zeros(self.model.width, self.x.dtype))
 
-    def shapes(self, field: int) -> np.ndarray:
-        """Interpolation (points, p+1) of a field from an element's nodes to its strain points."""
-        # The beamshell's squeeze strain is integrated at the nodes, so that it does not oscillate.
-        nodal = field == PSI and self.section is None
-        return self.element_rule.squeeze if nodal else self.element_rule.values
-
     def _fields_and_slopes(self, q: Array) -> tuple[list[Array], list[Array]]:
         """Fields and their slopes at all points of all elements, (points, elements) each."""
 
@@ -214,8 +211,11 @@ class ElasticStrip(eqx.Module):
             return jnp.asarray(sum(s[:, None] * v for s, v in zip(shape.T, values.T, strict=True)))
 
         rule = self.element_rule
+        shapes = [rule.values] * self.model.width
+        if self.section is None:
+            shapes[PSI] = rule.squeeze
         nodal = [elements.gather(column, self.element_order) for column in q.T]
-        section = [at(self.shapes(field), values) for field, values in enumerate(nodal)]
+        section = [at(shape, values) for shape, values in zip(shapes, nodal, strict=True)]
         slope = [at(rule.slopes, values) / self.lengths for values in nodal]
         if self.curvature is not None:
             inside = rule.values @ rule.nodes
@@ -227,6 +227,12 @@ class ElasticStrip(eqx.Module):
         """Strains of the beamshell at all points of all elements, (points, elements) each."""
         section, slope = self._fields_and_slopes(q)
         straight = slice(len(FIELDS))
-        return self._kinematics.strains(
+        strains = self._kinematics.strains(
             section[straight], slope[straight], self.half_height, self.curvature
         )
+        if self.section is not None:
+            return strains
+        # So e varies within an element that N does not vary with psi: see `mechanics.elements`.
+        weights = self.element_rule.weights
+        mean = [jnp.sum(weights[:, None] * part, axis=0) for part in (strains.e, strains.psi)]
+        return strains._replace(e=mean[0] - self.contraction * (strains.psi - mean[1]))

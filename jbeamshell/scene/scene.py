@@ -367,7 +367,7 @@ class Scene(Tree):
         fix = "is for loads under constant pressures, at rest; for vibrations take "
         fix += "jb.dynamics.Joint.of(scene) in a structure"
         require("member.support", support, support == "none", fix)
-        if "solution" not in self.model.open:
+        if "solution" not in self.model.open or self.model.solution == "stepwise":
             return self
         return self.replace({"model.solution": "stepwise"})
 

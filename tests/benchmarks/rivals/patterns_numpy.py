@@ -95,6 +95,9 @@ def _element_forces(lengths: np.ndarray, half_height: float) -> np.ndarray:
     strains[:, :, 1, 3::4] = half_height * slope
     strains[:, :, 2, 2::4] = strains[:, :, 4, 3::4] = slope
     strains[0, :, 3, 3] = strains[1, :, 3, 7] = 1.0
+    # e follows psi to either side of its mean, so that the normal force is even.
+    strains[0, :, 0, 3::4] = 0.5 * coupling * np.array([-1.0, 1.0])
+    strains[1, :, 0, 3::4] = 0.5 * coupling * np.array([1.0, -1.0])
     stiffness = np.sum(np.swapaxes(strains, 2, 3) @ law @ strains, axis=0)
     return 0.5 * lengths[:, None, None] * stiffness[:, :, ACTIVE]
 
