@@ -68,7 +68,6 @@ PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
 STEPWISE = Grid(161, END_SIZE, 1.5, 40)
-LIFTING = Grid(161, 1.0 / 48.0, 1.5, 40)  # the same for strips that may lift
 ARC_STEPS = 120  # load steps per half cycle, whose chords are shorter than a bending path
 
 
@@ -98,7 +97,7 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     found["fields"] = fields
     solution = found.get("solution", model.solution)
     soft = "nodes" in open_model and _is_soft(scene, numbers)
-    grid = _grid(solution, soft=soft, lifts="w" in fields)
+    grid = _grid(solution, soft)
     if "end_size" in open_model:
         found["end_size"] = grid.end_size
     if "nodes" in open_model:
@@ -111,13 +110,13 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     )
 
 
-def _grid(solution: str, soft: bool, lifts: bool) -> Grid:
+def _grid(solution: str, soft: bool) -> Grid:
     """Grid of a kind of strip for the tolerance `KNOWN`."""
     if solution == "plane":
         return PLANE
     if solution in CONDENSED:
         return SOFT_CONTACT_LINE if soft else CONTACT_LINE
-    return LIFTING if lifts else STEPWISE
+    return STEPWISE
 
 
 def _is_soft(scene: Parts, numbers: Numbers | None) -> bool:
@@ -146,7 +145,7 @@ def refinements(scene: Parts) -> int:
     model = scene.model
     if "nodes" not in model.open:
         return 0
-    halvings = range(1, _grid(model.solution, _is_soft(scene, None), lifts=True).halvings + 1)
+    halvings = range(1, _grid(model.solution, _is_soft(scene, None)).halvings + 1)
     return sum(2**times * (model.nodes - 1) < MOST_REFINED for times in halvings)
 
 

@@ -26,7 +26,7 @@ TABLE = jnp.array([[0.0, 10.0], [1.0, 9.0], [2.0, 10.0]])
 SCENE = jb.Scene(
     contact=jb.Contact(pressure=TABLE, law=ElasticSlip(16.0)),
     load=jb.Load(steps_per_half_cycle=20, cycles=1),
-    model=jb.Model(nodes=41, kinematics="linear"),
+    model=jb.Model(nodes=41, kinematics="linear", solution="stepwise"),
 )
 
 
