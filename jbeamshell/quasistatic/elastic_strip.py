@@ -230,9 +230,9 @@ class ElasticStrip(eqx.Module):
         strains = self._kinematics.strains(
             section[straight], slope[straight], self.half_height, self.curvature
         )
-        if self.section is not None:
+        if self.section is not None or self.element_order > 1:
             return strains
-        # So e varies within an element that N does not vary with psi: see `mechanics.elements`.
+        # e varies within an element so that N does not vary with psi, see `mechanics.elements`.
         weights = self.element_rule.weights
         mean = [jnp.sum(weights[:, None] * part, axis=0) for part in (strains.e, strains.psi)]
         return strains._replace(e=mean[0] - self.contraction * (strains.psi - mean[1]))
