@@ -5,9 +5,9 @@ An element of length h has, for the fields i and j of its ends a and b, the stif
     K = h c M_ss + c' M_sd + c'' M_ds + c''' M_dd/h,
 
 where M is the Hessian of the section's strain energy in its fields s and their slopes d, and the c
-are integrals of the element's shapes.  The squeeze strain of the beamshell, which is taken at the
-nodes, adds what `squeeze_at_even_force` tells.  Each entry of a block is an array over the nodes;
-further axes are lanes: strips that are solved together.
+are integrals of the element's shapes.  The squeeze strain of the beamshell is taken at the nodes,
+and `squeeze_at_even_force` is the stiffness against its difference between them.  Each entry of a
+block is an array over the nodes; further axes are lanes: strips that are solved together.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ class ElasticStrip(eqx.Module):
     curvature : alpha' before loading; None for a straight strip
     youngs_modulus : E; None for a laminate
     model : choices of the model
-    contraction : Phi_epsi/Phi_ee at rest, the fall of e per psi at which N stays
+    contraction : fall of e per psi at constant N, Phi_epsi/Phi_ee of small strains
     quadratic_energy : True if the strain energy is a quadratic form of the strains
     """
 

@@ -8,9 +8,9 @@ rules were measured (calibration/campaign.py, calibration/default_settings.py).
 * A lap joint is linear, and solved on its contact line.
 * A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
   in time.  Any other strip is solved in load steps.
-* A strip may lift off.  Held down by tension, strips that do lift had a dissipation that was off by
-  1 to 10 %.  Only linear load steps with sharp friction, which follow patterns of slip, keep the
-  fields that they are given.
+* A strip that bends may lift off.  Where strips that lift were held down, their dissipation was off
+  by 1 to 10 %.  Linear load steps with sharp friction keep the fields that they are given, because
+  their fast solver knows no lift.
 * Elastic sliders have smaller elements at the loaded end.  The strip rests on its last node there,
   and the slider of a single node is as stiff as the node is long: in the limit it holds nothing.
 
@@ -92,7 +92,8 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     if "solution" in open_model:
         found["solution"] = "condensed" if linear and may_condense(scene) else "stepwise"
         simple = found["solution"] == "stepwise" and linear and sharp
-        if not simple and scene.contact.normal != "none" and "w" not in fields:
+        bends = "beta" in fields and scene.contact.normal != "none"
+        if bends and not simple and "w" not in fields:
             fields = ("v", "w", *fields[1:])
     found["fields"] = fields
     solution = found.get("solution", model.solution)

@@ -38,6 +38,17 @@ def test_rigid_motion_stores_no_energy(grid):
     assert abs(float(energy(rigid))) < 1e-20 * float(energy(bent))
 
 
+def test_collocation_stores_the_energy_of_a_strain_that_varies_along_x():
+    """v = X^2 is e = 2 X, with the energy H C11 4 L^3/3 on any mesh."""
+    linear = {"model.kinematics": "linear", "model.grid": "collocation", "model.nodes": 5}
+    scene = STRIP.replace(linear)
+    system, strip = System(scene), scene.strip
+    fields = jnp.zeros((system.x.size, 4)).at[:, 0].set(system.x**2)
+    c11 = homogeneous.plane_stiffness(strip.plane_modulus, strip.poisson_ratio, strip.plane)[1]
+    known = float(strip.half_height * c11 * 4.0 * strip.length**3 / 3.0)
+    assert float(system.strain_energy(fields)) == pytest.approx(known, rel=1e-12)
+
+
 def curved(curvature, nodes=41, **values):
     return System(
         STRIP.replace(

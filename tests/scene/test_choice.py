@@ -55,6 +55,11 @@ def test_a_strip_may_lift(values):
     assert jb.Scene().replace(values).model.fields == ("v", "w", "beta", "psi")
 
 
+@pytest.mark.parametrize("values", [{"contact.smoothing": 8.0}, {"model.kinematics": "exact"}])
+def test_a_bar_stays_a_bar(values):
+    assert jb.Scene().replace({"model.fields": ["v"]} | values).model.fields == ("v",)
+
+
 def test_linear_load_steps_keep_their_fields():
     scene = jb.Scene().replace({"model.kinematics": "linear"})
     assert scene.replace({"model.solution": "stepwise"}).model.fields == ("v", "beta", "psi")
