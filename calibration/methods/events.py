@@ -37,7 +37,8 @@ class Matrices(NamedTuple):
     pressed : (n,) R under the pressure alone
     pull : (3n,) nodal forces of a unit end force
     tributary : (n,)
-    friction, slip_stiffness : mu and k_t
+    friction : mu
+    slip_stiffness : (n,) k_t
     """
 
     stiffness: sparse.csr_array
@@ -46,7 +47,7 @@ class Matrices(NamedTuple):
     pull: np.ndarray
     tributary: np.ndarray
     friction: float
-    slip_stiffness: float
+    slip_stiffness: np.ndarray
 
 
 class Branch(NamedTuple):
@@ -82,7 +83,7 @@ def matrices(scene: jb.Scene) -> Matrices:
         pull,
         tributary,
         float(system.foundation.friction),
-        float(system.foundation.slip_stiffness),
+        np.asarray(system.foundation.slip_stiffness),
     )
 
 

@@ -228,7 +228,8 @@ def _plane_vertices(
 
 def spring_stiffness(scene: Scene, strip: Strip) -> Array:
     """Stiffness (k,) of the elastic slip of each node, k_t times its contact length."""
-    return (scene.slip_stiffness * strip.body.tributary)[: strip.body.f_t.size]
+    lengths = strip.body.tributary[: strip.body.f_t.size]
+    return scene.slip_stiffness(lengths) * lengths
 
 
 def moving_volume(strip: Strip) -> Array:

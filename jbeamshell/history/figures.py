@@ -73,7 +73,7 @@ class CycleFigures(Record, LoopFigures):
             traction=self.traction[cycle],
             reaction=self.reaction[cycle],
             friction=self.scene.contact.friction,
-            slip_stiffness=self.scene.slip_stiffness,
+            slip_stiffness=self.scene.slip_stiffness(self.tributary),
             half_height=self.scene.strip.half_height,
         )
 

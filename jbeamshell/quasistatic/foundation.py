@@ -25,7 +25,7 @@ class Foundation(eqx.Module):
     friction_law : traction of one point from its slip
     normal_law : reaction of one point from its gap and the force on it
     friction : Coulomb friction coefficient mu
-    slip_stiffness : elastic stiffness k_t of the sliders, traction per slip
+    slip_stiffness : (n,) elastic stiffness k_t of the sliders, traction per slip
     cap_floor : cap of a node without reaction
     """
 
@@ -35,7 +35,9 @@ class Foundation(eqx.Module):
     slip_stiffness: Array
     cap_floor: Array
 
-    def __init__(self, scene: Scene, normal_force: Array, force_scale: Array, area: Array) -> None:
+    def __init__(
+        self, scene: Scene, normal_force: Array, force_scale: Array, tributary: Array
+    ) -> None:
         """Foundation of a scene.
 
         Parameters
@@ -43,12 +45,12 @@ class Foundation(eqx.Module):
         scene : scene with its contact
         normal_force : F_N L, resultant of the pressure on the top face
         force_scale : mu F_N L, or F_N L without friction
-        area : contact area per unit width
+        tributary : (n,) contact length of each node
         """
         strip, contact = scene.strip, scene.contact
         self.friction_law, self.friction = contact.law, contact.friction
-        self.slip_stiffness = scene.slip_stiffness
-        self.cap_floor = CAP_FLOOR * force_scale / area
+        self.slip_stiffness = scene.slip_stiffness(tributary)
+        self.cap_floor = CAP_FLOOR * force_scale / jnp.sum(tributary, axis=0)
         stiffness = strip.plane_modulus / strip.half_height
         self.normal_law = Rigid(stiffness)
         if contact.normal == "none":
@@ -84,7 +86,7 @@ class Foundation(eqx.Module):
     ) -> Array:
         """Friction traction (n,) after an increment of slip (n,); ``rough`` = 0 is no friction."""
         cap = self.cap(reaction)
-        law = jax.vmap(self.friction_law.traction, in_axes=(0, 0, 0, None))
+        law = jax.vmap(self.friction_law.traction, in_axes=(0, 0, 0, 0))
         rough = jnp.where(self.friction > 0.0, rough, 0.0)
         # Without reaction there is no traction, not even the floor's, whose sign would alternate.
         closed = jnp.clip(cap / self.cap_floor - 1.0, 0.0, 1.0)
@@ -98,7 +100,7 @@ class Foundation(eqx.Module):
         old, new : (n,) increments of slip of the last and of the next iterate
         traction_before, cap : (n,) traction and cap at the start of the step
         """
-        limited = jax.vmap(self.friction_law.limit, in_axes=(0, 0, 0, 0, None))(
+        limited = jax.vmap(self.friction_law.limit, in_axes=(0, 0, 0, 0, 0))(
             old, new, traction_before, cap, self.slip_stiffness
         )
         return jnp.where(self.has_friction(cap), limited, new)
@@ -113,7 +115,7 @@ class Foundation(eqx.Module):
         slip : (n,) increment of v
         tractions, caps : (n,) each, at the start and at the end of the step
         """
-        work = jax.vmap(self.friction_law.slip_work, in_axes=(0, 0, 0, 0, 0, None))(
+        work = jax.vmap(self.friction_law.slip_work, in_axes=(0, 0, 0, 0, 0, 0))(
             slip, *tractions, *caps, self.slip_stiffness
         )
         acts = (self.friction > 0.0) & self.has_friction(jnp.maximum(*caps))

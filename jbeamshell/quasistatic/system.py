@@ -119,8 +119,7 @@ class System(ElasticStrip):
         self.stiffness_scale = strip.stretching_stiffness / strip.length
         normal_force = jnp.sum(self.load)
         self.force_scale = normal_force * jnp.where(friction > 0.0, friction, 1.0)
-        area = jnp.sum(self.tributary, axis=0)
-        self.foundation = Foundation(scene, normal_force, self.force_scale, area)
+        self.foundation = Foundation(scene, normal_force, self.force_scale, self.tributary)
         self.far_end, self.control = strip.far_end, scene.load.control
 
     @property

@@ -11,8 +11,11 @@ rules were measured (calibration/campaign.py, calibration/default_settings.py).
 * A strip that bends may lift off.  Where strips that lift were held down, their dissipation was off
   by 1 to 10 %.  Linear load steps with sharp friction keep the fields that they are given, because
   their fast solver knows no lift.
-* Elastic sliders have smaller elements at the loaded end.  The strip rests on its last node there,
-  and the slider of a single node is as stiff as the node is long: in the limit it holds nothing.
+* Where the corner may open, elements are smaller at the loaded end.  In load steps this is so only
+  if friction is without elastic slip, and not under curved strips, whose large motions round off on
+  small elements.  On the contact line elastic sliders have far smaller ones.  The strip rests on
+  its last node there, and the slider of a single node is as stiff as the node is long: in the limit
+  it holds nothing.
 
 In a JAX transformation numbers are unknown: settings stay as they were chosen for the scene that
 was changed.
@@ -68,6 +71,7 @@ PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
 STEPWISE = Grid(161, END_SIZE, 1.5, 40)
+LIFTING = Grid(161, 1.0 / 48.0, 1.5, 40)  # load steps of a strip whose corner may open
 ARC_STEPS = 120  # load steps per half cycle, whose chords are shorter than a bending path
 
 
@@ -97,8 +101,9 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
             fields = ("v", "w", *fields[1:])
     found["fields"] = fields
     solution = found.get("solution", model.solution)
-    soft = "nodes" in open_model and _is_soft(scene, numbers)
-    grid = _grid(solution, soft)
+    adapts = "nodes" in open_model or solution not in CONDENSED
+    opens = "w" in fields and scene.strip.curvature is None
+    grid = _grid(solution, opens, adapts and _is_soft(scene, numbers))
     if "end_size" in open_model:
         found["end_size"] = grid.end_size
     if "nodes" in open_model:
@@ -111,13 +116,13 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     )
 
 
-def _grid(solution: str, soft: bool) -> Grid:
+def _grid(solution: str, opens: bool, soft: bool) -> Grid:
     """Grid of a kind of strip for the tolerance `KNOWN`."""
     if solution == "plane":
         return PLANE
     if solution in CONDENSED:
         return SOFT_CONTACT_LINE if soft else CONTACT_LINE
-    return STEPWISE
+    return LIFTING if opens and not soft else STEPWISE
 
 
 def _is_soft(scene: Parts, numbers: Numbers | None) -> bool:
@@ -146,7 +151,8 @@ def refinements(scene: Parts) -> int:
     model = scene.model
     if "nodes" not in model.open:
         return 0
-    halvings = range(1, _grid(model.solution, _is_soft(scene, None)).halvings + 1)
+    grid = _grid(model.solution, "w" in model.fields, _is_soft(scene, None))
+    halvings = range(1, grid.halvings + 1)
     return sum(2**times * (model.nodes - 1) < MOST_REFINED for times in halvings)
 
 

@@ -140,7 +140,7 @@ class ContactKeys(Part):
     )
     stick_stiffness: Array = number(
         1000.0,
-        "Elastic slip stiffness in units of G/H: k_t = alpha G/H.",
+        "Elastic slip stiffness in units of G/H: k_t = alpha G/H; friction is ideal from 1000 on.",
         symbol=r"\alpha",
     )
     normal: str = word(

@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.errors import InputError
@@ -256,16 +257,25 @@ class Scene(Tree):
         alpha = self.contact.stick_stiffness
         return self.model.condensed and not is_traced(alpha) and float(alpha) >= IDEAL
 
-    @property
-    def slip_stiffness(self) -> Array:
-        """Elastic stiffness k_t = alpha G/H of the sliders, traction per slip."""
-        strip = self.strip
-        stiffness = self.contact.stick_stiffness * strip.shear_modulus / strip.half_height
-        if not self.ideal_friction:
-            return stiffness
-        numbers: Any = np if isinstance(stiffness, np.ndarray | np.generic) else jnp  # much faster
-        rigid: Array = numbers.full_like(stiffness, np.inf)
-        return rigid
+    def slip_stiffness(self, tributary: ArrayLike) -> Array:
+        """Elastic stiffness k_t of the sliders at nodes, traction per slip.
+
+        It is alpha G/H.  Sliders from alpha = `IDEAL` on stand for friction without elastic slip.
+        On the contact line they are rigid.  In load steps a node of length l < H has alpha G/l, so
+        that its slider is as stiff as that of a longer one.
+
+        Parameters
+        ----------
+        tributary : contact length l of each node
+        """
+        strip, alpha = self.strip, self.contact.stick_stiffness
+        numbers: Any = jnp if is_traced(strip, alpha, tributary) else np  # much faster
+        if self.ideal_friction:
+            rigid: Array = numbers.full_like(tributary, np.inf)
+            return rigid
+        length = numbers.where(alpha >= IDEAL, tributary, strip.half_height)
+        each: Array = alpha * strip.shear_modulus / numbers.minimum(length, strip.half_height)
+        return each
 
     def get(self, key: str) -> Any:
         """Value of a dotted key, such as ``scene.get("strip.height_ratio")``."""

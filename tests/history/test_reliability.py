@@ -110,7 +110,7 @@ def even_cycle(nodes, slip=1.0):
         traction=2.0 * there - 1.0,
         reaction=np.full_like(there, 2.0),
         friction=np.asarray(0.5),
-        slip_stiffness=np.asarray(np.inf),
+        slip_stiffness=np.asarray([np.inf]),
         half_height=np.asarray(1.0),
     )
 
@@ -131,6 +131,17 @@ def test_the_error_of_the_grid_counts_the_nodes_that_share_the_work(nodes):
     assert found == pytest.approx(reliability.SAFETY * 0.5 * 1.0 / work)
 
 
+def test_long_load_steps_are_doubted_for_a_reaction_that_changes_within_them():
+    even = even_cycle(64)
+    changing = even._replace(reaction=even.reaction * np.array([[0.5], [1.5], [0.5]]))
+    assert reliability.step_error(even) == 0.0
+    assert reliability.step_error(changing) == pytest.approx(reliability.WITHIN_STEPS)
+    assert reliability.step_error(even_cycle(64, slip=0.0)) == 0.0
+    line, steps = jb.Scene(), jb.Scene().replace({"model.solution": "stepwise"})
+    assert reliability.estimates(line, changing)[3] == 0.0
+    assert reliability.estimates(steps, changing)[3] == reliability.step_error(changing)
+
+
 @pytest.mark.parametrize("rung", ["condensed-squeeze", "masing"])
 def test_where_nothing_slips_the_estimate_is_infinite(rung):
     scene = jb.Scene().replace({"model.rung": rung})
@@ -139,17 +150,21 @@ def test_where_nothing_slips_the_estimate_is_infinite(rung):
     assert np.max(reliability.estimates(scene, even_cycle(64))) == pytest.approx(64**-1.5)
 
 
-def test_the_corner_of_a_contact_line_counts_where_friction_is_elastic():
+def test_a_corner_that_may_open_counts_where_friction_is_elastic():
     even = even_cycle(4)
     rigid = even._replace(
         reaction=even.reaction + 2.0 * (even.x == 4),
         v=even.v * np.where(even.x < 4, 0.5, 1.0),
     )
+    elastic = rigid._replace(slip_stiffness=np.asarray([1e6]))
     line, steps = jb.Scene(), jb.Scene().replace({"model.solution": "stepwise"})
-    elastic = rigid._replace(slip_stiffness=np.asarray(1e6))
-    assert reliability.estimates(line, rigid)[1] == 0.0
-    assert reliability.estimates(line, elastic)[1] == reliability.estimates(steps, elastic)[1] > 0.0
-    refined = reliability.estimates(line, elastic, np.asarray(0.01))
+    lifting = steps.replace({"model.fields": ["v", "w", "beta", "psi"]})
+    soft, soft_lifting = (s.replace({"contact.stick_stiffness": 999.0}) for s in (line, lifting))
+    open_ends = [reliability.estimates(scene, rigid)[1] for scene in (line, lifting)]
+    held = [reliability.estimates(scene, elastic)[1] for scene in (soft, soft_lifting, steps)]
+    assert open_ends == [0.0, 0.0]
+    assert held[0] == held[1] == held[2] > 0.0
+    refined = reliability.estimates(soft, elastic, np.asarray(0.01))
     grid = reliability.dissipation_errors(elastic)[0]
     assert refined[:2] == (max(0.01, reliability.REFINED * grid), 0.0)
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.scene.choice import CONTACT_LINE, SOFT_CONTACT_LINE
+from jbeamshell.scene.choice import CONTACT_LINE, LIFTING, SOFT_CONTACT_LINE, STEPWISE
 
 ROTATING = {"contact.pressure": 500.0, "load.amplitude": 40.0}
 
@@ -66,15 +66,24 @@ def test_linear_load_steps_keep_their_fields():
 
 
 def test_load_steps_lift_as_the_contact_line_does():
-    """Kept down, this strip would dissipate 1.1 % more."""
-    falling = [[0.0, 18.0], [2.0, 5.8]]
-    thick = {"strip.height_ratio": 0.37, "strip.poisson_ratio": 0.06, "strip.kappa_s": 1.04}
-    load = {"contact.friction": 0.06, "load.amplitude": 0.54, "contact.pressure": falling}
-    scene = jb.Scene().replace(thick | load)
+    """Kept down, this strip would dissipate 5 % less, and as much with sliders of alpha G/H."""
+    thick = {"strip.height_ratio": 0.35, "contact.friction": 0.4, "load.amplitude": 2.0}
+    scene = jb.Scene().replace(thick)
     line = jb.solve(scene.replace({"model.kinematics": "linear"}))
     steps = jb.solve(scene.replace({"model.kinematics": "exact"}), throw=False)
     assert (line.scene.model.solution, steps.scene.model.solution) == ("condensed", "stepwise")
-    assert float(steps.dissipation) == pytest.approx(float(line.dissipation), rel=3e-3)
+    assert float(steps.dissipation) == pytest.approx(float(line.dissipation), rel=5e-3)
+
+
+def test_ideal_sliders_hold_as_much_on_small_elements_as_on_large_ones():
+    steps = jb.Scene().replace({"model.solution": "stepwise"})
+    strip, lengths = steps.strip, steps.strip.half_height * np.array([0.01, 0.5, 1.0, 3.0])
+    unit = float(strip.shear_modulus / strip.half_height)
+    ideal = steps.slip_stiffness(lengths)
+    np.testing.assert_allclose(ideal / unit, 1000.0 / np.array([0.01, 0.5, 1.0, 1.0]))
+    soft = steps.replace({"contact.stick_stiffness": 999.0}).slip_stiffness(lengths)
+    np.testing.assert_allclose(soft / unit, 999.0)
+    assert np.all(jb.Scene().slip_stiffness(lengths) == np.inf)
 
 
 def test_rotations_are_exact_where_their_bound_says_so():
@@ -112,7 +121,7 @@ def test_nodes_follow_the_tolerance():
     assert jb.Scene().replace(ramp).model.nodes - 1 == 1.5 * (nodes(0.005) - 1)
 
 
-def test_elastic_sliders_have_smaller_elements_at_the_loaded_end():
+def test_elements_at_the_loaded_end_are_small_where_the_corner_opens():
     def chosen(**values):
         model = jb.Scene().replace(values).model
         return model.nodes, model.end_size
@@ -124,6 +133,11 @@ def test_elastic_sliders_have_smaller_elements_at_the_loaded_end():
     assert chosen(**{"contact.stick_stiffness": 1000.0}) == grid(CONTACT_LINE)
     given = {"contact.stick_stiffness": 999.0, "model.nodes": 41}
     assert chosen(**given) == (41, CONTACT_LINE.end_size)
+    steps = {"model.kinematics": "exact"}
+    assert chosen(**steps) == grid(LIFTING)
+    assert chosen(**steps, **{"contact.stick_stiffness": 999.0}) == grid(STEPWISE)
+    assert chosen(**steps, **{"model.fields": ["v"]}) == grid(STEPWISE)
+    assert chosen(**{"strip.curvature": 0.01}) == grid(STEPWISE)
     over = {"contact.stick_stiffness": [50.0, 1000.0]}
     assert jb.Scene().pinned(_numbers(over)).model.nodes == SOFT_CONTACT_LINE.nodes
 

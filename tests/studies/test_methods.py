@@ -75,7 +75,7 @@ def test_events_balance_their_energy():
     supplied = np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement))
     system = System(scene)
     fields = jnp.zeros((21, 4)).at[:, events.FIELDS].set(march.q.reshape(-1, 3))
-    sliders = np.sum(strip.tributary * march.traction**2) / (2.0 * strip.slip_stiffness)
+    sliders = np.sum(strip.tributary * march.traction**2 / (2.0 * strip.slip_stiffness))
     stored = float(system.strain_energy(fields)) + sliders
     assert branch.work > 0.05 * supplied
     assert supplied == pytest.approx(stored + branch.work, rel=1e-10)

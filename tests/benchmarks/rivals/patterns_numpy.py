@@ -4,9 +4,9 @@ The same discrete problem as jbeamshell's on its finite-difference grid, and the
 round-off, but solved by guessing who sticks and who slips which way: with a guess the problem is
 linear, one banded solve, and its solution says who sticks and slips; until nothing changes.
 
-With k_t = alpha G/H, a node of plastic slip v_s has the traction t = k_t (v - v_s) while it sticks
-and t = +-mu R while it slips, where R = F_N + (dPi/dw)/l.  The plastic slip is all the memory.
-Displacements count from the pressed strip, where R = F_N and t = 0.
+With k_t = alpha G/min(l, H), a node of length l and plastic slip v_s has the traction
+t = k_t (v - v_s) while it sticks and t = +-mu R while it slips, where R = F_N + (dPi/dw)/l.  The
+plastic slip is all the memory.  Displacements count from the pressed strip, where R = F_N, t = 0.
 """
 
 import time
@@ -57,7 +57,7 @@ class Strip:
         tributary = 0.5 * (np.append(0.0, lengths) + np.append(lengths, 0.0))
         shear = 0.25 * (1.0 - POISSON) * STIFFNESS / half_height
         self.pressing = PRESSURE * tributary
-        self.slider = ALPHA * shear / half_height * tributary
+        self.slider = ALPHA * shear * tributary / np.minimum(tributary, half_height)
         forces = _element_forces(lengths, half_height)
         first, ends, local = np.arange(nodes - 1)[:, None], np.arange(2), np.arange(2 * FIELDS)
         self.stiffness = _banded(FIELDS * nodes, FIELDS * first + local, local, forces[:, ACTIVE])
