@@ -187,7 +187,7 @@ def _newton(
     method: Method,
 ) -> tuple[Array, Array, Array]:
     """Newton's iteration: change of the fields, largest residual left, iterations."""
-    limit = jax.vmap(system.foundation.friction_law.limit, in_axes=(0, 0, 0, 0, 0))
+    limit = jax.vmap(system.foundation.friction_law.limit)
 
     def size(residual: Array) -> Array:
         return jnp.max(jnp.abs(residual))

@@ -86,7 +86,7 @@ class Foundation(eqx.Module):
     ) -> Array:
         """Friction traction (n,) after an increment of slip (n,); ``rough`` = 0 is no friction."""
         cap = self.cap(reaction)
-        law = jax.vmap(self.friction_law.traction, in_axes=(0, 0, 0, 0))
+        law = jax.vmap(self.friction_law.traction)
         rough = jnp.where(self.friction > 0.0, rough, 0.0)
         # Without reaction there is no traction, not even the floor's, whose sign would alternate.
         closed = jnp.clip(cap / self.cap_floor - 1.0, 0.0, 1.0)
@@ -100,7 +100,7 @@ class Foundation(eqx.Module):
         old, new : (n,) increments of slip of the last and of the next iterate
         traction_before, cap : (n,) traction and cap at the start of the step
         """
-        limited = jax.vmap(self.friction_law.limit, in_axes=(0, 0, 0, 0, 0))(
+        limited = jax.vmap(self.friction_law.limit)(
             old, new, traction_before, cap, self.slip_stiffness
         )
         return jnp.where(self.has_friction(cap), limited, new)
@@ -115,9 +115,7 @@ class Foundation(eqx.Module):
         slip : (n,) increment of v
         tractions, caps : (n,) each, at the start and at the end of the step
         """
-        work = jax.vmap(self.friction_law.slip_work, in_axes=(0, 0, 0, 0, 0, 0))(
-            slip, *tractions, *caps, self.slip_stiffness
-        )
+        work = jax.vmap(self.friction_law.slip_work)(slip, *tractions, *caps, self.slip_stiffness)
         acts = (self.friction > 0.0) & self.has_friction(jnp.maximum(*caps))
         return jnp.where(acts, work, 0.0)
 
