@@ -198,8 +198,9 @@ def may_condense(scene: Parts) -> bool:
 def in_words(scene: Parts) -> str:
     """One line that says what a scene has chosen; empty if it left nothing open."""
     load, model = scene.load, scene.model
+    lifts = "w" in model.fields and "w" not in model.given("fields")
     shown = {
-        "solution": f"rung {model.rung}",
+        "solution": f"rung {model.rung}" + " that may lift off" * lifts,
         "kinematics": f"{model.kinematics} kinematics",
         "nodes": f"{model.nodes} nodes",
         "steps_per_half_cycle": f"{load.steps_per_half_cycle} steps per half cycle",

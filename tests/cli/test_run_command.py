@@ -48,7 +48,7 @@ def test_run_prints_text_to_read(cli):
     assert (code, err) == (0, "")
     title, chosen, *lines = out.splitlines()
     assert "v w beta psi on 21 nodes" in title
-    assert chosen == "chosen for a tolerance of 0.5 %: rung condensed-squeeze"
+    assert chosen == "chosen for a tolerance of 0.5 %: rung condensed-squeeze that may lift off"
     assert "eta = 0.2, force amplitude 0.5" in title
     figures = [line for line in lines if not line.startswith("  doubtful: ")]
     names = {line.split("  ")[1].replace(" ", "_") for line in figures}

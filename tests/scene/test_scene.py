@@ -675,8 +675,8 @@ def test_a_scene_is_printed_short_with_units():
         "  contact.bottom_pressure      table of 4 rows  [stress]",
         "  load.control                 force",
         "  load.amplitude               0.7855  [force/width]",
-        "  chosen for a tolerance of 0.5 %: rung condensed-squeeze, linear kinematics, "
-        "20 steps per half cycle",
+        "  chosen for a tolerance of 0.5 %: rung condensed-squeeze that may lift off, linear "
+        "kinematics, 20 steps per half cycle",
     ]
 
 
