@@ -60,7 +60,7 @@ def test_chosen_settings_keep_their_tolerance_or_are_doubted(rows):
     assert len(found) >= 1000
     beyond = [run.error for run in found if run.error > 0.005 and not run.doubted]
     assert len(beyond) <= 0.01 * len(found)
-    assert max(beyond) < 0.0125
+    assert max(beyond) < 0.02  # from which on a run that was not refined doubts itself
 
 
 @pytest.mark.slow
