@@ -31,7 +31,8 @@ class Problem(NamedTuple):
         mu F_N L, and the tangent's input
     limit : from an iterate and the next one to the one to go on with
     tangent : from its input and the stiffness to the matrix of the residual
-    refresh : from the unknowns to the stiffness; None if the stiffness is constant and given
+    refresh : from the unknowns and the tangent's input to the stiffness; None if the stiffness is
+        constant and given
     careful : from the residual, the tangent's input, the tolerance and the number of iterations to
         residual and input for a step that changes less, and True if it must be taken whole
     """
@@ -39,7 +40,7 @@ class Problem(NamedTuple):
     evaluate: Callable[[Array], tuple[Array, Any]]
     limit: Callable[[Array, Array], Array]
     tangent: Callable[[Any, Any], BlockTridiagonal]
-    refresh: Callable[[Array], Any] | None = None
+    refresh: Callable[[Array, Any], Any] | None = None
     careful: Callable[[Array, Any, float, Array], tuple[Array, Any, Array]] | None = None
 
 
@@ -170,7 +171,8 @@ class _Search(NamedTuple):
 
         def refreshed(state: tuple[_Iterate, Any]) -> tuple[_Iterate, Any]:
             at = self._chords(*state, state[0].tried + CHORDS)
-            return at, lax.cond(self._unfinished(at), refresh, lambda _: state[1], at.x)
+            found = at.x, at.tangent_input
+            return at, lax.cond(self._unfinished(at), refresh, lambda *_: state[1], *found)
 
         return lax.while_loop(lambda s: self._unfinished(s[0]), refreshed, (first, stiffness))[0]
 

@@ -78,13 +78,13 @@ class StepEquations(NamedTuple):
         """Matrix of the residual."""
         return matrix(self.system, stiffness, contact, self.before, self.prescribed)
 
-    def refresh(self, unknown: Array) -> Stiffness:
-        """Stiffness without the foundation's response, at the unknowns."""
+    def refresh(self, unknown: Array, contact: ContactInput) -> Stiffness:
+        """Stiffness without the foundation's response, at the unknowns and their contact input."""
         # The barrier ties it to the unknowns: the compiler would find it before it is needed.
         system, unknown = lax.optimization_barrier((self.system, unknown))
-        level, _, contact = self._advance(system, unknown)
+        q = self.before.q + system.embed(nodal(system, unknown))
         response = system.contact_response(contact, self.before, self.prescribed)
-        return stiffness_at(system, level.q, response, self.prescribed)
+        return stiffness_at(system, q, response, self.prescribed)
 
     def careful(
         self, residual: Array, contact: ContactInput, tolerance: float, tried: Array

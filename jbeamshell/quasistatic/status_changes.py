@@ -17,7 +17,7 @@ from typing import cast
 
 import jax
 import jax.numpy as jnp
-from jax import Array
+from jax import Array, lax
 
 from jbeamshell.mechanics.normal_contact import Rigid
 from jbeamshell.quasistatic.system import ContactInput, System, W
@@ -56,7 +56,8 @@ def one_change(
     changing = jax.vmap(law.changes_status)(pressed, gap)
     must = changing & (-forces[:, column] > tolerance)
     node = jnp.arange(must.size)
-    order = jnp.where(tried // TURN % 2 == 0, node, -node)
+    forwards = lax.rem(lax.div(tried, TURN), 2) == 0  # `//` and `%` would care for negative ones
+    order = jnp.where(forwards, node, -node)
     kept = changing & (order != jnp.max(order, where=must, initial=-must.size))
     force, far, other = jax.vmap(law.kept_status)(pressed, gap)
     other = other * system.tributary * system.residual_scale(W)

@@ -30,7 +30,7 @@ def test_an_iterate_within_the_tolerance_is_kept_where_the_next_step_leads_far_o
         evaluate=nearly_slipping,
         limit=lambda old, new: new,
         tangent=lambda steep, slope: row(jnp.where(steep, slope, 1e-7 * slope)[None, None]),
-        refresh=lambda x: jnp.ones(()),
+        refresh=lambda *_: jnp.ones(()),
     )
     _, (iterations, error) = Newton().solve(problem, jnp.full((1, 1), start), jnp.ones(()))
     assert error <= 1e-10
@@ -43,7 +43,7 @@ def test_no_more_steps_are_tried_than_allowed():
         evaluate=lambda x: (x, jnp.zeros(())),
         limit=lambda old, new: new,
         tangent=lambda _, slope: row(slope[None, None]),
-        refresh=lambda x: jnp.full((), 2.0),
+        refresh=lambda *_: jnp.full((), 2.0),
     )
     found = Newton(max_iterations=5).solve(problem, jnp.ones((1, 1)), jnp.full((), 2.0))
     assert found[1] == (5, 0.5**5)
