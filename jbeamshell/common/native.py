@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
+import equinox as eqx
 import jax
 from jax.experimental.xla_metadata import set_xla_metadata
+from jax.flatten_util import ravel_pytree
 
 from jbeamshell.common.checks import in_transformation, is_traced
 
@@ -14,6 +17,26 @@ from jbeamshell.common.checks import in_transformation, is_traced
 MARK = {"inlineable": "false", "xla_cpu_small_call": "true"}
 REFUSED = ("custom_call", "stablehlo.sort", "stablehlo.fft")  # operations that need the runtime
 MOST_ARRAYS = 16  # that are given to a native function: some twenty end the process (jaxlib 0.10)
+
+
+def one_call(function: Callable[..., Any], *given: Any) -> Any:
+    """Value of a function, marked for the compiler as one call.
+
+    Raises
+    ------
+    jax.errors.JaxRuntimeError
+        when the program is compiled, if the compiler cannot do an operation in a native function
+    """
+    arrays, static = eqx.partition(given, eqx.is_array)
+    arrays, unpack = ravel_pytree(arrays) if _many(arrays) else (arrays, lambda packed: packed)
+    called = jax.jit(lambda arrays: function(*eqx.combine(unpack(arrays), static)))
+    leaves, tree = jax.tree.flatten(called(arrays))
+    leaves[0] = set_xla_metadata(leaves[0], **MARK)  # marks the call that makes the leaf
+    return jax.tree.unflatten(tree, leaves)
+
+
+def _many(arrays: Any) -> bool:
+    return len(jax.tree.leaves(arrays)) > MOST_ARRAYS
 
 
 class Native:
@@ -36,13 +59,8 @@ class Native:
 
     def __init__(self, function: Callable[..., Any], *, worth: bool = True) -> None:
         self.ordinary = jax.jit(function)
-        self.whole = jax.jit(self._marked)
+        self.whole = jax.jit(functools.partial(one_call, function))
         self.fits = None if worth else False
-
-    def _marked(self, *given: Any) -> Any:
-        leaves, tree = jax.tree.flatten(self.ordinary(*given))
-        leaves[0] = set_xla_metadata(leaves[0], **MARK)  # marks the call that makes the leaf
-        return jax.tree.unflatten(tree, leaves)
 
     def now(self, *given: Any) -> Any | None:
         """Value for numbers; None if a JAX transformation asks with traced values."""
@@ -66,8 +84,8 @@ class Native:
 
 
 def _may_fit(whole: Any, given: tuple[Any, ...]) -> bool:
-    """True if the program runs on a CPU, is given few arrays, and needs no runtime."""
-    if jax.default_backend() != "cpu" or len(jax.tree.leaves(given)) > MOST_ARRAYS:
+    """True if the program runs on a CPU and needs no runtime."""
+    if jax.default_backend() != "cpu":
         return False
     text = whole.lower(*given).as_text()
     return not any(word in text for word in REFUSED)

@@ -20,21 +20,32 @@ VECTORS = "xla_backend_optimization_level"  # option without which loops stay ve
 def quick_options(*, vectors: bool = False) -> dict[str, Any] | None:
     """Compiler options for a small program: half the time to compile, the same time to run.
 
-    None where the whole process compiles with fewer optimisations anyway.  Options that this
-    release of JAX does not know are left out.
-
     Parameters
     ----------
     vectors : True for a program of many lanes side by side: it compiles a sixth longer, and runs in
         two thirds of the time
+
+    Returns
+    -------
+    dict, or None
+        see `known_options`
+    """
+    wanted = {name: value for name, value in QUICK.items() if not (vectors and name == VECTORS)}
+    return known_options(wanted)
+
+
+def known_options(wanted: dict[str, Any]) -> dict[str, Any] | None:
+    """Compiler options without those that this release of JAX does not know.
+
+    None where the whole process compiles with fewer optimisations anyway.
     """
     config: Any = jax.config
     if config.values["jax_disable_most_optimizations"]:
         return None
-    wanted = {name: value for name, value in QUICK.items() if not (vectors and name == VECTORS)}
     return {name: value for name, value in wanted.items() if _is_known(name, value)}
 
 
+@functools.cache
 def _is_known(name: str, value: Any) -> bool:
     """True if the compiler takes an option; it is asked by a program of no operation."""
     try:
@@ -53,11 +64,10 @@ class Small:
     Parameters
     ----------
     function : function of a pytree of arrays and of further arguments, which are static
-    vectors : see `quick_options`
     """
 
-    def __init__(self, function: Callable[..., Any], *, vectors: bool = False) -> None:
-        self._function, self._vectors = function, vectors
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
         self._inside = eqx.filter_jit(function)
 
     def __call__(self, given: Any, *static: Hashable) -> Any:
@@ -73,8 +83,7 @@ class Small:
             return self._function(jax.tree.unflatten(tree, leaves), *static)
 
         flat.__name__ = self._function.__name__
-        options = quick_options(vectors=self._vectors)
-        return jax.jit(flat, static_argnums=(1, 2), compiler_options=options)
+        return jax.jit(flat, static_argnums=(1, 2), compiler_options=quick_options())
 
 
 def _is_number(leaf: Any) -> bool:

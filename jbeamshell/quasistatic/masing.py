@@ -62,12 +62,13 @@ def masing(
     solver: Newton,
     method: Method = Method.NEWTON,
     recovering: bool = False,
+    native: bool = False,
 ) -> StepResults:
     """Solve the scene's own cycles by the backbones of a pull and of a push, or of a pull alone.
 
     Parameters
     ----------
-    scene, start, path, solver, method : see `jbeamshell.quasistatic.stepping.march`
+    scene, start, path, solver, method, native : see `jbeamshell.quasistatic.stepping.march`
     recovering : True walks failed steps in pieces, which cannot be traced
     """
     signs = (1.0, -1.0) if scene.model.solution == "masing" else (1.0,)
@@ -76,7 +77,7 @@ def masing(
     else:
 
         def pull(sign: Array) -> StepResults:
-            return march(scene, start, _backbone_path(scene, path, sign), solver, method)
+            return march(scene, start, _backbone_path(scene, path, sign), solver, method, native)
 
         both = lax.map(pull, jnp.asarray(signs))  # compiled once
         pulls = [jax.tree.map(lambda a, i=i: a[i], both) for i in range(len(signs))]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import warnings
 from collections.abc import Callable
 
@@ -15,7 +14,7 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.common.precision import is_single
-from jbeamshell.common.small import Small
+from jbeamshell.common.two_programs import TwoPrograms
 from jbeamshell.condensed.solve import Cycles, quickest
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.history.history import History
@@ -106,7 +105,7 @@ def solve(
     solver = solver or Newton()
     touching = None if contact is None else check_contact(scene, contact)
     method = method or _first_method(scene, whole)
-    steps, history = _solve((scene, touching, whole, np.asarray(True)), solver, method)
+    steps, history = _solve(scene, touching, whole, np.asarray(True), solver, method)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
@@ -227,7 +226,7 @@ def compile_for(
         _condensed(scene, whole, cycles, False, None, path is None)
         return
     method = _first_method(scene, whole)
-    compiled = _solve((scene, None, whole, np.asarray(False)), solver or Newton(), method)
+    compiled = _solve(scene, None, whole, np.asarray(False), solver or Newton(), method)
     jax.block_until_ready(compiled)
 
 
@@ -237,17 +236,22 @@ def _first_method(scene: Scene, path: LoadPath) -> Method:
     return Method.NEWTON if traced else Method.STATUS_ITERATION
 
 
-@functools.partial(Small, vectors=True)
+@TwoPrograms
 def _solve(
-    given: tuple[Scene, np.ndarray | None, LoadPath, ArrayLike], solver: Newton, method: Method
+    scene: Scene,
+    touching: np.ndarray | None,
+    path: LoadPath,
+    enabled: ArrayLike,
+    solver: Newton,
+    method: Method,
+    native: bool,
 ) -> tuple[StepResults, History]:
     """Results and history of a load path, from the nodes in contact and True to walk it."""
-    scene, touching, path, enabled = given
     start = initial_state(scene, touching)._replace(converged=jnp.asarray(enabled))
     if scene.model.solution == "closed-form":
         steps = bar_cycles(scene, path)
     elif scene.model.solution == "stepwise":
-        steps = march(scene, start, path, solver, method)
+        steps = march(scene, start, path, solver, method, native)
     else:
-        steps = masing(scene, start, path, solver, method)
+        steps = masing(scene, start, path, solver, method, native=native)
     return steps, with_end(history_of(scene, steps, path.pressure), steps)

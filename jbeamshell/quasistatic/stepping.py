@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import enum
 import functools
+from collections.abc import Callable
+from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax import Array, lax
 
+from jbeamshell.common.native import one_call
+from jbeamshell.common.two_programs import TwoPrograms
+from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.load_step import guess_from_bar, newton_step
@@ -21,7 +25,7 @@ from jbeamshell.quasistatic.path_state import (
 )
 from jbeamshell.quasistatic.slip_patterns import Memory, StatusSteps
 from jbeamshell.quasistatic.system import ContactResponse, LoadLevel, Prescribed, System
-from jbeamshell.quasistatic.tangent import in_blocks, initial_stiffness
+from jbeamshell.quasistatic.tangent import in_blocks, initial_stiffness, zero_unknowns
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
@@ -46,7 +50,12 @@ class Method(enum.Enum):
 
 
 def march(
-    scene: Scene, start: PathState, path: LoadPath, solver: Newton, method: Method = Method.NEWTON
+    scene: Scene,
+    start: PathState,
+    path: LoadPath,
+    solver: Newton,
+    method: Method = Method.NEWTON,
+    native: bool = False,
 ) -> StepResults:
     """Walk along a load path in one scan.
 
@@ -57,19 +66,28 @@ def march(
     path : what is prescribed, (steps,)
     solver : settings of Newton's method
     method : method that solves the steps
+    native : True compiles the loop over the steps to one native function, where its blocks are
+        small enough for that; see `one_call`
     """
     system = System(scene)
+    small = zero_unknowns(system).shape[1] <= block_tridiagonal.SMALL
+    called = one_call if native and small else _call
     if not slip_patterns.applies(scene):
-        return _march_from_bar(system, start, path, solver)
+        marched: StepResults = called(_march_from_bar, system, start, path, solver)
+        return marched
     if method is Method.NEWTON:
-        found = slip_patterns.solve_path_by_newton(system, start, path, solver)
+        found = called(slip_patterns.solve_path_by_newton, system, start, path, solver)
     else:
-        found = slip_patterns.solve_path(system, start, path)
+        found = called(slip_patterns.solve_path, system, start, path)
     checked = method is Method.STATUS_ITERATION
     return _results_of_statuses(system, start, path, solver, found, checked)
 
 
-compiled_march = eqx.filter_jit(march)
+compiled_march = TwoPrograms(march)
+
+
+def _call(function: Callable[..., Any], *given: Any) -> Any:
+    return function(*given)
 
 
 def _march_from_bar(

@@ -55,12 +55,18 @@ def test_values_are_the_function_s(function, fits):
             np.testing.assert_allclose(value, expected[name], rtol=1e-14)
 
 
-def test_many_arrays_are_not_given_to_one_native_function():
-    """Some twenty end the process within the compiler."""
-    native, given = Native(lambda *given: looped(*given[-2:])), [jnp.asarray(0.3)] * 24
-    expected = jax.jit(looped)(*given[:2])["turned"]
-    np.testing.assert_allclose(native.now(*given)["turned"], expected, rtol=1e-14)
-    assert native.fits is False
+def test_many_arrays_go_into_one_call_together():
+    """One by one, some twenty end the process within the compiler."""
+    counts, truths = [jnp.asarray(3)] * 12, [jnp.asarray(True)] * 12
+
+    def function(counts, truths, x, y):
+        return looped(jnp.where(truths[3], x, 0.0) * counts[7], y)
+
+    native, given = Native(function), (counts, truths, jnp.asarray(0.1), jnp.asarray(0.4))
+    found, expected = native.now(*given), looped(jnp.asarray(0.3), jnp.asarray(0.4))
+    assert native.fits is True
+    for name, value in found.items():
+        np.testing.assert_allclose(value, expected[name], rtol=1e-14)
 
 
 def test_it_is_for_numbers_only():
