@@ -36,11 +36,11 @@ class _Program(NamedTuple):
 class TwoPrograms:
     """Function that compiles fast for its first runs, and runs fast where it runs often.
 
-    The first program is compiled with few optimisations, which takes about half the time.  Once its
-    runs have taken as long as the first call with its compilation, the function is compiled again
-    with all of them: nobody waits much longer than with the better of the two.  Within a JAX
-    transformation it is an ordinary compiled function, because JAX takes compiler options for whole
-    programs only.
+    The first program is compiled with few optimisations, which takes about half the time; its loops
+    are native calls, which makes up for them.  Once its runs have taken as long as the first call
+    with its compilation, the function is compiled again with all optimisations.  What the compiler
+    cannot do in native calls has all of them from the beginning.  Within a JAX transformation it is
+    an ordinary compiled function, because JAX takes compiler options for whole programs only.
 
     Parameters
     ----------
@@ -54,43 +54,42 @@ class TwoPrograms:
         self._patience: dict[_Program, float] = {}  # seconds left for runs of the first program
         self._refused: set[_Program] = set()  # programs whose loops cannot be one call each
 
-    def __call__(self, *given: Any) -> Any:
-        """Value of the function."""
+    def __call__(self, *given: Any, native: bool = True) -> Any:
+        """Value of the function.
+
+        Parameters
+        ----------
+        given : arguments of the function
+        native : False where its loops are known not to fit in native calls
+        """
         if in_transformation() or is_traced(given):
             return self._inside(*given)
         leaves, tree = jax.tree.flatten(given)
         arrays = [leaf for leaf in leaves if _is_array(leaf)]
         static = tuple(None if _is_array(leaf) else leaf for leaf in leaves)
         shapes = tuple((array.shape, array.dtype) for array in arrays)
-        program = _Program(tree, static, shapes)
+        program, arguments = _Program(tree, static, shapes), (arrays, tree, static)
+        if not native or program in self._refused or jax.default_backend() != "cpu":
+            return self._compiled["ordinary"](*arguments)
         patience = self._patience.get(program)
         if patience is not None and patience < 0.0:
-            return self._run(program, arrays, often=True)
+            return self._compiled["often"](*arguments)
         began = time.perf_counter()
-        found = jax.block_until_ready(self._run(program, arrays, often=False))
+        try:
+            found = jax.block_until_ready(self._compiled["first"](*arguments))
+        except jax.errors.JaxRuntimeError:  # the compiler cannot do an operation in a native call
+            self._refused.add(program)
+            return self._compiled["ordinary"](*arguments)
         took = time.perf_counter() - began
         self._patience[program] = took if patience is None else patience - took
         return found
 
-    def _run(self, program: _Program, arrays: list[Any], often: bool) -> Any:
-        native = jax.default_backend() == "cpu" and program not in self._refused
-        given = arrays, program.tree, program.static
-        try:
-            return self._compiled[often, native](*given)
-        except jax.errors.JaxRuntimeError:  # the compiler cannot do an operation in one call
-            if not native:
-                raise
-            self._refused.add(program)
-            return self._compiled[often, False](*given)
-
     @functools.cached_property
-    def _compiled(self) -> dict[tuple[bool, bool], Any]:
-        """Compiled functions by often and native."""
-        first, often = known_options(COMPILED_FAST), known_options(RUNS_FAST)
-        made = {(False, native): self._made(first, native) for native in (False, True)}
-        if often == first:
-            return made | {(True, native): made[False, native] for native in (False, True)}
-        return made | {(True, native): self._made(often, native) for native in (False, True)}
+    def _compiled(self) -> dict[str, Any]:
+        fast, full = known_options(COMPILED_FAST), known_options(RUNS_FAST)
+        first = self._made(fast, native=True)
+        often = first if fast == full else self._made(full, native=True)
+        return {"first": first, "often": often, "ordinary": self._made(full, native=False)}
 
     def _made(self, options: dict[str, Any] | None, native: bool) -> Any:
         def flat(arrays: list[Any], tree: Any, static: tuple[Hashable, ...]) -> Any:

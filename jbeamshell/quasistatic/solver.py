@@ -31,7 +31,7 @@ from jbeamshell.quasistatic.outcome import (
 )
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
-from jbeamshell.quasistatic.stepping import Method, march
+from jbeamshell.quasistatic.stepping import Method, fits_native, march
 from jbeamshell.scene.choice import refinements
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
 from jbeamshell.scene.scene import Scene
@@ -105,7 +105,8 @@ def solve(
     solver = solver or Newton()
     touching = None if contact is None else check_contact(scene, contact)
     method = method or _first_method(scene, whole)
-    steps, history = _solve(scene, touching, whole, np.asarray(True), solver, method)
+    native, walked = fits_native(scene), np.asarray(True)
+    steps, history = _solve(scene, touching, whole, walked, solver, method, native=native)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
@@ -226,7 +227,8 @@ def compile_for(
         _condensed(scene, whole, cycles, False, None, path is None)
         return
     method = _first_method(scene, whole)
-    compiled = _solve(scene, None, whole, np.asarray(False), solver or Newton(), method)
+    given = scene, None, whole, np.asarray(False), solver or Newton(), method
+    compiled = _solve(*given, native=fits_native(scene))
     jax.block_until_ready(compiled)
 
 

@@ -13,6 +13,7 @@ from jax import Array, lax
 
 from jbeamshell.common.native import one_call
 from jbeamshell.common.two_programs import TwoPrograms
+from jbeamshell.mechanics.elements import ORDER
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
@@ -25,7 +26,7 @@ from jbeamshell.quasistatic.path_state import (
 )
 from jbeamshell.quasistatic.slip_patterns import Memory, StatusSteps
 from jbeamshell.quasistatic.system import ContactResponse, LoadLevel, Prescribed, System
-from jbeamshell.quasistatic.tangent import in_blocks, initial_stiffness, zero_unknowns
+from jbeamshell.quasistatic.tangent import in_blocks, initial_stiffness
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
@@ -66,12 +67,10 @@ def march(
     path : what is prescribed, (steps,)
     solver : settings of Newton's method
     method : method that solves the steps
-    native : True compiles the loop over the steps to one native function, where its blocks are
-        small enough for that; see `one_call`
+    native : True compiles the loop over the steps to one native function, see `one_call`
     """
     system = System(scene)
-    small = zero_unknowns(system).shape[1] <= block_tridiagonal.SMALL
-    called = one_call if native and small else _call
+    called = one_call if native else _call
     if not slip_patterns.applies(scene):
         marched: StepResults = called(_march_from_bar, system, start, path, solver)
         return marched
@@ -83,7 +82,22 @@ def march(
     return _results_of_statuses(system, start, path, solver, found, checked)
 
 
-compiled_march = TwoPrograms(march)
+def compiled_march(
+    scene: Scene, start: PathState, path: LoadPath, solver: Newton, method: Method
+) -> StepResults:
+    """Walk along a load path by a compiled program, see `march`."""
+    native = fits_native(scene)
+    steps: StepResults = _compiled_march(scene, start, path, solver, method, native=native)
+    return steps
+
+
+_compiled_march = TwoPrograms(march)
+
+
+def fits_native(scene: Scene) -> bool:
+    """True if the loop over the steps fits in one native function: its blocks are small."""
+    model = scene.model
+    return ORDER[model.grid] * len(model.active) <= block_tridiagonal.SMALL
 
 
 def _call(function: Callable[..., Any], *given: Any) -> Any:
