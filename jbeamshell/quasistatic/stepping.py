@@ -30,6 +30,9 @@ from jbeamshell.quasistatic.tangent import in_blocks, initial_stiffness
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
+POINTS = 2  # of an element of a small block, at which strains are computed
+LARGEST_SUM = 4096  # numbers up to which the compiler (jaxlib 0.10) computes sums itself
+
 
 class Method(enum.Enum):
     """Method that solves the steps of a load path.
@@ -95,9 +98,15 @@ _compiled_march = TwoPrograms(march)
 
 
 def fits_native(scene: Scene) -> bool:
-    """True if the loop over the steps fits in one native function: its blocks are small."""
+    """True if the compiler makes one native function of the loop over the steps.
+
+    It does for small blocks, as long as it gives no sum to a library.
+    """
     model = scene.model
-    return ORDER[model.grid] * len(model.active) <= block_tridiagonal.SMALL
+    size = ORDER[model.grid] * len(model.active)
+    probes = 3 * size * POINTS * (model.nodes - 1)  # values to find the stiffness
+    small = size <= block_tridiagonal.SMALL
+    return small and (slip_patterns.applies(scene) or probes <= LARGEST_SUM)
 
 
 def _call(function: Callable[..., Any], *given: Any) -> Any:

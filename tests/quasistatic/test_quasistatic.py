@@ -7,6 +7,7 @@ from toy import STRIP
 import jbeamshell as jb
 from jbeamshell.mechanics import bar
 from jbeamshell.quasistatic import solver
+from jbeamshell.quasistatic.stepping import fits_native
 
 SMALL = {
     "model.nodes": 41,
@@ -189,3 +190,26 @@ def test_plain_numbers_inside_a_callers_jit():
     assert float(inside) == pytest.approx(float(jb.solve(scene).dissipation), rel=1e-12)
     with pytest.raises(jb.InputError, match="gross slip"):
         jax.jit(lambda: jb.solve(scene, [1.0, 2.0]).displacement)()
+
+
+@pytest.mark.parametrize(
+    ("values", "fits"),
+    [
+        ({"model.kinematics": "exact", "model.nodes": 171}, True),
+        ({"model.kinematics": "exact", "model.nodes": 172}, False),
+        ({"model.solution": "stepwise", "model.nodes": 321}, True),
+        ({"model.rung": "p2", "model.kinematics": "exact", "model.nodes": 33}, False),
+    ],
+)
+def test_what_the_compiler_makes_one_native_function_of(values, fits):
+    assert fits_native(jb.Scene().replace(values).pinned()) is fits
+
+
+@pytest.mark.doubtful("few nodes")
+@pytest.mark.parametrize("values", [SMALL, EXACT, SMOOTH], ids=["linear", "exact", "smooth"])
+def test_the_compiler_refuses_no_loop_that_fits(values):
+    scene = STRIP.replace(values)
+    assert fits_native(scene)
+    refused = len(solver._solve._refused)
+    jb.solve(scene)
+    assert len(solver._solve._refused) == refused
