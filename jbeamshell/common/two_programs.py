@@ -14,6 +14,7 @@ import numpy as np
 from jbeamshell.common.checks import in_transformation, is_traced
 from jbeamshell.common.small import QUICK, VECTORS, known_options
 
+# Compiler options of the two programs; the loops of the second stay vectorised.
 COMPILED_FAST = QUICK | {VECTORS: 0}
 RUNS_FAST = {name: value for name, value in QUICK.items() if name != VECTORS}
 
