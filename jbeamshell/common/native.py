@@ -20,7 +20,9 @@ MOST_ARRAYS = 16  # that are given to a native function: some twenty end the pro
 
 
 def one_call(function: Callable[..., Any], *given: Any) -> Any:
-    """Value of a function, marked for the compiler as one call.
+    """Value of a function, marked for the compiler as one call; many arrays go in as one vector.
+
+    A program may have one such call: two of them get the same name, and do not link (jaxlib 0.10).
 
     Raises
     ------

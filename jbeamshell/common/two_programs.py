@@ -39,9 +39,10 @@ class TwoPrograms:
 
     The first program is compiled with few optimisations, which takes about half the time; its loops
     are native calls, which makes up for them.  Once its runs have taken as long as the first call
-    with its compilation, the function is compiled again with all optimisations.  What the compiler
-    cannot do in native calls has all of them from the beginning.  Within a JAX transformation it is
-    an ordinary compiled function, because JAX takes compiler options for whole programs only.
+    with its compilation, the function is compiled again with all optimisations.  The values of both
+    agree but for rounding.  What the compiler cannot do in native calls has all optimisations from
+    the beginning.  Within a JAX transformation it is an ordinary compiled function, because JAX
+    takes compiler options for whole programs only.
 
     Parameters
     ----------
