@@ -32,7 +32,7 @@ DOUBLE = {
 }
 SINGLE = DOUBLE | {
     "member.support": "clamped",
-    "strip.loaded_end": "guided",
+    "strip.loaded_end": "level",
     "strip.overhang": 0.5,
     "member.overhang": 0.4,
 }

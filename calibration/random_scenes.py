@@ -106,13 +106,13 @@ def beyond(random: Random) -> Values:
     return found | {
         "load.control": "displacement",
         "load.amplitude": gross * random.uniform(1.1, 4.0),
-        "strip.far_end": str(random.choice(["held", "free"])),
+        "strip.far_end": str(random.choice(["guided", "free"])),
     }
 
 
 def along_the_arc(random: Random) -> Values:
     """Arc length beyond gross slip."""
-    return beyond(random) | {"load.control": "arc-length", "strip.far_end": "held"}
+    return beyond(random) | {"load.control": "arc-length", "strip.far_end": "guided"}
 
 
 def squeezed(random: Random) -> Values:
@@ -232,7 +232,7 @@ def rotating(random: Random) -> Values:
 
 def sliders(random: Random) -> Values:
     """Elastic slip from soft to stiff, held in plane strain or free in plane stress."""
-    plane, end = (("strain", "held"), ("stress", "free"))[random.integers(2)]
+    plane, end = (("strain", "guided"), ("stress", "free"))[random.integers(2)]
     return plain(random) | {
         "contact.stick_stiffness": _log(random, 3.0, 1e3),
         "strip.far_end": end,
@@ -272,7 +272,7 @@ def lap(random: Random) -> Values:
         "model.rung": str(random.choice(["squeeze", "squeeze", "p2", "plane"])),
     }
     if support == "clamped":
-        found["strip.loaded_end"] = "guided"
+        found["strip.loaded_end"] = "level"
     if random.uniform() < 0.5:
         begin, end = np.sort(random.uniform(0.2, 1.8, 2))
         bolt = [[begin, 0.0], [begin, 20.0], [end, 20.0], [end, 0.0]]

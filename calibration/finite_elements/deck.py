@@ -11,6 +11,10 @@ to no friction, then the friction is raised to mu (`*CHANGE FRICTION`).  Calculi
 slip where there is no friction at all, and would count the slip of the pressing; with a millionth
 of mu the contact slides freely, and starts afresh.
 
+A face that is rigid is an equation between its nodes.  A length beyond the contact has nodes of its
+own in the section X = L.  It is held while the strip is pressed down, and then tied to it with the
+distance that the two sections have by then, so it is free of stress.
+
 Where a strip lifts off, CalculiX does not find a stiff contact from nowhere: springs open and close
 for ever.  So the first level is walked with soft springs before, each time ten or a hundred times
 stiffer (`*CHANGE SURFACE BEHAVIOR`), which settles in a few iterations each.
@@ -23,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from calibration.finite_elements.cards import card, equation, node_set, normal_behaviour
-from calibration.finite_elements.mesh import Mesh, nodal_loads
+from calibration.finite_elements.mesh import Block, Mesh, after, nodal_loads
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
@@ -34,6 +38,7 @@ HEIGHT_EFFECT = 13.0  # D/D_bar is about 1/(1 + 13 (eta a mu F_N/A)^2) by finite
 SMOOTH = 1e-6  # of mu, while the strip is pressed down
 SMALLEST_PART = 1e-4  # of a load level, below which CalculiX gives up
 MOST_PARTS = 10_000
+SUM = (1.0, -1.0, -1.0)  # a displacement is the sum of two
 
 
 class Penalty(NamedTuple):
@@ -117,19 +122,29 @@ def steps_before(scene: Scene) -> int:
 
 
 def _strip(scene: Scene, mesh: Mesh) -> str:
-    strip, (i, j) = scene.strip, np.nonzero(mesh.number)
+    strip = scene.strip
     kind = {"strain": "CPE", "stress": "CPS"}[strip.plane] + {1: "4", 2: "8R"}[mesh.order]
-    numbers = np.arange(1, len(mesh.elements) + 1)
     return (
-        card("NODE, NSET=STRIP", zip(mesh.number[i, j], mesh.x[i], mesh.y[j], strict=True))
-        + card(f"ELEMENT, TYPE={kind}, ELSET=STRIP", np.column_stack([numbers, mesh.elements]))
-        + node_set("BOTTOM", mesh.number[:, 0])
+        "".join(block_cards(block, kind, "STRIP") for block in mesh.blocks)
         + node_set("FAR", mesh.number[0])
-        + node_set("END", mesh.number[-1])
+        + (node_set("BEYOND", nodes_of(mesh.beyond)) if mesh.beyond is not None else "")
         + card("MATERIAL, NAME=STRIP")
         + card("ELASTIC", [(strip.youngs_modulus, strip.poisson_ratio)])
         + card("SOLID SECTION, ELSET=STRIP, MATERIAL=STRIP", [(1.0,)])
     )
+
+
+def block_cards(block: Block, kind: str, name: str) -> str:
+    """Nodes and elements of a block, in a node set and an element set of one name."""
+    (i, j), numbers = np.nonzero(block.number), block.first + np.arange(len(block.elements))
+    return card(
+        f"NODE, NSET={name}", zip(block.number[i, j], block.x[i], block.y[j], strict=True)
+    ) + card(f"ELEMENT, TYPE={kind}, ELSET={name}", np.column_stack([numbers, block.elements]))
+
+
+def nodes_of(block: Block) -> np.ndarray:
+    """Numbers of the nodes of a block."""
+    return block.number[block.number > 0]
 
 
 def _base(scene: Scene, mesh: Mesh, stiffness: Penalty) -> str:
@@ -143,14 +158,13 @@ def _base(scene: Scene, mesh: Mesh, stiffness: Penalty) -> str:
         for numbers, points in zip(mesh.base.T, rows, strict=True)
         for number, point in zip(numbers, points, strict=True)
     ]
-    first = len(mesh.elements) + 1
-    numbers = np.arange(first, first + len(mesh.base_elements))
+    numbers = after(mesh.blocks[-1]) + np.arange(len(mesh.base_elements))
     text = (
         card("NODE, NSET=BASE", nodes)
         + card("ELEMENT, TYPE=CPE4, ELSET=BASE", np.column_stack([numbers, mesh.base_elements]))
         + node_set("GROUND", mesh.base[:, 1])
         + card("SOLID SECTION, ELSET=BASE, MATERIAL=STRIP", [(1.0,)])
-        + card("SURFACE, NAME=BOTTOM", ((e + 1, "S1") for e in mesh.bottom_elements))
+        + card("SURFACE, NAME=BOTTOM", ((e, "S1") for e in mesh.bottom_elements))
         + card("SURFACE, NAME=GROUND", ((e, "S3") for e in numbers))
         + card("SURFACE INTERACTION, NAME=CONTACT")
         + normal_behaviour(stiffness.normal)
@@ -164,7 +178,7 @@ def _base(scene: Scene, mesh: Mesh, stiffness: Penalty) -> str:
 
 
 def _constraints(scene: Scene, mesh: Mesh) -> str:
-    """Means over a face, tied to reference nodes.
+    """What the nodes of a face have in common, also with reference nodes.
 
     Under displacement control the end face's mean u_x is the sum of two: one is free while the
     strip is pressed down and frozen then, the other is driven.  Without a foundation the far face's
@@ -172,11 +186,45 @@ def _constraints(scene: Scene, mesh: Mesh) -> str:
     """
     free, driven = references(mesh)
     text = card("NODE", [(free, mesh.x[-1], 0.0), (driven, mesh.x[-1], 0.0)])
+    text += _entry(scene, mesh)
     if scene.load.control == "displacement":
         terms = [(n, 1, w) for n, w in zip(mesh.number[-1, ::-1], mesh.shares[::-1], strict=True)]
         text += equation([*terms, (free, 1, -1.0), (driven, 1, -1.0)])
     if scene.contact.normal == "none":
         text += equation([(n, 2, w) for n, w in zip(mesh.number[0], mesh.shares, strict=True)])
+    return text
+
+
+def _entry(scene: Scene, mesh: Mesh) -> str:
+    """Equations of the section X = L, by how the force enters there."""
+    section, top = mesh.number[-1], int(mesh.number[-1, -1])
+    if scene.load.entry == "guided":
+        return "".join(equation([(n, 1, 1.0), (top, 1, -1.0)]) for n in section[:-1])
+    if scene.load.entry == "face":
+        parts = zip(section[1:-1], mesh.y[1:-1] / mesh.y[-1], strict=True)
+        return "".join(
+            equation([(n, 1, 1.0), (section[0], 1, y - 1.0), (top, 1, -y)]) for n, y in parts
+        )
+    if mesh.beyond is None:
+        return ""
+    distances = references(mesh)[-1] + 1 + np.arange(section.size)
+    return tie(section, mesh.beyond.number[0], distances, mesh.x[-1], mesh.y)
+
+
+def tie(
+    section: np.ndarray, twin: np.ndarray, distances: np.ndarray, x: float, y: np.ndarray
+) -> str:
+    """Equations of a section with its twin; between them are the nodes of the set DISTANCES.
+
+    Parameters
+    ----------
+    section, twin, distances : (k,) numbers of the nodes
+    x, y : position of the section, and heights (k,) of its nodes
+    """
+    text = card("NODE, NSET=DISTANCES", ((n, x, height) for n, height in zip(distances, y, strict=True)))
+    for nodes in zip(section, twin, distances, strict=True):
+        for direction in (1, 2):
+            text += equation([(n, direction, f) for n, f in zip(nodes, SUM, strict=True)])
     return text
 
 
@@ -203,12 +251,14 @@ def _step(
     free, driven = references(mesh)
     if step.begins:
         text += card("BOUNDARY, OP=NEW", _supports(scene, mesh, step.rough))
-        text += card("BOUNDARY, FIXED", [(free, 1, 1)]) if controlled and step.rough else ""
+        frozen = [(free, 1, 1)] if controlled else []
+        frozen += [("DISTANCES", 1, 2)] if mesh.beyond is not None else []
+        text += card("BOUNDARY, FIXED", frozen) if frozen and step.rough else ""
     if controlled and step.rough:
         text += card("BOUNDARY", [(driven, 1, 1, step.load)])
     text += card("CLOAD", [(node, 2, step.pressure * force) for node, force in pressing])
     if not controlled:
-        even = zip(mesh.number[-1], step.load * mesh.shares, strict=True)
+        even = zip(mesh.loaded, step.load * mesh.shares, strict=True)
         text += card("CLOAD", [(node, 1, force) for node, force in even])
     if step.begins:
         wanted = {"STRIP": "U", "FAR": "RF"} | ({"GROUND": "RF"} if founded else {})
@@ -221,7 +271,7 @@ def _step(
 def _supports(scene: Scene, mesh: Mesh, rough: bool) -> list[tuple[object, ...]]:
     free, driven = references(mesh)
     held: list[tuple[object, ...]] = [(free, 2, 3), (driven, 2, 3)]
-    if scene.strip.far_end == "held":
+    if scene.strip.far_end == "guided":
         held.append(("FAR", 1, 1))
     elif scene.strip.far_end == "pinned" or not rough:  # a free end is held by friction alone
         held.append((int(mesh.number[0, 0]), 1, 1))
@@ -231,6 +281,9 @@ def _supports(scene: Scene, mesh: Mesh, rough: bool) -> list[tuple[object, ...]]
         held += [(free, 1, 1), (driven, 1, 1)]
     elif not rough:
         held.append((driven, 1, 1))
+    if mesh.beyond is not None:
+        held.append(("DISTANCES", 3, 3))
+        held += [] if rough else [("BEYOND", 1, 2)]
     return held
 
 

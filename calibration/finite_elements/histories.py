@@ -66,20 +66,22 @@ def make_history(
     reached, levels = _reached(printed), path.target.size
     printed = {key: Printed(p.nodes, p.values[:reached]) for key, p in printed.items()}
     target, pressure, rough = (np.asarray(a, dtype=float)[:reached] for a in path)
-    u = _on_columns(mesh, printed, reached)
+    u = _at(printed, mesh.number, reached)
     if scene.contact.normal == "none":  # held by the mean of its far face
         u[..., 1] -= u[:, :1, :1, 1].copy()
     v, w = np.moveaxis(u[:, :, 0], -1, 0)
     beta, psi = fitted(mesh, u)
-    end, pressed = u[:, -1, :, 0] @ mesh.shares, scene.load.pressure_steps - 1
-    rest = end[pressed] if reached > pressed else 0.0
-    displacement = np.where(rough > 0.0, end - rest, 0.0)
     held = _held(printed, ("FAR", "GROUND"), 0, reached)
     force = target if scene.load.control == "force" else -rough * held
+    end, pressed = _at(printed, mesh.loaded, reached)[..., 0], scene.load.pressure_steps - 1
+    end, softness = end @ mesh.shares, _softness(scene, mesh)
+    rest = end[pressed] if reached > pressed else 0.0
+    displacement = np.where(rough > 0.0, end - rest - softness * force, 0.0)
     contact = _contact(scene, mesh, printed, v, rough, penalty(scene, path))
     load = nodal_loads(mesh.x, 1, scene.contact.pressure)
     sinking = _sinking(scene, mesh, u)
     strain_energy = printed["ELSE", "STRIP"].values if reached else np.zeros(0)
+    strain_energy = strain_energy - 0.5 * softness * force**2
 
     before = steps_before(scene)
     times = np.clip(np.ceil(increments[:, 0] - 1e-6).astype(int) - before, 1, levels)
@@ -134,13 +136,22 @@ def _reached(printed: dict[tuple[str, str], Printed]) -> int:
     return int(np.argmax(pulled)) if np.any(pulled) else reached
 
 
-def _on_columns(mesh: Mesh, printed: dict[tuple[str, str], Printed], levels: int) -> np.ndarray:
-    """Displacements (levels, m, k, 2); NaN where there is no node."""
-    values = np.full((levels, mesh.number.max() + 1, 2), np.nan)
+def _at(printed: dict[tuple[str, str], Printed], number: np.ndarray, levels: int) -> np.ndarray:
+    """Displacements (levels, ..., 2) of nodes; NaN where there is none."""
+    values = np.full((levels, number.max() + 1, 2), np.nan)
     if levels > 0:
         moved = printed["U", "STRIP"]
-        values[:, moved.nodes] = moved.values[..., :2]
-    return values[:, mesh.number]
+        there = moved.nodes <= number.max()
+        values[:, moved.nodes[there]] = moved.values[:, there, :2]
+    return values[:, number]
+
+
+def _softness(scene: Scene, mesh: Mesh) -> float:
+    """Even stretch of the length beyond for each unit of load, which u leaves out."""
+    if mesh.beyond is None:
+        return 0.0
+    strip = scene.strip
+    return float(np.ptp(mesh.beyond.x) / (2.0 * strip.half_height * strip.plane_modulus))
 
 
 def _contact(

@@ -8,7 +8,7 @@ the base takes the contact forces of the node above it.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
@@ -25,23 +25,24 @@ SHARES = {1: (0.5, 0.5), 2: (1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0)}  # of an element,
 END_SIZE = 1.0 / 8.0  # of H, where the contact is singular
 FAR_SIZE = 1.0 / 20.0  # of L, away from it
 GROWTH = 0.2  # of the element size over the distance
+REACH = 3.0  # of H, length beyond the contact
 ROWS = 3  # of quadratic elements over the height
 STRETCH = 1.5  # logarithm of the sizes' growth from the base to the top
 LARGEST = 200_000  # nodes
 
 
-class Mesh(NamedTuple):
-    """A strip's mesh.
+@dataclass(frozen=True)
+class Block:
+    """Rectangle of elements.
 
     Attributes
     ----------
     order : of the elements' displacements, 1 or 2
-    x : (m,) positions of the columns of nodes, from 0 to L
-    y : (k,) heights of the rows of nodes, from 0 to 2H
-    number : (m, k) numbers of the nodes, from 1; 0 in the middle of a quadratic element
+    x : (m,) positions of the columns of nodes
+    y : (k,) heights of the rows of nodes
+    number : (m, k) numbers of the nodes; 0 in the middle of a quadratic element
     elements : (e, 4 or 8) numbers of the elements' nodes, corners first, anticlockwise
-    base_x : (m + 2,) columns of the base, which reaches beyond the strip on both sides
-    base : (m + 2, 2) numbers of the base's nodes, at the bottom and at the top
+    first : number of the first element; those of a column follow each other upwards
     """
 
     order: int
@@ -49,8 +50,7 @@ class Mesh(NamedTuple):
     y: np.ndarray
     number: np.ndarray
     elements: np.ndarray
-    base_x: np.ndarray
-    base: np.ndarray
+    first: int
 
     @property
     def columns(self) -> np.ndarray:
@@ -64,8 +64,35 @@ class Mesh(NamedTuple):
 
     @property
     def bottom_elements(self) -> np.ndarray:
-        """(nx,) positions of the elements at the bottom face, from 0."""
-        return np.arange(self.columns.size - 1) * (self.rows.size - 1)
+        """(nx,) numbers of the elements at the bottom face."""
+        return self.first + np.arange(self.columns.size - 1) * (self.rows.size - 1)
+
+    @property
+    def top_elements(self) -> np.ndarray:
+        """(nx,) numbers of the elements at the top face."""
+        return self.bottom_elements + self.rows.size - 2
+
+    @property
+    def shares(self) -> np.ndarray:
+        """(k,) shares of an end face's nodes in an even traction; they add up to 1."""
+        share = weights(self.rows, self.order)
+        return share / np.sum(share)
+
+
+@dataclass(frozen=True)
+class Mesh(Block):
+    """A strip's mesh on its contact, from 0 to L and from 0 to 2H.
+
+    Attributes
+    ----------
+    base_x : (m + 2,) columns of the base, which reaches beyond the strip on both sides
+    base : (m + 2, 2) numbers of the base's nodes, at the bottom and at the top
+    beyond : the length on which a member goes on; its first column is a twin of the strip's last
+    """
+
+    base_x: np.ndarray
+    base: np.ndarray
+    beyond: Block | None
 
     @property
     def base_elements(self) -> np.ndarray:
@@ -74,10 +101,14 @@ class Mesh(NamedTuple):
         return np.stack([low[:-1], low[1:], high[1:], high[:-1]], axis=1)
 
     @property
-    def shares(self) -> np.ndarray:
-        """(k,) shares of the end face's nodes in an even traction; they add up to 1."""
-        share = weights(self.rows, self.order)
-        return share / np.sum(share)
+    def blocks(self) -> tuple[Block, ...]:
+        """The strip, and the length beyond if there is one."""
+        return (self,) if self.beyond is None else (self, self.beyond)
+
+    @property
+    def loaded(self) -> np.ndarray:
+        """(k,) numbers of the nodes of the loaded face."""
+        return self.blocks[-1].number[-1]
 
     @property
     def tributary(self) -> np.ndarray:
@@ -98,28 +129,46 @@ def make_mesh(scene: Scene, elements: str = "quadratic", refinement: float = 1.0
     require_number("refinement", refinement, POSITIVE)
     order = ORDERS[elements]
     finer = float(refinement) * 2.0 / order
-    columns = _graded(scene, finer)
+    columns, half_height = contact_columns(scene, finer), float(scene.strip.half_height)
     rows = max(1, round(ROWS * finer))
     fix = f"makes more than {LARGEST} nodes; take less"
     require("refinement", refinement, columns.size * rows * order**2 < LARGEST, fix)
-    rise = np.expm1(STRETCH * np.arange(rows + 1) / rows) / np.expm1(STRETCH)
-    height = 2.0 * float(scene.strip.half_height)
-    x, y = _with_middles(columns, order), _with_middles(height * rise, order)
+    heights = row_heights(half_height, rows)
+    strip = last = block(columns, heights, order)
+    beyond = None
+    if scene.load.entry == "member":
+        ends = columns[-1] + columns_beyond(half_height, finer)
+        beyond = last = block(ends, heights, order, strip)
+    base_x = np.concatenate([[-half_height], strip.x, [strip.x[-1] + half_height]])
+    base = last.number.max() + 1 + np.arange(2 * base_x.size).reshape(-1, 2)
+    return Mesh(**vars(strip), base_x=base_x, base=base, beyond=beyond)
 
+
+def block(columns: np.ndarray, rows: np.ndarray, order: int, before: Block | None = None) -> Block:
+    """Elements between columns and rows, numbered on from the block before."""
+    x, y = _with_middles(columns, order), _with_middles(rows, order)
     here = np.ones((x.size, y.size), bool)
     if order == 2:
         here[1::2, 1::2] = False
-    number = np.where(here, np.cumsum(here).reshape(here.shape), 0)
+    nodes, first = (0, 1) if before is None else (before.number.max(), after(before))
+    number = np.where(here, nodes + np.cumsum(here).reshape(here.shape), 0)
     left, low = slice(0, -order, order), slice(order, None, order)
     corners = [number[left, left], number[low, left], number[low, low], number[left, low]]
     if order == 2:
         odd = slice(1, None, 2)
         corners += [number[odd, left], number[low, odd], number[odd, low], number[left, odd]]
-    nodes = np.stack([c.ravel() for c in corners], axis=1)
-    beyond = 0.5 * height
-    base_x = np.concatenate([[-beyond], x, [x[-1] + beyond]])
-    base = number.max() + 1 + np.arange(2 * base_x.size).reshape(-1, 2)
-    return Mesh(order, x, y, number, nodes, base_x, base)
+    return Block(order, x, y, number, np.stack([c.ravel() for c in corners], axis=1), first)
+
+
+def after(before: Block) -> int:
+    """Number of the first element after a block."""
+    return before.first + len(before.elements)
+
+
+def row_heights(half_height: float, rows: int) -> np.ndarray:
+    """Heights (rows + 1,) of the elements' ends, from 0 at the contact to 2H."""
+    rise = np.expm1(STRETCH * np.arange(rows + 1) / rows) / np.expm1(STRETCH)
+    return 2.0 * half_height * rise
 
 
 def weights(ends: np.ndarray, order: int) -> np.ndarray:
@@ -143,7 +192,7 @@ def nodal_loads(ends: np.ndarray, order: int, pressure: Array) -> np.ndarray:
 def foci(scene: Scene) -> np.ndarray:
     """Positions (k,) towards which the mesh is refined."""
     length = float(scene.strip.length)
-    found = [length] if scene.strip.far_end == "held" else [0.0, length]
+    found = [length] if scene.strip.far_end == "guided" else [0.0, length]
     for pressure in (scene.contact.pressure, scene.contact.bottom_pressure):
         if pressure.ndim == 2:
             x, p = np.asarray(pressure).T
@@ -154,11 +203,22 @@ def foci(scene: Scene) -> np.ndarray:
     return np.unique(found)
 
 
-def _graded(scene: Scene, finer: float) -> np.ndarray:
-    """Ends of the elements along X."""
+def contact_columns(scene: Scene, finer: float) -> np.ndarray:
+    """Ends of the elements along the contact, whose sizes are divided by ``finer``."""
     length, half_height = float(scene.strip.length), float(scene.strip.half_height)
-    end = min(END_SIZE * half_height, FAR_SIZE * length)
-    near = foci(scene)
+    largest = FAR_SIZE * length
+    return _graded(length, min(END_SIZE * half_height, largest), largest, foci(scene), finer)
+
+
+def columns_beyond(half_height: float, finer: float) -> np.ndarray:
+    """Ends of the elements beyond the contact, as distances from it."""
+    return _graded(REACH * half_height, END_SIZE * half_height, half_height, np.zeros(1), finer)
+
+
+def _graded(
+    length: float, end: float, largest: float, near: np.ndarray, finer: float
+) -> np.ndarray:
+    """Ends of elements that are small near some places."""
     # A place is as dense as it is near a focus: sampled as finely as the smallest element there.
     away = end * np.expm1(np.linspace(0.0, np.log1p(length / end), 2000))
     samples = np.unique(
@@ -167,7 +227,7 @@ def _graded(scene: Scene, finer: float) -> np.ndarray:
     samples = samples[(samples >= 0.0) & (samples <= length)]
     middle = 0.5 * (samples[1:] + samples[:-1])
     distance = np.min(np.abs(middle[:, None] - near), axis=1)
-    size = np.minimum(end + GROWTH * distance, FAR_SIZE * length) / finer
+    size = np.minimum(end + GROWTH * distance, largest) / finer
     count = np.append(0.0, np.cumsum(np.diff(samples) / size))
     elements = max(2, int(np.ceil(count[-1])))
     return np.interp(np.linspace(0.0, count[-1], elements + 1), count, samples)

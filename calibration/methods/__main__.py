@@ -59,7 +59,7 @@ def compared_controls(quick: bool) -> Section:
     parts = [0.9, 1.1] if quick else [0.5, 0.9, 0.99, 0.999, 1.0, 1.1, 1.5, 2.0]
     pulls = [
         {"control": control, "far_end": end, "rows": controls.to_gross_slip(control, parts, end)}
-        for end in ("held", "free")
+        for end in ("guided", "free")
         for control in ("force", "displacement", "arc-length")
     ]
     return {"loop": controls.same_loop(), "pulls": pulls, "refusal": controls.refusal(1.1)}

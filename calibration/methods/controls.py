@@ -18,7 +18,7 @@ from jbeamshell.scene.load_path import LoadPath
 LARGE = 1.0  # an amplitude for paths of their own, for which it means nothing
 
 
-def scene_under(control: str, far_end: str = "held", **options: Any) -> jb.Scene:
+def scene_under(control: str, far_end: str = "guided", **options: Any) -> jb.Scene:
     """The standard strip under a control."""
     values = {"load.control": control, "load.amplitude": LARGE, "strip.far_end": far_end}
     return scene_of("standard", **options).replace(values)

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from jbeamshell.cli.terminal import warn
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import parsed_toml
 
@@ -67,10 +68,14 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
 def scene_of(options: argparse.Namespace) -> Scene:
     """Scene of the options: the one named, with ``--set`` on top."""
     from jbeamshell.scene import library
-    from jbeamshell.scene.toml import overridden, scene_from_values
+    from jbeamshell.scene.toml import entry_note, overridden, scene_from_values
 
     below = {} if options.scene is None else library.values_from(options.scene)
-    return scene_from_values(overridden(below, assignments(options.set)))
+    values = overridden(below, assignments(options.set))
+    scene = scene_from_values(values)
+    if options.scene is not None and entry_note(values):
+        warn(f"{options.scene}: {entry_note(values)}")
+    return scene
 
 
 def assignments(texts: Sequence[str]) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from jbeamshell.cli.dimensions import add_dimensions, dimensions
 from jbeamshell.cli.terminal import NOT_DESCRIBED, put, say, say_written
 from jbeamshell.common.errors import InputError
 
+EXAMPLE_ENTRY = {"load.entry": "traction"}
 EXAMPLE_START = {"contact.friction": 0.15, "strip.height_ratio": 0.2}
 EXAMPLE_FREE = "contact.friction,strip.height_ratio"
 
@@ -186,7 +187,7 @@ def _example(values: dict[str, Any]) -> Any:
         return plan.plan_for(values, example_loops())
     start = {key: value for key, value in EXAMPLE_START.items() if key in values["free"]}
     scene = values.pop("scene", None)
-    below = overridden(start, {} if scene is None else library.values_from(scene))
+    below = overridden(EXAMPLE_ENTRY | start, {} if scene is None else library.values_from(scene))
     return plan.plan_for(values | {"set": overridden(below, values["set"])}, example_loops())
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from jax import Array, lax
 
 from jbeamshell.common.pytrees import Tree
+from jbeamshell.condensed.ends import End
 from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.numerics.factors import inverse_cholesky
 
@@ -62,106 +63,169 @@ class Body(Tree):
 class Elimination(NamedTuple):
     """Elimination of the fields between the contact's, station by station, to find them again.
 
-    The unknowns are the steps of the fields to a station from the next one, and at the two ends the
-    fields.  The right-hand sides are v and w of all stations, the end load, and the pressure.
+    The right-hand sides are v and w of all stations, the end load, and the pressure.  The unknowns
+    are the steps of the fields to a station from the next one, and at both ends the fields.
 
     Attributes
     ----------
-    inverse : (n, m-2, m-2) inverses of the Cholesky factors
-    known : (n, m-2, 2n+2) right-hand sides, reduced
-    onwards : (n-1, m-2, m-2) coupling to the fields of the next station, reduced
+    inverse : (n-2, m-2, m-2) inverses of the Cholesky factors
+    known : (n-2, m-2, 2n+2) right-hand sides, reduced
+    onwards : (n-2, m-2, m-2) coupling to the fields of the next station, reduced
+    first : (m-2, 2n+2), (m-2, m-2) fields of the first station from the sides and from its next one
+    last : (m-2, 2n+2) fields of the last station from the sides
     """
 
     inverse: Array
     known: Array
     onwards: Array
+    first: tuple[Array, Array]
+    last: Array
 
     def recovered(self, given: Array) -> Array:
         """Fields (n, m-2, levels) from the right-hand sides' factors (2n+2, levels)."""
 
         def back(after: Array, station: tuple[Array, ...]) -> tuple[Array, Array]:
-            first, inverse, sides, onwards = station
-            step = -(inverse.T @ (sides + onwards @ after))
-            here = jnp.where(first, step, after + step)
+            inverse, sides, onwards = station
+            here = after - inverse.T @ (sides + onwards @ after)
             return here, here
 
-        none = jnp.zeros((self.inverse.shape[1], given.shape[1]), given.dtype)
-        onwards = jnp.pad(self.onwards, ((0, 1), (0, 0), (0, 0)))
-        first = np.arange(len(self.inverse)) == 0
-        stations = (first, self.inverse, self.known @ given, onwards)
-        return lax.scan(back, none, stations, reverse=True)[1]
+        last = self.last @ given
+        stations = (self.inverse, self.known @ given, self.onwards)
+        second, found = lax.scan(back, last, stations, reverse=True)
+        first = self.first[0] @ given + self.first[1] @ second
+        return jnp.concatenate([first[None], found, last[None]])
 
 
-def eliminate(
-    form: SectionForm, x: Array, loads: Array, held: tuple[np.ndarray, np.ndarray]
-) -> tuple[Elimination, Array]:
-    """Eliminate a strip of linear elements down to its contact nodes.
+class Line(NamedTuple):
+    """Strip on its contact line.
+
+    Attributes
+    ----------
+    elimination : what finds the eliminated fields again
+    hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
+    """
+
+    elimination: Elimination
+    hessian: Array
+
+
+def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -> tuple[Line, ...]:
+    """Strips of linear elements that differ at their last station alone, on their contact line.
 
     Parameters
     ----------
     form : energy of the section, m fields
-    x : (n,) stations, increasing, the loaded end last
+    x : (n,) stations, increasing, the loaded end last; three or more
     loads : (n,) nodal forces that press on the top face
-    held : (m,) True for fields that are zero at the far end, and at the loaded end; v and w of the
-        contact are left to the caller
-
-    Returns
-    -------
-    elimination : what finds the eliminated fields again
-    left : (2n+2, 2n+2) energy's second derivatives in v and w of all stations, end load, pressure
+    far : conditions at the first station; where v and w of the contact are held is left to the
+        caller
+    last : conditions at the last station of each strip
     """
-    n, inner = x.size, form.pull.size - 2
-    columns = 2 * n + 2
-    free, free_last = (jnp.asarray(~end[2:], x.dtype) for end in held)
+    n, columns = x.size, 2 * x.size + 2
 
     def go(
         carry: tuple[Array, Array], station: tuple[Array, ...]
     ) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
         before, forces = carry
         i, load, length = station
-        start, end, across = (part[0] for part in form.element(length[None]))
+        start, _, across = (part[0] for part in form.element(length[None]))
         stays, follows = form.moved(length)
         forces = forces + load * _in_last_column(form.press[2:], forces)
-        # Of the first station the fields are the unknowns, some of which are held.
-        first = i == 0
-        mask = jnp.where(first, free, 1.0)
         contacts = jnp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
-        sides = _add(forces, contacts, 2 * i) * mask[:, None]
-        matrix = (before + start[2:, 2:]) * mask[:, None] * mask + jnp.diag(1.0 - mask)
-        inverse = inverse_cholesky(matrix)
-        coupling = jnp.where(first, across[2:, 2:], before + stays.T[2:, 2:])
-        onwards = inverse @ (coupling * mask[:, None])
-        known = inverse @ sides
-        next_to = jnp.where(first, across[:2, 2:].T, stays[2:, :2])
-        contacts = jnp.concatenate([next_to, jnp.where(first, end, follows)[2:, :2]], axis=1)
-        forces = _add(jnp.where(first, 0.0, forces) - onwards.T @ known, contacts, 2 * i)
-        own = jnp.where(first, end, stays + follows)[2:, 2:]
+        inverse = inverse_cholesky(before + start[2:, 2:])
+        known = inverse @ _add(forces, contacts, 2 * i)
+        onwards = inverse @ (before + stays.T[2:, 2:])
+        contacts = jnp.concatenate([stays[2:, :2], follows[2:, :2]], axis=1)
+        forces = _add(forces - onwards.T @ known, contacts, 2 * i)
+        own = (stays + follows)[2:, 2:]
         return (before + own - onwards.T @ onwards, forces), (inverse, known, onwards)
 
-    carry = (jnp.zeros((inner, inner), x.dtype), jnp.zeros((inner, 2), x.dtype))
-    parts, total = [], jnp.zeros((columns, columns), x.dtype)
-    stations = (jnp.arange(n - 1), loads[:-1], jnp.diff(x))
+    carry, first, left = _begin(form, x, loads[0], far)
+    left, parts = _wider(_wider(left, columns).T, columns), []
+    stations = (jnp.arange(1, n - 1), loads[1:-1], jnp.diff(x)[1:])
     # No station knows a contact node beyond its next one: the right-hand sides grow part by part.
     count = PARTS if n > FEW else 1
-    for begin, stop in itertools.pairwise(np.linspace(0, n - 1, count + 1).astype(int)):
-        carry = carry[0], _wider(carry[1], 2 * stop + 4)
+    for begin, stop in itertools.pairwise(np.linspace(0, n - 2, count + 1).astype(int)):
+        carry = carry[0], _wider(carry[1], 2 * stop + 6)
         carry, part = lax.scan(go, carry, tuple(each[begin:stop] for each in stations))
         parts.append(part)
-        total = total + _products(part[1], columns)
-    matrix, sides = carry
-    ends = jnp.stack([-form.pull[2:], loads[-1] * form.press[2:]], axis=1)
-    sides = (sides + jnp.pad(ends, ((0, 0), (columns - 2, 0)))) * free_last[:, None]
-    matrix = matrix * free_last[:, None] * free_last + jnp.diag(1.0 - free_last)
-    inverse = inverse_cholesky(matrix)
-    last = inverse @ sides
-    total = total + _products(last[None], columns)
-    left = _among_contacts(form, x, loads) - total
-    found = Elimination(
-        jnp.concatenate([*(part[0] for part in parts), inverse[None]]),
-        jnp.concatenate([*(_wider(part[1], columns) for part in parts), last[None]]),
+        left = left - _products(part[1], columns)
+    inverse, known, onwards = (
+        jnp.concatenate([part[0] for part in parts]),
+        jnp.concatenate([_wider(part[1], columns) for part in parts]),
         jnp.concatenate([part[2] for part in parts]),
     )
-    return found, left
+    first, left = (_wider(first[0], columns), first[1]), left + _among_contacts(form, x, loads)
+    ends = [_finish(form, loads[-1], carry, end) for end in last]
+    return tuple(
+        Line(Elimination(inverse, known, onwards, first, fields), left + change)
+        for fields, change in ends
+    )
+
+
+def _begin(
+    form: SectionForm, x: Array, load: Array, far: End
+) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
+    """Elimination of the first station; the sides are v and w of two stations, load and pressure.
+
+    Returns
+    -------
+    carry : stiffness (m-2, m-2) of the second station's fields, and their sides (m-2, 6)
+    first : fields of the first station from the sides (m-2, 6) and from the next (m-2, m-2)
+    left : (6, 6) second derivatives of the energy in the sides, of the first station's fields alone
+    """
+    start, end, across = (part[0] for part in form.element(x[1:2] - x[:1]))
+    none = jnp.zeros_like(start[:, :1])
+    forces = [none, none, across[:, :2], none, load * form.press[:, None]]
+    fields, back, left = _of_end(start, jnp.concatenate(forces, axis=1), far, 0)
+    onwards = back.T @ across[:, 2:]
+    sides = across.T @ fields + jnp.pad(end[:, :2], ((0, 0), (2, 2)))
+    carry = end[2:, 2:] - onwards.T @ onwards, sides[2:]
+    return carry, (fields[2:], -(back @ onwards)[2:]), left
+
+
+def _finish(
+    form: SectionForm, load: Array, carry: tuple[Array, Array], loaded: End
+) -> tuple[Array, Array]:
+    """Elimination of the last station.
+
+    Returns
+    -------
+    last : (m-2, 2n+2) its fields from the sides
+    left : (2n+2, 2n+2) second derivatives of the energy in the sides, of its fields alone
+    """
+    before, sides = (jnp.pad(part, ((2, 0), (0, 0))) for part in carry)
+    ends = jnp.stack([-loaded.pull, load * form.press], axis=1)
+    forces = sides + jnp.pad(ends, ((0, 0), (sides.shape[1] - 2, 0)))
+    before = jnp.pad(before, ((0, 0), (2, 0)))
+    fields, _, left = _of_end(before, forces, loaded, sides.shape[1] - 4)
+    return fields[2:], left.at[-2, -2].add(-loaded.softness)
+
+
+def _of_end(stiffness: Array, forces: Array, end: End, place: int) -> tuple[Array, Array, Array]:
+    """Elimination of the fields of a station at an end.
+
+    Parameters
+    ----------
+    stiffness : (m, m) of its fields, without what lies beyond
+    forces : (m, sides) on its fields
+    end : its conditions
+    place : column of its v and w among the sides
+
+    Returns
+    -------
+    fields : (m, sides) its fields
+    back : (m, k) inverse factor of its free fields' stiffness
+    left : (sides, sides) second derivatives of the energy
+    """
+    contact, free = end.span[:, :2], end.span[:, 2:]
+    own = stiffness + end.stiffness
+    moved = jnp.pad(contact, ((0, 0), (place, forces.shape[1] - 2 - place)))
+    back = free @ inverse_cholesky(free.T @ own @ free).T
+    known = back.T @ (forces + own @ moved)
+    left = moved.T @ forces
+    left = left + left.T + moved.T @ own @ moved - known.T @ known
+    return moved - back @ known, back, left
 
 
 def _add(sides: Array, block: Array, column: Array) -> Array:
@@ -182,18 +246,22 @@ def _wider(sides: Array, columns: int) -> Array:
 
 
 def _among_contacts(form: SectionForm, x: Array, loads: Array) -> Array:
-    """Stiffness (2n + 2, 2n + 2) of the elements among v and w, and the forces of the loads."""
+    """Stiffness (2n + 2, 2n + 2) of the elements among v and w, and the forces of the pressure.
+
+    The parts of the fields of both ends are left out, which have conditions of their own.
+    """
     n = x.size
     start, end, across = (part[:, :2, :2] for part in form.element(jnp.diff(x)))
+    inner = (np.arange(n) > 0) & (np.arange(n) < n - 1)
+    start, across = (jnp.where(inner[:-1, None, None], part, 0.0) for part in (start, across))
     own = jnp.pad(start, ((0, 1), (0, 0), (0, 0))) + jnp.pad(end, ((1, 0), (0, 0), (0, 0)))
     beside = jnp.pad(across, ((0, 1), (0, 0), (0, 0)))
     here, following = (np.eye(n, k=k)[..., None, None] for k in (0, 1))
     blocks = here * own[:, None] + following * beside[:, None]
     blocks = blocks + np.swapaxes(following, 0, 1) * jnp.swapaxes(beside, 1, 2)
     stiffness = jnp.moveaxis(blocks, 2, 1).reshape(2 * n, 2 * n)
-    pull = jnp.pad(form.pull[:2], (2 * n - 2, 0))
-    press = (loads[:, None] * form.press[:2]).ravel()
-    sides = jnp.stack([-pull, press], axis=1)
+    press = (jnp.where(inner, loads, 0.0)[:, None] * form.press[:2]).ravel()
+    sides = jnp.stack([jnp.zeros_like(press), press], axis=1)
     return jnp.block([[stiffness, sides], [sides.T, jnp.zeros((2, 2), x.dtype)]])
 
 
@@ -201,3 +269,18 @@ def _products(known: Array, columns: int) -> Array:
     """Sum of known' known over the stations and their fields, (columns, columns)."""
     known = known.reshape(-1, known.shape[-1])
     return _wider(_wider(known.T @ known, columns).T, columns).T
+
+
+def local_compliance(stiffness: Array, pull: Array) -> Array:
+    """Compliance of the contact's own fields against the load, which is never zero.
+
+    A load on a contact node, or on a rigid face whose edge is one, has none beside it: c = 0.
+
+    Parameters
+    ----------
+    stiffness : (fields,) diagonal of the stiffness
+    pull : (fields,) part of the load that each clamped contact field carries
+    """
+    square = pull**2
+    whole = jnp.sum(square * stiffness)
+    return jnp.sum(square) / jnp.where(whole > 0.0, whole, 1.0)

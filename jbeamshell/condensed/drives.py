@@ -14,9 +14,11 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from jbeamshell.condensed.body import Body
+from jbeamshell.condensed.body import Body, local_compliance
 from jbeamshell.condensed.branches import ContactState
 from jbeamshell.numerics.factors import inverse_cholesky
+
+STIFF = 1e7  # rounding leaves nine digits beside it
 
 
 def driven_by_displacement(body: Body) -> Body:
@@ -27,9 +29,12 @@ def driven_by_displacement(body: Body) -> Body:
         K -> K + f f'/c,    f -> f/c,    c -> -1/c.
 
     A body that only friction holds back has no equilibrium beyond gross slip under a force; under a
-    displacement it has.  See `exchanged` for its states.
+    displacement it has.  See `exchanged` for its states.  A load that acts on the contact itself,
+    where c is zero, acts through a spring that is `STIFF` times as stiff as the contact.
     """
-    c, f_t, f_n = body.c, body.f_t, body.f_n
+    f_t, f_n = body.f_t, body.f_n
+    stiffness = jnp.append(jnp.diag(body.K_tt), jnp.diag(body.K_nn))
+    c = jnp.maximum(body.c, local_compliance(stiffness, jnp.append(f_t, f_n)) / STIFF)
     return eqx.tree_at(
         lambda b: (b.K_tt, b.K_tn, b.K_nn, b.f_t, b.f_n, b.c),
         body,

@@ -24,11 +24,11 @@ from jbeamshell.condensed.drives import (
     spring_energy,
     with_springs,
 )
+from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.events import walk
 from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
-from jbeamshell.condensed.pair import Pair
 from jbeamshell.condensed.stretch import Level
-from jbeamshell.condensed.strip import Strip, condensed, fields, spring_stiffness, stays_flat
+from jbeamshell.condensed.strip import Strip, condensed, moved_by, spring_stiffness, stays_flat
 from jbeamshell.history.history import History
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.scene.load_path import LoadPath
@@ -103,12 +103,14 @@ def quickest(scene: Scene) -> Search:
     """Search that most often does for a scene's cycles.
 
     Slip zones are nested where no point reaction at the loaded corner slips and opens out of turn,
-    as that of sections of low order does.  A lap joint slips and opens at both ends.  The grid of
-    elastic sliders has many nodes where a strip lifts off.
+    as that of sections of low order and that of a rigid face do.  A lap joint slips and opens at
+    both ends.  The grid of elastic sliders has many nodes where a strip lifts off, and so does the
+    edge of the contact under a member that goes on.
     """
-    if scene.member.support != "none":
+    if scene.member.support != "none" or goes_on(scene):
         return "events"
-    if scene.model.solution == "plane" or scene.model.order >= NESTED_FROM:
+    warps = scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
+    if warps and scene.load.entry == "traction":
         return "factors"
     return "near events" if scene.ideal_friction else "events"
 
@@ -215,22 +217,31 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
 
     settled, held = (jnp.pad(each[::-1], (n - k, 0)) for each in (strip.settled, body.t_0))
     driven = state.displacement if scene.load.control == "displacement" else state.force
-    v = along(state.v) + part[:, None] * settled
-    w = along(levels.lift[:, :n]) + pressing * strip.lift[::-1]
+    risen = along(levels.lift[:, :n] - strip.lift)
+    w = risen + part[:, None] * strip.lift[::-1]
     force = every(state.force)
-    sides = jnp.stack([v, w], axis=2).reshape(steps, 2 * n)
-    given = jnp.concatenate([sides, force[:, None], part[:, None]], axis=1)
-    own = given if strip.pair is None else strip.pair.above(given)
-    moved = fields(strip.elimination, own)[:, :n]
+    # The pressed strip, and what the load adds to it.
+    at_rest = jnp.stack([settled, strip.lift[::-1]], axis=1).ravel()
+    at_rest = jnp.concatenate([at_rest, jnp.array([0.0, 1.0])])
+    change = jnp.stack([along(state.v), risen], axis=2).reshape(steps, 2 * n)
+    change = jnp.pad(jnp.concatenate([change, force[:, None]], axis=1), ((0, 0), (0, 1)))
+    pressed, loaded = moved_by(strip.pressed, at_rest[None]), moved_by(strip.loaded, change)
+    moved, below = (
+        None if one is None or other is None else one * part + other
+        for one, other in zip(pressed, loaded, strict=True)
+    )
+    assert moved is not None
     further, sections = _sections(strip, moved)
-    below = None if strip.pair is None else _fields_below(strip.pair, given)
     reaction = along(state.r_n[:, :n]) / strip.tributary
     reaction = reaction + pressing * body.r_0[::-1] / strip.tributary
     traction = -along(state.r_t) / strip.tributary
     traction = traction - pressing * held / strip.tributary
     slipping = along(levels.slipping).astype(bool)
-    forces = given @ strip.hessian  # conjugate to v, w, minus the end load and the pressure
-    energy = 0.5 * jnp.sum(forces * given, axis=1) - forces[:, -2] * given[:, -2]
+    # Conjugate to v and w, minus the end load, and the pressure.
+    resting, added = at_rest @ strip.pressed.hessian, change @ strip.loaded.hessian
+    energy = 0.5 * part**2 * (resting @ at_rest) + change[:, :-2] @ resting[:-2]
+    energy = energy + 0.5 * jnp.sum(added * change, axis=1) - added[:, -2] * force
+    sinking = part * resting[-1] + added[:, -1]
     if soft:
         energy = energy + every(spring_energy(spring_stiffness(scene, strip), state.r_t))
     if scene.contact.bearing_stiffness is not None:
@@ -258,21 +269,20 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
         slip_work=masked(every(levels.slip_work)),
         stored_energy=masked(energy),
         pressure=part,
-        sinking=masked(forces[:, -1]),
+        sinking=masked(sinking),
         iterations=jnp.zeros(part.size, int),
         error=jnp.zeros(part.size),
         status=jnp.append(jnp.full(before, Status.CONVERGED), status),
         cycles=cycles,
         target=masked(every(driven)),
-        member=None if below is None else masked(below),
+        member=None if below is None else masked(_seen_from_above(strip, below)),
     )
 
 
-def _fields_below(pair: Pair, given: Array) -> Array:
+def _seen_from_above(strip: Strip, moved: Array) -> Array:
     """Fields v, w, beta, psi, ... (steps, n, k) of the member below, as the strip sees them."""
-    n = given.shape[1] // 2 - 1
-    moved = fields(pair.elimination, pair.below(given))[:, -n:]
-    further = jnp.tensordot(pair.form.further, moved, 1)
+    assert strip.loaded.pair is not None
+    further = jnp.tensordot(strip.loaded.pair.form.further, moved, 1)
     turned = jnp.asarray([1.0, -1.0, -1.0])  # w and beta count the other way from below
     seen = jnp.concatenate([moved[:2], further])
     return seen.at[:3].multiply(turned[:, None, None]).T

@@ -7,11 +7,12 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array, lax
 
+from jbeamshell.condensed.body import local_compliance
 from jbeamshell.condensed.branches import ContactState
 from jbeamshell.condensed.tableau import KINDS, OPEN, System, Tableau
 
 MOST_EVENTS = 40  # of a load branch, times the nodes
-SLIDES = 1e6  # compliance over that of the clamped contact at which a body slides as a whole
+SLIDES = 1e6  # compliance over that of the clamped contact from which on a body slides as a whole
 
 
 class Level(NamedTuple):
@@ -84,7 +85,8 @@ def ended(
     tau = jnp.abs(force - start.force)
     at = moved(at, system.friction, tau)
     state, lift = state_of(at, system.friction, start, force)
-    held = jnp.abs(at.rate[-1]) < SLIDES * jnp.abs(system.c)
+    own = local_compliance(jnp.diag(system.matrix), system.pull)
+    held = jnp.abs(at.rate[-1]) < SLIDES * (jnp.abs(system.c) + own)
     slipping = (at.sigma != 0.0) & ~at.opened[: at.sigma.size]
     return at, Level(state, lift, at.work, slipping, last.settled & (event >= tau) & held)
 

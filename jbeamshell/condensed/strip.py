@@ -8,21 +8,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.condensed import entry
 from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.body import Body, Elimination, eliminate
-from jbeamshell.condensed.pair import (
-    Member,
-    Pair,
-    joined,
-    lower_member,
-    over_gap,
-    upper_member,
-    with_shanks,
-)
+from jbeamshell.condensed.ends import end_section
+from jbeamshell.condensed.pair import Member, Pair, joined, with_shanks
 from jbeamshell.condensed.pressing import press as press_down
 from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements
-from jbeamshell.mechanics.section_form import SectionForm
+from jbeamshell.mechanics.section_form import SectionForm, on_symmetry_plane
 from jbeamshell.numerics.factors import solve
 from jbeamshell.scene.keys import FAR_ENDS
 from jbeamshell.scene.parts import Load
@@ -36,6 +30,21 @@ STEP_SIZE = 0.05  # of H, elements at a step of the pressure
 RULE = elements.element_rule("finite-difference")
 
 
+class Members(NamedTuple):
+    """Strip of a scene, with its second member if there is one, on its contact line.
+
+    Attributes
+    ----------
+    elimination : what finds the fields above the contact again
+    hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
+    pair : second member of a lap joint; v, w and hessian are then relative to it
+    """
+
+    elimination: Elimination
+    hessian: Array
+    pair: Pair | None
+
+
 class Strip(NamedTuple):
     """Strip of a scene, condensed.
 
@@ -43,47 +52,36 @@ class Strip(NamedTuple):
     ----------
     body : contact line, numbered from the loaded end
     form : energy of the section
-    elimination : what finds the fields above the contact again
-    hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
+    pressed : the strip under its pressures
+    loaded : the strip under its load, whose members may go on beyond the contact
     x, tributary, load : (n,) stations from the far end, contact lengths, forces of the top pressure
-    settled, lift : (k,) tangential displacements and (n,) lifts under the pressures
-    pair : second member of a lap joint; v, w, hessian, settled and lift are then relative to it
+    settled, lift : (k,) tangential displacements and (n,) lifts under the pressures, relative to a
+        second member
     """
 
     body: Body
     form: SectionForm
-    elimination: Elimination
-    hessian: Array
+    pressed: Members
+    loaded: Members
     x: Array
     tributary: Array
     load: Array
     settled: Array
     lift: Array
-    pair: Pair | None
 
 
 def condensed(scene: Scene, nodes: int) -> Strip:
     """Strip of a scene as its condensed section, or as plane elasticity, on its contact nodes."""
-    far_end = scene.strip.far_end
     form, x = section_form(scene), stations(scene, nodes)
     down, up = pressing(scene, x)
     tributary = elements.tributary_lengths(RULE, x)
-    if scene.member.support == "none":
-        pair = None
-        none = np.zeros_like(form.held)
-        held = form.held if "beta" in FAR_ENDS[far_end] else none
-        elimination, hessian = eliminate(form, x, down, (held, none))
-        lifted = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
-        from_below = lifted[:, None] * np.eye(lifted.size)[-1]
-        hessian = hessian - from_below - from_below.T
-    else:
-        upper, lower = _members(scene, form, x, down, up)
-        elimination = upper.elimination
-        pair, hessian = joined(upper, lower)
+    alone = scene.member.support == "none"
+    under_pressure, under_load = (_alone if alone else _joint)(scene, form, x, down, up)
     gap = initial_gap(scene, x)
     last = 2 * x.size - 2
-    v = slice(last, 0 if "v" in FAR_ENDS[far_end] else None, -2)
+    v = slice(last, 0 if "v" in FAR_ENDS[scene.strip.far_end] else None, -2)
     w = slice(last + 1, None, -2)
+    hessian = under_pressure.hessian
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
     # Without friction the far end keeps its place, even if nothing else holds it.
     some = x.size - 1
@@ -99,16 +97,17 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     else:
         based = scene.contact.normal == "rigid"
         lift, settled, reaction = press_down(*stiffness, press_t, press[w], based, away)
-    if gap is not None and pair is not None:
-        pair, hessian = over_gap(pair, hessian, gap)
+    if gap is not None:
+        under_pressure, under_load = (over_gap(each, gap) for each in (under_pressure, under_load))
     settled = jnp.pad(settled, (0, k_tt.shape[0] - settled.size))
+    hessian = under_load.hessian
     if scene.contact.bolt_stiffness is not None:
-        hessian = with_shanks(hessian, scene.contact.bolt_stiffness, down, settled[::-1])
+        hessian = with_shanks(hessian, scene.contact.bolt_stiffness, down)
     body = Body(
         x=x[::-1],
         tributary=tributary[::-1],
         K_tt=hessian[v, v],
-        K_tn=k_tn,
+        K_tn=hessian[v, w],
         K_nn=hessian[w, w],
         f_t=-hessian[v, -2],
         f_n=-hessian[w, -2],
@@ -116,7 +115,83 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         t_0=traction,
         c=-hessian[-2, -2],
     )
-    return Strip(body, form, elimination, hessian, x, tributary, down, settled, lift, pair)
+    under_load = under_load._replace(hessian=hessian)
+    return Strip(body, form, under_pressure, under_load, x, tributary, down, settled, lift)
+
+
+def _alone(
+    scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
+) -> tuple[Members, Members]:
+    """Strip on a rigid base, under its pressures and under its load."""
+    lifted = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
+    from_below = lifted[:, None] * np.eye(lifted.size)[-1]
+    reaches = (False, True) if entry.goes_on(scene) else (False,)
+    ends = [entry.loaded_end(scene, form, beyond).end for beyond in reaches]
+    found = [
+        Members(line.elimination, line.hessian - from_below - from_below.T, None)
+        for line in eliminate(form, x, down, entry.far_end(scene, form), *ends)
+    ]
+    return found[0], found[-1]
+
+
+def _joint(
+    scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
+) -> tuple[Members, Members]:
+    """Both members of a lap joint, under the pressures and under the load."""
+    found = []
+    for upper, lower, stretch in lap_members(scene, form, x, down, up):
+        pair, hessian = joined(upper, lower)
+        found.append(Members(upper.line.elimination, hessian.at[-2, -2].add(stretch), pair))
+    return found[0], found[-1]
+
+
+def lap_members(
+    scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
+) -> list[tuple[Member, Member, Array]]:
+    """Members of a lap joint under the pressures, and under the load if they then go on.
+
+    Returns
+    -------
+    list
+        upper and lower member, and the compliance of the latter that u leaves out
+    """
+    n, strip, rolls = x.size, scene.strip, scene.member.support == "rolling"
+    upper_form, below = loaded(form, scene.load), section_form(scene.of_member())
+    flat = rolls and below.top == 0  # what cannot be squeezed keeps its height
+    below = on_symmetry_plane(below) if rolls else below
+    arm = strip.half_height + scene.member.beside(strip).half_height
+    arm = arm if scene.load.arm is None else arm + scene.load.arm
+    pull = below.turn if scene.load.kind == "moment" else below.pull + arm * below.turn
+    below = below._replace(pull=jnp.zeros_like(below.pull))  # the load acts above
+    free = np.zeros((n - 1, 2), bool)
+    reaches = (False, True) if entry.goes_on(scene) else (False,)
+    entering = [entry.loaded_end(scene, upper_form, beyond) for beyond in reaches]
+    uppers = eliminate(
+        upper_form, x, down, end_section(upper_form), *(held.end for held in entering)
+    )
+    found = []
+    for beyond, held, upper in zip(reaches, entering, uppers, strict=True):
+        leaving, stretch = entry.leaving_end(scene, below, pull, flat, beyond)
+        fixed = np.append(leaving.fixed, free).reshape(n, 2) | [False, flat]
+        (lower,) = eliminate(below, x, up, leaving.end, end_section(below))
+        above = Member(upper_form, upper, np.append(free, held.fixed))
+        found.append((above, Member(below, lower, fixed.ravel()), stretch))
+    return found
+
+
+def over_gap(members: Members, gap: Array) -> Members:
+    """Members in their opening w + g_0 instead of the relative lift w.
+
+    Parameters
+    ----------
+    gap : (n,) distance g_0 of the members before anything presses
+    """
+    shift = jnp.stack([jnp.zeros_like(gap), -gap], axis=1).ravel()
+    change = jnp.eye(shift.size + 2, dtype=gap.dtype).at[:-2, -1].add(shift)
+    pair = members.pair
+    assert pair is not None
+    moved = pair._replace(upper=pair.upper @ change, lower=pair.lower @ change)
+    return members._replace(hessian=change.T @ members.hessian @ change, pair=moved)
 
 
 def initial_gap(scene: Scene, x: Array) -> Array | None:
@@ -138,18 +213,6 @@ def initial_gap(scene: Scene, x: Array) -> Array | None:
 def _on_stations(gap: Array, x: Array) -> Array:
     """Values (n,) of a number or a table at the stations."""
     return jnp.interp(x, gap[:, 0], gap[:, 1]) if gap.ndim else jnp.broadcast_to(gap, x.shape)
-
-
-def _members(scene: Scene, form: SectionForm, x: Array, down: Array, up: Array) -> list[Member]:
-    """Both members of a lap joint."""
-    strip, member = scene.strip, scene.member
-    below = section_form(scene.of_member())
-    return [
-        upper_member(
-            loaded(form, scene.load), x, strip.overhang, down, strip.loaded_end == "guided"
-        ),
-        lower_member(below, x, member.overhang, up, member.support == "clamped"),
-    ]
 
 
 def loaded(form: SectionForm, load: Load) -> SectionForm:
@@ -235,27 +298,39 @@ def spring_stiffness(scene: Scene, strip: Strip) -> Array:
 def moving_volume(strip: Strip) -> Array:
     """Integral of |u|^2/u(L)^2 over each layer, (layers,), under an end load, all nodes stuck.
 
-    A second member's counts with the lowest layer; overhangs do not count.
+    A second member's counts with the lowest layer; lengths beyond the contact do not count.
     """
     n = strip.x.size
     given = jnp.zeros((1, 2 * n + 2)).at[0, -2].set(1.0 / strip.body.c)
-    if strip.pair is None:
-        return _volume(strip, strip.form, strip.elimination, given, slice(n))
-    upper, lower = strip.pair.above(given), strip.pair.below(given)
-    volume = _volume(strip, strip.form, strip.elimination, upper, slice(n))
-    other = _volume(strip, strip.pair.form, strip.pair.elimination, lower, slice(-n, None))
-    return volume.at[0].add(jnp.sum(other))
+    upper, lower = moved_by(strip.loaded, given)
+    volume = _volume(strip, strip.form, upper)
+    if lower is None:
+        return volume
+    assert strip.loaded.pair is not None
+    return volume.at[0].add(jnp.sum(_volume(strip, strip.loaded.pair.form, lower)))
 
 
-def _volume(
-    strip: Strip, form: SectionForm, elimination: Elimination, given: Array, contact: slice
-) -> Array:
-    """Moving volume (layers,) of one member along the contact."""
-    moved = fields(elimination, given)[:, contact, 0]
-    return jnp.einsum("i,mi,lmk,ki->l", strip.tributary, moved, form.masses, moved)
+def _volume(strip: Strip, form: SectionForm, moved: Array) -> Array:
+    """Moving volume (layers,) of one member along the contact, of its fields (m, n, 1)."""
+    one = moved[..., 0]
+    return jnp.einsum("i,mi,lmk,ki->l", strip.tributary, one, form.masses, one)
 
 
-def fields(elimination: Elimination, given: Array) -> Array:
+def moved_by(members: Members, given: Array) -> tuple[Array, Array | None]:
+    """Fields (m, n, steps) of the strip and of its second member, each of its own form.
+
+    Parameters
+    ----------
+    given : (steps, 2n + 2) v and w of the stations, end load and pressure
+    """
+    pair = members.pair
+    if pair is None:
+        return _fields(members.elimination, given), None
+    above = _fields(members.elimination, pair.above(given))
+    return above, _fields(pair.elimination, pair.below(given))
+
+
+def _fields(elimination: Elimination, given: Array) -> Array:
     """Fields (m, n, steps) of a form from v and w of its stations, load and pressure (steps, :)."""
     contact = given[:, :-2].reshape(len(given), -1, 2)
     inner = elimination.recovered(given.T)  # (n, m-2, steps)

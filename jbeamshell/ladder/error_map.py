@@ -82,7 +82,7 @@ def place(scene: Scene) -> np.ndarray | str:
         "layers": strip.layers is not None,
         "a curvature": strip.curvature is not None,
         "a second member": scene.member.support != "none",
-        "a far end that is not held": strip.far_end != "held",
+        "a far end that is not guided": strip.far_end != "guided",
         "a pressure that varies": contact.pressure.ndim > 0,
         "a pressure from below": contact.bottom_pressure.ndim > 0 or contact.bottom_pressure != 0,
         "a contact that is not rigid": contact.normal != "rigid",

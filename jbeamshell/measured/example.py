@@ -27,6 +27,8 @@ def example_loops(
 ) -> list[Loop]:
     """Read steady loops of the standard strip by plane-strain finite elements (mu = .1, F_N = 10).
 
+    The force enters as an even traction, load.entry = traction.
+
     Parameters
     ----------
     height_ratio : eta, one of 0.0305, 0.0511, 0.1126, 0.2358, 0.4

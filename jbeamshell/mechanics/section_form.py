@@ -109,6 +109,17 @@ def on_symmetry_plane(form: SectionForm) -> SectionForm:
     kept = np.delete(np.arange(form.pull.size), form.top)
     others = -form.press[kept] / form.press[form.top]
     fields = jnp.eye(form.pull.size, dtype=form.pull.dtype)[:, kept].at[form.top].set(others)
+    return _within(form, fields, kept)._replace(press=jnp.zeros_like(others), top=0)
+
+
+def without_lift(form: SectionForm) -> SectionForm:
+    """Form of a section whose w is zero, and is left out."""
+    kept = np.delete(np.arange(form.pull.size), W)
+    return _within(form, jnp.eye(form.pull.size, dtype=form.pull.dtype)[:, kept], kept)
+
+
+def _within(form: SectionForm, fields: Array, kept: np.ndarray) -> SectionForm:
+    """Form in those fields that are kept, from which all others follow as ``fields`` (m, k)."""
 
     def within(matrix: Array) -> Array:
         return fields.T @ matrix @ fields
@@ -119,11 +130,10 @@ def on_symmetry_plane(form: SectionForm) -> SectionForm:
         slopes=within(form.slopes),
         pull=fields.T @ form.pull,
         turn=fields.T @ form.turn,
-        press=jnp.zeros_like(others),
+        press=fields.T @ form.press,
         held=form.held[kept],
         further=form.further @ fields,
         modes=form.modes[..., kept],
         spread=within(form.spread),
         masses=jax.vmap(within)(form.masses),
-        top=0,
     )

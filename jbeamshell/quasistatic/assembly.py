@@ -52,7 +52,7 @@ def band(system: System, section: Array, rough: bool) -> Band:
     section : (2, m, 2, m, ...) stiffness of the section, see `System.section_stiffness`
     rough : True if there is friction
     """
-    active, supports, first = system.model.active, system.supports(rough), node(system.x, 0)
+    active, supports = system.model.active, system.supports(rough)
     (own, onward), (back, end) = _elements(system, section)
     none = jnp.zeros_like(own[:, :, :1])
     middle = jnp.append(none, end, 2) + jnp.append(own, none, 2)
@@ -64,16 +64,18 @@ def band(system: System, section: Array, rough: bool) -> Band:
         for i in active:
             scale = system.residual_scale(i)
             row = [scale * rows[i, j] for j in active]
-            if i in supports:
-                fixed = [scale * supports[i] if held and i == j else 0.0 for j in active]
-                row = [jnp.where(first, a, b) for a, b in zip(fixed, row, strict=True)]
+            for place, field in supports:
+                if field == i:
+                    here, stiffness = node(system.x, place), scale * supports[place, field]
+                    fixed = [stiffness if held and i == j else 0.0 for j in active]
+                    row = [jnp.where(here, a, b) for a, b in zip(fixed, row, strict=True)]
             found.append(row)
         return found
 
     normal = [[rows[W, j] / system.tributary for j in active] for rows in near]
     rubbing = system.residual_scale(V) * system.tributary
-    if V in supports:
-        rubbing = jnp.where(first, 0.0, rubbing)
+    if (0, V) in supports:
+        rubbing = jnp.where(node(system.x, 0), 0.0, rubbing)
     lower, diagonal, upper = map(blocks, near, (False, True, False))
     return Band(lower, diagonal, upper, normal, rubbing)
 
@@ -110,12 +112,13 @@ def node(x: Array, node: int) -> np.ndarray:
 
 
 def unheld(system: System, rough: bool, load: list[Array]) -> list[Array]:
-    """Load, m entries (n, ...), without the part that acts on fields held at X = 0."""
-    first, supports = node(system.x, 0), system.supports(rough)
-    return [
-        jnp.where(first, 0.0, each) if field in supports else each
-        for field, each in zip(system.model.active, load, strict=True)
-    ]
+    """Load, m entries (n, ...), without the part that acts on fields held at the ends."""
+    free = list(load)
+    for place, field in system.supports(rough):
+        if field in system.model.active:
+            i = system.model.active.index(field)
+            free[i] = jnp.where(node(system.x, place), 0.0, free[i])
+    return free
 
 
 def times(rows: Sequence[Sequence[Array]], change: Sequence[Array]) -> Array:

@@ -24,6 +24,8 @@ from jbeamshell.quasistatic.foundation import Foundation
 from jbeamshell.scene.keys import ARC_LENGTH, FAR_ENDS
 from jbeamshell.scene.scene import Scene
 
+LAST = -1  # node at the loaded end
+
 
 class LoadLevel(NamedTuple):
     """State of the strip at the end of a load step, all that the next step needs to know.
@@ -105,6 +107,7 @@ class System(ElasticStrip):
     force_scale : mu F_N L, or F_N L without friction, which makes residuals dimensionless
     far_end : support at X = 0
     control : controlled quantity at the loaded end
+    entry : how the force enters there
     """
 
     foundation: Foundation
@@ -112,6 +115,7 @@ class System(ElasticStrip):
     force_scale: Array
     far_end: str = eqx.field(static=True)
     control: str = eqx.field(static=True)
+    entry: str = eqx.field(static=True)
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
@@ -121,6 +125,7 @@ class System(ElasticStrip):
         self.force_scale = normal_force * jnp.where(friction > 0.0, friction, 1.0)
         self.foundation = Foundation(scene, normal_force, self.force_scale, self.tributary)
         self.far_end, self.control = strip.far_end, scene.load.control
+        self.entry = scene.load.entry
 
     @property
     def linear(self) -> bool:
@@ -204,7 +209,7 @@ class System(ElasticStrip):
             assumed = jnp.asarray(self.youngs_modulus) * q[:, PSI] + mean
             forces = forces.at[:, PSI].set(2.0 * self.half_height * self.tributary * assumed)
         force, forces = self._end_load(forces, q, prescribed)
-        forces = self._hold_far_end(forces, q, prescribed.rough)
+        forces = self._hold_ends(forces, q, prescribed.rough)
         per_force = jnp.stack([self._per_force(field) for field in range(self.model.width)])
         residual = (forces * per_force / self.force_scale)[:, list(self.model.active)]
         return force, residual
@@ -222,13 +227,13 @@ class System(ElasticStrip):
         condition = self.stiffness_scale * (reached - prescribed.controlled)
         return force, forces.at[-1, V].set(jnp.where(no_force, condition, forces[-1, V]))
 
-    def _hold_far_end(self, forces: Array, q: Array, rough: Array) -> Array:
-        """Replace the balance of the fields held at X = 0 by their support conditions."""
+    def _hold_ends(self, forces: Array, q: Array, rough: Array) -> Array:
+        """Replace the balance of the fields held at both ends by their support conditions."""
 
-        def held(supports: dict[int, Array]) -> Array:
+        def held(supports: dict[tuple[int, int], Array]) -> Array:
             found = forces
-            for field, scale in supports.items():
-                found = found.at[0, field].set(scale * q[0, field])
+            for place, scale in supports.items():
+                found = found.at[place].set(scale * q[place])
             return found
 
         with_friction, without = self.supports(True), self.supports(False)
@@ -236,23 +241,31 @@ class System(ElasticStrip):
             return held(with_friction)
         return jnp.where(rough > 0.0, held(with_friction), held(without))
 
-    def supports(self, rough: bool) -> dict[int, Array]:
-        """Fields that are held at X = 0, each with the factor that makes its condition a force.
+    def supports(self, rough: bool) -> dict[tuple[int, int], Array]:
+        """Held fields, by node and number, each with the factor that makes its condition a force.
 
-        Without friction something must hold v: a free end is held too until friction acts.
+        Without friction something must hold v at X = 0: a free end is held too until friction acts.
         """
         names = FAR_ENDS[self.far_end]
         held = {}
         if not self.foundation.present:
-            held[W] = self.stiffness_scale
+            held[0, W] = self.stiffness_scale
         if "v" in names or not rough:
-            held[V] = self.stiffness_scale
-        if "beta" in names:
-            held[BETA] = self.stiffness_scale * self.half_height**2
-            # A section of order p also has displacements along X beyond its rotation.
-            further = range(len(FIELDS), self.model.width, 2)
-            held |= dict.fromkeys(further, self.stiffness_scale)
-        return held
+            held[0, V] = self.stiffness_scale
+        turning = self.stiffness_scale * self.half_height**2
+        ends = [0] if "beta" in names else []
+        if self.entry == "guided":
+            ends.append(LAST)
+        held |= {(node, BETA): turning for node in ends}
+        # A section of order p also has displacements along X beyond its rotation.
+        further = range(len(FIELDS), self.model.width, 2)
+        ends += [LAST] if self.entry == "face" else []
+        return held | {(node, field): self.stiffness_scale for node in ends for field in further}
+
+    def end_displacement(self, q: Array) -> Array:
+        """Displacement u(L) of the loaded end, the conjugate of F; see `ElasticStrip`."""
+        held = [field for node, field in self.supports(True) if node == LAST]
+        return super().end_displacement(q.at[LAST, held].set(0.0) if held else q)
 
     def residual_scale(self, field: int) -> Array:
         """Residual per force, or per moment, in a field's balance."""

@@ -52,6 +52,9 @@ def check_joint(scene: Parts) -> None:
     load = scene.load
     fix = "is for a force: leave it out with load.kind = moment"
     require("load.arm", load.arm, load.arm is None or load.kind == "force", fix)
+    turned = load.kind == "moment" or load.arm is not None
+    fix = "may not turn: take member, face or traction, or a force without load.arm"
+    require("load.entry", load.entry, load.entry != "guided" or not turned, fix)
     plain = member.layers is None and strip.layers is None
     fix = "is for homogeneous members; take 0"
     require("model.order", model.order, model.order == 0 or plain, fix)

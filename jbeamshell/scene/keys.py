@@ -22,7 +22,8 @@ from jbeamshell.mechanics.kinematics import KINEMATICS
 from jbeamshell.scene.rows import AUTO, Key, Part, count, number, rows, setting, word
 from jbeamshell.scene.rungs import CONDENSED, LARGEST_ORDER
 
-FAR_ENDS = {"held": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held at X = 0
+FAR_ENDS = {"guided": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held at X = 0
+ENTRIES = ("member", "face", "guided", "traction")
 CONTROLS = ("force", "displacement")
 ARC_LENGTH = "arc-length"
 LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
@@ -30,7 +31,7 @@ LOAD_KINDS = ("force", "moment")
 ASSEMBLIES = ("frictionless", "frictional")
 NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
-LOADED_ENDS = ("free", "guided")
+LOADED_ENDS = ("free", "level")
 MEMBERS = ("none", "rolling", "clamped")
 SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form", *CONDENSED)
 
@@ -73,12 +74,14 @@ class StripKeys(Part):
         0.44, "Squeeze-shear factor; 0.44 fits the squeeze layer.", symbol=r"\kappa_s"
     )
     far_end: str = word(
-        "held", FAR_ENDS, "Support at X = 0: held (v = beta = 0), pinned (v = 0) or free."
+        "guided",
+        FAR_ENDS,
+        "Support at X = 0: guided (a rigid face at rest), pinned (its lower edge at rest) or free.",
     )
     loaded_end: str = word(
         "free",
         LOADED_ENDS,
-        "Support at X = L beside the load: free, or guided (no deflection; lap joints only).",
+        "Support at X = L beside the load: free, or level (no deflection; lap joints only).",
     )
     overhang: Array | None = number(
         None,
@@ -212,6 +215,13 @@ class LoadKeys(Part):
         LOAD_KINDS,
         "What acts on the end: a force F along X, or a moment M (lap joints only).  A moment opens "
         "the joint if positive; u is then the rotation of the end, and F is M.",
+    )
+    entry: str = word(
+        "member",
+        ENTRIES,
+        "How the force enters at X = L: member (the strip goes on without contact and is pulled "
+        "evenly far away), face (a rigid face that may turn), guided (a rigid face that may not) "
+        "or traction (spread evenly over the face).",
     )
     arm: Array | None = number(
         None,

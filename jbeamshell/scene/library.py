@@ -23,14 +23,15 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path
 from jbeamshell.scene.scene import Scene
-from jbeamshell.scene.toml import read_scene, read_values
+from jbeamshell.scene.toml import read_values, scene_from_values
 
 
 def standard() -> Scene:
     """The standard strip: a thin bar on a rough base, pulled to and fro at its end.
 
-    It is the same as ``Scene()``: fields v, beta and psi, held at X = 0, two cycles of the end
-    force (after chapter III).  Units are any consistent ones.  Gross slip begins at F = 2.
+    It is ``Scene()`` under an even traction, as the dissertation's finite elements are: fields v,
+    beta and psi, held at X = 0, two cycles of the end force (after chapter III).  Units are any
+    consistent ones.  Gross slip begins at F = 2.
     """
     return named("standard")
 
@@ -134,8 +135,8 @@ def double_shear() -> Scene:
 def single_lap() -> Scene:
     """A single lap joint: two members pressed together as if by a bolt, which bend and lift off.
 
-    The lower member is clamped at X = 0, the upper one pulled and guided at X = L.  Units are any
-    consistent ones.  Gross slip begins near F = 2.
+    The lower member is clamped at X = 0, the upper one pulled and kept level at X = L.  Units are
+    any consistent ones.  Gross slip begins near F = 2.
     """
     return named("single-lap")
 
@@ -162,7 +163,7 @@ NAMES = tuple(_FUNCTIONS)
 
 def named(name: str) -> Scene:
     """Scene of a name; raises `InputError` with the nearest name if there is none."""
-    return read_scene(_file(name))
+    return scene_from_values(values_of(name))
 
 
 def values_of(name: str) -> dict[str, Any]:

@@ -41,6 +41,8 @@ def whole_path(
 ) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
     """Path of the pressing and of the given loads or the scene's own, and its closed cycles."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+    if path is not None or scene.load.cycles > 0:
+        scene.check_entry()
     pressing, known = scene.load.pressure_steps, scene.load.unit_path()
     closed = functools.partial(_own_cycles, scene.load.cycles, scene.load.steps_per_half_cycle)
     solution = scene.model.solution

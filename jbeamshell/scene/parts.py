@@ -148,7 +148,7 @@ class Member(MemberKeys):
             axial_stiffness=stiffness,
             poisson_ratio=nu,
             kappa_s=strip.kappa_s,
-            far_end="held",
+            far_end="guided",
             layers=layers,
             deviation=strip.deviation,
             plane=strip.plane,
@@ -338,6 +338,11 @@ class Model(ModelKeys):
     def walks(self) -> bool:
         """True if the solution follows any path of loads."""
         return self.solution == "stepwise" or self.condensed
+
+    @property
+    def warps(self) -> bool:
+        """True if a section may warp, so that its end is no rigid face by nature."""
+        return self.solution == "plane" or self.order > 1
 
     @property
     def width(self) -> int:

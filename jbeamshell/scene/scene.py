@@ -238,7 +238,8 @@ class Scene(Tree):
         require("model.squeeze", "assumed", not layered, "is for a homogeneous strip")
         if contact.normal == "none":
             held = "beta" in FAR_ENDS[strip.far_end]
-            fix = "is all that holds a strip without a foundation: take 'held' (rigid-body motion)"
+            fix = "is all that holds a strip without a foundation: take 'guided' (rigid-body "
+            fix += "motion)"
             require("strip.far_end", strip.far_end, held, fix)
         pressures = (contact.pressure, contact.bottom_pressure)
         if not is_traced(strip.length, contact.friction, *pressures):
@@ -377,9 +378,19 @@ class Scene(Tree):
         fix = "is for loads under constant pressures, at rest; for vibrations take "
         fix += "jb.dynamics.Joint.of(scene) in a structure"
         require("member.support", support, support == "none", fix)
-        if "solution" not in self.model.open or self.model.solution == "stepwise":
-            return self
-        return self.replace({"model.solution": "stepwise"})
+        found = self
+        if "solution" in self.model.open and self.model.solution != "stepwise":
+            found = self.replace({"model.solution": "stepwise"})
+        found.check_entry()
+        return found
+
+    def check_entry(self) -> None:
+        """Refuse a member that goes on where load steps cannot continue its section."""
+        model, entry = self.model, self.load.entry
+        fix = f"has no section of order {model.order} in load steps: take load.entry = face, "
+        fix += f"guided or traction, or model.rung = condensed-p{model.order} or squeeze"
+        ends = model.condensed or not model.warps or entry != "member"
+        require("load.entry", entry, ends, fix)
 
 
 def _number(key: str, value: Any) -> Array:

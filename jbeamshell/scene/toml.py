@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -54,14 +55,34 @@ def read_values(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def read_scene(path: str | os.PathLike[str]) -> Scene:
-    """Scene of a TOML file; keys that it leaves out are those of the standard strip.
+    """Scene of a TOML file; keys that it leaves out are those of ``Scene()``.
 
     Raises
     ------
     InputError
         if the file cannot be read, is no TOML, or describes no scene
+
+    Warns
+    -----
+    UserWarning
+        if the file does not say how the load enters
     """
-    return scene_from_values(read_values(path))
+    values = read_values(path)
+    scene = scene_from_values(values)
+    note = entry_note(values)
+    if note:
+        warnings.warn(f"{path}: {note}", stacklevel=2)
+    return scene
+
+
+def entry_note(values: Mapping[str, Any]) -> str:
+    """Sentence on what a file means that does not say how its load enters; else empty."""
+    if "load.entry" in values or values.get("load.cycles") == 0:
+        return ""
+    return (
+        "load.entry is not given and read as 'member', a member that goes on beyond the contact; "
+        "say it, or 'face', 'guided' or 'traction'"
+    )
 
 
 def scene_to_toml(scene: Scene) -> str:

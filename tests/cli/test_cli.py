@@ -49,7 +49,7 @@ ROOT = Path(jb.__file__).parent.parent
         ("contact.smoothing=blunt", "contact.smoothing = 'blunt': must be a number above 1, or"),
         ("strip.poisson_ratio=0.5", "strip.poisson_ratio = 0.5: must lie between -1 and 0.5"),
         ("strip.poisson_ratio=-1", "strip.poisson_ratio = -1.0: must lie between -1 and 0.5"),
-        ("strip.far_end=glued", "strip.far_end = 'glued': choose 'held' or 'pinned' or 'free'"),
+        ("strip.far_end=glued", "strip.far_end = 'glued': choose 'guided' or 'pinned' or 'free'"),
         ("load.cycles=1.5", "load.cycles = 1.5: must be a whole number, 0 to"),
         ("load.cycles=-1", "load.cycles = -1: must be a whole number, 0 to"),
         ("load.control=displacement", "load.amplitude = None: give the amplitude"),
@@ -91,7 +91,7 @@ TIPPING = {"contact.bottom_pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 19.0], [2.0
         ),
         (
             LIFTING | {"contact.normal": "none", "strip.far_end": "free"},
-            "strip.far_end = 'free': is all that holds a strip without a foundation: take 'held'",
+            "strip.far_end = 'free': is all that holds a strip without a foundation: take 'guided'",
         ),
         (
             {"contact.friction": 0, "strip.far_end": "free"},

@@ -13,7 +13,7 @@ from jbeamshell.scene.rungs import name_of, values_of
 
 # Elements at the loaded end are so large that slip zones are nested.
 COARSE = {"model.nodes": 17, "model.end_size": 1.0 / 6.0, "load.steps_per_half_cycle": 2}
-SCENE = jb.Scene().replace(COARSE)
+SCENE = jb.library.standard().replace(COARSE)
 LAYERS = [[0.1, 2.0e4, 0.3], [0.1252, 1.5e5, 0.2]]
 AMPLITUDE = float(SCENE.load.amplitude)
 SOFT = {"contact.stick_stiffness": 50.0}  # load steps have no ideal friction
@@ -88,7 +88,7 @@ class TestBody:
         size = np.sqrt(np.abs(np.diag(schur)))
         size = np.where(size > 0.0, size, 1.0)  # a shell is not squeezed
         np.testing.assert_allclose(
-            body.hessian / size / size[:, None], schur / size / size[:, None], atol=1e-12
+            body.pressed.hessian / size / size[:, None], schur / size / size[:, None], atol=1e-12
         )
 
     def test_a_phi_written_anew_is_the_built_in_one(self):

@@ -25,6 +25,7 @@ def scene_of(eta, mu=0.1, nu=0.3):
     return jb.Scene().replace(
         {
             "model.rung": "plane",
+            "load.entry": "traction",
             "strip.height_ratio": eta,
             "strip.poisson_ratio": nu,
             "contact.friction": mu,

@@ -17,10 +17,11 @@ WALK = jax.jit(events.walk)
 STRIP = jax.jit(lambda scene: strip.condensed(scene, NODES))
 
 
-@pytest.fixture(scope="module", params=["held", "free"])
+@pytest.fixture(scope="module", params=["guided", "free"])
 def body(request):
     changed = {
         "model.rung": "plane",
+        "load.entry": "traction",
         "contact.friction": MU,
         "contact.pressure": 1.0 / MU,
         "strip.far_end": request.param,
@@ -77,7 +78,7 @@ class TestDisplacementControl:
         np.testing.assert_allclose(driven.slip_work, pushed.slip_work, rtol=1e-10)
 
     def test_factors_serve_it_where_zones_are_nested(self):
-        changed = {"model.rung": "plane", "contact.friction": 0.1, "contact.pressure": 10.0}
+        changed = {"model.rung": "plane", "load.entry": "traction"}
         body = STRIP(jb.Scene().replace(changed)).body
 
         @jax.jit

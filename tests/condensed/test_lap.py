@@ -12,9 +12,9 @@ import pytest
 import jbeamshell as jb
 from calibration.finite_elements import lap
 from jbeamshell.condensed import strip
-from jbeamshell.condensed.pair import Pair, over_gap
+from jbeamshell.condensed.pair import Pair
 from jbeamshell.condensed.section import section_form
-from jbeamshell.condensed.strip import stations
+from jbeamshell.condensed.strip import Members, over_gap, stations
 from jbeamshell.dynamics import Joint
 from jbeamshell.mechanics.bar import lap_backbone, lap_cubic_law
 from jbeamshell.scene import library
@@ -319,7 +319,8 @@ class TestGap:
     def test_what_is_open_is_lifted_and_the_gap_besides(self):
         random, gap = np.random.default_rng(0), np.array([0.1, 0.0, 0.3])
         hessian, upper, lower = random.standard_normal((3, 8, 8))
-        moved, found = over_gap(Pair(None, None, upper, lower), hessian, jnp.asarray(gap))
+        members = Members(None, hessian, Pair(None, None, upper, lower))
+        _, found, moved = over_gap(members, jnp.asarray(gap))
         opening = np.append(random.standard_normal(7), 1.0)  # v, w + gap, load, pressure
         lift = opening.copy()
         lift[1:6:2] -= gap
@@ -386,7 +387,7 @@ class TestGap:
 
 
 def test_a_single_lap_beyond_its_gross_slip_is_told():
-    values = {"member.support": "clamped", "strip.loaded_end": "guided", "load.amplitude": 1.99}
+    values = {"member.support": "clamped", "strip.loaded_end": "level", "load.amplitude": 1.99}
     values |= {"contact.pressure": BOLT, "contact.bottom_pressure": BOLT, "model.rung": "shell"}
     values |= {"model.nodes": 41, "load.steps_per_half_cycle": 2, "load.cycles": 1}
     with pytest.raises(jb.UnconvergedError, match="all of the contact slides"):
@@ -426,13 +427,13 @@ def test_a_sweep_runs_over_both_heights():
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"strip.far_end": "held"}, "strip.far_end = 'held': must be 'free' in a lap joint"),
+        ({"strip.far_end": "guided"}, "strip.far_end = 'guided': must be 'free' in a lap joint"),
         ({"contact.normal": "compliant"}, "contact.normal"),
         ({"model.solution": "stepwise"}, "model.solution = 'stepwise'"),
         ({"contact.bottom_pressure": 3.0}, "must be 0 on a symmetry plane"),
         ({"strip.curvature": 0.1}, "strip.curvature"),
         ({"member.support": "none", "member.height_ratio": 0.1}, "give member.support"),
-        ({"member.support": "none", "strip.loaded_end": "guided"}, "give member.support"),
+        ({"member.support": "none", "strip.loaded_end": "level"}, "give member.support"),
         ({"member.support": "none", "contact.assembly": "frictional"}, "give member.support"),
         ({"member.layers": [[0.1, 1e5, 0.3]]}, "member.layers"),
         ({"load.amplitude": 2.5}, "gross slip"),

@@ -11,7 +11,7 @@ from jbeamshell.condensed.branches import factorise
 from jbeamshell.condensed.network import Network
 
 PLANE = {"model.rung": "plane", "model.nodes": 33}
-SCENE = jb.Scene().replace(PLANE)
+SCENE = jb.library.standard().replace(PLANE)
 NESTED = [0.5, 1.0, 0.6, -0.2, -0.6, -0.2, 0.2, -0.3, -0.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.1]
 of = eqx.filter_jit(Network.of)
 along = jax.jit(lambda network, path: network.along(path))

@@ -15,9 +15,8 @@ import scipy.sparse
 import jbeamshell as jb
 from calibration.finite_elements import body as calculix
 from jbeamshell.cli.main import main
-from jbeamshell.condensed.pair import lower_member, upper_member
 from jbeamshell.condensed.section import section_form
-from jbeamshell.condensed.strip import pressing, stations
+from jbeamshell.condensed.strip import lap_members, pressing, stations
 
 DATA = Path(__file__).parent / "calculix"  # of strip.inp by CalculiX 2.20
 SCENE = jb.Scene().replace(
@@ -47,10 +46,8 @@ def potentials(scene):
     """Stations, and of both members of a lap joint the Hessian and what is held."""
     x = stations(scene, scene.model.nodes)
     down, up = pressing(scene, x)
-    upper = upper_member(section_form(scene), x, None, down, False)
-    clamped = scene.member.support == "clamped"
-    lower = lower_member(section_form(scene.of_member()), x, None, up, clamped)
-    return x, (upper.hessian, upper.fixed), (lower.hessian, lower.fixed)
+    upper, lower, _ = lap_members(scene, section_form(scene), x, down, up)[-1]
+    return x, (upper.line.hessian, upper.fixed), (lower.line.hessian, lower.fixed)
 
 
 @functools.cache

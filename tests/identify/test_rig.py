@@ -170,7 +170,7 @@ def test_what_a_rig_cannot_be_is_refused():
 @pytest.mark.parametrize(("amplitude", "compliance"), [(6e-5, 1e-4), (2e-5, 1e-5)])
 def test_friction_of_a_strip_behind_a_spring(amplitude, compliance):
     """Beyond gross slip and below it, from a loop with .1 % noise."""
-    far = "free" if amplitude > 5e-5 else "held"
+    far = "free" if amplitude > 5e-5 else "guided"
     scene = SCENE.replace({"model.nodes": 21, "strip.far_end": far, "load.amplitude": amplitude})
     path = cycle(amplitude, 120)
     force = np.asarray(jb.solve(scene, path).force)[1:]

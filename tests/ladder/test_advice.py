@@ -169,7 +169,7 @@ def test_plane_stress_is_a_plane_strain_of_another_ratio():
 @pytest.mark.parametrize(
     ("key", "value", "why"),
     [
-        ("strip.far_end", "pinned", "a far end that is not held"),
+        ("strip.far_end", "pinned", "a far end that is not guided"),
         ("contact.pressure", [[0.0, 10.0], [2.0, 9.0]], "a pressure that varies"),
         ("contact.stick_stiffness", 5.0, "a soft contact"),
         ("contact.smoothing", 4.0, "a smooth friction law"),

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.condensed.pair import Supports, member
+from jbeamshell.condensed.body import eliminate
+from jbeamshell.condensed.ends import end_section
 from jbeamshell.condensed.section import section_form
 
 LENGTH, STRETCHING, SHEAR = 2.0, 3.4e4, 1.0
@@ -19,9 +20,9 @@ def layer(rung, eta, side, nodes=41):
     weights = np.full(nodes, LENGTH / (nodes - 1))
     weights[[0, -1]] *= 0.5
     pull = jnp.zeros_like(form.pull).at[1].set(0.5 * side)
-    supports = Supports(np.ones_like(form.held), np.zeros_like(form.held))
     form = form._replace(pull=pull)
-    made = member(form, x, (None, None), jnp.asarray(10.0 * weights), supports)
+    ends = end_section(form, "guided", level=True), end_section(form)
+    (made,) = eliminate(form, x, jnp.asarray(10.0 * weights), *ends)
     sign = np.append(np.tile([1.0, side], nodes), [1.0, 1.0])
     hessian = (np.asarray(made.hessian) * sign[:, None] * sign)[2:, 2:]  # without the clamped node
     return jb.Substructure(x[1:], hessian[:-2, :-2], -hessian[:-2, -2:], -hessian[-2:, -2:])

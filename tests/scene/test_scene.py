@@ -70,7 +70,7 @@ def values_of_all_keys(draw):
     fields = draw(st.sampled_from(MODELS))
     lifting, squeezing = "w" in fields, "psi" in fields
     normal = draw(st.sampled_from(["rigid", "compliant", "none"] if lifting else ["rigid"]))
-    far_end = draw(st.sampled_from(["held"] if normal == "none" else list(FAR_ENDS)))
+    far_end = draw(st.sampled_from(["guided"] if normal == "none" else list(FAR_ENDS)))
     law = draw(st.sampled_from(["elastic-slip", "smooth-cap", "tanh-increment"]))
     smoothing = st.just("sharp") if law == "tanh-increment" else st.floats(1.01, 1e3)
     presses_up = positive | tables(length) if normal == "none" else st.just(0.0)
@@ -158,7 +158,7 @@ def test_toml_keeps_a_lap_joint(path, height, stiffness, nu, clamped):
     values = JOINT | {"member.height_ratio": height, "member.axial_stiffness": stiffness}
     values |= {"member.poisson_ratio": nu, "contact.assembly": "frictional"}
     if clamped:
-        values |= {"member.support": "clamped", "strip.loaded_end": "guided"}
+        values |= {"member.support": "clamped", "strip.loaded_end": "level"}
     scene = Scene().replace(values)
     write_scene(scene, path)
     assert same(read_scene(path), scene)
@@ -393,7 +393,7 @@ BAD = [
     ("model.kinematics", "euler", "choose 'exact' or 'linear'"),
     ("model.grid", 3, "must be a word"),
     ("model.constants", "print", "choose 'consistent' or 'printed'"),
-    ("strip.far_end", "glued", "choose 'held' or 'pinned' or 'free'"),
+    ("strip.far_end", "glued", "choose 'guided' or 'pinned' or 'free'"),
     ("load.control", "stress", "choose 'force' or 'displacement'"),
     ("contact.law", "coulomb", "choose 'elastic-slip' or"),
     ("contact.law", 3, "choose 'elastic-slip' or"),
@@ -511,7 +511,7 @@ def test_parts_check_themselves(make, told):
         *[
             (
                 {"contact.normal": "none", "model.fields": LIFTING, "strip.far_end": far_end},
-                f"strip.far_end = '{far_end}': is all that holds .* take 'held'",
+                f"strip.far_end = '{far_end}': is all that holds .* take 'guided'",
             )
             for far_end in ("pinned", "free")
         ],

@@ -159,8 +159,9 @@ class MassMatrix(eqx.Module):
         """True for the active fields (n, a) that no support holds."""
         active = self.system.model.active
         free = np.ones((self.system.x.size, len(active)), bool)
-        held = self.system.supports(True)
-        free[0] = [field not in held for field in active]
+        for node, field in self.system.supports(True):
+            if field in active:
+                free[node, active.index(field)] = False
         return free
 
     def accelerations(self, q: Array, forces: Array) -> Array:
