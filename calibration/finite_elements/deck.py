@@ -221,7 +221,9 @@ def tie(
     section, twin, distances : (k,) numbers of the nodes
     x, y : position of the section, and heights (k,) of its nodes
     """
-    text = card("NODE, NSET=DISTANCES", ((n, x, height) for n, height in zip(distances, y, strict=True)))
+    text = card(
+        "NODE, NSET=DISTANCES", ((n, x, height) for n, height in zip(distances, y, strict=True))
+    )
     for nodes in zip(section, twin, distances, strict=True):
         for direction in (1, 2):
             text += equation([(n, direction, f) for n, f in zip(nodes, SUM, strict=True)])

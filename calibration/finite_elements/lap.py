@@ -1,8 +1,12 @@
-"""Single lap with two bolts in CalculiX, beside plane elasticity on the contact line.
+"""Lap joints in CalculiX, beside plane elasticity on the contact line.
 
-Two equal members, the lower one clamped at X = 0 and the upper one pulled at X = L, are pressed
-together under two bolts, rub, and lift off between and beside them.  Their contact is
-penalty contact, face to face, as in `calibration.finite_elements.deck`.
+Two members are pressed together, rub, and lift off where nothing presses.  Their contact is penalty
+contact, face to face, as in `calibration.finite_elements.deck`.  The lower member is clamped at
+X = 0 (single lap), or its bottom is a symmetry plane (double shear); the upper one is pulled at
+X = L.
+
+Members that go on are pressed together first, with free ends and only kept from moving as a whole.
+Then they are tied to their lengths beyond the contact, without stress, and held at the outer ends.
 
 `python -m calibration.finite_elements.lap` compares dissipation, stiffness and the open length, and
 writes lap.json beside this file.
@@ -26,8 +30,19 @@ from calibration.finite_elements.deck import (
     SMOOTH,
     SOFTER,
     Penalty,
+    block_cards,
+    nodes_of,
+    tie,
 )
-from calibration.finite_elements.mesh import Mesh, make_mesh, nodal_loads
+from calibration.finite_elements.mesh import (
+    ROWS,
+    Block,
+    block,
+    columns_beyond,
+    contact_columns,
+    nodal_loads,
+    row_heights,
+)
 from calibration.finite_elements.program import find_program, run, version
 from calibration.finite_elements.results import read
 from calibration.provenance import provenance
@@ -37,9 +52,15 @@ from jbeamshell.scene import library, load_path
 RECORD = Path(__file__).with_name("lap.json")
 BOLTS = [[0.6, 10.0, 0.3], [1.4, 10.0, 0.3]]  # X, force and width of the patch
 STEPS = 20  # per half cycle
+INNER = 0.2  # height ratio of the half of an inner member
 NORMAL, STICK = 300.0, 100.0  # stiffness of the contact, in units of E'/H
 SETS = ("END", "ABOVE", "BELOW")  # of printed nodes
 TOUCHES = 1e-3  # of the largest gap, above which the members are apart
+
+COMMON = {"load.cycles": 1, "load.steps_per_half_cycle": STEPS, "model.nodes": 257}
+
+Force = tuple[int, int, float]  # node, direction and force
+Held = list[tuple[object, int]]  # nodes, or their set, and a direction
 
 
 class Loop(NamedTuple):
@@ -77,96 +98,205 @@ class Loop(NamedTuple):
         return float(np.mean(np.interp(fine, self.x, gap) > 0.0) * np.ptp(self.x))
 
 
-def joint() -> jb.Scene:
-    """Scene of the joint."""
-    values = {"contact.bolts": BOLTS, "load.amplitude": 0.6, "load.cycles": 1}
-    values |= {"contact.assembly": "frictionless"}
-    return library.single_lap().replace(values | {"load.steps_per_half_cycle": STEPS})
+class Member(NamedTuple):
+    """Meshes of a member.
+
+    Attributes
+    ----------
+    name : of its elements and its material
+    strip : its section
+    mesh : on the contact
+    beyond : where it goes on, or None
+    end : column at which it goes on: -1 at X = L, 0 at X = 0
+    """
+
+    name: str
+    strip: jb.Strip
+    mesh: Block
+    beyond: Block | None
+    end: int
+
+    @property
+    def section(self) -> np.ndarray:
+        """(k,) numbers of the nodes of the section where the contact ends."""
+        return self.mesh.number[self.end]
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """All its meshes."""
+        return (self.mesh,) if self.beyond is None else (self.mesh, self.beyond)
+
+    @property
+    def outer(self) -> np.ndarray:
+        """(k,) numbers of the nodes of its outer end."""
+        return self.blocks[-1].number[self.end]
+
+    @property
+    def softness(self) -> float:
+        """Even stretch of the length beyond for each unit of load."""
+        stretches = 2.0 * self.strip.half_height * self.strip.plane_modulus
+        return float(sum(np.ptp(block.x) for block in self.blocks[1:]) / stretches)
 
 
-def write_deck(scene: jb.Scene, mesh: Mesh) -> str:
-    """Input deck of the joint; the lower member is the upper one's mirror image."""
-    path, _ = load_path.check(scene)
-    strip = scene.strip
-    unit = float(strip.plane_modulus / strip.half_height)
-    stiffness = Penalty(NORMAL * unit, STICK * unit)
-    i, j = np.nonzero(mesh.number)
-    below = np.where(mesh.number > 0, mesh.number + mesh.number.max(), 0)
-    turned = mesh.elements[:, [3, 2, 1, 0, 6, 5, 4, 7]] + mesh.number.max()
-    count = len(mesh.elements)
-    text = (
-        card("NODE", zip(mesh.number[i, j], mesh.x[i], mesh.y[j], strict=True))
-        + card("NODE", zip(below[i, j], mesh.x[i], -mesh.y[j], strict=True))
-        + card("ELEMENT, TYPE=CPE8R, ELSET=BOTH", _numbered(mesh.elements, 1))
-        + card("ELEMENT, TYPE=CPE8R, ELSET=BOTH", _numbered(turned, count + 1))
-        + node_set("END", mesh.number[-1])
-        + node_set("CLAMP", below[0])
-        + node_set("ABOVE", mesh.number[:, 0])
-        + node_set("BELOW", below[:, 0])
-        + card("MATERIAL, NAME=STRIP")
-        + card("ELASTIC", [(strip.youngs_modulus, strip.poisson_ratio)])
-        + card("SOLID SECTION, ELSET=BOTH, MATERIAL=STRIP", [(1.0,)])
-        + card("SURFACE, NAME=UPPER", ((e + 1, "S1") for e in mesh.bottom_elements))
-        + card("SURFACE, NAME=LOWER", ((count + e + 1, "S3") for e in mesh.bottom_elements))
-        + card("SURFACE INTERACTION, NAME=CONTACT")
-        + normal_behaviour(SOFTER[0] * stiffness.normal)
-        + card("FRICTION", [(SMOOTH * float(scene.contact.friction), stiffness.stick)])
-        + card("CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE", [("UPPER", "LOWER")])
+def joint(entry: str = "traction") -> jb.Scene:
+    """Scene of a single lap with two bolts."""
+    values = {"contact.bolts": BOLTS, "load.amplitude": 0.6, "load.entry": entry}
+    return library.single_lap().replace(values | {"contact.assembly": "frictionless"} | COMMON)
+
+
+def double_shear(entry: str = "traction") -> jb.Scene:
+    """Scene of a strip on the half of a thicker inner member."""
+    values = {"member.height_ratio": INNER, "load.amplitude": 1.3, "load.entry": entry}
+    return library.double_shear().replace(values | COMMON)
+
+
+def make_members(scene: jb.Scene, refinement: float) -> tuple[Member, Member]:
+    """Upper and lower member, with a node of each at every place of the contact."""
+    x, rows = contact_columns(scene, refinement), max(1, round(ROWS * refinement))
+    strips = scene.strip, scene.member.beside(scene.strip)
+    heights = [float(strip.half_height) for strip in strips]
+    above, below = row_heights(heights[0], rows), -row_heights(heights[1], rows)[::-1]
+    upper = block(x, above, 2)
+    lower = block(x, below, 2, upper)
+    right = left = None
+    if scene.load.entry == "member":
+        after, before = (columns_beyond(height, refinement) for height in heights)
+        right = block(x[-1] + after, above, 2, lower)
+        left = block(-before[::-1], below, 2, right)
+    return (
+        Member("UPPER", strips[0], upper, right, -1),
+        Member("LOWER", strips[1], lower, left, 0),
     )
-    press = nodal_loads(mesh.columns, mesh.order, scene.contact.pressure)
-    loads = [(n, 2, -p) for n, p in zip(mesh.number[:, -1], press, strict=True) if p]
-    loads += [(n, 2, p) for n, p in zip(below[:, -1], press, strict=True) if p]
-    clamp: list[tuple[object, ...]] = [("CLAMP", 1, 2), ("END", 2, 2)]
-    keeps_place = (int(mesh.number[-1, 0]), 1, 1)  # while nothing rubs
-    rough = card("CHANGE FRICTION, INTERACTION=CONTACT")
-    rough += card("FRICTION", [(float(scene.contact.friction), stiffness.stick)])
-    wanted = [card(f"NODE PRINT, NSET={s}, FREQUENCY={MOST_PARTS}", [("U",)]) for s in SETS]
+
+
+def write_deck(scene: jb.Scene, members: tuple[Member, Member]) -> str:
+    """Input deck of the joint."""
+    upper, lower = members
+    path, _ = load_path.check(scene)
+    unit = float(scene.strip.plane_modulus / scene.strip.half_height)
+    stiffness = Penalty(NORMAL * unit, STICK * unit)
+    mounted = _mounting(scene, upper.outer, lower.outer)
+    text = "".join(map(_member_cards, members)) + _contact_cards(scene, members, stiffness)
+    pressed, frozen = mounted, ""
+    if upper.beyond is not None:
+        ties, pressed = _ties(scene, members)
+        text += ties
+        frozen = _boundary("BOUNDARY, FIXED", [("DISTANCES", 1), ("DISTANCES", 2)])
+    pressed = [*pressed, (int(upper.mesh.number[0, 0]), 1)]  # while nothing rubs
+    forces = _pressing(scene, members)
     for softer in (*SOFTER, 1.0):
         change = card("CHANGE SURFACE BEHAVIOR, INTERACTION=CONTACT")
         change += normal_behaviour(softer * stiffness.normal)
         if softer == SOFTER[0]:
-            change += card("BOUNDARY", [*clamp, keeps_place]) + "".join(wanted)
-        text += _step(mesh, loads, 0.0, change)
-    for level, force in enumerate(np.asarray(path.target)[scene.load.pressure_steps :]):
-        change = rough + card("BOUNDARY, OP=NEW", clamp) if level == 0 else ""
-        text += _step(mesh, loads, float(force), change)
+            change += _boundary("BOUNDARY", pressed)
+            for nodes in SETS:
+                change += card(f"NODE PRINT, NSET={nodes}, FREQUENCY={MOST_PARTS}", [("U",)])
+        text += _step(forces, change)
+    rough = card("CHANGE FRICTION, INTERACTION=CONTACT")
+    rough += card("FRICTION", [(float(scene.contact.friction), stiffness.stick)])
+    rough += _boundary("BOUNDARY, OP=NEW", mounted) + frozen
+    for level, load in enumerate(np.asarray(path.target)[scene.load.pressure_steps :]):
+        even = zip(upper.outer, load * upper.mesh.shares, strict=True)
+        pulled = [*forces, *((n, 1, part) for n, part in even)]
+        text += _step(pulled, "" if level else rough)
     return text
 
 
-def _numbered(elements: np.ndarray, first: int) -> np.ndarray:
-    return np.column_stack([np.arange(first, first + len(elements)), elements])
+def _member_cards(member: Member) -> str:
+    name, strip = member.name, member.strip
+    return (
+        "".join(block_cards(each, "CPE8R", name) for each in member.blocks)
+        + card(f"MATERIAL, NAME={name}")
+        + card("ELASTIC", [(strip.youngs_modulus, strip.poisson_ratio)])
+        + card(f"SOLID SECTION, ELSET={name}, MATERIAL={name}", [(1.0,)])
+    )
 
 
-def _step(mesh: Mesh, loads: list[tuple[int, int, float]], force: float, change: str) -> str:
+def _contact_cards(scene: jb.Scene, members: tuple[Member, Member], stiffness: Penalty) -> str:
+    upper, lower = members
+    smooth = SMOOTH * float(scene.contact.friction)
+    return (
+        node_set("ABOVE", upper.mesh.number[:, 0])
+        + node_set("BELOW", lower.mesh.number[:, -1])
+        + node_set("END", upper.outer)
+        + node_set("PLANE", np.concatenate([each.number[1:, 0] for each in lower.blocks]))
+        + card("SURFACE, NAME=ABOVE", ((e, "S1") for e in upper.mesh.bottom_elements))
+        + card("SURFACE, NAME=BELOW", ((e, "S3") for e in lower.mesh.top_elements))
+        + card("SURFACE INTERACTION, NAME=CONTACT")
+        + normal_behaviour(SOFTER[0] * stiffness.normal)
+        + card("FRICTION", [(smooth, stiffness.stick)])
+        + card("CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE", [("ABOVE", "BELOW")])
+    )
+
+
+def _mounting(scene: jb.Scene, right: np.ndarray, left: np.ndarray) -> Held:
+    """Supports of the joint, at the upper member's right and the lower member's left end."""
+    held: Held = [(n, 1) for n in left]
+    if scene.member.support == "rolling":
+        held += [("PLANE", 2), (left[0], 2)]
+    else:
+        held += [(n, 2) for n in left]
+    return held + [(n, 2) for n in right if scene.strip.loaded_end == "level"]
+
+
+def _ties(scene: jb.Scene, members: tuple[Member, Member]) -> tuple[str, Held]:
+    """Ties of members to the lengths beyond, and what holds them all before they are mounted."""
+    further = [member.blocks[-1] for member in members]
+    text, last = node_set("BEYOND", np.concatenate([*map(nodes_of, further)])), further[-1].last
+    for member, beyond in zip(members, further, strict=True):
+        distances = last + 1 + np.arange(member.section.size)
+        twin, mesh, last = beyond.number[-1 - member.end], member.mesh, distances[-1]
+        text += tie(member.section, twin, distances, mesh.x[member.end], mesh.y)
+    face = members[1].mesh.number[-1]  # of the lower member, which is free
+    held: Held = [("BEYOND", 1), ("BEYOND", 2), (face[-1], 1)]
+    if scene.member.support == "rolling":
+        return text, [*held, ("PLANE", 2), (distances[0], 2)]
+    return text, [*held, (face[-1], 2), (face[0], 1)]
+
+
+def _boundary(keyword: str, held: Held) -> str:
+    return card(keyword, [(nodes, direction, direction) for nodes, direction in held])
+
+
+def _pressing(scene: jb.Scene, members: tuple[Member, Member]) -> list[Force]:
+    """Forces of the pressures on the outer faces of both members."""
+    forces: list[Force] = []
+    pressures = scene.contact.pressure, scene.contact.bottom_pressure
+    for member, sign, row, pressure in zip(members, (-1.0, 1.0), (-1, 0), pressures, strict=True):
+        loads = sign * nodal_loads(member.mesh.columns, member.mesh.order, pressure)
+        nodes = member.mesh.number[:, row]
+        forces += [(n, 2, load) for n, load in zip(nodes, loads, strict=True) if load]
+    return forces
+
+
+def _step(forces: list[Force], change: str) -> str:
     """One step with what changes in it; it keeps the rest of the step before."""
-    even = zip(mesh.number[-1], force * mesh.shares, strict=True)
     return (
         card(f"STEP, INC={MOST_PARTS}")
         + card("STATIC", [(1.0, 1.0, SMALLEST_PART, 1.0)])
         + change
-        + card("CLOAD", [*loads, *((node, 1, part) for node, part in even)])
+        + card("CLOAD", forces)
         + card("END STEP")
     )
 
 
 def by_elements(scene: jb.Scene, refinement: float, program: str | None = None) -> Loop:
     """Joint by CalculiX."""
-    mesh = make_mesh(scene, "quadratic", refinement)
+    upper, lower = members = make_members(scene, refinement)
     path, _ = load_path.check(scene)
     force = np.asarray(path.target)[scene.load.pressure_steps - 1 :]
     levels = force.size + len(SOFTER)
-    outcome = run(write_deck(scene, mesh), levels, find_program(program))
+    outcome = run(write_deck(scene, members), levels, find_program(program))
     if not outcome.finished:
         raise SystemExit(f"CalculiX stopped: {outcome.message} (files in {outcome.folder})")
     printed = read(outcome.data, len(SOFTER))
     end = printed["U", "END"]
-    order = np.argsort(mesh.number[-1])
-    shares = mesh.shares[order][np.searchsorted(np.sort(mesh.number[-1]), end.nodes)]
+    moved = end.values[:, np.searchsorted(end.nodes, upper.outer), 0] @ upper.mesh.shares
     above, below = printed["U", "ABOVE"].values, printed["U", "BELOW"].values
     return Loop(
         force,
-        end.values[:, :, 0] @ shares - end.values[0, :, 0] @ shares,
-        mesh.x,
+        moved - moved[0] - (upper.softness + lower.softness) * force,
+        upper.mesh.x,
         above[:, :, 1] - below[:, :, 1],
     )
 
@@ -185,15 +315,27 @@ def on_contact_line(scene: jb.Scene) -> Loop:
 def main(refinements: tuple[float, ...] = (0.5, 1.0)) -> int:
     """Compare, print and record."""
     jax.config.update("jax_enable_x64", True)
-    scene = joint()
-    rows = {"plane": on_contact_line(scene).figures()}
-    for refinement in refinements:
-        rows[f"CalculiX, refinement {refinement:g}"] = by_elements(scene, refinement).figures()
-    for name, figures in rows.items():
-        print(f"{name:28}", "  ".join(f"{k} {v:.5g}" for k, v in figures.items()))
-    record = provenance() | {"calculix": version(find_program()), "bolts": BOLTS, "joint": rows}
+    record = provenance() | {"calculix": version(find_program()), "bolts": BOLTS, "inner": INNER}
+    for name, scene in scenes().items():
+        rows = {"plane": on_contact_line(scene).figures()}
+        for refinement in refinements:
+            rows[f"CalculiX, refinement {refinement:g}"] = by_elements(scene, refinement).figures()
+        print(name)
+        for source, figures in rows.items():
+            print(f"  {source:26}", "  ".join(f"{k} {v:.5g}" for k, v in figures.items()))
+        record[name] = rows
     write_text(RECORD, json.dumps(record, indent=1) + "\n")
     return 0
+
+
+def scenes() -> dict[str, jb.Scene]:
+    """Scenes by their names in the record."""
+    return {
+        "joint": joint(),
+        "joint that goes on": joint("member"),
+        "double shear": double_shear(),
+        "double shear that goes on": double_shear("member"),
+    }
 
 
 if __name__ == "__main__":

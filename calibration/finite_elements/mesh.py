@@ -2,7 +2,8 @@
 
 Elements are smallest, an eighth of H, at the loaded end and where the pressure steps or comes to
 zero, for there the contact's stresses are singular, or nearly; they grow away from there, and
-towards the top.  The base has a node under every node of the strip's bottom face, so that a node of
+towards the top.  Where a member goes on, the contact ends like a crack, and they are four times
+smaller there.  The base has a node under every node of the strip's bottom face, so that a node of
 the base takes the contact forces of the node above it.
 """
 
@@ -16,6 +17,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import POSITIVE, require, require_choice, require_number
+from jbeamshell.condensed.entry import REACH
 from jbeamshell.mechanics import elements
 from jbeamshell.scene.scene import Scene
 
@@ -25,7 +27,7 @@ SHARES = {1: (0.5, 0.5), 2: (1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0)}  # of an element,
 END_SIZE = 1.0 / 8.0  # of H, where the contact is singular
 FAR_SIZE = 1.0 / 20.0  # of L, away from it
 GROWTH = 0.2  # of the element size over the distance
-REACH = 3.0  # of H, length beyond the contact
+TIP_SIZE = 1.0 / 32.0  # of H, where a member goes on
 ROWS = 3  # of quadratic elements over the height
 STRETCH = 1.5  # logarithm of the sizes' growth from the base to the top
 LARGEST = 200_000  # nodes
@@ -51,6 +53,11 @@ class Block:
     number: np.ndarray
     elements: np.ndarray
     first: int
+
+    @property
+    def last(self) -> int:
+        """Number of the last node."""
+        return int(self.number[-1, -1])
 
     @property
     def columns(self) -> np.ndarray:
@@ -140,7 +147,7 @@ def make_mesh(scene: Scene, elements: str = "quadratic", refinement: float = 1.0
         ends = columns[-1] + columns_beyond(half_height, finer)
         beyond = last = block(ends, heights, order, strip)
     base_x = np.concatenate([[-half_height], strip.x, [strip.x[-1] + half_height]])
-    base = last.number.max() + 1 + np.arange(2 * base_x.size).reshape(-1, 2)
+    base = last.last + 1 + np.arange(2 * base_x.size).reshape(-1, 2)
     return Mesh(**vars(strip), base_x=base_x, base=base, beyond=beyond)
 
 
@@ -150,7 +157,7 @@ def block(columns: np.ndarray, rows: np.ndarray, order: int, before: Block | Non
     here = np.ones((x.size, y.size), bool)
     if order == 2:
         here[1::2, 1::2] = False
-    nodes, first = (0, 1) if before is None else (before.number.max(), after(before))
+    nodes, first = (0, 1) if before is None else (before.last, after(before))
     number = np.where(here, nodes + np.cumsum(here).reshape(here.shape), 0)
     left, low = slice(0, -order, order), slice(order, None, order)
     corners = [number[left, left], number[low, left], number[low, low], number[left, low]]
@@ -205,29 +212,34 @@ def foci(scene: Scene) -> np.ndarray:
 
 def contact_columns(scene: Scene, finer: float) -> np.ndarray:
     """Ends of the elements along the contact, whose sizes are divided by ``finer``."""
-    length, half_height = float(scene.strip.length), float(scene.strip.half_height)
-    largest = FAR_SIZE * length
-    return _graded(length, min(END_SIZE * half_height, largest), largest, foci(scene), finer)
+    strip, near = scene.strip, foci(scene)
+    length, half_height = float(strip.length), float(strip.half_height)
+    tips = [length] if scene.member.support == "none" else [0.0, length]
+    sharp = np.isin(near, tips) & (scene.load.entry == "member")
+    sizes = np.where(sharp, TIP_SIZE, END_SIZE) * half_height
+    return _graded(length, near, sizes, FAR_SIZE * length, finer)
 
 
 def columns_beyond(half_height: float, finer: float) -> np.ndarray:
     """Ends of the elements beyond the contact, as distances from it."""
-    return _graded(REACH * half_height, END_SIZE * half_height, half_height, np.zeros(1), finer)
+    sizes = np.array([TIP_SIZE * half_height])
+    return _graded(REACH * half_height, np.zeros(1), sizes, half_height, finer)
 
 
 def _graded(
-    length: float, end: float, largest: float, near: np.ndarray, finer: float
+    length: float, near: np.ndarray, sizes: np.ndarray, largest: float, finer: float
 ) -> np.ndarray:
-    """Ends of elements that are small near some places."""
+    """Ends of elements that are small near some places, where their sizes are given."""
     # A place is as dense as it is near a focus: sampled as finely as the smallest element there.
+    end = min(float(np.min(sizes)), largest)
     away = end * np.expm1(np.linspace(0.0, np.log1p(length / end), 2000))
     samples = np.unique(
         np.concatenate([[0.0, length], *(near + s * away[:, None] for s in (-1, 1))], None)
     )
     samples = samples[(samples >= 0.0) & (samples <= length)]
     middle = 0.5 * (samples[1:] + samples[:-1])
-    distance = np.min(np.abs(middle[:, None] - near), axis=1)
-    size = np.minimum(end + GROWTH * distance, largest) / finer
+    grown = np.min(sizes + GROWTH * np.abs(middle[:, None] - near), axis=1)
+    size = np.minimum(grown, largest) / finer
     count = np.append(0.0, np.cumsum(np.diff(samples) / size))
     elements = max(2, int(np.ceil(count[-1])))
     return np.interp(np.linspace(0.0, count[-1], elements + 1), count, samples)

@@ -86,13 +86,21 @@ def solve(
 
 def check_reach(scene: Scene) -> None:
     """Raise `InputError` for a scene that these finite elements cannot have."""
-    strip, contact = scene.strip, scene.contact
+    strip, contact, load = scene.strip, scene.contact, scene.load
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(scene))
     require("scene", "traced", not traced, "finite elements here have no derivatives: no jax.grad")
     plain = "finite elements here are of a straight homogeneous strip; "
     require("strip.layers", strip.layers, strip.layers is None, plain + "leave the layers out")
     require("strip.curvature", strip.curvature, strip.curvature is None, plain + "take 0")
     require("energy", scene.energy, scene.energy is None, plain + "take the scene's own section")
+    support = scene.member.support
+    require("member.support", support, support == "none", plain + "joints are in lap.py")
     rigid = contact.normal != "compliant"
     fix = "finite elements here stand on a rigid base; take 'rigid' or 'none'"
     require("contact.normal", contact.normal, rigid, fix)
+    given = load.control != "arc-length"
+    fix = "finite elements here take forces or displacements"
+    require("load.control", load.control, given, fix)
+    on_face = load.control == "force" or load.entry != "member"
+    fix = "finite elements here drive the displacement of a face: take face, guided or traction"
+    require("load.entry", load.entry, on_face, fix)

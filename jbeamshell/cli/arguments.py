@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from jbeamshell.cli.terminal import warn
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import parsed_toml
 
@@ -66,7 +65,10 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
 
 
 def scene_of(options: argparse.Namespace) -> Scene:
-    """Scene of the options: the one named, with ``--set`` on top."""
+    """Scene of the options: the one named, with ``--set`` on top.
+
+    What its file leaves unsaid is kept as ``options.unsaid``, to be said at the end.
+    """
     from jbeamshell.scene import library
     from jbeamshell.scene.toml import entry_note, overridden, scene_from_values
 
@@ -74,7 +76,7 @@ def scene_of(options: argparse.Namespace) -> Scene:
     values = overridden(below, assignments(options.set))
     scene = scene_from_values(values)
     if options.scene is not None and entry_note(values):
-        warn(f"{options.scene}: {entry_note(values)}")
+        options.unsaid = f"{options.scene}: {entry_note(values)}"
     return scene
 
 

@@ -28,7 +28,7 @@ from jbeamshell.cli import (
     scenes,
     sweep,
 )
-from jbeamshell.cli.terminal import BAD_INPUT, INTERRUPTED, UNCONVERGED, complain
+from jbeamshell.cli.terminal import BAD_INPUT, INTERRUPTED, UNCONVERGED, complain, warn
 from jbeamshell.common import jax_options
 from jbeamshell.common.errors import InputError, UnconvergedError
 
@@ -43,7 +43,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not jax_options.started():
         jax_options.configure()
     try:
-        return options.run(options)
+        code: int = options.run(options)
+        unsaid = getattr(options, "unsaid", "")
+        if unsaid:
+            warn(unsaid)
+        return code
     except InputError as error:
         return complain(error, BAD_INPUT)
     except UnconvergedError as error:

@@ -135,7 +135,9 @@ def _long(form: SectionForm, length: Array, forwards: bool) -> Three:
     return (start, end, across.T) if forwards else (end, start, across)
 
 
-def compliance(form: SectionForm, pull: Array, bends: bool = True) -> Array:
+def compliance(
+    form: SectionForm, pull: Array, bends: bool = True, on_plane: bool = False
+) -> Array:
     """Displacement for each unit of load and of length of a member under an even load.
 
     The strains e and k are the same everywhere, and the section squeezes and warps as it likes.
@@ -144,11 +146,13 @@ def compliance(form: SectionForm, pull: Array, bends: bool = True) -> Array:
     ----------
     form : energy of the section
     pull : (m,) parts of the fields in the displacement that the load moves through
-    bends : False if the member stays straight, as on a symmetry plane
+    bends : False if the member stays straight
+    on_plane : True if its top rolls on a symmetry plane, so that w is no rigid motion
     """
     strains = form.modes[:3:2, 1]
-    mixed = (strains @ form.mixed.T)[:, 2:]  # v and w are a rigid motion
-    stiffness = strains @ form.slopes @ strains.T - mixed @ solve(form.values[2:, 2:], mixed.T)
+    free = slice(1 if on_plane else 2, None)  # v, and mostly w, are rigid motions
+    mixed = (strains @ form.mixed.T)[:, free]
+    stiffness = strains @ form.slopes @ strains.T - mixed @ solve(form.values[free, free], mixed.T)
     parts = strains @ pull
     if not bends:
         return parts[0] ** 2 / stiffness[0, 0]

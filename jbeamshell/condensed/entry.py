@@ -7,9 +7,10 @@ holds the energy that friction takes.  So u is the mean displacement of the sect
 what the shear there does on an even stretch.  That is less than half a per cent of u, but a fifth
 of the loop where little slips.
 
-The pressures act on members that end with the contact.  What lies beyond is tied to them without
-stress.  Else the edge of a base would press into a member that goes on, an even pressure would
-have a singular reaction there, and nothing would slip at small loads.
+Members that go on are pressed first and mounted then: the pressures act on members that end with
+the contact and whose ends are free.  What lies beyond is tied to them without stress.  Else the
+edge of a base would press into a member that goes on, an even pressure would have a singular
+reaction there, and nothing would slip at small loads.
 
 Sections that stay straight (the beamshell, p1) have a rigid face at X = L by nature.  They are
 nearer to a member that goes on as they are than if they were continued.
@@ -49,22 +50,34 @@ def goes_on(scene: Scene) -> bool:
     return scene.load.entry == "member" and scene.model.warps
 
 
-def loaded_end(scene: Scene, form: SectionForm, reaches: bool) -> Held:
+def states(scene: Scene) -> tuple[bool, ...]:
+    """True for members as they are mounted, after False for members that are only pressed.
+
+    One state serves both where the ends are the same.
+    """
+    joint = scene.member.support != "none"
+    apart = joint or scene.strip.overhang is not None or goes_on(scene)
+    return (False, True) if apart and scene.load.entry == "member" else (True,)
+
+
+def loaded_end(scene: Scene, form: SectionForm, mounted: bool) -> Held:
     """End of the strip at which the force enters.
 
     Parameters
     ----------
     form : energy of the strip's section, whose ``pull`` is that of the load
-    reaches : True to continue a member by a length that is not given
+    mounted : see `states`
     """
     strip, entry = scene.strip, scene.load.entry
     level = strip.loaded_end == "level"
     along: Condition = entry if entry in ("face", "guided") else "free"  # type: ignore[assignment]
+    if not mounted:
+        return Held(end_section(form), FREE)
     if strip.overhang is not None:
         outer = end_section(form, along, level, on_contact=False)
         lengths = _lengths(strip.overhang, strip.half_height, GIVEN)
         return Held(beyond(form, lengths, outer, True), FREE)
-    if reaches:
+    if goes_on(scene):
         outer, reach = end_section(form, level=level, on_contact=False), REACH * strip.half_height
         lengths = _lengths(reach, strip.half_height, _count(scene))
         stretch = reach * compliance(form, form.pull, bends=not level)
@@ -78,7 +91,7 @@ def far_end(scene: Scene, form: SectionForm) -> End:
 
 
 def leaving_end(
-    scene: Scene, form: SectionForm, pull: Array, flat: bool, reaches: bool
+    scene: Scene, form: SectionForm, pull: Array, flat: bool, mounted: bool
 ) -> tuple[Held, Array]:
     """End of the second member of a lap joint at which the force leaves.
 
@@ -87,7 +100,7 @@ def leaving_end(
     form : energy of its section
     pull : (m,) parts of its fields in the displacement of a rigid extension to the line of the load
     flat : True if its w is zero everywhere
-    reaches : True to continue it by a length that is not given
+    mounted : see `states`; a member that is not mounted keeps its place at X = 0
 
     Returns
     -------
@@ -97,12 +110,14 @@ def leaving_end(
     member, clamped = scene.member, scene.member.support == "clamped"
     half_height = member.beside(scene.strip).half_height
     stretch = jnp.zeros_like(half_height)
+    if not mounted:
+        return Held(end_section(form), np.array([True, clamped])), stretch
     if member.overhang is not None:
         lengths = _lengths(member.overhang, half_height, GIVEN)
-    elif reaches:
+    elif goes_on(scene):
         reach, bends = REACH * half_height, clamped and scene.strip.loaded_end == "free"
         lengths = _lengths(reach, half_height, _count(scene))
-        stretch = reach * compliance(form, pull, bends)
+        stretch = reach * compliance(form, pull, bends, on_plane=not clamped and not flat)
     else:
         return Held(end_section(form, "held", clamped), np.array([True, clamped])), stretch
     moving = without_lift(form) if flat else form

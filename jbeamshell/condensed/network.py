@@ -14,6 +14,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array, lax
 
 from jbeamshell.common.failed import nan_unless
@@ -23,6 +24,8 @@ from jbeamshell.condensed.cycles import STEADY
 from jbeamshell.condensed.drives import with_springs
 from jbeamshell.condensed.strip import condensed, moving_volume, spring_stiffness
 from jbeamshell.scene.scene import Scene
+
+SOFTENS = 1e-9  # of the first compliance: a corner of a backbone where it rises by less is none
 
 
 class Sliders(NamedTuple):
@@ -98,6 +101,46 @@ class Network(eqx.Module):
         if soft:
             body, _ = with_springs(body, spring_stiffness(scene, strip))
         return cls(body, factorise(body, friction), friction, moving_volume(strip))
+
+    @classmethod
+    def nearest(cls, scene: Scene, displacement: Array, force: Array) -> Network:
+        """Network of a backbone that is nearest to a scene whose slip zones are not nested.
+
+        Parameters
+        ----------
+        scene : scene on a condensed rung, for the mass that moves
+        displacement, force : (k,) points of the backbone, see `in_series`
+        """
+        moving = jax.jit(lambda scene: moving_volume(condensed(scene, scene.model.nodes)))
+        slopes = jnp.diff(displacement, prepend=0.0) / jnp.diff(force, prepend=0.0)
+        kept = np.append(np.diff(np.asarray(slopes)) > SOFTENS * slopes[0], True)
+        return cls.in_series(displacement[kept], force[kept], moving(scene))
+
+    @classmethod
+    def in_series(cls, displacement: Array, force: Array, volume: Array) -> Network:
+        """Network of sliders in series with one backbone, for pull and push alike.
+
+        Parameters
+        ----------
+        displacement, force : (k,) points of the backbone, which softens throughout
+        volume : (layers,) see `Network`
+        """
+        slopes = jnp.diff(displacement, prepend=0.0) / jnp.diff(force, prepend=0.0)
+        none = jnp.zeros((force.size - 1, force.size - 1), force.dtype)
+        body = Body(
+            x=none[0],
+            tributary=none[0],
+            K_tt=jnp.diag(1.0 / jnp.diff(slopes)),
+            K_tn=none,
+            K_nn=none,
+            f_t=jnp.ones_like(none[0]),
+            f_n=none[0],
+            r_0=force[:-1],
+            t_0=none[0],
+            c=slopes[0],
+        )
+        friction = jnp.ones((), force.dtype)  # of reactions that are the sliders' limits
+        return cls(body, factorise(body, friction), friction, volume)
 
     @property
     def rest(self) -> ContactState:

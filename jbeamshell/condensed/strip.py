@@ -125,8 +125,7 @@ def _alone(
     """Strip on a rigid base, under its pressures and under its load."""
     lifted = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
     from_below = lifted[:, None] * np.eye(lifted.size)[-1]
-    reaches = (False, True) if entry.goes_on(scene) else (False,)
-    ends = [entry.loaded_end(scene, form, beyond).end for beyond in reaches]
+    ends = [entry.loaded_end(scene, form, mounted).end for mounted in entry.states(scene)]
     found = [
         Members(line.elimination, line.hessian - from_below - from_below.T, None)
         for line in eliminate(form, x, down, entry.far_end(scene, form), *ends)
@@ -148,7 +147,7 @@ def _joint(
 def lap_members(
     scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
 ) -> list[tuple[Member, Member, Array]]:
-    """Members of a lap joint under the pressures, and under the load if they then go on.
+    """Members of a lap joint under the pressures, and under the load if they are mounted then.
 
     Returns
     -------
@@ -164,15 +163,16 @@ def lap_members(
     pull = below.turn if scene.load.kind == "moment" else below.pull + arm * below.turn
     below = below._replace(pull=jnp.zeros_like(below.pull))  # the load acts above
     free = np.zeros((n - 1, 2), bool)
-    reaches = (False, True) if entry.goes_on(scene) else (False,)
-    entering = [entry.loaded_end(scene, upper_form, beyond) for beyond in reaches]
+    states = entry.states(scene)
+    entering = [entry.loaded_end(scene, upper_form, mounted) for mounted in states]
     uppers = eliminate(
         upper_form, x, down, end_section(upper_form), *(held.end for held in entering)
     )
     found = []
-    for beyond, held, upper in zip(reaches, entering, uppers, strict=True):
-        leaving, stretch = entry.leaving_end(scene, below, pull, flat, beyond)
+    for mounted, held, upper in zip(states, entering, uppers, strict=True):
+        leaving, stretch = entry.leaving_end(scene, below, pull, flat, mounted)
         fixed = np.append(leaving.fixed, free).reshape(n, 2) | [False, flat]
+        fixed[-1, 1] |= not mounted and not rolls  # else it would turn
         (lower,) = eliminate(below, x, up, leaving.end, end_section(below))
         above = Member(upper_form, upper, np.append(free, held.fixed))
         found.append((above, Member(below, lower, fixed.ravel()), stretch))

@@ -151,11 +151,11 @@ def let_go(
     share, nested = None, False
     if light is not None and (whole is False or not inertia.damped):
         joint = Joint.of(light, end_force)
-        if joint.network is not None:
-            share = _share(joint.network, inertia, mass)
-            if whole is False or share <= LIGHT:
-                motion = ring(light, joint.network, mass, end_force, cycles, samples)
-                nested = bool(motion.nested)
+        network = joint.network or Network.nearest(light, joint.displacement, joint.force)
+        share = _share(network, inertia, mass)
+        if whole is False or share <= LIGHT:
+            motion = ring(light, network, mass, end_force, cycles, samples)
+            nested = bool(motion.nested)
     if motion is None or not nested:
         require("whole", whole, whole is not False, NOT_NESTED)
         require("model.rung", scene.model.rung, not scene.model.condensed, NO_INERTIA)

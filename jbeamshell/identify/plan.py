@@ -223,7 +223,7 @@ def _with_specimen(
         told = "; ".join(f"{key} ({reason})" for key, reason in reasons.items())
         notes.append(f"free is not given (--free on the command line), so fitted are: {told}")
     if "load.entry" not in own:
-        notes.append("load.entry is not given: the force enters as into a member that goes on")
+        notes.append("the force enters a member that goes on (set load.entry to change it)")
     own, fresh = _started(own, found, free)
     notes += [f"{label}: {note}" if label else note for note in fresh]
     control = own.get("load.control", "force")

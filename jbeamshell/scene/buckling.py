@@ -106,13 +106,13 @@ def sway(scene: Parts) -> float:
 
 
 def _columns_of_joint(scene: Parts, numbers: Numbers) -> list[Column]:
-    """Overhangs of a lap joint, and last a whole single lap; the load compresses all of them.
+    """Lengths beyond the contact, and last a whole single lap; the load compresses all of them.
 
     The loaded end is free, or guided and turns; the end of the second member is clamped.  Where the
     loaded end is free the joint sways, so that both overhangs are free at one end.
     """
     strip, member, load = scene.strip, scene.member, scene.load
-    if member.support == "none":
+    if member.support == "none" and strip.overhang is None:
         return []
     length = numbers("strip.length")
     none = np.zeros(())

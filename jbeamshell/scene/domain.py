@@ -20,6 +20,7 @@ from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
 from jbeamshell.scene.pressure import face_resultant, is_table, resultant
 
 EDGE = 1e-12  # part of the length by which a table may run beyond the strip, for round-off
+BALANCED = 1e-3  # of the pressing force, by which the pressures of a single lap may differ
 MARGIN = 1e-9  # part of gross slip: a force that is closer to it counts as beyond
 
 Numbers = Callable[[str], np.ndarray]  # value of a dotted key: a scalar, or an array over strips
@@ -48,13 +49,13 @@ class Rule(NamedTuple):
 
 @np.errstate(over="ignore", invalid="ignore")  # one of the rules refuses infinite forces
 def support_rules(
-    strip: Strip, member: Member, contact: Contact, model: Model, numbers: Numbers
+    strip: Strip, member: Member, contact: Contact, model: Model, load: Load, numbers: Numbers
 ) -> list[Rule]:
     """Rules by which pressures, friction and supports hold the strip, in the order of the checks.
 
     Parameters
     ----------
-    strip, member, contact, model : parts of the scene, for their words
+    strip, member, contact, model, load : parts of the scene, for their words
     numbers : values by dotted key
     """
     length, friction = numbers("strip.length"), numbers("contact.friction")
@@ -74,6 +75,12 @@ def support_rules(
     rules.append(Rule("contact.pressure", top, down > 0.0, "must press somewhere"))
     fix = "overflows together with contact.pressure: take other units"
     rules.append(Rule("strip.length", length, np.isfinite(moment), fix))
+    if member.support == "clamped" and load.entry == "member":
+        up, lifting = face_resultant(bottom, length)
+        off = np.maximum(np.abs(down - up), np.abs(moment - lifting) / length)
+        fix = "must balance contact.pressure in a single lap that is pressed before it is mounted: "
+        fix += "give both the same, or another load.entry, whose clamp carries the rest"
+        rules.append(Rule("contact.bottom_pressure", bottom, off <= BALANCED * down, fix))
     if contact.normal != "none":
         fix = "nothing holds the strip down (rigid-body motion): press more on top"
         rules.append(Rule("contact.bottom_pressure", bottom, force > 0.0, fix))

@@ -89,8 +89,10 @@ def _check_alone(scene: Parts) -> None:
     fix = "needs a second member: take 'free', or give member.support"
     end = scene.strip.loaded_end
     require("strip.loaded_end", end, end == "free", fix)
-    fix = "needs a second member: leave it out, or give member.support"
-    require("strip.overhang", scene.strip.overhang, scene.strip.overhang is None, fix)
+    fix = "needs linear kinematics on the contact line: leave it out, or take model.rung = "
+    fix += f"condensed-{scene.model.rung}"
+    linear = scene.strip.overhang is None or scene.model.condensed
+    require("strip.overhang", scene.strip.overhang, linear, fix)
     fix = "needs a second member: leave it out, or give member.support (a curved strip on a rigid "
     fix += "base has strip.curvature)"
     require("contact.gap", scene.contact.gap, scene.contact.gap is None, fix)

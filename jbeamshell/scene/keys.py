@@ -85,7 +85,7 @@ class StripKeys(Part):
     )
     overhang: Array | None = number(
         None,
-        "Length beyond X = L, at whose end the load acts (lap joints only); none is none.",
+        "Length beyond X = L, at whose end the load acts and u is taken; none is none.",
         unit="length",
     )
     layers: Array | None = number(

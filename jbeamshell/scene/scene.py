@@ -243,7 +243,8 @@ class Scene(Tree):
             require("strip.far_end", strip.far_end, held, fix)
         pressures = (contact.pressure, contact.bottom_pressure)
         if not is_traced(strip.length, contact.friction, *pressures):
-            for rule in support_rules(strip, self.member, contact, model, self.number):
+            parts = strip, self.member, contact, model, self.load
+            for rule in support_rules(*parts, self.number):
                 rule.demand()
 
     def of_member(self) -> Scene:

@@ -161,7 +161,7 @@ class Lanes:
             yield fill_height(thickness, 2.0 * self.value("strip.half_height"))
         targets = self.value("load.amplitude") if load.cycles else 0.0
         for rule in (
-            *support_rules(strip, member, contact, model, self.value),
+            *support_rules(strip, member, contact, model, load, self.value),
             gross_slip_rule(load, member, self.value, targets),
             bar_rule(load, model, self.value),
         ):

@@ -92,7 +92,10 @@ def test_fit_prints_text_to_read(cli, planted):
     assert re.fullmatch(r"  strip.height_ratio +0\.(2|19)\d* \+- \S+", lines[1])
     assert re.fullmatch(r"  misfit \S+ % of the range", lines[2])
     assert re.fullmatch(r"  converged after \d+ model runs", lines[3])
-    assert lines[-1] == "  the force drives these loops (set load.control to change it)"
+    assert lines[-2:] == [
+        "  the force drives these loops (set load.control to change it)",
+        "  the force enters a member that goes on (set load.entry to change it)",
+    ]
 
 
 def test_data_of_another_law_end_with_code_3(cli, planted, monkeypatch):

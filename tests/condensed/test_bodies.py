@@ -9,6 +9,7 @@ import jbeamshell as jb
 from jbeamshell.condensed import strip
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.quasistatic.elastic_strip import ElasticStrip, V, W
+from jbeamshell.quasistatic.system import System
 from jbeamshell.scene.rungs import name_of, values_of
 
 # Elements at the loaded end are so large that slip zones are nested.
@@ -49,6 +50,8 @@ BODIES = {
     "squeeze": SCENE.replace({"model.rung": "condensed-squeeze"}),
     "p2": SCENE.replace({"model.rung": "condensed-p2"}),
     "p4": SCENE.replace({"model.rung": "condensed-p4", "strip.plane": "stress"}),
+    "face": SCENE.replace({"model.rung": "condensed-p3", "load.entry": "face"}),
+    "guided": SCENE.replace({"model.rung": "condensed-p3", "load.entry": "guided"}),
     "laminate": SCENE.replace({"model.rung": "condensed-squeeze", "strip.layers": LAYERS}),
     "printed": SCENE.replace({"model.rung": "condensed-squeeze", "model.constants": "printed"}),
     "coupled": of_phi(
@@ -66,11 +69,12 @@ class TestBody:
         zero = jnp.zeros((5, scene.model.width))
         free = np.zeros(zero.shape, bool)
         free[:, list(scene.model.active)] = True
-        free[0, [2, *range(4, scene.model.width, 2)]] = False  # held far end
+        for (node, field), _ in System(scene).supports(True).items():
+            free[node, field] &= field in (0, 1)  # the contact's own are held later
 
         @jax.jit
         def derivatives(q):
-            conjugates = jax.grad(elastic.end_displacement)(q), jax.grad(elastic.sinking)(q)
+            conjugates = jax.grad(System(scene).end_displacement)(q), jax.grad(elastic.sinking)(q)
             return jax.hessian(elastic.strain_energy)(q), *conjugates
 
         matrix, pull, press = map(np.asarray, derivatives(zero))
@@ -118,6 +122,13 @@ def check_against_load_steps(exact, steps, tolerance=1e-9):
 
 class TestHistory:
     """Many load steps of the same section on the same nodes come to the same states."""
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("name", ["face", "guided"])
+    def test_a_rigid_face(self, name):
+        scene = BODIES[name].replace(SOFT | {"load.amplitude": 0.4})
+        steps = jb.solve(beside(scene, **{"load.steps_per_half_cycle": 160}))
+        check_against_load_steps(jb.solve(scene), steps)
 
     @pytest.mark.slow
     def test_a_section_of_order_two(self, tmp_path):

@@ -437,7 +437,7 @@ def test_a_sweep_runs_over_both_heights():
         ({"member.support": "none", "contact.assembly": "frictional"}, "give member.support"),
         ({"member.layers": [[0.1, 1e5, 0.3]]}, "member.layers"),
         ({"load.amplitude": 2.5}, "gross slip"),
-        ({"member.support": "none", "strip.overhang": 0.1}, "give member.support"),
+        ({"member.support": "none", "member.overhang": 0.1}, "give member.support"),
         ({"member.support": "none", "contact.bolt_stiffness": 1e3}, "give member.support"),
         ({"member.support": "none", "load.arm": 0.1}, "load.arm = 0.1: needs a second member"),
         ({"load.kind": "moment"}, "give the amplitude of a moment under force control"),

@@ -19,7 +19,7 @@ JOINT = Joint(U, np.tanh(U))
 FINE = np.linspace(0.0, 1.0, 401)[1:] ** 2 / 2.0
 BAR = Joint(FINE, np.sqrt(2.0 * FINE))
 
-PLANE = STRIP.replace({"model.rung": "plane", "model.nodes": 33})
+PLANE = STRIP.replace({"model.rung": "plane", "model.nodes": 33, "load.entry": "traction"})
 LOADS = [0.5, 1.0, 0.6, -0.2, -0.6, -0.2, 0.2, -0.3, -0.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.1]
 
 

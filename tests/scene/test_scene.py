@@ -21,7 +21,7 @@ from jbeamshell.mechanics.friction import (
     TanhIncrement,
 )
 from jbeamshell.scene import library
-from jbeamshell.scene.keys import DERIVED, FAR_ENDS, KEYS, NUMBERS
+from jbeamshell.scene.keys import DERIVED, ENTRIES, FAR_ENDS, KEYS, NUMBERS
 from jbeamshell.scene.keys import TABLE as TABLE_OF_KEYS
 from jbeamshell.scene.parts import MODELS
 from jbeamshell.scene.toml import scene_from_values, write_scene
@@ -109,6 +109,7 @@ def values_of_all_keys(draw):
             "member.support": "none",
             "load.control": draw(st.sampled_from(["force", "displacement"])),
             "load.kind": "force",
+            "load.entry": draw(st.sampled_from(ENTRIES)),
             "load.amplitude": draw(positive),
             "load.cycles": cycles,
             "load.steps_per_half_cycle": 2 * draw(st.integers(1, 1000)),
@@ -159,20 +160,23 @@ def test_toml_keeps_a_lap_joint(path, height, stiffness, nu, clamped):
     values |= {"member.poisson_ratio": nu, "contact.assembly": "frictional"}
     if clamped:
         values |= {"member.support": "clamped", "strip.loaded_end": "level"}
+        values |= {"contact.bottom_pressure": 10.0}
     scene = Scene().replace(values)
     write_scene(scene, path)
     assert same(read_scene(path), scene)
 
 
-def test_an_empty_file_is_the_standard_strip(path):
+def test_an_empty_file_is_the_default_strip_and_says_how_its_force_enters(path):
     path.write_text("")
-    assert same(read_scene(path), Scene())
+    with pytest.warns(UserWarning, match=r"load.entry is not given and read as 'member'"):
+        scene = read_scene(path)
+    assert same(scene, Scene())
 
 
 def test_a_readable_file(path):
     path.write_text(
         "[strip]\nhalf_height = 0.5\nlength = 4\n[contact]\nsmoothing = 8\n"
-        f"pressure = {TABLE}\n[model]\nfields = ['v', 'beta']\n"
+        f"pressure = {TABLE}\n[model]\nfields = ['v', 'beta']\n[load]\nentry = 'face'\n"
     )
     scene = read_scene(path)
     assert (scene.strip.height_ratio, scene.contact.smoothing) == (0.25, 8.0)
@@ -193,7 +197,7 @@ def test_scenes_that_ship_survive_a_file(path, name):
 def test_the_scenes_that_ship_are_the_files():
     folder = pathlib.Path(library.__file__).parent / "shipped"
     assert sorted(library.NAMES) == sorted(path.stem for path in folder.glob("*.toml"))
-    assert same(library.standard(), Scene())
+    assert same(library.standard(), Scene().replace({"load.entry": "traction"}))
 
 
 @pytest.mark.parametrize("ask", [library.named, library.values_of, library.summary])
