@@ -76,7 +76,7 @@ def by_the_other(values: Values, scene: jb.Scene, other: Values) -> jb.Scene:
     section: Values = {"model.fields": list(scene.model.fields), "model.order": scene.model.order}
     if scene.model.condensed and not scene.ideal_friction:
         section["model.end_size"] = scene.model.end_size
-    return jb.Scene().replace(given | section | other)
+    return jb.library.standard().replace(given | section | other)
 
 
 def off(value: float, reference: float) -> float:
@@ -138,7 +138,7 @@ def compared(values: Values, other: Values | None, before: Row | None = None) ->
     """
     begun = time.process_time()
     try:
-        scene = jb.Scene().replace(values)
+        scene = jb.library.standard().replace(values)
         found = jb.solve(scene, throw=False)
     except jb.InputError as error:
         return {"outcome": "fails, and says so", "reason": str(error)}

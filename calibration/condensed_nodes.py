@@ -52,7 +52,7 @@ def study() -> list[dict[str, float]]:
 
         @jax.jit
         def works(eta: jax.Array, sizes: jax.Array, nodes: int = nodes) -> tuple[jax.Array, ...]:
-            scene = jb.Scene().replace({"strip.height_ratio": eta})
+            scene = jb.library.standard().replace({"strip.height_ratio": eta})
             return both(strip.condensed(scene, nodes).body, scene.contact.friction, sizes)
 
         worst: dict[str, float] = {}

@@ -35,7 +35,7 @@ TOLERANCES = (0.02, 0.01, 0.005, 0.0025)
 
 def compared(values: Values) -> Row:
     """Errors and time of one scene."""
-    scene = jb.Scene().replace(values)
+    scene = jb.library.standard().replace(values)
     jb.solve(scene, throw=False)
     begun = time.perf_counter()
     found = jax.block_until_ready(jb.solve(scene, throw=False))

@@ -47,6 +47,10 @@ SETTINGS: dict[str, Values] = {
     "condensed, both faces": FEW | BOTH_FACES | SOFT,
     "condensed, layers": FEW | LAYERS | SOFT,
     "plane": FEW | {"model.rung": "plane"},
+    "plane, traction": FEW | {"model.rung": "plane", "load.entry": "traction"},
+    "plane, face": FEW | {"model.rung": "plane", "load.entry": "face"},
+    "plane, guided": FEW | {"model.rung": "plane", "load.entry": "guided"},
+    "plane, overhang": FEW | {"model.rung": "plane", "strip.overhang": 0.3},
     "bar": FEW | {"model.rung": "bar"},
     "masing": FEW | {"model.rung": "masing"},
     "masing of a pull": FEW | {"model.rung": "masing-pull"},
@@ -61,8 +65,8 @@ SETTINGS: dict[str, Values] = {
     "exact, layers": EXACT | LAYERS,
     "stepwise, displacement": STEPWISE | DISPLACED,
     "exact, arc length": EXACT | DISPLACED | {"load.control": "arc-length"},
-    "stepwise p2": STEPWISE | {"model.rung": "p2"},
-    "stepwise p3, exact": EXACT | {"model.rung": "p3"},
+    "stepwise p2": STEPWISE | {"model.rung": "p2", "load.entry": "guided"},
+    "stepwise p3, exact": EXACT | {"model.rung": "p3", "load.entry": "face"},
     "collocation": EXACT | {"model.grid": "collocation"},
     "assumed squeeze": EXACT | LIFT | {"model.squeeze": "assumed"},
     "printed constants": STEPWISE | {"model.constants": "printed"},
@@ -82,6 +86,7 @@ SETTINGS: dict[str, Values] = {
     "lap with a gap, moment": FEW
     | SINGLE
     | {
+        "contact.bottom_pressure": 10.0,
         "contact.gap": [[0.0, 0.0], [1.0, 2e-6], [2.0, 0.0]],
         "load.kind": "moment",
         "load.amplitude": 0.3,

@@ -35,7 +35,7 @@ MODELS = ("iwan4", "bouc-wen", "jenkins", "sliders4", "sliders8", "sliders16")
 
 def compared(eta: float) -> Comparison:
     """Comparison on the strip of one height."""
-    scene = jb.Scene().replace({"strip.height_ratio": eta})
+    scene = jb.library.standard().replace({"strip.height_ratio": eta})
     return jb.identify.compare(scene, MODELS, amplitudes=AMPLITUDES)
 
 

@@ -5,4 +5,6 @@ import jbeamshell as jb
 
 def in_load_steps() -> jb.Scene:
     """Standard strip in load steps with exact rotations; a study changes what it needs."""
-    return jb.Scene().replace({"model.solution": "stepwise", "model.kinematics": "exact"})
+    return jb.library.standard().replace(
+        {"model.solution": "stepwise", "model.kinematics": "exact"}
+    )

@@ -12,6 +12,7 @@ from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import UnconvergedError
 from jbeamshell.condensed.cycles import STEADY, SteadyCycles, steady_cycles
 from jbeamshell.condensed.drives import with_springs
+from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.solve import solve
 from jbeamshell.condensed.strip import condensed, spring_stiffness
 from jbeamshell.scene.load_path import check
@@ -86,12 +87,20 @@ def factors(scene: Scene, *, nodes: int | None = None) -> SteadyCycles:
         whose method ``dissipation`` takes (k,) amplitudes and returns (k,) works; NaN where slip
         zones are not nested, which `dissipation` would walk event by event
 
+    Raises
+    ------
+    InputError
+        for a member that goes on, whose contact opens at its edge so that no zones are nested
+
     Examples
     --------
-    >>> kept = jb.condensed.factors(jb.Scene())
+    >>> kept = jb.condensed.factors(jb.library.standard())
     >>> kept.dissipation(jnp.linspace(0.1, 1.9, 256))
     """
     scene = on_contact_line(scene, nodes)
+    fix = "opens the edge of the contact, so that no slip zones are nested: take traction, face or "
+    fix += "guided, or jbeamshell.condensed.dissipation"
+    require("load.entry", scene.load.entry, not goes_on(scene), fix)
     return _factors(scene, _is_soft(scene))
 
 

@@ -135,9 +135,7 @@ def _long(form: SectionForm, length: Array, forwards: bool) -> Three:
     return (start, end, across.T) if forwards else (end, start, across)
 
 
-def compliance(
-    form: SectionForm, pull: Array, bends: bool = True, on_plane: bool = False
-) -> Array:
+def compliance(form: SectionForm, pull: Array, bends: bool = True, on_plane: bool = False) -> Array:
     """Displacement for each unit of load and of length of a member under an even load.
 
     The strains e and k are the same everywhere, and the section squeezes and warps as it likes.

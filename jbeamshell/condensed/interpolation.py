@@ -19,6 +19,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.cycles import SteadyCycles, steady_cycles
 from jbeamshell.condensed.dissipation import factors, on_contact_line
+from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.strip import RULE, condensed, is_pressed_evenly, pressing, stations
 from jbeamshell.mechanics import elements
 from jbeamshell.scene.scene import Scene
@@ -70,12 +71,12 @@ class Bodies(eqx.Module):
         Raises
         ------
         InputError
-            if the strip has layers or an energy of its own, its pressure is a table, or a range is
-            none
+            if the strip has layers or an energy of its own or goes on beyond the contact, its
+            pressure is a table, or a range is none
 
         Examples
         --------
-        >>> bodies = jb.condensed.Bodies.of(jb.Scene(), (0.03, 0.4), (0.2, 0.4))
+        >>> bodies = jb.condensed.Bodies.of(jb.library.standard(), (0.03, 0.4), (0.2, 0.4))
         >>> eta, mu = np.array([0.05, 0.1]), np.array([0.1, 0.2])
         >>> values = {"strip.height_ratio": eta, "contact.friction": mu}
         >>> bodies.dissipation(values, [[1.0], [1.0]])  # (2, 1)
@@ -92,6 +93,8 @@ class Bodies(eqx.Module):
             require(name, pair, len(pair) == 2 and pair[0] <= pair[1], "give (least, most)")
         scene = on_contact_line(scene, nodes)
         require("contact.stick_stiffness", "soft", scene.ideal_friction, "must be 1000 or more")
+        fix = "opens the edge of the contact, so that no slip zones are nested: take another"
+        require("load.entry", scene.load.entry, not goes_on(scene), fix)
         low = jnp.array([np.log(height_ratios[0]), poisson_ratios[0]])
         high = jnp.array([np.log(height_ratios[1]), poisson_ratios[1]])
         found = cls(scene, low, high, _coefficients(scene, low, high, points), jnp.asarray(0.0))

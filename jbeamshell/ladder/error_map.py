@@ -82,6 +82,7 @@ def place(scene: Scene) -> np.ndarray | str:
         "layers": strip.layers is not None,
         "a curvature": strip.curvature is not None,
         "a second member": scene.member.support != "none",
+        f"load.entry = {scene.load.entry}": scene.load.entry != "traction",
         "a far end that is not guided": strip.far_end != "guided",
         "a pressure that varies": contact.pressure.ndim > 0,
         "a pressure from below": contact.bottom_pressure.ndim > 0 or contact.bottom_pressure != 0,

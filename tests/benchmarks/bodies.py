@@ -32,7 +32,7 @@ def main() -> None:
     jb.configure(cache=False)
     eta, amplitude = jnp.asarray(ETA), jnp.asarray([AMPLITUDE])
     for rung in options.rungs:
-        scene = jb.Scene().replace(
+        scene = jb.library.standard().replace(
             {"model.rung": f"condensed-{rung}", "model.nodes": options.nodes}
         )
 

@@ -82,7 +82,7 @@ def first(call: Callable[[], Any]) -> float:
 
 def scene(eta: Any = ETA) -> jb.Scene:
     """Standard strip of a height ratio."""
-    return jb.Scene().replace({"strip.height_ratio": eta})
+    return jb.library.standard().replace({"strip.height_ratio": eta})
 
 
 @functools.cache

@@ -61,7 +61,7 @@ def drift(scene: jb.Scene) -> float:
 def main() -> None:
     """Measure all variants side by side and write the record."""
     scenes = {
-        name: jb.Scene().replace(IN_LOAD_STEPS).replace(STANDARD | keys)
+        name: jb.library.standard().replace(IN_LOAD_STEPS).replace(STANDARD | keys)
         for name, keys in VARIANTS.items()
     }
     record: dict[str, dict] = {name: {"keys": VARIANTS[name]} for name in scenes}

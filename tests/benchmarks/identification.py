@@ -111,7 +111,7 @@ def timed(function, *arguments, **options):
 
 def fitted(keys: dict) -> tuple[identify.Fit, dict]:
     """A fit by each method, cold and warm."""
-    truth = jb.Scene().replace(IN_LOAD_STEPS).replace(TRUTH | keys)
+    truth = jb.library.standard().replace(IN_LOAD_STEPS).replace(TRUTH | keys)
     loops, scene = planted(truth), truth.replace(START)
     record = {}
     for method in ("levenberg-marquardt", "adam"):
@@ -192,7 +192,7 @@ def runs_to_target(fit: identify.Fit, scene: jb.Scene, loops: list[Loop]) -> int
 
 def at_the_defaults() -> dict:
     """A fit with all settings left open, cold and warm, with the time of the processors."""
-    scene = jb.Scene().replace(TRUTH)
+    scene = jb.library.standard().replace(TRUTH)
     loops, seconds = planted(scene), []
     for _ in range(1 + ROUNDS):
         begin = time.process_time()
@@ -226,7 +226,7 @@ def main() -> None:
         print(name, flush=True)
         fit, record[name] = fitted(keys)
         if name == COMPARED:
-            truth = jb.Scene().replace(IN_LOAD_STEPS).replace(TRUTH | keys)
+            truth = jb.library.standard().replace(IN_LOAD_STEPS).replace(TRUTH | keys)
             ours = record[name]["levenberg-marquardt"]
             ours["runs_to_target"] = runs_to_target(fit, truth.replace(START), planted(truth))
             record[name] |= (others := peers(fit))

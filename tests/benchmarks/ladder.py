@@ -137,7 +137,7 @@ def scene_of(strip: tuple[float, float], values: dict[str, Any]) -> jb.Scene:
     """A standard strip, with what differs from the defaults."""
     eta, amplitude = strip
     own = {"strip.height_ratio": eta, "load.amplitude": amplitude, "load.cycles": CYCLES}
-    return jb.Scene().replace(IN_LOAD_STEPS).replace(own | values)
+    return jb.library.standard().replace(IN_LOAD_STEPS).replace(own | values)
 
 
 def modelled(strip: tuple[float, float], case: Candidate) -> jb.Scene:

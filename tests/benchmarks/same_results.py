@@ -114,7 +114,9 @@ def results() -> dict[str, np.ndarray]:
     """Arrays by name, of every scene, of a gradient and of a sweep."""
     found = {}
     for name, settings in tqdm(SCENES.items(), disable=None):
-        history = jb.solve(jb.Scene().replace(IN_LOAD_STEPS).replace(settings), throw=False)
+        history = jb.solve(
+            jb.library.standard().replace(IN_LOAD_STEPS).replace(settings), throw=False
+        )
         found |= {f"{name}/{figure}": np.asarray(getattr(history, figure)) for figure in FIGURES}
         if history.cycles:
             found[f"{name}/dissipation"] = np.asarray(history.dissipation)
@@ -122,12 +124,14 @@ def results() -> dict[str, np.ndarray]:
     keys = ["contact.friction", "strip.height_ratio", "strip.poisson_ratio"]
     for name in ("linear", "smooth", "lift", "p2"):
         ask = jb.response(
-            jb.Scene().replace(IN_LOAD_STEPS).replace(SCENES[name]), keys, ["dissipation"]
+            jb.library.standard().replace(IN_LOAD_STEPS).replace(SCENES[name]),
+            keys,
+            ["dissipation"],
         )
         slopes = jax.jacrev(lambda x, ask=ask: ask(*x)["dissipation"])
         found[f"gradient, {name}/dissipation"] = np.asarray(slopes(np.array([0.12, 0.15, 0.25])))
     over = {"strip.height_ratio": np.geomspace(0.02, 0.4, 8), "load.amplitude": [0.3, 0.8, 1.9]}
-    swept = jb.sweep(jb.Scene().replace(IN_LOAD_STEPS).replace(LINEAR), over)
+    swept = jb.sweep(jb.library.standard().replace(IN_LOAD_STEPS).replace(LINEAR), over)
     return found | {f"sweep/{name}": np.asarray(values) for name, values in swept.values.items()}
 
 

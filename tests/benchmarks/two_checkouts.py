@@ -37,7 +37,7 @@ def calls():
     jb.configure()
     numbers = (0.1126, 0.7855)
     over = ["strip.height_ratio", "load.amplitude"]
-    scene = jb.Scene().replace(IN_LOAD_STEPS).replace(TUNED)
+    scene = jb.library.standard().replace(IN_LOAD_STEPS).replace(TUNED)
     many = scene.replace({"load.steps_per_half_cycle": 20, "model.nodes": 41})
     exact = scene.replace({"model.kinematics": "exact", "load.steps_per_half_cycle": 4})
     ask = jb.response(scene, over, ["dissipation"])

@@ -29,7 +29,9 @@ def elements(name):
     with ELEMENTS.open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row.pop("entry") == name]
     rows = [{key: float(value or "nan") for key, value in row.items()} for row in rows]
-    return [row for row in rows if row["overhang_over_H"] in (0.0, 4.0) and row["D_over_bar"] > 1e-3]
+    return [
+        row for row in rows if row["overhang_over_H"] in (0.0, 4.0) and row["D_over_bar"] > 1e-3
+    ]
 
 
 @functools.cache
@@ -98,7 +100,9 @@ class TestBeyond:
         thickness, stiffness = jnp.array([0.3, 0.7]), jnp.array([2.0, 5.0])
         form = layered_form(Material(thickness, stiffness, 0.4 * stiffness, 0.3 * stiffness))
         free = end_section(form, on_contact=False)
-        short, long = (beyond(form, jnp.full(160, length / 160), free, True) for length in (4.0, 6.0))
+        short, long = (
+            beyond(form, jnp.full(160, length / 160), free, True) for length in (4.0, 6.0)
+        )
         added = long.softness - short.softness
         # The end turns, too: what is added is that of the force and of its moment.
         assert float(added) > 2.0 * float(compliance(form, form.pull, bends=False))
@@ -107,7 +111,9 @@ class TestBeyond:
     def test_both_directions_are_mirror_images(self):
         form = section_form(PLANE)
         lengths = jnp.asarray([0.01, 0.05, 0.3])
-        sides = [beyond(form, lengths, end_section(form, on_contact=False), f) for f in (True, False)]
+        sides = [
+            beyond(form, lengths, end_section(form, on_contact=False), f) for f in (True, False)
+        ]
         mirror = np.where(form.held, -1.0, 1.0)  # u_x turns round, u_y stays
         one, other = sides
         np.testing.assert_allclose(
@@ -150,7 +156,9 @@ class TestSections:
             plane = float(jb.solve(fine, throw=False).dissipation)
             orders = [
                 jb.solve(
-                    jb.Scene().replace(small | {"load.entry": name, "model.rung": f"condensed-p{p}"}),
+                    jb.Scene().replace(
+                        small | {"load.entry": name, "model.rung": f"condensed-p{p}"}
+                    ),
                     throw=False,
                 )
                 for p in (2, 4, 8)

@@ -58,6 +58,7 @@ def test_a_slope_is_that_of_differences(bodies):
         ({"contact.pressure": [[0.0, 9.0], [2.0, 10.0]]}, RANGES, "contact.pressure"),
         ({}, (RANGES[0], (0.4, 0.3)), "poisson_ratios"),
         ({"contact.stick_stiffness": 10.0}, RANGES, "stick_stiffness"),
+        ({"load.entry": "member"}, RANGES, "load.entry"),
     ],
 )
 def test_what_it_does_not_cover_is_refused(values, ranges, said):

@@ -86,7 +86,7 @@ QUICK = Plan(
 
 def scene(values: Mapping[str, Any] | None = None) -> jb.Scene:
     """The standard strip on the grid that is timed, with what differs."""
-    return jb.Scene().replace(IN_LOAD_STEPS).replace(STANDARD | dict(values or {}))
+    return jb.library.standard().replace(IN_LOAD_STEPS).replace(STANDARD | dict(values or {}))
 
 
 @cache

@@ -1,0 +1,198 @@
+"""Errors of every section beside plane elasticity, for each way in which the force enters.
+
+    python calibration/section_errors.py [--only KIND ...]
+
+solves random strips and lap joints as plane elasticity and on the contact line of each section,
+with the same entry of the force.  It writes section_errors.json beside this file after every kind:
+of each run the slip length over the half height, as the section itself has it, and how far its
+dissipation and its secant stiffness are off, in per cent.  Most of the scatter of strips of all
+heights, frictions and Poisson's ratios falls on one curve of the slip length over the half height.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+
+jax.config.update("jax_enable_x64", True)
+
+import numpy as np  # noqa: E402
+from provenance import provenance  # noqa: E402
+
+import jbeamshell as jb  # noqa: E402
+from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell.scene.keys import ENTRIES  # noqa: E402
+
+RECORD = Path(__file__).with_suffix(".json")
+SEED = 46
+FIGURES = ("dissipation", "secant_stiffness", "slip_length", "dissipation_ratio")
+PARTS = np.geomspace(0.03, 0.95, 9)  # of gross slip
+FINE, NODES = 257, 129  # contact nodes of plane elasticity, and of the sections
+ORDERS = ("shell", "squeeze", "p2", "p3", "p4", "p6")
+Values = dict[str, Any]
+Random = np.random.Generator
+
+
+def _log(random: Random, low: float, high: float) -> float:
+    return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+
+def even(random: Random) -> tuple[Values, float]:
+    """Homogeneous strip under an even pressure, and its force of gross slip."""
+    mu = _log(random, 0.05, 1.0)
+    nu = float(random.choice([0.0, 0.3, 0.3, 0.45, 0.49]))
+    eta = _log(random, 0.03, 0.4)
+    found = {"strip.height_ratio": eta, "strip.poisson_ratio": nu, "contact.friction": mu}
+    return found, 20.0 * mu
+
+
+def table(random: Random) -> tuple[Values, float]:
+    """Pressure that changes along the strip without a jump."""
+    found, _ = even(random)
+    rows = np.column_stack([[0.0, 1.0, 2.0], random.uniform(3.0, 20.0, 3)])
+    force = np.sum(0.5 * (rows[1:, 1] + rows[:-1, 1]))
+    return found | {"contact.pressure": rows}, found["contact.friction"] * force
+
+
+def patch(random: Random) -> tuple[Values, float]:
+    """Pressure of one bolt, away from the loaded end."""
+    found, _ = even(random)
+    begin, end = random.uniform(0.0, 0.8), random.uniform(1.0, 1.8)
+    rows = np.array([[begin, 0.0], [begin, 10.0], [end, 10.0], [end, 0.0]])
+    return found | {"contact.pressure": rows}, found["contact.friction"] * 10.0 * (end - begin)
+
+
+def laminate(random: Random) -> tuple[Values, float]:
+    """Two layers of other stiffness."""
+    mu, eta = _log(random, 0.05, 1.0), _log(random, 0.03, 0.4)
+    share, ratio = random.uniform(0.3, 0.7), _log(random, 0.2, 5.0)
+    layers = [[2.0 * eta * share, 1e5, 0.3], [2.0 * eta * (1.0 - share), 1e5 * ratio, 0.25]]
+    found = {"strip.height_ratio": eta, "strip.layers": np.array(layers), "contact.friction": mu}
+    return found, 20.0 * mu
+
+
+def double_shear(random: Random) -> tuple[Values, float]:
+    """Half of a lap joint in double shear, with members of other heights."""
+    mu, eta = _log(random, 0.05, 0.6), _log(random, 0.03, 0.3)
+    thinner = _log(random, 0.5, 2.0)
+    found = {"strip.height_ratio": eta, "contact.friction": mu}
+    found |= {"member.height_ratio": thinner * eta, "member.axial_stiffness": 3.4e4 * thinner}
+    return found, 20.0 * mu
+
+
+def single_lap(random: Random) -> tuple[Values, float]:
+    """Single lap under one bolt."""
+    mu, eta = _log(random, 0.05, 0.6), _log(random, 0.03, 0.2)
+    begin, end = random.uniform(0.4, 0.8), random.uniform(1.2, 1.6)
+    rows = np.array([[begin, 0.0], [begin, 10.0], [end, 10.0], [end, 0.0]])
+    found = {"strip.height_ratio": eta, "contact.friction": mu}
+    found |= {"contact.pressure": rows, "contact.bottom_pressure": rows}
+    return found, 10.0 * (end - begin) * mu
+
+
+LAP = {"strip.far_end": "free"}
+DOUBLE = LAP | {"member.support": "rolling"}
+SINGLE = LAP | {"member.support": "clamped", "strip.loaded_end": "level"}
+SINGLE |= {"contact.assembly": "frictional"}
+Draw = Callable[[Random], tuple[Values, float]]
+KINDS: dict[str, tuple[Draw, Values, int]] = {  # how one is drawn, words of all, number of scenes
+    "even": (even, {}, 40),
+    "table": (table, {}, 12),
+    "patch": (patch, {}, 12),
+    "laminate": (laminate, {}, 12),
+    "double shear": (double_shear, DOUBLE, 12),
+    "single lap": (single_lap, SINGLE, 8),
+}
+
+
+def scenes_of(kind: str) -> tuple[list[Values], np.ndarray]:
+    """Values of the scenes of a kind, and their forces of gross slip."""
+    draw, words, count = KINDS[kind]
+    random = np.random.default_rng([SEED, list(KINDS).index(kind)])
+    drawn = [draw(random) for _ in range(count)]
+    return [words | values for values, _ in drawn], np.array([force for _, force in drawn])
+
+
+def runs(scenes: list[Values], gross: np.ndarray, model: Values) -> np.ndarray:
+    """Figures (scenes, parts, figures) of a model; NaN where a run has no equilibrium."""
+    numbers = [key for key, value in scenes[0].items() if not isinstance(value, str)]
+    begin = scenes[0] | model | {"load.amplitude": 0.1 * gross[0]}
+    ask = jb.response(jb.Scene().replace(begin), (*numbers, "load.amplitude"), FIGURES)
+    found = np.full((len(scenes), PARTS.size, len(FIGURES)), np.nan)
+    for i, values in enumerate(scenes):
+        for j, part in enumerate(PARTS):
+            answer = ask(*(values[key] for key in numbers), part * gross[i])
+            if int(answer["status"]) == 0:
+                found[i, j] = [float(answer[name]) for name in FIGURES]
+    return found
+
+
+def sections(kind: str) -> tuple[str, ...]:
+    """Sections that a kind of scenes may have."""
+    return ("shell", "squeeze") if kind == "laminate" else ORDERS
+
+
+def beside_elasticity(kind: str, entry: str) -> Values:
+    """Rows of one kind and one entry, by section."""
+    scenes, gross = scenes_of(kind)
+    height, friction, poisson = (
+        np.array([values.get(key, default) for values in scenes])[:, None]
+        for key, default in (
+            ("strip.height_ratio", None),  # of strips of length 2, it is H
+            ("contact.friction", None),
+            ("strip.poisson_ratio", 0.3),
+        )
+    )
+    plane = {"model.rung": "plane", "load.entry": entry}
+    exact = runs(scenes, gross, plane | {"model.nodes": FINE})
+    coarse = runs(scenes, gross, plane | {"model.nodes": NODES})
+    found: Values = {}
+    for section in ("plane", *sections(kind)):
+        model = {"model.rung": f"condensed-{section}", "load.entry": entry}
+        own = coarse
+        if section != "plane":
+            own = runs(scenes, gross, model | {"model.nodes": NODES})
+        with np.errstate(all="ignore"):
+            off = 100.0 * (own[..., :2] / exact[..., :2] - 1.0)
+        rows = [own[..., 2] / height, off[..., 0], off[..., 1], exact[..., 3]]
+        rows += [np.broadcast_to(constant, rows[0].shape) for constant in (friction, poisson)]
+        kept = np.all(np.isfinite(rows), axis=0)
+        names = ("slip_over_H", "D_percent", "K_percent", "D_over_bar", "mu", "nu")
+        found[section] = {
+            name: [float(f"{value:.4g}") for value in row[kept]]
+            for name, row in zip(names, rows, strict=True)
+        }
+    return found
+
+
+def main() -> None:
+    """Solve the kinds asked for, and write the record after each entry."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", nargs="*", default=list(KINDS), choices=list(KINDS))
+    given = parser.parse_args()
+    jb.configure()
+    record: Values = {"errors": {}}
+    if RECORD.exists():
+        record = json.loads(RECORD.read_text(encoding="utf-8"))
+    record["about"] = provenance() | {"plane_nodes": FINE, "section_nodes": NODES}
+    for kind in given.only:
+        for entry in ENTRIES:
+            begin = time.perf_counter()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", jb.DoubtfulWarning)
+                record["errors"].setdefault(kind, {})[entry] = beside_elasticity(kind, entry)
+            write_text(RECORD, json.dumps(record, separators=(",", ":")) + "\n")
+            print(kind, entry, f"{time.perf_counter() - begin:.0f} s", file=sys.stderr, flush=True)
+        jax.clear_caches()
+
+
+if __name__ == "__main__":
+    main()
