@@ -87,7 +87,7 @@ SETTINGS: dict[str, Values] = {
     | SINGLE
     | {
         "contact.bottom_pressure": 10.0,
-        "contact.gap": [[0.0, 0.0], [1.0, 2e-6], [2.0, 0.0]],
+        "contact.gap": [[0.0, 0.0], [0.9, 2e-6], [2.0, 0.0]],
         "load.kind": "moment",
         "load.amplitude": 0.3,
     },

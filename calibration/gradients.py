@@ -48,7 +48,7 @@ DISTANCES = (10.0, 1.0, 0.1, 0.01)  # times that, until they agree; round-off as
 CLOSE = 1e-4  # relative difference that still agrees
 LITTLE = 1e-3  # of a figure per relative change of a number, below which slopes count as this
 NOISE = 1e-10  # of a figure, by round-off, if no more was measured
-TINY, TRIES = 1e-13, 5  # relative changes of all numbers by which round-off is measured
+TINY, TRIES = 1e-11, 20  # relative changes of all numbers by which round-off is measured
 # Sizes of figures that are zero but for round-off, or small differences of larger numbers; that of
 # the closure is the width of the loop, that of the energy's imbalance the work of the load.
 LEAST = {"closure": 1.0, "error": 1.0, "curvature": 0.05, "tip_deflection": 1e-7}
@@ -221,7 +221,8 @@ def differences(
     far, near = ([at(vector + sign * d * way) for sign in (1, -1)] for d in (h, half))
     wide, close = (far[0] - far[1]) / (2.0 * h), (near[0] - near[1]) / h
     up, down = (near[0] - middle) / half, (middle - near[1]) / half
-    return Differences((4.0 * close - wide) / 3.0, up, down, noise / h)
+    # Of round-off, both differences leave up to 2 and 1 over h, of which 4/3 and 1/3 are taken.
+    return Differences((4.0 * close - wide) / 3.0, up, down, 3.0 * noise / h)
 
 
 def round_off(setting: Setting, vector: np.ndarray, random: np.random.Generator) -> np.ndarray:

@@ -3,15 +3,17 @@
     python calibration/section_errors.py [--only KIND ...]
 
 solves random strips and lap joints as plane elasticity and on the contact line of each section,
-with the same entry of the force.  It writes section_errors.json beside this file after every kind:
+with the same entry of the force.  It writes section_errors.json beside this file after every entry:
 of each run the slip length over the half height, as the section itself has it, and how far its
-dissipation and its secant stiffness are off, in per cent.  Most of the scatter of strips of all
-heights, frictions and Poisson's ratios falls on one curve of the slip length over the half height.
+dissipation and its secant stiffness are off, in per cent.  Strips of all heights, frictions and
+Poisson's ratios fall near one curve of the slip length over the half height.  These curves go to
+jbeamshell/history/section_errors.json, from where every run tells the error of its section.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
 import time
@@ -32,10 +34,15 @@ from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.scene.keys import ENTRIES  # noqa: E402
 
 RECORD = Path(__file__).with_suffix(".json")
+SHIPPED = Path(jb.__file__).parent / "history" / "section_errors.json"
 SEED = 46
 FIGURES = ("dissipation", "secant_stiffness", "slip_length", "dissipation_ratio")
 PARTS = np.geomspace(0.03, 0.95, 9)  # of gross slip
 FINE, NODES = 257, 129  # contact nodes of plane elasticity, and of the sections
+BINS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0)
+BINS += (20.0, 60.0)  # of the slip length over H
+ENOUGH = 3  # rows that make a point of a curve
+LITTLE = 1e-4  # of the bar's dissipation, below which rows count for no curve
 ORDERS = ("shell", "squeeze", "p2", "p3", "p4", "p6")
 Values = dict[str, Any]
 Random = np.random.Generator
@@ -173,6 +180,34 @@ def beside_elasticity(kind: str, entry: str) -> Values:
     return found
 
 
+def curve(rows: Values) -> Values:
+    """Median and largest error of the dissipation over the slip length, as a run tells them."""
+    slip, off, share = (np.array(rows[key]) for key in ("slip_over_H", "D_percent", "D_over_bar"))
+    points = []
+    for low, high in itertools.pairwise(BINS):
+        own = (slip >= low) & (slip < high) & (share > LITTLE)
+        if np.sum(own) >= ENOUGH:
+            middle = np.exp(np.mean(np.log(slip[own])))
+            points.append((middle, np.median(off[own]) / 100.0, np.max(np.abs(off[own])) / 100.0))
+    places, typical, largest = np.reshape(points, (-1, 3)).T
+    # A section that fails at much slip is not to be trusted at less.
+    largest = np.maximum.accumulate(largest[::-1])[::-1]
+    named = {"slip_over_H": places, "typical": typical, "largest": largest}
+    return {key: [float(f"{value:.3g}") for value in values] for key, values in named.items()}
+
+
+def ship(errors: Values) -> None:
+    """Write the curves that the package reads."""
+    curves = {
+        kind: {
+            entry: {name: curve(rows) for name, rows in sections.items() if name != "plane"}
+            for entry, sections in entries.items()
+        }
+        for kind, entries in errors.items()
+    }
+    write_text(SHIPPED, json.dumps(curves, separators=(",", ":")) + "\n")
+
+
 def main() -> None:
     """Solve the kinds asked for, and write the record after each entry."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -190,6 +225,7 @@ def main() -> None:
                 warnings.simplefilter("ignore", jb.DoubtfulWarning)
                 record["errors"].setdefault(kind, {})[entry] = beside_elasticity(kind, entry)
             write_text(RECORD, json.dumps(record, separators=(",", ":")) + "\n")
+            ship(record["errors"])
             print(kind, entry, f"{time.perf_counter() - begin:.0f} s", file=sys.stderr, flush=True)
         jax.clear_caches()
 

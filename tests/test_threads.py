@@ -8,11 +8,13 @@ import warnings
 import numpy as np
 import pytest
 from identify.test_law_fits import loops
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import jbeamshell as jb
 from jbeamshell import identify, laws
 from jbeamshell.common.files import write_text
 from jbeamshell.common.progress import bar
+from jbeamshell.common.threads import VARIABLE, in_one_lapack_thread
 from jbeamshell.common.workers import without_main
 
 TINY = {"model.nodes": 9, "load.steps_per_half_cycle": 2, "load.cycles": 1}
@@ -89,3 +91,34 @@ def test_solves_sweeps_and_fits_at_once_answer_as_alone(tmp_path):
     jobs += [lambda one=one: fitted(one) for one in data]
     for found, alone in zip(at_once(jobs), [job() for job in jobs], strict=True):
         assert all(map(np.array_equal, found, alone))
+
+
+def test_lapack_has_one_thread_while_a_strip_is_solved(monkeypatch):
+    def threads():
+        return {library["num_threads"] for library in threadpool_info()}
+
+    asked = in_one_lapack_thread(threads)
+    with threadpool_limits(2, user_api="blas"):
+        assert asked() == {2}  # OPENBLAS_NUM_THREADS says so in the tests
+        monkeypatch.delenv(VARIABLE, raising=False)
+        assert asked() == {1}
+        assert threads() == {2}
+
+
+def test_threads_at_once_leave_lapack_as_it_was(monkeypatch):
+    """Who comes first leaves first."""
+    monkeypatch.delenv(VARIABLE, raising=False)
+    inside, go_on, before = threading.Barrier(2), threading.Event(), threadpool_info()
+
+    def last():
+        inside.wait()
+        go_on.wait()
+
+    jobs = [in_one_lapack_thread(inside.wait), in_one_lapack_thread(last)]
+    workers = [threading.Thread(target=job) for job in jobs]
+    for worker in workers:
+        worker.start()
+    workers[0].join()
+    go_on.set()
+    workers[1].join()
+    assert threadpool_info() == before

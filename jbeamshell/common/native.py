@@ -12,6 +12,7 @@ from jax.experimental.xla_metadata import set_xla_metadata
 from jax.flatten_util import ravel_pytree
 
 from jbeamshell.common.checks import in_transformation, is_traced
+from jbeamshell.common.threads import in_one_lapack_thread
 
 # The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
 MARK = {"inlineable": "false", "xla_cpu_small_call": "true"}
@@ -82,7 +83,11 @@ class Native:
                 return self.whole(*given)
             except jax.errors.JaxRuntimeError:  # the compiler refuses an operation
                 self.fits = False
-        return self.ordinary(*given)
+        return self._called(*given)
+
+    @in_one_lapack_thread
+    def _called(self, *given: Any) -> Any:
+        return jax.block_until_ready(self.ordinary(*given))
 
 
 def _may_fit(whole: Any, given: tuple[Any, ...]) -> bool:

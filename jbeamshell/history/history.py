@@ -12,6 +12,7 @@ from jax import Array
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.summary import Summary, in_words
+from jbeamshell.history import section_error
 from jbeamshell.history.contact_line import ContactLine
 from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
 from jbeamshell.history.profiles import Profiles
@@ -106,7 +107,8 @@ class History(Profiles, ContactLine, CycleFigures):
         if self.scene.load.kind == "moment":
             control = "moment" if control == "force" else "rotation"
         what = f"{control} amplitude {float(np.max(np.abs(driver))):.4g}"
-        if not self.cycles and not np.any(driver):
+        pulled = bool(self.cycles or np.any(driver))
+        if not pulled:
             what = f"pressed by {float(np.sum(self.load)):.4g}"
         title = (
             f"{self.force.size} levels of {' '.join(self.scene.model.fields)} on "
@@ -117,6 +119,7 @@ class History(Profiles, ContactLine, CycleFigures):
             percent = 100.0 * float(self.change)
             chosen += f"; halving the elements changed the loop by {percent:.2g} %"
         figures = self.figures()
+        entered = section_error.in_words(self.scene, figures.get("slip_length")) if pulled else ""
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
         turned = self.scene.load.kind == "moment"
         units = UNITS | TURNED_UNITS if turned else UNITS
@@ -127,7 +130,7 @@ class History(Profiles, ContactLine, CycleFigures):
             )
             for name, value in figures.items()
         ]
-        return Summary("\n".join(filter(None, (title, chosen))), rows, doubts)
+        return Summary("\n".join(filter(None, (title, chosen, entered))), rows, doubts)
 
     def __str__(self) -> str:
         return self._summary.as_text()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require, require_choice, require_count
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.progress import bar
+from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.identify.assembly import Assembly
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.models import Driven
@@ -70,6 +71,7 @@ class FitProgress(NamedTuple):
         return f"{at} {self.step}, cost {self.cost:.4g}, at most {self.left:.0f} s left: {values}"
 
 
+@in_one_lapack_thread
 def fit(
     data: Measurement | Specimen | Sequence[Measurement] | Sequence[Specimen],
     scene: Scene | Law | Driven | Assembly | str | None = None,

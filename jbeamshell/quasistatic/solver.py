@@ -14,6 +14,7 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.common.precision import is_single
+from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.common.two_programs import TwoPrograms
 from jbeamshell.condensed.solve import Cycles, quickest
 from jbeamshell.condensed.solve import solve as solve_condensed
@@ -45,9 +46,10 @@ SINGLE = (
     "single precision in a JAX transformation: the dissipation may be off by several per cent; "
     "write jax.config.update('jax_enable_x64', True) before anything is computed"
 )
-STACK = 3  # frames from a warning to the caller of `jbeamshell.solve`
+STACK = 4  # frames from a warning to the caller of `jbeamshell.solve`
 
 
+@in_one_lapack_thread
 def solve(
     scene: Scene,
     path: ArrayLike | None = None,

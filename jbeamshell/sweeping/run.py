@@ -25,6 +25,7 @@ from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.files import as_path
 from jbeamshell.common.precision import doubled, is_single
 from jbeamshell.common.progress import counting, in_notebook
+from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.response import pinned
 from jbeamshell.scene.scene import Scene
@@ -53,6 +54,7 @@ PARTS = ".parts"  # suffix of the folder of finished blocks, beside the file
 Progress = Callable[[int, int], None]
 
 
+@in_one_lapack_thread
 def sweep(
     scene: Scene,
     over: Mapping[str, ArrayLike],

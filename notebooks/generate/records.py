@@ -7,6 +7,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import numpy as np
+
 from calibration.charts.campaign import chosen, counts, read
 from calibration.charts.failures import OUTCOMES, outcome
 
@@ -37,6 +39,7 @@ def tables(root: Path) -> dict[str, str]:
         "table_starting.md": starting(speed["start"]),
         "table_condensed.md": condensed(_read(benchmarks / "condensed.json")),
         "table_peer.md": peer(_read(benchmarks / "condensed.json")["peer"]),
+        "table_entries.md": entries(_read(root / "jbeamshell" / "history" / "section_errors.json")),
         "table_rungs.md": rungs(_read(benchmarks / "ladder.json")["map"]),
         "table_identification.md": identification(_read(benchmarks / "identification.json")),
         "table_motion.md": motion(_read(benchmarks / "dynamics.json")),
@@ -161,6 +164,29 @@ def rungs(record: dict) -> str:
     ]
     heads = ("height ratio", "A", "A over height ratio", *(f"`{rung}`" for rung in record["rungs"]))
     return table(heads, rows)
+
+
+def entries(record: dict) -> str:
+    """Slip length from which on each section is near plane elasticity, by entry of the force."""
+
+    def reach(curve: dict, level: float) -> str:
+        within = np.abs(curve["typical"]) <= level
+        first = within.size - int(np.argmin(within[::-1])) if not within.all() else 0
+        return f"{curve['slip_over_H'][first]:.2g} H" if first < within.size else "never"
+
+    names = list(record["even"])
+    sections = list(record["even"][names[0]])
+    rows = [
+        (
+            f"`{section}`",
+            *(
+                ", ".join(reach(record["even"][name][section], level) for level in (0.05, 0.01))
+                for name in names
+            ),
+        )
+        for section in sections
+    ]
+    return table(("section: 5 %, 1 %", *(f"`{name}`" for name in names)), rows)
 
 
 def identification(record: dict) -> str:

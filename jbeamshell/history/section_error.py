@@ -1,0 +1,124 @@
+"""Error of a section beside plane elasticity, from the slip length that a run itself has.
+
+Two things decide the dissipation before any grid does: how the force enters the loaded end, and
+whether the section may warp.  A straight section (the beamshell) is a rigid face that may turn,
+whatever ``load.entry`` says.  What that makes falls on curves of the slip length over the half
+height, which `calibration/section_errors.py` records and writes to section_errors.json beside this
+file.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jbeamshell.scene.scene import Scene
+
+KNOWN_ORDERS = (6, 4, 3, 2)
+ENTERS = {
+    "member": "enters a member that goes on beyond the contact",
+    "face": "enters a rigid face that may turn",
+    "guided": "enters a rigid face that may not turn",
+    "traction": "is an even traction on the face",
+}
+TOLD_FROM = 0.005  # error that is told
+
+
+class SectionError(NamedTuple):
+    """Relative error of the dissipation of a section.
+
+    Attributes
+    ----------
+    typical : median over strips of the same slip length over half height; positive if too large
+    largest : largest size over these and all that slip more
+    """
+
+    typical: float
+    largest: float
+
+
+@functools.cache
+def curves() -> dict[str, Any]:
+    """Recorded curves by kind of scene, entry and section."""
+    path = Path(__file__).with_name("section_errors.json")
+    record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return record
+
+
+def kind_of(scene: Scene) -> str:
+    """Kind of a scene for which curves are recorded; empty if there are none for it."""
+    strip, contact, member = scene.strip, scene.contact, scene.member
+    straight = strip.curvature is None and scene.energy is None and contact.normal == "rigid"
+    if not straight or scene.load.kind != "force":
+        return ""
+    if member.support != "none":
+        return {"rolling": "double shear", "clamped": "single lap"}[member.support]
+    if strip.layers is not None:
+        return "laminate"
+    if contact.pressure.ndim == 0:
+        return "even"
+    ends = np.asarray(contact.pressure)[-1]
+    return "patch" if ends[0] < float(strip.length) or ends[1] == 0.0 else "table"
+
+
+def section_of(scene: Scene) -> str:
+    """Section of a scene for which curves are recorded; empty if there are none for it."""
+    model = scene.model
+    if model.solution == "plane" or "beta" not in model.fields:
+        return ""
+    if model.order > 0:
+        return next((f"p{p}" for p in KNOWN_ORDERS if p <= model.order), "")
+    return "squeeze" if "psi" in model.fields else "shell"
+
+
+def section_error(scene: Scene, slip_length: float) -> SectionError | None:
+    """Error of a scene's section beside plane elasticity under the same entry of the force.
+
+    Parameters
+    ----------
+    scene : scene without traced leaves
+    slip_length : slip length of its own run, length
+
+    Returns
+    -------
+    SectionError or None
+        None where no curve is recorded: of plane elasticity, of bars, of slip that is shorter than
+        on any curve, and of scenes unlike those of the curves
+    """
+    known = curves().get(kind_of(scene), {}).get(scene.load.entry, {}).get(section_of(scene))
+    at = slip_length / float(scene.strip.half_height)
+    if known is None or not at >= known["slip_over_H"][0]:
+        return None
+    place = np.log(at), np.log(known["slip_over_H"])
+    typical = float(np.interp(*place, known["typical"]))
+    return SectionError(typical, float(np.exp(np.interp(*place, np.log(known["largest"])))))
+
+
+def in_words(scene: Scene, slip_length: float | None) -> str:
+    """Line that says how the force enters, and what the section makes of it.
+
+    Parameters
+    ----------
+    scene : scene without traced leaves
+    slip_length : see `section_error`; None if it is not known
+    """
+    load = scene.load
+    what = "moment" if load.kind == "moment" else "force"
+    line = f"the {what} {ENTERS[load.entry]} (load.entry = {load.entry})"
+    found = None if slip_length is None else section_error(scene, slip_length)
+    if slip_length is None or found is None:
+        return line
+    if abs(found.typical) < TOLD_FROM:
+        loss = f"as much, within {100.0 * TOLD_FROM:g} %, as"
+    elif found.typical > 1.0:
+        loss = f"{1.0 + found.typical:.2g} times as much as"
+    else:
+        sort = "more" if found.typical > 0.0 else "less"
+        loss = f"{100.0 * abs(found.typical):.2g} % {sort} than"
+    reach = slip_length / float(scene.strip.half_height)
+    about = f"where slip reaches {reach:.2g} H the section {section_of(scene)}"
+    return f"{line}; {about} typically loses {loss} plane elasticity"

@@ -1,0 +1,61 @@
+"""Error of a section, which a run tells from its own slip length, beside plane elasticity."""
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.history import section_error
+from jbeamshell.history.section_error import in_words
+from jbeamshell.scene import library
+from jbeamshell.scene.keys import ENTRIES
+
+SQUEEZE = jb.Scene().replace({"model.rung": "condensed-squeeze", "model.nodes": 65})
+
+
+def test_every_kind_has_curves_that_rise_with_less_slip():
+    for kind, entries in section_error.curves().items():
+        assert set(entries) == set(ENTRIES), kind
+        for sections in entries.values():
+            for curve in sections.values():
+                assert np.all(np.diff(curve["slip_over_H"]) > 0.0)
+                assert np.all(np.diff(curve["largest"]) <= 0.0)
+                assert np.all(np.abs(curve["typical"]) <= curve["largest"])
+
+
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_a_strip_is_as_far_off_as_its_curve_says(entry):
+    """A strip that the study did not draw, from a twentieth to half of gross slip."""
+    errors = []
+    for amplitude in (0.3, 0.7):
+        scene = SQUEEZE.replace({"load.entry": entry, "load.amplitude": amplitude})
+        plane = scene.replace({"model.rung": "plane"})
+        own, exact = (jb.solve(each, throw=False) for each in (scene, plane))
+        told = section_error.section_error(scene, float(own.slip_length))
+        off = float(own.dissipation / exact.dissipation) - 1.0
+        assert abs(off) <= 1.1 * told.largest
+        errors.append((off, told.typical))
+    off, typical = np.transpose(errors)
+    np.testing.assert_allclose(off, typical, rtol=0.6, atol=0.02)
+
+
+def test_it_is_told_in_words():
+    scene = SQUEEZE.replace({"load.amplitude": 0.3})
+    text = str(jb.solve(scene, throw=False))
+    assert "the force enters a member that goes on beyond the contact" in text
+    assert "the section squeeze typically loses" in text
+    assert "more than plane elasticity" in text
+    assert "load.entry" not in str(jb.solve(library.receding()))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"model.rung": "plane"},
+        {"model.rung": "bar"},
+        {"contact.normal": "compliant"},
+    ],
+)
+def test_there_is_none_where_none_was_recorded(values):
+    scene = jb.Scene().replace(values)
+    assert section_error.section_error(scene, 0.5) is None
+    assert in_words(scene, 0.5).endswith("(load.entry = member)")
