@@ -86,12 +86,13 @@ def section_error(scene: Scene, slip_length: float) -> SectionError | None:
     Returns
     -------
     SectionError or None
-        None where no curve is recorded: of plane elasticity, of bars, of slip that is shorter than
-        on any curve, and of scenes unlike those of the curves
+        that of the shortest slip on the curve where slip is shorter; None where nothing slips, and
+        where no curve is recorded: of plane elasticity, of bars, and of scenes unlike those of the
+        curves
     """
     known = curves().get(kind_of(scene), {}).get(scene.load.entry, {}).get(section_of(scene))
     at = slip_length / float(scene.strip.half_height)
-    if known is None or not at >= known["slip_over_H"][0]:
+    if known is None or not at > 0.0:
         return None
     place = np.log(at), np.log(known["slip_over_H"])
     typical = float(np.interp(*place, known["typical"]))

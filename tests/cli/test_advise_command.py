@@ -21,7 +21,7 @@ def test_the_answer_as_json(cli):
     told = json.loads(out)
     assert (code, err) == (0, "")
     assert told["rung"] == told["settings"]["model.rung"]
-    assert told["rung"] == "condensed-squeeze"
+    assert told["rung"] == "squeeze"
     assert 0.0 < told["estimated_error"] <= 0.05
     assert told["estimated_ms"] > 0.0
     assert (told["quantity"], told["tolerance"]) == ("dissipation", 0.05)

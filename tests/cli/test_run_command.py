@@ -46,10 +46,11 @@ def test_run_prints_one_json_object(cli):
 def test_run_prints_text_to_read(cli):
     code, out, err = cli("run", *BASE, *options({"strip.height_ratio": 0.2, "load.amplitude": 0.5}))
     assert (code, err) == (0, "")
-    title, chosen, *lines = out.splitlines()
+    title, chosen, entered, *lines = out.splitlines()
     assert "v w beta psi on 21 nodes" in title
     assert chosen == "chosen for a tolerance of 0.5 %: rung condensed-squeeze that may lift off"
     assert "eta = 0.2, force amplitude 0.5" in title
+    assert "load.entry = member); where slip reaches 1 H the section squeeze" in entered
     figures = [line for line in lines if not line.startswith("  doubtful: ")]
     names = {line.split("  ")[1].replace(" ", "_") for line in figures}
     assert names == FIGURES - TIMES - {"doubts"}
