@@ -12,6 +12,9 @@ Coulomb's friction, so that figures, pictures and comparisons work alike.  On th
 The standard strips dissipate what the data in calibration/data say to half a per cent, in about
 half a minute a cycle (checked.json, by `python -m calibration.finite_elements.check`).
 
+The force enters as ``load.entry`` says.  A member that goes on is meshed as far beyond the contact
+as plane elasticity continues it, and u leaves out that length's even stretch as there.
+
 What is the reduced model's own is ignored: everything under ``model`` but the kinematics (exact
 ones make the elements geometrically nonlinear), and kappa_s, alpha, m and the friction law, for
 here friction is Coulomb's with a stiff penalty.  The contact is always unilateral.

@@ -44,7 +44,7 @@ class Slice(NamedTuple):
 
 
 def strip_slice(scene: jb.Scene, nodes: int, rows: int = ROWS) -> Slice:
-    """Slice of a scene's strip under an even pressure, held at X = 0, of graded bricks."""
+    """Slice of a strip under an even pressure, held at X = 0, pulled evenly, of graded bricks."""
     strip, height = scene.strip, 2.0 * float(scene.strip.half_height)
     x = np.asarray(stations(scene.replace({"model.rung": "plane"}), nodes))
     y = height * np.expm1(np.linspace(0.0, np.log1p(RISE), rows)) / RISE
@@ -100,7 +100,8 @@ def body_of(made: Slice, folder: Path, program: str | None = None) -> jb.Substru
 def main(nodes: int = 49) -> None:
     """Compare dissipation and stiffness with the rung ``plane`` on as many contact nodes."""
     jax.config.update("jax_enable_x64", True)
-    scene = jb.Scene().replace({"model.rung": "plane", "model.nodes": nodes})
+    values = {"model.rung": "plane", "model.nodes": nodes, "load.entry": "traction"}
+    scene = jb.Scene().replace(values)
     with tempfile.TemporaryDirectory() as folder:
         body = body_of(strip_slice(scene, nodes), Path(folder))
     load = {"friction": scene.contact.friction, "amplitude": scene.load.amplitude}

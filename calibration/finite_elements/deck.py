@@ -137,9 +137,11 @@ def _strip(scene: Scene, mesh: Mesh) -> str:
 def block_cards(block: Block, kind: str, name: str) -> str:
     """Nodes and elements of a block, in a node set and an element set of one name."""
     (i, j), numbers = np.nonzero(block.number), block.first + np.arange(len(block.elements))
-    return card(
-        f"NODE, NSET={name}", zip(block.number[i, j], block.x[i], block.y[j], strict=True)
-    ) + card(f"ELEMENT, TYPE={kind}, ELSET={name}", np.column_stack([numbers, block.elements]))
+    places = zip(block.number[i, j], block.x[i], block.y[j], strict=True)
+    elements = np.column_stack([numbers, block.elements])
+    return card(f"NODE, NSET={name}", places) + card(
+        f"ELEMENT, TYPE={kind}, ELSET={name}", elements
+    )
 
 
 def nodes_of(block: Block) -> np.ndarray:
@@ -221,9 +223,8 @@ def tie(
     section, twin, distances : (k,) numbers of the nodes
     x, y : position of the section, and heights (k,) of its nodes
     """
-    text = card(
-        "NODE, NSET=DISTANCES", ((n, x, height) for n, height in zip(distances, y, strict=True))
-    )
+    places = ((n, x, height) for n, height in zip(distances, y, strict=True))
+    text = card("NODE, NSET=DISTANCES", places)
     for nodes in zip(section, twin, distances, strict=True):
         for direction in (1, 2):
             text += equation([(n, direction, f) for n, f in zip(nodes, SUM, strict=True)])
@@ -283,9 +284,8 @@ def _supports(scene: Scene, mesh: Mesh, rough: bool) -> list[tuple[object, ...]]
         held += [(free, 1, 1), (driven, 1, 1)]
     elif not rough:
         held.append((driven, 1, 1))
-    if mesh.beyond is not None:
-        held.append(("DISTANCES", 3, 3))
-        held += [] if rough else [("BEYOND", 1, 2)]
+    if mesh.beyond is not None and not rough:
+        held.append(("BEYOND", 1, 2))
     return held
 
 

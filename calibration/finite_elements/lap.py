@@ -46,18 +46,20 @@ from calibration.finite_elements.mesh import (
 from calibration.finite_elements.program import find_program, run, version
 from calibration.finite_elements.results import read
 from calibration.provenance import provenance
+from jbeamshell.common.checks import require_choice
 from jbeamshell.common.files import write_text
 from jbeamshell.scene import library, load_path
 
 RECORD = Path(__file__).with_name("lap.json")
 BOLTS = [[0.6, 10.0, 0.3], [1.4, 10.0, 0.3]]  # X, force and width of the patch
 STEPS = 20  # per half cycle
+CYCLE = {"load.cycles": 1, "load.steps_per_half_cycle": STEPS}
+NODES = 257  # of plane elasticity
 INNER = 0.2  # height ratio of the half of an inner member
 NORMAL, STICK = 300.0, 100.0  # stiffness of the contact, in units of E'/H
 SETS = ("END", "ABOVE", "BELOW")  # of printed nodes
 TOUCHES = 1e-3  # of the largest gap, above which the members are apart
-
-COMMON = {"load.cycles": 1, "load.steps_per_half_cycle": STEPS, "model.nodes": 257}
+KNOWN = ("traction", "member")  # entries of the force
 
 Force = tuple[int, int, float]  # node, direction and force
 Held = list[tuple[object, int]]  # nodes, or their set, and a direction
@@ -141,17 +143,18 @@ class Member(NamedTuple):
 def joint(entry: str = "traction") -> jb.Scene:
     """Scene of a single lap with two bolts."""
     values = {"contact.bolts": BOLTS, "load.amplitude": 0.6, "load.entry": entry}
-    return library.single_lap().replace(values | {"contact.assembly": "frictionless"} | COMMON)
+    return library.single_lap().replace(values | {"contact.assembly": "frictionless"} | CYCLE)
 
 
 def double_shear(entry: str = "traction") -> jb.Scene:
     """Scene of a strip on the half of a thicker inner member."""
     values = {"member.height_ratio": INNER, "load.amplitude": 1.3, "load.entry": entry}
-    return library.double_shear().replace(values | COMMON)
+    return library.double_shear().replace(values | CYCLE)
 
 
 def make_members(scene: jb.Scene, refinement: float) -> tuple[Member, Member]:
     """Upper and lower member, with a node of each at every place of the contact."""
+    require_choice("load.entry", scene.load.entry, KNOWN)
     x, rows = contact_columns(scene, refinement), max(1, round(ROWS * refinement))
     strips = scene.strip, scene.member.beside(scene.strip)
     heights = [float(strip.half_height) for strip in strips]
@@ -312,12 +315,12 @@ def on_contact_line(scene: jb.Scene) -> Loop:
     )
 
 
-def main(refinements: tuple[float, ...] = (0.5, 1.0)) -> int:
+def main(refinements: tuple[float, ...] = (0.5, 1.0, 2.0)) -> int:
     """Compare, print and record."""
     jax.config.update("jax_enable_x64", True)
     record = provenance() | {"calculix": version(find_program()), "bolts": BOLTS, "inner": INNER}
     for name, scene in scenes().items():
-        rows = {"plane": on_contact_line(scene).figures()}
+        rows = {"plane": on_contact_line(scene.replace({"model.nodes": NODES})).figures()}
         for refinement in refinements:
             rows[f"CalculiX, refinement {refinement:g}"] = by_elements(scene, refinement).figures()
         print(name)

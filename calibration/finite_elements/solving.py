@@ -95,6 +95,9 @@ def check_reach(scene: Scene) -> None:
     require("energy", scene.energy, scene.energy is None, plain + "take the scene's own section")
     support = scene.member.support
     require("member.support", support, support == "none", plain + "joints are in lap.py")
+    overhang = strip.overhang
+    fix = "finite elements here end at X = L or go on far beyond: leave it out"
+    require("strip.overhang", overhang, overhang is None, fix)
     rigid = contact.normal != "compliant"
     fix = "finite elements here stand on a rigid base; take 'rigid' or 'none'"
     require("contact.normal", contact.normal, rigid, fix)

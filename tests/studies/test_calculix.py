@@ -1,20 +1,26 @@
-"""Strips by CalculiX: meshes, decks, what is read back, what goes wrong, and one real run."""
+"""Strips and joints by CalculiX: meshes, decks, what is read back, what goes wrong, real runs."""
 
+import json
 import re
 import shutil
 import stat
+from pathlib import Path
 
 import jax
 import numpy as np
 import pytest
-from toy import STRIP
+import toy
 
 import jbeamshell as jb
 from calibration.finite_elements import __main__ as command
-from calibration.finite_elements import deck, histories, mesh, program, results, solve
+from calibration.finite_elements import deck, histories, lap, mesh, program, results, solve
 from jbeamshell.scene import library, load_path
+from jbeamshell.scene.keys import ENTRIES
 
+STRIP = toy.STRIP.replace({"load.entry": "traction"})
+RECORDS = Path(deck.__file__).parent
 COARSE = {"load.cycles": 1, "load.steps_per_half_cycle": 4}
+DRIVEN = {"load.control": "displacement", "load.amplitude": 1e-5}
 STEPPED = [[0.0, 10.0], [1.5, 10.0], [1.5, 0.0], [2.0, 0.0]]
 
 
@@ -85,6 +91,21 @@ def test_the_base_has_a_node_under_every_node_and_one_beyond_each_end():
     assert np.sum(made.tributary) == pytest.approx(2.0)
 
 
+@pytest.mark.parametrize("elements", ["linear", "quadratic"])
+def test_a_member_goes_on_from_a_twin_of_its_last_column(elements):
+    made = mesh.make_mesh(STRIP.replace({"load.entry": "member"}), elements)
+    beyond, half_height = made.beyond, 0.1126
+    assert [made.x[-1], beyond.x[0]] == [2.0, 2.0]
+    assert np.ptp(beyond.x) == pytest.approx(mesh.REACH * half_height)
+    np.testing.assert_array_equal(beyond.y, made.y)
+    numbers = [*deck.nodes_of(made), *deck.nodes_of(beyond), *made.base.ravel()]
+    np.testing.assert_array_equal(numbers, np.arange(1, len(numbers) + 1))
+    assert beyond.first == len(made.elements) + 1
+    for sizes in (np.diff(made.columns)[::-1], np.diff(beyond.columns)):
+        assert sizes[0] < half_height / 24.0 * made.order
+        assert np.all(sizes[1:] > 0.999 * sizes[:-1])
+
+
 # --- decks ----------------------------------------------------------------------------------------
 
 
@@ -119,8 +140,8 @@ def test_friction_comes_after_the_pressing():
 
 
 def test_what_a_scene_is_made_of_shows_in_its_deck():
-    driven = {"load.control": "displacement", "load.amplitude": 1e-5, "strip.far_end": "free"}
-    text = deck_of(STRIP.replace(COARSE | driven | {"strip.plane": "stress"}))[1]
+    other = {"strip.far_end": "free", "strip.plane": "stress"}
+    text = deck_of(STRIP.replace(COARSE | DRIVEN | other))[1]
     assert "TYPE=CPS8R" in text
     assert "*EQUATION" in text
     assert "*BOUNDARY, FIXED" in text
@@ -131,6 +152,69 @@ def test_what_a_scene_is_made_of_shows_in_its_deck():
     assert "*EQUATION" not in plain
     lifted = {"contact.normal": "none", "model.fields": ["v", "w", "beta", "psi"]}
     assert "*CONTACT PAIR" not in deck_of(STRIP.replace(lifted))[1]
+
+
+def equations(text):
+    """Terms (k, 3) of each equation: node, direction and factor."""
+    for keyword, rows in cards(text):
+        if keyword == "EQUATION":
+            yield np.array(rows[1:], float)
+
+
+def left_over(made, text, along):
+    """What displacements u_x of the section X = L leave in each equation of a deck."""
+    u = dict(zip(made.number[-1].tolist(), along, strict=True))
+    for terms in equations(text):
+        assert set(terms[:, 1]) == {1.0}
+        yield sum(u[int(node)] * factor for node, _, factor in terms)
+
+
+@pytest.mark.parametrize(("entry", "turns"), [("face", True), ("guided", False)])
+def test_a_rigid_face_moves_as_one(entry, turns):
+    made, text = deck_of(STRIP.replace(COARSE | {"load.entry": entry}))
+    assert sum(1 for _ in equations(text)) == made.y.size - (2 if turns else 1)
+    np.testing.assert_allclose([*left_over(made, text, np.ones(made.y.size))], 0.0, atol=1e-11)
+    turned = np.abs([*left_over(made, text, made.y)])
+    assert (np.max(turned) < 1e-11) == turns
+    assert np.min(np.abs([*left_over(made, text, made.y**2)])) > 1e-5
+
+
+def test_a_member_is_tied_after_the_pressing_to_what_lies_beyond():
+    made, text = deck_of(STRIP.replace(COARSE | {"load.entry": "member"}))
+    pairs = {tuple(terms[:2, 0].astype(int)) for terms in equations(text)}
+    assert pairs == set(zip(made.number[-1], made.beyond.number[0], strict=True))
+    found = [*cards(text)]
+    begins = [k for k, (keyword, _) in enumerate(found) if keyword == "BOUNDARY, OP=NEW"]
+    *pressed, loaded = (found[k][1] for k in begins)
+    assert all(["BEYOND", "1", "2"] in held for held in pressed)
+    assert ["BEYOND", "1", "2"] not in loaded
+    assert found[begins[-1] + 1] == ("BOUNDARY, FIXED", [["DISTANCES", "1", "2"]])
+    ends = [rows for keyword, rows in found if keyword == "CLOAD"][-1]
+    assert [int(row[0]) for row in ends] == made.beyond.number[-1].tolist()
+    surface = next(rows for keyword, rows in found if keyword == "SURFACE, NAME=BOTTOM")
+    assert max(int(row[0]) for row in surface) <= len(made.elements)
+
+
+@pytest.mark.parametrize("entry", ["traction", "member"])
+@pytest.mark.parametrize("joint", [lap.joint, lap.double_shear])
+def test_forces_on_a_joint_are_in_balance(joint, entry):
+    scene = joint(entry)
+    upper, lower = members = lap.make_members(scene, 0.4)
+    found = [*cards(lap.write_deck(scene, members))]
+    pressing, *_, pulling = (rows for keyword, rows in found if keyword == "CLOAD")
+    forces = {(int(n), int(d)): float(force) for n, d, force in pulling}
+    above, below = (
+        sum(forces.get((int(n), 2), 0.0) for n in member.mesh.number[:, row])
+        for member, row in ((upper, -1), (lower, 0))
+    )
+    assert above == pytest.approx(-20.0)
+    assert below == pytest.approx(0.0 if scene.member.support == "rolling" else 20.0)
+    pulled = sum(forces[int(n), 1] for n in upper.outer)
+    assert pulled == pytest.approx(float(scene.load.amplitude))
+    assert len(pulling) == len(pressing) + upper.outer.size
+    goes_on = any(keyword == "BOUNDARY, FIXED" for keyword, _ in found)
+    assert goes_on == (entry == "member")
+    assert (upper.softness > 0.0) == (lower.softness > 0.0) == goes_on
 
 
 def test_contact_stiffness_does_not_depend_on_the_units():
@@ -241,6 +325,10 @@ def test_without_calculix_one_line_says_how_to_get_it(monkeypatch):
             "contact.normal",
         ),
         (lambda: jb.Scene(energy=lambda e, g, k, psi, dpsi: e**2), "energy"),
+        (library.double_shear, "member.support"),
+        (lambda: jb.Scene().replace(DRIVEN | {"load.control": "arc-length"}), "load.control"),
+        (lambda: jb.Scene().replace(DRIVEN), "load.entry"),
+        (lambda: jb.Scene().replace({"strip.overhang": 0.3}), "strip.overhang"),
     ],
 )
 def test_a_scene_out_of_reach_is_refused(change, field):
@@ -310,10 +398,12 @@ def test_the_command_line_says_what_is_wrong(capsys, monkeypatch):
     assert "strip.layers" in capsys.readouterr().err
 
 
-# --- a real run -----------------------------------------------------------------------------------
+# --- real runs ------------------------------------------------------------------------------------
+
+CALCULIX = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 
 
-@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@CALCULIX
 def test_a_coarse_loop_dissipates_what_elasticity_says():
     """The data's D over the cubic law is .7583 (eta .1126, A .7855)."""
     scene = STRIP.replace(COARSE | {"model.kinematics": "linear"})
@@ -326,3 +416,73 @@ def test_a_coarse_loop_dissipates_what_elasticity_says():
     psi = -10.0 / float(scene.strip.plane_modulus)
     np.testing.assert_allclose(history.psi[pressed], psi, rtol=0.01)
     assert set(jax.tree.leaves(history.figures())) >= {"converged"}
+
+
+@CALCULIX
+@pytest.mark.slow
+@pytest.mark.parametrize("entry", ["face", "guided", "member"])
+def test_an_entry_dissipates_what_plane_elasticity_says(entry):
+    """The four entries' D are 2.47, 2.81, 7.19 and 2.66 here, in millionths."""
+    change = {"load.entry": entry, "strip.height_ratio": 0.2358, "load.cycles": 1}
+    history = solve(jb.Scene().replace(change | {"load.steps_per_half_cycle": 10}))
+    plane = jb.solve(jb.Scene().replace(change | {"model.rung": "plane", "model.nodes": 129}))
+    assert float(history.dissipation) == pytest.approx(float(plane.dissipation), rel=0.02)
+    assert float(history.secant_stiffness) == pytest.approx(float(plane.secant_stiffness), rel=2e-3)
+    assert float(history.dissipation_loop) == pytest.approx(float(history.dissipation), rel=0.02)
+    pressed = history.reaction[history.pressed, :-1]  # the last node takes what slid beyond it
+    np.testing.assert_allclose(pressed, 10.0, rtol=1e-3)
+    assert float(np.max(history.error)) < 1e-4
+
+
+@CALCULIX
+@pytest.mark.slow
+@pytest.mark.parametrize("control", ["force", "displacement"])
+@pytest.mark.parametrize("entry", ["face", "guided"])
+def test_a_rigid_face_may_be_driven(entry, control):
+    amplitude = {"force": 0.7855, "displacement": 1e-5}[control]
+    values = {"load.entry": entry, "load.control": control, "load.amplitude": amplitude}
+    history = solve(STRIP.replace(COARSE | values), elements="linear", refinement=0.5)
+    plane = jb.solve(jb.Scene().replace(COARSE | values | {"model.rung": "plane"}))
+    assert float(np.max(history.force)) == pytest.approx(float(np.max(plane.force)), rel=0.01)
+    assert float(history.secant_stiffness) == pytest.approx(float(plane.secant_stiffness), rel=0.01)
+
+
+@CALCULIX
+@pytest.mark.slow
+def test_an_inner_member_that_goes_on():
+    scene = lap.double_shear("member")
+    found = lap.by_elements(scene, 0.5).figures()
+    plane = lap.on_contact_line(scene.replace({"model.nodes": lap.NODES})).figures()
+    assert found["dissipation"] == pytest.approx(plane["dissipation"], rel=0.015)
+    assert found["secant_stiffness"] == pytest.approx(plane["secant_stiffness"], rel=0.003)
+
+
+# --- records --------------------------------------------------------------------------------------
+
+
+def recorded(name):
+    return json.loads((RECORDS / name).read_text("utf-8"))
+
+
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_entries_on_record_agree(entry):
+    rows = [row for row in recorded("checked.json")["entries"] if row["entry"] == entry]
+    assert len(rows) == 4
+    for row in rows:
+        coarse, fine = row["refinement 1"], row["refinement 2"]
+        assert fine["D_over_plane"] == pytest.approx(1.0, abs=0.01)
+        assert fine["K_over_plane"] == pytest.approx(1.0, abs=0.002)
+        assert fine["D_over_reference"] == pytest.approx(1.0, abs=0.01)
+        assert abs(fine["D_over_plane"] - 1.0) < abs(coarse["D_over_plane"] - 1.0) + 0.001
+        if entry != "member":  # whose u is not that of the reference
+            assert fine["K_over_reference"] == pytest.approx(1.0, abs=0.002)
+
+
+@pytest.mark.parametrize("name", lap.scenes())
+def test_joints_on_record_agree(name):
+    rows = recorded("lap.json")[name]
+    plane = rows["plane"]
+    for refinement in (1, 2):
+        found, off = rows[f"CalculiX, refinement {refinement}"], 0.01 / refinement
+        assert found["dissipation"] == pytest.approx(plane["dissipation"], rel=off)
+        assert found["secant_stiffness"] == pytest.approx(plane["secant_stiffness"], rel=1e-3)
