@@ -7,7 +7,7 @@ with the same entry of the force.  It writes section_errors.json beside this fil
 of each run the slip length over the half height, as the section itself has it, and how far its
 dissipation and its secant stiffness are off, in per cent.  Strips of all heights, frictions and
 Poisson's ratios fall near one curve of the slip length over the half height.  These curves go to
-jbeamshell/history/section_errors.json, from where every run tells the error of its section.
+jbeamshell.scene.section_errors.json, from where every run tells the error of its section.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.scene.keys import ENTRIES  # noqa: E402
 
 RECORD = Path(__file__).with_suffix(".json")
-SHIPPED = Path(jb.__file__).parent / "history" / "section_errors.json"
+SHIPPED = Path(jb.__file__).parent / "scene" / "section_errors.json"
 SEED = 46
 FIGURES = ("dissipation", "secant_stiffness", "slip_length", "dissipation_ratio")
 PARTS = np.geomspace(0.03, 0.95, 9)  # of gross slip
 FINE, NODES = 257, 129  # contact nodes of plane elasticity, and of the sections
-BINS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0)
-BINS += (20.0, 60.0)  # of the slip length over H
+BINS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0)
+BINS += (8.0, 10.0, 14.0, 20.0, 60.0)  # of the slip length over H
 ENOUGH = 3  # rows that make a point of a curve
 LITTLE = 1e-4  # of the bar's dissipation, below which rows count for no curve
 ORDERS = ("shell", "squeeze", "p2", "p3", "p4", "p6")

@@ -12,13 +12,12 @@ from jax import Array
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.summary import Summary, in_words
-from jbeamshell.history import section_error
 from jbeamshell.history.contact_line import ContactLine
 from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
 from jbeamshell.history.profiles import Profiles
 from jbeamshell.history.reliability import doubts_of_run
 from jbeamshell.history.saved import write_history
-from jbeamshell.scene import choice
+from jbeamshell.scene import choice, section_error
 
 FIGURES = (
     "dissipation",

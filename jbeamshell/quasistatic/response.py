@@ -22,7 +22,7 @@ from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.quasistatic.stepping import Method
-from jbeamshell.scene.choice import FEW_STEPS
+from jbeamshell.scene.choice import FEW_STEPS, is_elastic
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
 from jbeamshell.scene.scene import Scene
@@ -191,6 +191,8 @@ def pinned(scene: Scene, figures: Sequence[str], numbers: Numbers | None = None)
     figures : names of `jbeamshell.History`
     numbers : values by dotted key of the strips of a sweep, see `Scene.pinned`
     """
+    if numbers is None and is_elastic(scene):  # numbers that vary may be any
+        scene = scene.as_elasticity()
     found = scene.pinned(numbers)
     few = found.model.condensed and "steps_per_half_cycle" in scene.load.open
     if few and EXACT.issuperset(figures):

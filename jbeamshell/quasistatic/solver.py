@@ -33,9 +33,10 @@ from jbeamshell.quasistatic.outcome import (
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import Method, fits_native, march
-from jbeamshell.scene.choice import refinements
+from jbeamshell.scene.choice import is_elastic, refinements
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
 from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.section_error import section_error
 
 NO_END = (
     "no equilibrium: all of the contact slides, or its events come to no end; take a smaller "
@@ -146,13 +147,13 @@ def _condensed(
 ) -> History:
     """History on the contact line, by the quickest search unless derivatives may be taken."""
     traced = is_traced(scene, path) or is_staged()
-    by = quickest(scene)
-    if method is Method.NEWTON or (traced and method is None):
-        by = "either" if traced and by == "factors" else "events"
     if traced and not _precise(scene):
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
 
     def walked(scene: Scene) -> History:
+        by = quickest(scene)
+        if method is Method.NEWTON or (traced and method is None):
+            by = "either" if traced and by == "factors" else "events"
         history = solve_condensed(scene, path, cycles, by=by, own=own)
         if not traced and by != "events" and not history.converged:
             history = solve_condensed(scene, path, cycles, own=own)
@@ -164,6 +165,8 @@ def _condensed(
         return eqx.error_if(history, failed, f"a load step has {NO_END}") if throw else history
     if cycles and history.converged:
         history = _refined(history, walked)
+        if _needs_elasticity(history):
+            history = walked(scene.as_elasticity())
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
         load = float(path.target[step])
@@ -189,6 +192,15 @@ def _refined(history: History, walked: Callable[[Scene], History]) -> History:
             break
         history = finer.but(change=change_of(history, finer))
     return history
+
+
+def _needs_elasticity(history: History) -> bool:
+    """True if a section that was left open is further off than the tolerance, by its own slip."""
+    scene = history.scene
+    if scene.model.solution == "plane" or not is_elastic(scene):
+        return False
+    own = section_error(scene, float(history.slip_length))
+    return own is None or own.largest > scene.model.tolerance
 
 
 def _precise(scene: Scene) -> bool:

@@ -33,13 +33,17 @@ from jbeamshell.mechanics.elements import END_SIZE
 from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.scene.buckling import weakest_column
 from jbeamshell.scene.domain import Numbers
-from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS
+from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS, TABLE
 from jbeamshell.scene.linearisation import Parts, linear_errors
 from jbeamshell.scene.parts import Model
 from jbeamshell.scene.rows import AUTO
-from jbeamshell.scene.rungs import CONDENSED, IDEAL, PLANE_NODES
+from jbeamshell.scene.rungs import CONDENSED, FIELDS_OF, IDEAL, PLANE_NODES
+from jbeamshell.scene.section_error import error_beforehand
 
+SQUEEZE = FIELDS_OF["squeeze"]
+WHOLE = ("v", "w", *SQUEEZE[1:])
 LINEAR_PART = 0.2  # of the tolerance that linear rotations may take
+SECTION_PART = 0.8  # of the tolerance that the section may take
 FEW_STEPS = 1  # load steps per half cycle where only figures of a cycle are asked of exact events
 
 
@@ -93,7 +97,12 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
         found["kinematics"] = _kinematics(scene, numbers)
     linear = found.get("kinematics", model.kinematics) == "linear"
     fields, sharp = model.given("fields"), isinstance(scene.contact.law, SharpSlip)
-    if "solution" in open_model:
+    enough = SECTION_PART * model.tolerance
+    elastic = linear and is_elastic(scene) and _squeeze_error(scene, numbers) > enough
+    fields = SQUEEZE if fields == AUTO else fields
+    if elastic:
+        found["solution"], fields = "plane", WHOLE
+    elif "solution" in open_model:
         found["solution"] = "condensed" if linear and may_condense(scene) else "stepwise"
         simple = found["solution"] == "stepwise" and linear and sharp
         bends = "beta" in fields and scene.contact.normal != "none"
@@ -114,6 +123,26 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
         {name: value for name, value in values.items() if getattr(part, name) != value}
         for part, values in ((load, steps), (model, found))
     )
+
+
+def is_elastic(scene: Parts) -> bool:
+    """True if a scene leaves its section open, and plane elasticity can stand for it.
+
+    A squeeze-shear factor of the user's own is a number that elasticity does not have.
+    """
+    model, kappa_s = scene.model, scene.strip.kappa_s
+    left_open = {"fields", "solution"} <= set(model.open) and model.order == 0
+    own = is_traced(kappa_s) or float(kappa_s) != TABLE["strip.kappa_s"].default
+    plain = model.constants == "consistent" and not own
+    return left_open and plain and may_condense(scene)
+
+
+def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:
+    """Error of the squeeze section beside plane elasticity; infinite where it is not known."""
+    if is_traced(scene.strip, scene.contact, scene.load):
+        return float(np.inf)
+    with jax.ensure_compile_time_eval():
+        return error_beforehand(scene, "squeeze", numbers or scene.number)
 
 
 def _grid(solution: str, opens: bool, soft: bool) -> Grid:
@@ -162,6 +191,16 @@ def finer(model: Model) -> dict[str, Any]:
     return {"nodes": 2 * model.nodes - 1, **ends}
 
 
+def elasticity(scene: Parts) -> dict[str, Any]:
+    """Values for the model of a scene that is to be plane elasticity on a grid of its own."""
+    model, found = scene.model, {"solution": "plane", "fields": WHOLE}
+    if "end_size" in model.open:
+        found["end_size"] = PLANE.end_size
+    if "nodes" in model.open:
+        found["nodes"] = _nodes(PLANE, model.tolerance, scene.contact.jumps)
+    return found
+
+
 def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown."""
     strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
@@ -173,13 +212,16 @@ def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     bounded = strip.curvature is None and contact.normal == "rigid" and scene.energy is None
     if not bounded or load.control not in CONTROLS:
         return "exact"
-    elastic = model.order > 0 or model.solution == "plane"
+    elastic = model.order > 0 or model.solution == "plane" or is_elastic(scene)
     # Numbers stay numbers within a caller's jit; the largest there are may overflow.
     with jax.ensure_compile_time_eval(), np.errstate(all="ignore"):
         error = linear_errors(strip, load, elastic, numbers or scene.number)
         column = weakest_column(scene, numbers)
     known = error[np.isfinite(error)]  # lanes of a sweep outside the domain have none
-    small = known.size > 0 and np.max(known) <= LINEAR_PART * model.tolerance
+    allowed = LINEAR_PART * model.tolerance
+    if is_elastic(scene):  # its linear section is better than one that rotates and is further off
+        allowed = max(allowed, _squeeze_error(scene, numbers))
+    small = known.size > 0 and np.max(known) <= allowed
     return "linear" if small and not column.near else "exact"
 
 
@@ -189,7 +231,8 @@ def may_condense(scene: Parts) -> bool:
     if scene.member.support != "none":
         return True
     few = "nodes" in model.open or model.nodes <= MOST_CONDENSED
-    section = "beta" in model.fields and model.squeeze == "field" and scene.energy is None
+    fields = model.given("fields")
+    section = (fields == AUTO or "beta" in fields) and model.squeeze == "field" and scene.energy is None
     base = contact.normal == "rigid" and isinstance(contact.law, SharpSlip)
     straight = scene.strip.curvature is None and model.grid == "finite-difference"
     return few and section and base and straight and load.control in CONTROLS and load.cycles > 0

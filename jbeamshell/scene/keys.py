@@ -35,7 +35,7 @@ LOADED_ENDS = ("free", "level")
 MEMBERS = ("none", "rolling", "clamped")
 SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form", *CONDENSED)
 
-TOLERANCE = 0.005
+TOLERANCE = 0.01
 FINEST, COARSEST = 1e-4, 0.1  # tolerance: below, the finest mesh may not reach it
 LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 PRESSURE = "give a number or a table of [X, pressure] rows"
@@ -250,7 +250,7 @@ class ModelKeys(Part):
     heading: ClassVar[str] = "model"
 
     fields: tuple[str, ...] = word(
-        ("v", "beta", "psi"), (), "Fields of a section: v, with beta, with psi; w lets it lift off."
+        AUTO, (), "Fields of a section: v, with beta, with psi; w lets it lift off."
     )
     kinematics: str = word(AUTO, KINEMATICS, "Rotations: exact or linear.")
     grid: str = word(
@@ -279,8 +279,8 @@ class ModelKeys(Part):
     )
     tolerance: float = setting(
         TOLERANCE,
-        "Relative error of the dissipation and of the loop, to the same model on a fine mesh, for "
-        "which settings that are auto are chosen.",
+        "Relative error of the dissipation, the loop and the secant stiffness, to plane elasticity "
+        "of the same scene, for which settings that are auto are chosen.",
         low=FINEST,
         high=COARSEST,
         closed=True,

@@ -293,6 +293,8 @@ class Model(ModelKeys):
     """
 
     def __check_init__(self) -> None:
+        if self.fields == AUTO:
+            return  # until a scene has chosen
         require("model.fields", self.fields, isinstance(self.fields, tuple), "give a list of words")
         unknown = [f for f in self.fields if f not in FIELDS]
         require("model.fields", list(self.fields), not unknown, f"fields are {', '.join(FIELDS)}")

@@ -50,6 +50,8 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     2
     """
     text = rung if isinstance(rung, str) else repr(rung)
+    if text == AUTO:
+        return dict(zip(SETS, (AUTO, 0, AUTO), strict=True))
     full = f"{text}-squeeze" if text in ("masing", "masing-pull") else text
     match = _NAME.fullmatch(full)
     prefix = (match["prefix"] or "").rstrip("-") if match else ""
@@ -60,7 +62,7 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     bar = {"stepwise": section == "bar", "condensed": section != "bar"}  # the rest by no prefix
     if not match or not bar.get(prefix, True) or not (ordered or plane or section in FIELDS_OF):
         raise InputError(
-            f"model.rung = {rung!r}: choose 'bar', 'shell', 'squeeze', 'p1' to 'p{LARGEST_ORDER}', "
+            f"model.rung = {rung!r}: choose 'auto', 'bar', 'shell', 'squeeze', 'p1' to 'p{LARGEST_ORDER}', "
             "'plane', 'masing' (of squeeze), or 'masing-' or 'condensed-' and one of these"
         )
     fields = FIELDS_OF.get(section, FIELDS_OF["squeeze"])

@@ -32,7 +32,7 @@ from jbeamshell.mechanics.friction import (
 )
 from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
-from jbeamshell.scene.choice import choose, finer
+from jbeamshell.scene.choice import choose, elasticity, finer
 from jbeamshell.scene.domain import Numbers, support_rules
 from jbeamshell.scene.joint import check_joint
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
@@ -364,6 +364,12 @@ class Scene(Tree):
     def refined(self) -> Scene:
         """Copy on elements half as large, from which any change goes back to the chosen grid."""
         model = self.model.chosen(**finer(self.model))
+        scene: Scene = eqx.tree_at(lambda scene: scene.model, self, model)
+        return scene
+
+    def as_elasticity(self) -> Scene:
+        """Copy as plane elasticity, if its section was left open; from which any change goes back."""
+        model = self.model.chosen(**elasticity(self))
         scene: Scene = eqx.tree_at(lambda scene: scene.model, self, model)
         return scene
 

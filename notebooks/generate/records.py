@@ -39,7 +39,7 @@ def tables(root: Path) -> dict[str, str]:
         "table_starting.md": starting(speed["start"]),
         "table_condensed.md": condensed(_read(benchmarks / "condensed.json")),
         "table_peer.md": peer(_read(benchmarks / "condensed.json")["peer"]),
-        "table_entries.md": entries(_read(root / "jbeamshell" / "history" / "section_errors.json")),
+        "table_entries.md": entries(_read(root / "jbeamshell" / "scene" / "section_errors.json")),
         "table_rungs.md": rungs(_read(benchmarks / "ladder.json")["map"]),
         "table_identification.md": identification(_read(benchmarks / "identification.json")),
         "table_motion.md": motion(_read(benchmarks / "dynamics.json")),

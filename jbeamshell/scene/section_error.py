@@ -16,7 +16,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jbeamshell.scene.scene import Scene
+from jbeamshell.common.checks import is_traced
+from jbeamshell.mechanics.bar import bar_force
+from jbeamshell.scene.domain import Numbers
+from jbeamshell.scene.keys import TABLE
+from jbeamshell.scene.linearisation import Parts, stretching
+from jbeamshell.scene.pressure import is_table
 
 KNOWN_ORDERS = (6, 4, 3, 2)
 ENTERS = {
@@ -26,6 +31,7 @@ ENTERS = {
     "traction": "is an even traction on the face",
 }
 TOLD_FROM = 0.005  # error that is told
+POINTS = 400  # along X, for the friction of a pressure table
 
 
 class SectionError(NamedTuple):
@@ -49,23 +55,29 @@ def curves() -> dict[str, Any]:
     return record
 
 
-def kind_of(scene: Scene) -> str:
+def kind_of(scene: Parts) -> str:
     """Kind of a scene for which curves are recorded; empty if there are none for it."""
-    strip, contact, member = scene.strip, scene.contact, scene.member
+    strip, contact, member, load = scene.strip, scene.contact, scene.member, scene.load
     straight = strip.curvature is None and scene.energy is None and contact.normal == "rigid"
-    if not straight or scene.load.kind != "force":
+    pulled = load.kind == "force" and load.arm is None
+    if not straight or not pulled or strip.overhang is not None:
         return ""
     if member.support != "none":
         return {"rolling": "double shear", "clamped": "single lap"}[member.support]
+    ends = strip.far_end, strip.loaded_end
+    if ends != (TABLE["strip.far_end"].default, TABLE["strip.loaded_end"].default):
+        return ""
+    if is_traced(contact.bottom_pressure) or np.any(contact.bottom_pressure):
+        return ""
     if strip.layers is not None:
         return "laminate"
     if contact.pressure.ndim == 0:
         return "even"
-    ends = np.asarray(contact.pressure)[-1]
-    return "patch" if ends[0] < float(strip.length) or ends[1] == 0.0 else "table"
+    end = np.asarray(contact.pressure)[-1]
+    return "patch" if end[0] < float(strip.length) or end[1] == 0.0 else "table"
 
 
-def section_of(scene: Scene) -> str:
+def section_of(scene: Parts) -> str:
     """Section of a scene for which curves are recorded; empty if there are none for it."""
     model = scene.model
     if model.solution == "plane" or "beta" not in model.fields:
@@ -75,7 +87,7 @@ def section_of(scene: Scene) -> str:
     return "squeeze" if "psi" in model.fields else "shell"
 
 
-def section_error(scene: Scene, slip_length: float) -> SectionError | None:
+def section_error(scene: Parts, slip_length: float) -> SectionError | None:
     """Error of a scene's section beside plane elasticity under the same entry of the force.
 
     Parameters
@@ -90,16 +102,60 @@ def section_error(scene: Scene, slip_length: float) -> SectionError | None:
         where no curve is recorded: of plane elasticity, of bars, and of scenes unlike those of the
         curves
     """
-    known = curves().get(kind_of(scene), {}).get(scene.load.entry, {}).get(section_of(scene))
     at = slip_length / float(scene.strip.half_height)
-    if known is None or not at > 0.0:
+    return _on_curve(scene, section_of(scene), at) if at > 0.0 else None
+
+
+def error_beforehand(scene: Parts, section: str, numbers: Numbers) -> float:
+    """Largest error of a section at the slip length of a bar, for all of the numbers.
+
+    Parameters
+    ----------
+    scene : parts of the scene, for their words
+    section : name of a section, such as "squeeze"
+    numbers : values by dotted key, of one scene or of many
+
+    Returns
+    -------
+    relative error of the dissipation; infinite where none is known
+    """
+    if scene.member.support != "none":  # slip zones of both ends
+        return np.inf
+    reach = float(np.min(slip_of_bar(scene, numbers) / numbers("strip.half_height")))
+    known = _on_curve(scene, section, reach) if reach > 0.0 else None
+    return np.inf if known is None else known.largest
+
+
+def slip_of_bar(scene: Parts, numbers: Numbers) -> np.ndarray:
+    """Slip length of a bar at the load's amplitude, at most L; NaN where it is not known."""
+    length, friction = numbers("strip.length"), numbers("contact.friction")
+    force, pressure = numbers("load.amplitude"), numbers("contact.pressure")
+    if is_table(pressure):
+        if scene.load.control == "displacement":
+            return np.full(np.shape(length), np.nan)
+        x = np.linspace(0.0, float(np.max(length)), POINTS)[::-1]
+        here = np.interp(x, *pressure.T, left=0.0, right=0.0)
+        carried = np.append(0.0, np.cumsum(-0.5 * (here[1:] + here[:-1]) * np.diff(x)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.interp(force / friction, carried, x[0] - x)
+    limit = friction * pressure
+    if scene.load.control == "displacement":
+        force = bar_force(force, stretching(scene.strip, numbers), limit)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.minimum(length, force / limit)
+
+
+def _on_curve(scene: Parts, section: str, reach: float) -> SectionError | None:
+    """Error of a section whose slip reaches so many H, by its curve; None if there is none."""
+    known = curves().get(kind_of(scene), {}).get(scene.load.entry, {}).get(section)
+    if known is None:
         return None
-    place = np.log(at), np.log(known["slip_over_H"])
+    place = np.log(reach), np.log(known["slip_over_H"])
     typical = float(np.interp(*place, known["typical"]))
     return SectionError(typical, float(np.exp(np.interp(*place, np.log(known["largest"])))))
 
 
-def in_words(scene: Scene, slip_length: float | None) -> str:
+def in_words(scene: Parts, slip_length: float | None) -> str:
     """Line that says how the force enters, and what the section makes of it.
 
     Parameters

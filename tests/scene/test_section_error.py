@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.history import section_error
-from jbeamshell.history.section_error import in_words
+from jbeamshell.scene import section_error
+from jbeamshell.scene.section_error import in_words
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import ENTRIES
 
