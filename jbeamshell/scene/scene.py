@@ -39,6 +39,7 @@ from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
 from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Part, Strip
 from jbeamshell.scene.pressure import bolt_pressure
 from jbeamshell.scene.quadratic import check_quadratic
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.rungs import IDEAL, general_rung, spelled_out
 from jbeamshell.scene.text import summary
 
@@ -440,7 +441,7 @@ def check_word(name: str, value: Any) -> None:
         require(name, value, known, f"choose {' or '.join(map(repr, LAWS))}")
     elif name == "contact.smoothing" and isinstance(value, str):
         require(name, value, value == "sharp", key.words)
-    elif name == "model.fields":
+    elif name == "model.fields" and value != AUTO:
         words = isinstance(value, list | tuple) and all(isinstance(f, str) for f in value)
         require(name, value, words, "give a list such as ['v', 'beta', 'psi']")
     elif key.kind == "word":

@@ -33,6 +33,7 @@ KEYS = (
     "strip.kappa_s",
     "contact.stick_stiffness",
 )
+SQUEEZE = jb.Scene().replace({"model.rung": "squeeze", "model.tolerance": 0.005})
 COARSE = {"model.nodes": 41, "model.kinematics": "linear", "load.steps_per_half_cycle": 4}
 LITTLE = {"strip.height_ratio": 0.2, "load.amplitude": 0.3}  # only the corner slips
 
@@ -237,12 +238,12 @@ def relative_error(run, times=6):
 def test_elements_are_halved_until_the_tolerance_is_kept(load, nodes):
     with warnings.catch_warnings():
         warnings.simplefilter("error", jb.DoubtfulWarning)
-        run = jb.solve(jb.Scene().replace({"load.amplitude": load}))
+        run = jb.solve(SQUEEZE.replace({"load.amplitude": load}))
     assert run.x.size == run.scene.model.nodes == nodes
     assert relative_error(run) <= float(run.dissipation_error) < run.scene.model.tolerance
     assert ("halving the elements" in str(run)) == (nodes > 65)
     # Only this run is on the finer grid: any change of its scene goes back to the chosen one.
-    assert run.scene.replace({"load.amplitude": 1.0}).model == jb.Scene().model
+    assert run.scene.replace({"load.amplitude": 1.0}).model == SQUEEZE.model
     assert run.scene.pinned().model.nodes == nodes
 
 
@@ -257,7 +258,7 @@ def test_without_friction_nothing_is_refined():
 
 @pytest.mark.doubtful("few nodes do the slipping, and halving the elements changed the loop")
 def test_a_refined_run_that_misses_its_tolerance_is_doubted(tmp_path):
-    run = jb.solve(jb.Scene().replace({"load.amplitude": 0.006}))
+    run = jb.solve(SQUEEZE.replace({"load.amplitude": 0.006}))
     assert run.scene.model.tolerance < float(run.change) <= float(run.dissipation_error)
     assert relative_error(run) < float(run.change)
     run.save(tmp_path / "run.npz")
@@ -287,7 +288,7 @@ def test_where_nothing_slips_the_dissipation_is_doubted():
 
 @pytest.mark.doubtful("nothing slips")
 def test_where_nothing_slips_on_any_grid_no_change_is_told():
-    run = jb.solve(jb.Scene().replace({"load.amplitude": 1e-6}))
+    run = jb.solve(SQUEEZE.replace({"load.amplitude": 1e-6}))
     assert np.isinf(run.change)
     assert "halving the elements" not in str(run)
 

@@ -5,18 +5,58 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.scene.choice import CONTACT_LINE, LIFTING, SOFT_CONTACT_LINE, STEPWISE
+from jbeamshell.scene.choice import CONTACT_LINE, KNOWN, LIFTING, PLANE, SOFT_CONTACT_LINE, STEPWISE
 
+FINE = {"model.tolerance": KNOWN}  # for which grids were measured
+SQUEEZE = jb.Scene().replace({"model.rung": "squeeze"})
 ROTATING = {"contact.pressure": 500.0, "load.amplitude": 40.0}
 
 
 def test_the_standard_strip_is_solved_on_its_contact_line():
-    model = jb.Scene().model
+    model = jb.Scene().replace(FINE | {"load.amplitude": 1.8}).model
     assert model.rung == "condensed-squeeze"
     assert model.kinematics == "linear"
     assert (model.nodes, model.end_size) == (CONTACT_LINE.nodes, CONTACT_LINE.end_size)
-    assert model.given("nodes") == model.given("solution") == "auto"
-    assert model.given("fields") == ("v", "beta", "psi")
+    assert model.given("nodes") == model.given("solution") == model.given("fields") == "auto"
+
+
+@pytest.mark.parametrize(
+    ("values", "rung"),
+    [
+        ({}, "condensed-squeeze"),
+        ({"load.amplitude": 0.4}, "plane"),  # its slip reaches 2.5 H
+        ({"load.amplitude": 0.4, "model.tolerance": 0.1}, "condensed-squeeze"),
+        ({"load.entry": "traction"}, "plane"),
+        ({"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]}, "plane"),
+        ({"contact.pressure": [[0.0, 9.0], [2.0, 4.0]]}, "condensed-squeeze"),
+        ({"contact.pressure": [[0.5, 10.0], [1.5, 10.0]]}, "plane"),  # a patch
+        ({"strip.far_end": "free"}, "plane"),
+        ({"strip.layers": [[0.1, 1e5, 0.3], [0.1252, 2e5, 0.3]]}, "plane"),
+        ({"load.control": "displacement", "load.amplitude": 1e-5}, "condensed-squeeze"),
+        ({"load.control": "displacement", "load.amplitude": 1e-6}, "plane"),
+        ({"strip.kappa_s": 0.5, "load.amplitude": 0.4}, "condensed-squeeze"),
+        ({"strip.height_ratio": 0.4}, "plane"),  # though its rotations make more than .2 %
+        ({"model.rung": "squeeze", "load.amplitude": 0.4}, "condensed-squeeze"),
+        ({"model.rung": "auto", "load.amplitude": 0.4}, "plane"),
+    ],
+    ids=str,
+)
+def test_the_section_is_the_cheapest_that_keeps_the_tolerance(values, rung):
+    assert jb.Scene().replace({"model.rung": "squeeze"}).replace(values).replace(
+        {"model.rung": values.get("model.rung", "auto")}
+    ).model.rung == rung
+
+
+def test_a_section_that_is_too_far_off_gives_way_to_elasticity():
+    """A bar would slip over 4.4 H.  The section slips over 3 H, where it is some 5 % off."""
+    scene = jb.Scene().replace({"load.amplitude": 0.5, "model.tolerance": 0.02})
+    assert scene.model.rung == "condensed-squeeze"
+    history = jb.solve(scene)
+    assert history.scene.model.rung == "plane"
+    exact = jb.solve(scene.replace({"model.rung": "plane", "model.nodes": 193}))
+    assert float(history.dissipation) == pytest.approx(float(exact.dissipation), rel=0.02)
+    again = history.scene.replace({"load.amplitude": 1.2})
+    assert again.model.rung == "condensed-squeeze"
 
 
 @pytest.mark.parametrize(
@@ -69,7 +109,8 @@ def test_load_steps_lift_as_the_contact_line_does():
     """Kept down, this strip would dissipate 5 % less, and as much with sliders of alpha G/H."""
     thick = {"strip.height_ratio": 0.35, "contact.friction": 0.4, "load.amplitude": 2.0}
     scene = jb.Scene().replace(thick)
-    line = jb.solve(scene.replace({"model.kinematics": "linear", "model.nodes": 129}))
+    linear = {"model.kinematics": "linear", "model.nodes": 129, "model.rung": "squeeze"}
+    line = jb.solve(scene.replace(linear))
     steps = jb.solve(scene.replace({"model.kinematics": "exact"}), throw=False)
     assert (line.scene.model.solution, steps.scene.model.solution) == ("condensed", "stepwise")
     allowed = steps.scene.model.tolerance
@@ -105,26 +146,27 @@ def test_an_overhang_near_buckling_rotates():
 def test_given_settings_stay():
     scene = jb.Scene().replace({"model.nodes": 41})
     assert scene.replace({"contact.friction": 0.2}).model.nodes == 41
-    assert scene.replace({"model.nodes": "auto"}).model.nodes == CONTACT_LINE.nodes
+    chosen = jb.Scene().model.nodes
+    assert scene.replace({"model.nodes": "auto"}).model.nodes == chosen
     pinned = jb.Scene().pinned()
-    assert pinned.replace({"model.tolerance": 0.05}).model.nodes == CONTACT_LINE.nodes
+    assert pinned.replace({"model.tolerance": 0.05}).model.nodes == chosen
 
 
 def test_nodes_follow_the_tolerance():
     def nodes(tolerance):
-        return jb.Scene().replace({"model.tolerance": tolerance}).model.nodes
+        return SQUEEZE.replace({"model.tolerance": tolerance}).model.nodes
 
     assert nodes(0.005) == CONTACT_LINE.nodes
     assert (nodes(0.00125) - 1) == 2 * (nodes(0.005) - 1)  # second order
     assert nodes(0.02) < nodes(0.005)
-    ramp = {"contact.pressure": [[0.0, 10.0], [2.0, 8.0]], "model.rung": "condensed-squeeze"}
+    ramp = {"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]} | FINE
     # Half as many more for each row at which the pressure may jump.
-    assert jb.Scene().replace(ramp).model.nodes - 1 == 1.5 * (nodes(0.005) - 1)
+    assert SQUEEZE.replace(ramp).model.nodes - 1 == 1.5 * (nodes(0.005) - 1)
 
 
 def test_elements_at_the_loaded_end_are_small_where_the_corner_opens():
     def chosen(**values):
-        model = jb.Scene().replace(values).model
+        model = SQUEEZE.replace(FINE | values).model
         return model.nodes, model.end_size
 
     def grid(known):
@@ -140,7 +182,7 @@ def test_elements_at_the_loaded_end_are_small_where_the_corner_opens():
     assert chosen(**steps, **{"model.fields": ["v"]}) == grid(STEPWISE)
     assert chosen(**{"strip.curvature": 0.01}) == grid(STEPWISE)
     over = {"contact.stick_stiffness": [50.0, 1000.0]}
-    assert jb.Scene().pinned(_numbers(over)).model.nodes == SOFT_CONTACT_LINE.nodes
+    assert SQUEEZE.replace(FINE).pinned(_numbers(over)).model.nodes == SOFT_CONTACT_LINE.nodes
 
 
 @pytest.mark.slow
@@ -158,16 +200,17 @@ def test_the_chosen_elements_resolve_the_slider_of_the_last_node():
     assert abs(dissipation(CONTACT_LINE.end_size) / found - 1.0) > 0.02
 
 
-def test_traced_numbers_keep_what_was_chosen():
+def test_traced_numbers_take_elasticity_unless_the_section_is_named():
     found = []
 
     def dissipation(friction):
-        scene = jb.Scene().replace({"contact.friction": friction})
-        found.append((scene.model.rung, scene.model.nodes))
+        for given in (jb.Scene(), SQUEEZE):
+            scene = given.replace(FINE | {"contact.friction": friction})
+            found.append((scene.model.rung, scene.model.nodes))
         return scene.contact.friction
 
     jax.jit(jax.grad(dissipation))(0.1)
-    assert found == [(jb.Scene().model.rung, CONTACT_LINE.nodes)]
+    assert found == [("plane", PLANE.nodes), ("condensed-squeeze", CONTACT_LINE.nodes)]
     whole = jax.jit(lambda: jb.Scene().contact.friction)  # numbers that are known within jit
     assert float(whole()) == 0.1
 
@@ -175,7 +218,8 @@ def test_traced_numbers_keep_what_was_chosen():
 def test_a_file_keeps_what_was_left_open():
     text = jb.scene_to_toml(jb.Scene())
     assert 'nodes = "auto"' in text
-    assert "nodes = 65" in jb.scene_to_toml(jb.Scene().pinned())
+    assert 'fields = "auto"' in text
+    assert "nodes = 65" in jb.scene_to_toml(SQUEEZE.replace(FINE).pinned())
 
 
 @pytest.mark.parametrize(
@@ -196,8 +240,12 @@ def test_bad_settings_name_the_fix(key, value, fix):
 
 def test_a_sweep_chooses_for_all_its_strips():
     over = {"contact.pressure": [10.0, 500.0], "load.amplitude": [0.5]}
-    assert jb.Scene().pinned(_numbers(over)).model.kinematics == "exact"
-    assert jb.Scene().pinned(_numbers({"load.amplitude": [0.5]})).model.kinematics == "linear"
+    assert SQUEEZE.pinned(_numbers(over)).model.kinematics == "exact"
+    assert SQUEEZE.pinned(_numbers({"load.amplitude": [0.5]})).model.kinematics == "linear"
+    slips = {"load.amplitude": [0.4, 1.2]}  # over 2.5 H at least
+    assert jb.Scene().pinned(_numbers(slips)).model.rung == "plane"
+    slips = {"load.amplitude": [0.9, 1.2]}
+    assert jb.Scene().pinned(_numbers(slips)).model.rung == "condensed-squeeze"
 
 
 def _numbers(over):
@@ -208,13 +256,13 @@ def _numbers(over):
 
 def test_history_says_what_was_chosen():
     history = jb.solve(jb.Scene())
-    rung = "chosen for a tolerance of 0.5 %: rung condensed-squeeze that may lift off"
-    assert f"{rung}, linear kinematics, 65 nodes" in str(history)
+    rung = "chosen for a tolerance of 1 %: rung condensed-squeeze that may lift off"
+    assert f"{rung}, linear kinematics, {history.x.size} nodes" in str(history)
     assert history.doubts == ()
     assert "chosen" not in str(jb.solve(jb.Scene().pinned()))
-    # Within the tolerance of 257 nodes: D and K as recorded from load.cycles = 2.
-    assert float(history.dissipation) == pytest.approx(7.2844015e-06, rel=0.005)
-    assert float(history.secant_stiffness) == pytest.approx(79670.76, rel=0.005)
+    # Plane elasticity on 257 nodes.
+    assert float(history.dissipation) == pytest.approx(7.252e-06, rel=0.01)
+    assert float(history.secant_stiffness) == pytest.approx(79457.0, rel=0.01)
 
 
 @pytest.mark.slow

@@ -668,7 +668,7 @@ def test_a_scene_is_printed_short_with_units():
     table = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [2.0, 2.0]]
     changed = {"contact.bottom_pressure": table, "strip.far_end": "free", "model.nodes": 33}
     assert str(Scene().replace(changed)).splitlines() == [
-        "Strip of v w beta psi on 33 nodes, rung condensed-squeeze",
+        "Strip of v w beta psi on 33 nodes, rung plane",
         "  strip.length                 2  [length]",
         "  strip.height_ratio           0.1126",
         "  strip.axial_stiffness        34000  [force/width]",
@@ -679,7 +679,7 @@ def test_a_scene_is_printed_short_with_units():
         "  contact.bottom_pressure      table of 4 rows  [stress]",
         "  load.control                 force",
         "  load.amplitude               0.7855  [force/width]",
-        "  chosen for a tolerance of 0.5 %: rung condensed-squeeze that may lift off, linear "
+        "  chosen for a tolerance of 1 %: rung plane that may lift off, linear "
         "kinematics, 20 steps per half cycle",
     ]
 
