@@ -111,6 +111,7 @@ TRUTH = {
 
 def ratios(order, **more):
     base = {"model.order": order, "model.kinematics": "linear", "model.end_size": 1 / 12}
+    base |= {"load.entry": "traction"}
     scene = STRIP.replace(base | {"model.nodes": 101} | more)
 
     def one(cell):

@@ -32,6 +32,7 @@ from jbeamshell.common.checks import (
     require_number,
 )
 from jbeamshell.common.errors import DoubtfulWarning
+from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.export import table
 from jbeamshell.dynamics.export.element import Element
@@ -136,8 +137,9 @@ class Joint(eqx.Module):
         """Joint with the mean backbone of a strip's pull and push.
 
         Scenes on the rung ``plane``, or one such as ``condensed-squeeze``, give the sliders of
-        their contact where slip zones are nested.  The sliders of others are those whose loops are
-        nearest to the scene's own steady cycles, as in lap joints, which open and are no network.
+        their contact where slip zones are nested.  Lap joints and members that go on open, and are
+        no network.  Their sliders, and those of other scenes, are those whose loops are nearest to
+        the scene's own steady cycles.
 
         All numbers may be traced by `jax.jit` and `jax.grad`.  A traced scene cannot tell whether
         its slip zones are nested, nor whether a load step failed: the joint then holds NaN.
@@ -148,8 +150,8 @@ class Joint(eqx.Module):
         force : largest end force per width, below gross slip; None is ``scene.load.amplitude``
         width : width of the strip, by which forces are multiplied
         by : "sliders" of the contact, or "cycles" that are run; None takes the sliders where they
-            are nested.  A traced strip on a contact line takes them unless told otherwise, a traced
-            lap joint or strip of load steps its cycles
+            are nested.  A traced strip on a contact line takes them unless told otherwise; a traced
+            lap joint, a member that goes on and a strip of load steps take cycles
 
         Raises
         ------
@@ -168,8 +170,8 @@ class Joint(eqx.Module):
         capacity = width * gross_slip(scene)
         condensed = scene.model.condensed
         traced = is_traced(scene, force)
-        lap = scene.member.support != "none"
-        if condensed and by != "cycles" and not (traced and lap and by is None):
+        opens = scene.member.support != "none" or (condensed and goes_on(scene))
+        if condensed and by != "cycles" and not (traced and opens and by is None):
             soft = not scene.ideal_friction
             inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
             line = slider_line if inside else slider_line_once
