@@ -197,7 +197,7 @@ def _work(stations: _Station, begun: Array) -> Array:
     """Energy (2n+2, 2n+2) that the eliminated fields give back, as second derivatives in the sides.
 
     Let station i have the compliance G, the forces f of all sides that come before, and those c of
-    its own two nodes.  It gives back (f + c)' G (f + c) and hands on f_(i+1) = T f + b, b being new.
+    its own two nodes.  It gives back (f + c)' G (f + c) and hands on f_(i+1) = T f + b with new b.
     With M_i = G_i + T_i' M_(i+1) T_i, found from the other side,
 
         sum f' G f = sum (f' M b + b' M f - b' M b),

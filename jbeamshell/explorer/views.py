@@ -14,6 +14,7 @@ from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.explorer.controls import gross_slip
 from jbeamshell.history.history import History
 from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.choice import is_elastic
 from jbeamshell.scene.scene import Scene
 
 Numbers = NDArray[np.float64]
@@ -65,10 +66,10 @@ class Curve(NamedTuple):
 def drawable(scene: Scene) -> Scene:
     """Scene whose settings stay as they are chosen now, so that nothing is compiled again.
 
-    A joint of plane elasticity gets as many nodes as can be drawn while a slider moves, unless it
-    says how many it has.
+    A section that was left open is plane elasticity, whatever the sliders say.  Plane elasticity
+    gets as many nodes as can be drawn while a slider moves, unless the scene says how many.
     """
-    found = scene.pinned()
+    found = (scene.as_elasticity() if is_elastic(scene) else scene).pinned()
     if found.model.solution == "plane" and "nodes" in scene.model.open:
         return found.replace({"model.nodes": min(found.model.nodes, PLANE_NODES)})
     return found

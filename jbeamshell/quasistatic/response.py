@@ -93,6 +93,8 @@ def response(
     for name in figures:
         require_choice("figures", name, RESPONSES)
 
+    if "strip.kappa_s" not in over and is_elastic(scene):  # numbers that vary may be any
+        scene = scene.as_elasticity()
     return Answers(pinned(scene, figures), _Asked(tuple(over), tuple(figures), solver, method))
 
 
@@ -191,8 +193,6 @@ def pinned(scene: Scene, figures: Sequence[str], numbers: Numbers | None = None)
     figures : names of `jbeamshell.History`
     numbers : values by dotted key of the strips of a sweep, see `Scene.pinned`
     """
-    if numbers is None and is_elastic(scene):  # numbers that vary may be any
-        scene = scene.as_elasticity()
     found = scene.pinned(numbers)
     few = found.model.condensed and "steps_per_half_cycle" in scene.load.open
     if few and EXACT.issuperset(figures):

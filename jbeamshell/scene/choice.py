@@ -98,7 +98,7 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     linear = found.get("kinematics", model.kinematics) == "linear"
     fields, sharp = model.given("fields"), isinstance(scene.contact.law, SharpSlip)
     enough = SECTION_PART * model.tolerance
-    elastic = linear and is_elastic(scene) and _squeeze_error(scene, numbers) > enough
+    elastic = linear and is_elastic(scene, numbers) and _squeeze_error(scene, numbers) > enough
     fields = SQUEEZE if fields == AUTO else fields
     if elastic:
         found["solution"], fields = "plane", WHOLE
@@ -125,16 +125,21 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     )
 
 
-def is_elastic(scene: Parts) -> bool:
+def is_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
     """True if a scene leaves its section open, and plane elasticity can stand for it.
 
     A squeeze-shear factor of the user's own is a number that elasticity does not have.
+
+    Parameters
+    ----------
+    scene, numbers : see `choose`
     """
     model, kappa_s = scene.model, scene.strip.kappa_s
     left_open = {"fields", "solution"} <= set(model.open) and model.order == 0
-    own = is_traced(kappa_s) or float(kappa_s) != TABLE["strip.kappa_s"].default
-    plain = model.constants == "consistent" and not own
-    return left_open and plain and may_condense(scene)
+    if not left_open or model.constants != "consistent" or is_traced(kappa_s):
+        return False
+    factors = (numbers or scene.number)("strip.kappa_s")
+    return bool(np.all(factors == TABLE["strip.kappa_s"].default)) and may_condense(scene)
 
 
 def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:
@@ -193,7 +198,8 @@ def finer(model: Model) -> dict[str, Any]:
 
 def elasticity(scene: Parts) -> dict[str, Any]:
     """Values for the model of a scene that is to be plane elasticity on a grid of its own."""
-    model, found = scene.model, {"solution": "plane", "fields": WHOLE}
+    model = scene.model
+    found: dict[str, Any] = {"solution": "plane", "fields": WHOLE}
     if "end_size" in model.open:
         found["end_size"] = PLANE.end_size
     if "nodes" in model.open:
@@ -212,14 +218,14 @@ def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     bounded = strip.curvature is None and contact.normal == "rigid" and scene.energy is None
     if not bounded or load.control not in CONTROLS:
         return "exact"
-    elastic = model.order > 0 or model.solution == "plane" or is_elastic(scene)
+    elastic = model.order > 0 or model.solution == "plane" or is_elastic(scene, numbers)
     # Numbers stay numbers within a caller's jit; the largest there are may overflow.
     with jax.ensure_compile_time_eval(), np.errstate(all="ignore"):
         error = linear_errors(strip, load, elastic, numbers or scene.number)
         column = weakest_column(scene, numbers)
     known = error[np.isfinite(error)]  # lanes of a sweep outside the domain have none
     allowed = LINEAR_PART * model.tolerance
-    if is_elastic(scene):  # its linear section is better than one that rotates and is further off
+    if is_elastic(scene, numbers):  # better linear than a section that is further off
         allowed = max(allowed, _squeeze_error(scene, numbers))
     small = known.size > 0 and np.max(known) <= allowed
     return "linear" if small and not column.near else "exact"
@@ -232,7 +238,8 @@ def may_condense(scene: Parts) -> bool:
         return True
     few = "nodes" in model.open or model.nodes <= MOST_CONDENSED
     fields = model.given("fields")
-    section = (fields == AUTO or "beta" in fields) and model.squeeze == "field" and scene.energy is None
+    section = fields == AUTO or "beta" in fields
+    section = section and model.squeeze == "field" and scene.energy is None
     base = contact.normal == "rigid" and isinstance(contact.law, SharpSlip)
     straight = scene.strip.curvature is None and model.grid == "finite-difference"
     return few and section and base and straight and load.control in CONTROLS and load.cycles > 0
@@ -242,6 +249,7 @@ def in_words(scene: Parts) -> str:
     """One line that says what a scene has chosen; empty if it left nothing open."""
     load, model = scene.load, scene.model
     lifts = "w" in model.fields and "w" not in model.given("fields")
+    lifts = lifts and model.solution != "plane"
     shown = {
         "solution": f"rung {model.rung}" + " that may lift off" * lifts,
         "kinematics": f"{model.kinematics} kinematics",
@@ -251,4 +259,5 @@ def in_words(scene: Parts) -> str:
     found = [words for name, words in shown.items() if name in (*model.open, *load.open)]
     if not found:
         return ""
-    return f"chosen for a tolerance of {100.0 * model.tolerance:g} %: {', '.join(found)}"
+    to = "plane elasticity" if is_elastic(scene) else "its own fine mesh"
+    return f"chosen to be within {100.0 * model.tolerance:g} % of {to}: {', '.join(found)}"

@@ -62,8 +62,9 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     bar = {"stepwise": section == "bar", "condensed": section != "bar"}  # the rest by no prefix
     if not match or not bar.get(prefix, True) or not (ordered or plane or section in FIELDS_OF):
         raise InputError(
-            f"model.rung = {rung!r}: choose 'auto', 'bar', 'shell', 'squeeze', 'p1' to 'p{LARGEST_ORDER}', "
-            "'plane', 'masing' (of squeeze), or 'masing-' or 'condensed-' and one of these"
+            f"model.rung = {rung!r}: choose 'auto', 'bar', 'shell', 'squeeze', "
+            f"'p1' to 'p{LARGEST_ORDER}', 'plane', 'masing' (of squeeze), or 'masing-' or "
+            "'condensed-' and one of these"
         )
     fields = FIELDS_OF.get(section, FIELDS_OF["squeeze"])
     closed = section == "bar" and not prefix

@@ -369,7 +369,7 @@ class Scene(Tree):
         return scene
 
     def as_elasticity(self) -> Scene:
-        """Copy as plane elasticity, if its section was left open; from which any change goes back."""
+        """Copy as plane elasticity, from which any change goes back to the chosen section."""
         model = self.model.chosen(**elasticity(self))
         scene: Scene = eqx.tree_at(lambda scene: scene.model, self, model)
         return scene
@@ -441,7 +441,7 @@ def check_word(name: str, value: Any) -> None:
         require(name, value, known, f"choose {' or '.join(map(repr, LAWS))}")
     elif name == "contact.smoothing" and isinstance(value, str):
         require(name, value, value == "sharp", key.words)
-    elif name == "model.fields" and value != AUTO:
+    elif name == "model.fields" and not (isinstance(value, str) and value == AUTO):
         words = isinstance(value, list | tuple) and all(isinstance(f, str) for f in value)
         require(name, value, words, "give a list such as ['v', 'beta', 'psi']")
     elif key.kind == "word":

@@ -121,7 +121,8 @@ def error_beforehand(scene: Parts, section: str, numbers: Numbers) -> float:
     """
     if scene.member.support != "none":  # slip zones of both ends
         return np.inf
-    reach = float(np.min(slip_of_bar(scene, numbers) / numbers("strip.half_height")))
+    with np.errstate(all="ignore"):  # numbers may be as large or as small as there are
+        reach = float(np.min(slip_of_bar(scene, numbers) / numbers("strip.half_height")))
     known = _on_curve(scene, section, reach) if reach > 0.0 else None
     return np.inf if known is None else known.largest
 
@@ -134,15 +135,13 @@ def slip_of_bar(scene: Parts, numbers: Numbers) -> np.ndarray:
         if scene.load.control == "displacement":
             return np.full(np.shape(length), np.nan)
         x = np.linspace(0.0, float(np.max(length)), POINTS)[::-1]
-        here = np.interp(x, *pressure.T, left=0.0, right=0.0)
+        here = np.interp(x, pressure[:, 0], pressure[:, 1], left=0.0, right=0.0)
         carried = np.append(0.0, np.cumsum(-0.5 * (here[1:] + here[:-1]) * np.diff(x)))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.interp(force / friction, carried, x[0] - x)
+        return np.interp(force / friction, carried, x[0] - x)
     limit = friction * pressure
     if scene.load.control == "displacement":
         force = bar_force(force, stretching(scene.strip, numbers), limit)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.minimum(length, force / limit)
+    return np.minimum(length, force / limit)
 
 
 def _on_curve(scene: Parts, section: str, reach: float) -> SectionError | None:

@@ -68,7 +68,10 @@ def test_run_takes_the_model_advised(cli):
     [
         (("--tol", "1e-9"), "tolerance = 1e-09: must be a number from 0.005 to 1"),
         (("--tol", "nan"), "tolerance = nan: must be"),
-        (("--set", "model.rung=p0"), "model.rung = 'p0': choose 'bar', 'shell', 'squeeze', 'p1'"),
+        (
+            ("--set", "model.rung=p0"),
+            "model.rung = 'p0': choose 'auto', 'bar', 'shell', 'squeeze', 'p1'",
+        ),
         (("--set", "model.rung=p99"), "model.rung = 'p99': choose"),
         (("--set", "load.amplitude=3"), "load.amplitude = 3.0: must stay below gross slip"),
         (("bimaterial", "--set", "model.rung=bar"), "model.solution = 'closed-form'"),

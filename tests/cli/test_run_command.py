@@ -48,7 +48,10 @@ def test_run_prints_text_to_read(cli):
     assert (code, err) == (0, "")
     title, chosen, entered, *lines = out.splitlines()
     assert "v w beta psi on 21 nodes" in title
-    assert chosen == "chosen for a tolerance of 0.5 %: rung condensed-squeeze that may lift off"
+    assert (
+        chosen
+        == "chosen to be within 1 % of its own fine mesh: rung condensed-squeeze that may lift off"
+    )
     assert "eta = 0.2, force amplitude 0.5" in title
     assert "load.entry = member); where slip reaches 1 H the section squeeze" in entered
     figures = [line for line in lines if not line.startswith("  doubtful: ")]

@@ -294,7 +294,8 @@ def test_filling_up_adds_nothing(monkeypatch):
 @pytest.fixture(scope="module")
 def planted():
     """A loop of the contact line, and where a fit of it starts."""
-    start = jb.Scene().replace({"model.nodes": 17, "load.amplitude": 0.6})
+    coarse = {"model.rung": "squeeze", "model.nodes": 17}
+    start = jb.Scene().replace(coarse | {"load.amplitude": 0.6})
     return jb.solve(start.replace({MU: 0.27, ETA: 0.13}), throw=False), start
 
 

@@ -36,7 +36,7 @@ def test_names_come_back(rung, tmp_path):
 
 @pytest.mark.parametrize("rung", ["p0", "p13", "p99", "p-1", "p", "beam", "masing-", "Bar", ""])
 def test_unknown_names_are_refused(rung):
-    with pytest.raises(jb.InputError, match=r"model\.rung = .*choose 'bar', 'shell'"):
+    with pytest.raises(jb.InputError, match=r"model\.rung = .*choose 'auto', 'bar', 'shell'"):
         on(rung)
 
 

@@ -679,8 +679,8 @@ def test_a_scene_is_printed_short_with_units():
         "  contact.bottom_pressure      table of 4 rows  [stress]",
         "  load.control                 force",
         "  load.amplitude               0.7855  [force/width]",
-        "  chosen for a tolerance of 1 %: rung plane that may lift off, linear "
-        "kinematics, 20 steps per half cycle",
+        "  chosen to be within 1 % of plane elasticity: rung plane, linear kinematics, 20 steps "
+        "per half cycle",
     ]
 
 

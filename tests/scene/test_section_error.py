@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.scene import section_error
-from jbeamshell.scene.section_error import in_words
-from jbeamshell.scene import library
+from jbeamshell.scene import library, section_error
 from jbeamshell.scene.keys import ENTRIES
+from jbeamshell.scene.section_error import in_words
 
 SQUEEZE = jb.Scene().replace({"model.rung": "condensed-squeeze", "model.nodes": 65})
 

@@ -39,7 +39,8 @@ def reference() -> dict[tuple[float, float], float]:
 
 def sweep(fields, cells):
     """Ratio to the cubic law, ratio by loop area, smallest reaction, and status of many strips."""
-    scene = STRIP.replace({"model.fields": fields, "model.kinematics": "linear"})
+    settings = {"model.kinematics": "linear", "model.tolerance": 0.005}
+    scene = STRIP.replace({"model.fields": fields} | settings)
     keys = ("strip.height_ratio", "load.amplitude")
     names = ("dissipation", "dissipation_loop", "dissipation_ratio", "reaction_min", "closure")
     ask = jb.response(scene, keys, names, method=Method.STATUS_ITERATION)
