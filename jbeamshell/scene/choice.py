@@ -74,6 +74,7 @@ MOST_REFINED = 513  # nodes of a grid that was refined
 PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
+BOTH_ENDS = 1.75  # of the elements, for corners at both ends of a lap joint
 STEPWISE = Grid(161, END_SIZE, 1.5, 40)
 LIFTING = Grid(161, 1.0 / 48.0, 1.5, 40)  # load steps of a strip whose corner may open
 ARC_STEPS = 120  # load steps per half cycle, whose chords are shorter than a bending path
@@ -116,7 +117,7 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
     if "end_size" in open_model:
         found["end_size"] = grid.end_size
     if "nodes" in open_model:
-        found["nodes"] = _nodes(grid, model.tolerance, scene.contact.jumps)
+        found["nodes"] = _nodes(grid, scene)
     many = ARC_STEPS if load.control == ARC_LENGTH else grid.steps
     steps = {"steps_per_half_cycle": many} if "steps_per_half_cycle" in open_load else {}
     return tuple(
@@ -168,11 +169,13 @@ def _is_soft(scene: Parts, numbers: Numbers | None) -> bool:
     return bool(np.min(np.asarray(values)) < IDEAL)
 
 
-def _nodes(grid: Grid, tolerance: float, jumps: int) -> int:
-    """Odd number of nodes of a grid for a tolerance."""
-    elements = (grid.nodes - 1) * (KNOWN / tolerance) ** (1.0 / grid.order)
+def _nodes(grid: Grid, scene: Parts) -> int:
+    """Odd number of nodes of a grid for a scene's tolerance."""
+    elements = (grid.nodes - 1) * (KNOWN / scene.model.tolerance) ** (1.0 / grid.order)
     if grid in (CONTACT_LINE, SOFT_CONTACT_LINE):
-        elements *= 1.0 + PER_STEP * min(jumps, MOST_JUMPS)
+        elements *= 1.0 + PER_STEP * min(scene.contact.jumps, MOST_JUMPS)
+    elif grid is PLANE and scene.member.support != "none":
+        elements *= BOTH_ENDS
     return 2 * int(np.ceil(elements / 2.0)) + 1
 
 
@@ -203,7 +206,7 @@ def elasticity(scene: Parts) -> dict[str, Any]:
     if "end_size" in model.open:
         found["end_size"] = PLANE.end_size
     if "nodes" in model.open:
-        found["nodes"] = _nodes(PLANE, model.tolerance, scene.contact.jumps)
+        found["nodes"] = _nodes(PLANE, scene)
     return found
 
 
