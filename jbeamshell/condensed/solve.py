@@ -26,6 +26,7 @@ from jbeamshell.condensed.drives import (
 )
 from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.events import walk
+from jbeamshell.condensed.kept import kept
 from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
 from jbeamshell.condensed.stretch import Level
 from jbeamshell.condensed.strip import Strip, condensed, moved_by, spring_stiffness, stays_flat
@@ -137,6 +138,7 @@ def _known_turns(loads: np.ndarray) -> tuple[bool, ...]:
     return tuple(turns.tolist())
 
 
+@kept
 @Small
 def _strip(scene: Scene) -> Strip:
     strip = condensed(scene, scene.model.nodes)

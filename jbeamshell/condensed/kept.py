@@ -1,0 +1,54 @@
+"""Strips of plane elasticity that were condensed, kept for scenes that share them.
+
+A condensed strip depends on the strip, its supports, its pressures, the entry of the force and the
+grid.  Friction and the size of the load do not touch it, unless the strip is pressed with friction.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from jbeamshell.common.checks import in_transformation, is_traced
+from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.template import Template
+
+MOST = 8  # strips that are kept; one of plane elasticity holds some ten megabytes
+
+Build = Callable[[Scene], Any]
+
+
+def kept(build: Build) -> Build:
+    """Function of a scene that keeps what it built for the last strips of plane elasticity.
+
+    Parameters
+    ----------
+    build : function from a scene to its condensed strip
+    """
+
+    @functools.lru_cache(MOST)
+    def built(template: Template, numbers: bytes) -> Any:
+        values = np.frombuffer(numbers, template.dtype)
+        return build(template.scene([np.asarray(value) for value in values]))
+
+    @functools.wraps(build)
+    def found(scene: Scene) -> Any:
+        if scene.model.solution != "plane" or in_transformation() or is_traced(scene):
+            return build(scene)
+        template, numbers = Template.of(_alike(scene))
+        return built(template, np.asarray(numbers, template.dtype).tobytes())
+
+    return found
+
+
+def _alike(scene: Scene) -> Scene:
+    """One scene for all that share a condensed strip."""
+    none, contact = np.zeros_like(scene.load.amplitude), scene.contact
+    load = scene.load.but(amplitude=none, cycles=1, steps_per_half_cycle=1, as_given=())
+    model = scene.model.but(tolerance=1.0, as_given=())
+    if contact.assembly != "frictional":
+        contact = contact.but(friction=none)
+    return scene.but(load=load, contact=contact, model=model)
