@@ -2,7 +2,6 @@ from . import (
     condensed as condensed,
     dynamics as dynamics,
     identify as identify,
-    ladder as ladder,
     laws as laws,
     measured as measured,
     plotting as plotting,
@@ -22,8 +21,8 @@ from .condensed.substructure import Substructure as Substructure
 from .explorer import explore as explore
 from .history.contact_history import ContactHistory as ContactHistory
 from .history.history import History as History
-from .ladder.advice import Advice as Advice, advise as advise
-from .ladder.solving import solve as solve
+from .quasistatic.advice import Advice as Advice, advise as advise
+from .quasistatic.solving import solve as solve
 from .measured.inspection import Inspection as Inspection, inspect as inspect
 from .numerics.newton import Newton as Newton
 from .quasistatic.read_history import read_history as read_history

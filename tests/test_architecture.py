@@ -25,7 +25,6 @@ ORDER = [
     "history",
     "condensed",
     "quasistatic",
-    "ladder",
     "sweeping",
     "dynamics",
     "identify",

@@ -1,32 +1,24 @@
-"""`jbeamshell advise`: the cheapest model of a scene that is accurate enough."""
+"""`jbeamshell advise`: the model that a plain call takes for a scene, and why."""
 
 from __future__ import annotations
 
 import argparse
 from typing import Any
 
-from jbeamshell.cli.arguments import add_json, add_scene, add_settings, scene_of
-from jbeamshell.cli.terminal import put, say
+from jbeamshell.cli.arguments import add_json, add_scene, add_settings, add_tolerance, scene_of
+from jbeamshell.cli.terminal import put
 
 
 def add_to(commands: Any) -> None:
     """Add the command and its options to the parser."""
     parser = commands.add_parser(
         "advise",
-        help="name the cheapest model that is accurate enough",
-        description="Name the cheapest model of a scene whose estimated error against plane "
-        "elasticity stays within a tolerance.",
+        help="say which model a scene takes, and why",
+        description="Say which section and grid a scene takes to be within its tolerance of plane "
+        "elasticity, and why, without solving it.",
     )
     add_scene(parser)
-    parser.add_argument(
-        "--tol", type=float, default=0.05, metavar="ERROR", help="relative error (default 0.05)"
-    )
-    parser.add_argument(
-        "--quantity",
-        default="dissipation",
-        metavar="FIGURE",
-        help="figure that must be this accurate (default dissipation)",
-    )
+    add_tolerance(parser)
     add_settings(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -35,15 +27,8 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the advice; returns the exit code."""
     from jbeamshell.common import files
-    from jbeamshell.ladder import advice
+    from jbeamshell.quasistatic import advice
 
-    advised = advice.advise(
-        scene_of(options), options.tol, quantity=options.quantity, tell=tell_rung
-    )
+    advised = advice.advise(scene_of(options), options.tol)
     put(files.as_json(advised.figures()) if options.json else f"{advised}\n")
     return 0
-
-
-def tell_rung(rung: str) -> None:
-    """Report which rung of the ladder of models is being solved."""
-    say(f"solving on {rung} ...")

@@ -44,6 +44,12 @@ def add_folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", help="write tables and pictures to this folder")
 
 
+def add_tolerance(parser: argparse.ArgumentParser) -> None:
+    """Add ``--tol``."""
+    text = "model.tolerance: error to plane elasticity for which the model is chosen"
+    parser.add_argument("--tol", type=float, metavar="ERROR", help=text)
+
+
 def add_json(parser: argparse.ArgumentParser) -> None:
     """Add ``--json``."""
     parser.add_argument("--json", action="store_true", help="print the result as JSON")

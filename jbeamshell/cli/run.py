@@ -9,8 +9,14 @@ from typing import Any
 
 import jax
 
-from jbeamshell.cli.advise import tell_rung
-from jbeamshell.cli.arguments import add_folder, add_json, add_scene, add_settings, scene_of
+from jbeamshell.cli.arguments import (
+    add_folder,
+    add_json,
+    add_scene,
+    add_settings,
+    add_tolerance,
+    scene_of,
+)
 from jbeamshell.cli.terminal import put, say, say_written, warn
 from jbeamshell.common.errors import DoubtfulWarning
 
@@ -25,13 +31,7 @@ def add_to(commands: Any) -> None:
         epilog="`jbeamshell keys` lists every KEY of --set with its default, unit and meaning.",
     )
     add_scene(parser)
-    parser.add_argument(
-        "--tol",
-        type=float,
-        metavar="ERROR",
-        help="first choose the cheapest model within this relative error, as `jbeamshell advise` "
-        "does",
-    )
+    add_tolerance(parser)
     add_settings(parser)
     add_folder(parser)
     add_json(parser)
@@ -42,16 +42,11 @@ def run(options: argparse.Namespace) -> int:
     """Run a scene, report and write; returns the exit code."""
     from jbeamshell.common import files
     from jbeamshell.quasistatic import solver
+    from jbeamshell.quasistatic.advice import within
     from jbeamshell.scene import load_path
 
-    scene = scene_of(options)
+    scene = within(scene_of(options), options.tol)
     load_path.check(scene)
-    if options.tol is not None:
-        from jbeamshell.ladder import advice
-
-        advised = advice.advise(scene, options.tol, tell=tell_rung)
-        say(str(advised))
-        scene = advised.applied(scene)
     folder = None
     if options.out is not None:  # pictures take long to import
         from jbeamshell.history import report

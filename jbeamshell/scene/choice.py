@@ -38,7 +38,7 @@ from jbeamshell.scene.linearisation import Parts, linear_errors
 from jbeamshell.scene.parts import Model
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.rungs import CONDENSED, FIELDS_OF, IDEAL, PLANE_NODES
-from jbeamshell.scene.section_error import error_beforehand
+from jbeamshell.scene.section_error import known_beforehand
 
 SQUEEZE = FIELDS_OF["squeeze"]
 WHOLE = ("v", "w", *SQUEEZE[1:])
@@ -148,7 +148,8 @@ def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:
     if is_traced(scene.strip, scene.contact, scene.load):
         return float(np.inf)
     with jax.ensure_compile_time_eval():
-        return error_beforehand(scene, "squeeze", numbers or scene.number)
+        known = known_beforehand(scene, "squeeze", numbers or scene.number)
+    return float(np.inf) if known is None else known.largest
 
 
 def _grid(solution: str, opens: bool, soft: bool) -> Grid:
@@ -262,5 +263,11 @@ def in_words(scene: Parts) -> str:
     found = [words for name, words in shown.items() if name in (*model.open, *load.open)]
     if not found:
         return ""
-    to = "plane elasticity" if is_elastic(scene) else "its own fine mesh"
-    return f"chosen to be within {100.0 * model.tolerance:g} % of {to}: {', '.join(found)}"
+    percent = 100.0 * model.tolerance
+    return f"chosen to be within {percent:g} % of {reference(scene)}: {', '.join(found)}"
+
+
+def reference(scene: Parts) -> str:
+    """Words for what a scene's tolerance is relative to."""
+    elastic = scene.model.solution == "plane" or is_elastic(scene)
+    return "plane elasticity" if elastic else "its own fine mesh"

@@ -106,8 +106,8 @@ def section_error(scene: Parts, slip_length: float) -> SectionError | None:
     return _on_curve(scene, section_of(scene), at) if at > 0.0 else None
 
 
-def error_beforehand(scene: Parts, section: str, numbers: Numbers) -> float:
-    """Largest error of a section at the slip length of a bar, for all of the numbers.
+def known_beforehand(scene: Parts, section: str, numbers: Numbers) -> SectionError | None:
+    """Error of a section at the slip length of a bar, the shortest of all numbers.
 
     Parameters
     ----------
@@ -117,14 +117,14 @@ def error_beforehand(scene: Parts, section: str, numbers: Numbers) -> float:
 
     Returns
     -------
-    relative error of the dissipation; infinite where none is known
+    SectionError or None
+        None where no curve is recorded, or the slip length is not known
     """
     if scene.member.support != "none":  # slip zones of both ends
-        return np.inf
+        return None
     with np.errstate(all="ignore"):  # numbers may be as large or as small as there are
         reach = float(np.min(slip_of_bar(scene, numbers) / numbers("strip.half_height")))
-    known = _on_curve(scene, section, reach) if reach > 0.0 else None
-    return np.inf if known is None else known.largest
+    return _on_curve(scene, section, reach) if reach > 0.0 else None
 
 
 def slip_of_bar(scene: Parts, numbers: Numbers) -> np.ndarray:

@@ -1,15 +1,14 @@
-"""Front door of the solver: a history from a scene, on request by the cheapest adequate model."""
+"""Front door of the solver: a history from a scene, within a tolerance."""
 
 from __future__ import annotations
 
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import require
 from jbeamshell.common.progress import patience
 from jbeamshell.history.history import History
-from jbeamshell.ladder.advice import advise
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import solver as quasistatic
+from jbeamshell.quasistatic.advice import within
 from jbeamshell.scene.scene import Scene
 
 
@@ -24,12 +23,14 @@ def solve(
 ) -> History:
     """Press the strip down, follow a load path, and return the history of all load steps.
 
+    Settings that the scene leaves open are chosen so that the dissipation, the loop and the secant
+    stiffness are within ``model.tolerance`` of plane elasticity, where that can stand for the
+    scene; `jbeamshell.advise` says what is chosen and why.
+
     Parameters
     ----------
     scene, path, contact, solver, throw : see `jbeamshell.quasistatic.solver.solve`
-    tolerance : largest relative error of the dissipation against plane elasticity, .005 to 1.  The
-        scene's model is replaced by the cheapest one that `jbeamshell.advise` finds.  None keeps
-        the scene's model
+    tolerance : ``model.tolerance``, .0001 to .1; None is the scene's own
 
     Returns
     -------
@@ -39,8 +40,7 @@ def solve(
     Raises
     ------
     InputError
-        if the path is invalid or exceeds gross slip under force control, or if no model is accurate
-        enough
+        if the path is invalid or exceeds gross slip under force control
     UnconvergedError
         if a step has no equilibrium, even in smaller steps
 
@@ -53,12 +53,9 @@ def solve(
     --------
     ::
 
-        history = jb.solve(jb.library.standard(), tolerance=0.05)
+        history = jb.solve(jb.library.standard(), tolerance=0.02)
         history.dissipation, history.scene.model.rung
     """
-    if tolerance is not None:
-        fix = "a tolerance is for the scene's own cycles; leave the path out"
-        require("path", "given", path is None, fix)
-        scene = advise(scene, tolerance).applied(scene)
     with patience("solving"):
+        scene = within(scene, tolerance)
         return quasistatic.solve(scene, path, contact=contact, solver=solver, throw=throw)

@@ -1,0 +1,89 @@
+"""Advice on a scene's model: what a plain call takes, why, and the same words as the call."""
+
+import json
+
+import jax
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.scene import library
+
+SHORT = {"load.amplitude": 0.4}  # a bar slips over 3.6 H
+
+
+@pytest.mark.parametrize(
+    ("values", "rung", "to", "reason"),
+    [
+        ({}, "condensed-squeeze", "plane elasticity", "at most 0.77 % off"),
+        (SHORT, "plane", "plane elasticity", "may be off by 6.8 %"),
+        ({"load.amplitude": 0.03}, "plane", "plane elasticity", "off by a factor of"),
+        ({"strip.far_end": "free"}, "plane", "plane elasticity", "no curve says"),
+        ({"model.rung": "squeeze"}, "condensed-squeeze", "its own fine mesh", "section is named"),
+        ({"model.solution": "stepwise"}, "squeeze", "its own fine mesh", "solution is named"),
+        ({"strip.curvature": 1e-3}, "squeeze", "its own fine mesh", "it is curved"),
+        ({"contact.normal": "compliant"}, "squeeze", "its own fine mesh", "base is not rigid"),
+        ({"contact.smoothing": 8.0}, "squeeze", "its own fine mesh", "friction is smooth"),
+        ({"strip.kappa_s": 0.5}, "condensed-squeeze", "its own fine mesh", "strip.kappa_s"),
+        ({"model.grid": "collocation"}, "squeeze", "its own fine mesh", "its grid"),
+        (
+            {"load.control": "arc-length", "load.amplitude": 1e-5},
+            "squeeze",
+            "its own fine mesh",
+            "load.control = arc-length",
+        ),
+    ],
+    ids=str,
+)
+def test_what_is_taken_and_why(values, rung, to, reason):
+    scene = jb.Scene().replace(values)
+    advice = jb.advise(scene)
+    assert advice.scene.model == scene.model
+    assert (advice.settings["model.rung"], advice.to) == (rung, to)
+    assert reason in advice.reason
+    assert str(advice).startswith(f"{rung} on {scene.model.nodes} nodes with ")
+    assert f"for 1 % of {to}: " in str(advice)
+    json.dumps(advice.figures())
+
+
+def test_an_energy_of_ones_own_keeps_to_its_own_mesh():
+    scene = jb.Scene(energy=lambda e, g, k, psi, dpsi: e**2 + g**2 + k**2 + psi**2 + dpsi**2)
+    assert "energy of its own" in jb.advise(scene).reason
+
+
+def test_a_tolerance_is_the_scenes_number():
+    scene = jb.Scene().replace(SHORT)
+    loose = jb.advise(scene, 0.1)
+    assert loose.settings["model.rung"] == "condensed-squeeze"
+    assert 0.01 < loose.section_error < 0.08
+    assert jb.advise(scene).section_error == 0.0
+    given = scene.replace({"model.tolerance": 0.1})
+    assert loose.scene.model == given.model
+    history = jb.solve(scene, tolerance=0.1, throw=False)
+    assert history.scene.model.given("tolerance") == 0.1
+    fine = jb.solve(given, throw=False)
+    np.testing.assert_array_equal(history.displacement, fine.displacement)
+
+
+def test_a_lap_joint_is_plane_elasticity():
+    named = library.double_shear()
+    for joint, reason in ((named, "is named"), (named.replace({"model.rung": "auto"}), "no curve")):
+        advice = jb.advise(joint)
+        assert (advice.scene.model.solution, advice.to) == ("plane", "plane elasticity")
+        assert reason in advice.reason
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 1e-9, 0.2, float("nan"), "much"])
+def test_a_tolerance_out_of_range(tolerance):
+    for call in (jb.advise, lambda *given: jb.solve(given[0], tolerance=given[1])):
+        with pytest.raises(jb.InputError, match=r"model\.tolerance = "):
+            call(jb.Scene(), tolerance)
+
+
+def test_a_scene_that_cannot_be_solved():
+    with pytest.raises(jb.InputError, match=r"load\.amplitude = 3\.0: must stay below gross slip"):
+        jb.advise(jb.Scene().replace({"load.amplitude": 3.0}))
+    with pytest.raises(jb.InputError, match="scene = "):
+        jb.advise("standard")
+    with pytest.raises(jb.InputError, match="advice has no derivative"):
+        jax.jit(lambda mu: jb.advise(jb.Scene().replace({"contact.friction": mu})))(0.1)
