@@ -54,9 +54,10 @@ class TestSinglePrecision:
         )
 
     @pytest.mark.slow
-    def test_gradients_of_the_default_grid_are_right(self, single: None) -> None:
+    def test_gradients_of_a_section_are_right(self, single: None) -> None:
         def slope() -> float:
-            ask = jb.response(jb.Scene(), ["contact.friction"])
+            squeeze = jb.Scene().replace({"model.rung": "squeeze"})
+            ask = jb.response(squeeze, ["contact.friction"])
             return float(jax.grad(lambda mu: ask(mu)["dissipation"])(jnp.asarray(0.1)))
 
         assert slope() == pytest.approx(in_double(slope), rel=2e-3)

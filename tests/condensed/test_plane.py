@@ -152,7 +152,7 @@ class TestBranches:
 
     @pytest.mark.slow
     def test_what_is_not_nested_is_walked_event_by_event(self):
-        steady = {"load.steps_per_half_cycle": 1}
+        steady = {"load.steps_per_half_cycle": 1, "model.nodes": PLANE_NODES}
         history = plane(scene_of(0.1126, mu=0.5), **steady)
         found = condensed.dissipation(history.scene, [1.0], nodes=33)
         np.testing.assert_allclose(found, [history.dissipation], rtol=1e-12)

@@ -193,7 +193,7 @@ def test_elements_at_the_loaded_end_are_small_where_the_corner_opens():
 @pytest.mark.slow
 def test_the_chosen_elements_resolve_the_slider_of_the_last_node():
     soft = {"contact.stick_stiffness": 33.0, "contact.friction": 0.19, "load.amplitude": 1.74}
-    chosen = jb.Scene().replace(soft | {"strip.height_ratio": 0.25}).pinned()
+    chosen = SQUEEZE.replace(FINE | soft | {"strip.height_ratio": 0.25}).pinned()
     end = chosen.model.end_size
 
     def dissipation(end_size):
