@@ -1,6 +1,6 @@
 """Plain calls beside finite elements: how far off `jb.solve(scene)` is, and whether it says so.
 
-    python calibration/plain_call.py
+    python -m calibration.plain_call
 
 solves every scene of the finite elements in calibration/data (strips under every entry of the
 force, and lap joints) without a single setting.  It writes plain_call.json beside this file: of
@@ -24,9 +24,9 @@ import jax
 jax.config.update("jax_enable_x64", True)
 
 import numpy as np  # noqa: E402
-from provenance import provenance  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
+from calibration.provenance import provenance  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 
 HERE = Path(__file__).parent

@@ -1,0 +1,30 @@
+"""Plain calls beside finite elements: the record, and some of its scenes solved again."""
+
+import json
+
+import pytest
+
+import jbeamshell as jb
+from calibration import plain_call
+
+RECORD = json.loads(plain_call.RECORD.read_text("utf-8"))
+AGAIN = ("standard", "member", "guided", "double-shear")
+
+
+def test_nearly_all_are_within_the_tolerance_and_none_far_off_is_silent():
+    found = RECORD["all"]
+    assert found["scenes"] == len(RECORD["rows"]) > 250
+    assert found["within_percent"]["1.2"] > 0.95
+    assert found["worst_undoubted_percent"] < 2.0
+    assert 0.2 < found["elasticity"] < 0.9  # neither section serves all
+
+
+@pytest.mark.parametrize("kind", AGAIN)
+def test_a_scene_of_the_record(kind):
+    pairs = zip(RECORD["rows"], plain_call.scenes(), strict=True)
+    own = [(row, scene) for row, scene in pairs if row["kind"] == kind]
+    row, (_, scene, work, _) = own[len(own) // 2]
+    history = jb.solve(scene, throw=False)
+    assert history.scene.model.rung == row["section"]
+    off = 100.0 * (float(history.dissipation) / work - 1.0)
+    assert off == pytest.approx(row["D_percent"], abs=1e-2)
