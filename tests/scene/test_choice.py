@@ -31,6 +31,7 @@ def test_the_standard_strip_is_solved_on_its_contact_line():
         ({"contact.pressure": [[0.0, 9.0], [2.0, 4.0]]}, "condensed-squeeze"),
         ({"contact.pressure": [[0.5, 10.0], [1.5, 10.0]]}, "plane"),  # a patch
         ({"strip.far_end": "free"}, "plane"),
+        ({"strip.poisson_ratio": 0.495, "load.amplitude": 1.5}, "plane"),  # none was recorded
         ({"strip.layers": [[0.1, 1e5, 0.3], [0.1252, 2e5, 0.3]]}, "plane"),
         ({"load.control": "displacement", "load.amplitude": 1e-5}, "condensed-squeeze"),
         ({"load.control": "displacement", "load.amplitude": 1e-6}, "plane"),
