@@ -86,9 +86,8 @@ def section_error(scene: Scene, slip_length: float) -> SectionError | None:
     Returns
     -------
     SectionError or None
-        that of the shortest slip on the curve where slip is shorter; None where nothing slips, and
-        where no curve is recorded: of plane elasticity, of bars, and of scenes unlike those of the
-        curves
+        the curve's first point where slip is shorter than that.  None where nothing slips, for
+        plane elasticity and bars, and for scenes unlike those that were recorded
     """
     known = curves().get(kind_of(scene), {}).get(scene.load.entry, {}).get(section_of(scene))
     at = slip_length / float(scene.strip.half_height)
