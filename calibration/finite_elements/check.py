@@ -1,9 +1,9 @@
 """These finite elements against others, and against plane elasticity on the contact line.
 
-Three loops and a contact that recedes are those of the data that ship.  The data were made by an
-independent solver with exact Coulomb friction and contact, on meshes graded a thousand times finer
-(see calibration/data).  The entries of the force are beside both: plane elasticity, and that
-independent solver.  Writes checked.json beside this file; takes an hour:
+The data that ship were made by an independent solver with exact Coulomb friction and contact, on
+meshes graded a thousand times finer (see calibration/data).  Three loops and a contact that recedes
+are compared with them.  Strips under each entry of the force are compared with them and with plane
+elasticity.  Writes checked.json beside this file; takes an hour:
 
     python -m calibration.finite_elements.check
 """
@@ -13,6 +13,7 @@ from __future__ import annotations
 import csv
 import json
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -34,35 +35,14 @@ CYCLE = {"load.cycles": 1, "load.steps_per_half_cycle": 20}
 STEADY = CYCLE | {"load.cycles": 2}  # the first cycle does not close
 NODES = 129  # of plane elasticity
 REFINEMENTS = (1.0, 2.0)
-# By eta, A and mu: D and 2A/(u_max - u_min) by plane-strain finite elements (QM6, condensed to the
-# contact, graded to 5e-6 H at the corner, 60 steps from 0 to A).  Their member goes on by 4 H, and
-# its u is the mean over the section X = L, which is not conjugate to F: its stiffness is left out.
-ENTRIES: dict[tuple[float, float, float], dict[str, tuple[float, float | None]]] = {
-    (0.1126, 0.4359, 0.1): {
-        "traction": (5.9694981e-07, 118985.18),
-        "face": (6.2956419e-07, 118889.29),
-        "guided": (1.2359233e-06, 121549.93),
-        "member": (6.2420848e-07, None),
-    },
-    (0.1126, 0.7855, 0.1): {
-        "traction": (7.2053529e-06, 79436.703),
-        "face": (7.2317706e-06, 79437.781),
-        "guided": (8.0299188e-06, 79408.582),
-        "member": (7.2508821e-06, None),
-    },
-    (0.2358, 0.7855, 0.1): {
-        "traction": (2.4658745e-06, 60440.344),
-        "face": (2.8097819e-06, 60330.783),
-        "guided": (7.1877445e-06, 63392.814),
-        "member": (2.6606022e-06, None),
-    },
-    (0.1126, 1.3077, 0.3): {
-        "traction": (5.315044e-06, 119624.46),
-        "face": (5.6115958e-06, 119522.76),
-        "guided": (1.1175356e-05, 121538.02),
-        "member": (5.4990175e-06, None),
-    },
-}
+# Height ratio, amplitude and friction of the strips that are solved under every entry
+STRIPS = (
+    (0.1126, 0.4359, 0.1),
+    (0.1126, 0.7855, 0.1),
+    (0.2358, 0.7855, 0.1),
+    (0.1126, 1.3077, 0.3),
+)
+BEYOND = (0.0, 4.0)  # H that a member goes on in the data; other entries have none
 RECEDING = {"contact_end": 50.779, "reaction_max": 103.12, "lift_slope": 1.9858e-4}
 
 
@@ -105,28 +85,48 @@ def loop(height_ratio: float, amplitude: float, elements: str) -> dict[str, Any]
     }
 
 
-def entry(scene: jb.Scene, there: tuple[float, float | None]) -> dict[str, Any]:
+def entries() -> Iterator[tuple[jb.Scene, dict[str, float]]]:
+    """Strips under each entry of the force, with D and K of the data that ship.
+
+    K is that of the displacement which is conjugate to the force, as a history has it.
+    """
+    with open(data_folder() / "entry.csv", newline="") as file:
+        for row in csv.DictReader(file):
+            place = tuple(float(row[name]) for name in ("eta", "A", "mu"))
+            if place in STRIPS and float(row["overhang_over_H"]) in BEYOND:
+                keys = ("strip.height_ratio", "load.amplitude", "contact.friction")
+                values = dict(zip(keys, place, strict=True)) | {"load.entry": row["entry"]}
+                there = {"D": float(row["D"]), "K": float(row["K_conjugate"])}
+                yield jb.Scene().replace(values), there
+
+
+def entry(scene: jb.Scene, there: dict[str, float]) -> dict[str, Any]:
     """One entry of the force, by CalculiX on two meshes, beside both others."""
     plane = jb.solve(scene.replace({"model.rung": "plane", "model.nodes": NODES}))
+    others = {
+        "reference": there,
+        "plane": {"D": float(plane.dissipation), "K": float(plane.secant_stiffness)},
+    }
     row: dict[str, Any] = {
         "eta": float(scene.strip.height_ratio),
         "A": float(scene.load.amplitude),
         "mu": float(scene.contact.friction),
         "entry": scene.load.entry,
-        "reference": dict(zip(("D", "K"), there, strict=True)),
-        "plane": {"D": float(plane.dissipation), "K": float(plane.secant_stiffness)},
-    }
+    } | others
     for refinement in REFINEMENTS:
         history, took = timed(scene.replace(STEADY), refinement=refinement)
         found = {"D": float(history.dissipation), "K": float(history.secant_stiffness)}
-        beside = {
-            f"{name}_over_{other}": value / row[other][name]
-            for other in ("plane", "reference")
-            for name, value in found.items()
-            if row[other][name] is not None
-        }
-        row[f"refinement {refinement:g}"] = found | beside | took
+        row[f"refinement {refinement:g}"] = found | ratios(found, others) | took
     return row
+
+
+def ratios(found: dict[str, float], others: dict[str, dict[str, float]]) -> dict[str, float]:
+    """D and K over those of other solutions."""
+    return {
+        f"{name}_over_{other}": value / figures[name]
+        for other, figures in others.items()
+        for name, value in found.items()
+    }
 
 
 def receding() -> dict[str, Any]:
@@ -144,19 +144,16 @@ def main() -> None:
         for case in CASES if kind == "quadratic" else CASES[:1]:
             loops.append(loop(*case, kind))
             print({key: loops[-1][key] for key in ("eta", "A", "D_over_reference", "wall_s")})
-    entries = []
-    for (height_ratio, amplitude, friction), rows in ENTRIES.items():
-        for kind, there in rows.items():
-            change = {"strip.height_ratio": height_ratio, "load.amplitude": amplitude}
-            change |= {"contact.friction": friction, "load.entry": kind}
-            entries.append(row := entry(jb.Scene().replace(change), there))
-            print(kind, change, row["refinement 1"], row["refinement 2"])
+    strips = []
+    for scene, there in entries():
+        strips.append(row := entry(scene, there))
+        print(row)
     record = {
         "provenance": provenance() | {"calculix": program.version(program.find_program())},
         "steps": CYCLE,
         "D_source": "calibration/data/energy.csv",
         "loops": loops,
-        "entries": entries,
+        "entries": strips,
         "receding": receding(),
     }
     print(record["receding"])

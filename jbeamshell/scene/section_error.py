@@ -99,9 +99,8 @@ def section_error(scene: Parts, slip_length: float) -> SectionError | None:
     Returns
     -------
     SectionError or None
-        that of the shortest slip on the curve where slip is shorter; None where nothing slips, and
-        where no curve is recorded: of plane elasticity, of bars, and of scenes unlike those of the
-        curves
+        the curve's first point where slip is shorter than that.  None where nothing slips, for
+        plane elasticity and bars, and for scenes unlike those that were recorded
     """
     at = slip_length / float(scene.strip.half_height)
     return _on_curve(scene, section_of(scene), at) if at > 0.0 else None
