@@ -12,6 +12,7 @@ as unknowns these two would have to cancel, and round-off would grow.
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -22,6 +23,9 @@ from jbeamshell.common.pytrees import Tree
 from jbeamshell.condensed.ends import End
 from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.numerics.factors import inverse_cholesky
+
+PARTS = 3  # of a strip, eliminated one after the other with as many contact nodes as they know
+FEW = 100  # nodes up to which one part, which compiles in a third of the time, is as fast
 
 
 class Body(Tree):
@@ -60,53 +64,66 @@ class Elimination(NamedTuple):
     """Elimination of the fields between the contact's, station by station, to find them again.
 
     The right-hand sides are v and w of all stations, the end load, and the pressure.  The unknowns
-    are the steps of the fields to a station from the next one, and at both ends the fields.  At the
-    n - 2 stations i between the ends the sides enter with v and w of nodes i and i + 1.
+    are the steps of the fields to a station from the next one, and at both ends the fields.
 
     Attributes
     ----------
     inverse : (n-2, m-2, m-2) inverses of the Cholesky factors
+    known : (n-2, m-2, 2n+2) right-hand sides, reduced
     onwards : (n-2, m-2, m-2) coupling to the fields of the next station, reduced
-    here : (n-2, m-2, 4) forces of v and w of both nodes on the steps
-    passed : (n-2, m-2, 4) those that are handed on to the next station
-    pressure : (n-2, m-2) those of the pressure
-    begun : (m-2, 2n+2) forces on the fields of the second station, of all sides
     first : (m-2, 2n+2), (m-2, m-2) fields of the first station from the sides and from its next one
     last : (m-2, 2n+2) fields of the last station from the sides
     """
 
     inverse: Array
+    known: Array
     onwards: Array
-    here: Array
-    passed: Array
-    pressure: Array
-    begun: Array
     first: tuple[Array, Array]
     last: Array
 
+    @property
+    def forgotten(self) -> Unknown:
+        """Elimination by which the fields are not found again."""
+        return Unknown.of(self.inverse.shape[0] + 2, self.inverse.shape[1] + 2)
+
     def recovered(self, given: Array) -> Array:
         """Fields (n, m-2, levels) from the right-hand sides' factors (2n+2, levels)."""
-        nodes = given[:-2].reshape(-1, 2, given.shape[1])
-        beside = jnp.concatenate([nodes[1:-1], nodes[2:]], axis=1)
-
-        def go(forces: Array, station: tuple[Array, ...]) -> tuple[Array, Array]:
-            inverse, onwards, here, passed, pressure, contact = station
-            forces = forces + jnp.outer(pressure, given[-1])
-            known = inverse @ (forces + here @ contact)
-            return forces - onwards.T @ known + passed @ contact, known
 
         def back(after: Array, station: tuple[Array, ...]) -> tuple[Array, Array]:
-            inverse, onwards, known = station
-            here = after - inverse.T @ (known + onwards @ after)
+            inverse, sides, onwards = station
+            here = after - inverse.T @ (sides + onwards @ after)
             return here, here
 
-        inner = self.inverse, self.onwards, self.here, self.passed, self.pressure, beside
-        _, known = lax.scan(go, self.begun @ given, inner)
         last = self.last @ given
-        stations = self.inverse, self.onwards, known
+        stations = (self.inverse, self.known @ given, self.onwards)
         second, found = lax.scan(back, last, stations, reverse=True)
         first = self.first[0] @ given + self.first[1] @ second
         return jnp.concatenate([first[None], found, last[None]])
+
+
+class Unknown(NamedTuple):
+    """Elimination of a body whose inner fields nobody asks for: they are NaN.
+
+    Attributes
+    ----------
+    nothing : (n, m-2) NaN
+    """
+
+    nothing: Array
+
+    @classmethod
+    def of(cls, nodes: int, fields: int) -> Unknown:
+        """Elimination of a body of so many nodes whose form has so many fields."""
+        return cls(jnp.full((nodes, fields - 2), jnp.nan))
+
+    @property
+    def forgotten(self) -> Unknown:
+        """The same."""
+        return self
+
+    def recovered(self, given: Array) -> Array:
+        """Fields (n, m-2, levels), see `Elimination.recovered`."""
+        return jnp.broadcast_to(self.nothing[..., None], (*self.nothing.shape, given.shape[1]))
 
 
 class Line(NamedTuple):
@@ -138,104 +155,42 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
 
     def go(
         carry: tuple[Array, Array], station: tuple[Array, ...]
-    ) -> tuple[tuple[Array, Array], _Station]:
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
         before, forces = carry
         i, load, length = station
         start, _, across = (part[0] for part in form.element(length[None]))
         stays, follows = form.moved(length)
-        pressure = load * form.press[2:]
-        forces = forces.at[:, -1].add(pressure)
-        here = jnp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
-        passed = jnp.concatenate([stays[2:, :2], follows[2:, :2]], axis=1)
+        forces = forces + load * _in_last_column(form.press[2:], forces)
+        contacts = jnp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
         inverse = inverse_cholesky(before + start[2:, 2:])
+        known = inverse @ _add(forces, contacts, 2 * i)
         onwards = inverse @ (before + stays.T[2:, 2:])
-        reduced = inverse @ here
-        new = passed - onwards.T @ reduced
-        hands_on = jnp.eye(len(inverse), dtype=inverse.dtype) - onwards.T @ inverse
-        following = _add(hands_on @ forces, new, 2 * i)
+        contacts = jnp.concatenate([stays[2:, :2], follows[2:, :2]], axis=1)
+        forces = _add(forces - onwards.T @ known, contacts, 2 * i)
         own = (stays + follows)[2:, 2:]
-        found = _Station(inverse, onwards, here, passed, pressure, reduced, new, hands_on, forces)
-        return (before + own - onwards.T @ onwards, following), found
+        return (before + own - onwards.T @ onwards, forces), (inverse, known, onwards)
 
-    (before, sides), first, left = _begin(form, x, loads[0], far)
-    begun, left = _wider(sides, columns), _wider(_wider(left, columns).T, columns)
+    carry, first, left = _begin(form, x, loads[0], far)
+    left, parts = _wider(_wider(left, columns).T, columns), []
     stations = (jnp.arange(1, n - 1), loads[1:-1], jnp.diff(x)[1:])
-    carry, found = lax.scan(go, (before, begun), stations)
-    left = left - _work(found, begun) + _among_contacts(form, x, loads)
-    first = _wider(first[0], columns), first[1]
-    lines = []
-    for end in last:
-        fields, change = _finish(form, loads[-1], carry, end)
-        elimination = Elimination(*found[:5], begun, first, fields)
-        lines.append(Line(elimination, left + change))
-    return tuple(lines)
-
-
-class _Station(NamedTuple):
-    """Elimination of the stations between the ends; the first five parts are `Elimination`'s.
-
-    Attributes
-    ----------
-    reduced : (n-2, m-2, 4) ``here`` times the inverse factor
-    new : (n-2, m-2, 4) all forces of both nodes on the next station's fields
-    hands_on : (n-2, m-2, m-2) forces on the next station's fields from those on this one's
-    forces : (n-2, m-2, 2n+2) on the fields, of all sides but those ``here``
-    """
-
-    inverse: Array
-    onwards: Array
-    here: Array
-    passed: Array
-    pressure: Array
-    reduced: Array
-    new: Array
-    hands_on: Array
-    forces: Array
-
-
-def _work(stations: _Station, begun: Array) -> Array:
-    """Energy (2n+2, 2n+2) that the eliminated fields give back, as second derivatives in the sides.
-
-    Let station i have the compliance G, the forces f of all sides that come before, and those c of
-    its own two nodes.  It gives back (f + c)' G (f + c) and hands on f_(i+1) = T f + b with new b.
-    With M_i = G_i + T_i' M_(i+1) T_i, found from the other side,
-
-        sum f' G f = sum (f' M b + b' M f - b' M b),
-
-    so that only columns of few nodes are multiplied by M, never all sides by all sides.
-    """
-    compliance = _turned(stations.inverse) @ stations.inverse
-
-    def backwards(after: Array, station: tuple[Array, Array]) -> tuple[Array, Array]:
-        own, hands_on = station
-        whole = own + hands_on.T @ after @ hands_on
-        return whole, whole
-
-    none = jnp.zeros_like(compliance[0])
-    _, whole = lax.scan(backwards, none, (compliance, stations.hands_on), reverse=True)
-    forces, reduced = stations.forces, stations.reduced
-    new = jnp.concatenate([begun[None, :, :4], stations.new[:-1]])  # of nodes i - 1 and i
-    pressure = stations.pressure.at[0].add(begun[:, -1])
-    new = jnp.concatenate([new, pressure[..., None]], axis=2)
-    moved, own = whole @ new, _turned(stations.inverse) @ reduced
-    parts = (moved[..., :2], moved[..., 2:4] + own[..., :2], own[..., 2:], moved[..., 4:])
-    found = _turned(forces) @ jnp.concatenate(parts, axis=2)  # (n-2, 2n+2, 7)
-    count, columns = found.shape[:2]
-    sums = jnp.pad(jnp.sum(found[..., 6:], axis=0), ((0, 0), (columns - 1, 0)))
-    for k in range(3):
-        of_nodes = jnp.moveaxis(found[..., 2 * k : 2 * k + 2], 0, 1).reshape(columns, 2 * count)
-        sums = sums.at[:, 2 * k : 2 * (k + count)].add(of_nodes)
-    twice = np.append(np.arange(6), columns - 1) + 2 * np.arange(count)[:, None] * (
-        np.arange(7) < 6
+    # No station knows a contact node beyond its next one: the right-hand sides grow part by part.
+    count = PARTS if n > FEW else 1
+    for begin, stop in itertools.pairwise(np.linspace(0, n - 2, count + 1).astype(int)):
+        carry = carry[0], _wider(carry[1], 2 * stop + 6)
+        carry, part = lax.scan(go, carry, tuple(each[begin:stop] for each in stations))
+        parts.append(part)
+        left = left - _products(part[1], columns)
+    inverse, known, onwards = (
+        jnp.concatenate([part[0] for part in parts]),
+        jnp.concatenate([_wider(part[1], columns) for part in parts]),
+        jnp.concatenate([part[2] for part in parts]),
     )
-    before, here = twice[:, [0, 1, 2, 3, 6]], twice[:, 2:6]
-    sums = sums.at[before[:, :, None], before[:, None]].add(-0.5 * _turned(new) @ moved)
-    sums = sums.at[here[:, :, None], here[:, None]].add(0.5 * _turned(reduced) @ reduced)
-    return sums + sums.T
-
-
-def _turned(matrices: Array) -> Array:
-    return jnp.swapaxes(matrices, 1, 2)
+    first, left = (_wider(first[0], columns), first[1]), left + _among_contacts(form, x, loads)
+    ends = [_finish(form, loads[-1], carry, end) for end in last]
+    return tuple(
+        Line(Elimination(inverse, known, onwards, first, fields), left + change)
+        for fields, change in ends
+    )
 
 
 def _begin(
@@ -309,6 +264,11 @@ def _add(sides: Array, block: Array, column: Array) -> Array:
     return lax.dynamic_update_slice(sides, old + block, (0, column))
 
 
+def _in_last_column(values: Array, sides: Array) -> Array:
+    """Sides with values in their last column and zeros elsewhere."""
+    return jnp.pad(values[:, None], ((0, 0), (sides.shape[1] - 1, 0)))
+
+
 def _wider(sides: Array, columns: int) -> Array:
     """Sides with empty columns before the last two, those of the loads."""
     empty = [(0, 0)] * (sides.ndim - 1) + [(0, columns - sides.shape[-1])]
@@ -333,6 +293,12 @@ def _among_contacts(form: SectionForm, x: Array, loads: Array) -> Array:
     press = (jnp.where(inner, loads, 0.0)[:, None] * form.press[:2]).ravel()
     sides = jnp.stack([jnp.zeros_like(press), press], axis=1)
     return jnp.block([[stiffness, sides], [sides.T, jnp.zeros((2, 2), x.dtype)]])
+
+
+def _products(known: Array, columns: int) -> Array:
+    """Sum of known' known over the stations and their fields, (columns, columns)."""
+    known = known.reshape(-1, known.shape[-1])
+    return _wider(_wider(known.T @ known, columns).T, columns).T
 
 
 def local_compliance(stiffness: Array, pull: Array) -> Array:

@@ -44,6 +44,7 @@ def walk(
     needed: Array | None = None,
     *,
     lifting: int | None = None,
+    alike: bool = True,
 ) -> Level:
     """Levels of a load path, stacked along the first axis.
 
@@ -62,6 +63,7 @@ def walk(
         and compiles quicker
     lifting : number of nodes that may lift off, from the loaded end, which is quicker if few do;
         from where another one opens levels are not settled; None is all
+    alike : False if other loads on one body meet other events, so that none are shared
 
     Returns
     -------
@@ -70,7 +72,7 @@ def walk(
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
     given = body, jnp.asarray(friction), start, forces, lift
-    return _walk(*given, turns=turns, needed=needed, lifting=lifting)
+    return _walk(*given, turns=turns, needed=needed, lifting=lifting, alike=alike)
 
 
 @eqx.filter_custom_jvp
@@ -84,10 +86,11 @@ def _walk(
     turns: ArrayLike | tuple[bool, ...],
     needed: Array | None,
     lifting: int | None,
+    alike: bool,
 ) -> Level:
     known = turns if isinstance(turns, tuple) else None
     given = body, friction, start, forces, lift, jnp.asarray(turns), needed
-    return _one_or_many(known, lifting)(*given)
+    return _one_or_many(known, lifting, alike)(*given)
 
 
 @_walk.def_jvp
@@ -98,6 +101,7 @@ def _walk_jvp(
     turns: ArrayLike | tuple[bool, ...],
     needed: Array | None,
     lifting: int | None,
+    alike: bool,
 ) -> tuple[Level, Level]:
     changes = tuple(jax.tree.map(_full, *both) for both in zip(primals, tangents, strict=True))
     turns = jnp.asarray(turns)
@@ -106,12 +110,14 @@ def _walk_jvp(
 
 
 @functools.cache
-def _one_or_many(known: tuple[bool, ...] | None, lifting: int | None) -> Callable[..., Level]:
+def _one_or_many(
+    known: tuple[bool, ...] | None, lifting: int | None, alike: bool
+) -> Callable[..., Level]:
     """Levels of a path.
 
-    Loads on one body walk together, if their turns are known and that pays.  Other lanes of a batch
-    run one after the other, which a loop in step is slower than.  Lanes that need no walk cost
-    nothing.
+    Loads on one body walk together, if they meet alike events, their turns are known, and that
+    pays.  Other lanes of a batch run one after the other, which a loop in step is slower than.
+    Lanes that need no walk cost nothing.
     """
     path = functools.partial(_differentiable, lifting=lifting)
 
@@ -135,7 +141,7 @@ def _one_or_many(known: tuple[bool, ...] | None, lifting: int | None) -> Callabl
     def lanes(size: int, batched: list[PyTree], *given: PyTree) -> tuple[Level, Level]:
         own_body, own_friction, *_, own_turns, own_need = (_any(each) for each in batched)
         own = own_body or own_friction or own_turns or own_need
-        if known is None or own or not abreast.pays(known):
+        if known is None or own or not (alike and abreast.pays(known)):
             mapped, shared = eqx.partition(list(given), batched)
             found = lax.map(lambda some: lane(*eqx.combine(some, shared)), mapped)
         else:

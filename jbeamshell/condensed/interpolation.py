@@ -1,120 +1,77 @@
 """Bodies of strips between built ones: Chebyshev polynomials of height and Poisson's ratio.
 
 In units of E' the stiffness of a strip on its contact line depends on L/H and nu alone, and
-smoothly so: a dozen heights and half a dozen Poisson's ratios stand for all.
+smoothly so in ln(L/H) and ln(1 - 2 nu): some sixteen heights stand for all from .02 to .8, and ten
+Poisson's ratios for all from 0 to .49.  Interpolating what a body answers with would fail, because
+that is rough where the end of a slip zone passes a node.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
+import functools
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
-from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import require
-from jbeamshell.condensed.body import Body
-from jbeamshell.condensed.cycles import SteadyCycles, steady_cycles
-from jbeamshell.condensed.dissipation import factors, on_contact_line
-from jbeamshell.condensed.entry import goes_on
-from jbeamshell.condensed.strip import RULE, condensed, is_pressed_evenly, pressing, stations
+from jbeamshell.common.pytrees import Tree
+from jbeamshell.common.small import Small
+from jbeamshell.condensed.body import Body, Unknown
+from jbeamshell.condensed.strip import (
+    RULE,
+    Members,
+    Strip,
+    condensed,
+    is_pressed_evenly,
+    pressing,
+)
+from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements
 from jbeamshell.scene.scene import Scene
 
-KEYS = ("strip.height_ratio", "strip.poisson_ratio")
-SIDE_BY_SIDE = 16  # lanes that are interpolated at once; their factors are found one by one
+HEIGHT, POISSON = "strip.height_ratio", "strip.poisson_ratio"
+PER_HEIGHT = 3.5  # heights that are built for each factor of e between the least and the most
+PER_POISSON = 1.5  # Poisson's ratios for each factor of e between 1 - 2 nu
+LEAST = 4  # of either, in a range that is more than a point
 EDGE = 1e-9  # of a range, by which round-off may leave it
-CHECKED = np.geomspace(0.05, 0.95, 8)  # amplitudes over gross slip, for the error
+CLOSE = 5e-4  # of the largest entry of a matrix, by which an interpolated body may be off
+SMALL = 3e-5  # of the largest coefficient of a matrix: less is left out
+MOST = 3  # times that the numbers of built bodies are doubled, at most
+
+Range = tuple[float, float]
 
 
-class Bodies(eqx.Module):
-    """Strips of a range of heights and Poisson's ratios, interpolated; see `of`.
+class Bodies(Tree):
+    """Strips of a range of heights and Poisson's ratios, interpolated; see `built`.
 
     Attributes
     ----------
-    scene : strip, contact and pressure that they share
-    low, high : (2,) ends of the ranges of ln(height ratio) and Poisson's ratio
-    coefficients : of the products of Chebyshev polynomials, (points, points) as leading axes;
-        stiffness in units of E'
-    error : largest relative error of the dissipation at points between the built ones
+    low, high : (2,) ends of the ranges of ln(height ratio) and -ln(1 - 2 nu)
+    coefficients : of the products of Chebyshev polynomials, (terms,) as leading axis; stiffness in
+        units of E', positions in units of L
+    terms : orders of both polynomials of each product
     """
 
-    scene: Scene
     low: Array
     high: Array
     coefficients: Body
-    error: Array
+    terms: tuple[tuple[int, int], ...] = eqx.field(static=True)
 
-    @classmethod
-    def of(
-        cls,
-        scene: Scene,
-        height_ratios: tuple[float, float],
-        poisson_ratios: tuple[float, float],
-        *,
-        nodes: int | None = None,
-        points: tuple[int, int] = (12, 6),
-    ) -> Bodies:
-        """Bodies between strips that are built at the Chebyshev points of both ranges.
+    def strip(self, scene: Scene) -> Strip:
+        """Strip of a scene that differs from the one that was built in numbers.
 
-        Parameters
-        ----------
-        scene : homogeneous strip under a uniform pressure
-        height_ratios, poisson_ratios : (least, most); the same number twice for one point
-        nodes : contact nodes; see `jbeamshell.condensed.dissipation`
-        points : numbers of height ratios and Poisson's ratios; 12 and 6 err by some 1e-5 from .03
-            to .4 and from .15 to .45, 8 and 4 by 1e-3
-
-        Raises
-        ------
-        InputError
-            if the strip has layers or an energy of its own or goes on beyond the contact, its
-            pressure is a table, or a range is none
-
-        Examples
-        --------
-        >>> bodies = jb.condensed.Bodies.of(jb.library.standard(), (0.03, 0.4), (0.2, 0.4))
-        >>> eta, mu = np.array([0.05, 0.1]), np.array([0.1, 0.2])
-        >>> values = {"strip.height_ratio": eta, "contact.friction": mu}
-        >>> bodies.dissipation(values, [[1.0], [1.0]])  # (2, 1)
+        Fields above the contact and energies are not known: they are NaN.  All is NaN outside the
+        ranges.
         """
-        layers, pressure = scene.strip.layers, scene.contact.pressure
-        require("strip.layers", layers, layers is None, "must be left out to interpolate bodies")
-        support = scene.member.support
-        require("member.support", support, support == "none", "must be none for bodies")
-        fix = "must be left out to interpolate bodies: it has no moduli to scale with"
-        require("energy", scene.energy, scene.energy is None, fix)
-        fix = "must be one number to interpolate bodies"
-        require("contact.pressure", pressure, is_pressed_evenly(scene), fix)
-        for name, pair in (("height_ratios", height_ratios), ("poisson_ratios", poisson_ratios)):
-            require(name, pair, len(pair) == 2 and pair[0] <= pair[1], "give (least, most)")
-        scene = on_contact_line(scene, nodes)
-        require("contact.stick_stiffness", "soft", scene.ideal_friction, "must be 1000 or more")
-        fix = "opens the edge of the contact, so that no slip zones are nested: take another"
-        require("load.entry", scene.load.entry, not goes_on(scene), fix)
-        low = jnp.array([np.log(height_ratios[0]), poisson_ratios[0]])
-        high = jnp.array([np.log(height_ratios[1]), poisson_ratios[1]])
-        found = cls(scene, low, high, _coefficients(scene, low, high, points), jnp.asarray(0.0))
-        return eqx.tree_at(lambda bodies: bodies.error, found, _error(found, points))
-
-    def body(self, scene: Scene) -> Body:
-        """Body of a scene that differs from the shared one in numbers; NaN outside the ranges."""
-        strip = scene.strip
-        at = jnp.stack([jnp.log(strip.height_ratio), jnp.asarray(strip.poisson_ratio)])
-        span = jnp.where(self.high > self.low, self.high - self.low, 1.0)
-        at = 2.0 * (at - self.low) / span - 1.0
-        weights = jnp.where(jnp.all(jnp.abs(at) <= 1.0 + EDGE), 1.0, jnp.nan)
-        for x, count in zip(at, self.coefficients.c.shape, strict=True):
-            weights = jnp.multiply.outer(weights, _polynomials(x, count))
-        found = jax.tree.map(lambda c: jnp.tensordot(weights, c, 2), self.coefficients)
-        x, modulus = stations(scene, scene.model.nodes), strip.plane_modulus
+        own = scene.strip
+        found = self._body(jnp.log(own.height_ratio), -jnp.log1p(-2.0 * own.poisson_ratio))
+        modulus, x = own.plane_modulus, own.length * found.x[::-1]
         down, up = pressing(scene, x)
-        return Body(
+        tributary = elements.tributary_lengths(RULE, x)
+        body = Body(
             x=x[::-1],
-            tributary=elements.tributary_lengths(RULE, x)[::-1],
+            tributary=tributary[::-1],
             K_tt=modulus * found.K_tt,
             K_tn=modulus * found.K_tn,
             K_nn=modulus * found.K_nn,
@@ -124,60 +81,111 @@ class Bodies(eqx.Module):
             t_0=jnp.zeros_like(found.f_t),
             c=found.c / modulus,
         )
+        flat, form = jnp.zeros_like(x), section_form(scene)
+        none = Members(Unknown.of(x.size, form.pull.size), jnp.full((2 * x.size + 2,) * 2, jnp.nan))
+        settled = jnp.zeros_like(body.t_0)
+        return Strip(body, form, none, none, x, tributary, down, settled, flat)
 
-    def factors(self, scene: Scene) -> SteadyCycles:
-        """Factors of a scene that differs from the shared one in numbers, for steady cycles."""
-        return steady_cycles(self.body(scene), scene.contact.friction)
+    def _body(self, height: Array, poisson: Array) -> Body:
+        at = jnp.stack([height, poisson])
+        span = jnp.where(self.high > self.low, self.high - self.low, 1.0)
+        at = 2.0 * (at - self.low) / span - 1.0
+        inside = jnp.all((jnp.abs(at) <= 1.0 + EDGE) | (self.high == self.low))
+        orders = np.max(self.terms, axis=0)
+        heights, ratios = (_polynomials(x, order) for x, order in zip(at, orders, strict=True))
+        ratios = [jnp.where(inside, each, jnp.nan) for each in ratios]
+        weights = [heights[first] * ratios[second] for first, second in self.terms]
 
-    def dissipation(self, values: Mapping[str, ArrayLike], amplitudes: ArrayLike) -> Array:
-        """Work of friction per steady cycle of many strips, each at its own amplitudes.
+        def summed(values: Array) -> Array:  # term by term, which the compiler makes a quick loop
+            return functools.reduce(jnp.add, map(jnp.multiply, weights, values))
 
-        Parameters
-        ----------
-        values : (lanes,) numbers of the scenes by key, such as "strip.height_ratio"
-        amplitudes : (lanes, k) of the end force
-
-        Returns
-        -------
-        (lanes, k) works per unit width; NaN where slip zones are not nested, or outside the ranges
-        """
-        columns = {key: jnp.asarray(column, float) for key, column in values.items()}
-        return _lanes(self, columns, jnp.asarray(amplitudes, float))
-
-
-@eqx.filter_jit
-def _lanes(bodies: Bodies, values: dict[str, Array], amplitudes: Array) -> Array:
-    def one(lane: tuple[dict[str, Array], Array]) -> Array:
-        numbers, own = lane
-        return bodies.factors(bodies.scene.replace(numbers)).dissipation(own)
-
-    return lax.map(one, (values, amplitudes), batch_size=SIDE_BY_SIDE)
+        return jax.tree.map(summed, self.coefficients)
 
 
-@eqx.filter_jit
-def _built(scene: Scene, points: Array) -> Body:
-    """Bodies at points (bodies, 2) of ln(height ratio) and Poisson's ratio, in units of E'."""
+def may_be_interpolated(scene: Scene) -> bool:
+    """True if a scene's body depends on L/H and nu alone, in units of E'."""
+    strip, contact, load = scene.strip, scene.contact, scene.load
+    homogeneous = strip.layers is None and scene.energy is None and strip.curvature is None
+    homogeneous = homogeneous and strip.poisson_ratio is not None
+    alone = scene.member.support == "none" and strip.overhang is None
+    pressed = is_pressed_evenly(scene) and contact.normal == "rigid" and contact.gap is None
+    pressed = pressed and contact.holes is None and contact.assembly != "frictional"
+    pulled = load.kind == "force" and load.arm is None
+    return scene.model.solution == "plane" and homogeneous and alone and pressed and pulled
+
+
+def built(scene: Scene, height_ratios: Range, poisson_ratios: Range) -> Bodies | None:
+    """Bodies between strips that are built at the Chebyshev points of both ranges.
+
+    Half way between built strips they are checked.  Where they are off, more are built.
+
+    Parameters
+    ----------
+    scene : scene of whose kind they are, see `may_be_interpolated`
+    height_ratios, poisson_ratios : (least, most); the same number twice for one point
+
+    Returns
+    -------
+    Bodies, or None
+        None if too many strips would have to be built
+    """
+    ends = np.array([np.log(height_ratios), -np.log1p(-2.0 * np.array(poisson_ratios))])
+    low, high = ends.T
+    rates = np.array([PER_HEIGHT, PER_POISSON])
+    counts = np.where(high > low, LEAST + np.ceil(rates * (high - low)), 1).astype(int).tolist()
+    for _ in range(MOST):
+        found = Bodies(low, high, *_coefficients(scene, low, high, counts))
+        if _error(scene, found, counts) <= CLOSE:
+            return found
+        counts = [2 * count if count > 1 else 1 for count in counts]
+    return None
+
+
+@Small
+def _built(given: tuple[Scene, Array]) -> Body:
+    """Bodies at points (bodies, 2) of ln(height ratio) and -ln(1 - 2 nu), in units of E' and L."""
+    scene, points = given
 
     def one(point: Array) -> Body:
-        own = scene.replace(dict(zip(KEYS, (jnp.exp(point[0]), point[1]), strict=True)))
+        own = scene.replace({HEIGHT: jnp.exp(point[0]), POISSON: -0.5 * jnp.expm1(-point[1])})
         body, modulus = condensed(own, own.model.nodes).body, own.strip.plane_modulus
         stiffness = {name: getattr(body, name) / modulus for name in ("K_tt", "K_tn", "K_nn")}
-        return Body(**vars(body) | stiffness | {"c": body.c * modulus})
+        return body.but(**stiffness, c=body.c * modulus, x=body.x / own.strip.length)
 
     return lax.map(one, points)
 
 
-def _coefficients(scene: Scene, low: Array, high: Array, points: tuple[int, int]) -> Body:
-    at = [np.cos(np.pi * (np.arange(count) + 0.5) / count) for count in points]
-    places = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).reshape(-1, 2)
-    bodies = _built(scene, low + 0.5 * (places + 1.0) * (high - low))
+def _coefficients(
+    scene: Scene, low: np.ndarray, high: np.ndarray, counts: list[int]
+) -> tuple[Body, tuple[tuple[int, int], ...]]:
+    """Coefficients and terms of bodies from so many built strips, without terms that are small."""
+    at = [np.cos(np.pi * (np.arange(count) + 0.5) / count) for count in counts]
+    bodies = _built((scene, _places(at, low, high)))
     first, second = (_transform(x) for x in at)
 
-    def transformed(values: Array) -> Array:
-        own = values.reshape(*points, *values.shape[1:])
-        return jnp.einsum("pi,qj,ij...->pq...", first, second, own)
+    def transformed(values: Array) -> np.ndarray:
+        own = np.asarray(values).reshape(*counts, -1)
+        found = np.einsum("pi,qj,ijk->pqk", first, second, own, optimize=True)
+        return found.reshape(-1, *values.shape[1:])
 
-    return jax.tree.map(transformed, bodies)
+    found = jax.tree.map(transformed, bodies)
+    large = functools.reduce(np.logical_or, map(_is_large, jax.tree.leaves(found)))
+    terms = [(int(i), int(j)) for i, j in np.argwhere(large.reshape(counts))]
+    return jax.tree.map(lambda values: values[large], found), tuple(terms)
+
+
+def _is_large(values: np.ndarray) -> np.ndarray:
+    """True for terms (terms,) that matter in an array of coefficients (terms, ...)."""
+    sizes = np.max(np.abs(values.reshape(len(values), -1)), axis=1)
+    found: np.ndarray = sizes > SMALL * np.max(sizes)
+    return found
+
+
+def _places(at: list[np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Points (points, 2) of the ranges, from those of each in units of -1 to 1."""
+    places = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).reshape(-1, 2)
+    found: np.ndarray = low + 0.5 * (places + 1.0) * (high - low)
+    return found
 
 
 def _transform(points: np.ndarray) -> np.ndarray:
@@ -186,32 +194,24 @@ def _transform(points: np.ndarray) -> np.ndarray:
     return np.cos(order * np.arccos(points)) * np.where(order, 2.0, 1.0) / points.size
 
 
-def _polynomials(x: Array, count: int) -> Array:
-    """Chebyshev polynomials (count,) at x."""
+def _polynomials(x: Array, order: int) -> list[Array]:
+    """Chebyshev polynomials up to an order, at x."""
     found = [jnp.ones_like(x), x]
-    while len(found) < count:
+    while len(found) <= order:
         found.append(2.0 * x * found[-1] - found[-2])
-    return jnp.stack(found[:count])
+    return found
 
 
-def _error(bodies: Bodies, points: tuple[int, int]) -> Array:
-    """Largest relative error of the dissipation half way between built strips."""
-    scene = bodies.scene
-    between = [np.cos(np.pi * np.array([1, count // 2]) / count) for count in points]
-    places = np.stack(np.meshgrid(*between, indexing="ij"), axis=-1).reshape(-1, 2)
-    at = bodies.low + 0.5 * (places + 1.0) * (bodies.high - bodies.low)
-    force = scene.contact.friction * scene.contact.pressure * scene.strip.length
-    amplitudes = jnp.broadcast_to(CHECKED * force, (at.shape[0], CHECKED.size))
-    columns = dict(zip(KEYS, (jnp.exp(at[:, 0]), at[:, 1]), strict=True))
-    found = bodies.dissipation(columns, amplitudes)
-    exact = _exact(scene, columns, amplitudes)
-    return jnp.nanmax(jnp.abs(found / exact - 1.0))
+def _error(scene: Scene, bodies: Bodies, counts: list[int]) -> float:
+    """Largest error of a matrix half way between built strips, over its largest entry."""
+    at = [np.cos(np.pi * np.array([1, count // 2]) / count) for count in counts]
+    places = _places(at, np.asarray(bodies.low), np.asarray(bodies.high))
+    exact = _built((scene, places))
+    found = jax.vmap(lambda place: bodies._body(*place))(places)
 
+    def off(exact: Array, found: Array) -> float:
+        one, other = np.asarray(exact), np.asarray(found)
+        return float(np.max(np.abs(one - other)) / max(np.max(np.abs(one)), 1e-300))
 
-@eqx.filter_jit
-def _exact(scene: Scene, values: dict[str, Array], amplitudes: Array) -> Array:
-    def one(lane: tuple[dict[str, Array], Array]) -> Array:
-        numbers, own = lane
-        return factors(scene.replace(numbers), nodes=scene.model.nodes).dissipation(own)
-
-    return lax.map(one, (values, amplitudes))
+    names = ("K_tt", "K_tn", "K_nn", "f_t", "f_n", "c", "x")
+    return max(off(getattr(exact, name), getattr(found, name)) for name in names)

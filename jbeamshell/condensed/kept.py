@@ -38,13 +38,13 @@ def kept(build: Build) -> Build:
     def found(scene: Scene) -> Any:
         if scene.model.solution != "plane" or in_transformation() or is_traced(scene):
             return build(scene)
-        template, numbers = Template.of(_alike(scene))
+        template, numbers = Template.of(alike(scene))
         return built(template, np.asarray(numbers, template.dtype).tobytes())
 
     return found
 
 
-def _alike(scene: Scene) -> Scene:
+def alike(scene: Scene) -> Scene:
     """One scene for all that share a condensed strip."""
     none, contact = np.zeros_like(scene.load.amplitude), scene.contact
     load = scene.load.but(amplitude=none, cycles=1, steps_per_half_cycle=1, as_given=())

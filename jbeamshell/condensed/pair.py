@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.condensed.body import Elimination, Line
+from jbeamshell.condensed.body import Elimination, Line, Unknown
 from jbeamshell.mechanics.section_form import SectionForm
 from jbeamshell.numerics.factors import inverse_cholesky
 
@@ -37,7 +37,7 @@ class Pair(NamedTuple):
     """
 
     form: SectionForm
-    elimination: Elimination
+    elimination: Elimination | Unknown
     upper: Array
     lower: Array
 

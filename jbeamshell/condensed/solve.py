@@ -38,14 +38,20 @@ from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 
 Cycles = tuple[tuple[int, int, int], ...]
-Search = Literal["events", "near events", "factors", "either"]
+Search = Literal["events", "near events", "either"]
 LIFTING = 0.125  # of the nodes, that most often lift off at the loaded end
 NESTED_FROM = 6  # order of a section from which on no point reaction disturbs the corner's slip
 
 
 @in_double
 def solve(
-    scene: Scene, path: LoadPath, cycles: Cycles, *, by: Search = "events", own: bool = True
+    scene: Scene,
+    path: LoadPath,
+    cycles: Cycles,
+    *,
+    by: Search = "events",
+    own: bool = True,
+    strip: Strip | None = None,
 ) -> History:
     """Press a strip down and walk a load path.
 
@@ -61,9 +67,10 @@ def solve(
     path, cycles : whole path of the scene and its closed cycles, see
         `jbeamshell.scene.load_path.check`
     by : "events" walks any path event by event.  "near events" does so while only nodes near the
-        loaded end lift off, and "factors" needs nested slip zones; both mark other steps
-        unconverged.  "either" takes factors where zones are nested, and events elsewhere
+        loaded end lift off, and marks other steps unconverged.  "either" takes factors where slip
+        zones are nested, and events elsewhere: derivatives of factors are ten times as quick
     own : True if the loads are the scene's own cycles, whose turns are always known
+    strip : the scene's strip, if it is known
 
     Returns
     -------
@@ -88,7 +95,7 @@ def solve(
     fix += general_rung(rung)
     require("contact.normal", scene.contact.normal, base, fix)
     turns = _turns(scene, targets, own)
-    strip = _strip(scene)
+    strip = strip_of(scene) if strip is None else strip
     if not is_traced(strip.lift):
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
         fix = f"must press the strip down for model.rung = {rung}"
@@ -101,19 +108,27 @@ def solve(
 
 
 def quickest(scene: Scene) -> Search:
-    """Search that most often does for a scene's cycles.
+    """Search that most often is the quickest for a scene's cycles.
+
+    Many nodes of plane elasticity lift off, those under a member that goes on, and those of a lap
+    joint at both ends.  So do elastic sliders, whose grid is fine where a strip lifts off.
+    """
+    warps = scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
+    any_may_lift = warps or goes_on(scene) or scene.member.support != "none"
+    any_may_lift = any_may_lift or not scene.ideal_friction
+    return "events" if any_may_lift else "near events"
+
+
+def to_differentiate(scene: Scene) -> Search:
+    """Search whose derivatives are the quickest.
 
     Slip zones are nested where no point reaction at the loaded corner slips and opens out of turn,
-    as that of sections of low order and that of a rigid face do.  A lap joint slips and opens at
-    both ends.  The grid of elastic sliders has many nodes where a strip lifts off, and so does the
-    edge of the contact under a member that goes on.
+    as that of sections of low order and that of a rigid face do, and the edge of the contact under
+    a member that goes on.
     """
-    if scene.member.support != "none" or goes_on(scene):
-        return "events"
     warps = scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
-    if warps and scene.load.entry == "traction":
-        return "factors"
-    return "near events" if scene.ideal_friction else "events"
+    nested = warps and scene.load.entry == "traction" and scene.member.support == "none"
+    return "either" if nested else "events"
 
 
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
@@ -140,7 +155,8 @@ def _known_turns(loads: np.ndarray) -> tuple[bool, ...]:
 
 @kept
 @Small
-def _strip(scene: Scene) -> Strip:
+def strip_of(scene: Scene) -> Strip:
+    """Strip of a scene on its contact line."""
     strip = condensed(scene, scene.model.nodes)
     no_masses = strip.form.masses[:0]  # of no use without inertia, and slow to compile
     return strip._replace(form=strip.form._replace(masses=no_masses))
@@ -183,7 +199,7 @@ def _levels(
     if scene.load.control == "displacement":
         body = driven_by_displacement(body)
     start = pressed(body)
-    if (by == "factors" and bearing is None) or not targets.size:
+    if not targets.size:
         found, sound = nested_levels(body, friction, start, targets, turns)
     else:
         # Factors overflow in single precision.
@@ -192,7 +208,9 @@ def _levels(
             found = levels(body, friction, start, targets, turns, flat)
         else:
             lifting = math.ceil(LIFTING * strip.x.size) if by == "near events" else None
-            found = walk(body, friction, start, targets, turns, flat, lifting=lifting)
+            alike = not goes_on(scene)  # the edge of the contact opens at other events at each load
+            loads = body, friction, start, targets, turns, flat
+            found = walk(*loads, lifting=lifting, alike=alike)
         sound = jnp.all(jnp.isfinite(strip.lift))
     state = found.state
     if scene.load.control == "displacement":

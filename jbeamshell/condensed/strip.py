@@ -10,7 +10,7 @@ from jax import Array
 
 from jbeamshell.condensed import entry
 from jbeamshell.condensed.assembly import press_roughly
-from jbeamshell.condensed.body import Body, Elimination, eliminate
+from jbeamshell.condensed.body import Body, Elimination, Unknown, eliminate
 from jbeamshell.condensed.ends import end_section
 from jbeamshell.condensed.pair import Member, Pair, joined, with_shanks
 from jbeamshell.condensed.pressing import press as press_down
@@ -40,9 +40,17 @@ class Members(NamedTuple):
     pair : second member of a lap joint; v, w and hessian are then relative to it
     """
 
-    elimination: Elimination
+    elimination: Elimination | Unknown
     hessian: Array
-    pair: Pair | None
+    pair: Pair | None = None
+
+    @property
+    def of_contact(self) -> Members:
+        """Members without what finds the fields above the contact again."""
+        pair = self.pair
+        if pair is not None:
+            pair = pair._replace(elimination=pair.elimination.forgotten)
+        return self._replace(elimination=self.elimination.forgotten, pair=pair)
 
 
 class Strip(NamedTuple):
@@ -68,6 +76,11 @@ class Strip(NamedTuple):
     load: Array
     settled: Array
     lift: Array
+
+    @property
+    def of_contact(self) -> Strip:
+        """Strip without what finds the fields above the contact again: they are NaN."""
+        return self._replace(pressed=self.pressed.of_contact, loaded=self.loaded.of_contact)
 
 
 def condensed(scene: Scene, nodes: int) -> Strip:
@@ -330,7 +343,7 @@ def moved_by(members: Members, given: Array) -> tuple[Array, Array | None]:
     return above, _fields(pair.elimination, pair.below(given))
 
 
-def _fields(elimination: Elimination, given: Array) -> Array:
+def _fields(elimination: Elimination | Unknown, given: Array) -> Array:
     """Fields (m, n, steps) of a form from v and w of its stations, load and pressure (steps, :)."""
     contact = given[:, :-2].reshape(len(given), -1, 2)
     inner = elimination.recovered(given.T)  # (n, m-2, steps)

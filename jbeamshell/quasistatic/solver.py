@@ -16,8 +16,9 @@ from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.common.precision import is_single
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.common.two_programs import TwoPrograms
-from jbeamshell.condensed.solve import Cycles, quickest
+from jbeamshell.condensed.solve import Cycles, quickest, to_differentiate
 from jbeamshell.condensed.solve import solve as solve_condensed
+from jbeamshell.condensed.strip import Strip
 from jbeamshell.history.history import History
 from jbeamshell.history.reliability import change_of, misses_tolerance
 from jbeamshell.numerics.newton import Newton
@@ -59,6 +60,7 @@ def solve(
     solver: Newton | None = None,
     throw: bool = True,
     method: Method | None = None,
+    strip: Strip | None = None,
 ) -> History:
     """Press the strip down and walk along a load path.
 
@@ -74,6 +76,7 @@ def solve(
     throw : True raises for a step without equilibrium and warns of doubts; False leaves both to
         ``history.status`` and ``history.doubts``
     method : method of the load steps; None is the fastest that the run allows
+    strip : strip of the scene on its contact line, if it is known
 
     Returns
     -------
@@ -104,7 +107,7 @@ def solve(
     if scene.model.condensed:
         found = f"is found from the pressures for model.rung = {scene.model.rung}: leave it out"
         require("contact", "given", contact is None, found)
-        return _condensed(scene, whole, cycles, throw, method, path is None)
+        return _condensed(scene, whole, cycles, throw, method, path is None, strip)
     solver = solver or Newton()
     touching = None if contact is None else check_contact(scene, contact)
     method = method or _first_method(scene, whole)
@@ -144,22 +147,23 @@ def _condensed(
     throw: bool,
     method: Method | None,
     own: bool,
+    strip: Strip | None = None,
 ) -> History:
     """History on the contact line, by the quickest search unless derivatives may be taken."""
     traced = is_traced(scene, path) or is_staged()
     if traced and not _precise(scene):
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
 
-    def walked(scene: Scene) -> History:
+    def walked(scene: Scene, strip: Strip | None = None) -> History:
         by = quickest(scene)
         if method is Method.NEWTON or (traced and method is None):
-            by = "either" if traced and by == "factors" else "events"
-        history = solve_condensed(scene, path, cycles, by=by, own=own)
+            by = to_differentiate(scene) if traced else "events"
+        history = solve_condensed(scene, path, cycles, by=by, own=own, strip=strip)
         if not traced and by != "events" and not history.converged:
-            history = solve_condensed(scene, path, cycles, own=own)
+            history = solve_condensed(scene, path, cycles, own=own, strip=strip)
         return history.but(end=WholePath())
 
-    history = walked(scene)
+    history = walked(scene, strip)
     if traced:
         failed = history.status[-1] != Status.CONVERGED
         return eqx.error_if(history, failed, f"a load step has {NO_END}") if throw else history

@@ -14,6 +14,7 @@ import jax
 import numpy as np
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.condensed.interpolation import HEIGHT, POISSON
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.toml import scene_from_values, scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
@@ -22,6 +23,7 @@ from jbeamshell.sweeping.store import Store
 
 BLOCKS = 32  # least number of blocks of a large sweep, for equal shares of all processes
 LEAST = 8  # least lanes of a block that is worth a file
+MANY_BODIES = 32  # lanes from which on interpolated bodies are quicker than bodies of their own
 MANY = 10_000  # lanes from which on seconds of compilation are worth it
 
 
@@ -89,6 +91,18 @@ class Job:
         """True if a program that takes longer to compile, and less to run, pays."""
         return self.lanes.size > MANY
 
+    @functools.cached_property
+    def ranges(self) -> dict[str, tuple[float, float]] | None:
+        """Least and most height ratio and Poisson's ratio; None for too few lanes to share bodies."""
+        inside = ~self.outside
+        if np.count_nonzero(inside) < MANY_BODIES or self.lanes.scene.strip.layers is not None:
+            return None
+        values = {
+            key: np.broadcast_to(np.asarray(self.lanes.value(key), float), inside.shape)[inside]
+            for key in (HEIGHT, POISSON)
+        }
+        return {key: (float(own.min()), float(own.max())) for key, own in values.items()}
+
     @property
     def _rank(self) -> np.ndarray:
         """Rank of every lane in the order in which chunks are cut, (lanes,)."""
@@ -107,7 +121,7 @@ class Job:
         lanes = self.lanes
         keys = tuple(lanes.axes)
         about = lanes.scene, keys, self.figures, self.width, self.solver, devices
-        return Runner(*about, many=self.many)
+        return Runner(*about, many=self.many, ranges=self.ranges)
 
     def run(self, numbers: Sequence[int], runner: Runner) -> Iterator[tuple[int, Block]]:
         """Blocks by number, run in this process, one on each device at a time."""
@@ -152,6 +166,7 @@ class Job:
             "figures": list(self.figures),
             "dtype": self.dtype.name,
             "solver": None if self.solver is None else dataclasses.asdict(self.solver),
+            "ranges": self.ranges,
             "layout": [BLOCKS, BLOCK, LEAST, self.width, self.many],
         }
         return json.dumps(about)
@@ -171,4 +186,6 @@ def runner_of(text: str, devices: Sequence[Any]) -> Runner:
     scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
     solver = None if about["solver"] is None else Newton(**about["solver"])
     *_, width, many = about["layout"]
-    return Runner(scene, about["keys"], about["figures"], width, solver, devices, many=many)
+    ranges = about["ranges"] and {key: tuple(ends) for key, ends in about["ranges"].items()}
+    own = scene, about["keys"], about["figures"], width, solver, devices
+    return Runner(*own, many=many, ranges=ranges)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -18,10 +18,13 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import quick_options
+from jbeamshell.condensed.entry import goes_on
+from jbeamshell.condensed.interpolation import Range
+from jbeamshell.condensed.shared import Layout, shared
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
-from jbeamshell.quasistatic.response import Response, response
+from jbeamshell.quasistatic.response import Response, figures, response
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.scene.scene import Scene
@@ -61,9 +64,9 @@ class Block(NamedTuple):
 def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
     """Number of lanes that advance together.
 
-    On the contact line it is the one by which all lanes cost least, if a body costs as much as
-    `BODY` lanes: lanes that share no body run alone.  Elsewhere it is a whole block on a GPU.  On a
-    core it is `ABREAST` if only slip patterns are iterated, because vector instructions then run
+    On the contact line it is the one by which all lanes cost least, if a body and its factors cost
+    as much as `BODY` lanes: lanes that share no body run alone, and so do those under a member that
+    goes on, which meet other events at each load.  Elsewhere it is a whole block on a GPU.  On a core it is `ABREAST` if only slip patterns are iterated, because vector instructions then run
     over the lanes.  Otherwise each lane runs alone: a wide chunk would wait for its slowest lane,
     and vector instructions run over the nodes.
 
@@ -72,6 +75,8 @@ def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
     alike : (groups,) numbers of lanes that may share a body
     """
     if scene.model.condensed:
+        if goes_on(scene):
+            return 1
         widths = 2 ** np.arange(ABREAST.bit_length())
         costs = [np.sum(-(-alike // width)) * (BODY + width) for width in widths]
         return int(widths[np.argmin(costs)])
@@ -135,6 +140,7 @@ class Runner:
     width : lanes of a chunk, see `width_of_chunks`
     devices : devices on which blocks run side by side
     many : True for so many lanes that a program that takes longer to compile is worth it
+    ranges : least and most height ratio and Poisson's ratio, by key, if strips may be interpolated
     """
 
     def __init__(
@@ -147,6 +153,7 @@ class Runner:
         devices: Sequence[Any] | None = None,
         *,
         many: bool = False,
+        ranges: Mapping[str, Range] | None = None,
     ) -> None:
         self.scene, self.keys, self.figures = scene, tuple(keys), tuple(figures)
         self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
@@ -154,10 +161,15 @@ class Runner:
         self.width = width
         self._mesh = Mesh(np.array(self.devices), "lanes")
         template, self._numbers = Template.of(scene)
+        strips = None if ranges is None else shared(scene, self.keys, self.figures, ranges)
+        layout, self._strips = None, np.zeros(0, self.dtype)
+        if strips is not None:
+            layout, self._strips = strips.layout, strips.numbers
         self._shared = shared_keys(scene, self.keys) if width > 1 else []
         axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
         asked = self.keys, axes, self.figures, solver
-        self._about = template, asked, self._shape, self.dtype, self._mesh, many
+        given = self._shape, self._strips.size
+        self._about = template, layout, asked, given, self.dtype, self._mesh, many
 
     def compile(self) -> float:
         """Compile the model without running a lane; returns the seconds it took, now or before."""
@@ -189,7 +201,8 @@ class Runner:
             filled[device, :, : counts[device]] = repeated
         program, _ = _compiled(*self._about)
         given = jax.device_put((filled, counts), _spread(self._mesh))
-        return program(jax.device_put(self._numbers, _everywhere(self._mesh)), *given)
+        same = jax.device_put((self._numbers, self._strips), _everywhere(self._mesh))
+        return program(*same, *given)
 
     def _mend(self, columns: np.ndarray, block: Block) -> None:
         """Solve failed lanes alone, where long load steps are divided; mark what still fails."""
@@ -229,55 +242,67 @@ def _everywhere(mesh: Mesh) -> NamedSharding:
 @functools.lru_cache(KEPT)
 def _compiled(
     template: Template,
+    layout: Layout | None,
     asked: tuple[tuple[str, ...], tuple[int | None, ...], tuple[str, ...], Newton | None],
-    shape: tuple[int, ...],
+    given: tuple[tuple[int, ...], int],
     dtype: np.dtype,
     mesh: Mesh,
     many: bool,
 ) -> tuple[Callable[..., tuple[Array, Array]], float]:
     """Compiled program that runs one block on every device, and the seconds of its compilation.
 
-    It takes the scene's numbers, those of the lanes (devices, keys, chunks, width) and the count of
-    filled chunks of each device.  Only filled chunks run, one after the other, so that one shape
+    It takes the scene's numbers, those of the strips that lanes share, those of the lanes (devices,
+    keys, chunks, width) and the count of filled chunks of each device.  Only filled chunks run, one after the other, so that one shape
     serves sweeps of all sizes.
     """
     begun = time.perf_counter()
-    keys, axes, figures, solver = asked
+    keys, axes, names, solver = asked
+    shape, size = given
     method = Method.UNCHECKED_STATUS_ITERATION
 
     def chunk(ask: Response, lanes: Array) -> tuple[Array, Array]:
         width = lanes.shape[-1]
         numbers = [row if axis == 0 else row[0] for row, axis in zip(lanes, axes, strict=True)]
         answer = jax.vmap(ask, axes)(*numbers) if width > 1 else ask(*lanes[:, 0])
-        last = [answer[name].reshape(width, -1)[:, -1] for name in figures]
+        last = [answer[name].reshape(width, -1)[:, -1] for name in names]
         return jnp.stack(last), answer["status"].astype(jnp.int32)
 
-    def block(fixed: list[Array], lanes: Array, count: Array) -> tuple[Array, Array]:
+    def block(
+        fixed: list[Array], strips: Array, lanes: Array, count: Array
+    ) -> tuple[Array, Array]:
         _, chunks, width = lanes.shape
-        ask = response(template.scene(fixed), keys, figures, solver=solver, method=method)
+        scene = template.scene(fixed)
+
+        def ask(*values: Array) -> dict[str, Array]:
+            own = scene.replace(dict(zip(keys, values, strict=True)))
+            strip = None if layout is None else layout.strip(strips, own)
+            return figures(own, names, strip, solver, method)
 
         def step(i: Array, found: tuple[Array, Array]) -> tuple[Array, Array]:
             values, status = chunk(ask, lanes[:, i])
             return found[0].at[:, i].set(values), found[1].at[i].set(status)
 
-        nothing = jnp.full((len(figures), chunks, width), jnp.nan, lanes.dtype)
+        nothing = jnp.full((len(names), chunks, width), jnp.nan, lanes.dtype)
         return lax.fori_loop(0, count, step, (nothing, jnp.zeros((chunks, width), jnp.int32)))
 
-    def each(fixed: list[Array], lanes: Array, counts: Array) -> tuple[Array, Array]:
-        values, status = block(fixed, lanes[0], counts[0])
+    def each(
+        fixed: list[Array], strips: Array, lanes: Array, counts: Array
+    ) -> tuple[Array, Array]:
+        values, status = block(fixed, strips, lanes[0], counts[0])
         return values[None], status[None]
 
     spread = PartitionSpec("lanes")
     run: Callable[..., Any] = each
     if mesh.size > 1:
-        specs = (PartitionSpec(), spread, spread)
+        specs = (PartitionSpec(), PartitionSpec(), spread, spread)
         run = jax.shard_map(each, mesh=mesh, in_specs=specs, out_specs=spread, check_vma=False)
     kinds = ((shape, dtype), (shape[:1], np.int32))
-    given = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
+    lanes = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
     fixed = [jax.ShapeDtypeStruct((), dtype, sharding=_everywhere(mesh))] * template.numbers
+    strips = jax.ShapeDtypeStruct((size,), dtype, sharding=_everywhere(mesh))
     small = template.scene(fixed).model.condensed
     options = quick_options(vectors=many) if small else None
-    program = jax.jit(run, compiler_options=options).lower(fixed, *given).compile()
+    program = jax.jit(run, compiler_options=options).lower(fixed, strips, *lanes).compile()
     return program, time.perf_counter() - begun
 
 
