@@ -33,7 +33,7 @@ from jbeamshell.scene.template import Template
 Response = Callable[..., dict[str, Array]]
 
 # Figures of a cycle that condensed strips know from its turning points alone.
-EXACT = {*FIGURES, "dissipation_error"} - {"dissipation_loop"}
+EXACT = {*FIGURES, "dissipation_error"} - {"dissipation_loop", "reaction_min"}
 KEPT = 16  # compiled functions that are kept for scenes of other numbers
 FEW = 200  # number of nodes beyond which the arithmetic takes longer than the calls
 RESPONSES = (
