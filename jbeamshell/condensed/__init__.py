@@ -2,12 +2,11 @@
 
 `solve` walks the load path of a scene on the rung ``plane``, or on one such as
 ``condensed-squeeze``, which `jbeamshell.solve` does for such scenes; `dissipation` gives the work
-of a steady cycle at many amplitudes from one factorisation, which `factors` keeps; `Bodies` does so
-for many strips at once.  `jbeamshell.solve_contact` takes bodies from other programs.
+of a steady cycle at many amplitudes from one factorisation, which `factors` keeps.
+`jbeamshell.solve_contact` takes bodies from other programs.
 """
 
 from jbeamshell.condensed.cycles import SteadyCycles as SteadyCycles
 from jbeamshell.condensed.dissipation import dissipation as dissipation
 from jbeamshell.condensed.dissipation import factors as factors
-from jbeamshell.condensed.interpolation import Bodies as Bodies
 from jbeamshell.condensed.solve import solve as solve

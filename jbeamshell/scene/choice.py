@@ -222,7 +222,7 @@ def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     bounded = strip.curvature is None and contact.normal == "rigid" and scene.energy is None
     if not bounded or load.control not in CONTROLS:
         return "exact"
-    elastic = model.order > 0 or model.solution == "plane" or is_elastic(scene, numbers)
+    elastic = model.order > 0 or model.given("solution") == "plane" or is_elastic(scene, numbers)
     # Numbers stay numbers within a caller's jit; the largest there are may overflow.
     with jax.ensure_compile_time_eval(), np.errstate(all="ignore"):
         error = linear_errors(strip, load, elastic, numbers or scene.number)

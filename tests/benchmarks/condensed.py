@@ -7,7 +7,7 @@ core, which other work on the machine disturbs least; compile time apart; with t
 versions and the precision.  Rates and ratios are of the core's time.  Its parts:
 
 - cycle: one pull and a cycle of the standard strip, factors kept and building included;
-- batch: 64 height ratios x 256 amplitudes, and lanes with their own strip and friction;
+- batch: 64 height ratios x 256 amplitudes; sweeps are in sweeps.py;
 - error: over the contact nodes, against converged finite elements;
 - peer: given by ``--peer SCRIPT`` (a module with `Strip(eta, lines=, keep_lu=)` and `cyc(strip,
   amplitude, steps_per_quarter, cycles)`, which condenses finite elements), at equal error.
@@ -113,7 +113,7 @@ def cycle(budget: float) -> dict[str, Any]:
     return found
 
 
-def batch(budget: float, lanes: int) -> dict[str, Any]:
+def batch(budget: float) -> dict[str, Any]:
     """Many strips and amplitudes."""
     etas, amplitudes = jnp.geomspace(0.03, 0.4, 64), jnp.linspace(0.1, 1.9, 256)
     many = etas.size * amplitudes.size
@@ -125,37 +125,15 @@ def batch(budget: float, lanes: int) -> dict[str, Any]:
     ask = jax.jit(lambda kept: jax.lax.map(lambda own: own.dissipation(amplitudes), kept))
     both = jax.jit(lambda etas: jax.lax.map(lambda e: one(e).dissipation(amplitudes), etas))
     kept = build(etas)
-    ranges = ((0.03, 0.4), (0.2, 0.4))
-    bodies = condensed.Bodies.of(scene(), *ranges)
-    table = first(lambda: condensed.Bodies.of(scene(), *ranges))
-    random = np.random.default_rng(1)
-    friction = random.uniform(0.05, 0.15, lanes)
-    own = {
-        "strip.height_ratio": np.exp(random.uniform(*np.log(ranges[0]), lanes)),
-        "strip.poisson_ratio": random.uniform(*ranges[1], lanes),
-        "contact.friction": friction,
-    }
-    reach = (20.0 * friction * random.uniform(0.2, 0.95, lanes))[:, None]
-    heights = {"strip.height_ratio": np.asarray(etas)}
-    wide = np.broadcast_to(amplitudes, (etas.size, amplitudes.size))
     calls: dict[str, tuple[int, Callable[[], Any]]] = {
         "64 eta x 256 A, factors kept": (many, lambda: ask(kept)),
         "64 eta x 256 A, all built": (many, lambda: both(etas)),
-        "64 eta x 256 A, bodies interpolated": (many, lambda: bodies.dissipation(heights, wide)),
-        "own eta, nu, mu, bodies interpolated": (lanes, lambda: bodies.dissipation(own, reach)),
     }
     found: dict[str, Any] = {}
     for name, (count, call) in calls.items():
         took = repeated(call, budget)
         rate = 1e6 * count / took["core_us"]
         found[name] = took | {"lanes": count, "lanes_per_s": rate}
-    answers = np.asarray(bodies.dissipation(own, reach))
-    found["bodies"] = {
-        "points": [12, 6],
-        "table_s": table,
-        "error": float(bodies.error),
-        "without_answer": float(np.isnan(answers).mean()),
-    }
     return found
 
 
@@ -267,12 +245,12 @@ def main() -> None:
     options = parser.parse_args()
     jb.configure(cache=False)
     jax.config.update("jax_enable_compilation_cache", False)
-    budget, lanes = (0.1, 64) if options.quick else (BUDGET, 4096)
+    budget = 0.1 if options.quick else BUDGET
     counts = (NODES,) if options.quick else COUNTS
     record: dict[str, Any] = {
         "about": machine.about() | {"cores_used": 1, "peak_gflops": machine.peak_gflops()},
         "cycle": cycle(budget),
-        "batch": batch(budget, lanes),
+        "batch": batch(budget),
         "error": error(counts),
     }
     if options.peer:

@@ -297,3 +297,11 @@ def test_a_history_on_the_contact_line_goes_on():
     whole = jb.solve(scene, np.append(np.asarray(begun.target)[begun.pressed + 1 :], [0.5, -0.2]))
     np.testing.assert_array_equal(further.displacement, whole.displacement)
     assert further.force.size == begun.force.size + 2
+
+
+def test_a_choice_does_not_depend_on_the_choice_before():
+    little = {"strip.height_ratio": 0.18, "strip.kappa_s": 0.6, "load.amplitude": 0.02}
+    strip = jb.Scene().replace({"load.entry": "traction"})
+    before = [strip.replace({"load.amplitude": size}) for size in (0.5, 1.6)]
+    assert [scene.model.solution for scene in before] == ["plane", "condensed"]
+    assert before[0].replace(little).model == before[1].replace(little).model
