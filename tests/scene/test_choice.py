@@ -300,7 +300,7 @@ def test_a_history_on_the_contact_line_goes_on():
 
 
 def test_a_choice_does_not_depend_on_the_choice_before():
-    little = {"strip.height_ratio": 0.18, "strip.kappa_s": 0.6, "load.amplitude": 0.02}
+    little = {"strip.height_ratio": 0.3, "strip.kappa_s": 0.6, "load.amplitude": 0.02}
     strip = jb.Scene().replace({"load.entry": "traction"})
     before = [strip.replace({"load.amplitude": size}) for size in (0.5, 1.6)]
     assert [scene.model.solution for scene in before] == ["plane", "condensed"]
