@@ -1,4 +1,4 @@
-"""Charts of the record of tests/benchmarks/ladder.py: cost and error of the rungs, and advice."""
+"""Charts of the record of tests/benchmarks/ladder.py: cost and error of the rungs."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.colors import LogNorm
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from calibration.charts.table import Record, column, plain_numbers
@@ -171,63 +170,6 @@ def error_map(
         _cell_axes(axes, eta, rung)
         if colour_bar:
             axes.figure.colorbar(mesh, ax=axes, extend="both", label="error of the dissipation [%]")
-    return axes
-
-
-def advice_map(record: Record, tolerance: float, axes: Axes | None = None) -> Axes:
-    """Draw the advised rung over heights and amplitudes.
-
-    A cross marks a rung that is wrong by more than the tolerance.
-
-    Parameters
-    ----------
-    record : record of tests/benchmarks/ladder.py
-    tolerance : one of the record's
-    axes : where to draw; new ones when not given
-
-    Raises
-    ------
-    InputError
-        if the record does not have the tolerance
-    """
-    picks = [row for row in record["advice"]["picks"] if row["tolerance"] == tolerance]
-    if not picks:
-        known = ", ".join(map(str, record["advice"]["tolerances"]))
-        raise InputError(f"tolerance = {tolerance}: the record has {known}")
-    eta, amplitude, names = _grid(picks, "rung")
-    there = set(names.ravel())
-    shown = [rung for rung in RUNG_LOOKS if rung in there]
-    shown += sorted(there - {*RUNG_LOOKS, "none"})
-    shades = [RUNG_LOOKS.get(rung, OTHER)[0] for rung in shown]
-    edges = _edges(eta, amplitude)
-    places = np.vectorize(lambda name: shown.index(name) if name in shown else -1)(names)
-    with style():
-        axes = single(axes)
-        axes.pcolormesh(
-            *edges,
-            np.ma.masked_less(places, 0),
-            cmap=ListedColormap(shades or [FAINT]),
-            vmin=-0.5,
-            vmax=max(len(shown), 1) - 0.5,
-            edgecolors="white",
-            linewidth=0.6,
-            rasterized=True,
-        )
-        hatched: Any = {"facecolor": "none", "edgecolor": "0.45", "hatch": "////"}
-        for y, x in np.argwhere(names == "none"):
-            across, up = edges[0][x : x + 2], edges[1][y : y + 2]
-            axes.fill_between(across, *up, linewidth=0.0, **hatched)
-        keys: list[Any] = [Patch(color=c, label=n) for c, n in zip(shades, shown, strict=True)]
-        if "none" in there:
-            keys.append(Patch(label="finite elements", **hatched))
-        ratio = _grid(picks, "ratio")[2].astype(float)
-        y, x = np.nonzero(abs(ratio - 1.0) > tolerance)  # false where there is no ratio
-        if x.size:
-            cross: Any = {"color": DATA, "marker": "x", "linestyle": "", "markersize": 5.0}
-            axes.plot(eta[x], amplitude[y], **cross)
-            keys.append(Line2D([], [], label=f"off by more than {tolerance:.0%}", **cross))
-        _cell_axes(axes, eta, f"advised for an error of {tolerance:.0%}".replace("%", " %"))
-        axes.legend(handles=keys, **KEY_BESIDE)
     return axes
 
 

@@ -9,6 +9,7 @@ that is rough where the end of a slip zone passes a node.
 from __future__ import annotations
 
 import functools
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -18,6 +19,7 @@ from jax import Array, lax
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.body import Body, Unknown
+from jbeamshell.condensed.section import section_form
 from jbeamshell.condensed.strip import (
     RULE,
     Members,
@@ -26,7 +28,6 @@ from jbeamshell.condensed.strip import (
     is_pressed_evenly,
     pressing,
 )
-from jbeamshell.condensed.section import section_form
 from jbeamshell.mechanics import elements
 from jbeamshell.scene.scene import Scene
 
@@ -64,8 +65,9 @@ class Bodies(Tree):
         Fields above the contact and energies are not known: they are NaN.  All is NaN outside the
         ranges.
         """
-        own = scene.strip
-        found = self._body(jnp.log(own.height_ratio), -jnp.log1p(-2.0 * own.poisson_ratio))
+        own, nu = scene.strip, scene.strip.poisson_ratio
+        assert nu is not None
+        found = self._body(jnp.log(own.height_ratio), -jnp.log1p(-2.0 * nu))
         modulus, x = own.plane_modulus, own.length * found.x[::-1]
         down, up = pressing(scene, x)
         tributary = elements.tributary_lengths(RULE, x)

@@ -114,12 +114,15 @@ def shared(
     if vary <= LOADS:
         rough = scene.contact.assembly == "frictional" and "contact.friction" in vary
         return None if rough else _of_one(*_numbers(scene))
-    known = ranges is not None or POISSON not in vary
-    if not vary <= LOADS | SCALES | HEIGHTS | {POISSON} or not known or not may_be_interpolated(scene):
+    nu, known = strip.poisson_ratio, ranges is not None or POISSON not in vary
+    if nu is None or not known or not may_be_interpolated(scene):
         return None
-    own, nu = float(strip.height_ratio), float(strip.poisson_ratio)
+    if not vary <= LOADS | SCALES | HEIGHTS | {POISSON}:
+        return None
+    own, ratio = float(strip.height_ratio), float(nu)
     usual = min(USUAL_HEIGHTS[0], own / AROUND), max(USUAL_HEIGHTS[1], own * AROUND)
-    given = {HEIGHT: usual if vary & HEIGHTS else (own, own), POISSON: (nu, nu)} | dict(ranges or {})
+    given = {HEIGHT: usual if vary & HEIGHTS else (own, own), POISSON: (ratio, ratio)}
+    given |= dict(ranges or {})
     return _interpolated(*_numbers(scene), given[HEIGHT], given[POISSON])
 
 

@@ -93,7 +93,7 @@ class Job:
 
     @functools.cached_property
     def ranges(self) -> dict[str, tuple[float, float]] | None:
-        """Least and most height ratio and Poisson's ratio; None for too few lanes to share bodies."""
+        """Least and most height ratio and Poisson's ratio; None for too few lanes to share."""
         inside = ~self.outside
         if np.count_nonzero(inside) < MANY_BODIES or self.lanes.scene.strip.layers is not None:
             return None

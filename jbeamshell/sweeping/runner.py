@@ -66,7 +66,8 @@ def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
 
     On the contact line it is the one by which all lanes cost least, if a body and its factors cost
     as much as `BODY` lanes: lanes that share no body run alone, and so do those under a member that
-    goes on, which meet other events at each load.  Elsewhere it is a whole block on a GPU.  On a core it is `ABREAST` if only slip patterns are iterated, because vector instructions then run
+    goes on, which meet other events at each load.  Elsewhere it is a whole block on a GPU.  On a
+    core it is `ABREAST` if only slip patterns are iterated, because vector instructions then run
     over the lanes.  Otherwise each lane runs alone: a wide chunk would wait for its slowest lane,
     and vector instructions run over the nodes.
 
@@ -252,8 +253,8 @@ def _compiled(
     """Compiled program that runs one block on every device, and the seconds of its compilation.
 
     It takes the scene's numbers, those of the strips that lanes share, those of the lanes (devices,
-    keys, chunks, width) and the count of filled chunks of each device.  Only filled chunks run, one after the other, so that one shape
-    serves sweeps of all sizes.
+    keys, chunks, width) and the count of filled chunks of each device.  Only filled chunks run, one
+    after the other, so that one shape serves sweeps of all sizes.
     """
     begun = time.perf_counter()
     keys, axes, names, solver = asked
@@ -267,9 +268,7 @@ def _compiled(
         last = [answer[name].reshape(width, -1)[:, -1] for name in names]
         return jnp.stack(last), answer["status"].astype(jnp.int32)
 
-    def block(
-        fixed: list[Array], strips: Array, lanes: Array, count: Array
-    ) -> tuple[Array, Array]:
+    def block(fixed: list[Array], strips: Array, lanes: Array, count: Array) -> tuple[Array, Array]:
         _, chunks, width = lanes.shape
         scene = template.scene(fixed)
 
@@ -285,9 +284,7 @@ def _compiled(
         nothing = jnp.full((len(names), chunks, width), jnp.nan, lanes.dtype)
         return lax.fori_loop(0, count, step, (nothing, jnp.zeros((chunks, width), jnp.int32)))
 
-    def each(
-        fixed: list[Array], strips: Array, lanes: Array, counts: Array
-    ) -> tuple[Array, Array]:
+    def each(fixed: list[Array], strips: Array, lanes: Array, counts: Array) -> tuple[Array, Array]:
         values, status = block(fixed, strips, lanes[0], counts[0])
         return values[None], status[None]
 

@@ -16,7 +16,6 @@ FACES = {  # heading of the page of each face
     "jbeamshell.identify": "jb.identify: fits and their uncertainty",
     "jbeamshell.dynamics": "jb.dynamics: ring-down, structures, export",
     "jbeamshell.laws": "jb.laws: joints of a few numbers",
-    "jbeamshell.ladder": "jb.ladder: the cheapest model that is accurate enough",
     "jbeamshell.reference": "jb.reference: exact solutions",
     "jbeamshell.plotting": "jb.plotting: pictures",
 }

@@ -7,8 +7,7 @@ of an hour on one core, most of it to compile.  Its parts, any of which ``--only
 
 - work: on three strips, every rung over grids and load paths; errors against finite elements and
   against the rung's own limit, warm times interleaved between the cases, compilation apart;
-- map: the rungs on one grid over all heights and amplitudes that finite elements have computed;
-- advice: what `jbeamshell.advise` picks there, and how wrong that is.
+- map: the rungs on one grid over all heights and amplitudes that finite elements have computed.
 
 ``--peer SCRIPT`` times condensed finite elements anew, by a script of your own that takes ETA A NX
 NY STEPS_PER_QUARTER and prints a JSON line with "ratio" (to the cubic law), "build_s" and
@@ -27,7 +26,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 
@@ -42,7 +41,6 @@ import jbeamshell as jb  # noqa: E402
 from calibration import charts  # noqa: E402
 from jbeamshell import plotting  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.ladder.candidates import Candidate  # noqa: E402
 from jbeamshell.measured.example import data_folder, example_loops  # noqa: E402
 
 IN_LOAD_STEPS = {"model.solution": "stepwise", "model.kinematics": "exact"}
@@ -51,7 +49,7 @@ ROOT = Path(__file__).parents[2]
 RECORD = Path(__file__).with_suffix(".json")
 PICTURE = ROOT / "calibration" / "work_precision.png"
 CALCULIX = ROOT / "calibration" / "finite_elements" / "checked.json"
-PARTS = ("work", "map", "advice")
+PARTS = ("work", "map")
 ROUNDS = 7
 CYCLES = 2
 STRIPS = ((0.0511, 0.3247), (0.1126, 0.7855), (0.2358, 1.0))  # eta and A
@@ -60,10 +58,33 @@ RESOLUTIONS = ((21, 2), (41, 4), (41, 10), (81, 10), (161, 20), (161, 40))  # no
 LIMIT = (321, 80)
 MAPPED = (*RUNGS, "masing-pull")
 MAP_RESOLUTION = (81, 10)
-TOLERANCES = (0.2, 0.05, 0.01)
 PULL = 1.0  # force of the profiles
 PEER_MESHES = ((20, 2, 6), (40, 4, 10), (80, 8, 20))  # along x, over the height, steps per quarter
 QUICK = {"rungs": ("bar", "squeeze", "p3"), "resolutions": ((21, 2), (41, 4)), "limit": (81, 10)}
+
+
+class Case(NamedTuple):
+    """Rung with its numbers of nodes and of load steps per half cycle."""
+
+    rung: str
+    nodes: int
+    steps: int
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Dotted values of the model, in load steps.
+
+        Coarse grids need their nodes at the loaded end.  On finer elements than these the
+        beamshell's point reaction there turns into tension.
+        """
+        fine = self.nodes <= 41 or self.rung.startswith("p")
+        general = self.rung != "bar" and "masing" not in self.rung
+        return {
+            "model.rung": self.rung,
+            "model.nodes": self.nodes,
+            "model.end_size": 1.0 / 12.0 if fine else 1.0 / 6.0,
+            "load.steps_per_half_cycle": self.steps,
+        } | ({"model.solution": "stepwise"} if general else {})
 
 
 # --- finite elements ------------------------------------------------------------------------------
@@ -140,7 +161,7 @@ def scene_of(strip: tuple[float, float], values: dict[str, Any]) -> jb.Scene:
     return jb.library.standard().replace(IN_LOAD_STEPS).replace(own | values)
 
 
-def modelled(strip: tuple[float, float], case: Candidate) -> jb.Scene:
+def modelled(strip: tuple[float, float], case: Case) -> jb.Scene:
     """A standard strip by a rung on a grid, with linear kinematics."""
     return scene_of(strip, {"model.kinematics": "linear", **case.settings})
 
@@ -157,7 +178,7 @@ def ratio(history: jb.History, strip: tuple[float, float]) -> float:
     return float(history.dissipation) / cells()[strip]["D"]
 
 
-def profile_error(case: Candidate, eta: float) -> float:
+def profile_error(case: Case, eta: float) -> float:
     """Rms error of the contact's displacement along x under a pull, over its maximum."""
     history = jb.solve(modelled((eta, PULL), case))
     turn, _, _ = history.cycles[0]
@@ -166,7 +187,7 @@ def profile_error(case: Candidate, eta: float) -> float:
     return float(np.sqrt(np.trapezoid(off**2, x) / np.ptp(x)) / np.max(truth))
 
 
-def figures(history: jb.History, strip: tuple[float, float], case: Candidate) -> dict[str, Any]:
+def figures(history: jb.History, strip: tuple[float, float], case: Case) -> dict[str, Any]:
     """Row of the record for a run, without its times."""
     return {
         "eta": strip[0],
@@ -185,7 +206,7 @@ def measure_work(quick: bool) -> dict[str, Any]:
     rungs = QUICK["rungs"] if quick else RUNGS
     resolutions = QUICK["resolutions"] if quick else RESOLUTIONS
     limit = QUICK["limit"] if quick else LIMIT
-    cases = [Candidate(rung, *resolution) for rung in rungs for resolution in resolutions]
+    cases = [Case(rung, *resolution) for rung in rungs for resolution in resolutions]
     first = [
         {"rung": case.rung, "nodes": case.nodes, "steps": case.steps}
         | {"first_s": timed(modelled(STRIPS[0], case))[1]}
@@ -198,7 +219,7 @@ def measure_work(quick: bool) -> dict[str, Any]:
             seconds[lane].append(timed(modelled(*lane))[1])
     limits, runs = [], []
     for rung in tqdm(rungs, disable=None, unit="rung", desc="limits"):
-        case = Candidate(rung, *limit)
+        case = Case(rung, *limit)
         for strip in STRIPS:
             history, _ = timed(modelled(strip, case))
             limits.append(figures(history, strip, case))
@@ -229,7 +250,7 @@ def measure_map(quick: bool) -> dict[str, Any]:
         for cell, row in cells().items()
     }
     for rung in tqdm(rungs, disable=None, unit="rung", desc="map"):
-        case = Candidate(rung, *MAP_RESOLUTION)
+        case = Case(rung, *MAP_RESOLUTION)
         for cell, row in rows.items():
             row[rung] = ratio(jb.solve(modelled(cell, case)), cell)
     nodes, steps = MAP_RESOLUTION
@@ -241,33 +262,6 @@ def measure_map(quick: bool) -> dict[str, Any]:
         "rungs": list(rungs),
         "cells": list(rows.values()),
     }
-
-
-def measure_advice(quick: bool) -> dict[str, Any]:
-    """Advised rung in every cell, and its error."""
-    tolerances = TOLERANCES[1:2] if quick else TOLERANCES
-    lanes = [(tolerance, cell) for tolerance in tolerances for cell in cells()]
-    picks = []
-    for tolerance, cell in tqdm(lanes, disable=None, unit="pick", desc="advice"):
-        scene = scene_of(cell, {})
-        advice = jb.advise(scene, tolerance)
-        picked = advice.rung != "none"
-        there = scene.replace(advice.settings)
-        picks.append(
-            {
-                "tolerance": tolerance,
-                "eta": cell[0],
-                "A": cell[1],
-                "rung": advice.rung,
-                "nodes": there.model.nodes if picked else None,
-                "steps": there.load.steps_per_half_cycle if picked else None,
-                "kinematics": there.model.kinematics if picked else None,
-                "estimated_error": advice.estimated_error if picked else None,
-                "estimated_ms": advice.estimated_ms if picked else None,
-                "ratio": ratio(jb.solve(there), cell) if picked else None,
-            }
-        )
-    return {"about": about(), "tolerances": list(tolerances), "picks": picks}
 
 
 def about() -> dict[str, Any]:
@@ -310,7 +304,7 @@ def as_text(record: dict[str, Any]) -> str:
 
 
 def report(record: dict[str, Any]) -> str:
-    """Errors and times of the rungs on the strips, and of what is advised."""
+    """Errors and times of the rungs on the strips."""
     lines = [
         "eta     A       rung     nodes steps  D/FE - 1  D/own - 1   k/FE - 1   rms u  ms/cycle"
     ]
@@ -320,24 +314,14 @@ def report(record: dict[str, Any]) -> str:
         f" {row['stiffness'] - 1.0:11.2%} {row['profile_error']:7.2%} {row['ms_per_cycle']:9.2f}"
         for row in record["work"]["runs"]
     ]
-    for tolerance in record["advice"]["tolerances"]:
-        picks = [p for p in record["advice"]["picks"] if p["tolerance"] == tolerance]
-        off = [abs(p["ratio"] - 1.0) for p in picks if p["rung"] != "none"]
-        lines.append(
-            f"advised at {tolerance:.0%}: {len(off)} of {len(picks)} cells, off by"
-            f" {statistics.median(off):.2%} in the median, {max(off):.2%} at worst"
-        )
     return "\n".join(lines)
 
 
 def picture(record: dict[str, Any]) -> plt.Figure:
-    """Work and precision on the middle strip, and what is advised at 5 %."""
+    """Work and precision on the middle strip."""
     with plotting.style():
-        figure, (work, advice) = plt.subplots(
-            1, 2, figsize=(12.0, 5.0), gridspec_kw={"width_ratios": (1.35, 1.0)}
-        )
-        charts.ladder.work_precision(record, work)
-        charts.ladder.advice_map(record, 0.05, advice)
+        figure, axes = plt.subplots(figsize=(7.5, 5.0))
+        charts.ladder.work_precision(record, axes)
     return figure
 
 
@@ -356,7 +340,7 @@ def main() -> None:
     if RECORD.exists():
         record = json.loads(RECORD.read_text(encoding="utf-8"))
     if not options.draw:
-        measures = dict(zip(PARTS, (measure_work, measure_map, measure_advice), strict=True))
+        measures = dict(zip(PARTS, (measure_work, measure_map), strict=True))
         for part in [options.only] if options.only else PARTS:
             record[part] = measures[part](options.quick)
             kept = [r for r in record.get("finite_elements", []) if r["what"] == "condensed"]
