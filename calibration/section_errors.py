@@ -43,7 +43,7 @@ BINS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 
 BINS += (8.0, 10.0, 14.0, 20.0, 60.0)  # of the slip length over H
 ENOUGH = 3  # rows that make a point of a curve
 LITTLE = 1e-4  # of the bar's dissipation, below which rows count for no curve
-ORDERS = ("shell", "squeeze", "p2", "p3", "p4", "p6")
+WARPING = ("shell", "squeeze", "p2", "p3", "p4", "p6")
 Values = dict[str, Any]
 Random = np.random.Generator
 
@@ -143,8 +143,10 @@ def runs(scenes: list[Values], gross: np.ndarray, model: Values) -> np.ndarray:
 
 
 def sections(kind: str) -> tuple[str, ...]:
-    """Sections that a kind of scenes may have."""
-    return ("shell", "squeeze") if kind == "laminate" else ORDERS
+    """Sections that a kind of scenes may have; a bar is known under an even pressure alone."""
+    if kind == "laminate":
+        return "shell", "squeeze"
+    return ("bar", *WARPING) if kind == "even" else WARPING
 
 
 def beside_elasticity(kind: str, entry: str) -> Values:
@@ -163,7 +165,8 @@ def beside_elasticity(kind: str, entry: str) -> Values:
     coarse = runs(scenes, gross, plane | {"model.nodes": NODES})
     found: Values = {}
     for section in ("plane", *sections(kind)):
-        model = {"model.rung": f"condensed-{section}", "load.entry": entry}
+        rung = section if section == "bar" else f"condensed-{section}"
+        model = {"model.rung": rung, "load.entry": entry}
         own = coarse
         if section != "plane":
             own = runs(scenes, gross, model | {"model.nodes": NODES})
@@ -181,18 +184,25 @@ def beside_elasticity(kind: str, entry: str) -> Values:
 
 
 def curve(rows: Values) -> Values:
-    """Median and largest error of the dissipation over the slip length, as a run tells them."""
+    """Errors of the dissipation over the slip length, as a run tells them.
+
+    They are the median, the size that nine strips in ten keep, and the largest size.
+    """
     slip, off, share = (np.array(rows[key]) for key in ("slip_over_H", "D_percent", "D_over_bar"))
     points = []
     for low, high in itertools.pairwise(BINS):
         own = (slip >= low) & (slip < high) & (share > LITTLE)
         if np.sum(own) >= ENOUGH:
             middle = np.exp(np.mean(np.log(slip[own])))
-            points.append((middle, np.median(off[own]) / 100.0, np.max(np.abs(off[own])) / 100.0))
-    places, typical, largest = np.reshape(points, (-1, 3)).T
+            size = np.abs(off[own])
+            usual = np.quantile(size, 0.9, method="lower")
+            points.append(
+                (middle, *(each / 100.0 for each in (np.median(off[own]), usual, np.max(size))))
+            )
+    places, typical, *sizes = np.reshape(points, (-1, 4)).T
     # A section that fails at much slip is not to be trusted at less.
-    largest = np.maximum.accumulate(largest[::-1])[::-1]
-    named = {"slip_over_H": places, "typical": typical, "largest": largest}
+    usual, largest = (np.maximum.accumulate(size[::-1])[::-1] for size in sizes)
+    named = {"slip_over_H": places, "typical": typical, "usual": usual, "largest": largest}
     return {key: [float(f"{value:.3g}") for value in values] for key, values in named.items()}
 
 
@@ -217,6 +227,7 @@ def main() -> None:
     record: Values = {"errors": {}}
     if RECORD.exists():
         record = json.loads(RECORD.read_text(encoding="utf-8"))
+    ship(record["errors"])
     record["about"] = provenance() | {"plane_nodes": FINE, "section_nodes": NODES}
     for kind in given.only:
         for entry in ENTRIES:

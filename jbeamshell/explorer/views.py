@@ -14,7 +14,6 @@ from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.explorer.controls import gross_slip
 from jbeamshell.history.history import History
 from jbeamshell.quasistatic.solver import solve
-from jbeamshell.scene.choice import is_elastic
 from jbeamshell.scene.scene import Scene
 
 Numbers = NDArray[np.float64]
@@ -69,7 +68,7 @@ def drawable(scene: Scene) -> Scene:
     A section that was left open is plane elasticity, whatever the sliders say.  Plane elasticity
     gets as many nodes as can be drawn while a slider moves, unless the scene says how many.
     """
-    found = (scene.as_elasticity() if is_elastic(scene) else scene).pinned()
+    found = scene.serving(()).pinned()
     if found.model.solution == "plane" and "nodes" in scene.model.open:
         return found.replace({"model.nodes": min(found.model.nodes, PLANE_NODES)})
     return found

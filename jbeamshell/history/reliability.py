@@ -25,6 +25,7 @@ from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.linearisation import linear_error
 from jbeamshell.scene.rungs import IDEAL, general_rung
 from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.section_error import doubt_of_section
 
 NEGLIGIBLE = 1e-9  # slip over the sticking range, or tension over the pressure, taken as zero
 CLOSES = 1e-3  # distance between the ends of a steady loop, over its width
@@ -55,6 +56,8 @@ class Run(Protocol):
     def secant_stiffness(self) -> Array: ...
     @property
     def closure(self) -> Array: ...
+    @property
+    def slip_length(self) -> Array: ...
     @property
     def slip_cycle(self) -> SlipCycle: ...
 
@@ -245,13 +248,14 @@ def doubts_of_run(history: Run) -> tuple[str, ...]:
         return ("a load step found no equilibrium: that step and all after it hold NaN",)
     scene = plain.scene
     if scene.model.solution == "closed-form":
-        return ()
+        return _section(plain)
     if scene.contact.normal == "none":
         return _buckling(scene)
     if not plain.cycles:
         return _tension(plain)
     resolution = _resolution(plain) if scene.contact.friction > 0.0 else ()
-    return (*_unsteady(plain), *resolution, *_tension(plain), *doubts_of_scene(scene))
+    found = *_unsteady(plain), *resolution, *_tension(plain)
+    return *found, *_section(plain), *doubts_of_scene(scene)
 
 
 def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
@@ -344,6 +348,16 @@ def _resolution(history: Run) -> tuple[str, ...]:
             "load.steps_per_half_cycle"
         )
     return tuple(found)
+
+
+def _section(history: Run) -> tuple[str, ...]:
+    """Doubt about a section that the user names."""
+    model = history.scene.model
+    if {"fields", "solution"} <= set(model.open) or not history.cycles:
+        return ()
+    allowed = doubted_from(model.tolerance)
+    doubt = doubt_of_section(history.scene, float(history.slip_length), allowed)
+    return (doubt,) if doubt else ()
 
 
 def _slider_fix(scene: Scene) -> str:

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import Small
-from jbeamshell.identify.models import Model, is_rigid
+from jbeamshell.condensed.shared import Layout, Shared, shared
+from jbeamshell.identify.models import Model, Prepared, Runnable, is_rigid
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.rig import rigged, with_rig
 from jbeamshell.identify.rig_keys import RIG
@@ -29,7 +30,10 @@ from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Measurement, noise_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.choice import is_elastic
 from jbeamshell.scene.scene import Scene
+
+FINER = 0.5  # part of the tolerance that plane elasticity keeps: fitted numbers amplify its error
 
 
 class Prediction(NamedTuple):
@@ -72,7 +76,7 @@ class Experiment:
         *,
         points: int,
         noise: float | None = None,
-        rig: Sequence[str] = (),
+        free: Sequence[str] = (),
     ) -> None:
         """Set up the run of every measurement.
 
@@ -81,7 +85,7 @@ class Experiment:
         specimens : scenes with their measurements
         points : number of points to which each loop is thinned, approximately
         noise : standard deviation of measurements without noise, over their range
-        rig : keys of the rig that may change
+        free : keys of the numbers that may change
 
         Raises
         ------
@@ -101,7 +105,7 @@ class Experiment:
                 self.measurements.append(thinned)
                 self.owners.append(owner)
         observations = [
-            _observed(measurement, specimens[owner], rig)
+            _observed(measurement, specimens[owner], [key for key in free if key in RIG])
             for owner, measurement in zip(self.owners, self.measurements, strict=True)
         ]
         prefixes = [f"{one.label}: " if len(specimens) > 1 else "" for one in specimens]
@@ -114,13 +118,15 @@ class Experiment:
         self.observations = self._with_noise(observations, noise)
         self._compared = [np.flatnonzero(np.asarray(o.weight)) for o in self.observations]
         self._set_rows(np.concatenate(weights), noise)
+        served = [_served(scene, free) for scene in self.scenes]
         self._runs = [
-            (_filled(observation), self.scenes[owner])
+            (_filled(observation), served[owner])
             for observation, owner in zip(self.observations, self.owners, strict=True)
         ]
         shapes = [_shape(run) for run in self._runs]
         self._firsts = [shapes.index(shape) for shape in dict.fromkeys(shapes)]
         self._compiled: set[Any] = set()
+        self._shared: dict[Any, list[Shared | None]] = {}
 
     def _set_rows(self, weights: NDArray[np.float64], noise: float | None) -> None:
         """Set the rows of each measurement, and their factors."""
@@ -162,8 +168,9 @@ class Experiment:
         solver : settings of Newton's method
         """
         cost, slopes = jnp.zeros(()), jnp.zeros(table.shape)
-        for run, owner, rows in zip(self._runs, self.owners, self.slices, strict=True):
-            residual, jacobian, *_ = _respond(table[owner], *run, keys, solver)
+        strips, slices = self._strips(keys), self.slices
+        for run, owner, rows, strip in zip(self._runs, self.owners, slices, strips, strict=True):
+            residual, jacobian, *_ = _respond(table[owner], *run, strip, keys, solver)
             emphasis = self.emphasis[rows][0] ** 2
             cost = cost + emphasis * jnp.sum(residual**2)
             slopes = slopes.at[owner].add(2.0 * emphasis * residual @ jacobian)
@@ -179,6 +186,25 @@ class Experiment:
             for entry in range(len(tables))
         ]
 
+    def _strips(self, keys: tuple[str, ...]) -> list[Shared | None]:
+        """Strip of each run that its values share; None where each must be condensed."""
+        if keys not in self._shared:
+            vary = [key for key in keys if key not in RIG]
+            self._shared[keys] = [
+                shared(scene, vary, observation.figures) if isinstance(scene, Scene) else None
+                for observation, scene in self._runs
+            ]
+        return self._shared[keys]
+
+    def _strip(
+        self, place: int, keys: tuple[str, ...], values: NDArray[np.float64]
+    ) -> Shared | None:
+        """Strip of a run if it holds for all values (tables, k) of its specimen."""
+        scene, strip = self._runs[place][1], self._strips(keys)[place]
+        if strip is None or not isinstance(scene, Scene):
+            return None
+        return strip if all(strip.holds(scene, keys, own) for own in values) else None
+
     def _run(
         self,
         function: Callable[..., tuple[Array, ...]],
@@ -189,8 +215,9 @@ class Experiment:
         """Results of a function of every run and its specimen's values, (specimens, ...)."""
 
         def one(place: int) -> tuple[NDArray[Any], ...]:
-            own = jnp.asarray(values[self.owners[place]])
-            return tuple(map(np.asarray, function(own, *self._runs[place], keys, solver)))
+            own = values[self.owners[place]]
+            given = *self._runs[place], self._strip(place, keys, np.atleast_2d(own))
+            return tuple(map(np.asarray, function(jnp.asarray(own), *given, keys, solver)))
 
         # One run of each shape first: threads that miss the same compiled code all compile it.
         call, done = (function, values.shape[1:], keys, solver), {}
@@ -254,13 +281,23 @@ def _observed(measurement: Measurement, specimen: Specimen, rig: Sequence[str]) 
     return rigged(measurement, plain, specimen.scene, specimen.rig, rig)
 
 
+def _served(scene: Model, free: Sequence[str]) -> Model:
+    """Model with settings that serve all values that a fit may try."""
+    if not isinstance(scene, Scene):
+        return scene
+    finer = {"model.tolerance": FINER * scene.model.tolerance}
+    return scene.replace(finer if is_elastic(scene) else {}).serving(free).pinned()
+
+
 def _response(
     values: Array,
     observation: Observation,
     scene: Model,
-    keys: tuple[str, ...],
+    numbers: Any,
     solver: Newton,
+    keys: tuple[str, ...],
     rigid: bool,
+    layout: Layout | None,
 ) -> tuple[Array, Array, Array, Array]:
     """Residual (n,), its derivatives (n, k), prediction (n,) and convergence of a run."""
     if rigid and isinstance(scene, Scene):
@@ -268,9 +305,11 @@ def _response(
 
     def residual(own: Array) -> tuple[Array, tuple[Array, Array, Array]]:
         given = dict(zip(keys, own, strict=True))
-        at = scene.replace({key: value for key, value in given.items() if key not in RIG})
+        at: Runnable = scene.replace({key: v for key, v in given.items() if key not in RIG})
         of_rig = {key: value for key, value in given.items() if key in RIG}
         through = with_rig(observation, of_rig) if of_rig else observation
+        if layout is not None and isinstance(at, Scene):
+            at = Prepared(at, layout.strip(numbers, at))
         rows, prediction, converged = through.residual(at, solver)
         return rows, (rows, prediction, converged)
 
@@ -279,38 +318,48 @@ def _response(
 
 
 @Small
-def _respond_small(
-    given: tuple[Array, Observation, Model, Newton], keys: tuple[str, ...], rigid: bool
-) -> tuple[Array, Array, Array, Array]:
-    values, observation, scene, solver = given
-    return _response(values, observation, scene, keys, solver, rigid)
+def _respond_small(given: tuple[Any, ...], *static: Any) -> tuple[Array, Array, Array, Array]:
+    return _response(*given, *static)
 
 
 _respond_whole = eqx.filter_jit(_response)
 
 
 def _respond(
-    values: Array, observation: Observation, scene: Model, keys: tuple[str, ...], solver: Newton
+    values: Array,
+    observation: Observation,
+    scene: Model,
+    strip: Shared | None,
+    keys: tuple[str, ...],
+    solver: Newton,
 ) -> tuple[Array, Array, Array, Array]:
     """Compiled response; that of a strip on its contact line is a small program."""
+    numbers, layout = (None, None) if strip is None else (strip.numbers, strip.layout)
+    given = values, observation, scene, numbers, solver
     if isinstance(scene, Scene) and scene.model.condensed:
         found: tuple[Array, Array, Array, Array] = _respond_small(
-            (values, observation, scene, solver), keys, is_rigid(scene)
+            given, keys, is_rigid(scene), layout
         )
         return found
-    return _respond_whole(values, observation, scene, keys, solver, False)
+    return _respond_whole(*given, keys, False, None)
 
 
 def _respond_batch(
-    values: Array, observation: Observation, scene: Model, keys: tuple[str, ...], solver: Newton
+    values: Array,
+    observation: Observation,
+    scene: Model,
+    strip: Shared | None,
+    keys: tuple[str, ...],
+    solver: Newton,
 ) -> tuple[Array, ...]:
     """Compiled responses to several values (tables, k)."""
-    rigid = is_rigid(scene)
-    found: tuple[Array, ...] = _batch(values, observation, scene, keys, solver, rigid)
+    numbers, layout = (None, None) if strip is None else (strip.numbers, strip.layout)
+    given = values, observation, scene, numbers, solver
+    found: tuple[Array, ...] = _batch(*given, keys, is_rigid(scene), layout)
     return found
 
 
-_batch = eqx.filter_jit(eqx.filter_vmap(_response, in_axes=(0, None, None, None, None, None)))
+_batch = eqx.filter_jit(eqx.filter_vmap(_response, in_axes=(0, *[None] * 7)))
 
 
 def _shape(run: tuple[Observation, Model]) -> Any:

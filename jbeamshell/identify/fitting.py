@@ -21,7 +21,6 @@ from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit, fit_at
 from jbeamshell.identify.rig import with_starts
-from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, SearchResult, StoppingRule
 from jbeamshell.identify.search_space import SearchSpace, search_space
 from jbeamshell.identify.specimens import Specimen, as_specimens, free_of, inspected
@@ -172,8 +171,7 @@ def fit(
     parameters = with_starts(parameters, specimens)
     space, scenes = search_space(parameters, {one.label: one.scene for one in specimens})
     specimens = [one._replace(scene=scenes[one.label]) for one in specimens]
-    rig = [key for key in space.keys if key in RIG]
-    experiment = Experiment(specimens, points=points, noise=noise, rig=rig)
+    experiment = Experiment(specimens, points=points, noise=noise, free=space.keys)
     problem = Problem(experiment, space, solver or Newton(), save)
     if starts is None:
         bounded = all(parameter.bounded for parameter in parameters)

@@ -13,6 +13,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import require, require_choice
 from jbeamshell.common.errors import InputError
+from jbeamshell.condensed.strip import Strip
 from jbeamshell.identify.assembly import Assembly
 from jbeamshell.identify.drive import Drive as Drive
 from jbeamshell.laws import Law, MasingLaw, PowerLaw
@@ -21,6 +22,7 @@ from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.load_path import check
+from jbeamshell.scene.parts import Load
 from jbeamshell.scene.scene import Scene
 
 # Figure of a `History` that each curve over amplitude measures.
@@ -60,7 +62,26 @@ class Driven(eqx.Module):
         return type(self)(self.law.replace(values), self.load)
 
 
+class Prepared(eqx.Module):
+    """Scene whose strip on its contact line is known, so that a run need not condense it.
+
+    Attributes
+    ----------
+    scene : the scene
+    strip : its strip, which answers figures of the contact alone
+    """
+
+    scene: Scene
+    strip: Strip
+
+    @property
+    def load(self) -> Load:
+        """Load of the scene."""
+        return self.scene.load
+
+
 Model = Scene | Driven | Assembly
+Runnable = Model | Prepared
 
 
 def check_path(model: Model, path: ArrayLike) -> None:
@@ -99,11 +120,12 @@ def is_rigid(model: Model) -> bool:
     return isinstance(model, Scene) and model.ideal_friction
 
 
-def response_along(model: Model, path: Array, solver: Newton) -> tuple[Array, Array]:
+def response_along(model: Runnable, path: Array, solver: Newton) -> tuple[Array, Array]:
     """Answering column (T,) on a path (T,) of the driving one, and whether all of it converged."""
     by_force = model.load.control == "force"
-    if isinstance(model, Scene):
-        history = solve(model, path, solver=solver, throw=False)
+    scene, strip = _parts(model)
+    if scene is not None:
+        history = solve(scene, path, solver=solver, throw=False, strip=strip)
         response = history.displacement if by_force else history.force
         return response[history.pressed + 1 :], jnp.all(history.status == 0)
     law = of_law("loop", model).law
@@ -115,7 +137,7 @@ def response_along(model: Model, path: Array, solver: Newton) -> tuple[Array, Ar
 
 
 def cycle_figures(
-    model: Model, amplitude: Array, figure: Array, solver: Newton
+    model: Runnable, amplitude: Array, figure: Array, solver: Newton
 ) -> tuple[Array, Array]:
     """Figures (n,) of the steady cycles of some amplitudes (n,), and whether each converged.
 
@@ -126,12 +148,13 @@ def cycle_figures(
     figure : (n,) index of the figure in `FIGURES`
     solver : settings of Newton's method
     """
-    if isinstance(model, Scene):
-        scene, cycles = model, max(model.load.cycles, 1)
+    scene, strip = _parts(model)
+    if scene is not None:
+        cycles = max(scene.load.cycles, 1)
 
         def one(point: tuple[Array, Array]) -> tuple[Array, Array]:
             to = {"load.amplitude": point[0], "load.cycles": cycles}
-            history = solve(scene.replace(to), solver=solver, throw=False)
+            history = solve(scene.replace(to), solver=solver, throw=False, strip=strip)
             figures = (getattr(history, name) for name in FIGURES.values())
             return lax.select_n(point[1], *figures), jnp.all(history.status == 0)
 
@@ -145,7 +168,14 @@ def cycle_figures(
     return values, jnp.isfinite(values)
 
 
-def of_strips_alone(what: str, model: Model) -> Scene:
+def _parts(model: Runnable) -> tuple[Scene | None, Strip | None]:
+    """Scene of a model, and its strip if that is known; None for laws and structures."""
+    if isinstance(model, Prepared):
+        return model.scene, model.strip
+    return (model if isinstance(model, Scene) else None), None
+
+
+def of_strips_alone(what: str, model: Runnable) -> Scene:
     """Scene of a model; raises `InputError` for others, which have nothing of the kind."""
     if isinstance(model, Scene):
         return model
@@ -153,14 +183,14 @@ def of_strips_alone(what: str, model: Model) -> Scene:
     raise InputError(f"{what}: {other} has none; give a Scene")
 
 
-def of_law(what: str, model: Model) -> Driven:
+def of_law(what: str, model: Runnable) -> Driven:
     """Driven law of a model that is no scene; raises `InputError` for a structure."""
     if isinstance(model, Driven):
         return model
     raise InputError(f"{what}: a structure has none; give a Scene or a law")
 
 
-def of_structures_alone(what: str, model: Model) -> Assembly:
+def of_structures_alone(what: str, model: Runnable) -> Assembly:
     """Structure of a model; raises `InputError` for a strip or a law."""
     if isinstance(model, Assembly):
         return model

@@ -21,6 +21,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.identify.models import (
     FIGURES,
     Model,
+    Runnable,
     check_amplitudes,
     check_path,
     cycle_figures,
@@ -64,6 +65,7 @@ class Observation(eqx.Module):
     measured: Array
     weight: Array
     length_step: ClassVar[int] = 1  # the number of points is filled up to a multiple of this
+    figures: ClassVar[tuple[str, ...]] = ()  # of a History that are compared
 
     @property
     def span(self) -> float:
@@ -76,7 +78,7 @@ class Observation(eqx.Module):
         return prediction
 
     @abc.abstractmethod
-    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
         """Run the model.
 
         Parameters
@@ -90,7 +92,7 @@ class Observation(eqx.Module):
         converged : True if every load step found equilibrium
         """
 
-    def residual(self, scene: Model, solver: Newton) -> tuple[Array, Array, Array]:
+    def residual(self, scene: Runnable, solver: Newton) -> tuple[Array, Array, Array]:
         """Weighted difference (n,), prediction (n,), and whether every load step converged."""
         prediction, converged = self.predict(scene, solver)
         difference = (prediction - self.measured) * self.weight
@@ -116,6 +118,7 @@ class LoopObservation(Observation):
     path: Array
     free_zero: bool = eqx.field(static=True)
     length_step: ClassVar[int] = LENGTH_STEP
+    figures: ClassVar[tuple[str, ...]] = ("force", "displacement")
 
     @classmethod
     def of(cls, loop: Loop, scene: Model) -> LoopObservation:
@@ -171,7 +174,7 @@ class LoopObservation(Observation):
             getattr(measurement, "free_zero", False),
         )
 
-    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
         """Responding column (n,), and whether every load step converged."""
         response, converged = response_along(scene, self.path, solver)
         return self.shifted(response), converged
@@ -197,6 +200,7 @@ class SqueezeObservation(Observation):
 
     x: Array
     length_step: ClassVar[int] = LENGTH_STEP
+    figures: ClassVar[tuple[str, ...]] = ("squeeze_stress",)
 
     @classmethod
     def of(cls, curve: SqueezeCurve, scene: Model) -> SqueezeObservation:
@@ -220,7 +224,7 @@ class SqueezeObservation(Observation):
         weight = weight if curve.noise is None else 1.0 / curve.noise
         return cls(*map(jnp.asarray, (curve.stress, weight, curve.x)))
 
-    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
         """Squeeze stress (n,), linear between element midpoints, and whether it converged."""
         strip = of_strips_alone("squeeze stress", scene)
         history = solve(strip.replace({"load.cycles": 0}), solver=solver, throw=False)
@@ -260,6 +264,7 @@ class AmplitudeObservation(LogObservation):
 
     amplitude: Array
     figure: Array
+    figures: ClassVar[tuple[str, ...]] = tuple(FIGURES.values())
 
     @classmethod
     def of(cls, curve: AmplitudeCurve, scene: Model) -> AmplitudeObservation:
@@ -268,7 +273,7 @@ class AmplitudeObservation(LogObservation):
         figure = np.full(curve.amplitude.size, list(FIGURES).index(type(curve)), dtype=np.int32)
         return cls(*cls.columns(curve), *map(jnp.asarray, (curve.amplitude, figure)))
 
-    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
         """Logarithms (n,) of the figure, and whether every load step converged."""
         values, converged = cycle_figures(scene, self.amplitude, self.figure, solver)
         return _logarithm(values, self.measured)[0], jnp.all(converged)
@@ -306,7 +311,7 @@ class ModalObservation(LogObservation):
         figure = MODAL.index(type(curve))
         return cls(*cls.columns(curve), *map(jnp.asarray, (level, place, figure, omega)))
 
-    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
         """Logarithms (n,) of the figure, and whether all static equilibria were found."""
         curve, mobility = of_structures_alone("modal curve", scene).response(self.level)
         natural, ratio = curve.frequency[self.place], curve.damping[self.place]

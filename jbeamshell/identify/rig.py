@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.models import Model, response_along
+from jbeamshell.identify.models import Model, Runnable, response_along
 from jbeamshell.identify.observations import LoopObservation, Observation
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.rig_keys import PREFIX, RIG, check_rig_key
@@ -152,7 +152,7 @@ class RiggedObservation(LoopObservation):
     near: Array
     series: bool = eqx.field(static=True)
 
-    def predict(self, scene: Model, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
         """Responding column (n,), and whether every load step converged."""
         if scene.load.control == "force":
             path = self.path - self.rig.force_zero
@@ -167,7 +167,7 @@ class RiggedObservation(LoopObservation):
         response = response + self.rig.drift * self.time
         return self.shifted(response), converged
 
-    def _behind_spring(self, scene: Model, path: Array, solver: Newton) -> tuple[Array, Array]:
+    def _behind_spring(self, scene: Runnable, path: Array, solver: Newton) -> tuple[Array, Array]:
         """Force of the strip (n,) where spring and strip together follow a path."""
         begin, end, compliance = self.begin, self.end, self.rig.compliance
         zero = jnp.zeros(1)

@@ -10,7 +10,7 @@ import numpy as np
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.scene.choice import is_elastic, may_condense, reference
-from jbeamshell.scene.keys import CONTROLS, TABLE
+from jbeamshell.scene.keys import CONTROLS, KAPPA_S, TABLE
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import SectionError, known_beforehand
@@ -103,7 +103,7 @@ def within(scene: Scene, tolerance: float | None) -> Scene:
 def _why_not(scene: Scene) -> str:
     """Reason why plane elasticity does not stand for a scene."""
     strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
-    kappa_s = TABLE["strip.kappa_s"].default
+    kappa_s = TABLE[KAPPA_S].default
     reasons = {
         "its section is named": "fields" not in model.open or model.order > 0,
         "its solution is named": "solution" not in model.open,

@@ -24,7 +24,7 @@ from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.solver import solve
 from jbeamshell.quasistatic.stepping import Method
-from jbeamshell.scene.choice import FEW_STEPS, is_elastic
+from jbeamshell.scene.choice import FEW_STEPS
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
 from jbeamshell.scene.scene import Scene
@@ -97,9 +97,8 @@ def response(
     for name in figures:
         require_choice("figures", name, RESPONSES)
 
-    if "strip.kappa_s" not in over and is_elastic(scene):  # numbers that vary may be any
-        scene = scene.as_elasticity()
-    return Answers(pinned(scene, figures), _Asked(tuple(over), tuple(figures), solver, method))
+    served = pinned(scene.serving(over), figures)
+    return Answers(served, _Asked(tuple(over), tuple(figures), solver, method))
 
 
 class _Asked(NamedTuple):

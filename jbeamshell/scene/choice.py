@@ -33,7 +33,7 @@ from jbeamshell.mechanics.elements import END_SIZE
 from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.scene.buckling import weakest_column
 from jbeamshell.scene.domain import Numbers
-from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS, TABLE
+from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS, KAPPA_S, TABLE
 from jbeamshell.scene.linearisation import Parts, linear_errors
 from jbeamshell.scene.parts import Model
 from jbeamshell.scene.rows import AUTO
@@ -129,7 +129,8 @@ def choose(scene: Parts, numbers: Numbers | None = None) -> tuple[dict[str, Any]
 def is_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
     """True if a scene leaves its section open, and plane elasticity can stand for it.
 
-    A squeeze-shear factor of the user's own is a number that elasticity does not have.
+    A squeeze-shear factor of the user's own is a number that elasticity does not have.  A traced
+    one may be any number where a scene is made; in a scene that was made before it is as it was.
 
     Parameters
     ----------
@@ -137,10 +138,12 @@ def is_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
     """
     model, kappa_s = scene.model, scene.strip.kappa_s
     left_open = {"fields", "solution"} <= set(model.open) and model.order == 0
-    if not left_open or model.constants != "consistent" or is_traced(kappa_s):
+    if not left_open or model.constants != "consistent":
         return False
-    factors = (numbers or scene.number)("strip.kappa_s")
-    return bool(np.all(factors == TABLE["strip.kappa_s"].default)) and may_condense(scene)
+    if is_traced(kappa_s):
+        return model.solution != AUTO and may_condense(scene)
+    factors = (numbers or scene.number)(KAPPA_S)
+    return bool(np.all(factors == TABLE[KAPPA_S].default)) and may_condense(scene)
 
 
 def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:

@@ -26,6 +26,7 @@ FAR_ENDS = {"guided": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields hel
 ENTRIES = ("member", "face", "guided", "traction")
 CONTROLS = ("force", "displacement")
 ARC_LENGTH = "arc-length"
+KAPPA_S = "strip.kappa_s"  # squeeze-shear factor, which plane elasticity does not have
 LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
 LOAD_KINDS = ("force", "moment")
 ASSEMBLIES = ("frictionless", "frictional")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import equinox as eqx
@@ -32,10 +32,10 @@ from jbeamshell.mechanics.friction import (
 )
 from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
-from jbeamshell.scene.choice import choose, elasticity, finer
+from jbeamshell.scene.choice import choose, elasticity, finer, is_elastic
 from jbeamshell.scene.domain import Numbers, support_rules
 from jbeamshell.scene.joint import check_joint
-from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, TABLE, check_key
+from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, KAPPA_S, TABLE, check_key
 from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Part, Strip
 from jbeamshell.scene.pressure import bolt_pressure
 from jbeamshell.scene.quadratic import check_quadratic
@@ -312,6 +312,8 @@ class Scene(Tree):
             check_word(key, value)
             if DERIVED.get(key) in values:
                 raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")
+        if is_traced(values.get(KAPPA_S)) and is_elastic(self):
+            return self.serving([KAPPA_S]).replace(values)
         given = self.model.given("fields"), self.model.given("solution")
         values = spelled_out(dict(values), *given)
         parts: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
@@ -373,6 +375,21 @@ class Scene(Tree):
         model = self.model.chosen(**elasticity(self))
         scene: Scene = eqx.tree_at(lambda scene: scene.model, self, model)
         return scene
+
+    def serving(self, keys: Collection[str]) -> Scene:
+        """Copy on the section that serves any values of some numbers, if the section is open.
+
+        Plane elasticity serves all but the squeeze-shear factor, which it does not have.
+
+        Parameters
+        ----------
+        keys : dotted keys of the numbers
+        """
+        if not is_elastic(self):
+            return self
+        if KAPPA_S not in keys:
+            return self.as_elasticity()
+        return self.pinned(lambda key: np.array(np.nan) if key == KAPPA_S else self.number(key))
 
     def with_rigid_sliders(self) -> Scene:
         """Copy that knows that its sliders are rigid, which traced numbers do not tell."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from jbeamshell.common.checks import is_traced
 from jbeamshell.mechanics.bar import bar_force
+from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import TABLE
 from jbeamshell.scene.linearisation import Parts, stretching
@@ -41,10 +42,12 @@ class SectionError(NamedTuple):
     Attributes
     ----------
     typical : median over strips of the same slip length over half height; positive if too large
+    usual : size that nine strips in ten keep, of these and of all that slip more
     largest : largest size over these and all that slip more
     """
 
     typical: float
+    usual: float
     largest: float
 
 
@@ -60,6 +63,7 @@ def kind_of(scene: Parts) -> str:
     """Kind of a scene for which curves are recorded; empty if there are none for it."""
     strip, contact, member, load = scene.strip, scene.contact, scene.member, scene.load
     straight = strip.curvature is None and scene.energy is None and contact.normal == "rigid"
+    straight = straight and isinstance(contact.law, SharpSlip)
     pulled = load.kind == "force" and load.arm is None
     if not straight or not pulled or strip.overhang is not None:
         return ""
@@ -81,8 +85,10 @@ def kind_of(scene: Parts) -> str:
 def section_of(scene: Parts) -> str:
     """Section of a scene for which curves are recorded; empty if there are none for it."""
     model = scene.model
-    if model.solution == "plane" or "beta" not in model.fields:
+    if model.solution == "plane":
         return ""
+    if "beta" not in model.fields:
+        return "bar"
     if model.order > 0:
         return next((f"p{p}" for p in KNOWN_ORDERS if p <= model.order), "")
     return "squeeze" if "psi" in model.fields else "shell"
@@ -100,7 +106,7 @@ def section_error(scene: Parts, slip_length: float) -> SectionError | None:
     -------
     SectionError or None
         the curve's first point where slip is shorter than that.  None where nothing slips, for
-        plane elasticity and bars, and for scenes unlike those that were recorded
+        plane elasticity, and for scenes unlike those that were recorded
     """
     at = slip_length / float(scene.strip.half_height)
     return _on_curve(scene, section_of(scene), at) if at > 0.0 else None
@@ -152,8 +158,8 @@ def _on_curve(scene: Parts, section: str, reach: float) -> SectionError | None:
     if known is None:
         return None
     place = np.log(reach), np.log(known["slip_over_H"])
-    typical = float(np.interp(*place, known["typical"]))
-    return SectionError(typical, float(np.exp(np.interp(*place, np.log(known["largest"])))))
+    sizes = (np.exp(np.interp(*place, np.log(known[name]))) for name in ("usual", "largest"))
+    return SectionError(float(np.interp(*place, known["typical"])), *map(float, sizes))
 
 
 def in_words(scene: Parts, slip_length: float | None) -> str:
@@ -170,13 +176,36 @@ def in_words(scene: Parts, slip_length: float | None) -> str:
     found = None if slip_length is None else section_error(scene, slip_length)
     if slip_length is None or found is None:
         return line
-    if abs(found.typical) < TOLD_FROM:
-        loss = f"as much, within {100.0 * TOLD_FROM:g} %, as"
-    elif found.typical > 1.0:
-        loss = f"{1.0 + found.typical:.2g} times as much as"
-    else:
-        sort = "more" if found.typical > 0.0 else "less"
-        loss = f"{100.0 * abs(found.typical):.2g} % {sort} than"
     reach = slip_length / float(scene.strip.half_height)
     about = f"where slip reaches {reach:.2g} H the section {section_of(scene)}"
-    return f"{line}; {about} typically loses {loss} plane elasticity"
+    return f"{line}; {about} typically loses {_compared(found.typical)} plane elasticity"
+
+
+def doubt_of_section(scene: Parts, slip_length: float, allowed: float) -> str:
+    """Doubt about a section that the user names; empty if its own slip length speaks for it.
+
+    Parameters
+    ----------
+    scene : scene without traced leaves
+    slip_length : see `section_error`
+    allowed : relative error of the dissipation that is no doubt
+    """
+    found = section_error(scene, slip_length)
+    if found is None or found.usual <= allowed:
+        return ""
+    reach = slip_length / float(scene.strip.half_height)
+    off = f"more than {100.0 * min(found.usual, 1.0):.3g} %"
+    return (
+        f"where slip reaches {reach:.2g} H the section {section_of(scene)} typically loses "
+        f"{_compared(found.typical)} plane elasticity, and one strip in ten is off by {off}; leave "
+        "model.rung open, or take model.rung = plane"
+    )
+
+
+def _compared(error: float) -> str:
+    """Words for a loss that is off by a relative error."""
+    if abs(error) < TOLD_FROM:
+        return f"as much, within {100.0 * TOLD_FROM:g} %, as"
+    if error > 1.0:
+        return f"{1.0 + error:.2g} times as much as"
+    return f"{100.0 * abs(error):.2g} % {'more' if error > 0.0 else 'less'} than"

@@ -200,7 +200,7 @@ def test_the_error_of_the_grid_is_larger_where_the_pressure_has_steps():
     assert stepped[0] == pytest.approx(reliability.STEPS * 64**-1.5)
 
 
-@pytest.mark.doubtful("in the corner")
+@pytest.mark.doubtful("in the corner", "the section squeeze")
 def test_a_doubtful_run_warns_with_the_fix():
     scene = STRIP.replace(LITTLE | COARSE)
     with pytest.warns(jb.DoubtfulWarning, match=r"off by about \d+ %: few nodes do .*end_size"):
@@ -236,9 +236,8 @@ def relative_error(run, times=6):
     ("load", "nodes"), [(1.0, 65), pytest.param(0.1, 129, marks=pytest.mark.slow), (0.02, 257)]
 )
 def test_elements_are_halved_until_the_tolerance_is_kept(load, nodes):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", jb.DoubtfulWarning)
-        run = jb.solve(SQUEEZE.replace({"load.amplitude": load}))
+    run = jb.solve(SQUEEZE.replace({"load.amplitude": load}), throw=False)
+    assert not any("elements" in doubt for doubt in run.doubts)
     assert run.x.size == run.scene.model.nodes == nodes
     assert relative_error(run) <= float(run.dissipation_error) < run.scene.model.tolerance
     assert ("halving the elements" in str(run)) == (nodes > 65)
@@ -256,15 +255,15 @@ def test_without_friction_nothing_is_refined():
     assert jb.solve(jb.Scene().replace({"contact.friction": 0.0}), throw=False).change is None
 
 
-@pytest.mark.doubtful("few nodes do the slipping, and halving the elements changed the loop")
 def test_a_refined_run_that_misses_its_tolerance_is_doubted(tmp_path):
-    run = jb.solve(SQUEEZE.replace({"load.amplitude": 0.006}))
+    run = jb.solve(SQUEEZE.replace({"load.amplitude": 0.006}), throw=False)
     assert run.scene.model.tolerance < float(run.change) <= float(run.dissipation_error)
     assert relative_error(run) < float(run.change)
     run.save(tmp_path / "run.npz")
     again = jb.read_history(tmp_path / "run.npz")
     assert again.dissipation_error == run.dissipation_error
-    assert len(again.doubts) == len(run.doubts) == 1
+    assert len(again.doubts) == len(run.doubts) == 2  # of the grid, and of the section
+    assert "few nodes do the slipping, and halving the elements changed the loop" in run.doubts[0]
 
 
 @pytest.mark.slow

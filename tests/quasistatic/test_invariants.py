@@ -13,9 +13,9 @@ from toy import STRIP
 import jbeamshell as jb
 from jbeamshell.quasistatic.system import System
 
-# Random strips on 41 nodes: what slips may be a corner, or nothing.
+# Random beamshells on 41 nodes: what slips may be a corner, or nothing.
 pytestmark = pytest.mark.doubtful(
-    "within a load step", "few nodes", "in the corner", "single nodes", "nothing slips"
+    "within a load step", "few nodes", "in the corner", "single nodes", "nothing slips", "section"
 )
 
 # One compiled shape for all that cycles; linear kinematics, for which scalings are exact.

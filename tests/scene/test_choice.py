@@ -111,6 +111,7 @@ def test_linear_load_steps_keep_their_fields():
     assert scene.replace({"model.solution": "stepwise"}).model.fields == ("v", "beta", "psi")
 
 
+@pytest.mark.doubtful("the section squeeze")
 def test_load_steps_lift_as_the_contact_line_does():
     """Kept down, this strip would dissipate 5 % less, and as much with sliders of alpha G/H."""
     thick = {"strip.height_ratio": 0.35, "contact.friction": 0.4, "load.amplitude": 2.0}

@@ -59,6 +59,7 @@ def test_a_rung_and_what_it_stands_for_may_not_disagree():
     assert general_rung(scene_from_values(merged).model.rung) == "p2"
 
 
+@pytest.mark.doubtful("the section bar")
 def test_the_bar_is_the_cubic_law():
     history = jb.solve(on("bar"))
     assert float(history.dissipation_ratio) == pytest.approx(1.0, rel=1e-12)
@@ -115,6 +116,7 @@ def test_one_backbone_is_worse_than_two():
     assert 3.0 * two < one < 0.05
 
 
+@pytest.mark.doubtful("the section bar")
 @pytest.mark.parametrize("rung", ["bar", pytest.param("masing", marks=pytest.mark.slow)])
 def test_gradients_pass_through(rung):
     def dissipation(mu):

@@ -17,7 +17,9 @@ def test_every_kind_has_curves_that_rise_with_less_slip():
         for sections in entries.values():
             for curve in sections.values():
                 assert np.all(np.diff(curve["slip_over_H"]) > 0.0)
-                assert np.all(np.diff(curve["largest"]) <= 0.0)
+                for size in ("usual", "largest"):
+                    assert np.all(np.diff(curve[size]) <= 0.0)
+                assert np.all(np.array(curve["usual"]) <= curve["largest"])
                 assert np.all(np.abs(curve["typical"]) <= curve["largest"])
 
 
@@ -46,12 +48,37 @@ def test_it_is_told_in_words():
     assert "load.entry" not in str(jb.solve(library.receding()))
 
 
+@pytest.mark.parametrize("section", ["bar", "shell", "squeeze", "p3"])
+def test_a_section_that_the_user_names_is_doubted_where_slip_is_short(section):
+    """The doubt says the size and the fix, which leaves none; much slip is never doubted."""
+    little, much = (
+        jb.Scene().replace({"model.rung": section, "load.amplitude": load} | change)
+        for load, change in (
+            (0.2, {}),
+            (1.8, {"strip.height_ratio": 0.03, "model.tolerance": 0.05}),
+        )
+    )
+    with pytest.warns(jb.DoubtfulWarning, match=f"section {section} typically loses .* elasticity"):
+        history = jb.solve(little)
+    (doubt,) = (doubt for doubt in history.doubts if section in doubt)
+    assert "leave model.rung open, or take model.rung = plane" in doubt
+    assert section in jb.solve(much, throw=False).scene.model.rung
+    assert not any("typically" in doubt for doubt in jb.solve(much, throw=False).doubts)
+    assert jb.solve(little.replace({"model.rung": "auto"})).doubts == ()
+
+
+def test_a_section_that_is_left_open_is_not_doubted_for_its_section():
+    """It climbs by itself; where elasticity cannot stand for it, the tolerance is to itself."""
+    turning = jb.Scene().replace({"model.kinematics": "exact", "load.amplitude": 0.3})
+    assert not any("typically" in doubt for doubt in jb.solve(turning, throw=False).doubts)
+
+
 @pytest.mark.parametrize(
     "values",
     [
         {"model.rung": "plane"},
-        {"model.rung": "bar"},
         {"contact.normal": "compliant"},
+        {"contact.smoothing": 16.0},
     ],
 )
 def test_there_is_none_where_none_was_recorded(values):
