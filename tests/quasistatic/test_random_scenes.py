@@ -39,7 +39,9 @@ def check(history, steady=1e-6):
 
 
 @pytest.mark.parametrize("smoothing", ["sharp", pytest.param(16.0, marks=pytest.mark.slow)])
-@pytest.mark.doubtful("in the corner", "few nodes", "single nodes", "nothing slips", "lock", "the section squeeze")
+@pytest.mark.doubtful(
+    "in the corner", "few nodes", "single nodes", "nothing slips", "lock", "the section squeeze"
+)
 def test_random_strips_converge_and_obey_friction(smoothing):
     random = np.random.default_rng(11)
     base = STRIP.replace(SMALL | {"contact.smoothing": smoothing})
