@@ -85,6 +85,7 @@ def picture(fits: list[identify.Fit], record: dict) -> plt.Figure:
         figure, axes = plt.subplots(1, 3, figsize=(13.0, 4.2), layout="constrained")
         for fit in fits:
             fit.plot(axes[0])
+        axes[0].get_legend().remove()
         axes[0].set_title(rf"single loops of $\eta$ = {SHOWN:g}, fitted by the plain call")
         for axis, key, symbol in zip(axes[1:], FREE, SYMBOLS, strict=True):
             for name, marker in zip(MODELS, "os", strict=True):
@@ -93,8 +94,9 @@ def picture(fits: list[identify.Fit], record: dict) -> plt.Figure:
                     for loads in record[name].values()
                     for load, figures in ((float(a), one) for a, one in loads.items())
                 ]
-                axis.loglog(*np.transpose(rows), marker, label=name, alpha=0.7)
+                axis.semilogy(*np.transpose(rows), marker, label=name, alpha=0.7)
             axis.axhline(0.01, color="0.6", lw=0.8)
+            axis.set_xticks([load / 2.0 for load in LOADS])
             axis.set(xlabel="load over gross slip  [1]", ylabel=f"bias of {symbol}  [1]")
             axis.set_title(f"{symbol} from one loop, height ratios .03 to .4")
         axes[1].legend()

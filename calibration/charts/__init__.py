@@ -12,3 +12,4 @@ from calibration.charts import ladder as ladder
 from calibration.charts import methods as methods
 from calibration.charts import settings as settings
 from calibration.charts import speed as speed
+from calibration.charts import work_precision as work_precision

@@ -1,6 +1,7 @@
 """Parameters of a scene from measurements: least squares on the response, with uncertainty.
 
-`fit` searches, and its `Fit` holds the values with their uncertainty.  `profile` computes the
+`fit` searches, and its `Fit` holds the values with their uncertainty.  `fit_each` makes many fits,
+each on its own, and `bootstrap` those of copies of one.  `profile` computes the
 confidence interval of one parameter by running the model.  `posterior` is a density for samplers
 of other libraries.  `read_plan` reads a study from a file.  `compare` fits several laws of a joint
 to one target; `Driven` is such a law in place of a scene, driven by force or displacement.
@@ -11,6 +12,9 @@ from jbeamshell.identify.assembly import Assembly as Assembly
 from jbeamshell.identify.assembly import jointed as jointed
 from jbeamshell.identify.comparison import Comparison as Comparison
 from jbeamshell.identify.comparison import compare as compare
+from jbeamshell.identify.each import Fits as Fits
+from jbeamshell.identify.each import bootstrap as bootstrap
+from jbeamshell.identify.each import fit_each as fit_each
 from jbeamshell.identify.fitting import MAX_ITERATIONS as MAX_ITERATIONS
 from jbeamshell.identify.fitting import METHODS as METHODS
 from jbeamshell.identify.fitting import FitProgress as FitProgress

@@ -226,8 +226,9 @@ class Experiment:
             self._compiled.add(call)
         rest = [place for place in range(len(self._runs)) if place not in done]
         pool = ThreadPoolExecutor(os.cpu_count())
+        run_all = pool.map if len(rest) > 1 else map
         try:
-            done |= dict(zip(rest, pool.map(one, rest), strict=True))
+            done |= dict(zip(rest, run_all(one, rest), strict=True))
         finally:
             pool.shutdown(cancel_futures=True)
         return [done[place] for place in range(len(self._runs))]

@@ -141,7 +141,7 @@ class TestHistory:
         assert again.scene.model.rung == "condensed-p2"
         np.testing.assert_array_equal(again.fields, exact.fields)
 
-    @pytest.mark.doubtful("few nodes", "in the corner", "single nodes")
+    @pytest.mark.doubtful("few nodes", "in the corner", "single nodes", "the section squeeze")
     def test_a_laminate_that_lifts_while_its_end_is_moved(self):
         moved = {"load.control": "displacement", "load.amplitude": 4e-5}
         rough = {"contact.friction": 0.4, "contact.pressure": 2.5}

@@ -1,6 +1,7 @@
 """The model against plane-strain finite elements, without calibration."""
 
 import csv
+import json
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +10,7 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from jbeamshell.measured.example import data_folder
+from jbeamshell.measured.example import data_folder, example_loops
 from jbeamshell.quasistatic.stepping import Method
 
 # Dissipation over that of finite elements by fields: eta, then A = .3247, .5851, 1.0, 1.6, from an
@@ -92,6 +93,26 @@ def test_dissipation_reproduces_the_prototype(fields, squeeze):
     digits = np.where(expected >= 10, 0.5, np.where(expected >= 3, 0.05, 0.005))
     allowed = np.where(expected < 1.2, 0.01, 0.05) * expected + digits * (expected > 1.2)
     assert np.all(np.abs(ratio / truth - expected) < allowed)
+
+
+def test_a_plain_fit_finds_the_friction_and_the_height_that_made_a_loop():
+    """At a fifth of gross slip, where the beamshell's friction is off by factors in thick strips."""
+    (loop,) = example_loops(0.2358, (0.4359,))
+    start = {"load.entry": "traction", "contact.friction": 0.12, "strip.height_ratio": 0.28}
+    keys = ("contact.friction", "strip.height_ratio")
+    fit = jb.identify.fit(loop, jb.Scene().replace(start), keys, points=48)
+    np.testing.assert_allclose([fit.values[key] for key in keys], [0.1, 0.2358], rtol=0.002)
+
+
+def test_the_record_of_fits_says_so_for_all_loops():
+    record = json.loads((data_folder().parent / "fitted_finite_elements.json").read_text())
+    plain = [own for loads in record["fits"]["plain call"].values() for own in loads.values()]
+    friction, height = np.abs([list(own["relative_bias"].values()) for own in plain]).T
+    assert len(plain) == 15
+    assert friction.max() < 0.002
+    assert height.max() < 0.02
+    assert np.sum(height < 0.01) >= 13
+    assert all(own["status"] == "converged" for own in plain)
 
 
 def test_first_loading_follows_the_finite_element_backbone():

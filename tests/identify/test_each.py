@@ -1,0 +1,78 @@
+"""Many fits, each on its own: planted values, bootstrap copies beside intervals, bad input."""
+
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import identify
+from jbeamshell.measured.loops import make_loop
+
+MU, ETA = "contact.friction", "strip.height_ratio"
+START = jb.Scene().replace({"load.entry": "traction", "model.nodes": 33, "model.rung": "plane"})
+PLANTED = {MU: [0.08, 0.1, 0.14], ETA: [0.2, 0.25, 0.3]}
+POINTS = 32
+NOISE = 2e-3  # of the range
+
+
+def loop_of(mu, eta, seed=0, noise=0.0):
+    """Loop of a strip with noise on the displacement."""
+    history = jb.solve(START.replace({MU: mu, ETA: eta, "load.amplitude": 10.0 * mu}), throw=False)
+    force, displacement = map(np.asarray, history.loop)
+    random = np.random.default_rng(seed)
+    return make_loop(
+        force, displacement + noise * np.ptp(displacement) * random.normal(size=force.size)
+    )
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    start = START.replace({MU: 0.12, ETA: 0.22})
+    loop = loop_of(0.1, 0.25, 3, NOISE)
+    return identify.fit(loop, start, [MU, ETA], points=POINTS, unchecked=True)
+
+
+def test_planted_values_come_back_one_by_one():
+    loops = [loop_of(mu, eta) for mu, eta in zip(*PLANTED.values(), strict=True)]
+    seen = []
+    fits = identify.fit_each(
+        loops,
+        START.replace({MU: 0.12, ETA: 0.22}),
+        [MU, ETA],
+        points=POINTS,
+        progress=lambda *now: seen.append(now),
+    )
+    assert fits.converged.all()
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+    for key, planted in PLANTED.items():
+        np.testing.assert_allclose(fits.values[key], planted, rtol=2e-4)
+    alone = identify.fit(loops[1], START.replace({MU: 0.12, ETA: 0.22}), [MU, ETA], points=POINTS)
+    assert fits.values[MU][1] == pytest.approx(alone.values[MU], rel=1e-9)
+    assert fits.errors[MU][1] == pytest.approx(alone.errors[MU], rel=1e-6)
+    assert "3 fits, 3 converged" in str(fits)
+
+
+def test_bootstrap_copies_spread_as_the_standard_error_says(noisy):
+    """Under white noise and a model that is right, both tell the same spread and the truth."""
+    copies = identify.bootstrap(noisy, 40)
+    assert copies.converged.all()
+    for key, truth in ((MU, 0.1), (ETA, 0.25)):
+        spread = np.std(copies.values[key])
+        assert spread == pytest.approx(noisy.errors[key], rel=0.5)
+        assert abs(noisy.values[key] - truth) < 4.0 * spread
+        low, high = copies.intervals()[key]
+        assert low < noisy.values[key] < high
+    again = identify.bootstrap(noisy, 3)
+    np.testing.assert_array_equal(again.values[MU], copies.values[MU][:3])
+
+
+def test_bad_input_names_the_fit(noisy):
+    loop = loop_of(0.1, 0.25)
+    with pytest.raises(jb.InputError, match="data"):
+        identify.fit_each([], START, [MU])
+    beyond = make_loop(*(3.0 * np.asarray(column) for column in (loop.force, loop.displacement)))
+    with pytest.raises(jb.InputError, match=r"fit 2 of 2: .*gross slip"):
+        identify.fit_each([loop, beyond], START, [MU], points=POINTS)
+    with pytest.raises(jb.InputError, match="copies"):
+        identify.bootstrap(noisy, 1)
+    with pytest.raises(jb.InputError, match="was not made by fit"):
+        identify.bootstrap(noisy._replace(problem=None), 5)
