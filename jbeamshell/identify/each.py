@@ -168,7 +168,7 @@ def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
 
     Each copy is the fitted response with residuals that are drawn in blocks along the curve, so
     that neighbours stay as correlated as they are (Kunsch, Ann. Stat. 17, 1989).  The spread of the
-    values holds what residuals and a response that is not linear make of it.
+    values holds what residuals make of them, and not what the model's grid may leave.
 
     Parameters
     ----------

@@ -143,6 +143,15 @@ class Experiment:
         known = np.repeat([noise_of(m) is not None for m in self.measurements], sizes)
         self.relative = np.where(known, 1.0 / (self.weight * spans), noise or 1.0)
 
+    @property
+    def model_error(self) -> float:
+        """Size of what the strips' own grids may leave in a residual; 0 for other models."""
+        left = np.zeros(self.weight.size)
+        for rows, (observation, scene) in zip(self.slices, self._runs, strict=True):
+            if isinstance(scene, Scene):
+                left[rows] = observation.own_error * scene.model.tolerance
+        return float(np.sqrt(np.mean((left / self.relative) ** 2)))
+
     def __call__(
         self, keys: tuple[str, ...], table: NDArray[np.float64], solver: Newton
     ) -> Prediction:

@@ -66,6 +66,7 @@ class Observation(eqx.Module):
     weight: Array
     length_step: ClassVar[int] = 1  # the number of points is filled up to a multiple of this
     figures: ClassVar[tuple[str, ...]] = ()  # of a History that are compared
+    own_error: ClassVar[float] = 0.0  # of the range, over the model's tolerance
 
     @property
     def span(self) -> float:
@@ -119,6 +120,7 @@ class LoopObservation(Observation):
     free_zero: bool = eqx.field(static=True)
     length_step: ClassVar[int] = LENGTH_STEP
     figures: ClassVar[tuple[str, ...]] = ("force", "displacement")
+    own_error: ClassVar[float] = 0.1  # measured on loops of finite elements: .02 to .06
 
     @classmethod
     def of(cls, loop: Loop, scene: Model) -> LoopObservation:
@@ -265,6 +267,7 @@ class AmplitudeObservation(LogObservation):
     amplitude: Array
     figure: Array
     figures: ClassVar[tuple[str, ...]] = tuple(FIGURES.values())
+    own_error: ClassVar[float] = 0.5
 
     @classmethod
     def of(cls, curve: AmplitudeCurve, scene: Model) -> AmplitudeObservation:

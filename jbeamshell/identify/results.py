@@ -241,6 +241,7 @@ def fit_at(
         relative=experiment.relative,
         slices=experiment.slices,
         noisy=experiment.noisy,
+        model_error=experiment.model_error,
     )
     plain = best.residual[:rows] / experiment.emphasis
     relative = plain * experiment.relative

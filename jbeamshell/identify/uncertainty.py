@@ -3,7 +3,8 @@
 All follow from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where
 most parameters are logarithms.  The parameters' bijections map them to values.  Where the residuals
 are correlated, or more than measured noise, the model is wrong in some way: their variance is then
-that of the few independent points they are worth, see `jbeamshell.identify.model_error`.
+that of the few independent points they are worth, see `jbeamshell.identify.model_error`.  It is
+never less than what the model's own grid may leave.
 """
 
 from __future__ import annotations
@@ -182,6 +183,7 @@ def uncertainty_of(
     relative: NDArray[np.float64],
     slices: Sequence[slice],
     noisy: bool,
+    model_error: float = 0.0,
 ) -> Uncertainty:
     """Uncertainty from the residuals at a minimum.
 
@@ -194,6 +196,7 @@ def uncertainty_of(
     relative : factors of the same rows from residuals to parts of the range
     slices : rows of each measurement
     noisy : True if the residuals are in units of measured noise
+    model_error : size of what the model's own grid may leave in a residual, smooth along a curve
     """
     values = space.values(point)
     pairs = zip(space.bijections, values.tolist(), strict=True)
@@ -220,6 +223,7 @@ def uncertainty_of(
         sigma = max(sigma, 1.0)
         if explained and independent == left.size:
             sigma, freedom = 1.0, None
+    sigma = max(sigma, model_error * float(np.sqrt(left.size / min(independent, FEWEST))))
     factors = np.append(emphasis, priors / sigma)
     if np.any(factors != 1.0):
         # Sandwich estimator: the factors change the minimum, not the noise; priors keep theirs.
