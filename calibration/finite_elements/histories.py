@@ -19,6 +19,7 @@ from calibration.finite_elements.results import Printed
 from calibration.finite_elements.sections import fitted, section_forces
 from jbeamshell.common.errors import Status
 from jbeamshell.history.history import History
+from jbeamshell.history.record import Above
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
@@ -104,9 +105,12 @@ def make_history(
         load=jnp.asarray(load),
         force=whole(force),
         displacement=whole(displacement),
-        fields=whole(np.stack([v, w, beta, psi], axis=-1)),
+        contact_v=whole(v),
+        above=Above(
+            whole(np.stack([v, w, beta, psi], axis=-1)),
+            Strains(*map(whole, section_forces(scene, mesh, u))),
+        ),
         gap=whole(w),
-        sections=Strains(*map(whole, section_forces(scene, mesh, u))),
         traction=whole(contact.traction),
         reaction=whole(contact.reaction),
         slipping=jnp.asarray(slipping),

@@ -11,11 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.checks import is_staged, is_traced, require
 from jbeamshell.common.errors import Status
 from jbeamshell.common.failed import nan_unless
-from jbeamshell.common.precision import in_double
+from jbeamshell.common.precision import in_double, is_single
 from jbeamshell.common.small import Small
+from jbeamshell.condensed.above import Movement, Unread
 from jbeamshell.condensed.bearings import bearing_energy, with_bearings, with_gaps
 from jbeamshell.condensed.branches import pressed
 from jbeamshell.condensed.drives import (
@@ -29,9 +30,8 @@ from jbeamshell.condensed.events import walk
 from jbeamshell.condensed.kept import kept
 from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
 from jbeamshell.condensed.stretch import Level
-from jbeamshell.condensed.strip import Strip, condensed, moved_by, spring_stiffness, stays_flat
+from jbeamshell.condensed.strip import Strip, condensed, spring_stiffness, stays_flat
 from jbeamshell.history.history import History
-from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.parts import Load
 from jbeamshell.scene.rungs import general_rung
@@ -43,7 +43,6 @@ LIFTING = 0.125  # of the nodes, that most often lift off at the loaded end
 NESTED_FROM = 6  # order of a section from which on no point reaction disturbs the corner's slip
 
 
-@in_double
 def solve(
     scene: Scene,
     path: LoadPath,
@@ -59,7 +58,8 @@ def solve(
     in the load, so that load steps only say where the path is looked at.  Friction is Coulomb's,
     without elastic slip if contact.stick_stiffness is 1000 or more; contact is unilateral.
     Nodes are those of the load steps of the same section; plane elasticity resolves singular
-    stresses at the loaded corner to 1e-4 H.
+    stresses at the loaded corner to 1e-4 H.  Fields above the contact are found when they are read
+    first, because that takes twice as long as the walk.
 
     Parameters
     ----------
@@ -84,6 +84,21 @@ def solve(
         if the pressures lift the strip or change along the path, or if loads act on a strip without
         a foundation
     """
+    now = is_traced(scene, path, strip) or is_staged() or is_single(scene)
+    return _solved(scene, path, cycles, by, own, strip, now)
+
+
+@in_double
+def _solved(
+    scene: Scene,
+    path: LoadPath,
+    cycles: Cycles,
+    by: Search,
+    own: bool,
+    strip: Strip | None,
+    now: bool,
+) -> History:
+    """History, whose fields above the contact are found now or when they are read."""
     before = scene.load.pressure_steps
     whole = is_traced(path.pressure) or bool(np.all(np.asarray(path.pressure)[before:] == 1.0))
     rung = scene.model.rung
@@ -103,8 +118,10 @@ def solve(
     soft = not scene.ideal_friction
     known = isinstance(turns, tuple)
     given = (scene, strip, targets, () if known else turns)
-    history: History = _walk(given, turns if known else (), cycles, by, soft)
-    return history.but(scene=scene)
+    history, movement = _walk(given, turns if known else (), cycles, by, soft)
+    above = Unread(strip, movement)
+    found: History = history.but(scene=scene, above=above.found if now else above)
+    return found
 
 
 def quickest(scene: Scene) -> Search:
@@ -169,8 +186,10 @@ def _walk(
     cycles: Cycles,
     by: Search,
     soft: bool,
-) -> History:
-    """History, without its scene, of a strip pressed down and loaded along targets; see `solve`.
+) -> tuple[History, Movement]:
+    """History of a strip pressed down and loaded along targets; see `solve`.
+
+    It is without its scene and the fields above the contact, which follow from the movement.
 
     Parameters
     ----------
@@ -180,8 +199,9 @@ def _walk(
     scene, strip, targets, traced = given
     turns = known if isinstance(traced, tuple) else traced
     found = _levels(scene, strip, targets, turns, by, soft)
+    history, movement = _history(scene, strip, found, cycles, soft)
     # The scene's numbers would be copied, and they would no longer tell ideal sliders.
-    return _history(scene, strip, found, cycles, soft).but(scene=None)
+    return history.but(scene=None), movement
 
 
 def _levels(
@@ -221,8 +241,10 @@ def _levels(
     return found._replace(state=state, settled=found.settled & sound)
 
 
-def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bool) -> History:
-    """History of the levels after the pressing, whose steps come first."""
+def _history(
+    scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bool
+) -> tuple[History, Movement]:
+    """History of the levels after the pressing, whose steps come first, and the movement."""
     body, state = strip.body, levels.state
     before = scene.load.pressure_steps
     n, k, steps = strip.x.size, body.f_t.size, before + state.force.size
@@ -245,13 +267,6 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     at_rest = jnp.concatenate([at_rest, jnp.array([0.0, 1.0])])
     change = jnp.stack([along(state.v), risen], axis=2).reshape(steps, 2 * n)
     change = jnp.pad(jnp.concatenate([change, force[:, None]], axis=1), ((0, 0), (0, 1)))
-    pressed, loaded = moved_by(strip.pressed, at_rest[None]), moved_by(strip.loaded, change)
-    moved, below = (
-        None if one is None or other is None else one * part + other
-        for one, other in zip(pressed, loaded, strict=True)
-    )
-    assert moved is not None
-    further, sections = _sections(strip, moved)
     reaction = along(state.r_n[:, :n]) / strip.tributary
     reaction = reaction + pressing * body.r_0[::-1] / strip.tributary
     traction = -along(state.r_t) / strip.tributary
@@ -272,7 +287,8 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
     def masked(values: Array) -> Array:
         return nan_unless(sound, values)
 
-    return History(
+    movement = Movement(at_rest, change, part, sound)
+    history = History(
         scene=scene,
         x=strip.x,
         middles=0.5 * (strip.x[1:] + strip.x[:-1]),
@@ -280,9 +296,9 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
         load=strip.load,
         force=masked(force),
         displacement=masked(every(state.displacement)),
-        fields=masked(jnp.concatenate([moved[:2].T, further], axis=-1)),
+        contact_v=masked(part[:, None] * at_rest[:-2:2] + change[:, :-2:2]),
+        above=None,
         gap=masked(w),
-        sections=jax.tree.map(masked, sections),
         traction=masked(traction),
         reaction=masked(reaction),
         slipping=slipping,
@@ -295,33 +311,5 @@ def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bo
         status=jnp.append(jnp.full(before, Status.CONVERGED), status),
         cycles=cycles,
         target=masked(every(driven)),
-        member=None if below is None else masked(_seen_from_above(strip, below)),
     )
-
-
-def _seen_from_above(strip: Strip, moved: Array) -> Array:
-    """Fields v, w, beta, psi, ... (steps, n, k) of the member below, as the strip sees them."""
-    assert strip.loaded.pair is not None
-    further = jnp.tensordot(strip.loaded.pair.form.further, moved, 1)
-    turned = jnp.asarray([1.0, -1.0, -1.0])  # w and beta count the other way from below
-    seen = jnp.concatenate([moved[:2], further])
-    return seen.at[:3].multiply(turned[:, None, None]).T
-
-
-def _sections(strip: Strip, moved: Array) -> tuple[Array, Strains]:
-    """Further fields (steps, n, k), and N, Q, M, chi and xi of every element, (steps, elements).
-
-    Parameters
-    ----------
-    moved : fields (m, n, steps) of the section's form
-    """
-    form = strip.form
-    values, slopes = form.modes[:, 0], form.modes[:, 1]
-    on_mean = values @ form.values + slopes @ form.mixed.T
-    on_slope = values @ form.mixed + slopes @ form.slopes
-    rows = jnp.concatenate([on_mean, on_slope, form.further])
-    found = jnp.moveaxis(jnp.tensordot(rows, moved, 1), 2, 1)  # (rows, steps, n)
-    mean, slope, further = jnp.split(found, [len(on_mean), 2 * len(on_mean)])
-    between = jnp.diff(slope, axis=2) / jnp.diff(strip.x)
-    forces = 0.5 * (mean[..., 1:] + mean[..., :-1]) + between
-    return jnp.moveaxis(further, 0, 2), Strains(*forces)
+    return history, movement

@@ -81,7 +81,8 @@ class History(Profiles, ContactLine, CycleFigures):
         turned = self.scene.load.kind == "moment"  # which no bar can be
         of_cycle = [name for name in FIGURES if not (turned and name == "dissipation_ratio")]
         names = (*(of_cycle if self.cycles else ()), *self._contact_figures)
-        values = {name: float(value) for name, value in _last_values(self, names).items()}
+        read = self.but(above=self.above.found)
+        values = {name: float(value) for name, value in _last_values(read, names).items()}
         figures: dict[str, Any] = {k: v if np.isfinite(v) else None for k, v in values.items()}
         figures["newton_iterations"] = int(np.sum(np.asarray(self.iterations)))
         figures["status"] = worst.name.lower()

@@ -62,7 +62,8 @@ class Profiles(Record):
     @property
     def tip_deflection(self) -> Array:
         """Height of the bottom face at X = L over that at X = 0, (steps+1,), length."""
-        height = self.gap if self.member is None else self.w
+        alone = self.scene.member.support == "none"
+        height = self.gap if alone else self.w
         return height[:, -1] - height[:, 0]
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import equinox as eqx
 from jax import Array
@@ -10,6 +10,24 @@ from jax import Array
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.scene.scene import Scene
+
+
+class Above(NamedTuple):
+    """Fields above the contact line at every step.
+
+    Attributes
+    ----------
+    fields, sections, member : see `Record`
+    """
+
+    fields: Array
+    sections: Strains
+    member: Array | None = None
+
+    @property
+    def found(self) -> Self:
+        """The same."""
+        return self
 
 
 class Record(Tree):
@@ -27,6 +45,9 @@ class Record(Tree):
     load : (n,) nodal forces of the whole pressure on the top face
     force : (steps+1,) end force F
     displacement : (steps+1,) mid-height displacement u(L) since the pressure, conjugate to F
+    contact_v : (steps+1, n) tangential displacement of the contact, relative to the second member
+        if there is one
+    above : `Above`, or what has one as ``found``, when somebody reads a field
     fields : (steps+1, n, m) v, w, beta, psi, and those of a hierarchic section
     gap : (steps+1, n) height of the strip's bottom face over what it lies on
     sections : (steps+1, elements) section forces N, Q, M, chi and xi in the places of e, g, k, psi
@@ -57,9 +78,9 @@ class Record(Tree):
     load: Array
     force: Array
     displacement: Array
-    fields: Array
+    contact_v: Array
+    above: Any
     gap: Array
-    sections: Strains
     traction: Array
     reaction: Array
     slipping: Array
@@ -73,7 +94,6 @@ class Record(Tree):
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
     target: Array | None = None
     end: Any = None
-    member: Array | None = None
     change: Array | None = None
 
     @property
@@ -82,7 +102,19 @@ class Record(Tree):
         return self.scene.load.pressure_steps - 1
 
     @property
-    def contact_v(self) -> Array:
-        """Tangential displacement of the contact, to the second member if there is one."""
-        v = self.fields[..., 0]
-        return v if self.member is None else v - self.member[..., 0]
+    def fields(self) -> Array:
+        """Fields v, w, beta, psi, and those of a hierarchic section, (steps+1, n, m)."""
+        fields: Array = self.above.found.fields
+        return fields
+
+    @property
+    def sections(self) -> Strains:
+        """Section forces in the places of their strains, (steps+1, elements) each."""
+        sections: Strains = self.above.found.sections
+        return sections
+
+    @property
+    def member(self) -> Array | None:
+        """Fields of the second member of a lap joint, (steps+1, n, m); None on a rigid base."""
+        member: Array | None = self.above.found.member
+        return member

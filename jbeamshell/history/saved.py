@@ -20,7 +20,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.files import as_path
 from jbeamshell.scene.toml import scene_to_toml
 
-FORMAT = "jbeamshell history 4"
+FORMAT = "jbeamshell history 5"
 
 
 def write_history(history: Any, path: str | os.PathLike[str]) -> None:
@@ -57,5 +57,5 @@ def named_arrays(history: Any) -> list[tuple[str, Any]]:
 
 
 def without_scene(history: Any) -> Any:
-    """Copy of a history with None as its scene."""
-    return dataclasses.replace(history, scene=None)
+    """Copy of a history with None as its scene, and its fields above the contact as arrays."""
+    return dataclasses.replace(history, scene=None, above=history.above.found)

@@ -21,7 +21,7 @@ from jbeamshell.common.progress import counting
 from jbeamshell.common.summary import Summary
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.identify.experiment import Experiment
-from jbeamshell.identify.fitting import MAX_ITERATIONS, POINTS
+from jbeamshell.identify.fitting import MAX_ITERATIONS, POINTS, check_start
 from jbeamshell.identify.models import Model
 from jbeamshell.identify.parameters import Parameter, as_parameters
 from jbeamshell.identify.problem import Problem
@@ -101,7 +101,8 @@ def fit_each(
 
     Parameters
     ----------
-    data : measurements of one kind, or a list of measurements for each fit
+    data : measurements of one kind, or a list of measurements for each fit; loops are not
+        inspected, see `jbeamshell.inspect`
     scene : start values of every fit, and all values that stay fixed
     free : what to fit, see `fit`
     noise, points, max_iterations, tolerance : see `fit`
@@ -116,6 +117,8 @@ def fit_each(
     ------
     InputError
         if there are no data, or if a fit cannot be made; it names the fit
+    UnconvergedError
+        if the model finds no equilibrium at the start
 
     Examples
     --------
@@ -157,6 +160,7 @@ def fit_each(
 
 def _searched(problem: Problem, space: SearchSpace, stopping: StoppingRule) -> Fit:
     """Fit of one search from the start."""
+    check_start(problem, space)
     at_noise = problem.experiment.weight.size if problem.experiment.noisy else 0
     rule = stopping._replace(noise_cost=at_noise)
     end = minimise(lambda point: problem(space, point), np.zeros(len(space.names)), rule)

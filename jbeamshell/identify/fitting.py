@@ -265,7 +265,7 @@ def _search(
     progress: Callable[[FitProgress], None],
 ) -> list[SearchResult]:
     """Ends of the searches from all starts, the best first."""
-    _check_start(problem, space)
+    check_start(problem, space)
     first = np.zeros(len(space.names))
     if method == "adam":
         report = _Monitor(space, 1, stopping.max_iterations + ADAM_STEPS, progress)
@@ -283,7 +283,7 @@ def _search(
     return sorted(ends, key=lambda end: problem(space, end.point).cost)
 
 
-def _check_start(problem: Problem, space: SearchSpace) -> None:
+def check_start(problem: Problem, space: SearchSpace) -> None:
     """Raise unless the model has an equilibrium at the start, and every parameter an influence."""
     start = problem(space, np.zeros(len(space.names)))
     if not start.converged:

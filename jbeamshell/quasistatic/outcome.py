@@ -13,6 +13,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.history.history import History
+from jbeamshell.history.record import Above
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.path_state import StepResults
 from jbeamshell.quasistatic.system import System
@@ -69,6 +70,7 @@ def history_of(scene: Scene, steps: StepResults, pressure: Array) -> History:
     def masked(values: Array) -> Array:
         return nan_unless(converged, values)
 
+    forces = jax.vmap(system.section_forces)(level.q)
     return History(
         scene=scene,
         x=system.x,
@@ -77,9 +79,9 @@ def history_of(scene: Scene, steps: StepResults, pressure: Array) -> History:
         load=system.load,
         force=masked(level.force),
         displacement=masked(steps.displacement),
-        fields=masked(level.q),
+        contact_v=masked(level.q[..., 0]),
+        above=Above(masked(level.q), jax.tree.map(masked, forces)),
         gap=masked(jax.vmap(system.gap)(level.q)),
-        sections=jax.tree.map(masked, jax.vmap(system.section_forces)(level.q)),
         traction=masked(level.traction),
         reaction=masked(level.reaction),
         slipping=steps.slipping,

@@ -18,6 +18,7 @@ from jbeamshell.common.arrays import read_arrays
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.files import as_path, check_regular
 from jbeamshell.history.history import History
+from jbeamshell.history.record import Above
 from jbeamshell.history.saved import FORMAT, named_arrays, without_scene
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.quasistatic.continuation import PathEnd
@@ -31,7 +32,7 @@ ALONG_PATH = (
     *("force", "displacement", "pressure", "target"),
     *("slip_work", "stored_energy", "sinking", "error"),
 )
-ALONG_BOTH = ("gap", "traction", "reaction")
+ALONG_BOTH = ("contact_v", "gap", "traction", "reaction")
 COUNTS = ("iterations", "status")
 
 
@@ -65,7 +66,7 @@ def read_history(path: str | os.PathLike[str]) -> History:
         if held is None or (held.shape, held.dtype) != (wanted.shape, wanted.dtype):
             raise InputError(f"{path}: {name} is missing or of another shape: save it again")
     converged = np.cumsum(arrays["status"] != Status.CONVERGED) == 0
-    for name in ("force", "displacement", "fields", *ALONG_BOTH):
+    for name in ("force", "displacement", "above.fields", *ALONG_BOTH):
         if not np.all(np.isfinite(arrays[name][converged])):
             raise InputError(f"{path}: {name} holds NaN in a converged step: save it again")
     leaves = [jnp.asarray(arrays[name]) for name, _ in named_arrays(blank)]
@@ -83,18 +84,19 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     steps, elements = len(arrays["force"]), len(arrays["middles"])
     sections: list[Any] = [number((steps, elements))] * len(Strains._fields)
     nodes, width = scene.model.nodes, scene.model.width
+    fields: Any = number((steps, nodes, width))
     shapes: dict[str, Any] = {name: number((steps,)) for name in ALONG_PATH}
     shapes |= {name: count((steps,)) for name in COUNTS}
     shapes |= {name: number((nodes,)) for name in ALONG_X}
     shapes |= {name: number((steps, nodes)) for name in ALONG_BOTH}
     shapes |= {
         "middles": number((elements,)),
-        "fields": number((steps, nodes, width)),
-        "sections": Strains(*sections),
+        "above": Above(fields, Strains(*sections)),
         "slipping": jax.ShapeDtypeStruct((steps, nodes), bool),
     }
     if scene.member.support != "none":
-        shapes["member"] = number((steps, nodes, arrays["member"].shape[-1]))
+        member = number((steps, nodes, arrays["above.member"].shape[-1]))
+        shapes["above"] = shapes["above"]._replace(member=member)
     if "change" in arrays:
         shapes["change"] = number(())
     cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])

@@ -159,7 +159,7 @@ def damaged(path, evil):
     other = io.BytesIO()
     np.savez(other, force=np.arange(9.0))
     flipped = bytearray(good)
-    flipped[len(good) // 2] ^= 255
+    flipped[good.index(displacement.tobytes()) + 9] ^= 255
     return {
         "empty": b"",
         "text": b"force,displacement\n1,2\n",
