@@ -145,10 +145,10 @@ class Experiment:
 
     @property
     def model_error(self) -> float:
-        """Size of what the strips' own grids may leave in a residual; 0 for other models."""
+        """Size of what a grid of plane elasticity may leave in a residual; 0 for other models."""
         left = np.zeros(self.weight.size)
         for rows, (observation, scene) in zip(self.slices, self._runs, strict=True):
-            if isinstance(scene, Scene):
+            if isinstance(scene, Scene) and scene.model.solution == "plane":
                 left[rows] = observation.own_error * scene.model.tolerance
         return float(np.sqrt(np.mean((left / self.relative) ** 2)))
 
