@@ -96,7 +96,7 @@ def test_dissipation_reproduces_the_prototype(fields, squeeze):
 
 
 def test_a_plain_fit_finds_the_friction_and_the_height_that_made_a_loop():
-    """At a fifth of gross slip, where the beamshell's friction is off by factors in thick strips."""
+    """At a fifth of gross slip, where the beamshell's friction is off by factors."""
     (loop,) = example_loops(0.2358, (0.4359,))
     start = {"load.entry": "traction", "contact.friction": 0.12, "strip.height_ratio": 0.28}
     keys = ("contact.friction", "strip.height_ratio")
