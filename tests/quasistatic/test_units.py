@@ -22,6 +22,7 @@ SCENES = {
     "displaced": COARSE | {"load.control": "displacement", "load.amplitude": 2e-5},
     "lap": {"strip.far_end": "free", "member.support": "rolling", "load.amplitude": 1.0},
 }
+ELEMENT = 0.04  # of the lap joint's grid
 FIGURES = ("dissipation", "secant_stiffness", "loss_factor", "dissipation_error", "slip_length")
 
 
@@ -60,5 +61,7 @@ def test_figures_and_estimates_know_no_units(name):
         for figure, one, other in zip(FIGURES, found, known, strict=True):
             # The estimate of a refined run is a small difference of two dissipations.
             error = exact if figure == "dissipation_error" else 0.0
+            if (name, figure) == ("lap", "slip_length"):
+                error = ELEMENT  # a step ends where a node begins to slip: round-off decides
             close = pytest.approx(other, rel=exact, abs=error)
             assert one == close, f"{figure} in units of {length} and {force}"
