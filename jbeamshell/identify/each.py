@@ -56,7 +56,14 @@ class Fits(NamedTuple):
         """Ends between which this part of the converged values lies, by key.
 
         Of bootstrap copies they are a confidence interval.
+
+        Raises
+        ------
+        InputError
+            if no fit converged
         """
+        good = int(np.sum(self.converged))
+        require("converged", good, good > 0, "has no fit to tell from: start closer")
         sides = 0.5 - 0.5 * level, 0.5 + 0.5 * level
         known = {key: values[self.converged] for key, values in self.values.items()}
         return {key: tuple(np.quantile(own, sides).tolist()) for key, own in known.items()}
