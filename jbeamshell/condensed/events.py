@@ -21,9 +21,11 @@ from jaxtyping import PyTree
 from jbeamshell.condensed import abreast, slopes
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import ContactState
-from jbeamshell.condensed.slopes import Trace
+from jbeamshell.condensed.slopes import Slopes, Trace
 from jbeamshell.condensed.stretch import Event, Level, ended, goes_on, moved, next_event
-from jbeamshell.condensed.tableau import System, Tableau, changed, empty, reversed_at
+from jbeamshell.condensed.tableau import STICK, System, Tableau, changed, empty, reversed_at
+
+PARTS = 4  # traces of a level at most
 
 
 class Walk(NamedTuple):
@@ -32,6 +34,14 @@ class Walk(NamedTuple):
     at: Tableau
     event: Event
     trace: Trace | None
+
+
+class Part(NamedTuple):
+    """Part of a level that one trace holds: tableau and level at its end, and their slopes."""
+
+    at: Tableau
+    level: Level
+    change: Slopes
 
 
 def walk(
@@ -227,8 +237,12 @@ def _run(
     turned: Array,
     needed: Array,
     trace: Trace | None,
+    stops: Array,
 ) -> tuple[Tableau, Level, Trace | None]:
-    """Tableau and level at a load, and the trace of the events on the way if one is begun."""
+    """Tableau and level at a load, and the trace of the events on the way if one is begun.
+
+    If it ``stops``, the level is that where the trace is full, and may come before the load.
+    """
     sense = jnp.where(force >= origin.force, 1.0, -1.0)
     tau = jnp.abs(force - origin.force)
 
@@ -241,8 +255,14 @@ def _run(
     at, _ = lax.while_loop(lambda both: both[1], turn, (at, turned & needed))
     done = at.work
 
+    def full(now: Walk) -> Array:
+        # What sticks at once belongs to the event before, and to one trace with it.
+        if now.trace is None:
+            return jnp.asarray(False)
+        return stops & slopes.is_full(now.trace) & (now.event.kind != STICK)
+
     def unfinished(now: Walk) -> Array:
-        return needed & (now.event.tau < tau) & goes_on(now.at, now.event)
+        return needed & (now.event.tau < tau) & goes_on(now.at, now.event) & ~full(now)
 
     def go(now: Walk) -> Walk:
         event, trace = now.event, now.trace
@@ -254,10 +274,12 @@ def _run(
         at = changed(at, event.kind, event.node, system.friction)
         return Walk(at, next_event(at, system.friction), trace)
 
-    at, event, trace = lax.while_loop(
-        unfinished, go, Walk(at, next_event(at, system.friction), trace)
-    )
+    end = lax.while_loop(unfinished, go, Walk(at, next_event(at, system.friction), trace))
+    at, event, trace = end
     if trace is not None:
+        before = full(end) & (event.tau < tau)
+        tau = jnp.where(before, at.tau, tau)
+        force = jnp.where(before, origin.force + sense * tau, force)
         trace = slopes.along(trace, system, at, tau, origin, sense)
     at, level = ended(system, at, event.tau, last, origin, force)
     return at, level._replace(slip_work=level.slip_work - done), trace
@@ -275,7 +297,7 @@ def _next_level(
     needed: Array,
 ) -> tuple[Tableau, Level]:
     """Tableau and level at a load, from the level before and the contact at the reversal."""
-    at, level, _ = _run(system, last, force, at, origin, turned, needed, None)
+    at, level, _ = _run(system, last, force, at, origin, turned, needed, None, jnp.asarray(False))
     return at, level
 
 
@@ -290,20 +312,44 @@ def _next_level_jvp(
     needed: Array,
 ) -> tuple[tuple[Tableau, Level], tuple[Tableau, Level]]:
     (system, last, force), (change, last_change, force_change) = primals, tangents
+    change = System(*(_full(a, b) for a, b in zip(system, change, strict=True)))
+    slip_change, force_change = _full(last.state.v, last_change.state.v), _full(force, force_change)
     k, n = last.state.v.size, last.lift.size
-    begun = slopes.begun(k, n)
-    at, level, trace = _run(system, last, force, at, origin, turned, needed, begun)
-    assert trace is not None
-    found = slopes.level_slopes(
-        system,
-        System(*(_full(a, b) for a, b in zip(system, change, strict=True))),
-        before=(last.state, last.lift),
-        slip_change=_full(last.state.v, last_change.state.v),
-        after=(level.state, level.lift),
-        load_change=_full(force, force_change),
-        at=at,
-        trace=trace,
-    )
+
+    def part(now: Part, turned: Array, stops: Array) -> Part:
+        at, level, trace = _run(
+            system, now.level, force, now.at, origin, turned, needed, slopes.begun(k, n), stops
+        )
+        assert trace is not None
+        whole = level.state.force == force
+        found = slopes.level_slopes(
+            system,
+            change,
+            before=(now.level.state, now.level.lift),
+            slip_change=now.change.state.v,
+            after=(level.state, level.lift),
+            load_change=jnp.where(whole, force_change, 0.0),
+            at=at,
+            trace=trace,
+        )
+        level = level._replace(slip_work=now.level.slip_work + level.slip_work)
+        return Part(at, level, found._replace(work=now.change.work + found.work))
+
+    def parts(now: Part) -> Part:
+        def go(carry: tuple[Part, Array], number: Array) -> tuple[tuple[Part, Array], None]:
+            now, whole = carry
+            now = lax.cond(
+                whole, lambda: now, lambda: part(now, turned & (number == 0), number < PARTS - 1)
+            )
+            return (now, now.level.state.force == force), None
+
+        return lax.scan(go, (now, jnp.asarray(False)), jnp.arange(PARTS))[0][0]
+
+    none = jnp.zeros_like(last.slip_work)
+    state = jax.tree.map(jnp.zeros_like, last.state)._replace(v=slip_change)
+    start = Slopes(state, jnp.zeros_like(last.lift), none)
+    # A reverse pass walks the parts again in place of keeping their traces.
+    at, level, found = jax.checkpoint(parts)(Part(at, last._replace(slip_work=none), start))
     nothing, change_of_level = jax.tree.map(lambda _: None, (at, level))
     change_of_level = change_of_level._replace(
         state=found.state, lift=found.lift, slip_work=found.work

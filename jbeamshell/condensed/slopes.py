@@ -72,6 +72,11 @@ class Trace(NamedTuple):
     event: Row
 
 
+def is_full(trace: Trace) -> Array:
+    """True if no more events should be recorded; so many that stick at once are left room for."""
+    return trace.sticks >= trace.instance.size // 2
+
+
 def begun(k: int, n: int) -> Trace:
     """Trace of a level before its first event."""
     m = k + n

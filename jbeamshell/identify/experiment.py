@@ -31,7 +31,6 @@ from jbeamshell.measured.curves import Measurement, noise_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.choice import is_elastic
-from jbeamshell.scene.keys import KAPPA_S
 from jbeamshell.scene.scene import Scene
 
 FINER = 0.5  # part of the tolerance that plane elasticity keeps: fitted numbers amplify its error
@@ -78,7 +77,6 @@ class Experiment:
         points: int,
         noise: float | None = None,
         free: Sequence[str] = (),
-        by_beamshell: bool = False,
     ) -> None:
         """Set up the run of every measurement.
 
@@ -88,7 +86,6 @@ class Experiment:
         points : number of points to which each loop is thinned, approximately
         noise : standard deviation of measurements without noise, over their range
         free : keys of the numbers that may change
-        by_beamshell : True to keep to the beamshell where a section is open
 
         Raises
         ------
@@ -121,8 +118,7 @@ class Experiment:
         self.observations = self._with_noise(observations, noise)
         self._compared = [np.flatnonzero(np.asarray(o.weight)) for o in self.observations]
         self._set_rows(np.concatenate(weights), noise)
-        vary = (*free, KAPPA_S) if by_beamshell else free
-        served = [_served(scene, vary) for scene in self.scenes]
+        served = [_served(scene, free) for scene in self.scenes]
         self._runs = [
             (_filled(observation), served[owner])
             for observation, owner in zip(self.observations, self.owners, strict=True)
@@ -146,11 +142,6 @@ class Experiment:
         spans = np.repeat([o.span for o in self.observations], sizes)
         known = np.repeat([noise_of(m) is not None for m in self.measurements], sizes)
         self.relative = np.where(known, 1.0 / (self.weight * spans), noise or 1.0)
-
-    @property
-    def elastic(self) -> bool:
-        """True if a scene left its section open, and plane elasticity can stand for it."""
-        return any(isinstance(scene, Scene) and is_elastic(scene) for scene in self.scenes)
 
     @property
     def model_error(self) -> float:

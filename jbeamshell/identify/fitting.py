@@ -28,7 +28,6 @@ from jbeamshell.laws import Law
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.recordings import FEWEST_POINTS
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.scene.keys import KAPPA_S
 from jbeamshell.scene.scene import Scene
 
 POINTS = 96  # points of a loop at which the model is run
@@ -40,11 +39,6 @@ STARTS = 3  # default number of searches if all parameters have two bounds
 ADAM_STARTS = 8
 SCREENED = 4  # random points tried for each start besides the given one
 NO_INFLUENCE = 1e-9  # change of a residual for a unit step below which it is rounding
-
-NO_SLOPES = (
-    "plane elasticity has no derivative at the start, where nearly all of the contact slips: the "
-    "beamshell was fitted in its place"
-)
 
 Vector = NDArray[np.float64]
 
@@ -177,12 +171,7 @@ def fit(
     parameters = with_starts(parameters, specimens)
     space, scenes = search_space(parameters, {one.label: one.scene for one in specimens})
     specimens = [one._replace(scene=scenes[one.label]) for one in specimens]
-    given: dict[str, Any] = {"points": points, "noise": noise, "free": space.keys}
-    experiment = Experiment(specimens, **given)
-    by_elasticity = experiment.elastic and KAPPA_S not in space.keys
-    if by_elasticity and not _has_slopes(Problem(experiment, space, solver or Newton()), space):
-        experiment = Experiment(specimens, **given, by_beamshell=True)
-        doubts = [*doubts, NO_SLOPES]
+    experiment = Experiment(specimens, points=points, noise=noise, free=space.keys)
     problem = Problem(experiment, space, solver or Newton(), save)
     if starts is None:
         bounded = all(parameter.bounded for parameter in parameters)
@@ -292,12 +281,6 @@ def _search(
         points = [points[i] for i in np.argsort(costs, kind="stable")[: starts - 1]]
     ends = SEARCHES[method](problem, space, [first, *points], stopping, report)
     return sorted(ends, key=lambda end: problem(space, end.point).cost)
-
-
-def _has_slopes(problem: Problem, space: SearchSpace) -> bool:
-    """True if the response has a derivative at the start."""
-    start = problem(space, np.zeros(len(space.names)))
-    return bool(np.all(np.isfinite(start.jacobian)))
 
 
 def check_start(problem: Problem, space: SearchSpace) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.condensed import branches, events, levels, strip
+from jbeamshell.condensed import branches, drives, events, levels, strip
 from jbeamshell.condensed.solve import _known_turns
 
 NODES = 21
@@ -80,6 +80,22 @@ class TestSlopes:
         pairs = zip(jax.tree.leaves(found), jax.tree.leaves(way), strict=True)
         back = sum(float(jnp.vdot(a, b)) for a, b in pairs)
         assert back == pytest.approx(float(slope[4]), rel=1e-9)
+
+    def test_more_sticking_than_a_trace_holds_has_slopes(self):
+        # Far nodes slip and stick in turn after the reversal from near gross slip.
+        thin = jax.jit(lambda scene: strip.condensed(scene, 41).body)
+        body = drives.driven_by_displacement(thin(PLANE.replace({"strip.height_ratio": 0.0274})))
+        start = branches.pressed(body)
+
+        @jax.jit
+        def works(friction):
+            path = 2.3e-4 * TURNS
+            return levels.levels(body, friction, start, path, TURNED).slip_work
+
+        slope = jax.jit(jax.jacfwd(works))(0.4)
+        assert np.all(np.isfinite(slope))
+        change = (works(0.4 + 1e-6) - works(0.4 - 1e-6)) / 2e-6
+        np.testing.assert_allclose(slope, change, rtol=1e-6)
 
     def test_few_columns_give_the_slopes_of_all(self):
         body, friction = strip_body(0.3), jnp.asarray(0.3)
