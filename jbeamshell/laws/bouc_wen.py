@@ -2,11 +2,14 @@ r"""Bouc-Wen law: a differential equation of the hysteretic part z of the force.
 
     F = a k u + (1 - a) F_S z,   u_S dz/du = 1 - abs(z)^n (g sgn(z du) + 1 - g),   u_S = F_S/k.
 
-With n it turns sharper, and g = 1/2 unloads straight.  A steady cycle that reaches z_m has, by
-quadrature over z,
+With n it turns sharper, and g = 1/2 unloads straight.  The equation separates.  In one sense of
+motion the way over u_S from z = 0 on loading and to z = 0 on unloading is
 
-    2 U = u_S int_0^z_m dz/(1 - z^n) + dz/(1 + (2 g - 1) z^n),
-    D = 2 (1 - a) F_S u_S int_0^z_m z dz/(1 - z^n) - z dz/(1 + (2 g - 1) z^n).
+    s_L(z) = int_0^z dz/(1 - z^n),    s_U(z) = int_0^z dz/(1 + (2 g - 1) z^n),
+
+so that any straight piece of a path is exact, however long.  A steady cycle that reaches z_m has
+
+    2 U = u_S (s_L + s_U)(z_m),    D = 2 (1 - a) F_S u_S int_0^z_m z (ds_L - ds_U).
 
 References
 ----------
@@ -18,7 +21,7 @@ Wen, Y.-K. (1976). Method for random vibration of hysteretic systems. J. Eng. Me
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -30,11 +33,32 @@ from jax.typing import ArrayLike
 from jbeamshell.laws.law import Law, as_path
 from jbeamshell.scene.rows import number
 
-SUBSTEPS = 8  # of each piece of a path
-MOST_STEP = 40.0  # longest piece over u_S: beyond it z has reached its limit
-NODES = 24  # Gauss points of the quadrature over z
 FARTHEST = 36.0  # of t = -log(1 - z), where 1 - z is rounding
-BISECTIONS = 60
+CELLS = 512  # of the table of ways
+IN_CELL = 4  # Gauss points of a cell
+NODES = 64  # Gauss points of the energy of a cycle
+
+
+class Way(NamedTuple):
+    """Way over u_S as a table over t = -log(1 - z).
+
+    Attributes
+    ----------
+    t : (CELLS + 1,) dense near 0
+    value, slope : (CELLS + 1,) way from z = 0, and its slope over t
+    """
+
+    t: Array
+    value: Array
+    slope: Array
+
+    def at(self, t: Array) -> Array:
+        """Way at a t; any shape."""
+        return _hermite(t, self.t, self.value, self.slope)
+
+    def reached(self, way: Array) -> Array:
+        """Part t that is reached after a way; any shape."""
+        return _hermite(way, self.value, self.t, 1.0 / self.slope)
 
 
 class BoucWen(Law):
@@ -79,46 +103,56 @@ class BoucWen(Law):
 
     def backbone(self, u: ArrayLike) -> Array:
         """Force on first loading, an odd function of the displacement; any shape."""
-        u = jnp.asarray(u)
-        size = jnp.abs(u) / self.slip_displacement
-        z = self._solve(lambda z: self._ways(z)[0], size)
-        return jnp.sign(u) * self._force(jnp.abs(u), z)
+        u = jnp.asarray(u, dtype=jnp.result_type(float))
+        loading, _ = self._ways()
+        t = loading.reached(jnp.abs(u) / self.slip_displacement)
+        return jnp.sign(u) * self._force(jnp.abs(u), -jnp.expm1(-t))
 
     def path_forces(self, path: ArrayLike) -> Array:
-        """Forces (T,) on a path (T,) of displacements, from rest; second order in its pieces."""
+        """Forces (T,) on a path (T,) of displacements, from rest; exact on its straight pieces."""
         return self._forces(as_path(path))
 
     @eqx.filter_jit
     def _forces(self, points: Array) -> Array:
         """Forces (T,) on a path (T,), compiled."""
+        loading, unloading = self._ways()
         pieces = jnp.diff(points, prepend=0.0) / self.slip_displacement
 
-        def go(z: Array, piece: Array) -> tuple[Array, Array]:
-            step = jnp.clip(piece, -MOST_STEP, MOST_STEP) / SUBSTEPS
+        def go(now: tuple[Array, Array], piece: Array) -> tuple[tuple[Array, Array], Array]:
+            sense, t = now
+            move, way = jnp.sign(piece), jnp.abs(piece)
+            left = unloading.at(t) - way  # until z = 0
+            loads = (sense * move >= 0.0) | (left < 0.0)
+            gone = jnp.where(sense * move >= 0.0, loading.at(t) + way, -left)
+            loaded = loading.reached(jnp.maximum(gone, 0.0))
+            unloaded = unloading.reached(jnp.maximum(left, 0.0))
+            rests = move == 0.0
+            end = jnp.where(rests, t, jnp.where(loads, loaded, unloaded))
+            sense = jnp.where(loads & ~rests, move, sense)
+            return (sense, end), sense * -jnp.expm1(-end)
 
-            def substep(z: Array, _: None) -> tuple[Array, None]:
-                slope, change = jax.jvp(lambda z: self._slope(z, step), (z,), (jnp.ones_like(z),))
-                x = step * change
-                safe = jnp.where(jnp.abs(x) < 1e-5, 1.0, x)
-                mean = jnp.where(jnp.abs(x) < 1e-5, 1.0 + 0.5 * x, jnp.expm1(safe) / safe)
-                return jnp.clip(z + step * slope * mean, -1.0, 1.0), None
-
-            end = lax.scan(substep, z, None, length=SUBSTEPS)[0]
-            return end, end
-
-        hysteretic = lax.scan(go, jnp.zeros((), points.dtype), pieces)[1]
+        zero = jnp.zeros((), points.dtype)
+        hysteretic = lax.scan(go, (zero, zero), pieces)[1]
         return self._force(points, hysteretic)
 
     def dissipation(self, amplitude: ArrayLike) -> Array:
         """Energy lost per steady cycle at a displacement amplitude; any shape."""
-        z = self._steady(amplitude)
-        ways = self._moments(z)
+        t = self._steady(amplitude)
+        points, weights = np.polynomial.legendre.leggauss(NODES)
+        # Over the root of t, in which powers of z are smooth.
+        part = 0.5 * (1.0 + points)
+        bent = jnp.minimum(t, FARTHEST)
+        at = bent[..., None] * part**2
+        power, ahead = self._power(at)
+        back = ahead + 2.0 * self.unloading * power
+        lost = -jnp.expm1(-at) * jnp.exp(-at) * 2.0 * self.unloading * power / (ahead * back)
+        energy = bent * jnp.sum(lost * part * weights, axis=-1) + (t - bent) / self.exponent
         scale = 2.0 * (1.0 - self.hardening) * self.slip_force * self.slip_displacement
-        return scale * (ways[0] - ways[1])
+        return scale * energy
 
     def _reached(self, size: Array) -> Array:
         """Force amplitude of a steady cycle."""
-        return self._force(size, self._steady(size))
+        return self._force(size, -jnp.expm1(-self._steady(size)))
 
     @staticmethod
     def _start(force: float, displacement: float, work: float, stiffness: float) -> dict[str, Any]:
@@ -130,51 +164,43 @@ class BoucWen(Law):
         part = self.hardening
         return part * self.stiffness * u + (1.0 - part) * self.slip_force * z
 
-    def _slope(self, z: Array, move: Array) -> Array:
-        """Slope u_S dz/du in the sense of a move."""
-        away = jnp.sign(z) * jnp.sign(move)
-        size = jnp.maximum(jnp.abs(z), jnp.finfo(z.dtype).tiny)
-        return 1.0 - size**self.exponent * (self.unloading * away + 1.0 - self.unloading)
+    def _power(self, t: Array) -> tuple[Array, Array]:
+        """Powers z^n and 1 - z^n at a t, without the difference of two like numbers."""
+        logarithm = self.exponent * jax.nn.log1mexp(jnp.maximum(t, jnp.finfo(t.dtype).tiny))
+        return jnp.exp(logarithm), -jnp.expm1(logarithm)
 
-    def _nodes(self, z: Array) -> tuple[Array, Array]:
-        """Gauss points (..., NODES) from 0 to z and their weights, dense where z nears 1."""
-        points, weights = np.polynomial.legendre.leggauss(NODES)
-        far = -jnp.log1p(-z)
-        t = 0.5 * far[..., None] * (1.0 + points)
-        return -jnp.expm1(-t), 0.5 * far[..., None] * weights * jnp.exp(-t)
+    def _ways(self) -> tuple[Way, Way]:
+        """Ways on loading and on unloading."""
+        root = jnp.linspace(0.0, FARTHEST**0.5, CELLS + 1)
+        points, weights = np.polynomial.legendre.leggauss(IN_CELL)
+        half = 0.5 * root[1]
+        inner = root[:-1, None] + half * (1.0 + points)
 
-    def _ways(self, z: Array) -> tuple[Array, Array]:
-        """Ways over u_S from z = 0 on loading, and to z = 0 on unloading."""
-        at, weight = self._nodes(z)
-        power = at**self.exponent
-        back = 1.0 + (2.0 * self.unloading - 1.0) * power
-        return jnp.sum(weight / (1.0 - power), axis=-1), jnp.sum(weight / back, axis=-1)
+        def slopes(t: Array) -> tuple[Array, Array]:
+            power, ahead = self._power(t)
+            shrink = jnp.exp(-t)
+            return shrink / ahead, shrink / (ahead + 2.0 * self.unloading * power)
 
-    def _moments(self, z: Array) -> tuple[Array, Array]:
-        """Integrals of z over both ways of `_ways`."""
-        at, weight = self._nodes(z)
-        power = at**self.exponent
-        back = 1.0 + (2.0 * self.unloading - 1.0) * power
-        loading = jnp.sum(weight * at / (1.0 - power), axis=-1)
-        return loading, jnp.sum(weight * at / back, axis=-1)
+        def way(inside: Array, slope: Array) -> Way:
+            cells = half * jnp.sum(2.0 * inner * weights * inside, axis=1)
+            return Way(root**2, jnp.pad(jnp.cumsum(cells), (1, 0)), slope)
+
+        loading, unloading = map(way, slopes(inner**2), slopes(root**2))
+        return loading, unloading
 
     def _steady(self, amplitude: ArrayLike) -> Array:
-        """Part z_m that a steady cycle reaches."""
-        size = jnp.abs(jnp.asarray(amplitude)) / self.slip_displacement
-        return self._solve(lambda z: 0.5 * sum(self._ways(z)), size)
+        """Part t of z_m that a steady cycle reaches."""
+        size = jnp.abs(jnp.asarray(amplitude, dtype=jnp.result_type(float)))
+        mean = jax.tree.map(lambda a, b: 0.5 * (a + b), *self._ways())
+        return mean.reached(size / self.slip_displacement)
 
-    def _solve(self, way: Any, size: Array) -> Array:
-        """Part z at which a way, rising with z, has a size; with its derivatives."""
 
-        def halve(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-            low, high = ends
-            middle = 0.5 * (low + high)
-            below = way(-jnp.expm1(-middle)) < size
-            return jnp.where(below, middle, low), jnp.where(below, high, middle)
-
-        size = jnp.asarray(size, dtype=jnp.result_type(float))
-        far = jnp.full_like(size, FARTHEST)
-        low, high = lax.fori_loop(0, BISECTIONS, halve, (jnp.zeros_like(size), far))
-        t = lax.stop_gradient(0.5 * (low + high))
-        value, slope = jax.jvp(lambda t: way(-jnp.expm1(-t)), (t,), (jnp.ones_like(t),))
-        return -jnp.expm1(-jnp.maximum(t + (size - value) / slope, 0.0))
+def _hermite(x: Array, at: Array, value: Array, slope: Array) -> Array:
+    """Cubic Hermite interpolant of values and slopes at rising points; straight beyond the last."""
+    x, beyond = jnp.minimum(x, at[-1]), jnp.maximum(x - at[-1], 0.0)
+    j = jnp.clip(jnp.searchsorted(at, x, side="right") - 1, 0, at.size - 2)
+    width = at[j + 1] - at[j]
+    p = (x - at[j]) / width
+    q = 1.0 - p
+    ends = q**2 * (1.0 + 2.0 * p) * value[j] + p**2 * (1.0 + 2.0 * q) * value[j + 1]
+    return ends + width * p * q * (q * slope[j] - p * slope[j + 1]) + beyond * slope[-1]

@@ -54,15 +54,40 @@ def test_bouc_wen_with_exponent_one_and_straight_unloading_rises_like_dahl():
     np.testing.assert_allclose(law.backbone(SIZES), laws.Dahl(2.0, 5.0).backbone(SIZES), rtol=1e-9)
 
 
-def test_bouc_wen_has_order_two_in_the_pieces_of_its_path():
-    law = laws.BoucWen(slip_force=2.0, stiffness=5.0, exponent=1.7, unloading=0.8, hardening=0.1)
+@pytest.mark.parametrize(("exponent", "unloading"), [(1.0, 0.01), (1.7, 0.8), (50.0, 1.0 - 1e-6)])
+def test_bouc_wen_is_exact_on_long_straight_pieces(exponent, unloading):
+    law = laws.BoucWen(2.0, 5.0, exponent, unloading, 0.1)
+    ends = np.array([0.7, 0.1, -0.5, 9.0, -0.4, 0.05])
+    fine = np.concatenate(
+        [np.linspace(a, b, 501)[1:] for a, b in zip([0.0, *ends[:-1]], ends, strict=True)]
+    )
+    np.testing.assert_allclose(law.path_forces(ends), law.path_forces(fine)[499::500], atol=1e-6)
 
-    def end(pieces):
-        legs = [np.linspace(a, b, pieces + 1)[1:] for a, b in ((0.0, 0.7), (0.7, -0.5))]
-        return float(law.path_forces(np.concatenate(legs))[-1])
+    def step(z, move):
+        """Midpoint rule, the law in its own words."""
+        middle = z + 0.5 * move * rate(z, move)
+        return z + move * rate(middle, move)
 
-    exact = end(256)
-    assert np.log(abs(end(2) - exact) / abs(end(16) - exact)) / np.log(8.0) > 1.8
+    def rate(z, move):
+        return 1.0 - abs(z) ** exponent * (unloading * np.sign(z * move) + 1.0 - unloading)
+
+    z, last, found = 0.0, 0.0, []
+    for u in fine[:1500]:
+        for _ in range(4):
+            z = step(z, 0.25 * (u - last) * 5.0 / 2.0)
+        last = u
+        found.append(0.5 * u + 1.8 * z)
+    np.testing.assert_allclose(law.path_forces(fine[:1500]), found, atol=1e-5)
+
+
+def test_bouc_wen_loses_energy_at_all_sizes_within_its_bounds():
+    sizes = np.logspace(-3, 6, 10)
+    for exponent in (1.0, 1.5, 50.0):
+        for unloading in (1e-3, 0.5, 1.0 - 1e-6):
+            law = laws.BoucWen(2.0, 5.0, exponent, unloading, 0.0)
+            lost = np.asarray(law.dissipation(sizes))
+            assert np.all(np.diff(lost) > 0.0)
+            assert lost[-1] == pytest.approx(4.0 * 2.0 * sizes[-1], rel=1e-3)
 
 
 @pytest.mark.slow
