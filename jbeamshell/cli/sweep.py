@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import math
 import os
+import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
@@ -15,7 +16,7 @@ import numpy as np
 
 from jbeamshell.cli.arguments import add_json, add_scene, add_settings, scene_of
 from jbeamshell.cli.terminal import UNCONVERGED, put, say, say_written, warn
-from jbeamshell.common.errors import InputError
+from jbeamshell.common.errors import DoubtfulWarning, InputError
 from jbeamshell.common.files import as_path
 
 MOST = 2_000_000  # numbers in one JSON text
@@ -89,7 +90,8 @@ def run(options: argparse.Namespace) -> int:
     if options.plot is not None:
         _check_picture(options.plot)
     say("compiling ...")
-    with _workers(options.dask) as executor:
+    with _workers(options.dask) as executor, warnings.catch_warnings():
+        warnings.simplefilter("ignore", DoubtfulWarning)  # printed below, on one line
         result = sweep(
             scene,
             over,
@@ -107,6 +109,8 @@ def _report(options: argparse.Namespace, result: Any) -> int:
     from jbeamshell.common import files
 
     put(files.as_json(result.figures()) if options.json else f"{result}\n")
+    for doubt in result.doubts:
+        warn(doubt)
     if result.outside:
         warn(f"{result.outside:,} lanes lie outside the model's domain: {result.why_outside}")
     if result.undefined:

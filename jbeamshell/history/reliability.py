@@ -317,10 +317,7 @@ def _resolution(history: Run) -> tuple[str, ...]:
         cycle = jax.tree.map(np.asarray, history.slip_cycle)
         errors = estimates(history.scene, cycle, history.change)
         grid, corner, slider, steps = map(float, errors)
-    plane = history.scene.model.solution == "plane"  # it has a grid of its own
-    finer = "take more model.nodes" if plane else FINER
-    if "nodes" in history.scene.model.open:  # given nodes may change how the scene is solved
-        finer = "take a smaller model.tolerance"
+    plane, finer = history.scene.model.solution == "plane", finer_grid(history.scene)
     if np.isinf(grid):
         return (
             "nothing slips in the last cycle: slip that is smaller than the elements would not be "
@@ -348,6 +345,14 @@ def _resolution(history: Run) -> tuple[str, ...]:
             "load.steps_per_half_cycle"
         )
     return tuple(found)
+
+
+def finer_grid(scene: Scene) -> str:
+    """Fix that makes a scene's grid finer."""
+    if "nodes" in scene.model.open:  # given nodes may change how the scene is solved
+        return "take a smaller model.tolerance"
+    plane = scene.model.solution == "plane"  # it has a grid of its own
+    return "take more model.nodes" if plane else FINER
 
 
 def _section(history: Run) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from jbeamshell.common.errors import InputError
+from jbeamshell.common.errors import DoubtfulWarning, InputError
 from jbeamshell.scene.load_path import check
 from jbeamshell.sweeping import job, lanes, runner
 from jbeamshell.sweeping.lanes import Outcome, lanes_of
@@ -136,6 +136,7 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
         assert np.all(np.isnan(hurt[name][~known]))
 
 
+@pytest.mark.doubtful("lanes may be off")
 def test_a_lane_that_is_solved_alone_has_the_estimate_of_its_run(monkeypatch):
     """On the contact line that of rigid sliders, which its compiled figures have to be told."""
     failing, scene = runner.Runner._answers, jb.Scene().replace({"model.nodes": 17})
@@ -323,17 +324,18 @@ def test_a_sweep_within_the_limit_fits_into_memory():
 # --- what is left on disk -------------------------------------------------------------------------
 
 
+@pytest.mark.doubtful("lanes may be off")
 def test_the_table_holds_every_number_to_the_last_bit(result, tmp_path):
     again = jb.sweep(SCENE, OVER, FIGURES, out=tmp_path / "sweep.csv")
     same(result, again)
     assert [path.name for path in tmp_path.iterdir()] == ["sweep.csv"]
     with (tmp_path / "sweep.csv").open(encoding="utf-8") as file:
         header, *rows = list(csv.reader(file))
-    assert header == [*OVER, *FIGURES, "status"]
+    assert header == [*OVER, *FIGURES, "status", "doubtful"]
     for name, column in zip(header, zip(*rows, strict=True), strict=True):
         known = result.table()[name]
-        if name == "status":
-            assert list(column) == known.tolist()
+        if name in ("status", "doubtful"):
+            assert list(column) == known.astype(str).tolist()
         else:
             read = np.array([float(word) if word else np.nan for word in column])
             np.testing.assert_array_equal(read, known)
@@ -420,7 +422,10 @@ def test_lanes_of_plane_elasticity_share_their_bodies():
 
 
 def test_lanes_say_how_far_off_they_may_be():
-    found = jb.sweep(SCENE, {"load.amplitude": [1e-9, 1.2]})
+    with pytest.warns(DoubtfulWarning, match=r"of 2 lanes may be off by more than 2 %"):
+        found = jb.sweep(SCENE, {"load.amplitude": [1e-9, 1.2]})
+    assert f"doubtful: {found.doubts[0]}" in str(found)
+    assert found.figures()["doubts"] == list(found.doubts)
     assert np.all(found.status == Outcome.CONVERGED)
     stuck, sliding = found["dissipation_error"]
     assert stuck == np.inf  # nothing slips
