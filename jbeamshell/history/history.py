@@ -11,6 +11,7 @@ from jax import Array
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
+from jbeamshell.common.extras import table_library
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
 from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
@@ -160,6 +161,39 @@ class History(Profiles, ContactLine, CycleFigures):
             raise InputError("history: was made by hand and has no end to continue: solve it")
         further: History = self.end.continued(self, path, **options)
         return further
+
+    def table(self) -> dict[str, np.ndarray]:
+        """Columns (steps+1,) of the load path by name.
+
+        They are the step, force, displacement, part of the pressure, accumulated work of friction,
+        end of the contact (with unilateral contact only), Newton iterations and error.
+        """
+        scene = self.scene
+        columns: dict[str, Any] = {
+            "step": np.arange(self.force.size),
+            "force": self.force,
+            "displacement": self.displacement,
+            "pressure": self.pressure,
+            "friction_work": np.cumsum(self.slip_work),
+        }
+        if "w" in scene.model.fields and scene.contact.normal != "none":
+            columns["contact_end"] = self.contact_end
+        columns |= {"newton_iterations": self.iterations, "error": self.error}
+        return {name: np.asarray(column) for name, column in columns.items()}
+
+    def to_dataframe(self) -> Any:
+        """Load path as a `pandas.DataFrame`, a row for every step; see `table`.
+
+        Raises
+        ------
+        InputError
+            if pandas is not installed
+
+        Examples
+        --------
+        >>> history.to_dataframe().plot("displacement", "force")
+        """
+        return table_library("pandas").DataFrame(self.table())
 
     def save(self, path: Any) -> None:
         """Write to an .npz file that `jbeamshell.read_history` reads.

@@ -78,23 +78,9 @@ def turning_steps(history: History) -> list[int]:
 
 
 def loop_table(history: History) -> str:
-    """CSV of the load path, a row for every step.
-
-    The columns are the step, force, displacement, part of the pressure, accumulated work of
-    friction, end of the contact (with unilateral contact only), Newton iterations and error.
-    """
-    columns = {
-        "step": range(history.force.size),
-        "force": history.force,
-        "displacement": history.displacement,
-        "pressure": history.pressure,
-        "friction_work": np.cumsum(history.slip_work),
-    }
-    scene = history.scene
-    if "w" in scene.model.fields and scene.contact.normal != "none":
-        columns["contact_end"] = history.contact_end
-    columns |= {"newton_iterations": history.iterations, "error": history.error}
-    rows = zip(*(np.asarray(c).tolist() for c in columns.values()), strict=True)
+    """CSV of the load path, a row for every step; see `History.table` for its columns."""
+    columns = history.table()
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return csv_text(tuple(columns), rows)
 
 

@@ -49,4 +49,5 @@ from jbeamshell.plotting.style import style as style
 from jbeamshell.plotting.style import thumbnail as thumbnail
 from jbeamshell.plotting.sweeps import master_curve as master_curve
 from jbeamshell.plotting.sweeps import sweep as sweep
+from jbeamshell.plotting.sweeps import sweep_contour as sweep_contour
 from jbeamshell.plotting.sweeps import sweep_sheet as sweep_sheet

@@ -139,7 +139,11 @@ def contact(
         if reference:
             keys.append((reference_label, DOTS))
         handles = [Line2D([], [], label=label, **look) for label, look in keys]
-        grid.ravel()[0].legend(handles=handles, loc="best")
+        if axes is None:  # below the panels, where it covers nothing
+            place = {"loc": "outside lower center", "ncols": len(handles)}
+            grid.ravel()[0].figure.legend(handles=handles, **place)
+        else:
+            grid.ravel()[0].legend(handles=handles, loc="best")
     return grid
 
 

@@ -228,6 +228,7 @@ class SweptFigures(Protocol):
     axes : (n,) values of every key
     paired : True if the keys vary together
     shape : shape of the arrays of figures
+    doubtful : True for lanes not to rely on
     values : figures by name, which indexing by a name also gives
     lanes : quantities of the lanes
     """
@@ -238,6 +239,8 @@ class SweptFigures(Protocol):
     def axes(self) -> Mapping[str, np.ndarray]: ...
     @property
     def paired(self) -> bool: ...
+    @property
+    def doubtful(self) -> np.ndarray: ...
     @property
     def shape(self) -> tuple[int, ...]: ...
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from jbeamshell.plotting.protocols import ResponseCurve
-from jbeamshell.plotting.style import DATA, PALETTE, looks, panels, style
+from jbeamshell.plotting.style import DATA, PALETTE, beside, looks, panels, style
 
 AMPLITUDE = "amplitude  [length]"
 FREQUENCY, LEVEL = "frequency  [1/time]", "level of the force"
@@ -54,7 +54,7 @@ def forced_response(
         if label:
             pair[0].legend()
         if len(pair[1].get_lines()) == amplitudes.shape[1]:
-            pair[1].legend(ncols=2)
+            beside(pair[1])
     return pair
 
 

@@ -190,6 +190,11 @@ def below(axes: Axes, keys: Sequence[Any]) -> None:
     axes.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=columns)
 
 
+def beside(axes: Axes) -> None:
+    """Put the legend of an axes to its right, where it covers nothing."""
+    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+
+
 def mark_decades(*axes_of_one: Axis) -> None:
     """Mark 1, 2 and 5 of every decade on logarithmic axes of less than two decades.
 

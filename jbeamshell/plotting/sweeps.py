@@ -18,7 +18,16 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.measured.form import DISSIPATION, SECANT_STIFFNESS
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.plotting.protocols import SweptFigures
-from jbeamshell.plotting.style import DATA, PALETTE, looks, mark_decades, panels, single, style
+from jbeamshell.plotting.style import (
+    DATA,
+    PALETTE,
+    beside,
+    looks,
+    mark_decades,
+    panels,
+    single,
+    style,
+)
 from jbeamshell.scene.keys import TABLE, unit_of
 
 FIGURES = {
@@ -91,7 +100,67 @@ def sweep(
         axes.set(xlabel=_label(along, result), ylabel=FIGURES.get(figure, figure.replace("_", " ")))
         _scales(axes, x, values)
         if axes.get_legend_handles_labels()[1]:
-            axes.legend()
+            beside(axes)
+    return axes
+
+
+def sweep_contour(
+    result: SweptFigures,
+    axes: Axes | None = None,
+    *,
+    figure: str = "dissipation",
+    along: str | None = None,
+    per: str | None = None,
+) -> Axes:
+    """Draw a figure as a map over two keys; crosses are lanes not to rely on.
+
+    Further keys stay at their middle value.
+
+    Parameters
+    ----------
+    result : result of `jbeamshell.sweep` over two keys or more
+    axes : where to draw; new ones when not given
+    figure : name of one of the result's figures
+    along, per : keys along the axis and up; chosen as in `sweep` when not given
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        the axes drawn into
+
+    Raises
+    ------
+    InputError
+        if the result has no such figure or key, or is over one key alone
+
+    Examples
+    --------
+    >>> plotting.sweep_contour(result, figure="loss_factor")
+    """
+    along, per = _keys(result, along, per)
+    if per is None or result.paired:
+        raise InputError("sweep: a map needs two keys that vary as a product: sweep over two")
+    table, rest = _plane(result, result[figure], along, per)
+    doubtful, _ = _plane(result, result.doubtful, along, per)
+    x, y = result.axes[along], result.axes[per]
+    right, up = np.argsort(x), np.argsort(y)
+    wide = _is_wide(table)
+    with style():
+        axes = single(axes)
+        shown = np.ma.masked_invalid(table)
+        shown = np.ma.masked_less(shown, FLOOR * shown.max()) if wide else shown
+        norm = LogNorm(shown.min(), shown.max()) if wide else Normalize(shown.min(), shown.max())
+        mesh = (x[right], y[up], shown[np.ix_(up, right)])
+        drawn = axes.pcolormesh(*mesh, norm=norm, cmap="viridis", shading="nearest")
+        label = FIGURES.get(figure, figure.replace("_", " "))
+        axes.figure.colorbar(drawn, ax=axes, label=label)
+        rows, columns = np.nonzero(doubtful)
+        axes.plot(x[columns], y[rows], "x", color=DATA, markersize=3.0, markeredgewidth=0.7)
+        axes.set(xlabel=_label(along, result), ylabel=_label(per, result), title=rest)
+        for size, scaled in ((x, axes.set_xscale), (y, axes.set_yscale)):
+            if _is_wide(size) and size.min() > 0.0:
+                scaled("log")
+        axes.grid(visible=False)
     return axes
 
 
@@ -225,13 +294,19 @@ def _cubic_law(result: SweptFigures, axes: Axes, figure: str, along: str) -> Non
 
 def _scales(axes: Axes, x: np.ndarray, values: np.ndarray) -> None:
     """Make axes with a wide range of values logarithmic."""
-    if x.min() > 0.0 and x.max() > WIDE * x.min():
+    if x.min() > 0.0 and _is_wide(x):
         axes.set_xscale("log")
-    known = values[np.isfinite(values)]
-    if known.size and known.min() >= 0.0 and known.max() > WIDE * known.min():
+    if _is_wide(values):
+        known = values[np.isfinite(values)]
         axes.set_yscale("log")
         smallest = np.min(known[known > 0.0], initial=known.max())
         axes.set_ylim(bottom=max(0.7 * smallest, FLOOR * known.max()))
+
+
+def _is_wide(values: np.ndarray) -> bool:
+    """True for numbers, none negative, that a logarithmic scale shows better."""
+    known = values[np.isfinite(values)]
+    return bool(known.size and known.min() >= 0.0 and known.max() > WIDE * known.min())
 
 
 def _symbol(key: str | None) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 import functools
-import importlib
 import os
 from collections.abc import Iterator
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 
 from jbeamshell.common.checks import require_choice
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.extras import table_library
 from jbeamshell.common.files import written_whole
 from jbeamshell.common.summary import Summary
 from jbeamshell.history.figures import TURNED_UNITS, UNITS
@@ -181,7 +181,7 @@ class Sweep:
 
     def to_dataframe(self) -> Any:
         """Table as a `pandas.DataFrame`: a row for every lane, with the column ``doubtful``."""
-        return _library("pandas").DataFrame(self.table())
+        return table_library("pandas").DataFrame(self.table())
 
     def to_xarray(self) -> Any:
         """Sweep as an `xarray.Dataset`.
@@ -201,7 +201,7 @@ class Sweep:
 
             result.to_xarray()["dissipation"].sel({"load.amplitude": 0.8}, method="nearest").plot()
         """
-        xarray, load = _library("xarray"), self.scene.load
+        xarray, load = table_library("xarray"), self.scene.load
         dims = ["lane"] if self.paired else list(self.axes)
         units = UNITS | PURE | (TURNED_UNITS if load.kind == "moment" else {})
         variables: dict[str, Any] = {
@@ -296,6 +296,12 @@ class Sweep:
 
         return plotting.sweep(self, axes, **options)
 
+    def plot_contour(self, axes: Any = None, **options: Any) -> Any:
+        """Draw a figure as a map over two keys; see `plotting.sweep_contour`."""
+        from jbeamshell import plotting
+
+        return plotting.sweep_contour(self, axes, **options)
+
     def plot_master(self, axes: Any = None, **options: Any) -> Any:
         """Draw the dissipation ratio over A/eta; see `plotting.master_curve`."""
         from jbeamshell import plotting
@@ -307,14 +313,6 @@ def _span(values: np.ndarray) -> str:
     """Smallest and largest number, in words."""
     known = values[np.isfinite(values)]
     return f"{known.min():.6g} to {known.max():.6g}" if known.size else "none"
-
-
-def _library(name: str) -> Any:
-    """Library of an extra."""
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        raise InputError(f"{name}: is not installed: pip install 'jbeamshell[tables]'") from None
 
 
 def _known(values: np.ndarray) -> list[float | None]:

@@ -97,6 +97,13 @@ def test_the_loop_table_keeps_every_bit(history):
     assert [row[5] for row in rows] == [str(int(i)) for i in history.iterations]
 
 
+def test_a_frame_holds_the_load_path(history):
+    pytest.importorskip("pandas")
+    frame = history.to_dataframe()
+    assert len(frame) == history.force.size
+    np.testing.assert_array_equal(frame["displacement"], history.displacement)
+
+
 def test_the_loop_table_says_where_unilateral_contact_ends(history):
     lifting = pressed(history, 3, **{"model.fields": ["v", "w", "beta", "psi"]})
     header, rows = rows_of(report.loop_table(lifting))

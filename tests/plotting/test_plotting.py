@@ -185,7 +185,7 @@ class TestContact:
         gap = plotting.contact(clamped, panels=["gap"])[0]
         shown = [line.get_ydata() for line in gap.get_lines() if len(line.get_xdata()) == 61]
         np.testing.assert_array_equal(shown, clamped.gap[np.array([3, 12, 18])])
-        legend = [text.get_text() for text in gap.get_legend().get_texts()]
+        legend = [text.get_text() for text in gap.figure.legends[0].get_texts()]
         assert legend == ["$F = 0$", "$F = -30$", "$F = 30$", "contact ends"]
 
     def test_takes_the_end_of_a_path_without_a_cycle(self, pull):
@@ -207,7 +207,7 @@ class TestContact:
             np.testing.assert_array_equal(ends, clamped.contact_end[np.array(steps)])
 
     def test_marks_no_end_of_a_contact_that_does_not_end(self, history):
-        legend = plotting.contact(history)[0].get_legend().get_texts()
+        legend = plotting.contact(history)[0].figure.legends[0].get_texts()
         assert "contact ends" not in [text.get_text() for text in legend]
 
     def test_shows_where_something_happens(self, clamped, history):
@@ -233,7 +233,8 @@ class TestContact:
         assert [len(d) for d in dots] == [0, 1, 0, 0, 0, 0]
         np.testing.assert_array_equal(dots[1][0].get_xydata().T, reference["gap"])
         assert panels[1].get_ylim()[1] > 0.2
-        assert "test" in [text.get_text() for text in panels[0].get_legend().get_texts()]
+        legend = panels[0].figure.legends[0]
+        assert "test" in [text.get_text() for text in legend.get_texts()]
 
     def test_draws_only_what_is_modelled(self, clamped, history):
         assert len(plotting.contact(history)) == 5  # the lift is frozen

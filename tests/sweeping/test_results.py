@@ -96,6 +96,18 @@ def test_lanes_are_doubtful_without_a_result_and_with_a_large_error():
     np.testing.assert_array_equal(plain.doubtful, [[False, False], [False, True], [True, False]])
 
 
+def test_a_map_marks_the_lanes_not_to_rely_on():
+    axes = made_up().plot_contour(along="load.amplitude", per="strip.height_ratio")
+    (mesh,) = axes.collections
+    drawn = np.sort(mesh.get_array().compressed())
+    known = made_up()["dissipation"]
+    np.testing.assert_array_equal(drawn, np.sort(known[np.isfinite(known)]))
+    (crosses,) = axes.get_lines()
+    assert crosses.get_xdata().size == np.sum(made_up().doubtful)
+    with pytest.raises(jb.InputError, match="a map needs two keys"):
+        made_up(paired=True).plot_contour()
+
+
 @pytest.mark.parametrize(("name", "method"), [("xarray", "to_xarray"), ("pandas", "to_dataframe")])
 def test_a_library_that_is_missing_is_named(name, method, monkeypatch):
     monkeypatch.setitem(sys.modules, name, None)
