@@ -28,6 +28,7 @@ from jbeamshell.plotting.style import (
 PER_CENT = "(model - data) / range  [%]"
 LOG_PER_CENT = r"$\ln$(model / data)  [%]"
 BAND = 0.95
+ABOVE_DOTS = DOTS["zorder"] + 0.5  # where dots do not hide a line
 FEW = 30  # points that are drawn as larger dots
 MOST_NAMED = 6  # measurements whose names fit into a panel
 SHORT = 14  # letters of a name of which two fit beside each other below a panel
@@ -53,7 +54,8 @@ def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
         for form, places, panel in drawn:
             for place, look in zip(places, looks(len(places)), strict=True):
                 data, model = fit.data[place], fit.model[place]
-                panel.plot(*_xy(form, model), **look, label=_name(places, place, data.label))
+                name = _name(places, place, data.label)
+                panel.plot(*_xy(form, model), **look, label=name, zorder=ABOVE_DOTS)
                 first = "data" if place == places[0] else "_nolegend_"
                 x, y = _xy(form, data)
                 size = {"markersize": 5.0} if x.size < FEW else {}
