@@ -113,6 +113,19 @@ def require_number(
     require(key, value, bool(np.isfinite(number) and low < number < high), fix)
 
 
+def require_finite(key: str, values: Any) -> None:
+    """Raise `InputError` unless all of an array's numbers are finite; traced ones pass."""
+    if not is_traced(values):
+        fix = "holds NaN or infinity: give finite numbers"
+        require(key, values, bool(np.all(np.isfinite(np.asarray(values)))), fix)
+
+
+def require_whole(key: str, value: Any, low: int, high: int = 10**9) -> None:
+    """Raise `InputError` unless a value, which may be a float, is a whole number from low on."""
+    whole = bool(np.isfinite(value)) and value == int(value) and low <= value <= high
+    require(key, value, whole, f"must be a whole number, {low} to {high}")
+
+
 def check_words(key: str, words: Any) -> None:
     """Raise `InputError` unless a value is a list of words."""
     several = isinstance(words, list | tuple) and all(isinstance(word, str) for word in words)
