@@ -120,10 +120,22 @@ def require_finite(key: str, values: Any) -> None:
         require(key, values, bool(np.all(np.isfinite(np.asarray(values)))), fix)
 
 
-def require_whole(key: str, value: Any, low: int, high: int = 10**9) -> None:
-    """Raise `InputError` unless a value, which may be a float, is a whole number from low on."""
-    whole = bool(np.isfinite(value)) and value == int(value) and low <= value <= high
-    require(key, value, whole, f"must be a whole number, {low} to {high}")
+def whole_numbers(key: str, values: Any) -> np.ndarray:
+    """Whole numbers of a table, which may hold them as floats, such as nodes.
+
+    Raises
+    ------
+    InputError
+        naming the first value that is no whole number
+    """
+    table = np.asarray(values)
+    numeric = table.dtype.kind in "iuf"
+    require(key, f"of type {table.dtype}", numeric, "must hold whole numbers")
+    with np.errstate(invalid="ignore"):  # NaN and infinity
+        found = table.astype(np.int64)
+    wrong = table[found != table]
+    require(key, wrong[:1], not wrong.size, "must be whole numbers, as nodes and directions are")
+    return found
 
 
 def check_words(key: str, words: Any) -> None:
