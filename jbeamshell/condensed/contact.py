@@ -53,6 +53,8 @@ HARDLY = 1e-11  # energy of a movement over that of the nodes alone, from which 
 SMALL_PUSH = 1e-6  # of the pressing, from which on it pushes along the contact
 MOST_CYCLES = 32  # until the loop is steady
 REPEATS = 1e-6  # slip left over by a steady cycle, over its largest range
+NOISE = 1e-12  # slip over what the friction would move a node by, taken as none
+HELD = 1e-8  # stiffness that holds a body which slides, over that of its nodes
 
 
 def solve_contact(
@@ -131,15 +133,17 @@ def solve_contact(
     distance = None if flat else jnp.broadcast_to(away, upper.x.shape)
     until_steady = path is None and cycles is None
     words = control, assembly, steps_per_half_cycle if until_steady else None
-    levels, walked = _walked((contact, distance, targets), held, words)
+    levels, walked, error = _walked((contact, distance, targets), held, words)
     if until_steady and not is_traced(levels):
         targets = targets[: _unit_path(int(walked), steps_per_half_cycle).size]
-        levels = jax.tree.map(lambda a: a[: targets.size + 1], levels)
+        levels, error = jax.tree.map(lambda a: a[: targets.size + 1], (levels, error))
     if not is_traced(levels) and throw:
         _demand(levels, targets)
     unit = _unit_path(MOST_CYCLES if cycles is None else cycles, steps_per_half_cycle)
     loads = unit[: targets.size] if path is None else targets
-    history = _history(upper, levels, held, _cycles(loads), as_leaf(friction), control, assembly)
+    history = _history(
+        upper, levels, held, error, _cycles(loads), as_leaf(friction), control, assembly
+    )
     if not is_traced(levels) and throw:
         warn_of_doubts(history.doubts, stacklevel=2)
     return history
@@ -203,11 +207,11 @@ def _walked(
     given: tuple[tuple[Array, ...], Array | None, Array],
     held: tuple[bool, ...],
     words: tuple[str, str, int | None],
-) -> tuple[Level, Array]:
-    """Levels of the path, the pressed contact first, and the number of cycles until it is steady.
+) -> tuple[Level, Array, Array]:
+    """Levels of the path, the number of cycles until it is steady, and the `_errors`.
 
-    Nodes are as `_order` has them.  The last word is the steps per half cycle of a path that goes
-    on until it is steady, see `_until_steady`.
+    The pressed contact comes first.  Nodes are as `_order` has them.  The last word is the steps
+    per half cycle of a path that goes on until it is steady, see `_until_steady`.
     """
     ((hessian, x, tributary, friction, slides), gap, targets) = given
     control, assembly, half = words
@@ -216,15 +220,17 @@ def _walked(
     k_tt, k_tn, k_nn = hessian[np.ix_(v, v)], hessian[np.ix_(v, w)], hessian[np.ix_(w, w)]
     press_t, press_n, away = hessian[v, -1], hessian[w, -1], None if gap is None else gap[order]
     traction = jnp.zeros_like(press_t)
+    # Without it, the matrix of a body that friction alone holds is singular once all of it slips,
+    # even for a moment in which one part slips along and another against v.
+    spring = jnp.where(slides, jnp.max(jnp.diag(k_tt)), 0.0)
+    k_tt = k_tt + HELD * spring * jnp.eye(free)
     if assembly == "frictional":
         rough = press_roughly(k_tt, k_tn, k_nn, press_t, press_n, friction, away)
         lift, reaction, traction = rough.lift, rough.reaction, rough.traction
     else:
-        # Without friction a spring that carries nothing keeps the place of a body that slides.
-        spring = jnp.where(slides, jnp.max(jnp.diag(k_tt)), 0.0)
-        lift, _, reaction = press(
-            k_tt.at[-1, -1].add(spring), k_tn, k_nn, press_t, press_n, gap=away
-        )
+        # Without friction a spring that carries nothing keeps its place.
+        placed = k_tt.at[-1, -1].add(spring)
+        lift, _, reaction = press(placed, k_tn, k_nn, press_t, press_n, gap=away)
     body = Body(
         x=x[order],
         tributary=tributary[order],
@@ -247,7 +253,29 @@ def _walked(
     sound = jnp.all(jnp.isfinite(lift))
     first = Level(start, lift, jnp.zeros_like(body.c), jnp.zeros_like(start.v, bool), sound)
     found = found._replace(state=state, settled=found.settled & sound)
-    return jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), first, found), walked
+    found = jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), first, found)
+    return found, walked, _errors(body, friction, found)
+
+
+def _errors(body: Body, friction: Array, levels: Level) -> Array:
+    """Largest violation (levels,) of balance, Coulomb's law and Signorini's, over the reactions.
+
+    It needs nothing that the walk knows but its levels.
+    """
+    state, lift, k = levels.state, levels.lift, body.f_t.size
+    moved, risen = state.v - state.v[0], lift - lift[0]
+    r_t = body.t_0 + moved @ body.K_tt + risen @ body.K_tn.T - jnp.outer(state.force, body.f_t)
+    r_n = body.r_0 + moved @ body.K_tn + risen @ body.K_nn - jnp.outer(state.force, body.f_n)
+    wrong = [
+        jnp.abs(r_t - state.r_t),
+        jnp.abs(r_n - state.r_n),
+        jnp.abs(state.r_t) - friction * state.r_n[:, :k],
+        -state.r_n,
+        -lift * jnp.diag(body.K_nn),
+        jnp.minimum(jnp.abs(lift * jnp.diag(body.K_nn)), jnp.abs(state.r_n)),
+    ]
+    worst = jnp.max(jnp.concatenate(wrong, axis=1), axis=1)
+    return worst / jnp.max(jnp.abs(state.r_n), axis=1)
 
 
 def _until_steady(
@@ -255,7 +283,8 @@ def _until_steady(
 ) -> tuple[Level, Array]:
     """Levels of the first loading and of all cycles, and the number of those that were walked.
 
-    A cycle is steady if its slip ends where it began.  The cycles after it are copies.
+    A cycle is steady if its slip ends where it began, or has moved on as far as in the cycle
+    before: a body may walk.  The cycles after it are copies.
     """
     rise = targets.size - 2 * half * MOST_CYCLES
     rest = jnp.full(2 * half - rise, targets[rise - 1])  # the load rests until the first cycle
@@ -265,21 +294,26 @@ def _until_steady(
     paths = loads, jnp.asarray(turned), jnp.arange(MOST_CYCLES + 1) > 0
 
     def go(
-        carry: tuple[Level, Array], to: tuple[Array, Array, Array]
-    ) -> tuple[tuple[Level, Array], tuple[Level, Array]]:
-        before, steady = carry
+        carry: tuple[Level, Array, Array], to: tuple[Array, Array, Array]
+    ) -> tuple[tuple[Level, Array, Array], tuple[Level, Array]]:
+        before, moved, copied = carry
         loads, turns, closes = to
         state, at = jax.tree.map(lambda a: a[-1], (before.state, before.lift))
-        found = walk(body, friction, state, loads, turns, at, ~steady)
+        found = walk(body, friction, state, loads, turns, at, ~copied)
         found = found._replace(settled=found.settled & before.settled[-1])
-        now = jax.tree.map(lambda old, new: jnp.where(steady, old, new), before, found)
+        now = jax.tree.map(lambda old, new: jnp.where(copied, old, new), before, found)
         slip = lax.stop_gradient(jnp.concatenate([state.v[None], now.state.v]))
-        repeats = jnp.max(jnp.abs(slip[-1] - slip[0])) <= REPEATS * jnp.max(jnp.ptp(slip, axis=0))
-        return (now, steady | (closes & repeats) | ~now.settled[-1]), (now, steady)
+        none = NOISE * jnp.max(jnp.abs(state.r_t)) / jnp.max(jnp.abs(body.K_tt))
+        onwards = slip[-1] - slip[0]
+        left = jnp.minimum(*(jnp.max(jnp.abs(way)) for way in (onwards, onwards - moved)))
+        repeats = left <= REPEATS * jnp.max(jnp.ptp(slip, axis=0)) + none
+        steady = copied | (closes & repeats) | ~now.settled[-1]
+        return (now, onwards, steady), (now, copied)
 
     first = Level(start, lift, body.c, start.v > 0.0, jnp.asarray(True))
     first = jax.tree.map(lambda a: jnp.broadcast_to(a, (2 * half, *a.shape)), first)
-    _, (found, copied) = lax.scan(go, (first, jnp.asarray(False)), paths)
+    at_start = first, jnp.zeros_like(start.v), jnp.asarray(False)
+    _, (found, copied) = lax.scan(go, at_start, paths)
     kept = np.arange(loads.size)
     kept = np.append(kept[:rise], kept[2 * half :])
     flat = jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[kept], found)
@@ -317,6 +351,7 @@ def _history(
     upper: Substructure,
     levels: Level,
     held: tuple[bool, ...],
+    error: Array,
     cycles: tuple[tuple[int, int, int], ...],
     friction: Array,
     control: str,
@@ -346,6 +381,7 @@ def _history(
         slipping=along(levels.slipping.astype(float)) == 1.0,
         slip_work=sound(levels.slip_work),
         settled=levels.settled,
+        error=error,
         friction=friction,
         cycles=cycles,
         control=control,

@@ -145,7 +145,7 @@ class StiffnessModel:
         require("normal", normal, normal != tangential, "must differ from tangential")
         row = {(int(a), int(b)): i for i, (a, b) in enumerate(model.dofs)}
         nodes, x, group = _groups(contact)
-        known = set(model.dofs[:, 0].tolist())
+        known = set(self.dofs[:, 0].tolist())
         for node in nodes:
             fix = "is no node of the model: give nodes that have rows in the matrix"
             require("contact", node, node in known, fix)

@@ -11,7 +11,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import TINY
 from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.figures import UNITS
@@ -27,6 +26,8 @@ FIGURES = (
     "slip_length",
     "closure",
 )
+OUT_OF_BALANCE = 1e-6  # force over the largest reaction, from which on a result is doubted
+NO_SLIP = 1e-12  # work over that of the loop's width, taken as zero
 PRESSED = {"frictionless": "pressed without friction", "frictional": "pressed with friction"}
 
 
@@ -45,6 +46,7 @@ class ContactHistory(LoopFigures, eqx.Module):
     slipping : (steps+1, n) True if the node slips at the end of the step
     slip_work : (steps+1,) work of friction in each step
     settled : (steps+1,) True where equilibrium was found
+    error : (steps+1,) violation of balance, friction and contact, force over the largest reaction
     friction : Coulomb's coefficient mu
     cycles : steps at the start, the turn and the end of each closed cycle
     control : "force" or "displacement", what the amplitude is of
@@ -67,6 +69,7 @@ class ContactHistory(LoopFigures, eqx.Module):
     slipping: Array
     slip_work: Array
     settled: Array
+    error: Array
     friction: Array
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
     control: str = eqx.field(static=True)
@@ -92,7 +95,14 @@ class ContactHistory(LoopFigures, eqx.Module):
         force, displacement = self.loop
         answer = displacement if self.control == "force" else force
         both = (_ends_apart(each) for each in (answer[:, None], self.slip[start : stop + 1]))
-        return jnp.maximum(*both)
+        loop, slip = both
+        return jnp.maximum(loop, jnp.where(self._slips, slip, 0.0))
+
+    @property
+    def _slips(self) -> Array:
+        """True if slip in the last cycle is more than rounding."""
+        force, displacement = self.loop
+        return self.dissipation > NO_SLIP * jnp.ptp(force) * jnp.ptp(displacement)
 
     @property
     def dissipation_error(self) -> Array:
@@ -103,13 +113,19 @@ class ContactHistory(LoopFigures, eqx.Module):
         start, _, stop = self._last
         slip, cap = self.slip[start : stop + 1], self.friction * self.reaction[start : stop + 1]
         path = jnp.abs(jnp.diff(slip, axis=0)) * 0.5 * (cap[1:] + cap[:-1])
-        return grid_error(jnp.sum(path, axis=0) * self.tributary)
+        return grid_error(jnp.where(self._slips, jnp.sum(path, axis=0), 0.0) * self.tributary)
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """Reasons to doubt this result, each a sentence with the size of the error and the fix."""
         if not self.converged:
             return ("a load found no equilibrium: that step and all after it hold NaN",)
+        wrong = float(jnp.max(self.error))
+        if wrong > OUT_OF_BALANCE:
+            return (
+                f"forces are off by {wrong:.2g} of the largest reaction: the contact jumps where "
+                "much friction meets little stiffness; take a smaller amplitude or friction",
+            )
         if not self.cycles or not float(self.friction) > 0.0:
             return ()
         return *self._unsteady, *doubts_of_mesh(float(self.dissipation_error))
@@ -120,16 +136,20 @@ class ContactHistory(LoopFigures, eqx.Module):
         apart, count = float(self.closure), len(self.cycles)
         if not apart > CLOSES:
             return ()
-        change = ""
+        said = f"the last cycle is not steady: its ends are {apart:.2g} of its width apart"
         if count > 1:
+            ways = np.stack([self.slip[stop] - self.slip[start] for start, _, stop in self.cycles])
+            walked = float(np.max(np.abs(ways[-1])))
+            if np.max(np.abs(ways[-1] - ways[-2])) <= CLOSES * walked:
+                return (
+                    f"the body walks: every cycle moves its contact on by {walked:.3g}; hold it, "
+                    "or take a smaller amplitude, if it should stay",
+                )
             start, _, stop = self.cycles[-2]
-            before, last = float(jnp.sum(self.slip_work[start + 1 : stop + 1])), self.dissipation
-            percent = 100.0 * abs(float(last) - before) / max(before, float(last), TINY)
-            change = f", and the dissipation changed by {percent:.2g} % since the cycle before"
-        return (
-            f"the last cycle is not steady: its ends are {apart:.2g} of its width apart{change}; "
-            f"leave cycles out, or take more than {count}",
-        )
+            last, before = self.dissipation, jnp.sum(self.slip_work[start + 1 : stop + 1])
+            percent = 100.0 * abs(float(last / before) - 1.0) if before > 0.0 else 100.0
+            said += f", and the dissipation changed by {percent:.2g} % since the cycle before"
+        return (f"{said}; leave cycles out, or take more than {count}",)
 
     def figures(self) -> dict[str, Any]:
         """Figures of the last cycle and of the contact at the last step, as plain numbers.

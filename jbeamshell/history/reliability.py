@@ -393,7 +393,7 @@ def doubts_of_mesh(error: float) -> tuple[str, ...]:
 
 def _off(error: float) -> str:
     """Beginning of a doubt about the dissipation."""
-    by = f"about {100.0 * error:.2g} %" if error < 1.0 else "100 % or more"
+    by = f"about {100.0 * error:.2g} %" if error < 0.995 else "100 % or more"
     return f"the dissipation may be off by {by}"
 
 
