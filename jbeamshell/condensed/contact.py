@@ -28,7 +28,7 @@ from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.assembly import press_roughly
-from jbeamshell.condensed.body import Body
+from jbeamshell.condensed.body import Body, local_compliance
 from jbeamshell.condensed.branches import ContactState, pressed
 from jbeamshell.condensed.contact_input import (
     check_bodies,
@@ -41,7 +41,7 @@ from jbeamshell.condensed.events import walk
 from jbeamshell.condensed.levels import turns_of
 from jbeamshell.condensed.pair import together
 from jbeamshell.condensed.pressing import press
-from jbeamshell.condensed.stretch import Level
+from jbeamshell.condensed.stretch import SLIDES, Level
 from jbeamshell.condensed.substructure import Substructure, potential
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
@@ -54,7 +54,7 @@ SMALL_PUSH = 1e-6  # of the pressing, from which on it pushes along the contact
 MOST_CYCLES = 32  # until the loop is steady
 REPEATS = 1e-6  # slip left over by a steady cycle, over its largest range
 NOISE = 1e-12  # slip over what the friction would move a node by, taken as none
-HELD = 1e-8  # stiffness that holds a body which slides, over that of its nodes
+FREER = 30.0  # times `SLIDES`, how much the spring of a body that slides gives way
 
 
 def solve_contact(
@@ -220,15 +220,18 @@ def _walked(
     k_tt, k_tn, k_nn = hessian[np.ix_(v, v)], hessian[np.ix_(v, w)], hessian[np.ix_(w, w)]
     press_t, press_n, away = hessian[v, -1], hessian[w, -1], None if gap is None else gap[order]
     traction = jnp.zeros_like(press_t)
-    # Without it, the matrix of a body that friction alone holds is singular once all of it slips,
-    # even for a moment in which one part slips along and another against v.
-    spring = jnp.where(slides, jnp.max(jnp.diag(k_tt)), 0.0)
-    k_tt = k_tt + HELD * spring * jnp.eye(free)
+    f_t, f_n, c = -hessian[v, -2], -hessian[w, -2], -hessian[-2, -2]
+    # Without a weak spring, the matrix of a body that friction alone holds is singular once all of
+    # it slips, even for a moment in which one part slips along and another against v.
+    stiffness = jnp.append(jnp.diag(k_tt), jnp.diag(k_nn))
+    gives = c + local_compliance(stiffness, jnp.append(f_t, f_n))
+    k_tt = k_tt + jnp.where(slides, 1.0 / (FREER * SLIDES * free * gives), 0.0) * jnp.eye(free)
     if assembly == "frictional":
         rough = press_roughly(k_tt, k_tn, k_nn, press_t, press_n, friction, away)
         lift, reaction, traction = rough.lift, rough.reaction, rough.traction
     else:
         # Without friction a spring that carries nothing keeps its place.
+        spring = jnp.where(slides, jnp.max(stiffness), 0.0)
         placed = k_tt.at[-1, -1].add(spring)
         lift, _, reaction = press(placed, k_tn, k_nn, press_t, press_n, gap=away)
     body = Body(
@@ -237,11 +240,11 @@ def _walked(
         K_tt=k_tt,
         K_tn=k_tn,
         K_nn=k_nn,
-        f_t=-hessian[v, -2],
-        f_n=-hessian[w, -2],
+        f_t=f_t,
+        f_n=f_n,
         r_0=reaction,
         t_0=traction,
-        c=-hessian[-2, -2],
+        c=c,
     )
     start = pressed(body)
     driven = driven_by_displacement(body) if control == "displacement" else body

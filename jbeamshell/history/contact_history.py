@@ -26,7 +26,7 @@ FIGURES = (
     "slip_length",
     "closure",
 )
-OUT_OF_BALANCE = 1e-6  # force over the largest reaction, from which on a result is doubted
+OUT_OF_BALANCE = 1e-4  # force over the largest reaction, from which on a result is doubted
 NO_SLIP = 1e-12  # work over that of the loop's width, taken as zero
 PRESSED = {"frictionless": "pressed without friction", "frictional": "pressed with friction"}
 
