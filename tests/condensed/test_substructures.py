@@ -98,7 +98,8 @@ class TestContact:
         assert found.converged
         for name in ("dissipation", "dissipation_loop", "secant_stiffness", "slip_length"):
             assert float(getattr(found, name)) == pytest.approx(
-                float(getattr(joint, name)), rel=1e-8  # a weak spring holds a body that slides
+                float(getattr(joint, name)),
+                rel=1e-8,  # a weak spring holds a body that slides
             )
         np.testing.assert_allclose(found.reaction, joint.reaction, atol=1e-8)
         np.testing.assert_allclose(found.traction, joint.traction, atol=1e-9)
