@@ -148,7 +148,7 @@ class ContactHistory(LoopFigures, eqx.Module):
             start, _, stop = self.cycles[-2]
             last, before = self.dissipation, jnp.sum(self.slip_work[start + 1 : stop + 1])
             percent = 100.0 * abs(float(last / before) - 1.0) if before > 0.0 else 100.0
-            said += f", and the dissipation changed by {percent:.2g} % since the cycle before"
+            said += f", and the dissipation changed by {percent:.3g} % since the cycle before"
         return (f"{said}; leave cycles out, or take more than {count}",)
 
     def figures(self) -> dict[str, Any]:
