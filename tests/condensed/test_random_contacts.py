@@ -13,7 +13,7 @@ from jax import lax
 import jbeamshell as jb
 
 ALLOWED = 0.02  # relative error of the dissipation and of the stiffness
-SMALL = 1e-9  # dissipation over the product of the loop's ranges, below which it is none
+SMALL = 1e-6  # dissipation over the product of the loop's ranges, below which it is none
 STEPS, CYCLES = 200, 64  # of the reference, per half cycle, and at most until it is steady
 STEADY = 1e-4  # change of its dissipation in a cycle
 
@@ -215,7 +215,7 @@ def brute_force(case):
         v, r_t, pull = q[:, ::2], r[:, ::2], np.append(amplitude, cycle[:, 0])
         work = -float(np.sum(0.5 * (r_t[1:] + r_t[:-1]) * np.diff(v, axis=0)))
         moved = soft[0] * pull + q @ f[:, 0]
-        if abs(work - before) <= STEADY * work + SMALL**2 * np.ptp(pull) * np.ptp(moved):
+        if abs(work - before) <= STEADY * work + 1e-9 * np.ptp(pull) * np.ptp(moved):
             break
         before = work
     return work, np.ptp(pull) / np.ptp(moved), worst
