@@ -5,6 +5,7 @@
     friction = 0.1
     amplitude = 0.5
     bolts = [8e3, 8e3]
+    assembly = "frictionless"    # or "frictional"; this, and a steady cycle, if left out
 
     [upper]
     file = "upper.sti"           # or .npz, .mat, .mtx, .op4; paths are those beside this file
