@@ -101,8 +101,9 @@ def solve_contact(
     Raises
     ------
     InputError
-        if the contact lines do not match; if nothing holds the bodies, pulls them or presses them
-        together; or if a pressing without friction would push a body away along X
+        for numbers that make no sense; if the contact lines do not match; if nothing holds the
+        bodies, pulls them or presses them together; or if a pressing without friction would push a
+        body away along X
     UnconvergedError
         if a load has no equilibrium, such as beyond gross slip
 
@@ -159,6 +160,7 @@ def _targets(
             require_count("cycles", cycles, 1)
         count = MOST_CYCLES if cycles is None else cycles
         return as_leaf(amplitude) * jnp.asarray(_unit_path(count, steps_per_half_cycle))
+    require("cycles", cycles, cycles is None, "is given beside path: leave one of them out")
     loads = as_leaf(path, "path")
     require("path", loads.shape, loads.ndim == 1 and loads.size > 0, "give (levels,) loads")
     require_finite("path", loads)
