@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from typing import Any
 
 from jbeamshell.cli.arguments import add_folder, add_json
-from jbeamshell.cli.terminal import put, say_written
+from jbeamshell.cli.terminal import put, say_written, warn
+from jbeamshell.common.errors import DoubtfulWarning
 
 
 def add_to(commands: Any) -> None:
@@ -15,7 +17,8 @@ def add_to(commands: Any) -> None:
         "bodies",
         help="solve the contact of bodies from your own finite elements",
         description="Press bodies from your own finite elements together, load them to and fro, "
-        "and report the hysteresis loop.",
+        "and report the hysteresis loop. They are pressed without friction unless the file says "
+        "assembly, and loaded until the loop is steady unless it says cycles.",
         epilog="The file says friction, amplitude, cycles, bolts, gap, ... and, in [upper] and "
         "[lower], the file of each stiffness matrix (.sti of CalculiX, .mtx, .mat, .npz, .op4) "
         "with the tables contact (node, X), pull and press (node, direction, force).",
@@ -31,16 +34,23 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Solve a contact, report and write; returns the exit code."""
     from jbeamshell.common import files
+    from jbeamshell.common.checks import require
     from jbeamshell.condensed.contact import solve_contact
     from jbeamshell.condensed.contact_file import read_contact
     from jbeamshell.plotting.folder import check_folder
 
     given = read_contact(options.file)
+    follows = options.amplitude is not None and "path" in given
+    require("--amplitude", options.amplitude, not follows, "the file gives a path: change that")
     for name in ("amplitude", "friction"):
         if getattr(options, name) is not None:
             given[name] = getattr(options, name)
     folder = None if options.out is None else check_folder(options.out)
-    history = solve_contact(**given)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DoubtfulWarning)  # printed below, one line each
+        history = solve_contact(**given)
+    for doubt in history.doubts:
+        warn(doubt)
     put(files.as_json(history.figures()) if options.json else f"{history}\n")
     if folder is not None:
         say_written(history.write(folder))

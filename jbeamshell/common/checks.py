@@ -113,6 +113,31 @@ def require_number(
     require(key, value, bool(np.isfinite(number) and low < number < high), fix)
 
 
+def require_finite(key: str, values: Any) -> None:
+    """Raise `InputError` unless all of an array's numbers are finite; traced ones pass."""
+    if not is_traced(values):
+        fix = "holds NaN or infinity: give finite numbers"
+        require(key, values, bool(np.all(np.isfinite(np.asarray(values)))), fix)
+
+
+def whole_numbers(key: str, values: Any) -> np.ndarray:
+    """Whole numbers of a table, which may hold them as floats, such as nodes.
+
+    Raises
+    ------
+    InputError
+        naming the first value that is no whole number
+    """
+    table = np.asarray(values)
+    numeric = table.dtype.kind in "iuf"
+    require(key, f"of type {table.dtype}", numeric, "must hold whole numbers")
+    with np.errstate(invalid="ignore"):  # NaN and infinity
+        found = table.astype(np.int64)
+    wrong = table[found != table]
+    require(key, wrong[:1], not wrong.size, "must be whole numbers, as nodes and directions are")
+    return found
+
+
 def check_words(key: str, words: Any) -> None:
     """Raise `InputError` unless a value is a list of words."""
     several = isinstance(words, list | tuple) and all(isinstance(word, str) for word in words)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+import warnings
+from collections.abc import Iterable
 
 LONGEST = 800  # characters of a message
 
@@ -26,6 +28,12 @@ class UnconvergedError(RuntimeError):
 
 class DoubtfulWarning(UserWarning):
     """Result that converged and may still be wrong; see `jbeamshell.History.doubts`."""
+
+
+def warn_of_doubts(doubts: Iterable[str], stacklevel: int) -> None:
+    """Warn of everything that is doubtful about a result, at the line of a caller."""
+    for doubt in doubts:
+        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=stacklevel + 1)
 
 
 class Status(enum.IntEnum):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import (
@@ -20,29 +20,41 @@ from jbeamshell.common.checks import (
     is_traced,
     require,
     require_choice,
+    require_count,
+    require_finite,
     require_number,
 )
-from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.assembly import press_roughly
-from jbeamshell.condensed.body import Body
-from jbeamshell.condensed.branches import pressed
+from jbeamshell.condensed.body import Body, local_compliance
+from jbeamshell.condensed.branches import ContactState, pressed
+from jbeamshell.condensed.contact_input import (
+    check_bodies,
+    checked_bolts,
+    checked_gap,
+    held_nodes,
+)
 from jbeamshell.condensed.drives import driven_by_displacement, exchanged
 from jbeamshell.condensed.events import walk
 from jbeamshell.condensed.levels import turns_of
 from jbeamshell.condensed.pair import together
 from jbeamshell.condensed.pressing import press
-from jbeamshell.condensed.stretch import Level
-from jbeamshell.condensed.substructure import Substructure, loose_mode, potential
+from jbeamshell.condensed.stretch import SLIDES, Level
+from jbeamshell.condensed.substructure import Substructure, potential
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.keys import ASSEMBLIES, CONTROLS
 from jbeamshell.scene.parts import Load
 
-MATCH = 1e-6  # of the contact's length, within which nodes match
 STEPS = 16  # per half cycle
 HARDLY = 1e-11  # energy of a movement over that of the nodes alone, from which nothing resists
+SMALL_PUSH = 1e-6  # of the pressing, from which on it pushes along the contact
+MOST_CYCLES = 32  # until the loop is steady
+REPEATS = 1e-6  # slip left over by a steady cycle, over its largest range
+NOISE = 1e-12  # slip over what the friction would move a node by, taken as none
+FREER = 30.0  # times `SLIDES`, how much the spring of a body that slides gives way
 
 
 def solve_contact(
@@ -51,13 +63,13 @@ def solve_contact(
     *,
     friction: ArrayLike = 0.1,
     amplitude: ArrayLike = 1.0,
-    cycles: int = 2,
+    cycles: int | None = None,
     steps_per_half_cycle: int = STEPS,
     control: str = "force",
     path: ArrayLike | None = None,
     bolts: ArrayLike = 1.0,
     gap: ArrayLike = 0.0,
-    assembly: str = "frictional",
+    assembly: str = "frictionless",
     throw: bool = True,
 ) -> ContactHistory:
     """Press bodies together, load them to and fro, and return the history of their contact.
@@ -69,15 +81,18 @@ def solve_contact(
     upper : body that is pulled
     lower : body below, on matching nodes, its displacements in the same frame; None is a rigid base
     friction : Coulomb's coefficient mu
-    amplitude, cycles, steps_per_half_cycle : load path, 0 to A, then so many times A, -A, A
+    amplitude, steps_per_half_cycle : load path, 0 to A, then cycles A, -A, A
+    cycles : number of cycles; None goes on until the loop is steady, 32 at most.  A traced history
+        always has 32, those after the first steady one copied at no cost
     control : "force" or "displacement", what the amplitude is of
     path : (levels,) loads instead of the cycles
     bolts : size of each pressing load of the bodies, a number or one for each
     gap : distance of the nodes before anything presses, a number or (n,); in a frictional assembly
         it grows together with the pressures
-    assembly : "frictional", as bolts are tightened one with the other, or "frictionless", which
-        locks no shear in
-    throw : False to return steps without equilibrium as NaN
+    assembly : "frictionless", which locks no shear in, as in a scene, or "frictional", as bolts are
+        tightened one with the other
+    throw : True raises for a load without equilibrium and warns of doubts; False returns NaN, and
+        leaves both to ``history.settled`` and ``history.doubts``
 
     Returns
     -------
@@ -86,9 +101,16 @@ def solve_contact(
     Raises
     ------
     InputError
-        if the contact lines do not match, or nothing holds the bodies or presses them together
+        for numbers that make no sense; if the contact lines do not match; if nothing holds the
+        bodies, pulls them or presses them together; or if a pressing without friction would push a
+        body away along X
     UnconvergedError
         if a load has no equilibrium, such as beyond gross slip
+
+    Warns
+    -----
+    DoubtfulWarning
+        if the result may still be wrong, see `jbeamshell.ContactHistory.doubts`
 
     Examples
     --------
@@ -97,57 +119,51 @@ def solve_contact(
         history = jb.solve_contact(upper, lower, friction=0.1, amplitude=0.5, bolts=[8e3, 8e3])
         history.dissipation, history.loop
     """
-    for key, body in (("upper", upper), ("lower", lower)):
-        known = isinstance(body, Substructure) or (body is None and key == "lower")
-        require(key, type(body).__name__, known, "give a jbeamshell.Substructure")
+    check_bodies(upper, lower)
     require_choice("assembly", assembly, ASSEMBLIES)
     require_choice("control", control, CONTROLS)
     require_number("friction", friction, NOT_NEGATIVE, low=-TINY)
-    sizes = _bolts(upper, lower, bolts)
-    away = as_leaf(gap, "gap")
-    fix = f"give a number or {upper.x.size} of them, not negative"
-    require("gap", gap, away.shape in ((), upper.x.shape), fix)
-    require("gap", gap, is_traced(away) or bool(np.all(np.asarray(away) >= 0.0)), fix)
+    sizes, away = checked_bolts(upper, lower, bolts), checked_gap(upper, gap)
     targets = _targets(amplitude, cycles, steps_per_half_cycle, path)
-    if lower is not None:
-        _check_match(upper, lower)
-        _check_held(upper, lower)
-    held = _held(upper, lower)
-    hessian = _relative(upper, lower, sizes)
-    contact = hessian, upper.x, upper.tributary, as_leaf(friction)
-    flat = assembly == "frictional" and not is_traced(away) and not np.any(away)
+    held = held_nodes(upper, lower)
+    hessian, slides = _relative(upper, lower, sizes)
+    if assembly == "frictionless" and not is_traced(hessian):
+        _check_push(hessian, held, slides)
+    contact = hessian, upper.x, upper.tributary, as_leaf(friction), slides
+    flat = not is_traced(away) and not np.any(np.asarray(away))
     distance = None if flat else jnp.broadcast_to(away, upper.x.shape)
-    slides = assembly == "frictionless" and (_slides(upper) or _slides(lower))
-    words = control, assembly, slides
-    levels: Level = _walked((contact, distance, targets), held, words)
+    until_steady = path is None and cycles is None
+    words = control, assembly, steps_per_half_cycle if until_steady else None
+    levels, walked, error = _walked((contact, distance, targets), held, words)
+    if until_steady and not is_traced(levels):
+        targets = targets[: _unit_path(int(walked), steps_per_half_cycle).size]
+        levels, error = jax.tree.map(lambda a: a[: targets.size + 1], (levels, error))
     if not is_traced(levels) and throw:
         _demand(levels, targets)
-    return _history(upper, levels, held, _cycles(targets, cycles, steps_per_half_cycle, path))
-
-
-def _bolts(upper: Substructure, lower: Substructure | None, bolts: ArrayLike) -> Array:
-    """Size of each pressing load, (m - 1,)."""
-    count = upper.bolts if lower is None else max(upper.bolts, lower.bolts)
-    require("bolts", 0, count > 0, "nothing presses the bodies together: condense one with press=")
-    for key, body in (("upper.press", upper), ("lower.press", lower)):
-        if body is not None:
-            fix = f"give {count} in both bodies, or none in one of them"
-            require(key, body.bolts, body.bolts in (0, count), fix)
-    sizes = as_leaf(bolts, "bolts")
-    fix = f"give a number, or one for each of {count} presses"
-    require("bolts", bolts, sizes.shape in ((), (count,)), fix)
-    return jnp.broadcast_to(sizes, (count,))
+    unit = _unit_path(MOST_CYCLES if cycles is None else cycles, steps_per_half_cycle)
+    loads = unit[: targets.size] if path is None else targets
+    history = _history(
+        upper, levels, held, error, _cycles(loads), as_leaf(friction), control, assembly
+    )
+    if not is_traced(levels) and throw:
+        warn_of_doubts(history.doubts, stacklevel=2)
+    return history
 
 
 def _targets(
-    amplitude: ArrayLike, cycles: int, steps_per_half_cycle: int, path: ArrayLike | None
+    amplitude: ArrayLike, cycles: int | None, steps_per_half_cycle: int, path: ArrayLike | None
 ) -> Array:
-    """Loads (levels,) after the pressing."""
+    """Loads (levels,) after the pressing; those of all cycles that a steady one may take."""
     if path is None:
         require_number("amplitude", amplitude)
-        return as_leaf(amplitude) * jnp.asarray(_unit_path(cycles, steps_per_half_cycle))
+        if cycles is not None:
+            require_count("cycles", cycles, 1)
+        count = MOST_CYCLES if cycles is None else cycles
+        return as_leaf(amplitude) * jnp.asarray(_unit_path(count, steps_per_half_cycle))
+    require("cycles", cycles, cycles is None, "is given beside path: leave one of them out")
     loads = as_leaf(path, "path")
     require("path", loads.shape, loads.ndim == 1 and loads.size > 0, "give (levels,) loads")
+    require_finite("path", loads)
     return loads
 
 
@@ -156,104 +172,157 @@ def _unit_path(cycles: int, steps: int) -> np.ndarray:
     return Load(amplitude=jnp.ones(()), cycles=cycles, steps_per_half_cycle=steps).unit_path()
 
 
-def _check_match(upper: Substructure, lower: Substructure) -> None:
-    """Refuse contact lines that do not match, and a place that both bodies hold."""
-    same = upper.x.size == lower.x.size
-    fix = f"does not match the {upper.x.size} nodes of the upper body: mesh both lines alike"
-    require("lower.x", f"{lower.x.size} nodes", same, fix)
-    if is_traced(upper.x, lower.x):
-        return
-    x, other = np.asarray(upper.x), np.asarray(lower.x)
-    worst = int(np.argmax(np.abs(x - other)))
-    fix = f"does not match node {worst} of the upper body at X = {x[worst]:.6g}: mesh both alike"
-    close = abs(x[worst] - other[worst]) <= MATCH * float(np.ptp(x))
-    require(f"lower.x[{worst}]", float(other[worst]), close, fix)
-
-
-def _held(upper: Substructure, lower: Substructure | None) -> tuple[bool, ...]:
-    """True for contact nodes (n,) that cannot slip, because supports hold both sides."""
-    fixed = np.array(upper.fixed).reshape(-1, 2)
-    if lower is not None:
-        fixed = fixed & np.array(lower.fixed).reshape(-1, 2)
-    first = int(np.argmax(fixed[:, 1]))
-    fix = "holds the normal direction of both sides: leave this node out of the contact"
-    require(f"contact[{first}]", "a support", not fixed[:, 1].any(), fix)
-    return tuple(fixed[:, 0].tolist())
-
-
-def _check_held(upper: Substructure, lower: Substructure) -> None:
-    """Refuse two bodies that move together without energy."""
-    if is_traced(upper, lower):
-        return
-    fixed = np.array(upper.fixed) | np.array(lower.fixed)  # the bodies stuck to each other
-    both = np.asarray(upper.stiffness + lower.stiffness)
-    both = np.where(fixed | fixed[:, None], 0.0, both) + np.diag(fixed * np.max(both))
-    mode = loose_mode(both, np.asarray(upper.x))
-    fix = f"{mode} with the other one: hold one of them by a support"
-    require("lower", "loose body", not mode, fix)
-
-
-def _slides(body: Substructure | None) -> bool:
-    """True if nothing but friction keeps a body from moving along X."""
-    if body is None or any(body.fixed[::2]):
-        return False
-    fix = "asks the numbers of the bodies what holds them: take 'frictional' where they are traced"
-    require("assembly", "frictionless", not is_traced(body.stiffness), fix)
-    stiffness = np.asarray(body.stiffness)
-    energy = float(np.sum(stiffness[::2, ::2]))  # of a unit displacement
-    return energy < HARDLY * body.x.size * float(np.max(stiffness))
-
-
 @jax.jit
-def _relative(upper: Substructure, lower: Substructure | None, bolts: Array) -> Array:
-    """Potential (2n + 2, 2n + 2) in the displacements over what is below, load and pressing."""
+def _relative(upper: Substructure, lower: Substructure | None, bolts: Array) -> tuple[Array, Array]:
+    """Potential (2n + 2, 2n + 2) in the displacements over what is below, load and pressing.
+
+    True beside it if nothing but friction keeps one of the bodies from moving along X.
+    """
     own = potential(upper, bolts)
     if lower is None:
-        return own
+        return own, _slides(upper)
     fixed = np.array(upper.fixed), np.array(lower.fixed)
-    return together(own, potential(lower, bolts), *fixed)[0]
+    hessian = together(own, potential(lower, bolts), *fixed)[0]
+    return hessian, _slides(upper) | _slides(lower)
+
+
+def _slides(body: Substructure) -> Array:
+    """True if nothing but friction keeps a body from moving along X."""
+    if any(body.fixed[::2]):
+        return jnp.asarray(False)
+    energy = jnp.sum(body.stiffness[::2, ::2])  # of a unit displacement
+    return energy < HARDLY * body.x.size * jnp.max(body.stiffness)
+
+
+def _check_push(hessian: Array, held: tuple[bool, ...], slides: Array) -> None:
+    """Refuse a pressing that pushes along X what only friction would hold."""
+    order, free = _order(held)
+    press = np.asarray(hessian[:-2, -1]).reshape(-1, 2)[order]
+    push, down = np.sum(press[:free, 0]), np.sum(np.abs(press))
+    fix = "only friction holds the body against it: take assembly='frictional'"
+    stays = not slides or abs(push) <= SMALL_PUSH * down
+    require("press", f"{-push:.4g} along X", bool(stays), fix)
 
 
 @Small
 def _walked(
     given: tuple[tuple[Array, ...], Array | None, Array],
     held: tuple[bool, ...],
-    words: tuple[str, str, bool],
-) -> Level:
-    """Levels of the path, the pressed contact first; nodes as `_order` has them."""
-    ((hessian, x, tributary, friction), gap, targets), (control, assembly, slides) = given, words
+    words: tuple[str, str, int | None],
+) -> tuple[Level, Array, Array]:
+    """Levels of the path, the number of cycles until it is steady, and the `_errors`.
+
+    The pressed contact comes first.  Nodes are as `_order` has them.  The last word is the steps
+    per half cycle of a path that goes on until it is steady, see `_until_steady`.
+    """
+    ((hessian, x, tributary, friction, slides), gap, targets) = given
+    control, assembly, half = words
     order, free = _order(held)
     v, w = 2 * order[:free], 2 * order + 1
     k_tt, k_tn, k_nn = hessian[np.ix_(v, v)], hessian[np.ix_(v, w)], hessian[np.ix_(w, w)]
     press_t, press_n, away = hessian[v, -1], hessian[w, -1], None if gap is None else gap[order]
     traction = jnp.zeros_like(press_t)
+    f_t, f_n, c = -hessian[v, -2], -hessian[w, -2], -hessian[-2, -2]
+    # Without a weak spring, the matrix of a body that friction alone holds is singular once all of
+    # it slips, even for a moment in which one part slips along and another against v.
+    stiffness = jnp.append(jnp.diag(k_tt), jnp.diag(k_nn))
+    gives = c + local_compliance(stiffness, jnp.append(f_t, f_n))
+    k_tt = k_tt + jnp.where(slides, 1.0 / (FREER * SLIDES * free * gives), 0.0) * jnp.eye(free)
     if assembly == "frictional":
         rough = press_roughly(k_tt, k_tn, k_nn, press_t, press_n, friction, away)
         lift, reaction, traction = rough.lift, rough.reaction, rough.traction
     else:
-        some = free - 1 if slides else free  # without friction one node keeps its place
-        parts = k_tt[:some, :some], k_tn[:some], k_nn, press_t[:some], press_n
-        lift, _, reaction = press(*parts, gap=away)
+        # Without friction a spring that carries nothing keeps its place.
+        spring = jnp.where(slides, jnp.max(stiffness), 0.0)
+        placed = k_tt.at[-1, -1].add(spring)
+        lift, _, reaction = press(placed, k_tn, k_nn, press_t, press_n, gap=away)
     body = Body(
         x=x[order],
         tributary=tributary[order],
         K_tt=k_tt,
         K_tn=k_tn,
         K_nn=k_nn,
-        f_t=-hessian[v, -2],
-        f_n=-hessian[w, -2],
+        f_t=f_t,
+        f_n=f_n,
         r_0=reaction,
         t_0=traction,
-        c=-hessian[-2, -2],
+        c=c,
     )
     start = pressed(body)
     driven = driven_by_displacement(body) if control == "displacement" else body
-    found = walk(driven, friction, start, targets, turns_of(targets), lift)
+    if half is None:
+        found, walked = walk(driven, friction, start, targets, turns_of(targets), lift), targets
+    else:
+        found, walked = _until_steady(driven, friction, start, targets, lift, half)
     state = jax.vmap(exchanged)(found.state) if control == "displacement" else found.state
     sound = jnp.all(jnp.isfinite(lift))
     first = Level(start, lift, jnp.zeros_like(body.c), jnp.zeros_like(start.v, bool), sound)
     found = found._replace(state=state, settled=found.settled & sound)
-    return jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), first, found)
+    found = jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), first, found)
+    return found, walked, _errors(body, friction, found)
+
+
+def _errors(body: Body, friction: Array, levels: Level) -> Array:
+    """Largest violation (levels,) of balance, Coulomb's law and Signorini's, over the reactions.
+
+    It needs nothing that the walk knows but its levels.
+    """
+    state, lift, k = levels.state, levels.lift, body.f_t.size
+    moved, risen = state.v - state.v[0], lift - lift[0]
+    r_t = body.t_0 + moved @ body.K_tt + risen @ body.K_tn.T - jnp.outer(state.force, body.f_t)
+    r_n = body.r_0 + moved @ body.K_tn + risen @ body.K_nn - jnp.outer(state.force, body.f_n)
+    wrong = [
+        jnp.abs(r_t - state.r_t),
+        jnp.abs(r_n - state.r_n),
+        jnp.abs(state.r_t) - friction * state.r_n[:, :k],
+        -state.r_n,
+        -lift * jnp.diag(body.K_nn),
+        jnp.minimum(jnp.abs(lift * jnp.diag(body.K_nn)), jnp.abs(state.r_n)),
+    ]
+    worst = jnp.max(jnp.concatenate(wrong, axis=1), axis=1)
+    return worst / jnp.max(jnp.abs(state.r_n), axis=1)
+
+
+def _until_steady(
+    body: Body, friction: Array, start: ContactState, targets: Array, lift: Array, half: int
+) -> tuple[Level, Array]:
+    """Levels of the first loading and of all cycles, and the number of those that were walked.
+
+    A cycle is steady if its slip ends where it began, or has moved on as far as in the cycle
+    before: a body may walk.  The cycles after it are copies.
+    """
+    rise = targets.size - 2 * half * MOST_CYCLES
+    rest = jnp.full(2 * half - rise, targets[rise - 1])  # the load rests until the first cycle
+    loads = jnp.concatenate([targets[:rise], rest, targets[rise:]]).reshape(-1, 2 * half)
+    turned = np.zeros(loads.shape, bool)
+    turned[:, 0] = turned[1:, half] = True
+    paths = loads, jnp.asarray(turned), jnp.arange(MOST_CYCLES + 1) > 0
+
+    def go(
+        carry: tuple[Level, Array, Array], to: tuple[Array, Array, Array]
+    ) -> tuple[tuple[Level, Array, Array], tuple[Level, Array]]:
+        before, moved, copied = carry
+        loads, turns, closes = to
+        state, at = jax.tree.map(lambda a: a[-1], (before.state, before.lift))
+        found = walk(body, friction, state, loads, turns, at, ~copied)
+        found = found._replace(settled=found.settled & before.settled[-1])
+        now = jax.tree.map(lambda old, new: jnp.where(copied, old, new), before, found)
+        slip = lax.stop_gradient(jnp.concatenate([state.v[None], now.state.v]))
+        none = NOISE * jnp.max(jnp.abs(state.r_t)) / jnp.max(jnp.abs(body.K_tt))
+        onwards = slip[-1] - slip[0]
+        left = jnp.minimum(*(jnp.max(jnp.abs(way)) for way in (onwards, onwards - moved)))
+        repeats = left <= REPEATS * jnp.max(jnp.ptp(slip, axis=0)) + none
+        steady = copied | (closes & repeats) | ~now.settled[-1]
+        return (now, onwards, steady), (now, copied)
+
+    first = Level(start, lift, body.c, start.v > 0.0, jnp.asarray(True))
+    first = jax.tree.map(lambda a: jnp.broadcast_to(a, (2 * half, *a.shape)), first)
+    at_start = first, jnp.zeros_like(start.v), jnp.asarray(False)
+    _, (found, copied) = lax.scan(go, at_start, paths)
+    kept = np.arange(loads.size)
+    kept = np.append(kept[:rise], kept[2 * half :])
+    flat = jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[kept], found)
+    return flat, jnp.maximum(jnp.sum(~copied) - 1, 1)
 
 
 def _order(held: tuple[bool, ...]) -> tuple[np.ndarray, int]:
@@ -278,22 +347,20 @@ def _demand(levels: Level, targets: Array) -> None:
     )
 
 
-def _cycles(
-    targets: Array, cycles: int, steps: int, path: ArrayLike | None
-) -> tuple[tuple[int, int, int], ...]:
-    """Closed cycles of the path, whose first step is the pressing."""
-    if path is None:
-        loads = _unit_path(cycles, steps)
-    else:
-        loads = np.zeros(0) if is_traced(targets) else np.asarray(targets)
-    return closed_cycles(np.append(0.0, loads)) if loads.size else ()
+def _cycles(loads: Array | np.ndarray) -> tuple[tuple[int, int, int], ...]:
+    """Closed cycles of a path, whose first step is the pressing; none of one that is traced."""
+    return () if is_traced(loads) else closed_cycles(np.append(0.0, np.asarray(loads)))
 
 
 def _history(
     upper: Substructure,
     levels: Level,
     held: tuple[bool, ...],
+    error: Array,
     cycles: tuple[tuple[int, int, int], ...],
+    friction: Array,
+    control: str,
+    assembly: str,
 ) -> ContactHistory:
     """History of levels, its nodes along X."""
     order, _ = _order(held)
@@ -319,5 +386,9 @@ def _history(
         slipping=along(levels.slipping.astype(float)) == 1.0,
         slip_work=sound(levels.slip_work),
         settled=levels.settled,
+        error=error,
+        friction=friction,
         cycles=cycles,
+        control=control,
+        assembly=assembly,
     )

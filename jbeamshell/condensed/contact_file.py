@@ -5,6 +5,7 @@
     friction = 0.1
     amplitude = 0.5
     bolts = [8e3, 8e3]
+    assembly = "frictionless"    # or "frictional"; this, and a steady cycle, if left out
 
     [upper]
     file = "upper.sti"           # or .npz, .mat, .mtx, .op4; paths are those beside this file
@@ -67,6 +68,9 @@ def read_contact(path: str | os.PathLike[str]) -> dict[str, Any]:
         known = (*BODIES, *NUMBERS)
         require(str(path), f"key {key}", key in known, f"keys are {', '.join(known)}")
     require(str(path), "without [upper]", "upper" in values, "write the body that is pulled")
+    for key in ("amplitude", "cycles", "steps_per_half_cycle"):
+        both = key in values and "path" in values
+        require(key, values.get(key), not both, "is given beside path: leave one of them out")
     here = Path(path).parent
     found = {key: values[key] for key in NUMBERS if key in values}
     return found | {key: _body(key, values[key], here) for key in BODIES if key in values}
@@ -80,6 +84,9 @@ def _body(key: str, table: Any, here: Path) -> Substructure:
     file = table.get("file")
     require(f"{key}.file", file, isinstance(file, str), "name a file of a matrix")
     if "contact" not in table:
+        beside = [name for name in table if name != "file"]
+        fix = "needs contact = ... beside it: without, the file holds a body that is condensed"
+        require(f"{key}.{', '.join(beside)}", "without contact", not beside, fix)
         return Substructure.read(here / str(file))
     given: dict[str, Any] = {
         name: _table(f"{key}.{name}", table[name], here) for name in TABLES if name in table

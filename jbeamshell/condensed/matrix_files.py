@@ -22,6 +22,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
+from jbeamshell.common.checks import whole_numbers
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured import matlab
 from jbeamshell.measured.tables import LARGEST, read_bytes
@@ -75,7 +76,7 @@ def _archive(data: bytes, _: Path) -> Rows:
             return Rows(scipy.sparse.csc_array(matrix))
         named = {name: archive[name] for name in archive.files}
     dofs = named.pop("dofs", None)
-    return Rows(_the_matrix(named, ARRAYS), None if dofs is None else dofs.astype(np.int64))
+    return Rows(_the_matrix(named, ARRAYS), None if dofs is None else whole_numbers("dofs", dofs))
 
 
 def _matlab(data: bytes, _: Path) -> Rows:
@@ -94,7 +95,7 @@ def _matlab(data: bytes, _: Path) -> Rows:
                 (value["value"].ravel(), places), shape=tuple(value["shape"].ravel())
             )
     found = _the_matrix(named, "give one square matrix, or name it stiffness")
-    return Rows(found, None if dofs is None else dofs.astype(np.int64))
+    return Rows(found, None if dofs is None else whole_numbers("dofs", dofs))
 
 
 def _the_matrix(named: dict[str, Any], fix: str) -> scipy.sparse.csc_array:
@@ -173,6 +174,8 @@ def _substructure(text: str) -> Rows:
             given.append((1, numbers))
         elif numbers:
             given.append((numbers[0], numbers[1:]))
+    if any(not 1 <= place <= len(nodes) for place, _ in given):
+        raise InputError(f"names an element node beyond the {len(nodes)} that it lists")
     rows = [(nodes[place - 1], direction) for place, found in given for direction in found]
     body, _, _ = rest.partition("*")
     values = np.array(body.replace(",", " ").split(), float)

@@ -20,7 +20,7 @@ import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
-from jbeamshell.common.checks import require, require_count
+from jbeamshell.common.checks import require, require_count, shown, whole_numbers
 from jbeamshell.common.errors import InputError
 from jbeamshell.condensed.matrix_files import read_matrix
 from jbeamshell.condensed.substructure import Substructure
@@ -30,6 +30,8 @@ SAME_PLACE = 1e-9  # of the contact's length, within which nodes lie at one X
 LOST = 1e-12  # pivot over its diagonal entry, from which on nothing is left of the stiffness
 TABLE = "give rows of node and X"
 FORCES = "give rows of node, direction and force"
+SUPPORTS = "give rows of node and direction"
+DIRECTIONS = 6  # three ways and three turns
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -46,7 +48,8 @@ class StiffnessModel:
     Raises
     ------
     InputError
-        if the matrix is not square or not symmetric, or has no row for each degree of freedom
+        if the matrix is not square or not symmetric, if it has no row for each degree of freedom,
+        or if a node or a direction is no whole number
 
     Examples
     --------
@@ -70,13 +73,15 @@ class StiffnessModel:
         apart = float(abs(matrix - matrix.T).max()) if matrix.nnz else 0.0
         fix = "is not symmetric: give the whole matrix, or mirror the half that was written"
         require("matrix", f"max|K - K'| {apart:.3g}", apart <= SYMMETRIC * largest, fix)
-        dofs = np.asarray(self.dofs)
+        dofs = whole_numbers("dofs", self.dofs)
         fix = f"give the node and direction of each of its {matrix.shape[0]} rows"
         require("dofs", dofs.shape, dofs.shape == (matrix.shape[0], 2), fix)
+        known = bool(np.all((dofs >= [0, 1]) & (dofs[:, 1:] <= DIRECTIONS)))
+        require("dofs", dofs, known, f"directions are 1 to {DIRECTIONS}, and nodes not negative")
         unique = len({tuple(row) for row in dofs.tolist()}) == len(dofs)
         require("dofs", dofs.shape, unique, "must name each node and direction once")
         object.__setattr__(self, "matrix", 0.5 * (matrix + matrix.T))
-        object.__setattr__(self, "dofs", dofs.astype(np.int64))
+        object.__setattr__(self, "dofs", dofs)
 
     @classmethod
     def read(
@@ -100,7 +105,7 @@ class StiffnessModel:
             return cls(found.matrix, np.asarray(dofs))
         if found.dofs is not None:
             return cls(found.matrix, found.dofs)
-        require_count("directions", directions, 1, 6)
+        require_count("directions", directions, 1, DIRECTIONS)
         node, direction = np.divmod(np.arange(found.matrix.shape[0]), directions)
         return cls(found.matrix, np.column_stack([node, direction]) + 1)
 
@@ -124,22 +129,29 @@ class StiffnessModel:
         pull : (k, 3) node, direction and force of a unit of the load that is cycled; its
             displacement is the one conjugate to it.  None for a body that is not pulled
         press : for each bolt or pressure, (k, 3) node, direction and force
-        held : (k, 2) node and direction of supports that the matrix still has
+        held : (k, 2) node and direction of supports that the matrix still has; may be empty
         tangential, normal : directions along the contact and away from the body below
         tributary : contact length of each X; None is half the way to its neighbours
 
         Raises
         ------
         InputError
-            for a node that the model does not have, or a body with a negative or a loose mode
+            for a node or a direction that the model does not have, or that is no whole number; for
+            forces and lengths that are not finite; for a body with a negative or a loose mode
         """
         model = self if held is None else self._without(held)
+        for key, side in (("tangential", tangential), ("normal", normal)):
+            require_count(key, side, 1, DIRECTIONS)
+        require("normal", normal, normal != tangential, "must differ from tangential")
         row = {(int(a), int(b)): i for i, (a, b) in enumerate(model.dofs)}
         nodes, x, group = _groups(contact)
-        known = set(model.dofs[:, 0].tolist())
+        known = set(self.dofs[:, 0].tolist())
         for node in nodes:
             fix = "is no node of the model: give nodes that have rows in the matrix"
             require("contact", node, node in known, fix)
+        for key, side in (("tangential", tangential), ("normal", normal)):
+            fix = "is a direction that no node of the contact has: name another, or free a node"
+            require(key, side, any((node, side) in row for node in nodes), fix)
         size = model.dofs.shape[0]
         place = np.full(size, -1)
         fixed = np.zeros((x.size, 2), bool)
@@ -180,20 +192,21 @@ class StiffnessModel:
 
     def _without(self, held: ArrayLike) -> StiffnessModel:
         """Model without the rows of supports."""
-        table = np.asarray(held)
-        fix = "give rows of node and direction"
-        require("held", table.shape, table.ndim == 2 and table.shape[1] == 2, fix)
-        gone = {(int(a), int(b)) for a, b in table}
-        kept = [i for i, (a, b) in enumerate(self.dofs.tolist()) if (a, b) not in gone]
+        rows = _rows("held", held, 2, SUPPORTS)
+        gone = {(a, b) for a, b in whole_numbers("held", rows).tolist()}
+        known = set(map(tuple, self.dofs.tolist()))
+        for node, direction in sorted(gone - known):
+            fix = "is not in the model: leave it out where its matrix has the support already"
+            raise InputError(f"held = node {node}, direction {direction}: {fix}")
+        kept = [i for i, dof in enumerate(self.dofs.tolist()) if tuple(dof) not in gone]
+        require("held", f"{len(gone)} rows", bool(kept), "holds the whole body: leave some free")
         return StiffnessModel(self.matrix[kept][:, kept], self.dofs[kept])
 
 
 def _groups(contact: ArrayLike) -> tuple[list[int], NDArray[np.float64], NDArray[np.int64]]:
     """Nodes of the contact, the rising places X, and the place of each node."""
-    table = np.asarray(contact, float)
-    require("contact", table.shape, table.ndim == 2 and table.shape[1] == 2, TABLE)
-    require("contact", table.shape, bool(np.all(np.isfinite(table))), TABLE)
-    nodes = [int(node) for node in table[:, 0]]
+    table = _rows("contact", contact, 2, TABLE)
+    nodes = whole_numbers("contact", table[:, 0]).tolist()
     require("contact", len(nodes), len(set(nodes)) == len(nodes), "names a node twice")
     order = np.argsort(table[:, 1], kind="stable")
     rising = table[order, 1]
@@ -209,16 +222,29 @@ def _forces(
     key: str, table: ArrayLike, row: dict[tuple[int, int], int], size: int
 ) -> NDArray[np.float64]:
     """Nodal forces (N,) of a table of node, direction and force."""
-    values = np.asarray(table, float).reshape(-1, 3) if np.size(table) else np.zeros((0, 3))
-    require(key, values.shape, bool(np.all(np.isfinite(values))), FORCES)
+    values = _rows(key, table, 3, FORCES)
     found = np.zeros(size)
-    for node, direction, force in values:
-        where = row.get((int(node), int(direction)))
+    places = whole_numbers(key, values[:, :2]).tolist()
+    for (node, direction), force in zip(places, values[:, 2], strict=True):
+        where = row.get((node, direction))
         if where is None:
             fix = "is not in the model: leave it out where a support holds it"
-            raise InputError(f"{key} = node {int(node)}, direction {int(direction)}: {fix}")
+            raise InputError(f"{key} = node {node}, direction {direction}: {fix}")
         found[where] += force
     return found
+
+
+def _rows(key: str, table: ArrayLike, columns: int, fix: str) -> NDArray[np.float64]:
+    """Rows of finite numbers of a table; none of an empty one."""
+    try:
+        values = np.asarray(table, float)
+    except (TypeError, ValueError):
+        raise InputError(f"{key} = {shown(table)}: is no table of numbers: {fix}") from None
+    values = values if values.size else np.zeros((0, columns))
+    require(key, values.shape, values.ndim == 2 and values.shape[1] == columns, fix)
+    finite = np.all(np.isfinite(values), axis=1)
+    require(key, values[~finite], bool(np.all(finite)), "holds NaN or infinity: " + fix)
+    return values
 
 
 def _factors(matrix: scipy.sparse.csc_array) -> SuperLU:

@@ -21,7 +21,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.arrays import read_arrays, write_arrays
-from jbeamshell.common.checks import as_leaf, is_traced, require
+from jbeamshell.common.checks import as_leaf, is_traced, require, require_choice, require_finite
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, check_regular
 
@@ -47,7 +47,8 @@ class Substructure(eqx.Module):
     Raises
     ------
     InputError
-        for shapes that do not go together, a matrix that is not symmetric, or a negative mode
+        for shapes that do not go together, numbers that are not finite, a contact length that is
+        not positive, a matrix that is not symmetric, or a negative mode
 
     Examples
     --------
@@ -81,6 +82,8 @@ class Substructure(eqx.Module):
         self.flexibility = none if flexibility is None else as_leaf(flexibility, "flexibility")
         beside = jnp.append(half, 0.0) + jnp.append(0.0, half)
         self.tributary = beside if tributary is None else as_leaf(tributary, "tributary")
+        for i, truth in enumerate(fixed):
+            require_choice(f"fixed[{i}]", truth, (False, True))
         self.fixed = tuple(map(bool, fixed)) or (False,) * (2 * self.x.size)
 
     def __check_init__(self) -> None:
@@ -99,19 +102,18 @@ class Substructure(eqx.Module):
         require("stiffness", "numbers of 32 bits", self.stiffness.dtype == jnp.float64, fix)
         if is_traced(self.x, self.tributary, self.stiffness, self.forces, self.flexibility):
             return
-        x, stiffness = np.asarray(self.x), np.asarray(self.stiffness)
+        for key, (value, _) in shapes.items():
+            require_finite(key, value)
+        x, tributary = np.asarray(self.x), np.asarray(self.tributary)
         require("x", x, bool(np.all(np.diff(x) > 0.0)), "must rise from node to node")
-        whole = all(bool(np.all(np.isfinite(value))) for value, _ in shapes.values())
-        require("substructure", "NaN or infinity", whole, "give finite numbers")
-        apart = float(np.max(np.abs(stiffness - stiffness.T)))
-        size = float(np.max(np.abs(stiffness)))
-        same = apart <= 1e-8 * size
-        require("stiffness", f"max|K - K'| {apart:.3g}", same, "is not symmetric: mirror it")
+        fix = "must be positive: give the contact length of each node"
+        require("tributary", tributary, bool(np.all(tributary > 0.0)), fix)
         free = ~np.array(self.fixed)
-        values = np.linalg.eigvalsh(stiffness[np.ix_(free, free)])
         fix = "has a negative mode: check the supports and the sign of the matrix"
-        good = bool(values[0] >= -LOOSE * values[-1])
-        require("stiffness", f"least eigenvalue {values[0]:.3g}", good, fix)
+        _check_energy("stiffness", np.asarray(self.stiffness), free, LOOSE, fix)
+        fix = "has a negative mode: give displacements per load, positive along each load"
+        loads = np.full(self.flexibility.shape[:1], True)
+        _check_energy("flexibility", np.asarray(self.flexibility), loads, 1e-8, fix)
 
     @property
     def bolts(self) -> int:
@@ -158,6 +160,15 @@ class Substructure(eqx.Module):
         )
 
 
+def _check_energy(key: str, matrix: np.ndarray, free: np.ndarray, least: float, fix: str) -> None:
+    """Refuse a matrix that is not symmetric, or whose free part has a negative eigenvalue."""
+    apart, size = (float(np.max(np.abs(part))) for part in (matrix - matrix.T, matrix))
+    same = apart <= 1e-8 * size
+    require(key, f"max|K - K'| {apart:.3g}", same, "is not symmetric: mirror it")
+    values = np.linalg.eigvalsh(matrix[np.ix_(free, free)])
+    require(key, f"least eigenvalue {values[0]:.3g}", values[0] >= -least * values[-1], fix)
+
+
 def potential(body: Substructure, bolts: Array) -> Array:
     """Second derivatives (2n + 2, 2n + 2) of a body's potential in q, the pull and the pressing.
 
@@ -166,9 +177,9 @@ def potential(body: Substructure, bolts: Array) -> Array:
     body : substructure with m - 1 pressures
     bolts : (m - 1,) their sizes when the pressing is 1
     """
-    mixed = jnp.concatenate([jnp.eye(1, body.bolts + 1), jnp.append(0.0, bolts)[None]]).T
-    if body.bolts != bolts.size:  # a body that no bolt presses
-        mixed = jnp.eye(1, 2)
+    mixed = jnp.eye(1, 2)  # of a body that no bolt presses
+    if body.bolts:
+        mixed = jnp.concatenate([jnp.eye(1, body.bolts + 1), jnp.append(0.0, bolts)[None]]).T
     forces = -body.forces @ mixed
     return jnp.block([[body.stiffness, forces], [forces.T, -mixed.T @ body.flexibility @ mixed]])
 

@@ -12,16 +12,11 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import require
-from jbeamshell.common.errors import InputError
+from jbeamshell.common.errors import InputError, warn_of_doubts
 from jbeamshell.history.history import History
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.outcome import (
-    check_solver,
-    history_of,
-    raise_if_failed,
-    warn_of_doubts,
-)
+from jbeamshell.quasistatic.outcome import check_solver, history_of, raise_if_failed
 from jbeamshell.quasistatic.path_state import PathState, StepResults
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import Method, compiled_march
@@ -94,7 +89,7 @@ class PathEnd(eqx.Module):
         )
         result = dataclasses.replace(history, **joined, end=PathEnd(end), cycles=cycles)
         if throw:
-            warn_of_doubts(result, stacklevel=3)
+            warn_of_doubts(result.doubts, stacklevel=3)
         return result
 
 

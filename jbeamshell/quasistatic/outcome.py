@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
-
 import equinox as eqx
 import jax
 import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import require
-from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
+from jbeamshell.common.errors import Status, UnconvergedError
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.history.history import History
 from jbeamshell.history.record import Above
@@ -95,9 +93,3 @@ def history_of(scene: Scene, steps: StepResults, pressure: Array) -> History:
         cycles=(),
         target=steps.state.target,
     )
-
-
-def warn_of_doubts(history: History, stacklevel: int) -> None:
-    """Warn of everything that is doubtful about a history, at the line of a caller."""
-    for doubt in history.doubts:
-        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=stacklevel + 1)

@@ -12,7 +12,7 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
-from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError
+from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, warn_of_doubts
 from jbeamshell.common.precision import is_single
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.common.two_programs import TwoPrograms
@@ -24,13 +24,7 @@ from jbeamshell.history.reliability import change_of, misses_tolerance
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.continuation import further_path, with_end
 from jbeamshell.quasistatic.masing import bar_cycles, masing
-from jbeamshell.quasistatic.outcome import (
-    ADVICE,
-    check_solver,
-    history_of,
-    raise_if_failed,
-    warn_of_doubts,
-)
+from jbeamshell.quasistatic.outcome import ADVICE, check_solver, history_of, raise_if_failed
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import Method, fits_native, march
@@ -129,7 +123,7 @@ def solve(
         history = with_end(history_of(scene, steps, whole.pressure), steps)
     history = history.but(cycles=cycles)
     if throw:
-        warn_of_doubts(history, stacklevel=STACK)
+        warn_of_doubts(history.doubts, stacklevel=STACK)
     return history
 
 
@@ -176,7 +170,7 @@ def _condensed(
         load = float(path.target[step])
         raise UnconvergedError(f"load step {step} (load {load:.6g}) has {NO_END}")
     if throw:
-        warn_of_doubts(history, stacklevel=STACK + 1)
+        warn_of_doubts(history.doubts, stacklevel=STACK + 1)
     return history
 
 

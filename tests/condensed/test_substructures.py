@@ -18,6 +18,8 @@ from jbeamshell.cli.main import main
 from jbeamshell.condensed.section import section_form
 from jbeamshell.condensed.strip import lap_members, pressing, stations
 
+# Few nodes are quick; their meshes are doubted.
+pytestmark = pytest.mark.filterwarnings("ignore::jbeamshell.DoubtfulWarning")
 DATA = Path(__file__).parent / "calculix"  # of strip.inp by CalculiX 2.20
 SCENE = jb.Scene().replace(
     {
@@ -91,14 +93,16 @@ def strip_body():
 
 class TestContact:
     def test_two_members_are_a_lap_joint(self):
-        joint, found = jb.solve(SCENE, throw=False), jb.solve_contact(upper(), lower(), **LOAD)
+        joint = jb.solve(SCENE, throw=False)
+        found = jb.solve_contact(upper(), lower(), **LOAD, cycles=2)
         assert found.converged
         for name in ("dissipation", "dissipation_loop", "secant_stiffness", "slip_length"):
             assert float(getattr(found, name)) == pytest.approx(
-                float(getattr(joint, name)), rel=1e-9
+                float(getattr(joint, name)),
+                rel=1e-8,  # a weak spring holds a body that slides
             )
         np.testing.assert_allclose(found.reaction, joint.reaction, atol=1e-8)
-        np.testing.assert_allclose(found.traction, joint.traction, atol=1e-9)
+        np.testing.assert_allclose(found.traction, joint.traction, atol=1e-7)
 
     def test_displacements_that_forces_caused_cause_them(self):
         forces = jb.solve_contact(upper(), lower(), **LOAD)
@@ -160,8 +164,10 @@ class TestContact:
             stiffer = changed(one, stiffness=k * one.stiffness)
             return jb.solve_contact(stiffer, other, **LOAD).dissipation
 
-        with pytest.raises(jb.InputError, match="take 'frictional' where they are traced"):
-            jax.jit(of_stiffness)(1.0)
+        step = 1e-5
+        slope = (of_stiffness(1.0 + step) - of_stiffness(1.0 - step)) / (2.0 * step)
+        found = jax.jit(jax.grad(of_stiffness))(1.0)
+        assert float(found) == pytest.approx(float(slope), rel=1e-4)
 
     @pytest.mark.slow
     def test_derivatives_have_slope_two(self):
@@ -274,7 +280,9 @@ def test_a_file_of_two_bodies_is_solved_by_the_command(tmp_path, capsys):
     (tmp_path / "joint.toml").write_text(text)
     words = [str(tmp_path / "joint.toml"), "--friction", "0.2", "--json"]
     assert main(["bodies", *words, "--out", str(tmp_path / "out")]) == 0
-    figures = json.loads(capsys.readouterr().out)
+    said = capsys.readouterr()
+    figures = json.loads(said.out)
+    assert f"jbeamshell: warning: {figures['doubts'][0]}" in said.err
     load = {"amplitude": 0.4, "cycles": 1, "steps_per_half_cycle": 8, "friction": 0.2}
     own = jb.solve_contact(strip_body(), **load)
     assert figures["dissipation"] == pytest.approx(float(own.dissipation), rel=1e-9)
@@ -288,6 +296,12 @@ def test_a_file_of_two_bodies_is_solved_by_the_command(tmp_path, capsys):
     (tmp_path / "joint.toml").write_text(text.replace("cycles", "bicycles"))
     assert main(["bodies", words[0]]) == 2
     assert "key bicycles" in capsys.readouterr().err
+    (tmp_path / "joint.toml").write_text("path = [0.1, -0.1, 0.1]\n" + text)
+    assert main(["bodies", words[0]]) == 2
+    assert "amplitude = 0.4: is given beside path" in capsys.readouterr().err
+    (tmp_path / "joint.toml").write_text(text.replace('contact = "contact.csv"', ""))
+    assert main(["bodies", words[0]]) == 2
+    assert "upper.pull, press = 'without contact'" in capsys.readouterr().err
 
 
 def changed(body, **arrays):
@@ -308,7 +322,24 @@ def changed(body, **arrays):
         (lambda: changed(upper(), forces=upper().forces[:-1]), "forces.shape"),
         (lambda: jb.solve_contact(changed(upper(), forces=upper().forces[:, :1])), "flexibility"),
         (lambda: jb.solve_contact(upper(), lower(), bolts=[1.0, 2.0]), "bolts"),
-        (lambda: jb.solve_contact(upper(), lower(), gap=-1.0), "gap = -1.0"),
+        (lambda: jb.solve_contact(upper(), lower(), bolts=np.nan), "bolts = .*NaN"),
+        (lambda: jb.solve_contact(upper(), lower(), bolts=-1.0), "bolts = -1.0: must not be neg"),
+        (lambda: jb.solve_contact(upper(), lower(), gap=-1.0), "gap = -1.0: must not be negative"),
+        (lambda: jb.solve_contact(upper(), lower(), gap=np.nan), "gap = nan: holds NaN"),
+        (lambda: jb.solve_contact(upper(), lower(), gap=np.inf), "gap = inf: holds NaN or inf"),
+        (lambda: jb.solve_contact(upper(), lower(), path=[0.1, np.nan]), "path = .*finite"),
+        (lambda: jb.solve_contact(upper(), lower(), path=[0.1], cycles=2), "beside path"),
+        (lambda: jb.solve_contact(upper(), lower(), cycles=0), "cycles = 0: must be a whole"),
+        (lambda: jb.solve_contact(upper(), lower(), cycles=2.5), "cycles = 2.5: must be a whole"),
+        (lambda: jb.solve_contact(unpulled(), lower()), "nothing pulls the bodies"),
+        (lambda: changed(upper(), tributary=0.0 * upper().x), "tributary = .*must be positive"),
+        (lambda: changed(upper(), tributary=-upper().tributary), "tributary = .*positive"),
+        (lambda: changed(upper(), tributary=np.nan * upper().x), "tributary = .*NaN"),
+        (lambda: changed(upper(), x=np.inf * upper().x), "x = .*NaN or infinity"),
+        (lambda: changed(upper(), fixed=[3] * 50), "fixed\\[0\\] = 3: choose False or True"),
+        (lambda: changed(upper(), flexibility=-np.eye(2)), "flexibility = .*negative mode"),
+        (lambda: jb.StiffnessModel(np.eye(2), [[14.7, 1], [14, 2]]), "dofs = .*14.7.*whole"),
+        (lambda: jb.StiffnessModel(np.eye(2), [[14, 0], [14, 1]]), "directions are 1 to 6"),
         (lambda: jb.solve_contact("upper"), "give a jbeamshell.Substructure"),
         (lambda: jb.StiffnessModel(np.eye(3)[:2], [[1, 1], [1, 2]]), "must be square"),
         (lambda: jb.StiffnessModel(np.eye(2), [[1, 1]]), "each of its 2 rows"),
@@ -320,6 +351,71 @@ def changed(body, **arrays):
 def test_what_is_no_body_is_refused(what, said):
     with pytest.raises(jb.InputError, match=said):
         what()
+
+
+def unpulled():
+    return changed(
+        upper(),
+        forces=upper().forces.at[:, 0].set(0.0),
+        flexibility=upper().flexibility.at[0].set(0.0).at[:, 0].set(0.0),
+    )
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"held": [[999, 1]]}, "held = node 999, direction 1: is not in the model"),
+        ({"held": [[5, 3]]}, "held = node 5, direction 3: is not in the model"),
+        ({"held": [[5.5, 1]]}, "held = .*5.5.*whole numbers"),
+        ({"held": [5, 1]}, "held = \\(2,\\): give rows of node and direction"),
+        ({"contact": [[1.5, 0.0], [2, 1.0]]}, "contact = .*1.5.*whole numbers"),
+        ({"contact": [[1, 0.0], [2, np.nan]]}, "contact = .*NaN or infinity"),
+        ({"contact": [["left", 0.0], [2, 1.0]]}, "contact = .*no table of numbers"),
+        ({"pull": [[5.5, 1, 1.0]]}, "pull = .*5.5.*whole numbers"),
+        ({"pull": [[5, 1.5, 1.0]]}, "pull = .*1.5.*whole numbers"),
+        ({"pull": [[5, 1]]}, "pull = \\(1, 2\\): give rows of node, direction and force"),
+        ({"press": [[[5, 2, np.inf]]]}, "press\\[0\\] = .*NaN or infinity"),
+        ({"tangential": 3}, "tangential = 3: is a direction that no node of the contact has"),
+        ({"tangential": 1.5}, "tangential = 1.5: must be a whole number"),
+        ({"normal": 1}, "normal = 1: must differ from tangential"),
+        ({"tributary": [-1.0] * 6}, "tributary = .*must be positive"),
+    ],
+)
+def test_numbers_of_tables_are_checked(tables, said):
+    model, made = jb.StiffnessModel.read(DATA / "strip.sti"), slice_of()
+    with pytest.raises(jb.InputError, match=said):
+        model.condensed(
+            **{"contact": made.contact, "pull": made.pull, "press": [made.press]} | tables
+        )
+
+
+def test_supports_may_be_none_and_may_hold_contact_nodes():
+    model, made = jb.StiffnessModel.read(DATA / "strip.sti"), slice_of()
+    given = {"contact": made.contact, "pull": made.pull, "press": [made.press]}
+    none = model.condensed(**given, held=[])
+    np.testing.assert_array_equal(none.stiffness, strip_body().stiffness)
+    first = [(int(node), way) for node, x in made.contact if x == 0.0 for way in (1, 2)]
+    rows = set(map(tuple, model.dofs.tolist()))
+    held = model.condensed(**given, held=[dof for dof in first if dof in rows])
+    assert held.fixed[:2] == (True, True)
+
+
+def test_a_pressing_that_only_friction_holds_along_x_is_refused_without_friction():
+    forces = upper().forces.at[::2, 1].add(0.01)
+    pushed = changed(upper(), forces=forces)
+    with pytest.raises(jb.InputError, match="only friction holds the body"):
+        jb.solve_contact(pushed, lower(), **LOAD)
+    assert jb.solve_contact(pushed, lower(), **LOAD | {"assembly": "frictional"}).converged
+
+
+def test_the_result_says_how_the_bodies_were_pressed():
+    for assembly in ("frictionless", "frictional"):
+        found = jb.solve_contact(upper(), lower(), **LOAD | {"assembly": assembly})
+        assert found.figures()["assembly"] == assembly
+        words = {"frictionless": "without friction", "frictional": "with friction"}
+        assert f"pressed {words[assembly]}" in str(found).splitlines()[0]
+    plain = jb.solve_contact(upper(), lower(), amplitude=1.0, steps_per_half_cycle=8)
+    assert plain.assembly == jb.Scene().contact.assembly
 
 
 def test_tables_that_do_not_fit_the_model_are_refused():
