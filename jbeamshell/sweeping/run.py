@@ -21,7 +21,7 @@ import jax
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.checks import check_words, require
-from jbeamshell.common.errors import DoubtfulWarning, InputError, UnconvergedError
+from jbeamshell.common.errors import InputError, UnconvergedError, warn_of_doubts
 from jbeamshell.common.files import as_path
 from jbeamshell.common.precision import doubled, is_single
 from jbeamshell.common.progress import counting, in_notebook
@@ -138,8 +138,7 @@ def sweep(
         if store is not None and table is not None:
             store.publish(result, table)
             store.remove()
-    for doubt in result.doubts:
-        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=3)
+    warn_of_doubts(result.doubts, stacklevel=3)
     return result
 
 
