@@ -263,7 +263,7 @@ def test_the_command_tells_what_is_in_a_file_and_refuses_by_its_exit_code(csv, c
     assert main(["inspect", str(good), "--out", str(tmp_path / "seen")]) == 0
     told = capsys.readouterr().out
     assert "column 'Load [kN]'" in told
-    assert "4 of amplitude 13.16 kN" in told
+    assert "4 of amplitude 20 um" in told
     assert "nothing speaks against a fit" in told
     assert {path.name for path in (tmp_path / "seen").iterdir()} == {
         "inspection.png",
