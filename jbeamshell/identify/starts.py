@@ -18,6 +18,7 @@ import numpy as np
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.specimens import plausible_stiffness
 from jbeamshell.measured.curves import Backbone
+from jbeamshell.measured.findings import TOO_SOFT, TOO_STIFF
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene.pressure import resultant
@@ -37,6 +38,8 @@ STRAIGHT = 0.875  # halfway over the way that work is short of; 1 if straight, .
 STIFF = 3.0  # stretching stiffness over that of soft sliders, at the start
 STEEP = 0.02  # way to a plateau over the amplitude, at least
 STRAIN = 1e-3  # displacement over a length that nobody gave, at most
+FRICTIONS = (0.003, 3.0)  # friction that surfaces have, beyond which a unit is wrong
+MODULI = (5e8, 3e12)  # plane moduli [Pa] of the materials of joints, likewise
 SIMILAR = 3.0  # factor of a force of gross slip within which the standard strip may be meant
 
 HEIGHT = ("strip.height_ratio", "strip.half_height")
@@ -150,6 +153,8 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
         take("strip.height_ratio", float(np.clip(2.0 * found.force / gross / x, *HEIGHTS)))
     if not stiff:
         take("strip.axial_stiffness", _stretching(found, gross, length))
+        if found.si and tall and "strip.length" in known:
+            _check_modulus(float(scene_from_values(values).strip.plane_modulus))
     if found.soft and "contact.stick_stiffness" not in values:
         scene = scene_from_values(values)
         sliders = gross / found.short / length * float(scene.strip.half_height)
@@ -158,11 +163,18 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
         take("contact.pressure", gross / (float(scene.contact.friction) * length))
     elif "contact.friction" not in values:
         take("contact.friction", gross / _pressing(scene))
+        _check_friction(values["contact.friction"], found)
     told = ", ".join(
         f"{key} = {value:.4g}" if isinstance(value, float) else f"{key} = {value}"
         for key, value in fresh.items()
     )
     notes = [f"not given, so estimated from the loops: {told}"] if fresh else []
+    if fresh.get("contact.friction", 1.0) < FRICTIONS[0]:
+        notes.append(
+            f"contact.friction starts at {fresh['contact.friction']:.2g}, which surfaces hardly "
+            "have: are kilonewtons taken for newtons (--unit force=kN), and with them millimetres "
+            "for micrometres (--unit displacement=mm), or are pressure, bolts or width wrong"
+        )
     if "contact.pressure" in fresh and found.normal is None:
         notes.append("the pressure is not given: of friction, only mu F_N L is determined")
     return overridden(dict(known), fresh), notes
@@ -174,10 +186,34 @@ def _check_known(scene: Scene, values: Mapping[str, Any], found: Estimate, force
         return
     friction, pressing = float(scene.contact.friction), _pressing(scene)
     if found.peak >= BELOW * friction * pressing:
+        _check_friction(found.peak / pressing, found)
         raise InputError(
             f"contact.friction = {friction:.6g}: slides at mu F_N L = {friction * pressing:.4g}, "
             f"but the measured force reaches {found.peak:.4g}: start it above "
             f"{found.peak / pressing:.3g}, press more, or set load.control to 'displacement'"
+        )
+
+
+def _check_friction(needed: float, found: Estimate) -> None:
+    """Raise `InputError` if only friction that no surface has can resist the measured force."""
+    if needed > FRICTIONS[1]:
+        raise InputError(
+            f"contact.friction: the measured force, {found.peak:.4g} per width, would need "
+            f"{needed:.3g}, which no surface has: are newtons taken for kilonewtons (--unit "
+            "force=N), and with them micrometres for millimetres (--unit displacement=um), or are "
+            "pressure, bolts or width wrong"
+        )
+
+
+def _check_modulus(modulus: float) -> None:
+    """Raise `InputError` if only a modulus that no usual material has explains the stiffness."""
+    low, high = MODULI
+    if not low <= modulus <= high:
+        raise InputError(
+            f"strip.axial_stiffness: force over displacement would need a modulus of "
+            f"{1e-9 * modulus:.3g} GPa, which no usual material has: "
+            f"{TOO_SOFT if modulus < low else TOO_STIFF}, or is --width wrong; if all are right, "
+            "give --modulus"
         )
 
 

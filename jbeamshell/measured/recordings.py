@@ -214,8 +214,9 @@ def read_recordings(
     ----------
     paths : one file or several; the files' names are the labels
     columns : name of a column by "force", "displacement", "time" or "normal_force", for columns
-        that cannot be found by name
-    units : unit by the same quantities, such as {"force": "kN"}, which overrides the header
+        that cannot be found by name; its number, from 1, in a file without a header
+    units : unit by the same quantities, such as {"force": "kN"}, which overrides the header; a
+        sensor's factor goes before it, such as "0.05mm", or "0.05mm/V" of a signal
     decimal : decimal mark, "," or "."; None infers it from the numbers
 
     Returns

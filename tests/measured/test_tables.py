@@ -235,7 +235,8 @@ BAD = {
     ),
     "no header": (
         text(ROWS[0], ROWS[1:]),
-        "data.csv: needs one column named 'force' in line 1, which holds '3.0', '0.2388",
+        "data.csv: has no header: say which columns hold what, by their numbers, such as "
+        "--column force=1 --column displacement=2 --unit force=N --unit displacement=m ",
     ),
     "two forces": (
         text(["force left", "force right", "displacement"], [[f, f, u] for f, u in ROWS]),
