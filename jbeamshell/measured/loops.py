@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.common.errors import InputError
 from jbeamshell.common.summary import Summary, ranged, with_unit
 from jbeamshell.measured.form import LOOP, Form
 from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
