@@ -715,7 +715,11 @@ SPECIMENS = {
         "strip.youngs_modulus": 210e9,
         "contact.bolts": [[1.0, 20.0, 0.5]],
         "member.support": "clamped",
+        "strip.far_end": "free",
+        "strip.loaded_end": "level",
         "load.entry": "traction",
+        "model.fields": ["v", "w", "beta", "psi"],
+        "model.solution": "plane",
     },
     "numbers of the model": {
         "strip.height_ratio": 0.0937,
