@@ -18,7 +18,7 @@ import numpy as np
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.specimens import plausible_stiffness
 from jbeamshell.measured.curves import Backbone
-from jbeamshell.measured.findings import TOO_SOFT, TOO_STIFF
+from jbeamshell.measured.findings import TOO_LARGE, TOO_SMALL, TOO_SOFT, TOO_STIFF, UNIT_ERROR
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene.pressure import resultant
@@ -163,18 +163,12 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
         take("contact.pressure", gross / (float(scene.contact.friction) * length))
     elif "contact.friction" not in values:
         take("contact.friction", gross / _pressing(scene))
-        _check_friction(values["contact.friction"], found)
+        _check_friction(values["contact.friction"], found, scene, values)
     told = ", ".join(
         f"{key} = {value:.4g}" if isinstance(value, float) else f"{key} = {value}"
         for key, value in fresh.items()
     )
     notes = [f"not given, so estimated from the loops: {told}"] if fresh else []
-    if fresh.get("contact.friction", 1.0) < FRICTIONS[0]:
-        notes.append(
-            f"contact.friction starts at {fresh['contact.friction']:.2g}, which surfaces hardly "
-            "have: are kilonewtons taken for newtons (--unit force=kN), and with them millimetres "
-            "for micrometres (--unit displacement=mm), or are pressure, bolts or width wrong"
-        )
     if "contact.pressure" in fresh and found.normal is None:
         notes.append("the pressure is not given: of friction, only mu F_N L is determined")
     return overridden(dict(known), fresh), notes
@@ -186,7 +180,7 @@ def _check_known(scene: Scene, values: Mapping[str, Any], found: Estimate, force
         return
     friction, pressing = float(scene.contact.friction), _pressing(scene)
     if found.peak >= BELOW * friction * pressing:
-        _check_friction(found.peak / pressing, found)
+        _check_friction(found.peak / pressing, found, scene, values)
         raise InputError(
             f"contact.friction = {friction:.6g}: slides at mu F_N L = {friction * pressing:.4g}, "
             f"but the measured force reaches {found.peak:.4g}: start it above "
@@ -194,15 +188,24 @@ def _check_known(scene: Scene, values: Mapping[str, Any], found: Estimate, force
         )
 
 
-def _check_friction(needed: float, found: Estimate) -> None:
-    """Raise `InputError` if only friction that no surface has can resist the measured force."""
-    if needed > FRICTIONS[1]:
-        raise InputError(
-            f"contact.friction: the measured force, {found.peak:.4g} per width, would need "
-            f"{needed:.3g}, which no surface has: are newtons taken for kilonewtons (--unit "
-            "force=N), and with them micrometres for millimetres (--unit displacement=um), or are "
-            "pressure, bolts or width wrong"
-        )
+def _check_friction(
+    needed: float, found: Estimate, scene: Scene, values: Mapping[str, Any]
+) -> None:
+    """Raise `InputError` if only friction that no surface has explains the measured force."""
+    low, high = FRICTIONS
+    if low <= needed <= high or not found.si:
+        return
+    units = TOO_SMALL if needed < low else TOO_LARGE
+    if any(key in values for key in STIFFNESS):  # which tells the wrong one of two units
+        stiffness = found.force / found.displacement
+        soft, stiff = plausible_stiffness(scene, ()) or (0.0, np.inf)
+        units = TOO_SOFT if stiffness * UNIT_ERROR < soft else units
+        units = TOO_STIFF if stiffness > UNIT_ERROR * stiff else units
+    raise InputError(
+        f"contact.friction: the measured force, {found.peak:.4g} per width, is that of a friction "
+        f"of {needed:.2g}, which no surface has: {units}, or are pressure, bolts or width wrong; "
+        f"if all are right, start from it by --start contact.friction={needed:.2g}"
+    )
 
 
 def _check_modulus(modulus: float) -> None:

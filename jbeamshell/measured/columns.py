@@ -68,6 +68,7 @@ TAIL = re.compile(
 
 
 VOLT = "V"  # unit of a signal
+OTHER_NAMES = {"mil": "thou"}
 LONGEST_TITLE = 1000  # characters; of a longer title only its beginning is read
 
 
@@ -224,10 +225,10 @@ def conversions(
                 f"'{title} [{bases[0]}]', or give it by {choice(quantity, bases[0], 'unit')}"
             )
         elif converted is None and conversion(str(unit), (VOLT,)):
-            factor = choice(quantity, f"0.05{bases[0]}/{VOLT}", "unit")
+            factor = f"0.05{bases[0]}/{VOLT}"
             raise InputError(
-                f"{name}: column {title!r} is a signal in {unit!r}: give the sensor's factor, such "
-                f"as {factor}"
+                f"{name}: column {title!r} is a signal in {unit!r}: give each sensor's factor, "
+                f"such as {choice(quantity, factor, 'unit')}"
             )
         elif converted is None:
             raise InputError(
@@ -364,7 +365,7 @@ def conversion(unit: str, bases: Sequence[str]) -> Conversion | None:
         return Conversion(number * found.factor, found.unit) if found and usable else None
     if len(unit) > 32 or not UNIT.fullmatch(unit):
         return None
-    registry = _registry()
+    registry, unit = _registry(), OTHER_NAMES.get(unit, unit)
     for base in bases:
         try:
             factor = float(registry.Quantity(1.0, unit).to(base).magnitude)

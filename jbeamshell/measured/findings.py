@@ -32,6 +32,14 @@ TOO_STIFF = (
     "are newtons taken for kilonewtons (--unit force=N), metres for millimetres (--unit "
     "displacement=m), millimetres for micrometres (--unit displacement=mm)"
 )
+TOO_LARGE = (  # of forces, where their quotient by the displacement may be right
+    "are newtons taken for kilonewtons (--unit force=N), and with them micrometres for "
+    "millimetres (--unit displacement=um)"
+)
+TOO_SMALL = (
+    "are kilonewtons taken for newtons (--unit force=kN), and with them millimetres for "
+    "micrometres (--unit displacement=mm)"
+)
 CLIPPED, DRIFT = "clipped", "drift"
 FALLS = -0.5  # correlation of force and displacement of a first loading that leans backward
 
