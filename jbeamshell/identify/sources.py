@@ -28,6 +28,10 @@ from jbeamshell.scene.keys import CONTROLS
 
 KINDS = ("loop", "backbone", *CURVES)
 CYCLES = ("auto", "steady", "recorded")
+WRONG_DRIVE = (
+    "the displacement goes from turn to turn as a machine drives it, the force does not: if it "
+    "drives, give --set load.control=displacement"
+)
 QUIET = 1e-3  # noise of the driving column, over its range, above which cycles are averaged
 
 
@@ -135,6 +139,8 @@ class Source:
             if self.drift == "keep":  # which the mean loops do not show
                 drifts = [f.text for view in seen.views for f in view.findings if f.name == DRIFT]
                 per_width = per_width._replace(notes=(*per_width.notes, *drifts))
+            if self.driver == "force" and any(v.driver == "displacement" for v in seen.views):
+                per_width = per_width._replace(notes=(*per_width.notes, WRONG_DRIVE))
             if self.kind == "backbone":
                 columns = per_width.force, per_width.displacement
                 yield Backbone(*columns, per_width.label), per_width.notes
