@@ -268,7 +268,7 @@ def wrong() -> Iterator[Case]:
     metres = ("time [s]", "force [kN]", "displacement [m]")
     yield case("wrong unit.csv", text(strip, names=metres), "--unit displacement=mm")
     newtons = ("time [s]", "force [MN]", "displacement [mm]")
-    yield case("wrong force.csv", text(strip, names=newtons), "units wrong")
+    yield case("wrong force.csv", text(strip, names=newtons), "--unit force=")
     swapped = ("time [s]", "displacement [mm]", "force [kN]")
     yield case("swapped.csv", text(strip, names=swapped), "--column force=", ALONE)
     clipped = text(lambda: with_column(1, lambda f: np.minimum(f, 0.6 * np.max(f))))

@@ -22,6 +22,7 @@ from jbeamshell.measured.splitting import Cycles
 
 DRIFTING = 0.03  # drift over the response's range that is told
 OFF_CENTRE = 0.1  # middle of a driving cycle over its range that is told
+OUTERMOST = 0.9  # range of a cycle's drive over that of the recording
 OFF_ZERO = 0.03  # mean of a response over its range that is told
 UNIT_ERROR = 10.0  # factor beyond a plausible stiffness that only a wrong unit explains
 TOO_SOFT = (  # wrong units, and how to set them right
@@ -252,10 +253,12 @@ def _of_drift(level: Level, number: int, found: Cycles) -> Finding | None:
 
 def _of_centre(level: Level, found: Cycles, recording: Recording) -> Finding | None:
     """Finding about a column that does not swing about zero, the driving one first."""
-    loop = level.loop
+    loop, driver = level.loop, found.driver
     zeros = loop.zeros()
-    for name, least in ((found.driver, OFF_CENTRE), (found.responding, OFF_ZERO)):
-        unlike = level.shape.asymmetric or abs(level.shape.drift) >= DRIFTING
+    # Within larger ones, cycles answer about where those left them.
+    outermost = np.ptp(getattr(loop, driver)) > OUTERMOST * np.ptp(getattr(recording, driver))
+    for name, least in ((driver, OFF_CENTRE), (found.responding, OFF_ZERO)):
+        unlike = level.shape.asymmetric or abs(level.shape.drift) >= DRIFTING or not outermost
         if name == found.responding and unlike:
             return None
         noise = 4.0 * level.shape.error * (name == found.responding)

@@ -132,12 +132,14 @@ def find_driver(force: Floats, displacement: Floats) -> str:
 def _unevenness(column: Floats, ends: list[int]) -> float:
     """Deviation of the branches between some extremes from straight lines or half sines in time.
 
-    It is a root mean square without the noise, over the range of the column.  Ends of the path do
-    not count where there is a branch between turns.
+    It is a root mean square without the noise, over the range of the column; 0 where no branch goes
+    from turn to turn, as in a first loading.
     """
     turns = [i for i in ends if 0 < i < column.size - 1]
+    if len(turns) == 1 and abs(column[-1] - column[0]) < SMALLEST * np.ptp(column):
+        turns = ends  # one cycle from turn to turn to turn
     squares = []
-    for here, there in itertools.pairwise(turns if len(turns) > 1 else ends):
+    for here, there in itertools.pairwise(turns):
         way, branch = np.linspace(0.0, 1.0, there - here + 1), column[here : there + 1]
         if branch.size < FEWEST or np.ptp(branch) == 0.0:
             continue
