@@ -106,7 +106,8 @@ class TextTable(Table):
     def _above_numbers(self, content: list[tuple[int, str]]) -> tuple[int, str]:
         """First line with as many cells as the numbers below it, which may be numbers itself.
 
-        Sets the delimiter; the first line of all is taken if there are no rows of numbers.
+        Sets the delimiter; the first line of all is taken if there are no rows of numbers.  Between
+        blanks any words would do, so that the first numbers are taken.
         """
         first, delimiter = len(content), self._delimiter
         for mark in DELIMITERS:
@@ -114,9 +115,13 @@ class TextTable(Table):
             found = next((i for i, row in enumerate(rows) if _are_numbers(row)), first)
             if found < first:
                 first, delimiter = found, mark
+        if first == len(content):
+            return content[0]
         self._delimiter = delimiter
+        if delimiter == " ":
+            return content[first]
         cells = [len(_filled(_split(line, delimiter) or [])) for _, line in content[: first + 1]]
-        return content[cells.index(cells[-1])] if first < len(content) else content[0]
+        return content[cells.index(cells[-1])]
 
     def _content(self) -> Iterator[tuple[int, str]]:
         """Lines that are neither blank nor comments, with their numbers, counted from 1."""
