@@ -65,10 +65,8 @@ TAIL = re.compile(
     r"thou|micron|k?lbf?|kip|[kg]?gf|dyn|"
     r"(?:giga|mega|kilo|centi|milli|micro|nano)?(?:newton|met(?:er|re)|second)s?)"
 )
-
-
 VOLT = "V"  # unit of a signal
-OTHER_NAMES = {"mil": "thou"}
+OTHER_NAMES = {"mil": "thou"}  # in pint
 LONGEST_TITLE = 1000  # characters; of a longer title only its beginning is read
 
 
@@ -234,12 +232,18 @@ def conversions(
             raise InputError(
                 f"{name}: column {title!r}: {str(unit)[:40]!r} is no unit of {quantity}: write one "
                 f"in brackets, such as '{quantity} [{bases[0]}]', or give it by "
-                f"{choice(quantity, bases[0], 'unit')}; a sensor's factor goes before it, as in "
-                f"0.05{bases[0]}, and a sign is turned by --reverse {quantity}"
+                f"{choice(quantity, bases[0], 'unit')}{_of_factor(str(unit), quantity, bases[0])}"
             )
         else:
             found[quantity] = converted
     return found
+
+
+def _of_factor(unit: str, quantity: str, base: str) -> str:
+    """Words on a sensor's factor, if a text that is no unit begins with a number."""
+    told = f"; a sensor's factor goes before its unit, as in 0.05{base}"
+    turned = f", and a sign is turned by --reverse {quantity}" * unit.startswith("-")
+    return told + turned if re.match(r"[-+.\d]", unit) else ""
 
 
 def unit_of(title: str) -> str | None:

@@ -209,7 +209,7 @@ def test_a_sensors_factor_goes_before_its_unit(read, unit):
     np.testing.assert_allclose(got, [1e3 * FORCE, factor * DISPLACEMENT], rtol=1e-14)
 
 
-@pytest.mark.parametrize("unit", ["-0.05mm", "0mm", "1e999mm", "2 3 m", "0.05kg", "0.05", "mm/N"])
+@pytest.mark.parametrize("unit", ["-0.05mm", "0mm", "1e999mm", "2 3 m", "0.05kg", "0.05"])
 def test_what_is_no_factor_is_refused(read, unit):
     with pytest.raises(InputError, match=r"is no unit of displacement: .* a sensor's factor goes"):
         read(text(["force [kN]", "displacement"]), units={"displacement": unit})
