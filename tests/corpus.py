@@ -9,9 +9,10 @@ from __future__ import annotations
 import csv
 import functools
 import io
+import itertools
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -66,6 +67,7 @@ class Case(NamedTuple):
     kinds : endings that are right
     told : regular expression that the text of a refusal or a doubt must match
     planted : value and relative tolerance by figure; "gross slip" is mu F_N L in N
+    then : further options, which the text names and which lead to the planted parameters
     """
 
     name: str
@@ -74,6 +76,7 @@ class Case(NamedTuple):
     kinds: tuple[str, ...]
     told: str = ""
     planted: dict[str, tuple[float, float]] = {}  # noqa: RUF012 - never changed
+    then: tuple[str, ...] = ()
 
 
 # --- what is written ------------------------------------------------------------------------------
@@ -265,7 +268,7 @@ def wrong() -> Iterator[Case]:
     metres = ("time [s]", "force [kN]", "displacement [m]")
     yield case("wrong unit.csv", text(strip, names=metres), "--unit displacement=mm")
     newtons = ("time [s]", "force [MN]", "displacement [mm]")
-    yield case("wrong force.csv", text(strip, names=newtons), "units wrong")
+    yield case("wrong force.csv", text(strip, names=newtons), "--unit force=")
     swapped = ("time [s]", "displacement [mm]", "force [kN]")
     yield case("swapped.csv", text(strip, names=swapped), "--column force=", ALONE)
     clipped = text(lambda: with_column(1, lambda f: np.minimum(f, 0.6 * np.max(f))))
@@ -304,15 +307,24 @@ def corpus() -> list[Case]:
 # --- how they end ---------------------------------------------------------------------------------
 
 
-def words(case: Case, folder: Path) -> list[str]:
+def words(case: Case, folder: Path, then: Sequence[str] = ()) -> list[str]:
     """Words of the command line that fits a case, whose file is written to the folder."""
     case.write(folder / case.name)
-    return ["fit", str(folder / case.name), *case.words, "--json", "--out", str(folder / "out")]
+    options = [*case.words, *then, "--json", "--out", str(folder / "out")]
+    return ["fit", str(folder / case.name), *options]
+
+
+def named(then: Sequence[str]) -> Iterator[str]:
+    """Options as a text names them: each with the quantity or key that it sets, if any."""
+    for option, value in itertools.zip_longest(then, then[1:], fillvalue=""):
+        if option.startswith("--"):
+            key, mark, _ = value.partition("=")
+            yield f"{option} {key}{mark}" if mark else option
 
 
 def ended(code: int, out: str, err: str, case: Case, folder: Path) -> Ending:
     """Ending of the command from its exit code, what it printed and what it wrote."""
-    if code == 2:
+    if not out:  # refused, or a fit that failed
         line = err.strip().splitlines()[-1] if err.strip() else ""
         fix = re.search(r"--\w|give|record|write|keep|name|remove|leave", line)
         return Ending("refused" if fix and line.startswith("jbeamshell: ") else "silent", line)

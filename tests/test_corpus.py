@@ -8,14 +8,17 @@ import pytest
 import jbeamshell as jb
 from jbeamshell.cli.main import main
 from jbeamshell.common.errors import InputError
-from tests import corpus
+from tests import corpus, foreign
 
 CASES = corpus.corpus()
+FOREIGN = foreign.foreign()
 
 
 def test_the_corpus_has_many_files_with_names_of_their_own():
-    names = [case.name for case in CASES]
-    assert len(set(names)) == len(names) >= 25
+    names = [case.name for case in (*CASES, *FOREIGN)]
+    assert len(set(names)) == len(names)
+    assert len(CASES) >= 25
+    assert len(FOREIGN) >= 30
 
 
 SEEN = {  # findings of `jb.inspect` on files that no run of the model is needed for
@@ -62,3 +65,24 @@ def test_no_file_ends_in_silence(case, tmp_path, capsys):
         print(f"\n{case.name:28s} {ending.kind:16s} {ending.told}")
     assert ending.kind in case.kinds, ending
     assert re.search(case.told, ending.told), ending
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("optimised")
+@pytest.mark.parametrize("case", FOREIGN, ids=lambda case: case.name)
+def test_foreign_files_end_right_or_name_the_options_that_lead_there(case, tmp_path, capsys):
+    def end(then=()):
+        code = main(corpus.words(case, tmp_path, then))
+        out, err = capsys.readouterr()
+        ending = corpus.ended(code, out, err, case, tmp_path)
+        with capsys.disabled():
+            print(f"\n{case.name:36s} {ending.kind:16s} {ending.told}")
+        return ending
+
+    ending = end()
+    assert ending.kind in case.kinds, ending
+    assert re.search(case.told, ending.told), ending
+    if case.then:
+        for option in corpus.named(case.then):
+            assert option in ending.told, ending
+        assert end(case.then).kind == "parameters"

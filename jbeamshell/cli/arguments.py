@@ -57,8 +57,11 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 def add_columns(parser: argparse.ArgumentParser) -> None:
     """Add ``--column``, ``--unit`` and ``--decimal``, which tell how tables are read."""
-    column = "name of the column that holds the force, the displacement, ..."
-    unit = "unit of the force, the displacement, ..."
+    column = (
+        "name of the column that holds the force, the displacement, ..., or its number in a file "
+    )
+    column += "without a header"
+    unit = "unit of the force, the displacement, ...; a sensor's factor goes before it: 0.05mm"
     for option, word, text in (("column", "NAME", column), ("unit", "UNIT", unit)):
         parser.add_argument(
             f"--{option}", action="append", default=[], metavar=f"QUANTITY={word}", help=text
@@ -71,18 +74,24 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
 
 
 def scene_of(options: argparse.Namespace) -> Scene:
-    """Scene of the options: the one named, with ``--set`` on top.
+    """Scene of the options: the one named, with a specimen's dimensions and ``--set`` on top.
 
     What its file leaves unsaid is kept as ``options.unsaid``, to be said at the end.
     """
+    from jbeamshell.cli.dimensions import check_specimen, specimen_of, with_units
     from jbeamshell.scene import library
     from jbeamshell.scene.toml import entry_note, overridden, scene_from_values
 
     below = {} if options.scene is None else library.values_from(options.scene)
-    values = overridden(below, assignments(options.set))
+    known, width, notes = specimen_of(options)
+    below = overridden(below, known)
+    values = overridden(below, with_units(assignments(options.set), below, width))
     scene = scene_from_values(values)
+    if known:
+        check_specimen(scene, values, width)
     if options.scene is not None and entry_note(values):
-        options.unsaid = f"{options.scene}: {entry_note(values)}"
+        notes = (*notes, f"{options.scene}: {entry_note(values)}")
+    options.unsaid = "; ".join(notes)
     return scene
 
 

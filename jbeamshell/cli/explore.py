@@ -50,12 +50,17 @@ def run(options: argparse.Namespace) -> int:
     loops = read_loops(options.data) if options.data else []
     say("compiling ...")
     name = options.scene if options.scene in library.NAMES and not options.set else "own scene"
+
+    def tell(address: str) -> None:
+        put(f"{address}\n")
+        say("Ctrl+C stops it")
+
     serve(
         scene,
         loops,
         name,
         port=port,
         browser=not options.no_browser,
-        tell=lambda address: put(f"{address}\n"),
+        tell=tell,
     )
     return 0

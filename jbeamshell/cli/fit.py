@@ -84,8 +84,8 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--centre",
         action=argparse.BooleanOptionalAction,
-        help="shift closed loops so that their centres lie at the origin: removes the sensors' "
-        "offsets (default: only where gross slip makes them arbitrary)",
+        help="shift loops so that their centres, or their unloaded starts, lie at the origin: "
+        "removes the sensors' offsets (default: only where no joint answers so)",
     )
     add_columns(parser)
     add_dimensions(parser)

@@ -17,6 +17,7 @@ from jbeamshell.cli.arguments import (
     add_tolerance,
     scene_of,
 )
+from jbeamshell.cli.dimensions import add_dimensions
 from jbeamshell.cli.terminal import put, say, say_written, warn
 from jbeamshell.common.errors import DoubtfulWarning
 
@@ -28,10 +29,13 @@ def add_to(commands: Any) -> None:
         help="solve one scene: press the strip down, load it to and fro",
         description="Press a strip down, load it to and fro, and report its hysteresis loop: "
         "dissipation, stiffness, slip and contact.",
-        epilog="`jbeamshell keys` lists every KEY of --set with its default, unit and meaning.",
+        epilog="`jbeamshell keys` lists every KEY of --set with its default, unit and meaning. "
+        "VALUE may have a unit, which is converted to SI: --set load.amplitude=4kN --width 50mm.  "
+        "Ctrl+C stops a run.",
     )
     add_scene(parser)
     add_tolerance(parser)
+    add_dimensions(parser)
     add_settings(parser)
     add_folder(parser)
     add_json(parser)
@@ -53,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         from jbeamshell.plotting.folder import check_folder
 
         folder = check_folder(options.out)
-    say("compiling ...")
+    say("compiling ... (Ctrl+C stops it)")
     begin = time.perf_counter()
     solver.compile_for(scene)
     compiled = time.perf_counter()

@@ -180,6 +180,7 @@ def fit(
         starts = ADAM_STARTS if method == "adam" else few
     noise_cost = experiment.weight.size if experiment.noisy else 0
     stopping = StoppingRule(max_iterations, tolerance, noise_cost)
+    told = "".join(f"; {doubt}" for doubt in doubts)  # where a fit fails, they may say why
     try:
         with bar("fit") as shown:
 
@@ -195,6 +196,8 @@ def fit(
         if problem.saved_in:
             kept = f"all are in {problem.saved_in}: fit again with the same arguments to continue"
         raise KeyboardInterrupt(f"interrupted after {problem.runs} model runs; {kept}") from None
+    except UnconvergedError as error:
+        raise UnconvergedError(f"{error}{told}") from None
     minima = [(space.values(end.point), problem(space, end.point).cost) for end in ends]
     best, status = ends[0]
     if throw and status != "converged":
@@ -202,7 +205,7 @@ def fit(
         named = ", ".join(f"{name} = {value:.6g}" for name, value in space.named(values).items())
         raise UnconvergedError(
             f"the fit has not converged after {max_iterations} iterations, at {named}, cost "
-            f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations"
+            f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations{told}"
         )
     found = fit_at(problem, space, best, list(scenes), status, minima)
     return found._replace(warnings=[*found.warnings, *doubts])

@@ -17,7 +17,7 @@ from jbeamshell.measured.columns import QUANTITIES
 from jbeamshell.measured.curve_files import CURVES, read_curves
 from jbeamshell.measured.curves import Backbone, Measurement
 from jbeamshell.measured.drift import DRIFTS
-from jbeamshell.measured.findings import DRIFT, OFF_CENTRE
+from jbeamshell.measured.findings import DRIFT, OFF_CENTRE, OFF_ZERO
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop, loop_of
 from jbeamshell.measured.recordings import Recording, read_recordings
@@ -28,6 +28,10 @@ from jbeamshell.scene.keys import CONTROLS
 
 KINDS = ("loop", "backbone", *CURVES)
 CYCLES = ("auto", "steady", "recorded")
+WRONG_DRIVE = (
+    "the displacement goes from turn to turn as a machine drives it, the force does not: if it "
+    "drives, give --set load.control=displacement"
+)
 QUIET = 1e-3  # noise of the driving column, over its range, above which cycles are averaged
 
 
@@ -43,8 +47,8 @@ class Source:
         "recorded" takes the recording as one loop; "auto" averages if cycles repeat or if the
         driving column is noisy
     driver, drift : arguments of `steady_loops`
-    centre : True to take the zeros of the sensors from closed loops, see `Loop.centred`; None to do
-        so where gross slip makes them arbitrary
+    centre : True to take the zeros of the sensors from the loops, see `Loop.centred`; None to do so
+        where they can only be offsets
     reverse : "force" or "displacement" to turn the sign of that column
     width : width of the specimen, by which forces are divided
     columns, units, decimal : arguments of `read_recordings`
@@ -135,6 +139,8 @@ class Source:
             if self.drift == "keep":  # which the mean loops do not show
                 drifts = [f.text for view in seen.views for f in view.findings if f.name == DRIFT]
                 per_width = per_width._replace(notes=(*per_width.notes, *drifts))
+            if self.driver == "force" and any(v.driver == "displacement" for v in seen.views):
+                per_width = per_width._replace(notes=(*per_width.notes, WRONG_DRIVE))
             if self.kind == "backbone":
                 columns = per_width.force, per_width.displacement
                 yield Backbone(*columns, per_width.label), per_width.notes
@@ -169,11 +175,20 @@ class Source:
 
 
 def _forgets_zero(loop: Loop) -> bool:
-    """True for a closed loop off the zero of its displacement that slides as a whole.
+    """True for a loop whose response has an offset that no joint makes.
 
-    A contact that slides has no place of its own, so the zero was never that of the strip.
+    A joint that is driven to and fro alike answers about zero.  A contact that slides as a whole
+    has no place of its own, so the zero of its displacement was never that of the strip.  A path
+    that is not closed starts unloaded, unless its driving column has an offset too.
     """
-    levels = inspect(loop).views[0].levels if loop.closed else ()
-    middle = 0.5 * float(np.max(loop.displacement) + np.min(loop.displacement))
-    off = abs(middle) > OFF_CENTRE * float(np.ptp(loop.displacement))
-    return off and bool(levels) and levels[-1].shape.kind == "gross slip"
+    zeros = loop.zeros()
+    off = {n: abs(zero) > OFF_CENTRE * np.ptp(getattr(loop, n)) for n, zero in zeros.items()}
+    driver, answer = zeros
+    if not loop.closed:
+        return off[answer] and abs(zeros[driver]) < OFF_ZERO * np.ptp(getattr(loop, driver))
+    levels = inspect(loop).views[0].levels
+    if not levels or not any(off.values()):
+        return False
+    shape = levels[-1].shape
+    slides = off["displacement"] and shape.kind == "gross slip"
+    return slides or (off[answer] and not off[driver] and not shape.asymmetric)

@@ -18,6 +18,7 @@ import numpy as np
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.specimens import plausible_stiffness
 from jbeamshell.measured.curves import Backbone
+from jbeamshell.measured.findings import TOO_LARGE, TOO_SMALL, TOO_SOFT, TOO_STIFF, UNIT_ERROR
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene.pressure import resultant
@@ -37,6 +38,8 @@ STRAIGHT = 0.875  # halfway over the way that work is short of; 1 if straight, .
 STIFF = 3.0  # stretching stiffness over that of soft sliders, at the start
 STEEP = 0.02  # way to a plateau over the amplitude, at least
 STRAIN = 1e-3  # displacement over a length that nobody gave, at most
+FRICTIONS = (0.003, 3.0)  # friction that surfaces have, beyond which a unit is wrong
+MODULI = (5e8, 3e12)  # plane moduli [Pa] of the materials of joints, likewise
 SIMILAR = 3.0  # factor of a force of gross slip within which the standard strip may be meant
 
 HEIGHT = ("strip.height_ratio", "strip.half_height")
@@ -150,6 +153,8 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
         take("strip.height_ratio", float(np.clip(2.0 * found.force / gross / x, *HEIGHTS)))
     if not stiff:
         take("strip.axial_stiffness", _stretching(found, gross, length))
+        if found.si and tall and "strip.length" in known:
+            _check_modulus(float(scene_from_values(values).strip.plane_modulus))
     if found.soft and "contact.stick_stiffness" not in values:
         scene = scene_from_values(values)
         sliders = gross / found.short / length * float(scene.strip.half_height)
@@ -158,6 +163,7 @@ def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], 
         take("contact.pressure", gross / (float(scene.contact.friction) * length))
     elif "contact.friction" not in values:
         take("contact.friction", gross / _pressing(scene))
+        _check_friction(values["contact.friction"], found, scene, values)
     told = ", ".join(
         f"{key} = {value:.4g}" if isinstance(value, float) else f"{key} = {value}"
         for key, value in fresh.items()
@@ -174,10 +180,43 @@ def _check_known(scene: Scene, values: Mapping[str, Any], found: Estimate, force
         return
     friction, pressing = float(scene.contact.friction), _pressing(scene)
     if found.peak >= BELOW * friction * pressing:
+        _check_friction(found.peak / pressing, found, scene, values)
         raise InputError(
             f"contact.friction = {friction:.6g}: slides at mu F_N L = {friction * pressing:.4g}, "
             f"but the measured force reaches {found.peak:.4g}: start it above "
             f"{found.peak / pressing:.3g}, press more, or set load.control to 'displacement'"
+        )
+
+
+def _check_friction(
+    needed: float, found: Estimate, scene: Scene, values: Mapping[str, Any]
+) -> None:
+    """Raise `InputError` if only friction that no surface has explains the measured force."""
+    low, high = FRICTIONS
+    if low <= needed <= high or not found.si:
+        return
+    units = TOO_SMALL if needed < low else TOO_LARGE
+    if any(key in values for key in STIFFNESS):  # which tells the wrong one of two units
+        stiffness = found.force / found.displacement
+        soft, stiff = plausible_stiffness(scene, ()) or (0.0, np.inf)
+        units = TOO_SOFT if stiffness * UNIT_ERROR < soft else units
+        units = TOO_STIFF if stiffness > UNIT_ERROR * stiff else units
+    raise InputError(
+        f"contact.friction: the measured force, {found.peak:.4g} per width, is that of a friction "
+        f"of {needed:.2g}, which no surface has: {units}, or are pressure, bolts or width wrong; "
+        f"if all are right, start from it by --start contact.friction={needed:.2g}"
+    )
+
+
+def _check_modulus(modulus: float) -> None:
+    """Raise `InputError` if only a modulus that no usual material has explains the stiffness."""
+    low, high = MODULI
+    if not low <= modulus <= high:
+        raise InputError(
+            f"strip.axial_stiffness: force over displacement would need a modulus of "
+            f"{1e-9 * modulus:.3g} GPa, which no usual material has: "
+            f"{TOO_SOFT if modulus < low else TOO_STIFF}, or is --width wrong; if all are right, "
+            "give --modulus"
         )
 
 

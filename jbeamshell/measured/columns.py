@@ -57,14 +57,16 @@ COUNTERS |= {"rapporto", "vitesse", "velocita", "geschwindigkeit"}
 # A unit: letters, powers of one digit, products and quotients; no sums, no nested powers.
 TERM = r"[^\W\d_]+(?:(?:\^|\*\*)?-?[1-4]|[²³])?|[%°]"
 UNIT = re.compile(rf"(?:{TERM})(?:(?: ?[/*·.] ?| )(?:{TERM}))*")
+# A sensor's factor before its unit: "0.05mm", "2.5e-2 kN/V".
+SCALED = re.compile(r"\s*(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\s*\*?\s*([^\d\s*.+-].*)")
 # Units after a space or an underscore, which may be followed by other words too.
 TAIL = re.compile(
     r"(?:[GMkcmuµμn]?N(?:/[cmuµμn]?m)?|[kdcmuµμnp]?m|[mkuµμn]?s|sec|%|rad|deg|in|inch|ft|mil|"
     r"thou|micron|k?lbf?|kip|[kg]?gf|dyn|"
     r"(?:giga|mega|kilo|centi|milli|micro|nano)?(?:newton|met(?:er|re)|second)s?)"
 )
-
-
+VOLT = "V"  # unit of a signal
+OTHER_NAMES = {"mil": "thou"}  # in pint
 LONGEST_TITLE = 1000  # characters; of a longer title only its beginning is read
 
 
@@ -87,7 +89,7 @@ def find_columns(
     ----------
     titles : titles of the columns
     chosen : title by quantity, for columns that are not found by name
-    name, place : name of the table and place of its titles, for messages
+    name, place : name of the table and place of its titles, for messages; no place without titles
 
     Returns
     -------
@@ -117,6 +119,8 @@ def find_columns(
         elif quantity == "displacement" and (instead := _instead(titles, chosen, name, held)):
             columns |= instead
         elif quantity in QUANTITIES:
+            if not place:
+                raise InputError(f"{name}: {no_header(QUANTITIES)}")
             needed = f"{name}: needs one column named {quantity!r} {place}, which holds {held}: "
             if not found:
                 raise InputError(
@@ -206,23 +210,40 @@ def conversions(
         bases = all_bases[quantity]
         unit = "gravity" if quantity == "acceleration" and unit == "g" else unit  # no gram
         converted = Conversion() if unit is None else conversion(unit, bases)
+        if converted is None and quantity in given:  # of a signal: mm/V
+            signals = (unit_of(titles[quantity]), below.get(quantity), VOLT)
+            products = (conversion(f"{unit}*{signal}", bases) for signal in signals if signal)
+            converted = next(filter(None, products), None)
         if quantity in FURTHER:
             mixed = quantity == "normal_force" and bool(unit) != named[0]
             found[quantity] = None if mixed else converted
         elif any(named) and unit is None:
             raise InputError(
                 f"{name}: column {title!r} names no unit but the other one does: write "
-                f"'{title} [{bases[0]}]'"
+                f"'{title} [{bases[0]}]', or give it by {choice(quantity, bases[0], 'unit')}"
+            )
+        elif converted is None and conversion(str(unit), (VOLT,)):
+            factor = f"0.05{bases[0]}/{VOLT}"
+            raise InputError(
+                f"{name}: column {title!r} is a signal in {unit!r}: give each sensor's factor, "
+                f"such as {choice(quantity, factor, 'unit')}"
             )
         elif converted is None:
             raise InputError(
                 f"{name}: column {title!r}: {str(unit)[:40]!r} is no unit of {quantity}: write one "
                 f"in brackets, such as '{quantity} [{bases[0]}]', or give it by "
-                f"{choice(quantity, bases[0], 'unit')}"
+                f"{choice(quantity, bases[0], 'unit')}{_of_factor(str(unit), quantity, bases[0])}"
             )
         else:
             found[quantity] = converted
     return found
+
+
+def _of_factor(unit: str, quantity: str, base: str) -> str:
+    """Words on a sensor's factor, if a text that is no unit begins with a number."""
+    told = f"; a sensor's factor goes before its unit, as in 0.05{base}"
+    turned = f", and a sign is turned by --reverse {quantity}" * unit.startswith("-")
+    return told + turned if re.match(r"[-+.\d]", unit) else ""
 
 
 def unit_of(title: str) -> str | None:
@@ -295,6 +316,8 @@ def bare(title: str) -> str:
 
 
 def _chosen(titles: Sequence[str], quantity: str, title: str, name: str, held: str) -> int:
+    if title.strip().isdigit() and f"column {title.strip()}" in titles:
+        return titles.index(f"column {title.strip()}")
     keys: list[Any] = [str.strip, lambda t: t.strip().lower(), lambda t: bare(t).strip().lower()]
     found: list[int] = []
     for key in keys:
@@ -313,6 +336,16 @@ def choice(quantity: str, value: str, option: str = "column") -> str:
     return f"{shell} (in Python {option}s={{{quantity!r}: {value!r}}})"
 
 
+def no_header(quantities: Mapping[str, Sequence[str]]) -> str:
+    """Sentence on a table of numbers alone: how to say what its columns hold."""
+    columns = " ".join(f"--column {name}={i}" for i, name in enumerate(quantities, 1))
+    units = " ".join(f"--unit {name}={bases[0]}" for name, bases in quantities.items() if bases)
+    return (
+        f"has no header: say which columns hold what, by their numbers, such as {columns} {units} "
+        "(in Python columns={...}, units={...}), or write a header"
+    )
+
+
 def _listed(titles: Sequence[str]) -> str:
     return ", ".join(repr(title.strip()) for title in titles)[:200]
 
@@ -324,12 +357,19 @@ def factor_of(unit: str, bases: Sequence[str]) -> float | None:
 
 
 def conversion(unit: str, bases: Sequence[str]) -> Conversion | None:
-    """Conversion of a unit to the first base unit that suits it; None if none does."""
+    """Conversion of a unit to the first base unit that suits it; None if none does.
+
+    A number before the unit is a sensor's factor: "0.05mm" is one twentieth of a millimetre.
+    """
     if unit in bases:
         return Conversion(1.0, unit)
+    if scaled := SCALED.fullmatch(unit):
+        found, number = conversion(scaled[2], bases), float(scaled[1])
+        usable = found is not None and 0.0 < number < np.inf
+        return Conversion(number * found.factor, found.unit) if found and usable else None
     if len(unit) > 32 or not UNIT.fullmatch(unit):
         return None
-    registry = _registry()
+    registry, unit = _registry(), OTHER_NAMES.get(unit, unit)
     for base in bases:
         try:
             factor = float(registry.Quantity(1.0, unit).to(base).magnitude)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.columns import bare, choice, factor_of, unit_of
+from jbeamshell.measured.columns import bare, choice, factor_of, no_header, unit_of
 from jbeamshell.measured.curves import IN_FILES, Curve
 from jbeamshell.measured.form import NUMBER
 from jbeamshell.measured.read_table import read_table
@@ -73,11 +73,13 @@ def _read(
 ) -> tuple[Curve, tuple[str, ...]]:
     curve: Any = CURVES[kind]
     wanted = {name: column.units for name, column in curve.form.columns.items()}
+    measured = {name: () if units == NUMBER else units for name, units in wanted.items()}
 
     def places(titles: Sequence[str]) -> dict[str, int]:
         names = [bare(title).strip().lower() for title in titles]
         asked = {quantity: chosen.get(quantity, quantity) for quantity in (*wanted, "noise")}
         asked = {quantity: bare(title).strip().lower() for quantity, title in asked.items()}
+        asked |= {q: f"column {t}" for q, t in asked.items() if t.isdigit() and t not in names}
         return {quantity: names.index(t) for quantity, t in asked.items() if t in names}
 
     table = read_table(path, lambda titles: set(wanted) <= set(places(titles)), decimal)
@@ -86,6 +88,8 @@ def _read(
     for quantity in (*wanted, *chosen):
         if quantity not in found:
             name = chosen.get(quantity, quantity)
+            if not table.place:
+                raise InputError(f"{table.name}: {no_header(measured)}")
             raise InputError(
                 f"{table.name}: needs a column {name!r} {table.place}, which holds {held}: name it "
                 f"there, or choose it by {choice(quantity, 'NAME')}"

@@ -21,8 +21,26 @@ from jbeamshell.measured.reversals import noise_of
 from jbeamshell.measured.splitting import Cycles
 
 DRIFTING = 0.03  # drift over the response's range that is told
-OFF_CENTRE = 0.1  # middle of a cycle over its range that is told
+OFF_CENTRE = 0.1  # middle of a driving cycle over its range that is told
+OUTERMOST = 0.9  # range of a cycle's drive over that of the recording
+OFF_ZERO = 0.03  # mean of a response over its range that is told
 UNIT_ERROR = 10.0  # factor beyond a plausible stiffness that only a wrong unit explains
+TOO_SOFT = (  # wrong units, and how to set them right
+    "are kilonewtons taken for newtons (--unit force=kN), millimetres for metres (--unit "
+    "displacement=mm), micrometres for millimetres (--unit displacement=um)"
+)
+TOO_STIFF = (
+    "are newtons taken for kilonewtons (--unit force=N), metres for millimetres (--unit "
+    "displacement=m), millimetres for micrometres (--unit displacement=mm)"
+)
+TOO_LARGE = (  # of forces, where their quotient by the displacement may be right
+    "are newtons taken for kilonewtons (--unit force=N), and with them micrometres for "
+    "millimetres (--unit displacement=um)"
+)
+TOO_SMALL = (
+    "are kilonewtons taken for newtons (--unit force=kN), and with them millimetres for "
+    "micrometres (--unit displacement=mm)"
+)
 CLIPPED, DRIFT = "clipped", "drift"
 FALLS = -0.5  # correlation of force and displacement of a first loading that leans backward
 
@@ -204,8 +222,7 @@ def _of_stiffness(level: Level, band: tuple[float, float] | None) -> Finding | N
     low, high = band
     soft = level.stiffness < low
     factor = low / level.stiffness if soft else level.stiffness / high
-    taken = "millimetres taken for metres" if soft else "metres taken for millimetres"
-    fix = f"are {taken}, or other units wrong (--unit displacement=mm, --width, --modulus)"
+    fix = f"{TOO_SOFT if soft else TOO_STIFF}, or are --width or --modulus wrong"
     return Finding(
         "stiffness",
         f"force over displacement, {level.stiffness:.3g} per width, is {factor:.3g} times "
@@ -235,12 +252,21 @@ def _of_drift(level: Level, number: int, found: Cycles) -> Finding | None:
 
 
 def _of_centre(level: Level, found: Cycles, recording: Recording) -> Finding | None:
-    drive = getattr(level.loop, found.driver)
-    middle = 0.5 * float(np.max(drive) + np.min(drive))
-    if abs(middle) < OFF_CENTRE * np.ptp(drive):
-        return None
-    return Finding(
-        "off centre",
-        f"the {found.driver} swings about {with_unit(middle, recording.unit(found.driver))}, not "
-        "about zero: if this is the sensor's offset, remove it by --centre",
-    )
+    """Finding about a column that does not swing about zero, the driving one first."""
+    loop, driver = level.loop, found.driver
+    zeros = loop.zeros()
+    # Within larger ones, cycles answer about where those left them.
+    outermost = np.ptp(getattr(loop, driver)) > OUTERMOST * np.ptp(getattr(recording, driver))
+    for name, least in ((driver, OFF_CENTRE), (found.responding, OFF_ZERO)):
+        unlike = level.shape.asymmetric or abs(level.shape.drift) >= DRIFTING or not outermost
+        if name == found.responding and unlike:
+            return None
+        noise = 4.0 * level.shape.error * (name == found.responding)
+        if abs(zeros[name]) >= max(least, noise) * np.ptp(getattr(loop, name)):
+            return Finding(
+                "off centre",
+                f"the {name} swings about {with_unit(zeros[name], recording.unit(name))}, not "
+                "about zero: if this is the sensor's offset, remove it by --centre (in a plan "
+                "centre = true)",
+            )
+    return None

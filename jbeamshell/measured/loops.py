@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.common.errors import InputError
 from jbeamshell.common.summary import Summary, ranged, with_unit
 from jbeamshell.measured.form import LOOP, Form
 from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
@@ -103,30 +102,34 @@ class Loop(NamedTuple):
             return None
         return float(np.sqrt(np.mean(self.scatter**2) / self.cycles))
 
-    def centred(self) -> Loop:
-        """Loop without the offsets of its sensors.
+    def zeros(self) -> dict[str, float]:
+        """Numbers about which the columns swing, which are zero unless sensors have offsets.
 
-        The driving column is shifted to the middle of its range, the responding one by its mean
-        along the path. A model's loop may have another mean, so ``free_zero`` is set: a fit then
-        ignores the offset of the responding column.
-
-        Raises
-        ------
-        InputError
-            for a loop that is not closed: its zeros are those of the unloaded strip
+        Of the driving column it is the middle of its range, of the responding one its mean along
+        the path.  A path that is not closed starts unloaded: they are those of its first point.
         """
-        if not self.closed:
-            raise InputError(
-                f"{self.label}: is not closed: its zeros are where it started; leave out centre"
-            )
         driver = self.driver or find_driver(self.force, self.displacement)
-        answer = "displacement" if driver == "force" else "force"
+        answer = LOOP.response(driver)
         drive, column = getattr(self, driver), getattr(self, answer)
+        if not self.closed:
+            return {driver: float(drive[0]), answer: float(column[0])}
         middle = 0.5 * float(np.max(drive) + np.min(drive))
         way = np.abs(np.diff(drive))
-        mean = float(np.sum(0.5 * (column[1:] + column[:-1]) * way) / np.sum(way))
-        note = f"removed, zeros of the sensors: {driver} {middle:.3g} and {answer} {mean:.3g}"
-        shifted = {driver: drive - middle, answer: column - mean}
+        return {
+            driver: middle,
+            answer: float(np.sum(0.5 * (column[1:] + column[:-1]) * way) / np.sum(way)),
+        }
+
+    def centred(self) -> Loop:
+        """Loop without the offsets of its sensors, see `zeros`.
+
+        A model's loop may have another mean, so ``free_zero`` is set: a fit then ignores the offset
+        of the responding column.
+        """
+        zeros = self.zeros()
+        told = " and ".join(f"{name} {zero:.3g}" for name, zero in zeros.items())
+        shifted = {name: getattr(self, name) - zero for name, zero in zeros.items()}
+        note = f"removed, zeros of the sensors: {told}"
         return self._replace(**shifted, notes=(*self.notes, note), free_zero=True)
 
     def thinned(self, points: int, driver: str) -> Loop:

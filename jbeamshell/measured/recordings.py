@@ -92,15 +92,23 @@ class Recording(NamedTuple):
         return mean if np.isfinite(mean) else None
 
     def per_width(self, width: float) -> Recording:
-        """Recording of forces per unit width; a width of 1 changes nothing."""
+        """Recording of forces per unit width; those that are so by their unit stay as they are."""
         if width == 1.0:
             return self
-        units = self.units
-        if units is not None:
-            forces = {name: "N/m" for name in ("force", "normal_force") if name in units}
-            units = {**units, **forces}
-        normal = None if self.normal_force is None else self.normal_force / width
-        return self._replace(force=self.force / width, normal_force=normal, units=units)
+        units, columns, notes = dict(self.units or {}), dict[str, Any](), self.notes
+        for name in ("force", "normal_force"):
+            column = getattr(self, name)
+            if column is None:
+                continue
+            if units.get(name) == "N/m":
+                notes = (
+                    *notes,
+                    f"the {name} is per width already, so the width does not divide it",
+                )
+                continue
+            columns[name] = column / width
+            units |= {name: "N/m"} if name in units else {}
+        return self._replace(**columns, notes=notes, units=self.units and units)
 
 
 def recording_from_arrays(
@@ -214,8 +222,9 @@ def read_recordings(
     ----------
     paths : one file or several; the files' names are the labels
     columns : name of a column by "force", "displacement", "time" or "normal_force", for columns
-        that cannot be found by name
-    units : unit by the same quantities, such as {"force": "kN"}, which overrides the header
+        that cannot be found by name; its number, from 1, in a file without a header
+    units : unit by the same quantities, such as {"force": "kN"}, which overrides the header; a
+        sensor's factor goes before it, such as "0.05mm", or "0.05mm/V" of a signal
     decimal : decimal mark, "," or "."; None infers it from the numbers
 
     Returns

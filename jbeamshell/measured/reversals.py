@@ -16,6 +16,10 @@ PARTS = 25  # of a branch, over which force and displacement are compared
 SHUFFLED = 2.0  # scatter of displacement over force to its converse, above which it drives
 TOLD = 0.01  # part of the range that this scatter has at least
 CALM = 0.001  # excess travel over the travel from turn to turn of a column without noise
+EVEN = 0.5  # unevenness of one column over that of the other, below which it drives
+OF_NOISE = 0.2  # unevenness over the noise, above which it is told
+OF_SAMPLE = 0.25  # and times the points of a branch: a sine that turns between two samples
+FEWEST = 5  # points of a branch that tells its rate
 
 Floats = NDArray[np.float64]
 
@@ -99,22 +103,52 @@ def find_driver(force: Floats, displacement: Floats) -> str:
     """Find the column, "force" or "displacement", that drove a test.
 
     It is the displacement if there is a plateau, see `has_plateau`.  Else it is the column that
-    travels from turn to turn with less movement to and fro, and the force if both are smooth.
+    goes from turn to turn as machines do, at a constant rate or as a sine; the other one bends as
+    the joint softens.  Where neither tells, it is the column that travels from turn to turn with
+    less movement to and fro, and the force if both are smooth.
 
     Parameters
     ----------
-    force, displacement : (points,) columns of a recording
+    force, displacement : (points,) columns of a recording, evenly in time
     """
     if has_plateau(force, displacement):
         return "displacement"
-    excess = {}
+    uneven, excess, least = {}, {}, 0.0
     for name, column in (("force", force), ("displacement", displacement)):
         path = smoothed_path(column)
-        ends = column[extremes(path.smooth, path.band)]
-        net = float(np.sum(np.abs(np.diff(ends)))) or float(np.ptp(column))
+        ends = extremes(path.smooth, path.band)
+        uneven[name] = _unevenness(column, ends)
+        net = float(np.sum(np.abs(np.diff(column[ends])))) or float(np.ptp(column))
         excess[name] = float(np.sum(np.abs(np.diff(column)))) / net - 1.0
+        least = max(least, OF_NOISE * noise_of(column) / float(np.ptp(column)))
+        least = max(least, OF_SAMPLE * max(len(ends) - 1, 1) / column.size)
+    even, other = sorted(uneven, key=uneven.__getitem__)
+    if uneven[other] > least and uneven[even] < EVEN * uneven[other]:
+        return even
     noisy = max(excess.values()) > CALM
     return "displacement" if noisy and excess["displacement"] < 0.5 * excess["force"] else "force"
+
+
+def _unevenness(column: Floats, ends: list[int]) -> float:
+    """Deviation of the branches between some extremes from straight lines or half sines in time.
+
+    It is a root mean square without the noise, over the range of the column; 0 where no branch goes
+    from turn to turn, as in a first loading.
+    """
+    turns = [i for i in ends if 0 < i < column.size - 1]
+    if len(turns) == 1 and abs(column[-1] - column[0]) < SMALLEST * np.ptp(column):
+        turns = ends  # one cycle from turn to turn to turn
+    squares = []
+    for here, there in itertools.pairwise(turns):
+        way, branch = np.linspace(0.0, 1.0, there - here + 1), column[here : there + 1]
+        if branch.size < FEWEST or np.ptp(branch) == 0.0:
+            continue
+        rates = (way, -np.cos(np.pi * way))
+        alike = max(float(np.corrcoef(branch, rate)[0, 1]) ** 2 for rate in rates)
+        squares.append(float(np.var(branch)) * (1.0 - alike))
+    if not squares:
+        return 0.0
+    return max(float(np.mean(squares)) - noise_of(column) ** 2, 0.0) ** 0.5 / float(np.ptp(column))
 
 
 def has_plateau(force: Floats, displacement: Floats) -> bool:

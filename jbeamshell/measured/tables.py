@@ -23,7 +23,8 @@ class Table(abc.ABC):
     ----------
     name : name of the file, for messages
     titles : titles of the columns
-    place : place of the titles in the file, for messages
+    place : place of the titles in the file, for messages; empty if it names no columns, which are
+        "column 1" and so on then
     """
 
     name: str

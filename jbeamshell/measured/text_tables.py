@@ -46,7 +46,7 @@ class TextTable(Table):
     ----------
     path : text file
     recognised : function that is True for the titles of a header; if no row is one, the first row
-        is taken
+        with as many cells as the numbers below it is taken
     decimal : decimal mark, "." or ","; None infers it from the numbers
     """
 
@@ -74,11 +74,11 @@ class TextTable(Table):
             )
         self._delimiter = max(",;\t", key=content[0][1].count)
         number, line = self._header(content, recognised)
-        self.place = f"in line {number}"
-        self.titles = [title.strip() for title in self._cells(number, line)]
-        while self.titles and not self.titles[-1]:  # a delimiter that ends every line
-            self.titles.pop()
-        self._first = number
+        self.titles = _filled(self._cells(number, line))
+        self.place, self._first = f"in line {number}", number
+        if _are_numbers(self.titles):
+            self.titles = [f"column {place}" for place in range(1, len(self.titles) + 1)]
+            self.place, self._first = "", number - 1
 
     def _header(
         self, content: list[tuple[int, str]], recognised: Callable[[Sequence[str]], bool]
@@ -101,7 +101,27 @@ class TextTable(Table):
             if alike >= fewest:
                 self._delimiter = delimiter
                 return number, line
-        return content[0]
+        return self._above_numbers(content)
+
+    def _above_numbers(self, content: list[tuple[int, str]]) -> tuple[int, str]:
+        """First line with as many cells as the numbers below it, which may be numbers itself.
+
+        Sets the delimiter; the first line of all is taken if there are no rows of numbers.  Between
+        blanks any words would do, so that the first numbers are taken.
+        """
+        first, delimiter = len(content), self._delimiter
+        for mark in DELIMITERS:
+            rows = (_filled(_split(line, mark) or []) for _, line in content[:first])
+            found = next((i for i, row in enumerate(rows) if _are_numbers(row)), first)
+            if found < first:
+                first, delimiter = found, mark
+        if first == len(content):
+            return content[0]
+        self._delimiter = delimiter
+        if delimiter == " ":
+            return content[first]
+        cells = [len(_filled(_split(line, delimiter) or [])) for _, line in content[: first + 1]]
+        return content[cells.index(cells[-1])]
 
     def _content(self) -> Iterator[tuple[int, str]]:
         """Lines that are neither blank nor comments, with their numbers, counted from 1."""
@@ -246,6 +266,24 @@ def decoded(data: bytes, name: str) -> str:
             f"{name}: is not text in UTF-8 or Latin-1: save it as a CSV table in UTF-8"
         )
     return text
+
+
+def _filled(cells: Sequence[str]) -> list[str]:
+    """Cells without blanks, and without the empty ones after the last delimiters of a line."""
+    filled = [cell.strip() for cell in cells]
+    while filled and not filled[-1]:
+        filled.pop()
+    return filled
+
+
+def _are_numbers(cells: Sequence[str]) -> bool:
+    """True for several cells of which all hold numbers, or are missing ones."""
+    numbers = [bool(DIGITS.fullmatch(cell)) for cell in cells]
+    whole = all(
+        number or cell.lower() in {*MISSING, "nan"}
+        for number, cell in zip(numbers, cells, strict=True)
+    )
+    return len(cells) > 1 and any(numbers) and whole
 
 
 def _alike(row: Sequence[str], titles: Sequence[str], delimiter: str) -> bool:

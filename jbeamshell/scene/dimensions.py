@@ -3,8 +3,9 @@
 Forces of a scene are per unit width, so N/m.  X runs from the supported end to the loaded one.
 
 The pressure of a bolt is even over the patch where its pressure cone meets the contact. The cone
-widens from the head, or the washer, at 30 degrees to its axis, as is usual for clamped plates
-(Shigley, Mechanical Engineering Design, 10th ed., section 8-5; VDI 2230 part 1).
+widens from the head, or the washer, of width d at 30 degrees to its axis, as is usual for clamped
+plates (Shigley, Mechanical Engineering Design, 10th ed., section 8-5; VDI 2230 part 1).  It goes
+through the whole thickness 2H, so the patch is d + 2 (2H) tan 30 = d + 4 H tan 30 wide.
 """
 
 from __future__ import annotations

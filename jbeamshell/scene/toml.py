@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import tomli_w
+from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
@@ -18,6 +19,8 @@ from jbeamshell.scene.keys import DERIVED, KEYS, LENGTHS, NUMBERS
 from jbeamshell.scene.parts import SECTIONS, Load
 from jbeamshell.scene.rungs import spelled_out
 from jbeamshell.scene.scene import Scene, check_word
+
+FEW_DIGITS = {4: 6, 8: 12}  # of a number that somebody wrote, by the bytes of its precision
 
 
 def scene_from_values(values: Mapping[str, Any]) -> Scene:
@@ -88,8 +91,9 @@ def entry_note(values: Mapping[str, Any]) -> str:
 def scene_to_toml(scene: Scene) -> str:
     """TOML text of a scene; `read_scene` makes the same scene of it, to the last bit.
 
-    Settings that the scene left open are written as such; write ``scene.pinned()`` to keep what
-    was chosen.
+    What two keys can say is written by the one that says it in few digits, which is the one that
+    was given: Young's modulus, the half height and bolts.  Settings that the scene left open are
+    written as such; write ``scene.pinned()`` to keep what was chosen.
     """
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     if scene.energy is not None or not isinstance(law_name(scene.contact.law), str):
@@ -97,19 +101,62 @@ def scene_to_toml(scene: Scene) -> str:
             "energy, law: a function of your own cannot be written to TOML; keep it in code"
         )
     tables: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
+    said = _in_few_digits(scene)
     for key in KEYS:
-        if key in DERIVED or key == "model.rung":
+        if (key in DERIVED and key not in said) or key == "model.rung":
             continue
         section, name = key.split(".")
-        value = dict(getattr(scene, section).as_given).get(name, scene.get(key))
+        value = said.get(key, dict(getattr(scene, section).as_given).get(name, scene.get(key)))
         if value is None:  # such as no layers
             continue
         if key in NUMBERS:
-            value = np.asarray(value, dtype=float).tolist()
+            value = _shortest(value)
         if key == "contact.smoothing" and np.isinf(value):
             value = "sharp"
         tables[section][name] = list(value) if isinstance(value, tuple) else value
     return tomli_w.dumps(tables)
+
+
+def _in_few_digits(scene: Scene) -> dict[str, Any]:
+    """Values of derived keys that take fewer digits than their fields, which are None then."""
+    said: dict[str, Any] = {}
+    for key in ("strip.youngs_modulus", "strip.half_height", "contact.bolts"):
+        field, value = DERIVED[key], scene.get(key)
+        if value is None:
+            continue
+        own, few = np.asarray(scene.get(field)), _rounded(value)
+        again = scene.replace({key: few})
+        # Beside a modulus stands the half height; bolts are fewer rows always.
+        told = bool(said) or key == "contact.bolts" or _digits(few) < _digits(own)
+        if not (told and np.array_equal(again.get(field), own)):
+            continue
+        said |= {key: few, field: None}
+        if key == "contact.bolts" and np.array_equal(
+            again.contact.bottom_pressure, scene.contact.bottom_pressure
+        ):
+            said["contact.bottom_pressure"] = None  # follows from the bolts
+    return said
+
+
+def _rounded(value: Any) -> NDArray[Any]:
+    """Numbers without the digits that only round-off makes, of the same precision."""
+    array = np.asarray(value)
+    digits = FEW_DIGITS[array.dtype.itemsize]
+    few = [float(f"{number:.{digits}g}") for number in array.ravel()]
+    return np.asarray(few, array.dtype).reshape(array.shape)
+
+
+def _digits(array: NDArray[Any]) -> int:
+    """Most significant digits that one of some numbers takes."""
+    shown = (np.format_float_scientific(number) for number in array.ravel())
+    return max(len(text.partition("e")[0].strip("-0.").replace(".", "")) for text in shown)
+
+
+def _shortest(value: Any) -> Any:
+    """Number, or lists of numbers, in the fewest digits that mean the same in their precision."""
+    array = np.asarray(value)
+    numbers = [float(str(number)) for number in array.ravel()]
+    return np.asarray(numbers, float).reshape(array.shape).tolist()
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:

@@ -64,6 +64,41 @@ def test_run_prints_text_to_read(cli):
         json.loads(out)
 
 
+SPECIMEN = ["--length", "120mm", "--thickness", "12mm", "--modulus", "210GPa", "--width", "50mm"]
+
+
+@pytest.mark.doubtful("slip")
+def test_run_takes_a_specimen_and_settings_with_units(cli, tmp_path):
+    folder = tmp_path / "out"
+    load = ["--pressure", "8MPa", "--set", "load.amplitude=2.4kN", "--out", str(folder)]
+    code, out, _ = cli("run", *BASE, *SPECIMEN, *load, "--json")
+    assert code == 0
+    values = {"strip.length": 0.12, "strip.half_height": 0.006, "strip.youngs_modulus": 210e9}
+    values |= {"contact.pressure": 8e6, "load.amplitude": 2.4e3 / 0.05}
+    history = jb.solve(jb.Scene().replace(COARSE | values))
+    assert json.loads(out)["dissipation"] == pytest.approx(float(history.dissipation), rel=1e-9)
+    text = (folder / "scene.toml").read_text()
+    for line in ("half_height = 0.006", "youngs_modulus = 210000000000.0", "amplitude = 48000.0"):
+        assert line in text
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([*SPECIMEN, "--pressure", "8MPa"], "slides at mu F_N L = 4.8 kN: give a part of it, such"),
+        (SPECIMEN, "contact.pressure: the specimen is in SI, the standard strip is not: give it"),
+        (
+            ["--set", "load.amplitude=2kN"],
+            "load.amplitude = '2kN': forces are per width: give --wi",
+        ),
+        (["--set", "strip.length=2kg"], "strip.length = '2kg': 'kg' is no unit of it: write m"),
+        (["--set", "contact.friction=2mm"], "contact.friction = '2mm': takes no unit"),
+    ],
+)
+def test_a_specimen_is_not_mixed_with_the_standard_strip(refused, words, told):
+    assert told in refused("run", *words)
+
+
 def test_run_leaves_what_runs_again_to_the_last_bit(cli, tmp_path):
     folder = tmp_path / "new" / "run"
     third = 1.0 / 30.0 + 0.1

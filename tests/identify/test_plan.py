@@ -9,6 +9,7 @@ from jbeamshell.identify.sources import Source
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
+from tests import rig
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 101)
 
@@ -190,3 +191,37 @@ def test_a_file_that_is_no_plan_is_refused(tmp_path, text):
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError, match=r"plan\.toml"):
         read_plan(path)
+
+
+@pytest.mark.parametrize("cycles", [1, 4])
+@pytest.mark.parametrize(("driver", "off"), [("force", 0.4), ("displacement", -0.3)])
+def test_an_offset_of_the_responding_sensor_is_removed_and_said(tmp_path, cycles, driver, off):
+    u = rig.path(cycles, 80)
+    force, along = (u, rig.iwan_by_force(u)) if driver == "force" else (rig.bouc_wen(u), u)
+    columns = {"force": force, "displacement": along}
+    answer = next(name for name in columns if name != driver)
+    whole = {**columns, answer: columns[answer] + off * np.ptp(columns[answer])}
+    for name, table in (("right", columns), ("off", whole)):
+        rows = np.column_stack(list(table.values()))
+        head = "force,displacement"
+        np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header=head, comments="")
+    read = {name: list(Source([f"{name}.csv"]).measurements(tmp_path)) for name in ("right", "off")}
+    for (loop, _), (moved, notes) in zip(read["right"], read["off"], strict=True):
+        assert any("zeros of the sensors" in note for note in notes)
+        assert moved.free_zero
+        assert not loop.free_zero
+        shift = getattr(moved, answer) - getattr(loop, answer)
+        assert np.ptp(shift) < 1e-9 * np.ptp(columns[answer])
+        assert np.max(np.abs(shift)) < 0.05 * np.ptp(columns[answer])
+    (kept, _), *_ = Source(["off.csv"], centre=False).measurements(tmp_path)
+    assert not kept.free_zero
+
+
+def test_a_drive_that_the_data_contradict_is_said(tmp_path):
+    u = rig.path(3, 80)
+    rows = np.column_stack([rig.bouc_wen(u), u])
+    head = "force,displacement"
+    np.savetxt(tmp_path / "rig.csv", rows, delimiter=",", header=head, comments="")
+    for driver, said in ((None, False), ("displacement", False), ("force", True)):
+        for _, notes in Source(["rig.csv"], driver=driver).measurements(tmp_path):
+            assert any("load.control=displacement" in note for note in notes) == said

@@ -164,3 +164,30 @@ def test_fits_of_random_specimens_converge_from_the_file_alone(seed):
     fit = jb.identify.fit(plan.specimens, free=plan.free, points=48)
     assert fit.status == "converged"
     assert fit.misfit < 0.02
+
+
+SPECIMEN = {L: 0.12, "strip.half_height": 0.006, "strip.youngs_modulus": 210e9, P: 5e6}
+
+
+@pytest.mark.parametrize(
+    ("factors", "known", "told"),
+    [
+        ((1e3, 1e3), SPECIMEN, "force=N.*displacement=um.* --start contact.friction="),
+        ((1e-3, 1e-3), SPECIMEN, "force=kN.*displacement=mm.* --start contact.friction="),
+        ((1e3, 1.0), SPECIMEN, "force=N.*displacement=m.*displacement=mm"),
+        ((1e-3, 1.0), SPECIMEN, "force=kN.*displacement=mm.*displacement=um"),
+        ((1.0, 1e3), {k: v for k, v in SPECIMEN.items() if "modulus" not in k}, "give --modulus"),
+    ],
+)
+def test_a_wrong_unit_is_named_where_no_surface_or_material_explains_it(factors, known, told):
+    u = rig.path(4)
+    made = rig.recorded(7.0e4 * rig.iwan(u), 1e-6 * u, 0.002, driver="displacement")
+    right, wrong = (
+        steady_loops(
+            made._replace(force=f * made.force, displacement=d * made.displacement, units=SI)
+        )
+        for f, d in ((1.0, 1.0), factors)
+    )
+    plan_for({"set": known, "free": {MU: {}}}, right)
+    with pytest.raises(InputError, match=told):
+        plan_for({"set": known, "free": {MU: {}}}, wrong)

@@ -446,3 +446,14 @@ def test_drift_goes_on_beyond_the_cycles_as_it_was_at_each_end():
     middles, offsets = np.array([1.0, 2.0, 4.0]), np.array([0.0, 1.0, 0.0])
     found = _through(np.array([0.0, 1.5, 3.0, 5.0]), middles, offsets)
     np.testing.assert_allclose(found, [-1.0, 0.5, 0.5, -0.5])
+
+
+@pytest.mark.parametrize("name", ["jenkins", "bouc-wen", "iwan by force"])
+def test_the_column_that_moves_as_a_machine_drives(name):
+    random = np.random.default_rng(7)
+    for seed in range(40):
+        noise = random.choice([0.0, 0.002, 0.01])
+        columns = rig.sound(name, random)
+        noisy = random.choice(list(rig.NOISES))
+        made = rig.recorded(*columns, noise, noisy, seed, rig.SOUND[name])
+        assert find_driver(made.force, made.displacement) == rig.SOUND[name], seed

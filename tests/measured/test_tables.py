@@ -191,6 +191,53 @@ def test_units_and_columns_by_argument(read):
     np.testing.assert_allclose(got, [1e3 * FORCE, 1e-3 * DISPLACEMENT], rtol=1e-14)
 
 
+FACTORS = {
+    "0.05mm": ("displacement", 5e-5),
+    ".05 mm": ("displacement", 5e-5),
+    "5e-2*mm": ("displacement", 5e-5),
+    "0.05mm/V": ("displacement [V]", 5e-5),
+    "0.05 mm/V": ("displacement [mV]", 5e-8),
+    "mm/V": ("displacement", 1e-3),
+    "mil": ("displacement", 2.54e-5),
+}
+
+
+@pytest.mark.parametrize("unit", FACTORS)
+def test_a_sensors_factor_goes_before_its_unit(read, unit):
+    title, factor = FACTORS[unit]
+    got = columns(read(text(["force [kN]", title]), units={"displacement": unit}))
+    np.testing.assert_allclose(got, [1e3 * FORCE, factor * DISPLACEMENT], rtol=1e-14)
+
+
+@pytest.mark.parametrize("unit", ["-0.05mm", "0mm", "1e999mm", "2 3 m", "0.05kg", "0.05"])
+def test_what_is_no_factor_is_refused(read, unit):
+    with pytest.raises(InputError, match=r"is no unit of displacement: .* a sensor's factor goes"):
+        read(text(["force [kN]", "displacement"]), units={"displacement": unit})
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "decimal"), [(",", "."), (";", ","), ("\t", ","), (" ", ".")]
+)
+@pytest.mark.parametrize("above", ["", "Rig 3\n12.05.2024; A. B.\n\n", "# by hand\n"])
+def test_columns_of_a_table_without_a_header_have_numbers(read, delimiter, decimal, above):
+    rows = [["7", *(cell.replace(".", decimal) for cell in row)] for row in ROWS]
+    content = above + text(rows[0], rows[1:], delimiter)
+    got = columns(read(content, columns={"force": "2", "displacement": "3"}))
+    np.testing.assert_array_equal(got, [FORCE, DISPLACEMENT])
+    with pytest.raises(InputError, match=r"data.csv: has no header: .* --column force=1"):
+        read(content)
+    with pytest.raises(InputError, match="'column 1', 'column 2', 'column 3': choose one"):
+        read(content, columns={"force": "2", "displacement": "4"})
+
+
+def test_forces_per_width_are_not_divided_again(tmp_path):
+    (tmp_path / "data.csv").write_text(text(["force [N/mm]", "displacement [mm]"]))
+    (recording,) = read_recordings(tmp_path / "data.csv")
+    again = recording.per_width(0.05)
+    np.testing.assert_array_equal(again.force, recording.force)
+    assert "the force is per width already, so the width does not divide it" in again.notes
+
+
 # --- several loops ------------------------------------------------------------------------------
 
 
@@ -235,7 +282,8 @@ BAD = {
     ),
     "no header": (
         text(ROWS[0], ROWS[1:]),
-        "data.csv: needs one column named 'force' in line 1, which holds '3.0', '0.2388",
+        "data.csv: has no header: say which columns hold what, by their numbers, such as "
+        "--column force=1 --column displacement=2 --unit force=N --unit displacement=m ",
     ),
     "two forces": (
         text(["force left", "force right", "displacement"], [[f, f, u] for f, u in ROWS]),

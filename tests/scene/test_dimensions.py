@@ -46,6 +46,7 @@ def test_a_bolt_presses_where_its_cone_meets_the_contact():
     on = pressure[pressure[:, 1] > 0.0]
     np.testing.assert_allclose(on[:, 0], [0.06 - reach, 0.06 + reach])
     np.testing.assert_allclose(on[:, 1], 8e3 / 0.05 / (2.0 * reach))
+    assert on[-1, 0] - on[0, 0] == pytest.approx(26.86e-3, rel=1e-3)  # as the page says
     assert pressure[0, 0] == 0.0
     assert pressure[-1, 0] == pytest.approx(0.12)
     assert math.degrees(HALF_ANGLE) == pytest.approx(30.0)

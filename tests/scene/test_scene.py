@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jbeamshell import Contact, InputError, Load, Model, Scene, Strip, read_scene, scene_to_toml
-from jbeamshell.common.files import written_whole
+from jbeamshell.common.files import parsed_toml, written_whole
 from jbeamshell.mechanics.friction import (
     CappedTrial,
     ElasticSlip,
@@ -701,3 +701,44 @@ def test_only_patches_of_pressure_are_bolts():
     np.testing.assert_allclose(scene.get("contact.bolts"), bolts, rtol=1e-12)
     step = [[0.0, 30.0], [0.6, 30.0], [0.6, 0.0], [2.0, 0.0]]
     assert Scene().replace({"contact.pressure": step}).get("contact.bolts") is None
+
+
+SPECIMENS = {
+    "dimensions": {
+        "strip.length": 0.12855,
+        "strip.half_height": 0.0009513,
+        "strip.youngs_modulus": 3.2851e9,
+        "contact.bolts": [[0.03856, 31.0, 0.0257], [0.08998, 2290.7, 0.0193]],
+    },
+    "clamped": {
+        "strip.half_height": 0.1127,
+        "strip.youngs_modulus": 210e9,
+        "contact.bolts": [[1.0, 20.0, 0.5]],
+        "member.support": "clamped",
+        "strip.far_end": "free",
+        "strip.loaded_end": "level",
+        "load.entry": "traction",
+        "model.fields": ["v", "w", "beta", "psi"],
+        "model.solution": "plane",
+    },
+    "numbers of the model": {
+        "strip.height_ratio": 0.0937,
+        "strip.axial_stiffness": 2.71e8,
+        "contact.pressure": 4.31,
+    },
+}
+
+
+@pytest.mark.parametrize("values", SPECIMENS.values(), ids=SPECIMENS)
+def test_a_file_says_what_was_given_and_means_the_same(values):
+    scene = scene_from_values(values)
+    text = scene_to_toml(scene)
+    said = {
+        f"{section}.{name}": number
+        for section, table in parsed_toml(text).items()
+        for name, number in table.items()
+    }
+    assert {key: said[key] for key in values} == values
+    again = scene_from_values(said)
+    for here, there in zip(jax.tree.leaves(scene), jax.tree.leaves(again), strict=True):
+        np.testing.assert_array_equal(here, there)
