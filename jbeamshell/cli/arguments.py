@@ -57,10 +57,7 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 def add_columns(parser: argparse.ArgumentParser) -> None:
     """Add ``--column``, ``--unit`` and ``--decimal``, which tell how tables are read."""
-    column = (
-        "name of the column that holds the force, the displacement, ..., or its number in a file "
-    )
-    column += "without a header"
+    column = "name of the column that holds the force, ..., or its number in a file without header"
     unit = "unit of the force, the displacement, ...; a sensor's factor goes before it: 0.05mm"
     for option, word, text in (("column", "NAME", column), ("unit", "UNIT", unit)):
         parser.add_argument(
