@@ -159,7 +159,7 @@ def test_forced_amplitudes_have_derivatives():
     assert_slope_two(figures)
 
 
-CAPPED = two_masses(Joint(*SLIDERS, capacity=1.0))
+CAPPED = two_masses(Joint(*SLIDERS, capacity=1.2))
 REFUSED = {
     "force": (lambda: dynamics.forced_response(HELD, [1.0], (0.3, 1.0)), "force.*2 numbers"),
     "no force": (lambda: dynamics.forced_response(HELD, [0.0, 0.0], (0.3, 1.0)), "force.*zero"),

@@ -3,6 +3,8 @@ r"""Joint as a force element: a network of Jenkins sliders with the backbone of 
 Parallel sliders have a backbone F(u) that is linear between points: where its slope falls by s at
 u, a spring of stiffness s starts to slip at the force s u; a spring with the last slope remains
 (Iwan 1966).  Their loops follow Masing's rule exactly: the branch from U is F(U) - 2 F((U-u)/2).
+A joint is known up to the last point of its backbone.  If that point is gross slip, the force stays
+there, and the joint is known everywhere; beyond any other last point nothing is known.
 A strip becomes one such element by the mean of its pull and its push, whose sliders are the nodes
 of its contact; `jbeamshell.condensed.network` has both, and every branch between them, exactly.
 Scenes that are no network, such as lap joints, become the element nearest to their steady cycles.
@@ -31,7 +33,8 @@ from jbeamshell.common.checks import (
     require_choice,
     require_number,
 )
-from jbeamshell.common.errors import DoubtfulWarning
+from jbeamshell.common.errors import DoubtfulWarning, InputError
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.export import table
@@ -58,6 +61,9 @@ BACKBONE = "give as many displacements as forces, both rising from above zero, s
 SIDES = "give the displacements of pull and push, (2, k), both positive, at the forces"
 DOUBTED_ASYMMETRY = 0.05  # of an exported joint
 BY = ("sliders", "cycles")
+GROSS = 0.99  # force over that of gross slip from which on the last point counts as gross slip
+FLAT = 1e-9  # last slope over the first one that counts as zero
+ROUNDING = 1e-6  # of a displacement at the last point
 UNLIKE = "needs sliders that follow one another: take 'cycles', or None"
 
 
@@ -66,12 +72,13 @@ class Joint(eqx.Module):
 
     Attributes
     ----------
-    displacement, force : (k,) points of the backbone; the last slope continues beyond them
+    displacement, force : (k,) points of the backbone.  At .99 of the capacity or more a point on
+        the plateau of gross slip follows the given ones
     network : sliders of the strip behind it, per width; None for a backbone alone
     width : of the strip
     asymmetry : largest difference of the strip's pull and push from the backbone, over the
         displacement at one force
-    capacity : force of gross slip, beyond the backbone; infinite if it is not known
+    capacity : force of gross slip; infinite if it is not known
     sides : (2, k) displacements of a pull and of a push at the forces; None if they are the
         backbone's
     scene : scene behind a joint without a network, such as a lap joint, for `path_forces`
@@ -115,6 +122,10 @@ class Joint(eqx.Module):
         self.capacity = as_leaf(capacity, "joint.capacity")
         self.sides = None if sides is None else as_leaf(sides, "joint.sides", SIDES)
         self.scene = scene
+        if self._ends_in_gross_slip:
+            self.force = jnp.append(self.force, self.force[-1])
+            self.displacement = _longer(self.displacement)
+            self.sides = None if self.sides is None else _longer(self.sides)
 
     def __check_init__(self) -> None:
         if is_traced(self.displacement, self.force):
@@ -167,7 +178,8 @@ class Joint(eqx.Module):
         force = largest_force(scene, force)
         require_number("width", width)
         require_choice("by", by, (None, *BY))
-        capacity = width * gross_slip(scene)
+        bolted = scene.contact.bolt_stiffness is not None  # which holds beyond
+        capacity = np.inf if bolted else width * gross_slip(scene)
         condensed = scene.model.condensed
         traced = is_traced(scene, force)
         opens = scene.member.support != "none" or (condensed and goes_on(scene))
@@ -190,14 +202,58 @@ class Joint(eqx.Module):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Joint:
-        """Joint with the backbone of a table, such as `export` writes: CSV or MATLAB.
+        """Joint of a table, such as `export` writes: CSV or MATLAB.
+
+        Backbone, width, asymmetry and capacity come back; those that a table of another origin
+        does not say are 1, 0 and infinite.
 
         Raises
         ------
         InputError
             for a file that holds no columns ``displacement`` and ``force``, or no backbone
         """
-        return cls(*table.read(path))
+        u, f, about = table.read(path)
+        return cls(u, f, **about)
+
+    @property
+    def _ends_in_gross_slip(self) -> bool:
+        """True if the last point is gross slip, and no plateau follows yet."""
+        u, f = self.displacement, self.force
+        paired = u.ndim == 1 and u.shape == f.shape and u.size > 0
+        if is_traced(u, f, self.capacity) or not paired or np.ndim(self.capacity):
+            return False
+        rising = f.size == 1 or float(f[-1]) > float(f[-2])
+        return rising and float(f[-1]) >= GROSS * float(self.capacity)
+
+    @property
+    def reach(self) -> Array:
+        """Largest displacement at which the joint is known; infinite if it ends in gross slip."""
+        slopes = self._slopes
+        return jnp.where(slopes[-1] <= FLAT * slopes[0], jnp.inf, self.displacement[-1])
+
+    def unknown_at(self, u: float) -> str:
+        """Words of an error at a displacement beyond the reach, with the fix."""
+        capacity, top = float(self.capacity), float(self.force[-1])
+        if np.isfinite(capacity):
+            level = 0.5 * (1.0 + GROSS) * capacity / float(self.width)
+            fix = f"give Joint.of the force {level:.6g} per width, or points up to there: this is "
+            fix += "nearly gross slip, beyond which the force is known"
+        else:
+            fix = f"give more points, or capacity={top:.6g} if it slides at this force (gross slip)"
+        return (
+            f"{u:.4g}, beyond its backbone, which ends at {float(self.displacement[-1]):.4g} and "
+            f"the force {top:.4g}, below gross slip: take less, or {fix}"
+        )
+
+    def _where_known(self, u: Array, values: Array) -> Array:
+        """Values (...) at displacements within the reach; others raise, or are NaN if traced."""
+        within = jnp.abs(u) <= (1.0 + ROUNDING) * self.reach
+        if is_traced(within):
+            return nan_unless(within, values)
+        if not np.all(within):
+            most = float(np.max(np.abs(np.asarray(u))))
+            raise InputError(f"the joint is moved by {self.unknown_at(most)}")
+        return values
 
     @property
     def springs(self) -> Array:
@@ -255,17 +311,26 @@ class Joint(eqx.Module):
         ----------
         u : displacement, positive for a pull
         mean : True for the mean of pull and push, an odd function; False for each its own
+
+        Raises
+        ------
+        InputError
+            for a displacement beyond the `reach`, here and below; traced ones give NaN there
         """
         u = jnp.asarray(u)
         if not mean and self.sides is not None:
             pull, push = (
                 eqx.tree_at(lambda joint: joint.displacement, self, s) for s in self.sides
             )
-            return jnp.where(u < 0.0, push.backbone(u), pull.backbone(u))
+            return pull.backbone(jnp.maximum(u, 0.0)) + push.backbone(jnp.minimum(u, 0.0))
+        return self._where_known(u, self.line(u))
+
+    def line(self, u: Array) -> Array:
+        """Backbone whose last slope goes on, for searches; any shape."""
         return self.springs[-1] * u + jnp.sum(self.springs[:-1] * self._stretched(u), axis=-1)
 
     def tangent(self, u: ArrayLike) -> Array:
-        """Slope of the backbone; any shape."""
+        """Slope of the `line`; any shape."""
         segment = jnp.searchsorted(self.displacement, jnp.abs(jnp.asarray(u)), side="right")
         return self._slopes[jnp.minimum(segment, self._slopes.size - 1)]
 
@@ -281,7 +346,12 @@ class Joint(eqx.Module):
 
         It equals that of Masing's rule.
         """
-        slip = jnp.maximum(jnp.asarray(amplitude)[..., None] - self.displacement[:-1], 0.0)
+        size = jnp.abs(jnp.asarray(amplitude))
+        return self._where_known(size, self.loss(size))
+
+    def loss(self, amplitude: Array) -> Array:
+        """Energy lost per cycle by the sliders of the `line`; any shape."""
+        slip = jnp.maximum(amplitude[..., None] - self.displacement[:-1], 0.0)
         return 4.0 * jnp.sum(self.limits * slip, axis=-1)
 
     def first_harmonic(self, amplitude: ArrayLike) -> Array:
@@ -289,14 +359,16 @@ class Joint(eqx.Module):
 
         The real part is elastic; the imaginary part is the energy per cycle over pi amplitude^2.
         """
-        size = jnp.asarray(amplitude)
+        size = jnp.abs(jnp.asarray(amplitude))
         springs, slip = self.springs, self.displacement[:-1]
         moves = slip < size[..., None]
         part = jnp.where(moves, slip, 0.5) / jnp.where(moves, size[..., None], 1.0)
         angle = jnp.arccos(1.0 - 2.0 * part)  # of the cycle from its turn until the slider slips
         share = jnp.where(moves, (angle - 0.5 * jnp.sin(2.0 * angle)) / jnp.pi, 1.0)
         elastic = springs[-1] + jnp.sum(springs[:-1] * share, axis=-1)
-        return elastic + 1j * self.dissipation(size) / (jnp.pi * size**2)
+        return elastic + 1j * self.dissipation(size) / (
+            jnp.pi * jnp.where(size > 0.0, size, 1.0) ** 2
+        )
 
     def path_forces(self, path: ArrayLike) -> NDArray[np.float64]:
         """Forces (T,) on a path (T,) of displacements, which starts with unloaded sliders.
@@ -307,7 +379,8 @@ class Joint(eqx.Module):
         Raises
         ------
         InputError
-            for a path of a strip beyond gross slip, or on which its slip zones are not nested
+            for a path of a strip beyond gross slip, or on which its slip zones are not nested; for
+            one beyond the `reach` of other joints
         UnconvergedError
             for a path of a lap joint without equilibrium
         """
@@ -316,6 +389,7 @@ class Joint(eqx.Module):
             return np.asarray(self.width * network_forces(self.network, points))
         if self.scene is not None and not is_traced(self.scene):
             return np.asarray(self.width * walked_forces(self.scene, points))
+        self._where_known(jnp.asarray(points), jnp.zeros(points.shape))
         springs, limits = np.asarray(self.springs), np.asarray(self.limits)
         sliders, last, forces = np.zeros(limits.size), 0.0, []
         for u in points:
@@ -392,7 +466,9 @@ class Joint(eqx.Module):
             spring=float(springs[-1]),
             width=float(self.width),
             asymmetry=float(self.asymmetry),
+            capacity=float(self.capacity),
             units=(units[0], units[1]),
+            sides=None if self.sides is None else np.asarray(self.sides, float),
             model=self.four_parameters() if to == "tmdsimpy" and self._nears_slip else None,
         )
         written = write(element, to, path)
@@ -411,6 +487,11 @@ class Joint(eqx.Module):
         """Displacements (..., k-1) of the springs of the sliders on first loading."""
         slip = self.displacement[:-1]
         return jnp.clip(u[..., None], -slip, slip)
+
+
+def _longer(places: Array) -> Array:
+    """Displacements (..., k + 1) with a point on the plateau of gross slip."""
+    return jnp.append(places, 2.0 * places[..., -1:], axis=-1)
 
 
 def largest_force(scene: Scene, force: Any = None) -> Any:

@@ -78,7 +78,8 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
     Raises
     ------
     InputError
-        for amplitudes that are not positive and rising, or a structure without joints
+        for amplitudes that are not positive and rising, or that move a joint beyond its `reach`;
+        for a structure without joints
     UnconvergedError
         if no static equilibrium is found
 
@@ -109,12 +110,13 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
     backbones = tuple((joint.displacement, joint.force) for joint in joints)
     curve, sound = _curve(backbones, statics, jnp.asarray(amplitude))
     if is_traced(curve):
-        return nan_unless(sound, curve)
+        return nan_unless(sound & structure.knows(curve.joints, ""), curve)
     if not np.all(sound):
         raise UnconvergedError(
             "no equilibrium of the joints at the modal displacement "
             f"{amplitude[int(np.argmin(sound))]:.6g}: give more amplitudes below it"
         )
+    structure.knows(curve.joints, f"the modal displacement {amplitude[-1]:.6g}")
     return jax.tree.map(np.asarray, curve)
 
 
@@ -157,7 +159,7 @@ def _curve(
         _, matrix = _residual(known, found, q, u)
         u = u - jnp.linalg.solve(matrix, residual)
         force = _modal_force(joints, statics, q, u)
-        loss = jnp.sum(jax.vmap(Joint.dissipation)(joints, jnp.abs(u)))
+        loss = jnp.sum(jax.vmap(Joint.loss)(joints, jnp.abs(u)))
         omega = jnp.sqrt(force / q)
         zeta = loss / (2.0 * jnp.pi * force * q) + 0.5 * statics.damping / omega
         return ModalCurve(q, omega, zeta, loss, jnp.abs(u))
@@ -181,7 +183,7 @@ def _alike(backbones: tuple[tuple[Array, Array], ...]) -> Joint:
 
 def _lost(joints: Joint, u: Array) -> Array:
     """Forces (joints,) that the joints lose by slip."""
-    return jax.vmap(lambda joint, x: joint.stiffness * x - joint.backbone(x))(joints, u)
+    return jax.vmap(lambda joint, x: joint.stiffness * x - joint.line(x))(joints, u)
 
 
 def _modal_force(joints: Joint, statics: _Statics, q: Array, u: Array) -> Array:
