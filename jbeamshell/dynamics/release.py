@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
@@ -178,12 +179,16 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
         reach, loss = jax.device_get(_cycles((joint.network, force)))
         nested = np.isfinite(loss)
         force, reach, loss = force[nested], reach[nested], loss[nested]
+    elastic = np.real(np.asarray(joint.harmonic(jnp.asarray(reach))))
+    softer = elastic * reach / force
     return ModalCurve(
         amplitude=reach * np.sqrt(mass),
         frequency=np.sqrt(force / (mass * reach)),
         damping=loss / (2.0 * np.pi * force * reach),
         dissipation=loss,
         joints=reach[:, None],
+        frequency_error=1.0 - np.sqrt(softer),
+        damping_error=1.0 - 1.0 / softer,
     )
 
 

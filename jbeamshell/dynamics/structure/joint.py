@@ -16,7 +16,7 @@ import dataclasses
 import os
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -35,6 +35,7 @@ from jbeamshell.common.checks import (
 )
 from jbeamshell.common.errors import DoubtfulWarning, InputError
 from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.summary import Summary, ranged, with_unit
 from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.export import table
@@ -65,6 +66,30 @@ GROSS = 0.99  # force over that of gross slip from which on the last point count
 FLAT = 1e-9  # last slope over the first one that counts as zero
 ROUNDING = 1e-6  # of a displacement at the last point
 UNLIKE = "needs sliders that follow one another: take 'cycles', or None"
+
+
+class Equivalent(NamedTuple):
+    """Spring and damper in place of a joint under a mass, at an amplitude; any shape.
+
+    Attributes
+    ----------
+    amplitude : displacement amplitude
+    stiffness : force over displacement, of the first harmonic
+    damping : damping coefficient, force over velocity
+    damping_ratio : half the loss factor
+    frequency : angular frequency of the mass
+    """
+
+    amplitude: Array
+    stiffness: Array
+    damping: Array
+    damping_ratio: Array
+    frequency: Array
+
+    def __str__(self) -> str:
+        columns = self._asdict()
+        rows = [(name.replace("_", " "), ranged(np.asarray(columns[name]))) for name in columns]
+        return Summary("spring and damper in place of a joint", rows).as_text()
 
 
 class Joint(eqx.Module):
@@ -360,15 +385,45 @@ class Joint(eqx.Module):
         The real part is elastic; the imaginary part is the energy per cycle over pi amplitude^2.
         """
         size = jnp.abs(jnp.asarray(amplitude))
+        return self._where_known(size, self.harmonic(size))
+
+    def harmonic(self, size: Array) -> Array:
+        """First harmonic of the `line`; any shape."""
         springs, slip = self.springs, self.displacement[:-1]
         moves = slip < size[..., None]
         part = jnp.where(moves, slip, 0.5) / jnp.where(moves, size[..., None], 1.0)
         angle = jnp.arccos(1.0 - 2.0 * part)  # of the cycle from its turn until the slider slips
         share = jnp.where(moves, (angle - 0.5 * jnp.sin(2.0 * angle)) / jnp.pi, 1.0)
         elastic = springs[-1] + jnp.sum(springs[:-1] * share, axis=-1)
-        return elastic + 1j * self.dissipation(size) / (
-            jnp.pi * jnp.where(size > 0.0, size, 1.0) ** 2
-        )
+        return elastic + 1j * self.loss(size) / (jnp.pi * jnp.where(size > 0.0, size, 1.0) ** 2)
+
+    def equivalent(self, amplitude: ArrayLike, mass: Any) -> Equivalent:
+        """Spring and damper of a mass that the joint holds, at a displacement amplitude; any shape.
+
+        They are the first harmonic of the loop (Krylov & Bogoliubov 1943).
+
+        Parameters
+        ----------
+        amplitude : displacement amplitude, positive
+        mass : mass on the joint
+
+        Raises
+        ------
+        InputError
+            for an amplitude beyond the `reach`, or a mass that is not positive
+
+        Examples
+        --------
+        >>> found = Joint([1.0, 3.0], [1.0, 2.0]).equivalent(2.0, mass=4.0)
+        >>> float(found.stiffness), round(float(found.damping_ratio), 4)
+        (0.75, 0.1061)
+        """
+        require_number("mass", mass)
+        complex_stiffness = self.first_harmonic(amplitude)
+        stiffness, loss = jnp.real(complex_stiffness), jnp.imag(complex_stiffness)
+        frequency = jnp.sqrt(stiffness / mass)
+        size = jnp.abs(jnp.asarray(amplitude))
+        return Equivalent(size, stiffness, loss / frequency, 0.5 * loss / stiffness, frequency)
 
     def path_forces(self, path: ArrayLike) -> NDArray[np.float64]:
         """Forces (T,) on a path (T,) of displacements, which starts with unloaded sliders.
@@ -477,6 +532,30 @@ class Joint(eqx.Module):
             fix = "which is exported; joint.path_forces has each way exactly"
             warnings.warn(f"{text}, {fix}", DoubtfulWarning, stacklevel=2)
         return written
+
+    @property
+    def summary(self) -> Summary:
+        """Summary in a few lines."""
+        if is_traced(self):
+            return Summary("joint, traced", [])
+        count, end, top = self.limits.size, float(self.displacement[-1]), float(self.force[-1])
+        if np.isinf(self.reach):
+            known = f"everywhere: it slides at {top:.4g}"
+        else:
+            known = f"up to the displacement {end:.4g} and the force {top:.4g}"
+        rows = [("stiffness", with_unit(float(self.stiffness))), ("known", known)]
+        if np.isfinite(self.capacity):
+            rows.append(("gross slip", with_unit(float(self.capacity))))
+        rows.append(("pull and push", f"differ from their mean by {float(self.asymmetry):.2%}"))
+        rows.append(("width", with_unit(float(self.width))))
+        return Summary(f"joint of {count} slider{'s' * (count != 1)}", rows)
+
+    def __str__(self) -> str:
+        return self.summary.as_text()
+
+    def _repr_html_(self) -> str:
+        """Summary, for a notebook."""
+        return self.summary.as_html()
 
     @property
     def _nears_slip(self) -> bool:
