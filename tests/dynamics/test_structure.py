@@ -173,6 +173,7 @@ class TestReach:
         assert np.isfinite(curve(1.0).damping[0])
         assert np.isnan(curve(1.0).damping[1])
 
+    @pytest.mark.doubtful("damping may be off")
     def test_a_joint_that_was_followed_to_gross_slip_slides(self):
         joint = Joint.of(PLANE, 1.99, width=3.0)
         end = float(joint.displacement[-2])
@@ -186,7 +187,47 @@ class TestReach:
         assert float(far.frequency[1] ** 2) == pytest.approx(5.97 / (50.0 * end), rel=1e-9)
 
 
+def test_a_mass_has_the_spring_and_damper_of_the_first_harmonic():
+    """Jenkins: k_1 = k (theta - sin(2 theta)/2)/pi of the angle theta until slip, D = 4 F (U - u)."""
+    joint = Joint([0.5], [1.0], capacity=1.0)
+    size, mass = 2.0, 3.0
+    found = joint.equivalent(size, mass)
+    angle = np.arccos(1.0 - 2.0 * 0.5 / size)
+    stiffness = 2.0 * (angle - 0.5 * np.sin(2.0 * angle)) / np.pi
+    assert float(found.stiffness) == pytest.approx(stiffness, rel=1e-9)
+    assert float(found.frequency) == pytest.approx(np.sqrt(stiffness / mass), rel=1e-9)
+    lost = np.pi * float(found.damping) * float(found.frequency) * size**2
+    assert lost == pytest.approx(4.0 * 1.5, rel=1e-9)
+    ratio = float(found.damping) / (2.0 * mass * float(found.frequency))
+    assert float(found.damping_ratio) == pytest.approx(ratio, rel=1e-9)
+    assert "damping ratio" in str(found)
+    with pytest.raises(jb.InputError, match="mass = 0"):
+        joint.equivalent(size, 0.0)
+
+
 class TestModes:
+    def test_statics_doubt_themselves_where_they_are_off(self):
+        """Three masses whose second mode has nearly three times the frequency of the first."""
+        joint = Joint.of(PLANE, 1.99)
+        stiff = float(joint.stiffness)
+        spring = 0.5 * stiff * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+        structure = Structure(20.0 * np.eye(3), spring, [Attachment(joint, 0)])
+        small = 0.02 * float(joint.displacement[-2]) * np.sqrt(20.0)
+        assert modal_curve(structure, [0.1 * small]).doubts == ()
+        with pytest.warns(jb.DoubtfulWarning, match="damping may be off by.*take nonlinear_mode"):
+            curve = modal_curve(structure, [small, 20.0 * small])
+        mode = dynamics.nonlinear_mode(structure, small * np.geomspace(1.0, 20.0, 5))
+        off = curve.damping[-1] / mode.damping[-1] - 1.0
+        assert 0.02 < abs(off) < abs(curve.damping_error[-1])
+
+    def test_results_print_few_lines(self):
+        curve = modal_curve(chain(), [0.01, 0.02])
+        for found in (JOINT, curve):
+            assert str(found).count("\n") < 8
+        assert str(JOINT).startswith("joint of 40 sliders")
+        assert curve.plot()[0].get_xlabel().startswith("modal displacement")
+
+    @pytest.mark.doubtful("damping may be off")
     def test_one_mass_is_the_joint_itself(self):
         structure = Structure([[2.0]], [[0.5]], [Attachment(BAR, 0)])
         amplitude = np.array([0.05, 0.2, 0.4])

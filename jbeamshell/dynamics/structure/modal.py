@@ -12,8 +12,9 @@ the joints' first harmonics k_1(u) in place of their forces, its shape is x of
 
     (K + B k_1(B^T x) B^T) x = omega^2 M x,   phi^T M x = q,   zeta = D/(2 pi omega^2 x^T M x),
 
-nearly that of harmonic balance (`jbeamshell.dynamics.nonlinear_mode`).  What statics differ
-from it by is the error that a curve states.
+nearly that of harmonic balance (`jbeamshell.dynamics.nonlinear_mode`).  A curve states as its error
+what statics differ from that by, and five times the third harmonic of the joints' displacements over
+the first.  This is large where three times the frequency is that of another mode.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ from jbeamshell.dynamics.vibration.reduction import basis_of
 SLIDING = "must be joints: take nonlinear_mode for cubic springs"
 AMPLITUDES = "give rising positive modal displacements"
 SHAPE = 1e-4  # change of displacements at which a shape is found
+PHASES = 64  # of half a cycle
+THIRD = 5.0  # error of the damping over the third harmonic
 DOUBTED = 0.02  # error of frequency or damping
 MAX_ITERATIONS = 100
 SUBSTEPS = 8  # load steps between two amplitudes
@@ -256,10 +259,11 @@ def _curve(
         loss = jnp.sum(jax.vmap(Joint.loss)(joints, jnp.abs(u)))
         omega = jnp.sqrt(force / q)
         zeta = loss / (2.0 * jnp.pi * force * q) + 0.5 * statics.damping / omega
-        moved, lost = lax.stop_gradient(_harmonic(known, modes, q, jnp.abs(u)))
+        moved, lost, third = lax.stop_gradient(_harmonic(known, modes, q, jnp.abs(u)))
         ratio = lost / (2.0 * jnp.pi) + 0.5 * statics.damping / moved
         damped = jnp.where(zeta > 0.0, zeta, 1.0)
         off = jnp.where(zeta > 0.0, 1.0 - ratio / damped, 0.0)
+        off = off + jnp.where(off < 0.0, -1.0, 1.0) * THIRD * third
         size = jnp.abs(u)
         return ModalCurve(q, omega, zeta, loss, size, 1.0 - moved / omega, off)
 
@@ -280,14 +284,19 @@ def _alike(backbones: tuple[tuple[Array, Array], ...]) -> Joint:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *stacked)
 
 
-def _harmonic(joints: Joint, modes: _Modes, q: Array, u: Array) -> tuple[Array, Array]:
-    """Frequency of the first harmonics at a modal displacement, and energy lost over x^T K x."""
+def _harmonic(joints: Joint, modes: _Modes, q: Array, u: Array) -> tuple[Array, Array, Array]:
+    """Frequency of the first harmonics at a modal displacement, energy lost and third harmonic.
+
+    The energy is over x^T K x, the third harmonic of the joints' displacements over the first.
+    """
     stuck, directions, momentum = modes
 
+    def slipping(u: Array) -> Array:
+        softer = jax.vmap(lambda joint, x: joint.harmonic(x) - joint.stiffness)(joints, u)
+        return stuck + (directions * softer) @ directions.T
+
     def shape(u: Array) -> tuple[Array, Array]:
-        stiffness = jax.vmap(lambda joint, x: jnp.real(joint.harmonic(x)))(joints, u)
-        softer = stiffness - jax.vmap(lambda joint: joint.stiffness)(joints)
-        squares, forms = jnp.linalg.eigh(stuck + (directions * softer) @ directions.T)
+        squares, forms = jnp.linalg.eigh(jnp.real(slipping(u)))
         place = jnp.argmax(jnp.abs(momentum @ forms))
         return squares[place], forms[:, place] * q / (momentum @ forms[:, place])
 
@@ -302,7 +311,18 @@ def _harmonic(joints: Joint, modes: _Modes, q: Array, u: Array) -> tuple[Array, 
     u, _, _ = lax.while_loop(left, improved, (u, jnp.full_like(q, jnp.inf), jnp.zeros((), int)))
     square, x = shape(u)
     lost = jnp.sum(jax.vmap(Joint.loss)(joints, u))
-    return jnp.sqrt(square), lost / (square * (x @ x))
+    # Third harmonic of the forces on the half cycle from a turn, and what it moves.
+    angle = jnp.pi * jnp.arange(PHASES) / PHASES
+
+    def third(joint: Joint, size: Array) -> Array:
+        branch = joint.line(size) - 2.0 * joint.line(0.5 * size * (1.0 - jnp.cos(angle)))
+        return 2.0 * jnp.mean(branch * jnp.exp(-3j * angle))
+
+    forces = jax.vmap(third)(joints, u)
+    matrix = slipping(u) - 9.0 * square * jnp.eye(x.size)
+    moved = directions.T @ jnp.linalg.solve(matrix, directions @ forces)
+    part = jnp.max(jnp.abs(moved) / jnp.where(u > 0.0, u, 1.0))
+    return jnp.sqrt(square), lost / (square * (x @ x)), jnp.minimum(part, 1.0)
 
 
 def _lost(joints: Joint, u: Array) -> Array:
