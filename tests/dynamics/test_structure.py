@@ -188,7 +188,7 @@ class TestReach:
 
 
 def test_a_mass_has_the_spring_and_damper_of_the_first_harmonic():
-    """Jenkins: k_1 = k (theta - sin(2 theta)/2)/pi of the angle theta until slip, D = 4 F (U - u)."""
+    """Jenkins: k_1 = k (theta - sin(2 theta)/2)/pi of the angle until slip, D = 4 F (U - u)."""
     joint = Joint([0.5], [1.0], capacity=1.0)
     size, mass = 2.0, 3.0
     found = joint.equivalent(size, mass)

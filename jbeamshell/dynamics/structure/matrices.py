@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import TINY, as_leaf, is_traced, require, require_number
 from jbeamshell.common.errors import InputError
-from jbeamshell.dynamics.structure.joint import ROUNDING, Joint
+from jbeamshell.dynamics.structure.backbone import ROUNDING
+from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.vibration.elements import CubicSpring
 
 SQUARE = "give a square matrix of numbers, dense or scipy sparse, as large as the mass matrix"

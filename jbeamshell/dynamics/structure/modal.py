@@ -13,8 +13,8 @@ the joints' first harmonics k_1(u) in place of their forces, its shape is x of
     (K + B k_1(B^T x) B^T) x = omega^2 M x,   phi^T M x = q,   zeta = D/(2 pi omega^2 x^T M x),
 
 nearly that of harmonic balance (`jbeamshell.dynamics.nonlinear_mode`).  A curve states as its error
-what statics differ from that by, and five times the third harmonic of the joints' displacements over
-the first.  This is large where three times the frequency is that of another mode.
+what statics differ from that by, and five times the third harmonic of the joints over the first,
+which is large where three times the frequency is that of another mode.
 """
 
 from __future__ import annotations
