@@ -152,7 +152,7 @@ def let_go(
     share, nested = None, False
     if light is not None and (whole is False or not inertia.damped):
         joint = Joint.of(light, end_force)
-        network = joint.network or Network.nearest(light, joint.displacement, joint.force)
+        network = joint.network or Network.nearest(light, *joint.below_gross_slip)
         share = _share(network, inertia, mass)
         if whole is False or share <= LIGHT:
             motion = ring(light, network, mass, end_force, cycles, samples)
@@ -170,7 +170,8 @@ def let_go(
 def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
     """Frequency and damping of the mass on steady cycles, from a displacement to the largest."""
     if joint.network is None:
-        reach = np.geomspace(smallest, np.asarray(joint.displacement)[-1], AMPLITUDES)
+        largest = np.asarray(joint.below_gross_slip[0])[-1]
+        reach = np.geomspace(smallest, largest, AMPLITUDES)
         force, loss = np.asarray(joint.backbone(reach)), np.asarray(joint.dissipation(reach))
     else:
         known = np.asarray(joint.force)

@@ -314,8 +314,7 @@ def main():
         for seed in range(count):
             error, words = verdict(name, seed)
             met[words] += 1
-            if words == "SILENT":
-                print(f"  {name} {seed}: off by {error:.2%}", flush=True)
+            print(f"  {name} {seed}: {words}, off by {error:.2%}", flush=True)
         print(name, dict(met), flush=True)
 
 

@@ -70,6 +70,12 @@ class Backbone(eqx.Module):
         slopes = self._slopes
         return jnp.where(slopes[-1] <= FLAT * slopes[0], jnp.inf, self.displacement[-1])
 
+    @property
+    def below_gross_slip(self) -> tuple[Array, Array]:
+        """Displacements and forces of the points up to the largest force, without a plateau."""
+        count = 1 + int(jnp.argmax(self.force >= self.force[-1]))
+        return self.displacement[:count], self.force[:count]
+
     def unknown_at(self, u: float) -> str:
         """Words of an error at a displacement beyond the reach, with the fix."""
         capacity, top = float(self.capacity), float(self.force[-1])
