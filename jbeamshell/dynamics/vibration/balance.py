@@ -31,7 +31,7 @@ from jbeamshell.dynamics.vibration.reduction import Reduced
 
 SPLIT = 2.0  # s over the stiffness of a stuck joint, more than any joint can damp
 MOST_ITERATIONS = 16
-FAR = 0.1  # change of the frequency within a step, over it
+FAR = 0.3  # change of the frequency within a step, over it
 LEAST_PART = 1.0 / 256.0  # of a step of a march
 EXACT = 0.6  # power of the rounding unit to which Newton's steps are small
 
@@ -236,7 +236,8 @@ def marched(
 ) -> Found:
     """Solutions (k, ...) at third targets (k,), each from the one before.
 
-    The guess ``start`` is nearly a solution at the target ``before``.  Steps without convergence
+    The guess ``start`` is nearly a solution at the target ``before``.  Steps without convergence,
+    or to a far frequency,
     or with a far frequency are halved.
     """
 
