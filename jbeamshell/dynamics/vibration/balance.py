@@ -236,8 +236,7 @@ def marched(
 ) -> Found:
     """Solutions (k, ...) at third targets (k,), each from the one before.
 
-    The guess ``start`` is nearly a solution at the target ``before``.  Steps without convergence,
-    or to a far frequency,
+    The guess ``start`` is nearly a solution at the target ``before``.  Steps without convergence
     or with a far frequency are halved.
     """
 
