@@ -58,6 +58,8 @@ def with_unit(value: float, unit: str = "", digits: int = 4) -> str:
 def ranged(values: np.ndarray, unit: str = "", digits: int = 4) -> str:
     """Smallest and largest of some values with their unit, such as "-12 to 12 kN"."""
     ends = [float(np.nanmin(values)), float(np.nanmax(values))]
+    if ends[0] == ends[1]:
+        return with_unit(ends[0], unit, digits)
     if not unit:
         return f"{ends[0]:.{digits}g} to {ends[1]:.{digits}g}"
     return _prefixed(ends, unit, digits)

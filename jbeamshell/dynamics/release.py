@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
@@ -151,7 +152,7 @@ def let_go(
     share, nested = None, False
     if light is not None and (whole is False or not inertia.damped):
         joint = Joint.of(light, end_force)
-        network = joint.network or Network.nearest(light, joint.displacement, joint.force)
+        network = joint.network or Network.nearest(light, *joint.below_gross_slip)
         share = _share(network, inertia, mass)
         if whole is False or share <= LIGHT:
             motion = ring(light, network, mass, end_force, cycles, samples)
@@ -169,7 +170,8 @@ def let_go(
 def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
     """Frequency and damping of the mass on steady cycles, from a displacement to the largest."""
     if joint.network is None:
-        reach = np.geomspace(smallest, np.asarray(joint.displacement)[-1], AMPLITUDES)
+        largest = np.asarray(joint.below_gross_slip[0])[-1]
+        reach = np.geomspace(smallest, largest, AMPLITUDES)
         force, loss = np.asarray(joint.backbone(reach)), np.asarray(joint.dissipation(reach))
     else:
         known = np.asarray(joint.force)
@@ -178,12 +180,16 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
         reach, loss = jax.device_get(_cycles((joint.network, force)))
         nested = np.isfinite(loss)
         force, reach, loss = force[nested], reach[nested], loss[nested]
+    elastic = np.real(np.asarray(joint.harmonic(jnp.asarray(reach))))
+    softer = elastic * reach / force
     return ModalCurve(
         amplitude=reach * np.sqrt(mass),
         frequency=np.sqrt(force / (mass * reach)),
         damping=loss / (2.0 * np.pi * force * reach),
         dissipation=loss,
         joints=reach[:, None],
+        frequency_error=1.0 - np.sqrt(softer),
+        damping_error=1.0 - 1.0 / softer,
     )
 
 

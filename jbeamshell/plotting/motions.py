@@ -20,7 +20,9 @@ from jbeamshell.plotting.style import (
     style,
 )
 
-TIME, AMPLITUDE = "$t$  [time]", "amplitude of $u(L)$  [length]"
+TIME = "$t$  [time]"
+AMPLITUDE, OF_STRIP = "amplitude  [length]", "amplitude of $u(L)$  [length]"
+MODAL = r"modal displacement $q$  [length $\sqrt{\mathrm{mass}}$]"
 FREQUENCY, DAMPING = "frequency  [1/time]", r"damping ratio $\zeta$  [dimensionless]"
 LEDGER = {
     "kinetic": "kinetic",
@@ -84,13 +86,14 @@ def ring_down(
     label : words of the legend
     axes : two axes; a new figure when not given
     """
-    return _pair((found.amplitude, found.frequency, found.damping), axes, label, "o", DATA)
+    columns = found.amplitude, found.frequency, found.damping
+    return _pair(columns, axes, label, "o", DATA, AMPLITUDE)
 
 
 def modal_curve(
     curve: ModalProperties,
     *,
-    mass: float = 1.0,
+    mass: float | None = None,
     label: str = "quasi-static",
     axes: Sequence[Axes] | None = None,
 ) -> Any:
@@ -99,13 +102,15 @@ def modal_curve(
     Parameters
     ----------
     curve : result of `jbeamshell.dynamics.modal_curve` or `nonlinear_mode`
-    mass : mass whose root divides the modal displacements, to give those drawn
+    mass : mass whose root divides the modal displacements, to give those drawn; None draws modal
+        displacements
     label : words of the legend
     axes : two axes; a new figure when not given
     """
-    amplitude = np.asarray(curve.amplitude) / np.sqrt(mass)
+    amplitude = np.asarray(curve.amplitude) / np.sqrt(1.0 if mass is None else mass)
     frequency = np.asarray(curve.frequency) / (2.0 * np.pi)
-    return _pair((amplitude, frequency, curve.damping), axes, label, "", PALETTE[1])
+    columns, along = (amplitude, frequency, curve.damping), MODAL if mass is None else AMPLITUDE
+    return _pair(columns, axes, label, "", PALETTE[1], along)
 
 
 def spectrogram(motion: Vibration, axes: Axes | None = None) -> Axes:
@@ -150,13 +155,19 @@ def ring_down_sheet(study: RingDownComparison) -> Figure:
             known = values[values > 0.0]
             room = (known.max() / known.min()) ** 0.1
             below.set_xlim(0.9 * reach.min(), 1.1 * reach.max())
+            below.set_xlabel(OF_STRIP)
             mark_decades(below.xaxis)
             below.set_ylim(known.min() / room, known.max() * room)
     return axes[0, 0].figure
 
 
 def _pair(
-    columns: tuple[Any, Any, Any], axes: Sequence[Axes] | None, label: str, marker: str, colour: str
+    columns: tuple[Any, Any, Any],
+    axes: Sequence[Axes] | None,
+    label: str,
+    marker: str,
+    colour: str,
+    along: str,
 ) -> Any:
     """Draw frequency and damping over amplitude on two axes."""
     amplitude, frequency, damping = map(np.asarray, columns)
@@ -167,8 +178,8 @@ def _pair(
         pair[0].plot(amplitude, frequency, **line)
         shown = damping > 0.0
         pair[1].plot(amplitude[shown], damping[shown], **line)
-        pair[0].set(xlabel=AMPLITUDE, ylabel=FREQUENCY, xscale="log")
-        pair[1].set(xlabel=AMPLITUDE, ylabel=DAMPING, xscale="log", yscale="log")
+        pair[0].set(xlabel=along, ylabel=FREQUENCY, xscale="log")
+        pair[1].set(xlabel=along, ylabel=DAMPING, xscale="log", yscale="log")
         pair[1].legend(loc="upper left")
         mark_decades(pair[0].xaxis, pair[1].xaxis)
     return pair

@@ -122,6 +122,20 @@ class TestNonlinearMode:
         assert found.damping[0] == pytest.approx(0.01 / found.frequency[0], rel=1e-9)
 
 
+@pytest.mark.slow
+def test_a_mode_does_not_jump_to_another():
+    """Three masses whose second mode has nearly three times the frequency of the first."""
+    joint = Joint.of(jb.Scene().replace({"model.rung": "plane"}), 1.99)
+    stiff = float(joint.stiffness)
+    spring = 0.5 * stiff * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    structure = Structure(20.0 * np.eye(3), spring, [Attachment(joint, 0)])
+    try:
+        found = dynamics.nonlinear_mode(structure, np.geomspace(4.73e-5, 4.26e-4, 8)).frequency
+    except jb.UnconvergedError:
+        return
+    assert np.all(np.abs(np.diff(np.log(found))) < 0.3)
+
+
 def varied(values):
     """Structure whose joint, mass and damping are varied."""
     stretch, mass, damping = values
@@ -159,7 +173,7 @@ def test_forced_amplitudes_have_derivatives():
     assert_slope_two(figures)
 
 
-CAPPED = two_masses(Joint(*SLIDERS, capacity=1.0))
+CAPPED = two_masses(Joint(*SLIDERS, capacity=1.2))
 REFUSED = {
     "force": (lambda: dynamics.forced_response(HELD, [1.0], (0.3, 1.0)), "force.*2 numbers"),
     "no force": (lambda: dynamics.forced_response(HELD, [0.0, 0.0], (0.3, 1.0)), "force.*zero"),

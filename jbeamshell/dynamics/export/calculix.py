@@ -37,7 +37,8 @@ def write(element: Element, draft: Path) -> None:
             lines.append(f"{plate + i},{x * side!r},{y * side!r},{z!r}")
     lines += [f"{base},0.,0.,{-side!r}", f"{top},0.,0.,{2.0 * side!r}"]
     lines += ["*NSET, NSET=JOINT_BASE", f"{base}", "*NSET, NSET=JOINT_END", f"{top}"]
-    for number, (stiffness, limit) in enumerate([*element.sliders, (element.spring, None)]):
+    spring = [] if element.slides else [(element.spring, None)]
+    for number, (stiffness, limit) in enumerate([*element.sliders, *spring]):
         lines += _cube(number, stiffness, limit, side)
     for i in range(8):
         lines += ["*EQUATION", "2", f"{FIRST + i},1,1.,{base if i < 4 else top},1,-1."]

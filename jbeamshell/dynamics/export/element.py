@@ -30,7 +30,9 @@ class Element:
     spring : stiffness of the spring beside them
     width : width of the strip, with which forces are multiplied already
     asymmetry : largest difference of pull and push from the backbone, over the displacement
+    capacity : force of gross slip; infinite if it is not known
     units : names of the units of displacement and force
+    sides : (2, k + 1) displacements of pull and push at the forces; None if they do not differ
     model : four-parameter Iwan model of the same joint, for targets that have one
     """
 
@@ -41,7 +43,9 @@ class Element:
     spring: float
     width: float
     asymmetry: float
+    capacity: float
     units: tuple[str, str]
+    sides: NDArray[np.float64] | None = None
     model: FourParameters | None = None
 
     @property
@@ -50,6 +54,11 @@ class Element:
         total = self.spring + float(np.sum(self.stiffness))
         kept = self.stiffness > NEGLIGIBLE * total
         return list(zip(self.stiffness[kept].tolist(), self.limit[kept].tolist(), strict=True))
+
+    @property
+    def slides(self) -> bool:
+        """True if no spring remains at the last point, so that the force stays there."""
+        return self.spring <= NEGLIGIBLE * float(np.sum(self.stiffness))
 
     @property
     def title(self) -> str:
@@ -64,11 +73,12 @@ class Element:
         """Units, sign, width, range and asymmetry, a line each."""
         length, force = self.units
         reach, top = float(self.displacement[-1]), float(self.force[-1])
+        beyond = "the joint slides at this force" if self.slides else "nothing is known"
         return [
             f"Units: u in {length}, F in {force}, stiffness in {force}/{length}.",
             f"Width: {self.width!r} {length}; forces are those of the whole width.",
             "Sign: positive in a pull.  F moves the end by u; -F acts on what pulls.",
-            f"Range: |F| <= {top:.6g}, |u| <= {reach:.6g}; beyond, the spring's slope goes on.",
+            f"Range: |F| <= {top:.6g}, |u| <= {reach:.6g}; beyond, {beyond}.",
             f"Pull and push: this is their mean; each differs from it by up to "
             f"{100.0 * self.asymmetry:.2g} % of u at one F.",
         ]

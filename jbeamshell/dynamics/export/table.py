@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from jbeamshell.dynamics.export.element import Element
 from jbeamshell.measured.read_table import read_table
 
 COLUMNS = ("displacement", "force", "stiffness", "limit")
+SIDES = ("pull", "push")
+ABOUT = ("width", "asymmetry", "capacity")  # the same in all rows
 
 
 def write(element: Element, draft: Path) -> None:
@@ -24,24 +27,41 @@ def write(element: Element, draft: Path) -> None:
     """
     notes = [
         "displacement, force: points of the first loading.  stiffness, limit: each slider; the",
-        "last row is the spring, which has no limit.",
+        "last row is the spring, which has no limit.  capacity: force of gross slip, if it is",
+        "known.  pull, push: displacements of each way at the forces, if they differ.",
     ]
-    stiffness = np.append(element.stiffness, element.spring)
-    limit = np.append(element.limit, np.nan)
-    columns = (element.displacement, element.force, stiffness, limit)
+    columns = {
+        "displacement": element.displacement,
+        "force": element.force,
+        "stiffness": np.append(element.stiffness, element.spring),
+        "limit": np.append(element.limit, np.nan),
+    }
+    if element.sides is not None:
+        columns |= dict(zip(SIDES, element.sides, strict=True))
+    capacity = element.capacity if np.isfinite(element.capacity) else np.nan
+    for name, value in zip(ABOUT, (element.width, element.asymmetry, capacity), strict=True):
+        columns[name] = np.full(element.force.shape, value)
     if draft.suffix.lower() == ".mat":
         from scipy.io import savemat
 
-        about = {"about": [element.title, *element.facts, *notes], "width": element.width}
-        named = {name: column[:, None] for name, column in zip(COLUMNS, columns, strict=True)}
-        savemat(draft, {**about, **named}, appendmat=False)
+        named = {name: column[:, None] for name, column in columns.items()}
+        savemat(draft, {"about": [element.title, *element.facts, *notes], **named}, appendmat=False)
         return
-    cells = [["" if np.isnan(x) else repr(x) for x in row] for row in np.stack(columns, 1).tolist()]
-    draft.write_text(element.comment("#", notes) + csv_text(COLUMNS, cells), encoding="utf-8")
+    rows = np.stack(list(columns.values()), 1).tolist()
+    cells = [["" if np.isnan(x) else repr(x) for x in row] for row in rows]
+    text = element.comment("#", notes) + csv_text(tuple(columns), cells)
+    draft.write_text(text, encoding="utf-8")
 
 
-def read(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Displacements and forces of the backbone in a table.
+def read(
+    path: str | os.PathLike[str],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]]:
+    """Displacements and forces of the backbone in a table, and what else it says of the joint.
+
+    Returns
+    -------
+    displacements and forces (k,), and a dictionary of width, asymmetry, capacity and sides, as far
+    as the table has them
 
     Raises
     ------
@@ -56,9 +76,20 @@ def read(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArray[np.
     table = read_table(path, recognised)
     fix = f"give columns {' and '.join(wanted)}, as joint.export('table', path) does"
     require(str(path), table.titles, recognised(table.titles), fix)
-    places = [table.titles.index(name) for name in wanted]
-    table.units(places)
-    u, f = table.numbers(places).T
+
+    def columns(names: Sequence[str]) -> NDArray[np.float64]:
+        places = [table.titles.index(name) for name in names]
+        table.units(places)
+        return table.numbers(places).T
+
+    u, f = columns(wanted)
     whole = bool(np.all(np.isfinite([u, f])))
     require(str(path), "a number is missing", whole, "export the joint again")
-    return u, f
+    about: dict[str, Any] = {}
+    for name in ABOUT:
+        if name in table.titles:
+            value = float(columns([name])[0, 0])
+            about |= {name: value} if np.isfinite(value) else {}
+    if all(name in table.titles for name in SIDES):
+        about["sides"] = columns(SIDES)
+    return u, f, about

@@ -18,33 +18,37 @@ from jbeamshell.scene.scene import Scene
 
 OPEN = 1e-3  # part of the energy that moved by which a balance may be open without a doubt
 
+LITTLE = 0.01  # of the kinetic energy: losses below it are not told exactly
+
 
 class Balance(Protocol):
     """Energies and works of a motion, (T,) each; those of times that were not reached are NaN."""
 
     @property
-    def kinetic(self) -> Array: ...
+    def kinetic(self) -> Any: ...
     @property
-    def stored(self) -> Array: ...
+    def stored(self) -> Any: ...
     @property
-    def external_work(self) -> Array: ...
+    def external_work(self) -> Any: ...
     @property
-    def friction_work(self) -> Array: ...
+    def friction_work(self) -> Any: ...
     @property
-    def damping_work(self) -> Array: ...
+    def damping_work(self) -> Any: ...
     @property
-    def imbalance(self) -> Array: ...
+    def imbalance(self) -> Any: ...
 
 
 def open_part(motion: Balance) -> float:
     """Largest error of the energy balance over the energy that moved.
 
-    That is the largest of the works since t = 0 and of the range of kinetic plus stored energy.
+    That is the largest of the works since t = 0, of the range of kinetic plus stored energy, and of
+    a hundredth of the kinetic energy, as nearly nothing may be lost.
     """
     energy = np.asarray(motion.kinetic) + np.asarray(motion.stored)
     lost = np.asarray(motion.friction_work) + np.asarray(motion.damping_work)
     works = np.nanmax(np.abs([np.asarray(motion.external_work), lost]))
     moved = max(float(works), float(np.nanmax(energy) - np.nanmin(energy)))
+    moved = max(moved, LITTLE * float(np.nanmax(np.asarray(motion.kinetic))))
     error = float(np.nanmax(np.abs(np.asarray(motion.imbalance))))
     return error / moved if moved > 0.0 else 0.0
 

@@ -3,6 +3,8 @@ r"""Joint as a force element: a network of Jenkins sliders with the backbone of 
 Parallel sliders have a backbone F(u) that is linear between points: where its slope falls by s at
 u, a spring of stiffness s starts to slip at the force s u; a spring with the last slope remains
 (Iwan 1966).  Their loops follow Masing's rule exactly: the branch from U is F(U) - 2 F((U-u)/2).
+A joint is known up to the last point of its backbone.  If that point is gross slip, the force stays
+there, and the joint is known everywhere; beyond any other last point nothing is known.
 A strip becomes one such element by the mean of its pull and its push, whose sliders are the nodes
 of its contact; `jbeamshell.condensed.network` has both, and every branch between them, exactly.
 Scenes that are no network, such as lap joints, become the element nearest to their steady cycles.
@@ -32,6 +34,7 @@ from jbeamshell.common.checks import (
     require_number,
 )
 from jbeamshell.common.errors import DoubtfulWarning
+from jbeamshell.common.summary import Summary, with_unit
 from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.export import table
@@ -43,6 +46,7 @@ from jbeamshell.dynamics.four_parameters import (
     FourParameters,
 )
 from jbeamshell.dynamics.steady_cycles import gross_slip
+from jbeamshell.dynamics.structure.backbone import GROSS, Backbone
 from jbeamshell.dynamics.structure.strip_line import (
     cycled_line,
     network_forces,
@@ -61,17 +65,18 @@ BY = ("sliders", "cycles")
 UNLIKE = "needs sliders that follow one another: take 'cycles', or None"
 
 
-class Joint(eqx.Module):
+class Joint(Backbone):
     """Force element between two points, given by its backbone.
 
     Attributes
     ----------
-    displacement, force : (k,) points of the backbone; the last slope continues beyond them
+    displacement, force : (k,) points of the backbone.  At .99 of the capacity or more a point on
+        the plateau of gross slip follows the given ones
     network : sliders of the strip behind it, per width; None for a backbone alone
     width : of the strip
     asymmetry : largest difference of the strip's pull and push from the backbone, over the
         displacement at one force
-    capacity : force of gross slip, beyond the backbone; infinite if it is not known
+    capacity : force of gross slip; infinite if it is not known
     sides : (2, k) displacements of a pull and of a push at the forces; None if they are the
         backbone's
     scene : scene behind a joint without a network, such as a lap joint, for `path_forces`
@@ -88,12 +93,8 @@ class Joint(eqx.Module):
     ([0.5, 0.5], [0.5])
     """
 
-    displacement: Array
-    force: Array
     network: Network | None
-    width: Array
     asymmetry: Array
-    capacity: Array
     sides: Array | None
     scene: Scene | None
 
@@ -115,6 +116,10 @@ class Joint(eqx.Module):
         self.capacity = as_leaf(capacity, "joint.capacity")
         self.sides = None if sides is None else as_leaf(sides, "joint.sides", SIDES)
         self.scene = scene
+        if self._ends_in_gross_slip:
+            self.force = jnp.append(self.force, self.force[-1])
+            self.displacement = _longer(self.displacement)
+            self.sides = None if self.sides is None else _longer(self.sides)
 
     def __check_init__(self) -> None:
         if is_traced(self.displacement, self.force):
@@ -167,7 +172,8 @@ class Joint(eqx.Module):
         force = largest_force(scene, force)
         require_number("width", width)
         require_choice("by", by, (None, *BY))
-        capacity = width * gross_slip(scene)
+        bolted = scene.contact.bolt_stiffness is not None  # which holds beyond
+        capacity = np.inf if bolted else width * gross_slip(scene)
         condensed = scene.model.condensed
         traced = is_traced(scene, force)
         opens = scene.member.support != "none" or (condensed and goes_on(scene))
@@ -190,37 +196,28 @@ class Joint(eqx.Module):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Joint:
-        """Joint with the backbone of a table, such as `export` writes: CSV or MATLAB.
+        """Joint of a table, such as `export` writes: CSV or MATLAB.
+
+        Backbone, width, asymmetry and capacity come back; those that a table of another origin
+        does not say are 1, 0 and infinite.
 
         Raises
         ------
         InputError
             for a file that holds no columns ``displacement`` and ``force``, or no backbone
         """
-        return cls(*table.read(path))
+        u, f, about = table.read(path)
+        return cls(u, f, **about)
 
     @property
-    def springs(self) -> Array:
-        """Stiffnesses (k,) of the k-1 sliders and of the spring that remains."""
-        slopes = self._slopes
-        return jnp.append(-jnp.diff(slopes), slopes[-1:])
-
-    @property
-    def limits(self) -> Array:
-        """Forces (k-1,) at which the sliders slip."""
-        return self.springs[:-1] * self.displacement[:-1]
-
-    @property
-    def _slopes(self) -> Array:
-        """Slopes (k,) of the backbone's segments."""
-        zero = jnp.zeros(1)
-        rise = jnp.diff(jnp.append(zero, self.force))
-        return rise / jnp.diff(jnp.append(zero, self.displacement))
-
-    @property
-    def stiffness(self) -> Array:
-        """Stiffness of the stuck joint."""
-        return self._slopes[0]
+    def _ends_in_gross_slip(self) -> bool:
+        """True if the last point is gross slip, and no plateau follows yet."""
+        u, f = self.displacement, self.force
+        paired = u.ndim == 1 and u.shape == f.shape and u.size > 0
+        if is_traced(u, f, self.capacity) or not paired or np.ndim(self.capacity):
+            return False
+        rising = f.size == 1 or float(f[-1]) > float(f[-2])
+        return rising and float(f[-1]) >= GROSS * float(self.capacity)
 
     def in_series(self, stiffness: Any) -> Joint:
         """Joint with a spring in series, which its points then contain.
@@ -255,48 +252,19 @@ class Joint(eqx.Module):
         ----------
         u : displacement, positive for a pull
         mean : True for the mean of pull and push, an odd function; False for each its own
+
+        Raises
+        ------
+        InputError
+            for a displacement beyond the `reach`, here and below; traced ones give NaN there
         """
         u = jnp.asarray(u)
         if not mean and self.sides is not None:
             pull, push = (
                 eqx.tree_at(lambda joint: joint.displacement, self, s) for s in self.sides
             )
-            return jnp.where(u < 0.0, push.backbone(u), pull.backbone(u))
-        return self.springs[-1] * u + jnp.sum(self.springs[:-1] * self._stretched(u), axis=-1)
-
-    def tangent(self, u: ArrayLike) -> Array:
-        """Slope of the backbone; any shape."""
-        segment = jnp.searchsorted(self.displacement, jnp.abs(jnp.asarray(u)), side="right")
-        return self._slopes[jnp.minimum(segment, self._slopes.size - 1)]
-
-    def work(self, u: ArrayLike) -> Array:
-        """Work on first loading, the integral of the backbone from 0 to u; any shape."""
-        u = jnp.asarray(u)
-        stored = self.springs[:-1] * self._stretched(u) ** 2 / 2.0
-        slid = 0.25 * self.dissipation(jnp.abs(u))
-        return 0.5 * self.springs[-1] * u**2 + jnp.sum(stored, axis=-1) + slid
-
-    def dissipation(self, amplitude: ArrayLike) -> Array:
-        """Energy lost per cycle at a displacement amplitude, 4 times limit times slip; any shape.
-
-        It equals that of Masing's rule.
-        """
-        slip = jnp.maximum(jnp.asarray(amplitude)[..., None] - self.displacement[:-1], 0.0)
-        return 4.0 * jnp.sum(self.limits * slip, axis=-1)
-
-    def first_harmonic(self, amplitude: ArrayLike) -> Array:
-        """Complex stiffness, the first harmonic of the loop over the amplitude; any shape.
-
-        The real part is elastic; the imaginary part is the energy per cycle over pi amplitude^2.
-        """
-        size = jnp.asarray(amplitude)
-        springs, slip = self.springs, self.displacement[:-1]
-        moves = slip < size[..., None]
-        part = jnp.where(moves, slip, 0.5) / jnp.where(moves, size[..., None], 1.0)
-        angle = jnp.arccos(1.0 - 2.0 * part)  # of the cycle from its turn until the slider slips
-        share = jnp.where(moves, (angle - 0.5 * jnp.sin(2.0 * angle)) / jnp.pi, 1.0)
-        elastic = springs[-1] + jnp.sum(springs[:-1] * share, axis=-1)
-        return elastic + 1j * self.dissipation(size) / (jnp.pi * size**2)
+            return pull.backbone(jnp.maximum(u, 0.0)) + push.backbone(jnp.minimum(u, 0.0))
+        return self._where_known(u, self.line(u))
 
     def path_forces(self, path: ArrayLike) -> NDArray[np.float64]:
         """Forces (T,) on a path (T,) of displacements, which starts with unloaded sliders.
@@ -307,7 +275,8 @@ class Joint(eqx.Module):
         Raises
         ------
         InputError
-            for a path of a strip beyond gross slip, or on which its slip zones are not nested
+            for a path of a strip beyond gross slip, or on which its slip zones are not nested; for
+            one beyond the `reach` of other joints
         UnconvergedError
             for a path of a lap joint without equilibrium
         """
@@ -316,6 +285,7 @@ class Joint(eqx.Module):
             return np.asarray(self.width * network_forces(self.network, points))
         if self.scene is not None and not is_traced(self.scene):
             return np.asarray(self.width * walked_forces(self.scene, points))
+        self._where_known(jnp.asarray(points), jnp.zeros(points.shape))
         springs, limits = np.asarray(self.springs), np.asarray(self.limits)
         sliders, last, forces = np.zeros(limits.size), 0.0, []
         for u in points:
@@ -392,7 +362,9 @@ class Joint(eqx.Module):
             spring=float(springs[-1]),
             width=float(self.width),
             asymmetry=float(self.asymmetry),
+            capacity=float(self.capacity),
             units=(units[0], units[1]),
+            sides=None if self.sides is None else np.asarray(self.sides, float),
             model=self.four_parameters() if to == "tmdsimpy" and self._nears_slip else None,
         )
         written = write(element, to, path)
@@ -403,14 +375,38 @@ class Joint(eqx.Module):
         return written
 
     @property
+    def summary(self) -> Summary:
+        """Summary in a few lines."""
+        if is_traced(self):
+            return Summary("joint, traced", [])
+        count, end, top = self.limits.size, float(self.displacement[-1]), float(self.force[-1])
+        if np.isinf(self.reach):
+            known = f"everywhere: it slides at {top:.4g}"
+        else:
+            known = f"up to the displacement {end:.4g} and the force {top:.4g}"
+        rows = [("stiffness", with_unit(float(self.stiffness))), ("known", known)]
+        if np.isfinite(self.capacity):
+            rows.append(("gross slip", with_unit(float(self.capacity))))
+        rows.append(("pull and push", f"differ from their mean by {float(self.asymmetry):.2%}"))
+        rows.append(("width", with_unit(float(self.width))))
+        return Summary(f"joint of {count} slider{'s' * (count != 1)}", rows)
+
+    def __str__(self) -> str:
+        return self.summary.as_text()
+
+    def _repr_html_(self) -> str:
+        """Summary, for a notebook."""
+        return self.summary.as_html()
+
+    @property
     def _nears_slip(self) -> bool:
         """True if the backbone tells the four parameters."""
         return float(self.force[-1]) >= FRACTIONS[ENOUGH - 1] * float(self.capacity)
 
-    def _stretched(self, u: Array) -> Array:
-        """Displacements (..., k-1) of the springs of the sliders on first loading."""
-        slip = self.displacement[:-1]
-        return jnp.clip(u[..., None], -slip, slip)
+
+def _longer(places: Array) -> Array:
+    """Displacements (..., k + 1) with a point on the plateau of gross slip."""
+    return jnp.append(places, 2.0 * places[..., -1:], axis=-1)
 
 
 def largest_force(scene: Scene, force: Any = None) -> Any:

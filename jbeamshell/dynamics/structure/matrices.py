@@ -16,6 +16,8 @@ from jax.scipy.linalg import solve_triangular
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import TINY, as_leaf, is_traced, require, require_number
+from jbeamshell.common.errors import InputError
+from jbeamshell.dynamics.structure.backbone import ROUNDING
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.vibration.elements import CubicSpring
 
@@ -195,6 +197,34 @@ class Structure:
             return scipy.linalg.solve(dense(self.stuck_stiffness), loads, assume_a="pos")
         solver = scipy.sparse.linalg.splu(scipy.sparse.csc_array(self.stuck_stiffness))
         return solver.solve(loads)
+
+    def within_reach(self, peaks: Any) -> Array:
+        """True where joints are known at their largest displacements (..., joints)."""
+        ends = [a.joint.reach for a in self.attachments]
+        return jnp.abs(peaks) <= (1.0 + ROUNDING) * jnp.stack(ends) if ends else jnp.abs(peaks) >= 0
+
+    def knows(self, peaks: Any, what: str) -> Any:
+        """True where the joints are known at their largest displacements, (k,).
+
+        Parameters
+        ----------
+        peaks : (k, joints) largest displacements
+        what : words for what moves the joints
+
+        Raises
+        ------
+        InputError
+            for a displacement beyond the `Joint.reach`, unless it is traced
+        """
+        within = self.within_reach(peaks)
+        if is_traced(within) or bool(jnp.all(within)):
+            return jnp.all(within, axis=-1)
+        peaks = np.asarray(peaks)
+        place = int(np.argmin(np.all(np.asarray(within), axis=0)))
+        joint, most = self.attachments[place].joint, float(np.nanmax(abs(peaks[:, place])))
+        assert isinstance(joint, Joint)
+        words = joint.unknown_at(most)
+        raise InputError(f"{what} moves the joint of attachments[{place}] by {words}")
 
     def _check_modes(self) -> None:
         """Raise `InputError` for matrices with negative modes, or a rigid-body mode."""

@@ -6,11 +6,20 @@ the backbone alpha(q) of the mode, Masing's rule gives
 
     omega^2 = alpha/q,      zeta = D/(2 pi alpha q),      D = 8 int_0^q alpha dq - 4 alpha q.
 
-`jbeamshell.dynamics.nonlinear_mode` is an independent check, and has the damping of the structure.
+It takes the secant of the loop for its stiffness, and the static shape for the motion.  The
+motion itself follows the first harmonic of the loop, and the inertia of all masses bends it.  With
+the joints' first harmonics k_1(u) in place of their forces, its shape is x of
+
+    (K + B k_1(B^T x) B^T) x = omega^2 M x,   phi^T M x = q,   zeta = D/(2 pi omega^2 x^T M x),
+
+nearly that of harmonic balance (`jbeamshell.dynamics.nonlinear_mode`).  A curve states as its error
+what statics differ from that by, and five times the third harmonic of the joints over the first,
+which is large where three times the frequency is that of another mode.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -20,15 +29,22 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import ArrayLike
 
-from jbeamshell.common.checks import is_traced, require
+from jbeamshell.common.checks import in_transformation, is_traced, require
 from jbeamshell.common.errors import UnconvergedError
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
+from jbeamshell.common.summary import Summary, ranged
+from jbeamshell.dynamics.strip.motion import warn_of_doubts
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Structure
+from jbeamshell.dynamics.vibration.reduction import basis_of
 
 SLIDING = "must be joints: take nonlinear_mode for cubic springs"
 AMPLITUDES = "give rising positive modal displacements"
+SHAPE = 1e-4  # change of displacements at which a shape is found
+PHASES = 64  # of half a cycle
+THIRD = 5.0  # error of the damping over the third harmonic
+DOUBTED = 0.02  # error of frequency or damping
 MAX_ITERATIONS = 100
 SUBSTEPS = 8  # load steps between two amplitudes
 ROUNDING = 4e3  # residual over the rounding of a displacement, at which an equilibrium is found
@@ -45,6 +61,7 @@ class ModalCurve(NamedTuple):
     damping : damping ratio zeta of joints and structure
     dissipation : energy lost in the joints per cycle
     joints : (k, joints) amplitudes of the joints' displacements
+    frequency_error, damping_error : estimated errors of statics, relative
     """
 
     amplitude: Any
@@ -52,12 +69,50 @@ class ModalCurve(NamedTuple):
     damping: Any
     dissipation: Any
     joints: Any
+    frequency_error: Any
+    damping_error: Any
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Sentence that says from where on statics are off, and the fix; none if they hold."""
+        errors = np.abs([np.asarray(self.frequency_error), np.asarray(self.damping_error)])
+        off = np.max(errors, axis=0) > DOUBTED
+        if not np.any(off):
+            return ()
+        worst = np.max(errors, axis=1)
+        return (
+            f"from the modal displacement {np.asarray(self.amplitude)[np.argmax(off)]:.4g} on, the "
+            f"damping may be off by up to {worst[1]:.0%} and the frequency by {worst[0]:.1%}, as "
+            "statics know no inertia and no shape of the loop: take nonlinear_mode there",
+        )
+
+    def __str__(self) -> str:
+        return summary_of_mode("modal curve, by statics", self, self.doubts).as_text()
+
+    def __repr__(self) -> str:
+        return str(self)
 
     def plot(self, axes: Any = None) -> Any:
         """Draw frequency and damping over amplitude; see `jbeamshell.plotting.modal_curve`."""
         from jbeamshell import plotting
 
         return plotting.modal_curve(self, axes=axes)
+
+
+def summary_of_mode(title: str, mode: Any, doubts: Sequence[str] = ()) -> Summary:
+    """Summary of frequency and damping over the amplitude of a mode."""
+    if is_traced(mode):
+        return Summary(f"{title}, traced", [])
+    columns = {
+        "modal displacement": mode.amplitude,
+        "angular frequency": mode.frequency,
+        "damping ratio": mode.damping,
+        "lost per cycle": mode.dissipation,
+        "joints move by": np.max(np.asarray(mode.joints), axis=-1, initial=0.0),
+    }
+    rows = [(name, ranged(np.asarray(column))) for name, column in columns.items()]
+    notes = [f"doubtful: {doubt}" for doubt in doubts]
+    return Summary(f"{title}, {np.size(mode.amplitude)} points", rows, notes)
 
 
 def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> ModalCurve:
@@ -78,9 +133,15 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
     Raises
     ------
     InputError
-        for amplitudes that are not positive and rising, or a structure without joints
+        for amplitudes that are not positive and rising, or that move a joint beyond its `reach`;
+        for a structure without joints
     UnconvergedError
         if no static equilibrium is found
+
+    Warns
+    -----
+    DoubtfulWarning
+        if frequency or damping may be off by more than 2 %, see ``curve.doubts``
 
     Examples
     --------
@@ -107,15 +168,21 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
     sliding = len(joints) == len(structure.attachments)
     require("attachments", structure.attachments, sliding, SLIDING)
     backbones = tuple((joint.displacement, joint.force) for joint in joints)
-    curve, sound = _curve(backbones, statics, jnp.asarray(amplitude))
+    curve, sound = _curve(
+        backbones, statics, _Modes.of(structure, load, mode), jnp.asarray(amplitude)
+    )
     if is_traced(curve):
-        return nan_unless(sound, curve)
+        return nan_unless(sound & structure.knows(curve.joints, ""), curve)
     if not np.all(sound):
         raise UnconvergedError(
             "no equilibrium of the joints at the modal displacement "
             f"{amplitude[int(np.argmin(sound))]:.6g}: give more amplitudes below it"
         )
-    return jax.tree.map(np.asarray, curve)
+    structure.knows(curve.joints, f"the modal displacement {amplitude[-1]:.6g}")
+    curve = jax.tree.map(np.asarray, curve)
+    if not in_transformation():
+        warn_of_doubts(curve.doubts)
+    return curve
 
 
 class _Statics(NamedTuple):
@@ -135,10 +202,42 @@ class _Statics(NamedTuple):
     damping: Array
 
 
+class _Modes(NamedTuple):
+    """Structure of r coordinates of unit mass.
+
+    Attributes
+    ----------
+    stiffness : (r, r) with all joints stuck
+    directions : (r, joints) of the joints
+    momentum : (r,) phi^T M
+    """
+
+    stiffness: Array
+    directions: Array
+    momentum: Array
+
+    @classmethod
+    def of(cls, structure: Structure, load: Any, mode: int) -> _Modes:
+        """Coordinates of a structure, for the load M phi of a mode."""
+        xp: Any = jnp if structure.traced else np
+        basis = basis_of(structure, structure.directions, mode, xp)
+        mass, stiffness = (
+            xp.asarray(basis.T @ (a @ basis)) for a in (structure.mass, structure.stuck_stiffness)
+        )
+        unused = xp.diag(xp.where(xp.all(xp.asarray(basis) == 0.0, axis=0), 1.0, 0.0))
+        root = xp.linalg.inv(xp.linalg.cholesky(mass + unused))
+        turned = root @ basis.T
+        stiffness = root @ (stiffness + unused * xp.max(stiffness)) @ root.T
+        return cls(stiffness, turned @ structure.directions, turned @ load)
+
+
 @in_double
 @eqx.filter_jit
 def _curve(
-    backbones: tuple[tuple[Array, Array], ...], statics: _Statics, amplitude: Array
+    backbones: tuple[tuple[Array, Array], ...],
+    statics: _Statics,
+    modes: _Modes,
+    amplitude: Array,
 ) -> tuple[ModalCurve, Array]:
     """Curve, and whether each of its points converged."""
     joints = _alike(backbones)
@@ -157,10 +256,16 @@ def _curve(
         _, matrix = _residual(known, found, q, u)
         u = u - jnp.linalg.solve(matrix, residual)
         force = _modal_force(joints, statics, q, u)
-        loss = jnp.sum(jax.vmap(Joint.dissipation)(joints, jnp.abs(u)))
+        loss = jnp.sum(jax.vmap(Joint.loss)(joints, jnp.abs(u)))
         omega = jnp.sqrt(force / q)
         zeta = loss / (2.0 * jnp.pi * force * q) + 0.5 * statics.damping / omega
-        return ModalCurve(q, omega, zeta, loss, jnp.abs(u))
+        moved, lost, third = lax.stop_gradient(_harmonic(known, modes, q, jnp.abs(u)))
+        ratio = lost / (2.0 * jnp.pi) + 0.5 * statics.damping / moved
+        damped = jnp.where(zeta > 0.0, zeta, 1.0)
+        off = jnp.where(zeta > 0.0, 1.0 - ratio / damped, 0.0)
+        off = off + jnp.where(off < 0.0, -1.0, 1.0) * THIRD * third
+        size = jnp.abs(u)
+        return ModalCurve(q, omega, zeta, loss, size, 1.0 - moved / omega, off)
 
     curve = jax.vmap(one)(amplitude, lax.stop_gradient(path[SUBSTEPS - 1 :: SUBSTEPS]))
     return curve, jnp.cumprod(sound)[SUBSTEPS - 1 :: SUBSTEPS] > 0
@@ -179,9 +284,50 @@ def _alike(backbones: tuple[tuple[Array, Array], ...]) -> Joint:
     return jax.tree.map(lambda *leaves: jnp.stack(leaves), *stacked)
 
 
+def _harmonic(joints: Joint, modes: _Modes, q: Array, u: Array) -> tuple[Array, Array, Array]:
+    """Frequency of the first harmonics at a modal displacement, energy lost and third harmonic.
+
+    The energy is over x^T K x, the third harmonic of the joints' displacements over the first.
+    """
+    stuck, directions, momentum = modes
+
+    def slipping(u: Array) -> Array:
+        softer = jax.vmap(lambda joint, x: joint.harmonic(x) - joint.stiffness)(joints, u)
+        return stuck + (directions * softer) @ directions.T
+
+    def shape(u: Array) -> tuple[Array, Array]:
+        squares, forms = jnp.linalg.eigh(jnp.real(slipping(u)))
+        place = jnp.argmax(jnp.abs(momentum @ forms))
+        return squares[place], forms[:, place] * q / (momentum @ forms[:, place])
+
+    def left(state: tuple[Array, Array, Array]) -> Array:
+        return (state[1] > SHAPE * jnp.max(state[0])) & (state[2] < MAX_ITERATIONS)
+
+    def improved(state: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+        u, _, count = state
+        new = 0.5 * (u + jnp.abs(directions.T @ shape(u)[1]))
+        return new, jnp.max(jnp.abs(new - u)), count + 1
+
+    u, _, _ = lax.while_loop(left, improved, (u, jnp.full_like(q, jnp.inf), jnp.zeros((), int)))
+    square, x = shape(u)
+    lost = jnp.sum(jax.vmap(Joint.loss)(joints, u))
+    # Third harmonic of the forces on the half cycle from a turn, and what it moves.
+    angle = jnp.pi * jnp.arange(PHASES) / PHASES
+
+    def third(joint: Joint, size: Array) -> Array:
+        branch = joint.line(size) - 2.0 * joint.line(0.5 * size * (1.0 - jnp.cos(angle)))
+        return 2.0 * jnp.mean(branch * jnp.exp(-3j * angle))
+
+    forces = jax.vmap(third)(joints, u)
+    matrix = slipping(u) - 9.0 * square * jnp.eye(x.size)
+    moved = directions.T @ jnp.linalg.solve(matrix, directions @ forces)
+    part = jnp.max(jnp.abs(moved) / jnp.where(u > 0.0, u, 1.0))
+    return jnp.sqrt(square), lost / (square * (x @ x)), jnp.minimum(part, 1.0)
+
+
 def _lost(joints: Joint, u: Array) -> Array:
     """Forces (joints,) that the joints lose by slip."""
-    return jax.vmap(lambda joint, x: joint.stiffness * x - joint.backbone(x))(joints, u)
+    return jax.vmap(lambda joint, x: joint.stiffness * x - joint.line(x))(joints, u)
 
 
 def _modal_force(joints: Joint, statics: _Statics, q: Array, u: Array) -> Array:
@@ -191,7 +337,7 @@ def _modal_force(joints: Joint, statics: _Statics, q: Array, u: Array) -> Array:
 
 def _residual(joints: Joint, statics: _Statics, q: Array, u: Array) -> tuple[Array, Array]:
     """Displacements of the joints less those of their forces, and the derivative."""
-    a, b, compliance, _ = statics
+    a, b, compliance = statics[:3]
     residual = u - b * _modal_force(joints, statics, q, u) - compliance @ _lost(joints, u)
     softer = jax.vmap(lambda joint, x: joint.stiffness - joint.tangent(x))(joints, u)
     return residual, jnp.eye(u.size) + jnp.outer(b, b * softer) / a - compliance * softer

@@ -31,6 +31,7 @@ from jbeamshell.dynamics.vibration.reduction import Reduced
 
 SPLIT = 2.0  # s over the stiffness of a stuck joint, more than any joint can damp
 MOST_ITERATIONS = 16
+FAR = 0.3  # change of the frequency within a step, over it
 LEAST_PART = 1.0 / 256.0  # of a step of a march
 EXACT = 0.6  # power of the rounding unit to which Newton's steps are small
 
@@ -236,7 +237,7 @@ def marched(
     """Solutions (k, ...) at third targets (k,), each from the one before.
 
     The guess ``start`` is nearly a solution at the target ``before``.  Steps without convergence
-    are halved.
+    or with a far frequency are halved.
     """
 
     def reach(state: tuple[Found, Array], target: Array) -> Any:
@@ -254,7 +255,9 @@ def marched(
             guess = Point(growth * now.point.x, now.point.p.at[1].multiply(growth))
             wanted = rows._replace(target=rows.target.at[2].set(value))
             new, _ = newton(model, balance, guess, wanted)
-            good = new.converged
+            # A far solution lies on another branch, such as that of another mode.
+            moved = jnp.abs(new.point.p[0] - now.point.p[0])
+            good = new.converged & (moved <= FAR * jnp.abs(now.point.p[0]))
             kept = jax.tree.map(lambda a, b: jnp.where(good, a, b), new, now)
             return kept, jnp.where(good, aim, part), jnp.where(good, 2.0 * step, 0.5 * step)
 

@@ -50,6 +50,11 @@ class CubicSpring(eqx.Module):
         """Forces (0,) at which sliders slip; none."""
         return jnp.zeros(0)
 
+    @property
+    def reach(self) -> Array:
+        """Largest displacement at which the spring is known: infinite."""
+        return jnp.asarray(jnp.inf)
+
     def backbone(self, u: ArrayLike) -> Array:
         """Force; any shape."""
         size = jnp.asarray(u)

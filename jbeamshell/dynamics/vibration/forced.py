@@ -162,7 +162,11 @@ def steady_response(
     with setup.precise(traced):
         model, basis = reduced(structure, force)
         found = _steady(model, balance, jnp.asarray(omega), traced)
-        x = nan_unless(found.converged, found.point.x)
+        good, directions = found.converged, model.directions
+        peaks = setup.joint_peaks(found.point.x, directions, balance.harmonics, jnp)
+        if traced:
+            good = good & structure.knows(peaks, "")
+        x = nan_unless(good, found.point.x)
         harmonic = x @ basis[place]
         first = harmonic[:, 0]
         after = left_out(model, balance, omega, x @ model.directions, found.lost)
@@ -173,8 +177,7 @@ def steady_response(
     if not np.all(found.converged):
         lost = float(omega[int(np.argmin(found.converged))])
         raise UnconvergedError(f"no steady response is found at the frequency {lost:.6g}")
-    reach = setup.Reach(structure, balance.harmonics)
-    reach.check(result.coefficients, np.asarray(model.directions), "the force")
+    structure.knows(peaks, "the force")
     setup.doubt_harmonics(result.truncation, balance.harmonics)
     return result
 
@@ -221,7 +224,6 @@ def _followed(
     balance = setup.checked_balance(*setting[1:3])
     force = setup.checked_force(structure, force)
     place = setup.checked_place(structure, setting[0], force)
-    reach = setup.Reach(structure, balance.harmonics)
     with setup.precise(traced=False):
         model, basis = reduced(structure, force)
         directions = np.asarray(model.directions)
@@ -229,7 +231,8 @@ def _followed(
         def check(found: Found) -> None:
             omega, level, _ = found.point.p
             what = f"the force times {level:.4g} at the frequency {omega:.6g}"
-            reach.check(found.point.x[None], directions, what)
+            peaks = setup.joint_peaks(found.point.x[None], directions, balance.harmonics)
+            structure.knows(peaks, what)
 
         omega, level = start
         begin = _slight(model, balance, omega, level)

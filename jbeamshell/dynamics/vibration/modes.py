@@ -16,7 +16,7 @@ from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration import setup
 from jbeamshell.dynamics.vibration.balance import Point, Rows, left_out, marched, polished
 from jbeamshell.dynamics.vibration.reduction import Reduced, reduced
-from jbeamshell.dynamics.vibration.results import NonlinearMode, over_a_cycle
+from jbeamshell.dynamics.vibration.results import NonlinearMode
 
 SLIGHT = 1e-3  # part of the first amplitude, at which a mode is nearly linear
 
@@ -82,14 +82,17 @@ def nonlinear_mode(
             found = polished(model, balance, found, rows, target)
         directions = xp.asarray(model.directions)
         found = jax.tree.map(xp.asarray, found)
+        peaks = setup.joint_peaks(found.point.x, directions, balance.harmonics, xp)
         good = found.converged
+        if traced:
+            good = good & structure.knows(peaks, "")
         omega, u = xp.where(good, found.point.p[:, 0], xp.nan), found.point.x @ directions
         result = NonlinearMode(
             amplitude=amplitude,
             frequency=omega,
             damping=found.point.p[:, 2] / (2.0 * omega),
             dissipation=setup.dissipation(found, directions, balance.harmonics, xp),
-            joints=abs(over_a_cycle(u, balance.harmonics, xp)).max(axis=1),
+            joints=peaks,
             harmonic=np.array(balance.harmonics),
             coefficients=found.point.x,
             basis=basis,
@@ -103,9 +106,7 @@ def nonlinear_mode(
             f"no motion is found at the modal displacement {lost_at:.6g}: give more amplitudes "
             "below it, or fewer harmonics"
         )
-    reach = setup.Reach(structure, balance.harmonics)
-    what = f"the modal displacement {float(amplitude[-1]):.6g}"
-    reach.check(result.coefficients, directions, what)
+    structure.knows(peaks, f"the modal displacement {float(amplitude[-1]):.6g}")
     setup.doubt_harmonics(result.truncation, balance.harmonics)
     return result
 

@@ -49,13 +49,11 @@ def reduced(structure: Structure, force: Any, mode: int = 0) -> tuple[Reduced, A
     own = structure.directions
     matrices = (structure.mass, structure.damping, structure.stuck_stiffness)
     traced = structure.traced or is_traced(force)
+    xp: Any = jnp if traced else np
+    basis = basis_of(structure, xp.column_stack([own, force]), mode, xp)
     if structure.size <= SMALL:
-        basis: Any = np.eye(structure.size)
         projected = [jnp.asarray(_dense(matrix)) for matrix in matrices]
     else:
-        xp: Any = jnp if traced else np
-        basis = _basis(structure, xp.column_stack([own, force]), MODES + mode, xp)
-        basis = lax.stop_gradient(basis) if traced else basis
         projected = [jnp.asarray(basis.T @ (matrix @ basis)) for matrix in matrices]
     mass, damping, stiffness = projected
     unused = jnp.all(jnp.asarray(basis) == 0.0, axis=0)
@@ -67,12 +65,15 @@ def reduced(structure: Structure, force: Any, mode: int = 0) -> tuple[Reduced, A
     return Reduced(mass, damping, stiffness, jnp.asarray(basis.T @ own), drive, laws), basis
 
 
-def _basis(structure: Structure, loads: Any, count: int, xp: Any) -> Any:
-    """Modes, and static displacements (n, r) independent of them, orthogonal in the mass.
+def basis_of(structure: Structure, loads: Any, mode: int, xp: Any) -> Any:
+    """Modes beyond the given one, and static displacements (n, r) under loads independent of them.
 
-    Static displacements that the others contain become zero.
+    They are orthogonal in the mass; static displacements that the others contain become zero.  The
+    basis of a small structure is that of its degrees of freedom.
     """
-    _, modes = structure.modes(count)
+    if structure.size <= SMALL:
+        return np.eye(structure.size)
+    _, modes = structure.modes(MODES + mode)
     static = structure.static_displacements(loads)
     for _ in range(2):  # the second time for rounding
         static = static - modes @ (modes.T @ (structure.mass @ static))
@@ -81,7 +82,8 @@ def _basis(structure: Structure, loads: Any, count: int, xp: Any) -> Any:
     values, vectors = xp.linalg.eigh(static.T @ (structure.mass @ static))
     kept = values > DEPENDENT
     scale = xp.where(kept, 1.0 / xp.sqrt(xp.where(kept, values, 1.0)), 0.0)
-    return xp.column_stack([modes, static @ (vectors * scale)])
+    found = xp.column_stack([modes, static @ (vectors * scale)])
+    return lax.stop_gradient(found) if xp is jnp else found
 
 
 def _dense(matrix: Any) -> Any:

@@ -7,7 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jbeamshell.common.checks import is_traced
 from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.summary import Summary, ranged, with_unit
+from jbeamshell.dynamics.structure.modal import summary_of_mode
 
 PHASES = 720  # angles of a cycle at which largest values are looked for
 
@@ -69,6 +72,29 @@ class ForcedResponse(NamedTuple):
         """Largest displacement (k,) at ``place`` within a cycle."""
         return np.max(np.abs(over_a_cycle(self.at(self.place), self.harmonic)), axis=1)
 
+    @property
+    def summary(self) -> Summary:
+        """Summary in a few lines."""
+        top = int(np.argmax(self.amplitude))
+        over = "level" if np.ptp(self.frequency) == 0.0 else "frequency"
+        rows = [
+            (over, ranged(getattr(self, over))),
+            ("largest amplitude", f"{self.amplitude[top]:.4g} at {getattr(self, over)[top]:.4g}"),
+            ("lost per cycle", f"{self.dissipation[top]:.4g} there"),
+            ("joints", f"move by up to {np.max(self.joints, initial=0.0):.4g}"),
+            ("left out", f"{np.max(self.truncation):.2g} of the first harmonic"),
+        ]
+        unstable = int(np.sum(~self.stable))
+        notes = [f"{self.folds.size} folds, {unstable} unstable points"] if unstable else []
+        title = f"forced response at degree of freedom {self.place}, {self.level.size} points"
+        return Summary(title, rows, notes)
+
+    def __str__(self) -> str:
+        return self.summary.as_text()
+
+    def __repr__(self) -> str:
+        return self.summary.as_text()
+
     def plot(self, axes: Any = None) -> Any:
         """Draw amplitude and harmonics; see `jbeamshell.plotting.forced_response`."""
         from jbeamshell import plotting
@@ -114,6 +140,12 @@ class NonlinearMode(NamedTuple):
         """Complex amplitudes (k, H) of the harmonics of a degree of freedom."""
         return self.coefficients @ self.basis[place]
 
+    def __str__(self) -> str:
+        return summary_of_mode("nonlinear mode, by harmonic balance", self).as_text()
+
+    def __repr__(self) -> str:
+        return str(self)
+
     def plot(self, axes: Any = None) -> Any:
         """Draw frequency and damping over amplitude; see `jbeamshell.plotting.modal_curve`."""
         from jbeamshell import plotting
@@ -141,6 +173,19 @@ class SteadyResponse(NamedTuple):
     coefficients: Any
     basis: Any
     truncation: Any
+
+    def __str__(self) -> str:
+        if is_traced(self):
+            return "steady response, traced"
+        rows = [
+            ("frequency", ranged(np.asarray(self.frequency))),
+            ("amplitude", ranged(np.asarray(self.amplitude))),
+            ("left out", f"{with_unit(float(np.max(self.truncation)))} of the first harmonic"),
+        ]
+        return Summary(f"steady response at {len(self.frequency)} frequencies", rows).as_text()
+
+    def __repr__(self) -> str:
+        return str(self)
 
 
 def over_a_cycle(coefficients: Any, harmonic: Any, xp: Any = np) -> Any:

@@ -10,7 +10,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
 from jbeamshell.common.checks import (
     as_leaf,
@@ -20,8 +19,7 @@ from jbeamshell.common.checks import (
     require_count,
     require_number,
 )
-from jbeamshell.common.errors import DoubtfulWarning, InputError
-from jbeamshell.dynamics.structure.joint import Joint
+from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration.balance import Balance, Found
 from jbeamshell.dynamics.vibration.results import over_a_cycle
@@ -96,35 +94,9 @@ def checked_rising(key: str, values: Any, fix: str, rising: bool = True) -> Any:
     return numbers
 
 
-class Reach:
-    """Largest displacements up to which the joints are known.
-
-    A joint of a strip ends with its backbone, below gross slip; the last slope of a backbone that
-    was given by hand goes on.
-    """
-
-    def __init__(self, structure: Structure, harmonics: Sequence[int]) -> None:
-        self.harmonics = np.array(harmonics)
-        self.directions = structure.directions
-        self.ends = np.array([_end(a.joint) for a in structure.attachments])
-
-    def check(self, motion: Any, directions: Any, what: str) -> NDArray[np.float64]:
-        """Largest displacements (k, J) of motions (k, H, r); raises `InputError`."""
-        peaks = np.max(np.abs(over_a_cycle(motion @ directions, self.harmonics)), axis=1)
-        for place, end in enumerate(self.ends):
-            most = float(np.max(peaks[:, place], initial=0.0))
-            if most > end:
-                raise InputError(
-                    f"{what} moves the joint of attachments[{place}] by {most:.4g}, beyond its "
-                    f"backbone, which ends at {end:.4g}: take less, or give Joint.of more force, "
-                    "below gross slip"
-                )
-        return np.asarray(peaks)
-
-
-def _end(element: Any) -> float:
-    known = isinstance(element, Joint) and bool(np.isfinite(element.capacity))
-    return float(element.displacement[-1]) if known else np.inf
+def joint_peaks(motion: Any, directions: Any, harmonics: Sequence[int], xp: Any = np) -> Any:
+    """Largest displacements (k, J) of the elements in motions (k, H, r)."""
+    return abs(over_a_cycle(motion @ directions, np.array(harmonics), xp)).max(axis=1)
 
 
 def dissipation(found: Found, directions: Any, harmonics: Sequence[int], xp: Any = np) -> Any:
