@@ -1,0 +1,374 @@
+"""Decaying vibration by least squares: rate of decay and frequency as functions of the amplitude.
+
+The signal is x(t) = c(t) + a(t) cos psi(t) with a slow mean c, and
+
+    d log a/dt = -sigma(a),      d psi/dt = omega(a),
+
+the slow flow of a lightly damped mode (Nayfeh and Mook 1979).  Both rates are splines of log a,
+with as many numbers as the data ask for by Akaike's corrected criterion, from constants upwards.
+Noise is taken from what is left about the frequency of the vibration, so that harmonics and drifts
+do not count.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+NUMBERS = (1, 2, 3, 4, 6, 9)  # of each rate
+DENSEST = 32.0  # samples of a period, beyond which neighbours are averaged
+ZETAS = (0.0, 0.003, 0.01, 0.03, 0.1, 0.2, 0.35)  # at which a first fit starts
+PEAKS = 3  # of the spectrum, at which it starts
+MOST = 4000  # samples of a first fit
+VISIBLE = 2.0  # smallest amplitude that tells a rate, over the noise of one cycle's amplitude
+ROUNDING = 1e-9  # of the signal, below which nothing is told
+BAND = 0.5  # half width of the band about the frequency that tells the noise, over the frequency
+ODDS = 1e-3  # of white noise, below which what is left is not taken as white
+LEVEL = 0.95  # of the intervals
+CONSTANT = 5.0  # gain of the criterion that rates which depend on the amplitude must show
+FEWEST_PERIODS = 1.5  # of a number of a rate
+
+
+class Decay(NamedTuple):
+    """Decaying vibration that was fitted to a signal, at k times.
+
+    Attributes
+    ----------
+    time, amplitude, decay, omega : (k,) times, amplitudes, rates of decay and angular frequencies
+    decay_off, omega_off : (k,) half widths of their 95 % intervals
+    product : (k,) covariance of decay and omega, in the scale of the half widths squared
+    numbers : of each rate; 1 where they do not depend on the amplitude
+    noise : standard deviation of a sample
+    left : what the fit leaves of the signal, (n,)
+    evidence : ratio of the part of the signal's power that it tells to that of the noise
+    """
+
+    time: Floats
+    amplitude: Floats
+    decay: Floats
+    omega: Floats
+    decay_off: Floats
+    omega_off: Floats
+    product: Floats
+    numbers: int
+    noise: float
+    left: Floats
+    evidence: float
+
+
+class _Fit(NamedTuple):
+    """Least-squares fit with some numbers of each rate; times in samples."""
+
+    values: Floats
+    inverse: Floats
+    mean: int
+    left: Floats
+    level: Floats
+    knots: Floats
+    variance: float
+    freedom: float
+    score: float
+
+    @property
+    def numbers(self) -> int:
+        return (self.values.size - self.mean - 2) // 2
+
+    def rates(self, level: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """Decay and frequency at levels of log a, and their variances and covariance."""
+        basis = _basis(level, self.knots, self.numbers)
+        first, last = self.mean + 2, self.mean + 2 + self.numbers
+        one, two = slice(first, last), slice(last, None)
+        spread = self.inverse * self.variance
+        variances = (
+            np.einsum("ki,ij,kj->k", basis, spread[i, j], basis)
+            for i, j in ((one, one), (two, two), (one, two))
+        )
+        decay, omega = basis @ self.values[one], basis @ self.values[two]
+        return decay, omega, *variances
+
+
+def fit_decay(time: Floats, signal: Floats) -> Decay | None:
+    """Fit a decaying vibration to a signal at evenly spaced times; None where none is found."""
+    from scipy.special import stdtrit
+
+    step, size = float(time[1] - time[0]), float(np.ptp(signal))
+    y = (signal - np.mean(signal)) / size
+    begun = _begin(y)
+    y, time = y[begun:], time[begun:]
+    start = _start(y)
+    if start is None:
+        return None
+    merged = max(1, int(2.0 * np.pi / start[1] / DENSEST))
+    if merged > 1:
+        y = y[: y.size // merged * merged].reshape(-1, merged).mean(axis=1)
+        start = merged * start[0], merged * start[1]
+        time = time[0] + step * (np.arange(y.size) * merged + 0.5 * (merged - 1))
+        step *= merged
+    fits = _fits(y, start)
+    if not fits:
+        return None
+    scores = np.array([fit.score for fit in fits])
+    scores[1:] += CONSTANT
+    place = int(np.argmin(scores))
+    best, other = fits[place], fits[place + 1 if place + 1 < len(fits) else max(place - 1, 0)]
+    at = _times(best)
+    if at.size < 1:
+        return None
+    level = np.interp(at, np.arange(y.size), best.level)
+    decay, omega, one, two, both = best.rates(level)
+    factor = float(stdtrit(best.freedom, 0.5 + 0.5 * LEVEL))
+    zeta = decay / omega
+    offs = []
+    for value, variance, beside, order in (
+        (decay, one, other.rates(level)[0], (2.0 * np.pi * zeta) ** 2 / 24.0),
+        (omega, two, other.rates(level)[1], 0.5 * zeta**2),
+    ):
+        off = np.sqrt(factor**2 * variance) + ROUNDING * omega
+        if best.numbers > 1:
+            off = np.hypot(off, beside - value) + np.abs(value) * order
+        offs.append(off)
+    complex_rate = -decay + 1j * omega
+    within = (np.arange(merged) - 0.5 * (merged - 1)) / merged
+    shrunk = np.abs(np.exp(complex_rate[:, None] * within).mean(axis=1))
+    told = float(np.sum((y - y.mean()) ** 2) - np.sum(best.left**2))
+    return Decay(
+        time[0] + step * at,
+        size * np.exp(level) / shrunk,
+        decay / step,
+        omega / step,
+        offs[0] / step,
+        offs[1] / step,
+        factor**2 * both / step**2,
+        best.numbers,
+        size * float(np.sqrt(best.variance * merged)),
+        size * best.left,
+        told / best.variance,
+    )
+
+
+def _begin(y: Floats) -> int:
+    """First sample of the decay: where a cycle is strongest, if the signal begins with less."""
+    omega = _peaks(y)[0]
+    length = max(3, round(2.0 * np.pi / omega))
+    if y.size < 3 * length:
+        return 0
+    total = np.cumsum(np.concatenate([[0.0], (y - np.median(y)) ** 2]))
+    power = total[length:] - total[:-length]
+    return 0 if power[0] > 0.5 * power.max() else int(np.argmax(power))
+
+
+def _peaks(y: Floats) -> list[float]:
+    """Angular frequencies per sample of the highest peaks of the spectrum, the highest first."""
+    count = 4 * y.size
+    power = np.abs(np.fft.rfft(y - np.mean(y[-y.size // 4 :]), count)) ** 2
+    power += np.abs(np.fft.rfft((y - np.mean(y)) * np.hanning(y.size), count)) ** 2
+    power[:3] = 0.0
+    tops = 1 + np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:]))
+    tops = tops if tops.size else np.array([max(int(np.argmax(power)), 1)])
+    order = np.argsort(-power[tops])[:PEAKS]
+    return [2.0 * np.pi * float(top) / count for top in tops[order]]
+
+
+def _start(y: Floats) -> tuple[float, float] | None:
+    """Decay and angular frequency per sample of the best of many first guesses."""
+    best, found = np.inf, None
+    for peak in _peaks(y):
+        merged = max(1, int(2.0 * np.pi / peak / DENSEST))
+        z = y[: y.size // merged * merged].reshape(-1, merged).mean(axis=1)[:MOST]
+        n = np.arange(z.size)
+        total = float(np.sum((z - z.mean()) ** 2)) * merged
+        for zeta in ZETAS:
+            spread = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2) if zeta > 0.05 else (1.0,)
+            for factor in spread:
+                omega = factor * peak * merged
+                if omega >= np.pi:
+                    continue
+                size = np.exp(-zeta * omega * n)
+                columns = np.stack([size * np.cos(omega * n), size * np.sin(omega * n)], axis=1)
+                columns = np.column_stack([columns, np.ones(n.size)])
+                values = np.linalg.lstsq(columns, z, rcond=None)[0]
+                left = float(np.sum((z - columns @ values) ** 2)) * merged - total
+                if left < best:
+                    best, found = left, (zeta * omega / merged, omega / merged)
+    return found
+
+
+def _fits(y: Floats, start: tuple[float, float]) -> list[_Fit]:
+    """Fits with rising numbers of each rate, until the criterion has risen twice."""
+    n = np.arange(y.size, dtype=float)
+    fits: list[_Fit] = []
+    level, rates = -start[0] * n, (np.array([start[0]]), np.array([start[1]]))
+    for numbers in NUMBERS:
+        if fits:
+            before = fits[-1]
+            level, floor = before.level, _floor(before)
+            periods = before.rates(level[:1])[1][0] * np.sum(level > floor) / (2.0 * np.pi)
+            if numbers * FEWEST_PERIODS > periods or level[0] - floor < 0.1:
+                break
+        fit = None
+        for _ in range(1 if numbers == 1 else 3):
+            knots = _knots(level, fits[-1] if fits else None, numbers)
+            basis = _basis(level, knots, numbers)
+            if fits or fit is not None:
+                old = fit or fits[-1]
+                decay, omega = old.rates(old.level)[:2]
+                weight = np.exp(2.0 * np.maximum(old.level - old.level.max(), -6.0))
+                root = np.sqrt(weight)[:, None]
+                fitted = np.linalg.lstsq(
+                    root * basis, root * np.stack([decay, omega], axis=1), rcond=None
+                )[0]
+                rates = fitted[:, 0], fitted[:, 1]
+            mean = np.ones((n.size, 1)) if numbers == 1 else basis
+            fit = _least_squares(y, mean, basis, rates, knots)
+            if fit is None:
+                break
+            level = fit.level
+        if fit is None or fit.rates(fit.level)[1].min() <= 0.0:
+            break
+        fits.append(fit)
+        scores = [each.score for each in fits]
+        if len(fits) - 1 - int(np.argmin(scores)) >= 2:
+            break
+    return fits
+
+
+def _least_squares(
+    y: Floats, mean: Floats, basis: Floats, rates: tuple[Floats, Floats], knots: Floats
+) -> _Fit | None:
+    """Fit of the mean, amplitude, phase and rates."""
+    from scipy.optimize import least_squares
+
+    count, numbers = mean.shape[1], basis.shape[1]
+    passed = np.zeros_like(basis)
+    passed[1:] = np.cumsum(0.5 * (basis[1:] + basis[:-1]), axis=0)
+    size, angle = np.exp(-passed @ rates[0]), passed @ rates[1]
+    columns = np.column_stack([mean, size * np.cos(angle), size * np.sin(angle)])
+    first = np.linalg.lstsq(columns, y, rcond=None)[0]
+    c, s = first[-2:]
+    top = float(np.log(max(np.hypot(c, s), 1e-12)))
+    begin = np.concatenate([first[:-2], [top, np.arctan2(-s, c)], rates[0], rates[1]])
+    one, two = slice(count + 2, count + 2 + numbers), slice(count + 2 + numbers, None)
+
+    def parts(values: Floats) -> tuple[Floats, Floats]:
+        level = np.minimum(values[count] - passed @ values[one], 50.0)
+        return np.exp(level), values[count + 1] + passed @ values[two]
+
+    def off(values: Floats) -> Floats:
+        size, angle = parts(values)
+        return np.asarray(mean @ values[:count] + size * np.cos(angle) - y)
+
+    def slopes(values: Floats) -> Floats:
+        size, angle = parts(values)
+        c, s = (size * np.cos(angle))[:, None], (-size * np.sin(angle))[:, None]
+        return np.hstack([mean, c, s, -c * passed, s * passed])
+
+    if y.size <= begin.size + 2:
+        return None
+    try:
+        found: Any = least_squares(
+            off, begin, slopes, method="lm", x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13
+        )
+    except ValueError:
+        return None
+    jacobian = found.jac
+    scale = np.linalg.norm(jacobian, axis=0)
+    if not np.all(np.isfinite(found.x)) or np.any(scale == 0.0):
+        return None
+    inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-12)
+    inverse /= np.outer(scale, scale)
+    level = found.x[count] - passed @ found.x[one]
+    left = -found.fun
+    omega = float(np.median((basis @ found.x[two])[: max(1, y.size // 4)]))
+    variance, freedom, score = _noise(left, omega, count, 2 * numbers + 2)
+    return _Fit(found.x, inverse, count, left, level, knots, variance, freedom, score)
+
+
+def _noise(left: Floats, omega: float, mean: int, numbers: int) -> tuple[float, float, float]:
+    """Variance of a sample, its degrees of freedom, and Akaike's corrected criterion.
+
+    What is left in a band about the frequency tells the variance where it is not white.
+    """
+    from scipy.stats import f
+
+    n = left.size
+    power = np.abs(np.fft.rfft(left)) ** 2 / n
+    frequency = 2.0 * np.pi * np.arange(power.size) / n
+    inside = np.abs(frequency - omega) < BAND * omega
+    inside[0] = False
+    known = 2.0 * float(np.count_nonzero(inside))
+    least = ROUNDING**2
+    whole = float(np.sum(left**2)) / max(n - mean - numbers, 1) + least
+    freedom = max(n - mean - numbers, 1)
+    if known - numbers < 4:
+        return whole, freedom, _criterion(whole * freedom, n, numbers + mean)
+    near = 2.0 * float(np.sum(power[inside])) / (known - numbers) + least
+    score = _criterion(near * (known - numbers), known, numbers)
+    rest = n - known - mean
+    if rest >= 4:
+        far = max(float(np.sum(left**2)) - 2.0 * float(np.sum(power[inside])), 0.0) / rest + least
+        odds = float(f.sf(max(near / far, far / near), known - numbers, rest))
+        if odds < ODDS:
+            return near, known - numbers, score
+    return whole, freedom, score
+
+
+def _criterion(square: float, count: float, numbers: int) -> float:
+    """Akaike's corrected criterion of a sum of squares."""
+    if count - numbers - 2 <= 0:
+        return np.inf
+    return count * float(np.log(square / count)) + 2.0 * (numbers + 1) * count / (
+        count - numbers - 2
+    )
+
+
+def _floor(fit: _Fit) -> float:
+    """Smallest log a that tells a rate."""
+    omega = float(fit.rates(fit.level[:1])[1][0])
+    cycle = max(2.0 * np.pi / omega, 2.0)
+    noise = np.sqrt(2.0 * fit.variance / cycle)
+    return max(float(np.log(VISIBLE * noise)), float(fit.level.max()) - 14.0)
+
+
+def _knots(level: Floats, before: _Fit | None, numbers: int) -> Floats:
+    """Ends and inner knots of the splines, between which the vibration tells equally much."""
+    if before is None or numbers == 1:
+        return np.array([level.min() - 1.0, level.max() + 1.0])
+    low = max(_floor(before), float(level.min()))
+    high = float(level.max())
+    inner = max(0, numbers - 1 - _degree(numbers))
+    seen = np.clip(level, low, high)
+    weight = np.cumsum(np.exp(seen - high) * (level > low))
+    at = np.interp(np.linspace(0.0, 1.0, inner + 2)[1:-1], weight / weight[-1], seen)
+    return np.concatenate([[low], np.sort(at), [high]])
+
+
+def _degree(numbers: int) -> int:
+    return min(numbers - 1, 3)
+
+
+def _basis(level: Floats, knots: Floats, numbers: int) -> Floats:
+    """Splines of log a, (n, numbers), constant beyond the ends."""
+    from scipy.interpolate import BSpline
+
+    degree = _degree(numbers)
+    if degree == 0:
+        return np.ones((level.size, 1))
+    ends = np.concatenate([[knots[0]] * degree, knots, [knots[-1]] * degree])
+    seen = np.clip(level, knots[0], knots[-1])
+    return np.asarray(BSpline.design_matrix(seen, ends, degree).toarray())
+
+
+def _times(fit: _Fit) -> Floats:
+    """Times in samples, two a cycle, as long as the vibration is seen."""
+    omega = fit.rates(fit.level)[1]
+    angle = np.cumsum(omega)
+    seen = np.flatnonzero(fit.level >= _floor(fit))
+    if seen.size == 0:
+        return np.zeros(0)
+    last = angle[seen[-1]]
+    turns = np.arange(angle[0], last + 1e-9, np.pi)
+    return np.interp(turns, angle, np.arange(angle.size))
