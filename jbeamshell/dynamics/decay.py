@@ -30,6 +30,8 @@ BAND = 0.5  # half width of the band about the frequency that tells the noise, o
 ODDS = 1e-3  # of white noise, below which what is left is not taken as white
 LEVEL = 0.95  # of the intervals
 CONSTANT = 5.0  # gain of the criterion that rates which depend on the amplitude must show
+ROUNDS = 8  # of a fit, whose splines are those of the amplitude before
+SETTLED = 1e-3  # change of log a by a round after which there is no further one
 FEWEST_PERIODS = 1.5  # of a number of a rate
 
 
@@ -210,7 +212,7 @@ def _fits(y: Floats, start: tuple[float, float]) -> list[_Fit]:
             if numbers * FEWEST_PERIODS > periods or level[0] - floor < 0.1:
                 break
         fit = None
-        for _ in range(1 if numbers == 1 else 3):
+        for _ in range(1 if numbers == 1 else ROUNDS):
             knots = _knots(level, fits[-1] if fits else None, numbers)
             basis = _basis(level, knots, numbers)
             if fits or fit is not None:
@@ -226,7 +228,9 @@ def _fits(y: Floats, start: tuple[float, float]) -> list[_Fit]:
             fit = _least_squares(y, mean, basis, rates, knots)
             if fit is None:
                 break
-            level = fit.level
+            moved, level = float(np.max(np.abs(fit.level - level))), fit.level
+            if moved < SETTLED:
+                break
         if fit is None or fit.rates(fit.level)[1].min() <= 0.0:
             break
         fits.append(fit)
@@ -329,8 +333,15 @@ def _floor(fit: _Fit) -> float:
     """Smallest log a that tells a rate."""
     omega = float(fit.rates(fit.level[:1])[1][0])
     cycle = max(2.0 * np.pi / omega, 2.0)
-    noise = np.sqrt(2.0 * fit.variance / cycle)
+    noise = np.sqrt(2.0 * min(fit.variance, _quiet(fit.left)) / cycle)
     return max(float(np.log(VISIBLE * noise)), float(fit.level.max()) - 14.0)
+
+
+def _quiet(left: Floats) -> float:
+    """Variance of white noise in what is left, by the median of its spectrum."""
+    window = np.hanning(left.size)
+    power = np.abs(np.fft.rfft(window * left)) ** 2 / np.sum(window**2)
+    return float(np.median(power)) / float(np.log(2.0)) + ROUNDING**2
 
 
 def _knots(level: Floats, before: _Fit | None, numbers: int) -> Floats:
