@@ -28,6 +28,7 @@ VISIBLE = 2.0  # smallest amplitude that tells a rate, over the noise of one cyc
 ROUNDING = 1e-9  # of the signal, below which nothing is told
 BAND = 0.5  # half width of the band about the frequency that tells the noise, over the frequency
 ODDS = 1e-3  # of white noise, below which what is left is not taken as white
+FREE = 4  # degrees of freedom that tell a variance
 LEVEL = 0.95  # of the intervals
 CONSTANT = 5.0  # gain of the criterion that rates which depend on the amplitude must show
 ROUNDS = 8  # of a fit, whose splines are those of the amplitude before
@@ -225,7 +226,7 @@ def _fits(y: Floats, start: tuple[float, float]) -> list[_Fit]:
                 )[0]
                 rates = fitted[:, 0], fitted[:, 1]
             mean = np.ones((n.size, 1)) if numbers == 1 else basis
-            fit = _least_squares(y, mean, basis, rates, knots)
+            fit = _least_squares(y, mean, basis, rates, knots, start[1])
             if fit is None:
                 break
             moved, level = float(np.max(np.abs(fit.level - level))), fit.level
@@ -241,7 +242,12 @@ def _fits(y: Floats, start: tuple[float, float]) -> list[_Fit]:
 
 
 def _least_squares(
-    y: Floats, mean: Floats, basis: Floats, rates: tuple[Floats, Floats], knots: Floats
+    y: Floats,
+    mean: Floats,
+    basis: Floats,
+    rates: tuple[Floats, Floats],
+    knots: Floats,
+    about: float,
 ) -> _Fit | None:
     """Fit of the mean, amplitude, phase and rates."""
     from scipy.optimize import least_squares
@@ -286,47 +292,40 @@ def _least_squares(
     inverse /= np.outer(scale, scale)
     level = found.x[count] - passed @ found.x[one]
     left = -found.fun
-    omega = float(np.median((basis @ found.x[two])[: max(1, y.size // 4)]))
-    variance, freedom, score = _noise(left, omega, count, 2 * numbers + 2)
+    variance, freedom, score = _noise(left, about, count, 2 * numbers + 2)
     return _Fit(found.x, inverse, count, left, level, knots, variance, freedom, score)
 
 
-def _noise(left: Floats, omega: float, mean: int, numbers: int) -> tuple[float, float, float]:
+def _noise(left: Floats, about: float, mean: int, numbers: int) -> tuple[float, float, float]:
     """Variance of a sample, its degrees of freedom, and Akaike's corrected criterion.
 
     What is left in a band about the frequency tells the variance where it is not white.
     """
     from scipy.stats import f
 
-    n = left.size
-    power = np.abs(np.fft.rfft(left)) ** 2 / n
+    n, numbers = left.size, mean + numbers
+    square = float(np.sum(left**2))
+    power = 2.0 * np.abs(np.fft.rfft(left)) ** 2 / n
     frequency = 2.0 * np.pi * np.arange(power.size) / n
-    inside = np.abs(frequency - omega) < BAND * omega
+    inside = np.abs(frequency - about) < BAND * about
     inside[0] = False
-    known = 2.0 * float(np.count_nonzero(inside))
-    least = ROUNDING**2
-    whole = float(np.sum(left**2)) / max(n - mean - numbers, 1) + least
-    freedom = max(n - mean - numbers, 1)
-    if known - numbers < 4:
-        return whole, freedom, _criterion(whole * freedom, n, numbers + mean)
-    near = 2.0 * float(np.sum(power[inside])) / (known - numbers) + least
-    score = _criterion(near * (known - numbers), known, numbers)
-    rest = n - known - mean
-    if rest >= 4:
-        far = max(float(np.sum(left**2)) - 2.0 * float(np.sum(power[inside])), 0.0) / rest + least
-        odds = float(f.sf(max(near / far, far / near), known - numbers, rest))
-        if odds < ODDS:
-            return near, known - numbers, score
-    return whole, freedom, score
+    known, within = 2 * int(np.count_nonzero(inside)), float(np.sum(power[inside]))
+    whole = square / (n - numbers) + ROUNDING**2
+    free, rest = known - numbers, n - known
+    if free < FREE or rest < FREE:
+        return whole, n - numbers, np.inf
+    near, far = within / free + ROUNDING**2, max(square - within, 0.0) / rest + ROUNDING**2
+    score = _criterion(near, known, numbers)
+    if float(f.sf(max(near / far, far / near), free, rest)) < ODDS:
+        return near, free, score
+    return whole, n - numbers, score
 
 
-def _criterion(square: float, count: float, numbers: int) -> float:
-    """Akaike's corrected criterion of a sum of squares."""
-    if count - numbers - 2 <= 0:
-        return np.inf
-    return count * float(np.log(square / count)) + 2.0 * (numbers + 1) * count / (
-        count - numbers - 2
-    )
+def _criterion(variance: float, count: int, numbers: int) -> float:
+    """Akaike's corrected criterion of independent numbers whose variance is known."""
+    spare = count - numbers - 2
+    share = variance * (count - numbers) / count
+    return count * float(np.log(share) + 2.0 * (numbers + 1) / spare) if spare > 0 else np.inf
 
 
 def _floor(fit: _Fit) -> float:
