@@ -22,12 +22,15 @@ Floats = NDArray[np.float64]
 NUMBERS = (1, 2, 3, 4, 6, 9)  # of each rate
 DENSEST = 32.0  # samples of a period, beyond which neighbours are averaged
 ZETAS = (0.0, 0.003, 0.01, 0.03, 0.1, 0.2, 0.35)  # at which a first fit starts
+FACTORS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)  # of a broad peak's frequency
+SHARP = 0.05  # zeta of a narrow peak
 PEAKS = 3  # of the spectrum, at which it starts
 MOST = 4000  # samples of a first fit
 VISIBLE = 2.0  # smallest amplitude that tells a rate, over the noise of one cycle's amplitude
 ROUNDING = 1e-9  # of the signal, below which nothing is told
 BAND = 0.5  # half width of the band about the frequency that tells the noise, over the frequency
 ODDS = 1e-3  # of white noise, below which what is left is not taken as white
+LEAST = 0.1  # range of log a that may tell how rates depend on it
 FREE = 4  # degrees of freedom that tell a variance
 LEVEL = 0.95  # of the intervals
 CONSTANT = 5.0  # gain of the criterion that rates which depend on the amplitude must show
@@ -43,11 +46,15 @@ class Decay(NamedTuple):
     ----------
     time, amplitude, decay, omega : (k,) times, amplitudes, rates of decay and angular frequencies
     decay_off, omega_off : (k,) half widths of their 95 % intervals
-    product : (k,) covariance of decay and omega, in the scale of the half widths squared
     numbers : of each rate; 1 where they do not depend on the amplitude
     noise : standard deviation of a sample
-    left : what the fit leaves of the signal, (n,)
-    evidence : ratio of the part of the signal's power that it tells to that of the noise
+    quiet : standard deviation of a sample's white noise, without what the fit cannot describe
+    left : largest that the fit leaves of the signal
+    other : strongest vibration in what the fit leaves, its amplitude over that of the fitted one,
+        both over the record
+    other_omega : its angular frequency
+    evidence : power of the fitted vibration over the record, over the variance of the noise
+    samples : number of those that were fitted
     """
 
     time: Floats
@@ -56,11 +63,14 @@ class Decay(NamedTuple):
     omega: Floats
     decay_off: Floats
     omega_off: Floats
-    product: Floats
     numbers: int
     noise: float
-    left: Floats
+    quiet: float
+    left: float
+    other: float
+    other_omega: float
     evidence: float
+    samples: int
 
 
 class _Fit(NamedTuple):
@@ -80,38 +90,43 @@ class _Fit(NamedTuple):
     def numbers(self) -> int:
         return (self.values.size - self.mean - 2) // 2
 
-    def rates(self, level: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """Decay and frequency at levels of log a, and their variances and covariance."""
+    def rates(self, level: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Decay and frequency at levels of log a, and their variances."""
         basis = _basis(level, self.knots, self.numbers)
         first, last = self.mean + 2, self.mean + 2 + self.numbers
         one, two = slice(first, last), slice(last, None)
         spread = self.inverse * self.variance
-        variances = (
-            np.einsum("ki,ij,kj->k", basis, spread[i, j], basis)
-            for i, j in ((one, one), (two, two), (one, two))
-        )
+        variances = (np.einsum("ki,ij,kj->k", basis, spread[i, i], basis) for i in (one, two))
         decay, omega = basis @ self.values[one], basis @ self.values[two]
         return decay, omega, *variances
 
 
-def fit_decay(time: Floats, signal: Floats) -> Decay | None:
-    """Fit a decaying vibration to a signal at evenly spaced times; None where none is found."""
+def fit_decay(
+    time: Floats, signal: Floats, band: tuple[float, float] = (0.0, np.inf)
+) -> Decay | None:
+    """Fit a decaying vibration to a signal at evenly spaced times; None where none is found.
+
+    Parameters
+    ----------
+    time, signal : samples
+    band : angular frequencies outside of which a filter has left no noise
+    """
     from scipy.special import stdtrit
 
     step, size = float(time[1] - time[0]), float(np.ptp(signal))
     y = (signal - np.mean(signal)) / size
     begun = _begin(y)
-    y, time = y[begun:], time[begun:]
+    y, time, band = y[begun:], time[begun:], (step * band[0], step * band[1])
     start = _start(y)
     if start is None:
         return None
-    merged = max(1, int(2.0 * np.pi / start[1] / DENSEST))
+    merged = max(1, int(2.0 * np.pi / start[2] / DENSEST))
     if merged > 1:
         y = y[: y.size // merged * merged].reshape(-1, merged).mean(axis=1)
-        start = merged * start[0], merged * start[1]
+        band = merged * band[0], merged * band[1]
         time = time[0] + step * (np.arange(y.size) * merged + 0.5 * (merged - 1))
         step *= merged
-    fits = _fits(y, start)
+    fits = _fits(y, merged * start[1], merged * start[2], band)
     if not fits:
         return None
     scores = np.array([fit.score for fit in fits])
@@ -122,7 +137,7 @@ def fit_decay(time: Floats, signal: Floats) -> Decay | None:
     if at.size < 1:
         return None
     level = np.interp(at, np.arange(y.size), best.level)
-    decay, omega, one, two, both = best.rates(level)
+    decay, omega, one, two = best.rates(level)
     factor = float(stdtrit(best.freedom, 0.5 + 0.5 * LEVEL))
     zeta = decay / omega
     offs = []
@@ -137,6 +152,7 @@ def fit_decay(time: Floats, signal: Floats) -> Decay | None:
     complex_rate = -decay + 1j * omega
     within = (np.arange(merged) - 0.5 * (merged - 1)) / merged
     shrunk = np.abs(np.exp(complex_rate[:, None] * within).mean(axis=1))
+    rest = _start(best.left)
     told = float(np.sum((y - y.mean()) ** 2) - np.sum(best.left**2))
     return Decay(
         time[0] + step * at,
@@ -145,11 +161,14 @@ def fit_decay(time: Floats, signal: Floats) -> Decay | None:
         omega / step,
         offs[0] / step,
         offs[1] / step,
-        factor**2 * both / step**2,
         best.numbers,
         size * float(np.sqrt(best.variance * merged)),
-        size * best.left,
+        size * float(np.sqrt(_quiet(best.left) * merged)),
+        size * float(np.max(np.abs(best.left))),
+        float(np.sqrt(max(rest[0] if rest else 0.0, 0.0) / max(told, ROUNDING**2))),
+        rest[2] / step if rest else 0.0,
         told / best.variance,
+        y.size,
     )
 
 
@@ -167,8 +186,9 @@ def _begin(y: Floats) -> int:
 def _peaks(y: Floats) -> list[float]:
     """Angular frequencies per sample of the highest peaks of the spectrum, the highest first."""
     count = 4 * y.size
-    power = np.abs(np.fft.rfft(y - np.mean(y[-y.size // 4 :]), count)) ** 2
-    power += np.abs(np.fft.rfft((y - np.mean(y)) * np.hanning(y.size), count)) ** 2
+    y = y - np.polynomial.Polynomial.fit(np.arange(y.size), y, 1)(np.arange(y.size))
+    power = np.abs(np.fft.rfft(y, count)) ** 2
+    power += np.abs(np.fft.rfft(y * np.hanning(y.size), count)) ** 2
     power[:3] = 0.0
     tops = 1 + np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:]))
     tops = tops if tops.size else np.array([max(int(np.argmax(power)), 1)])
@@ -176,44 +196,47 @@ def _peaks(y: Floats) -> list[float]:
     return [2.0 * np.pi * float(top) / count for top in tops[order]]
 
 
-def _start(y: Floats) -> tuple[float, float] | None:
-    """Decay and angular frequency per sample of the best of many first guesses."""
-    best, found = np.inf, None
+def _start(y: Floats) -> tuple[float, float, float] | None:
+    """Strongest of many decaying vibrations: its power, decay and angular frequency per sample."""
+    best, found = 0.0, None
     for peak in _peaks(y):
         merged = max(1, int(2.0 * np.pi / peak / DENSEST))
         z = y[: y.size // merged * merged].reshape(-1, merged).mean(axis=1)[:MOST]
         n = np.arange(z.size)
-        total = float(np.sum((z - z.mean()) ** 2)) * merged
+        total = float(np.sum((z - z.mean()) ** 2))
         for zeta in ZETAS:
-            spread = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2) if zeta > 0.05 else (1.0,)
-            for factor in spread:
+            for factor in FACTORS if zeta > SHARP else (1.0,):
                 omega = factor * peak * merged
                 if omega >= np.pi:
                     continue
                 size = np.exp(-zeta * omega * n)
-                columns = np.stack([size * np.cos(omega * n), size * np.sin(omega * n)], axis=1)
-                columns = np.column_stack([columns, np.ones(n.size)])
-                values = np.linalg.lstsq(columns, z, rcond=None)[0]
-                left = float(np.sum((z - columns @ values) ** 2)) * merged - total
-                if left < best:
-                    best, found = left, (zeta * omega / merged, omega / merged)
+                columns = [size * np.cos(omega * n), size * np.sin(omega * n), np.ones(n.size), n]
+                given = np.stack(columns, axis=1)
+                values = np.linalg.lstsq(given, z, rcond=None)[0]
+                power = merged * (total - float(np.sum((z - given @ values) ** 2)))
+                if power > best:
+                    best, found = power, (power, zeta * omega / merged, omega / merged)
     return found
 
 
-def _fits(y: Floats, start: tuple[float, float]) -> list[_Fit]:
+def _fits(y: Floats, fall: float, about: float, band: tuple[float, float]) -> list[_Fit]:
     """Fits with rising numbers of each rate, until the criterion has risen twice."""
     n = np.arange(y.size, dtype=float)
     fits: list[_Fit] = []
-    level, rates = -start[0] * n, (np.array([start[0]]), np.array([start[1]]))
+    level, rates = -fall * n, (np.array([fall]), np.array([about]))
+    band = max(band[0], (1.0 - BAND) * about), min(band[1], (1.0 + BAND) * about)
     for numbers in NUMBERS:
         if fits:
             before = fits[-1]
             level, floor = before.level, _floor(before)
             periods = before.rates(level[:1])[1][0] * np.sum(level > floor) / (2.0 * np.pi)
-            if numbers * FEWEST_PERIODS > periods or level[0] - floor < 0.1:
+            if numbers * FEWEST_PERIODS > periods or level[0] - floor < LEAST:
                 break
         fit = None
         for _ in range(1 if numbers == 1 else ROUNDS):
+            if fits and level.max() - _floor(fits[-1]) < LEAST:
+                fit = None
+                break
             knots = _knots(level, fits[-1] if fits else None, numbers)
             basis = _basis(level, knots, numbers)
             if fits or fit is not None:
@@ -225,8 +248,8 @@ def _fits(y: Floats, start: tuple[float, float]) -> list[_Fit]:
                     root * basis, root * np.stack([decay, omega], axis=1), rcond=None
                 )[0]
                 rates = fitted[:, 0], fitted[:, 1]
-            mean = np.ones((n.size, 1)) if numbers == 1 else basis
-            fit = _least_squares(y, mean, basis, rates, knots, start[1])
+            mean = np.column_stack([basis, n / n.size])
+            fit = _least_squares(y, mean, basis, rates, knots, band)
             if fit is None:
                 break
             moved, level = float(np.max(np.abs(fit.level - level))), fit.level
@@ -247,7 +270,7 @@ def _least_squares(
     basis: Floats,
     rates: tuple[Floats, Floats],
     knots: Floats,
-    about: float,
+    band: tuple[float, float],
 ) -> _Fit | None:
     """Fit of the mean, amplitude, phase and rates."""
     from scipy.optimize import least_squares
@@ -292,11 +315,13 @@ def _least_squares(
     inverse /= np.outer(scale, scale)
     level = found.x[count] - passed @ found.x[one]
     left = -found.fun
-    variance, freedom, score = _noise(left, about, count, 2 * numbers + 2)
+    variance, freedom, score = _noise(left, band, count, 2 * numbers + 2)
     return _Fit(found.x, inverse, count, left, level, knots, variance, freedom, score)
 
 
-def _noise(left: Floats, about: float, mean: int, numbers: int) -> tuple[float, float, float]:
+def _noise(
+    left: Floats, band: tuple[float, float], mean: int, numbers: int
+) -> tuple[float, float, float]:
     """Variance of a sample, its degrees of freedom, and Akaike's corrected criterion.
 
     What is left in a band about the frequency tells the variance where it is not white.
@@ -307,7 +332,7 @@ def _noise(left: Floats, about: float, mean: int, numbers: int) -> tuple[float, 
     square = float(np.sum(left**2))
     power = 2.0 * np.abs(np.fft.rfft(left)) ** 2 / n
     frequency = 2.0 * np.pi * np.arange(power.size) / n
-    inside = np.abs(frequency - about) < BAND * about
+    inside = (frequency > band[0]) & (frequency < band[1])
     inside[0] = False
     known, within = 2 * int(np.count_nonzero(inside)), float(np.sum(power[inside]))
     whole = square / (n - numbers) + ROUNDING**2

@@ -23,7 +23,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.light_strip import LightMotion, ring
-from jbeamshell.dynamics.ringdown import RingDown, ring_down
+from jbeamshell.dynamics.over_amplitude import RingDown
+from jbeamshell.dynamics.ringdown import ring_down
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.motion import Motion
 from jbeamshell.dynamics.structure.joint import Joint, largest_force
