@@ -31,6 +31,7 @@ SMOOTH = 16.0  # samples of a period from which turning points are met
 NOISY = 1e-4  # noise of a sample over the signal's range, beyond which they are not
 STRANGE = 1e-5  # what a fit leaves over that range, from which they are better
 CLEARLY = 10.0  # that over the noise
+STILL = 1e-12  # range of a signal over its values, up to which it never changes
 EDGES = 2.0  # time that a filter disturbs at its ends, times its width
 EVIDENCE = 8.0  # power of a vibration over the noise and the log of the samples, to be one
 OTHER = 0.05  # another vibration over the first one, from which it is doubted
@@ -103,10 +104,10 @@ def ring_down(
     even = bool(np.all(np.isfinite(signal)) and step > 0.0 and np.all(off < UNEVEN * step))
     require("time", times[:3], even, SIGNAL.format(8))
     require_choice("kind", kind, KINDS)
-    moves = float(np.ptp(signal)) > 1e-12 * float(np.max(np.abs(signal)))
-    require("values", float(signal[0]), moves, "never changes: give the signal of a vibration")
+    first, moves = float(signal[0]), float(np.ptp(signal)) > STILL * float(np.max(np.abs(signal)))
     if band is not None:
         signal = _within(signal, step, band)
+    require("values", first, moves, "never changes: give the signal of a vibration")
     known = slice(None) if band is None else _undisturbed(times, band)
     if method in ("auto", "least-squares"):
         limits = band or (0.0, np.inf)
@@ -118,21 +119,31 @@ def ring_down(
         else:
             result = _told(fitted, step, limits)
     if method in ("turning-points", "hilbert"):
-        at, reached = extrema(times, signal)
-        fix = "must be at least 5: follow the motion for longer"
-        require("extrema of values", at.size, at.size >= 5, fix)
-        if method == "turning-points":
-            points = from_swings(at, reached)
-        else:
-            share = 1.0 if band is None else 2.0 * step * (band[1] - band[0])
-            period = 2.0 * float(np.mean(np.diff(at)))
-            points = from_analytic_signal(times, signal, period, smoothing, share)
+        points = _points(times, signal, method, smoothing, band)
         result = _measured(points, method)
     for doubt in result.doubts:
         warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=2)
     return dataclasses.replace(
         result, amplitude=result.amplitude / result.omega ** KINDS.index(kind)
     )
+
+
+def _points(
+    times: Floats,
+    signal: Floats,
+    method: str,
+    smoothing: float,
+    band: tuple[float, float] | None,
+) -> Envelope:
+    """Envelope by turning points or by the analytic signal."""
+    at, reached = extrema(times, signal)
+    fix = "must be at least 5: follow the motion for longer"
+    require("extrema of values", at.size, at.size >= 5, fix)
+    if method == "turning-points":
+        return from_swings(at, reached)
+    share = 1.0 if band is None else 2.0 * float(times[1] - times[0]) * (band[1] - band[0])
+    period = 2.0 * float(np.mean(np.diff(at)))
+    return from_analytic_signal(times, signal, period, smoothing, share)
 
 
 def _undisturbed(times: Floats, band: tuple[float, float]) -> slice:
@@ -144,10 +155,10 @@ def _undisturbed(times: Floats, band: tuple[float, float]) -> slice:
 def _is_strange(fitted: Decay, step: float, size: float) -> bool:
     """True for a dense motion without noise that no slowly changing vibration describes."""
     dense = 2.0 * np.pi / (fitted.omega[-1] * step) > SMOOTH
-    if _has_another(fitted):
-        return False
     strange = fitted.left > max(STRANGE * size, CLEARLY * fitted.quiet)
-    return bool(dense and strange and fitted.quiet < NOISY * size)
+    octave = abs(np.log2(max(fitted.other_omega, 1e-300) / fitted.omega[-1])) > 1.0
+    several = octave and _has_another(fitted)
+    return bool(dense and strange and fitted.quiet < NOISY * size and not several)
 
 
 def _told(fitted: Decay | None, step: float, band: tuple[float, float]) -> RingDown:
@@ -228,10 +239,10 @@ def _doubts_of_record(fitted: Decay, step: float, band: tuple[float, float]) -> 
         between = float(np.sqrt(omega * other))
         top = min(2.0 * omega, 0.9 * np.pi / step)
         ends = (between, top) if other < omega else (0.5 * omega, between)
-        band = ", ".join(f"{end / (2.0 * np.pi):.3g}" for end in ends)
+        words = ", ".join(f"{end / (2.0 * np.pi):.3g}" for end in ends)
         doubts.append(
             f"another vibration of frequency {other / (2.0 * np.pi):.4g} is left, "
-            f"{100.0 * fitted.other:.2g} % of the one that was fitted: give band=({band})"
+            f"{100.0 * fitted.other:.2g} % of the one that was fitted: give band=({words})"
         )
     if omega * step > 2.0 * np.pi / COARSE:
         doubts.append(

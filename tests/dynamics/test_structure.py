@@ -322,7 +322,7 @@ REFUSED = {
     "amplitudes": (lambda: modal_curve(chain(), [0.2, 0.1]), "amplitudes"),
     "still": (lambda: dynamics.shake(chain(), 1.0), "nothing happens"),
     "start": (lambda: dynamics.shake(chain(), 1.0, velocity=[1.0]), "velocity"),
-    "silence": (lambda: dynamics.ring_down(np.arange(9.0), np.zeros(9)), "extrema of values"),
+    "silence": (lambda: dynamics.ring_down(np.arange(9.0), np.zeros(9)), "never changes"),
     "uneven": (lambda: dynamics.ring_down(np.arange(9.0) ** 2, np.ones(9)), "evenly"),
 }
 
