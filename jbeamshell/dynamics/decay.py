@@ -30,6 +30,7 @@ VISIBLE = 2.0  # smallest amplitude that tells a rate, over the noise of one cyc
 ROUNDING = 1e-9  # of the signal, below which nothing is told
 BAND = 0.5  # half width of the band about the frequency that tells the noise, over the frequency
 ODDS = 1e-3  # of white noise, below which what is left is not taken as white
+EVIDENCE = 8.0  # power of a vibration over the noise and the log of the samples, to be one
 LEAST = 0.1  # range of log a that may tell how rates depend on it
 FREE = 4  # degrees of freedom that tell a variance
 LEVEL = 0.95  # of the intervals
@@ -149,10 +150,14 @@ def fit_decay(
         if best.numbers > 1:
             off = np.hypot(off, beside - value) + np.abs(value) * order
         offs.append(off)
+    # A mean of neighbours is smaller than the vibration, and the more so, the higher its frequency.
     complex_rate = -decay + 1j * omega
     within = (np.arange(merged) - 0.5 * (merged - 1)) / merged
     shrunk = np.abs(np.exp(complex_rate[:, None] * within).mean(axis=1))
-    rest = _start(best.left)
+    rest, quiet = _start(best.left), _quiet(best.left)
+    seen = rest is not None and rest[0] > evidence_needed(y.size) * quiet
+    if at.size > 1:
+        decay = decay + np.gradient(np.log(shrunk), at)
     told = float(np.sum((y - y.mean()) ** 2) - np.sum(best.left**2))
     return Decay(
         time[0] + step * at,
@@ -163,13 +168,18 @@ def fit_decay(
         offs[1] / step,
         best.numbers,
         size * float(np.sqrt(best.variance * merged)),
-        size * float(np.sqrt(_quiet(best.left) * merged)),
+        size * float(np.sqrt(quiet * merged)),
         size * float(np.max(np.abs(best.left))),
-        float(np.sqrt(max(rest[0] if rest else 0.0, 0.0) / max(told, ROUNDING**2))),
+        float(np.sqrt(rest[0] / max(told, ROUNDING**2))) if rest and seen else 0.0,
         rest[2] / step if rest else 0.0,
         told / best.variance,
         y.size,
     )
+
+
+def evidence_needed(samples: int) -> float:
+    """Power that a vibration among some samples must have over the noise of one, to be one."""
+    return EVIDENCE * float(np.log(samples))
 
 
 def _begin(y: Floats) -> int:

@@ -82,12 +82,14 @@ def from_swings(at: Floats, reached: Floats) -> Envelope:
     # The mean over a swing forth and one back cancels the difference between the two.
     decrement = np.log(swings[:-2] / swings[2:]) / (2.0 * np.pi)
     frequency = 1.0 / (0.5 * (at[2:-1] + at[3:] - at[:-3] - at[1:-2]))
+    # A vibration turns atan(zeta) before its phase does, and zeta changes by so much in a swing.
+    turned = np.abs(np.gradient(decrement)) / np.pi if decrement.size > 1 else np.abs(decrement)
     return Envelope(
         0.5 * (at[1:-2] + at[2:-1]),
         swings[1:-1],
         frequency,
         decrement,
-        _scatter(frequency),
+        _scatter(frequency) + frequency * turned,
         _scatter(decrement) + np.abs(decrement) * (2.0 * np.pi * decrement) ** 2 / 24.0,
     )
 

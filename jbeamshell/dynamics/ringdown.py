@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import require, require_choice
 from jbeamshell.common.errors import DoubtfulWarning, InputError
-from jbeamshell.dynamics.decay import Decay, fit_decay
+from jbeamshell.dynamics.decay import Decay, evidence_needed, fit_decay
 from jbeamshell.dynamics.envelopes import Envelope, extrema, from_analytic_signal, from_swings
 from jbeamshell.dynamics.over_amplitude import RingDown
 
@@ -33,7 +33,6 @@ STRANGE = 1e-5  # what a fit leaves over that range, from which they are better
 CLEARLY = 10.0  # that over the noise
 STILL = 1e-12  # range of a signal over its values, up to which it never changes
 EDGES = 2.0  # time that a filter disturbs at its ends, times its width
-EVIDENCE = 8.0  # power of a vibration over the noise and the log of the samples, to be one
 OTHER = 0.05  # another vibration over the first one, from which it is doubted
 HARMONICS = 0.15  # distance from a multiple of the frequency, over it, that makes another vibration
 UNKNOWN = 0.2  # half width of an interval over its value, beyond which there is no frequency
@@ -163,7 +162,7 @@ def _is_strange(fitted: Decay, step: float, size: float) -> bool:
 
 def _told(fitted: Decay | None, step: float, band: tuple[float, float]) -> RingDown:
     """Ring-down by the fit of a decaying vibration, with its doubts."""
-    if fitted is None or fitted.evidence < EVIDENCE * np.log(fitted.samples):
+    if fitted is None or fitted.evidence < evidence_needed(fitted.samples):
         raise InputError(f"values: {NOTHING}")
     off = fitted.omega_off / fitted.omega
     known = (off < UNKNOWN) & (fitted.decay < fitted.omega)
