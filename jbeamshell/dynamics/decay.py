@@ -133,7 +133,8 @@ def fit_decay(
     scores = np.array([fit.score for fit in fits])
     scores[1:] += CONSTANT
     place = int(np.argmin(scores))
-    best, other = fits[place], fits[place + 1 if place + 1 < len(fits) else max(place - 1, 0)]
+    place = min(place + 1, len(fits) - 1) if place else 0
+    best, other = fits[place], fits[max(place - 1, 0)]
     at = _times(best)
     if at.size < 1:
         return None
