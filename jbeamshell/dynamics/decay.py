@@ -85,7 +85,9 @@ class _Fit(NamedTuple):
     knots: Floats
     variance: float
     freedom: float
-    score: float
+    near: float
+    whole: float
+    white: bool
 
     @property
     def numbers(self) -> int:
@@ -130,9 +132,7 @@ def fit_decay(
     fits = _fits(y, merged * start[1], merged * start[2], band)
     if not fits:
         return None
-    scores = np.array([fit.score for fit in fits])
-    scores[1:] += CONSTANT
-    place = int(np.argmin(scores))
+    place = int(np.argmin(_scores(fits)))
     place = min(place + 1, len(fits) - 1) if place else 0
     best, other = fits[place], fits[max(place - 1, 0)]
     at = _times(best)
@@ -269,8 +269,7 @@ def _fits(y: Floats, fall: float, about: float, band: tuple[float, float]) -> li
         if fit is None or fit.rates(fit.level)[1].min() <= 0.0:
             break
         fits.append(fit)
-        scores = [each.score for each in fits]
-        if len(fits) - 1 - int(np.argmin(scores)) >= 2:
+        if len(fits) - 1 - int(np.argmin(_scores(fits))) >= 2:
             break
     return fits
 
@@ -326,14 +325,14 @@ def _least_squares(
     inverse /= np.outer(scale, scale)
     level = found.x[count] - passed @ found.x[one]
     left = -found.fun
-    variance, freedom, score = _noise(left, band, count, 2 * numbers + 2)
-    return _Fit(found.x, inverse, count, left, level, knots, variance, freedom, score)
+    told = _noise(left, band, count, 2 * numbers + 2)
+    return _Fit(found.x, inverse, count, left, level, knots, *told)
 
 
 def _noise(
     left: Floats, band: tuple[float, float], mean: int, numbers: int
-) -> tuple[float, float, float]:
-    """Variance of a sample, its degrees of freedom, and Akaike's corrected criterion.
+) -> tuple[float, float, float, float, bool]:
+    """Variance of a sample, its degrees of freedom, criteria in the band and in all, if white.
 
     What is left in a band about the frequency tells the variance where it is not white.
     """
@@ -349,12 +348,19 @@ def _noise(
     whole = square / (n - numbers) + ROUNDING**2
     free, rest = known - numbers, n - known
     if free < FREE or rest < FREE:
-        return whole, n - numbers, np.inf
+        return whole, n - numbers, np.inf, _criterion(whole, n, numbers), True
     near, far = within / free + ROUNDING**2, max(square - within, 0.0) / rest + ROUNDING**2
-    score = _criterion(near, known, numbers)
+    scores = _criterion(near, known, numbers), _criterion(whole, n, numbers)
     if float(f.sf(max(near / far, far / near), free, rest)) < ODDS:
-        return near, free, score
-    return whole, n - numbers, score
+        return near, free, *scores, False
+    return whole, n - numbers, *scores, True
+
+
+def _scores(fits: list[_Fit]) -> Floats:
+    """Criterion of each fit: of all that is left where it is white, and else of the band."""
+    scores = np.array([fit.whole if fits[-1].white else fit.near for fit in fits])
+    scores[1:] += CONSTANT
+    return scores
 
 
 def _criterion(variance: float, count: int, numbers: int) -> float:
