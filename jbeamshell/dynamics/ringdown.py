@@ -27,10 +27,12 @@ SIGNAL = "give as many evenly spaced times as finite values, at least {} of both
 KINDS = ("displacement", "velocity", "acceleration")  # powers of i omega
 ORDER = 3  # of the filter of a band
 UNEVEN = 0.2  # largest shift of a time from an even one, in steps
+TURNS = 8  # least number of turning points that are met of themselves
 SMOOTH = 16.0  # samples of a period from which turning points are met
 NOISY = 1e-4  # noise of a sample over the signal's range, beyond which they are not
 STRANGE = 1e-4  # what a fit leaves over that range, from which they are better
 CLEARLY = 10.0  # that over the noise
+FEWEST = 5  # turning points, of which two points of a ring-down come
 STILL = 1e-12  # range of a signal over its values, up to which it never changes
 EDGES = 2.0  # time that a filter disturbs at its ends, times its width
 OTHER = 0.05  # another vibration over the first one, from which it is doubted
@@ -79,7 +81,7 @@ def ring_down(
     ------
     InputError
         for a signal that is not finite or evenly spaced, is constant, shows no decaying vibration
-        above its noise, or has fewer than four extrema where they are measured; for a band that the
+        above its noise, or has fewer than five extrema where they are measured; for a band that the
         times do not resolve
 
     Warns
@@ -112,7 +114,7 @@ def ring_down(
         limits = band or (0.0, np.inf)
         angular = 2.0 * np.pi * limits[0], 2.0 * np.pi * limits[1]
         fitted = fit_decay(times[known], signal[known], angular)
-        free = method == "auto" and fitted is not None and band is None
+        free = method == "auto" and band is None and extrema(times, signal)[0].size >= TURNS
         if free and fitted and _is_strange(fitted, step, float(np.ptp(signal))):
             method = "turning-points"
         else:
@@ -136,8 +138,8 @@ def _points(
 ) -> Envelope:
     """Envelope by turning points or by the analytic signal."""
     at, reached = extrema(times, signal)
-    fix = "must be at least 5: follow the motion for longer"
-    require("extrema of values", at.size, at.size >= 5, fix)
+    fix = f"must be at least {FEWEST}: follow the motion for longer"
+    require("extrema of values", at.size, at.size >= FEWEST, fix)
     if method == "turning-points":
         return from_swings(at, reached)
     share = 1.0 if band is None else 2.0 * float(times[1] - times[0]) * (band[1] - band[0])
@@ -215,6 +217,8 @@ def _doubts(found: RingDown) -> tuple[str, ...]:
         return ("the vibration grows: give the part of the record in which it decays",)
     if np.mean(off > np.maximum(VAGUE * damping, SMALL)) <= 0.5:
         return ()
+    if not np.all(np.isfinite(off)):
+        return ("too few swings tell no error: follow the motion for longer",)
     row = int(np.argsort(off / np.maximum(damping, 1e-300))[off.size // 2])
     return (
         f"the damping lies between {ends[row, 0]:.3g} and {ends[row, 1]:.3g} as far as the record "
