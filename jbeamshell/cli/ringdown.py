@@ -8,13 +8,21 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jbeamshell.cli.arguments import add_folder, add_json, add_scene, add_settings, scene_of
+from jbeamshell.cli.arguments import (
+    add_folder,
+    add_json,
+    add_scene,
+    add_settings,
+    assignments,
+    scene_of,
+)
 from jbeamshell.cli.terminal import doubts_in_lines, put, say, say_written, warn
 from jbeamshell.common.errors import InputError
 
 if TYPE_CHECKING:
     from jbeamshell.scene.scene import Scene
 
+SMALL = 0.05  # part of gross slip below which the default amplitude is no pull of a ring-down
 ROWS = 12  # rows of the printed table, about
 
 
@@ -78,11 +86,12 @@ def run(options: argparse.Namespace) -> int:
         from jbeamshell.plotting.folder import check_folder
 
         folder = check_folder(options.out)
+    chosen = options.scene is not None or "load.amplitude" in assignments(options.set)
     say("compiling ...")
     with doubts_in_lines():
         study = let_go(
             scene,
-            _pull(scene) if options.force is None else options.force,
+            _pull(scene, chosen) if options.force is None else options.force,
             payload=options.payload,
             inertia=Inertia(options.density),
             cycles=options.cycles,
@@ -101,22 +110,27 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _pull(scene: Scene) -> float:
-    """Pull of a scene: its amplitude, or half of gross slip where that is no force below it."""
+def _pull(scene: Scene, chosen: bool) -> float:
+    """Pull of a scene: its amplitude, or half of gross slip.
+
+    The latter is taken where the amplitude is no force below gross slip, or where nobody chose it
+    and it is a small part of gross slip.
+    """
     from jbeamshell.dynamics.steady_cycles import gross_slip
     from jbeamshell.dynamics.structure.joint import largest_force
 
-    try:
+    limit = float(gross_slip(scene))
+    with contextlib.suppress(InputError):
+        force = float(largest_force(scene))
+        if chosen or not SMALL * limit > force:
+            return force
+    if not 0.0 < limit < math.inf:
         return float(largest_force(scene))
-    except InputError:
-        limit = float(gross_slip(scene))
-        if not 0.0 < limit < math.inf:
-            raise
-        warn(
-            f"load.amplitude is no force below gross slip, {limit:.4g}: the mass is pulled with "
-            f"half of it; --force takes another"
-        )
-        return 0.5 * limit
+    warn(
+        f"load.amplitude is no force between {SMALL:g} and 1 of gross slip, {limit:.4g}: the mass "
+        "is pulled with half of it; --force takes another"
+    )
+    return 0.5 * limit
 
 
 def _table(figures: dict[str, Any]) -> str:
