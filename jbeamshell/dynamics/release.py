@@ -32,12 +32,16 @@ from jbeamshell.dynamics.structure.modal import ModalCurve
 from jbeamshell.scene.scene import Scene
 
 LIGHT = 0.005  # largest m_1/m at which the strip's inertia is left out by itself
-NO_NETWORK = "the rung plane does not cover this scene, so that it has no network: take True"
-NOT_NESTED = "slip zones are not nested, so that the strip is no network of sliders: take True"
-LAP = "follows no lap joint in time steps: take None, for its sliders without its own mass"
+NO_NETWORK = (
+    "the rung plane does not cover this scene, so that it has no network: take True (--strip whole)"
+)
+NOT_NESTED = "slip zones are not nested, so that it is no network of sliders: take True (--strip whole)"
+LAP = "follows no lap joint in time steps: take None (--strip auto), for its sliders"
 DAMPED = "is for time steps, and a lap joint has none: leave it out"
 FEW = "shows too little of the motion: take more cycles, or a smaller force or a heavier payload"
-NO_INERTIA = "has no inertia here: take whole=False, a heavier payload, or another rung"
+NO_INERTIA = (
+    "has no inertia here: take whole=False (--strip sliders), a heavier payload, or another rung"
+)
 HEAVY = 50.0  # default payload, over the mass of the strip
 RELEASE = 0.1  # duration of the release in periods, long enough to excite the strip's waves little
 SAMPLES_PER_CYCLE = 50

@@ -165,6 +165,9 @@ class Joint(eqx.Module):
         >>> joint.dissipation(joint.displacement[-1])  # energy per cycle
         """
         force = largest_force(scene, force)
+        if scene.load.control != "force":
+            load = dataclasses.replace(scene.load, control="force", amplitude=as_leaf(force))
+            scene = dataclasses.replace(scene, load=load)
         require_number("width", width)
         require_choice("by", by, (None, *BY))
         capacity = width * gross_slip(scene)
