@@ -35,7 +35,9 @@ LIGHT = 0.005  # largest m_1/m at which the strip's inertia is left out by itsel
 NO_NETWORK = (
     "the rung plane does not cover this scene, so that it has no network: take True (--strip whole)"
 )
-NOT_NESTED = "slip zones are not nested, so that it is no network of sliders: take True (--strip whole)"
+NOT_NESTED = (
+    "slip zones are not nested, so that it is no network of sliders: take True (--strip whole)"
+)
 LAP = "follows no lap joint in time steps: take None (--strip auto), for its sliders"
 DAMPED = "is for time steps, and a lap joint has none: leave it out"
 FEW = "shows too little of the motion: take more cycles, or a smaller force or a heavier payload"

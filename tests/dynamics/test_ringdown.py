@@ -111,10 +111,10 @@ def test_little_noise_leaves_frequency_and_damping():
 
 
 def test_intervals_are_no_wider_than_the_noise_makes_them():
-    """The Cramer-Rao bound of a long decay: the rate's variance is 8 s^2 sigma^3 h/A^2."""
+    """The Cramer-Rao bound of a long decay: the rate's variance is 16 s^2 sigma^3 h/A^2."""
     noise = 0.01
     found = ring_down(TIME, PLAIN + noise * np.random.default_rng(3).standard_normal(TIME.size))
-    rate = np.sqrt(8.0 * noise**2 * 0.1**3 * (TIME[1] - TIME[0]))
+    rate = np.sqrt(16.0 * noise**2 * 0.1**3 * (TIME[1] - TIME[0]))
     width = np.ptp(found.damping_interval, axis=1) * 10.0
     assert np.allclose(width, 2.0 * 1.96 * rate, rtol=0.15)
 

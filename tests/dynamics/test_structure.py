@@ -335,6 +335,13 @@ def test_bad_input_is_one_clear_line(name):
     assert "\n" not in str(refusal.value)
 
 
+def test_a_displacement_driven_scene_gives_the_joint_of_its_forces():
+    driven = PLANE.replace({"load.control": "displacement", "load.amplitude": 1e-5})
+    one, other = Joint.of(PLANE, 1.2), Joint.of(driven, 1.2)
+    assert np.allclose(one.displacement, other.displacement, rtol=1e-12)
+    assert np.allclose(one.force, other.force, rtol=1e-12)
+
+
 def test_pull_and_push_each_have_their_backbone():
     joint = Joint.of(PLANE, 1.2, width=3.0)
     assert joint.sides is not None
