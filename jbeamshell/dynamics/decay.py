@@ -31,6 +31,7 @@ ROUNDING = 1e-9  # of the signal, below which nothing is told
 BAND = 0.5  # half width of the band about the frequency that tells the noise, over the frequency
 ODDS = 1e-3  # of white noise, below which what is left is not taken as white
 EVIDENCE = 8.0  # power of a vibration over the noise and the log of the samples, to be one
+HIGHEST = 50.0  # log a that a search may meet
 LEAST = 0.1  # range of log a that may tell how rates depend on it
 FREE = 4  # degrees of freedom that tell a variance
 LEVEL = 0.95  # of the intervals
@@ -258,7 +259,10 @@ def _fits(y: Floats, fall: float, about: float, band: tuple[float, float]) -> li
                 fitted = np.linalg.lstsq(
                     root * basis, root * np.stack([decay, omega], axis=1), rcond=None
                 )[0]
-                rates = fitted[:, 0], fitted[:, 1]
+                rates = (
+                    np.clip(fitted[:, 0], decay.min(), decay.max()),
+                    np.clip(fitted[:, 1], omega.min(), omega.max()),
+                )
             mean = np.column_stack([basis, n / n.size])
             fit = _least_squares(y, mean, basis, rates, knots, band)
             if fit is None:
@@ -288,7 +292,7 @@ def _least_squares(
     count, numbers = mean.shape[1], basis.shape[1]
     passed = np.zeros_like(basis)
     passed[1:] = np.cumsum(0.5 * (basis[1:] + basis[:-1]), axis=0)
-    size, angle = np.exp(-passed @ rates[0]), passed @ rates[1]
+    size, angle = np.exp(np.minimum(-passed @ rates[0], HIGHEST)), passed @ rates[1]
     columns = np.column_stack([mean, size * np.cos(angle), size * np.sin(angle)])
     first = np.linalg.lstsq(columns, y, rcond=None)[0]
     c, s = first[-2:]
@@ -297,7 +301,7 @@ def _least_squares(
     one, two = slice(count + 2, count + 2 + numbers), slice(count + 2 + numbers, None)
 
     def parts(values: Floats) -> tuple[Floats, Floats]:
-        level = np.minimum(values[count] - passed @ values[one], 50.0)
+        level = np.minimum(values[count] - passed @ values[one], HIGHEST)
         return np.exp(level), values[count + 1] + passed @ values[two]
 
     def off(values: Floats) -> Floats:
