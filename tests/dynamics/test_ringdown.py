@@ -63,8 +63,11 @@ def nonlinear(random):
 
 
 def covered(draw, count, seed):
-    """Parts of the points whose intervals hold zeta and omega, and how many were refused."""
-    random, held, refused = np.random.default_rng(seed), [], 0
+    """Parts of the points whose intervals hold zeta and omega, width, and number of refusals.
+
+    The width is the median of the half widths of zeta over zeta.
+    """
+    random, held, wide, refused = np.random.default_rng(seed), [], [], 0
     for _ in range(count):
         time, values, zeta, omega = draw(random)
         try:
@@ -76,27 +79,31 @@ def covered(draw, count, seed):
             continue
         truths = zeta(found.amplitude), omega(found.amplitude)
         ends = found.damping_interval, found.omega_interval
+        wide.append(np.median(0.5 * np.ptp(ends[0], axis=1) / truths[0]))
         held.append(
             [
                 np.mean((low <= truth) & (truth <= high))
                 for truth, (low, high) in zip(truths, (each.T for each in ends), strict=True)
             ]
         )
-    return np.mean(held, axis=0), refused
+    return np.mean(held, axis=0), np.median(wide), refused
 
 
 @pytest.mark.parametrize(("draw", "count"), [(linear, 60), (nonlinear, 20)])
 def test_planted_values_lie_in_the_stated_intervals(draw, count):
-    part, refused = covered(draw, count, seed=1)
+    part, wide, refused = covered(draw, count, seed=1)
     assert np.all(part > 0.88)
+    assert wide < 0.03
     assert refused == 0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("draw", [linear, nonlinear])
-def test_planted_values_lie_in_the_stated_intervals_of_200(draw):
-    part, refused = covered(draw, 200, seed=2)
-    assert np.all((part > 0.9) & (part < 0.99))
+@pytest.mark.parametrize(("draw", "most"), [(linear, 0.99), (nonlinear, 1.0)])
+def test_planted_values_lie_in_the_stated_intervals_of_200(draw, most):
+    """Rates that depend on the amplitude are stated with what the splines may leave out."""
+    part, wide, refused = covered(draw, 200, seed=2)
+    assert np.all((part > 0.9) & (part < most))
+    assert wide < 0.03
     assert refused <= 4
 
 
