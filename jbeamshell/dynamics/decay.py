@@ -6,7 +6,8 @@ The signal is x(t) = c(t) + a(t) cos psi(t) with a slow mean c, and
 
 the slow flow of a lightly damped mode (Nayfeh and Mook 1979).  Both rates are splines of log a,
 with as many numbers as the data ask for by Akaike's corrected criterion, from constants upwards.
-Noise is taken from what is left about the frequency of the vibration, so that harmonics and drifts
+Rates that depend on the amplitude are stated one step richer than the criterion asks, because what
+it leaves out is as large as the error.  Noise is taken from what is left about the frequency of the vibration, so that harmonics and drifts
 do not count.
 """
 
@@ -49,7 +50,6 @@ class Decay(NamedTuple):
     time, amplitude, decay, omega : (k,) times, amplitudes, rates of decay and angular frequencies
     decay_off, omega_off : (k,) half widths of their 95 % intervals
     numbers : of each rate; 1 where they do not depend on the amplitude
-    noise : standard deviation of a sample
     quiet : standard deviation of a sample's white noise, without what the fit cannot describe
     left : largest that the fit leaves of the signal
     other : strongest vibration in what the fit leaves, its amplitude over that of the fitted one,
@@ -66,7 +66,6 @@ class Decay(NamedTuple):
     decay_off: Floats
     omega_off: Floats
     numbers: int
-    noise: float
     quiet: float
     left: float
     other: float
@@ -169,7 +168,6 @@ def fit_decay(
         offs[0] / step,
         offs[1] / step,
         best.numbers,
-        size * float(np.sqrt(best.variance * merged)),
         size * float(np.sqrt(quiet * merged)),
         size * float(np.max(np.abs(best.left))),
         float(np.sqrt(rest[0] / max(told, ROUNDING**2))) if rest and seen else 0.0,

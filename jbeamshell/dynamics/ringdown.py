@@ -101,9 +101,11 @@ def ring_down(
     paired = times.ndim == 1 and times.shape == signal.shape and times.size >= 8
     require("values", signal.shape, paired, SIGNAL.format(8))
     step = float(times[-1] - times[0]) / (times.size - 1)
-    off = np.abs(times - (times[0] + step * np.arange(times.size)))
+    meant = times[0] + step * np.arange(times.size)  # files may hold rounded times
+    off = np.abs(times - meant)
     even = bool(np.all(np.isfinite(signal)) and step > 0.0 and np.all(off < UNEVEN * step))
     require("time", times[:3], even, SIGNAL.format(8))
+    times = meant
     require_choice("kind", kind, KINDS)
     first, moves = float(signal[0]), float(np.ptp(signal)) > STILL * float(np.max(np.abs(signal)))
     if band is not None:

@@ -135,6 +135,12 @@ def test_lead_in_drift_and_steps_of_a_converter_do_no_harm():
         assert np.allclose(found.damping, 0.01, rtol=3e-3)
 
 
+def test_rounded_times_do_no_harm():
+    even = 0.0033 * np.arange(6000)
+    found = ring_down(np.round(even, 3), np.exp(-0.1 * even) * np.cos(10.0 * even))
+    assert np.allclose(found.frequency, 10.0 / (2.0 * np.pi), rtol=1e-4)
+
+
 @pytest.mark.doubtful("another vibration")
 def test_another_vibration_is_doubted_and_the_band_given_mends_it():
     both = PLAIN + 0.4 * np.exp(-0.2 * TIME) * np.cos(37.0 * TIME)
