@@ -7,8 +7,8 @@ The signal is x(t) = c(t) + a(t) cos psi(t) with a slow mean c, and
 the slow flow of a lightly damped mode (Nayfeh and Mook 1979).  Both rates are splines of log a,
 with as many numbers as the data ask for by Akaike's corrected criterion, from constants upwards.
 Rates that depend on the amplitude are stated one step richer than the criterion asks, because what
-it leaves out is as large as the error.  Noise is taken from what is left about the frequency of the vibration, so that harmonics and drifts
-do not count.
+it leaves out is as large as the error.  Noise is taken from what is left; where that is not white,
+about the frequency of the vibration, so that harmonics and drifts do not count.
 """
 
 from __future__ import annotations

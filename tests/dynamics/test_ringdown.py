@@ -139,6 +139,9 @@ def test_rounded_times_do_no_harm():
     even = 0.0033 * np.arange(6000)
     found = ring_down(np.round(even, 3), np.exp(-0.1 * even) * np.cos(10.0 * even))
     assert np.allclose(found.frequency, 10.0 / (2.0 * np.pi), rtol=1e-4)
+    kept = np.arange(6000) != 3000
+    with pytest.raises(jb.InputError, match="evenly spaced"):
+        ring_down(even[kept], np.cos(10.0 * even[kept]))
 
 
 @pytest.mark.doubtful("another vibration")
