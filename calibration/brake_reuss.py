@@ -68,8 +68,7 @@ def extracted(folder: Path) -> dict[str, Any]:
         time, acceleration, method="hilbert", smoothing=WINDOW, band=BAND, kind="acceleration"
     )
     inside = (found.time > SPAN[0]) & (found.time < SPAN[1])
-    cut = dynamics.RingDown(*(column[inside] for column in found))
-    frequency, damping = cut.modal_curves(POINTS)
+    frequency, damping = found.part(inside).modal_curves(POINTS)
     sweeps = loadmat(folder / "ForcedFrequencyResponses.mat")["FRdata"][0, 0]
     resonances = {
         name: [at_resonance(*columns(sweep)) for sweep in sweeps[name].ravel()]

@@ -4,13 +4,25 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from jbeamshell.cli.arguments import add_folder, add_json, add_scene, add_settings, scene_of
-from jbeamshell.cli.terminal import doubts_in_lines, put, say, say_written
+from jbeamshell.cli.arguments import (
+    add_folder,
+    add_json,
+    add_scene,
+    add_settings,
+    assignments,
+    scene_of,
+)
+from jbeamshell.cli.terminal import doubts_in_lines, put, say, say_written, warn
 from jbeamshell.common.errors import InputError
 
+if TYPE_CHECKING:
+    from jbeamshell.scene.scene import Scene
+
+SMALL = 0.05  # part of gross slip below which the default amplitude is no pull of a ring-down
 ROWS = 12  # rows of the printed table, about
 
 
@@ -27,7 +39,8 @@ def add_to(commands: Any) -> None:
         "--force",
         type=float,
         metavar="F",
-        help="pull before it is let go, force per width (default: load.amplitude)",
+        help="pull before it is let go, force per width (default: load.amplitude, or half of gross "
+        "slip where that is no force below it)",
     )
     parser.add_argument(
         "--payload",
@@ -73,26 +86,51 @@ def run(options: argparse.Namespace) -> int:
         from jbeamshell.plotting.folder import check_folder
 
         folder = check_folder(options.out)
+    chosen = options.scene is not None or "load.amplitude" in assignments(options.set)
     say("compiling ...")
     with doubts_in_lines():
         study = let_go(
             scene,
-            options.force,
+            _pull(scene, chosen) if options.force is None else options.force,
             payload=options.payload,
             inertia=Inertia(options.density),
             cycles=options.cycles,
             whole={"auto": None, "whole": True, "sliders": False}[options.strip],
         )
     if study.light:
+        other = "" if scene.member.support != "none" else " (--strip whole follows it)"
         say(
             "the strip is plane elasticity's network of sliders: its own mass, which adds "
-            f"{study.share:.2g} of the payload, is left out (--strip whole follows it)"
+            f"{study.share:.2g} of the payload, is left out{other}"
         )
     figures = study.figures()
     put(files.as_json(figures) if options.json else f"{_table(figures)}\n")
     if folder is not None:
         say_written(_write(folder, study, figures))
     return 0
+
+
+def _pull(scene: Scene, chosen: bool) -> float:
+    """Pull of a scene: its amplitude, or half of gross slip.
+
+    The latter is taken where the amplitude is no force below gross slip, or where nobody chose it
+    and it is a small part of gross slip.
+    """
+    from jbeamshell.dynamics.steady_cycles import gross_slip
+    from jbeamshell.dynamics.structure.joint import largest_force
+
+    limit = float(gross_slip(scene))
+    with contextlib.suppress(InputError):
+        force = float(largest_force(scene))
+        if chosen or not SMALL * limit > force:
+            return force
+    if not 0.0 < limit < math.inf:
+        return float(largest_force(scene))
+    warn(
+        f"load.amplitude is no force between {SMALL:g} and 1 of gross slip, {limit:.4g}: the mass "
+        "is pulled with half of it; --force takes another"
+    )
+    return 0.5 * limit
 
 
 def _table(figures: dict[str, Any]) -> str:

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
+from jbeamshell.common.checks import require
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.branches import ContactState, Factors, factorise, follow, path, pressed
@@ -25,6 +26,7 @@ from jbeamshell.condensed.drives import with_springs
 from jbeamshell.condensed.strip import condensed, moving_volume, spring_stiffness
 from jbeamshell.scene.scene import Scene
 
+STUCK = "nothing slips under it, so that it has no sliders: take more of gross slip, mu F_N L"
 SOFTENS = 1e-9  # of the first compliance: a corner of a backbone where it rises by less is none
 
 
@@ -110,10 +112,16 @@ class Network(eqx.Module):
         ----------
         scene : scene on a condensed rung, for the mass that moves
         displacement, force : (k,) points of the backbone, see `in_series`
+
+        Raises
+        ------
+        InputError
+            for a backbone along which nothing slips
         """
         moving = jax.jit(lambda scene: moving_volume(condensed(scene, scene.model.nodes)))
         slopes = jnp.diff(displacement, prepend=0.0) / jnp.diff(force, prepend=0.0)
         kept = np.append(np.diff(np.asarray(slopes)) > SOFTENS * slopes[0], True)
+        require("force", float(force[-1]), bool(np.sum(kept) > 1), STUCK)
         return cls.in_series(displacement[kept], force[kept], moving(scene))
 
     @classmethod

@@ -2,8 +2,9 @@ from .four_parameters import (
     FourParameters as FourParameters,
     four_parameters as four_parameters,
 )
+from .over_amplitude import RingDown as RingDown
 from .release import RingDownStudy as RingDownStudy, let_go as let_go
-from .ringdown import RingDown as RingDown, ring_down as ring_down
+from .ringdown import ring_down as ring_down
 from .strip.attached_masses import AttachedMasses as AttachedMasses
 from .strip.excitation import (
     Excitation as Excitation,

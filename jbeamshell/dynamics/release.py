@@ -24,7 +24,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.light_strip import LightMotion, ring
-from jbeamshell.dynamics.ringdown import RingDown, ring_down
+from jbeamshell.dynamics.over_amplitude import RingDown
+from jbeamshell.dynamics.ringdown import ring_down
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.motion import Motion
 from jbeamshell.dynamics.structure.joint import Joint, largest_force
@@ -32,9 +33,18 @@ from jbeamshell.dynamics.structure.modal import ModalCurve
 from jbeamshell.scene.scene import Scene
 
 LIGHT = 0.005  # largest m_1/m at which the strip's inertia is left out by itself
-NO_NETWORK = "the rung plane does not cover this scene, so that it has no network: take True"
-NOT_NESTED = "slip zones are not nested, so that the strip is no network of sliders: take True"
-NO_INERTIA = "has no inertia here: take whole=False, a heavier payload, or another rung"
+NO_NETWORK = (
+    "the rung plane does not cover this scene, so that it has no network: take True (--strip whole)"
+)
+NOT_NESTED = (
+    "slip zones are not nested, so that it is no network of sliders: take True (--strip whole)"
+)
+LAP = "follows no lap joint in time steps: take None (--strip auto), for its sliders"
+DAMPED = "is for time steps, and a lap joint has none: leave it out"
+FEW = "shows too little of the motion: take more cycles, or a smaller force or a heavier payload"
+NO_INERTIA = (
+    "has no inertia here: take whole=False (--strip sliders), a heavier payload, or another rung"
+)
 HEAVY = 50.0  # default payload, over the mass of the strip
 RELEASE = 0.1  # duration of the release in periods, long enough to excite the strip's waves little
 SAMPLES_PER_CYCLE = 50
@@ -119,7 +129,7 @@ def let_go(
         plane elasticity (or of the scene's own condensed rung), exact in time, without the strip's
         inertia; None to take the network where the strip's inertia matters little (`LIGHT`), it is
         not damped, its slip zones are nested, and the scene is not a bar or a shell without squeeze
-        strain
+        strain.  A lap joint is always its sliders
     progress : show a progress bar of the time steps; None shows it where a person watches
 
     Returns
@@ -139,7 +149,10 @@ def let_go(
     >>> study = let_go(jb.Scene(), 1.0, cycles=30)
     >>> study.found.damping  # damping ratios at study.found.amplitude
     """
-    inertia, scene = inertia or Inertia(), scene.by_load_steps()
+    inertia, lap = inertia or Inertia(), scene.member.support != "none"
+    require("whole", whole, not (lap and whole), LAP)
+    require("inertia", "damped", not (lap and inertia.damped), DAMPED)
+    scene = scene if lap else scene.by_load_steps()
     end_force = float(largest_force(scene, force))
     require_number("cycles", cycles, POSITIVE)
     inertia.check(scene)
@@ -154,15 +167,18 @@ def let_go(
         joint = Joint.of(light, end_force)
         network = joint.network or Network.nearest(light, *joint.below_gross_slip)
         share = _share(network, inertia, mass)
-        if whole is False or share <= LIGHT:
+        if lap or whole is False or share <= LIGHT:
             motion = ring(light, network, mass, end_force, cycles, samples)
             nested = bool(motion.nested)
     if motion is None or not nested:
-        require("whole", whole, whole is not False, NOT_NESTED)
+        require("whole", whole, whole is not False and not lap, NOT_NESTED)
         require("model.rung", scene.model.rung, not scene.model.condensed, NO_INERTIA)
         motion = _whole(scene, end_force, mass, inertia, cycles, per_cycle, samples, progress)
         joint = Joint.of(scene, end_force)
-    found = ring_down(motion.time, motion.displacement)
+    try:
+        found = ring_down(motion.time, motion.displacement)
+    except InputError as error:
+        raise InputError(f"cycles = {cycles}: {FEW}") from error
     smallest = 0.5 * float(found.amplitude.min())
     return RingDownStudy(motion, found, _prediction(joint, mass, smallest), mass, share)
 

@@ -1,171 +1,93 @@
 """Frequency and damping over amplitude, from the signal of a decaying vibration.
 
-Friction shifts the mean of the vibration from swing to swing, so the amplitude of a swing is half
-the distance between one extremum and the next, and the mean is not used.
+By itself `ring_down` fits a decaying vibration (`jbeamshell.dynamics.decay`), which withstands
+noise, short records and few samples of a period.  A motion without noise that is no vibration of
+slowly changing amplitude and frequency, such as the first swings of a strip that is let go from
+near gross slip, is measured swing by swing.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import dataclasses
+import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import require, require_choice
-from jbeamshell.measured.curves import (
-    DampingCurve,
-    DissipationCurve,
-    FrequencyCurve,
-    StiffnessCurve,
-)
+from jbeamshell.common.errors import DoubtfulWarning, InputError
+from jbeamshell.dynamics.decay import Decay, evidence_needed, fit_decay
+from jbeamshell.dynamics.envelopes import Envelope, extrema, from_analytic_signal, from_swings
+from jbeamshell.dynamics.over_amplitude import RingDown
 
-METHODS = ("turning-points", "hilbert")
+Floats = NDArray[np.float64]
+
+METHODS = ("auto", "least-squares", "turning-points", "hilbert")
 SIGNAL = "give as many evenly spaced times as finite values, at least {} of both"
-EDGE = 0.05  # part of the signal left out at both ends, where the Hilbert transform is inaccurate
 KINDS = ("displacement", "velocity", "acceleration")  # powers of i omega
 ORDER = 3  # of the filter of a band
-FEWEST = 4  # points of a bin that tell its scatter
-SHORTEST = 0.2  # shortest time between two extrema, in periods
-
-
-class RingDown(NamedTuple):
-    """Frequency and damping over the amplitude of a decaying vibration, (k,) each.
-
-    Attributes
-    ----------
-    time : times
-    amplitude : half of a swing
-    frequency : cycles per time
-    damping : damping ratio zeta; the logarithmic decrement is 2 pi zeta per cycle
-    """
-
-    time: NDArray[np.float64]
-    amplitude: NDArray[np.float64]
-    frequency: NDArray[np.float64]
-    damping: NDArray[np.float64]
-
-    def curves(
-        self, mass: float, points: int = 12, width: float = 1.0
-    ) -> tuple[DissipationCurve, StiffnessCurve]:
-        """Dissipation and stiffness of a strip from the ring-down of a mass on it.
-
-        The mass balances the strip, so the amplitude of the force is F = m omega^2 u, and the
-        energy per cycle is 2 pi zeta F u.
-
-        Parameters
-        ----------
-        mass : mass at the loaded end, far heavier than the strip
-        points : number of points of a curve, evenly spaced in the logarithm of the amplitude
-        width : width of the strip, by which forces are divided
-
-        Returns
-        -------
-        DissipationCurve, StiffnessCurve
-            observations for `jbeamshell.identify.fit`
-
-        Raises
-        ------
-        InputError
-            for a signal that does not decay
-        """
-        rising = np.argsort(self.amplitude)
-        known = rising[self.damping[rising] > 0.0]
-        fix = "is nowhere positive: give the signal of a vibration that decays"
-        require("damping", float(self.damping.max()), known.size > 1, fix)
-        smallest, largest = self.amplitude[known[[0, -1]]].tolist()
-        u = np.geomspace(smallest, largest, points)
-        frequency, damping = (
-            np.interp(u, self.amplitude[known], column[known])
-            for column in (self.frequency, self.damping)
-        )
-        force = mass / width * (2.0 * np.pi * frequency) ** 2 * u
-        loss = DissipationCurve(
-            force, 2.0 * np.pi * damping * force * u, label="ring-down, damping"
-        )
-        return loss, StiffnessCurve(force, force / u, label="ring-down, frequency")
-
-    def modal_curves(
-        self, points: int = 20, *, low: float = 0.0, high: float = np.inf, label: str = "ring-down"
-    ) -> tuple[FrequencyCurve, DampingCurve]:
-        """Frequency and damping of a structure over the amplitude, with their noise.
-
-        Each point is the mean of a bin, evenly wide in the logarithm of the amplitude.  Its noise
-        is that of the mean: the scatter about a straight line in the bin, over the root of its
-        independent points, whose number follows from the correlation of neighbours.
-
-        Parameters
-        ----------
-        points : number of bins; those without enough points are left out
-        low, high : amplitudes between which the vibration is taken
-        label : label of the curves
-
-        Returns
-        -------
-        FrequencyCurve, DampingCurve
-            observations of a structure for `jbeamshell.identify.fit`
-
-        Raises
-        ------
-        InputError
-            for a signal that does not decay between these amplitudes
-        """
-        kept = (self.amplitude >= low) & (self.amplitude <= high)
-        size, bins = np.log(self.amplitude[kept]), []
-        fix = "leaves no vibration: take wider bounds"
-        require("low, high", (low, high), size.size >= FEWEST, fix)
-        edges = np.linspace(size.min(), size.max() + 1e-9, points + 1)
-        for place in range(points):
-            inside = (size >= edges[place]) & (size < edges[place + 1])
-            if np.count_nonzero(inside) < FEWEST:
-                continue
-            columns = (self.frequency[kept][inside], self.damping[kept][inside])
-            means = [_mean_and_noise(size[inside], column) for column in columns]
-            if means[1][0] > 0.0:
-                bins.append((np.exp(np.mean(size[inside])), *means[0], *means[1]))
-        fix = "has no bin that decays: take fewer points, or more of the vibration"
-        require("points", points, len(bins) > 1, fix)
-        u, frequency, scatter, damping, spread = np.array(bins).T
-        return (
-            FrequencyCurve(u, frequency, f"{label}, frequency", scatter),
-            DampingCurve(u, damping, f"{label}, damping", spread),
-        )
-
-    def plot(self, axes: Any = None) -> Any:
-        """Draw frequency and damping over amplitude; see `jbeamshell.plotting.ring_down`."""
-        from jbeamshell import plotting
-
-        return plotting.ring_down(self, axes=axes)
+UNEVEN = 0.35  # largest shift of a time from an even one, in steps: a lost sample shifts .5
+TURNS = 8  # least number of turning points that are met of themselves
+SMOOTH = 16.0  # samples of a period from which turning points are met
+NOISY = 1e-4  # noise of a sample over the signal's range, beyond which they are not
+STRANGE = 1e-4  # what a fit leaves over that range, from which they are better
+CLEARLY = 10.0  # that over the noise
+FEWEST = 5  # turning points, of which two points of a ring-down come
+STILL = 1e-12  # range of a signal over its values, up to which it never changes
+EDGES = 2.0  # time that a filter disturbs at its ends, times its width
+OTHER = 0.05  # another vibration over the first one, from which it is doubted
+HARMONICS = 0.15  # distance from a multiple of the frequency, over it, that makes another vibration
+UNKNOWN = 0.2  # half width of an interval over its value, beyond which there is no frequency
+VAGUE = 0.5  # half width of the damping's interval over the damping, beyond which it is doubted
+SMALL = 1e-5  # half width of that interval that is always good enough
+COARSE = 2.5  # samples of a period, below which it is doubted
+NOTHING = (
+    "no decaying vibration stands out from noise: follow more cycles with less noise, or give the "
+    "band= of frequencies that it lies in"
+)
 
 
 def ring_down(
     time: ArrayLike,
     values: ArrayLike,
     *,
-    method: str = "turning-points",
+    method: str = METHODS[0],
     smoothing: float = 1.0,
     band: tuple[float, float] | None = None,
     kind: str = KINDS[0],
 ) -> RingDown:
-    """Amplitude, frequency and damping of one decaying vibration.
+    """Amplitude, frequency and damping of one decaying vibration, with their 95 % intervals.
 
     Parameters
     ----------
     time : (T,) evenly spaced times
     values : (T,) displacements, or what ``kind`` names
-    method : "turning-points" measures the length and the decrease of every swing; "hilbert" fits
-        straight lines to the logarithm and the phase of the analytic signal over a moving window
-        (Feldman 2011)
+    method : "least-squares" fits a decaying vibration whose rates are constant, or depend on the
+        amplitude if the data show it; "turning-points" measures the length and the decrease of
+        every swing; "hilbert" fits straight lines to the logarithm and the phase of the analytic
+        signal over a moving window (Feldman 2011); "auto" takes turning points for a motion without
+        noise that the fit cannot describe, and the fit for all else
     smoothing : length of that window, in periods
     band : lowest and highest frequency of a band-pass filter without phase shift, which leaves one
-        mode of several; it disturbs some periods at both ends
+        mode of several; it disturbs some periods at both ends, which a fit leaves out
     kind : "displacement", "velocity" or "acceleration" of an accelerometer; the amplitude is that
         of the displacement, by the frequency found
+
+    Returns
+    -------
+    RingDown
 
     Raises
     ------
     InputError
-        for a signal that is not finite or evenly spaced, or has fewer than four extrema; for a band
-        that the times do not resolve
+        for a signal that is not finite or evenly spaced, is constant, shows no decaying vibration
+        above its noise, or has fewer than five extrema where they are measured; for a band that the
+        times do not resolve
+
+    Warns
+    -----
+    DoubtfulWarning
+        if the record leaves damping or frequency open, or has another vibration; see ``doubts``
 
     Examples
     --------
@@ -178,20 +100,161 @@ def ring_down(
     require_choice("method", method, METHODS)
     paired = times.ndim == 1 and times.shape == signal.shape and times.size >= 8
     require("values", signal.shape, paired, SIGNAL.format(8))
-    steps = np.diff(times)
-    even = bool(np.all(np.isfinite(signal)) and np.allclose(steps, steps[0]) and steps[0] > 0.0)
+    step = float(times[-1] - times[0]) / (times.size - 1)
+    meant = times[0] + step * np.arange(times.size)  # files may hold rounded times
+    off = np.abs(times - meant)
+    even = bool(np.all(np.isfinite(signal)) and step > 0.0 and np.all(off < UNEVEN * step))
     require("time", times[:3], even, SIGNAL.format(8))
+    times = meant
     require_choice("kind", kind, KINDS)
-    signal = signal if band is None else _within(signal, float(np.mean(steps)), band)
+    first, moves = float(signal[0]), float(np.ptp(signal)) > STILL * float(np.max(np.abs(signal)))
+    if band is not None:
+        signal = _within(signal, step, band)
+    require("values", first, moves, "never changes: give the signal of a vibration")
+    known = slice(None) if band is None else _undisturbed(times, band)
+    if method in ("auto", "least-squares"):
+        limits = band or (0.0, np.inf)
+        angular = 2.0 * np.pi * limits[0], 2.0 * np.pi * limits[1]
+        fitted = fit_decay(times[known], signal[known], angular)
+        free = method == "auto" and band is None and extrema(times, signal)[0].size >= TURNS
+        if free and fitted and _is_strange(fitted, step, float(np.ptp(signal))):
+            method = "turning-points"
+        else:
+            result = _told(fitted, step, limits)
+    if method in ("turning-points", "hilbert"):
+        points = _points(times, signal, method, smoothing, band)
+        result = _measured(points, method)
+    for doubt in result.doubts:
+        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=2)
+    return dataclasses.replace(
+        result, amplitude=result.amplitude / result.omega ** KINDS.index(kind)
+    )
+
+
+def _points(
+    times: Floats,
+    signal: Floats,
+    method: str,
+    smoothing: float,
+    band: tuple[float, float] | None,
+) -> Envelope:
+    """Envelope by turning points or by the analytic signal."""
     at, reached = extrema(times, signal)
-    fix = "must be at least 4: follow the motion for longer"
-    require("extrema of values", at.size, at.size >= 4, fix)
+    fix = f"must be at least {FEWEST}: follow the motion for longer"
+    require("extrema of values", at.size, at.size >= FEWEST, fix)
     if method == "turning-points":
-        found = _from_swings(at, reached)
-    else:
-        found = _from_envelope(times, signal, 2.0 * float(np.mean(np.diff(at))), smoothing)
-    omega = 2.0 * np.pi * found.frequency
-    return found._replace(amplitude=found.amplitude / omega ** KINDS.index(kind))
+        return from_swings(at, reached)
+    share = 1.0 if band is None else 2.0 * float(times[1] - times[0]) * (band[1] - band[0])
+    period = 2.0 * float(np.mean(np.diff(at)))
+    return from_analytic_signal(times, signal, period, smoothing, share)
+
+
+def _undisturbed(times: Floats, band: tuple[float, float]) -> slice:
+    """Samples that the filter of a band does not disturb at its ends."""
+    edge = int(EDGES / (band[1] - band[0]) / (times[1] - times[0]))
+    return slice(edge, times.size - edge) if times.size > 4 * edge else slice(None)
+
+
+def _is_strange(fitted: Decay, step: float, size: float) -> bool:
+    """True for a dense motion without noise that no slowly changing vibration describes."""
+    dense = 2.0 * np.pi / (fitted.omega[-1] * step) > SMOOTH
+    strange = fitted.left > max(STRANGE * size, CLEARLY * fitted.quiet)
+    octave = abs(np.log2(max(fitted.other_omega, 1e-300) / fitted.omega[-1])) > 1.0
+    several = octave and _has_another(fitted)
+    return bool(dense and strange and fitted.quiet < NOISY * size and not several)
+
+
+def _told(fitted: Decay | None, step: float, band: tuple[float, float]) -> RingDown:
+    """Ring-down by the fit of a decaying vibration, with its doubts."""
+    if fitted is None or fitted.evidence < evidence_needed(fitted.samples):
+        raise InputError(f"values: {NOTHING}")
+    off = fitted.omega_off / fitted.omega
+    known = (off < UNKNOWN) & (fitted.decay < fitted.omega)
+    if np.count_nonzero(known) < 2:
+        raise InputError(f"values: {NOTHING}")
+    ratio, spread = fitted.decay / fitted.omega, fitted.decay_off / fitted.omega
+    frequency, root = fitted.omega / (2.0 * np.pi), np.sqrt(1.0 + ratio**2)
+    spread = np.hypot(spread, ratio * off) / root**3
+    result = RingDown(
+        fitted.time,
+        fitted.amplitude,
+        frequency,
+        ratio / root,
+        _ends(frequency, frequency * off),
+        _ends(ratio / root, spread),
+        fitted.numbers,
+        "least-squares",
+    ).part(known)
+    return dataclasses.replace(
+        result, doubts=(*_doubts_of_record(fitted, step, band), *_doubts(result))
+    )
+
+
+def _measured(found: Envelope, method: str) -> RingDown:
+    """Ring-down of points that were measured one by one, with its doubts."""
+    root = np.sqrt(1.0 + found.decrement**2)
+    result = RingDown(
+        found.time,
+        found.amplitude,
+        found.frequency,
+        found.decrement / root,
+        _ends(found.frequency, found.frequency_off),
+        _ends(found.decrement / root, found.decrement_off / root**3),
+        method=method,
+    )
+    return dataclasses.replace(result, doubts=_doubts(result))
+
+
+def _ends(column: Floats, off: Floats) -> Floats:
+    """Ends (k, 2) of intervals."""
+    return np.stack([column - off, column + off], axis=1)
+
+
+def _doubts(found: RingDown) -> tuple[str, ...]:
+    """Doubt about a damping that the record leaves open."""
+    ends = found.damping_interval
+    assert ends is not None
+    off, damping = 0.5 * np.ptp(ends, axis=1), np.abs(found.damping)
+    if np.mean(ends[:, 1] < 0.0) > 0.5:
+        return ("the vibration grows: give the part of the record in which it decays",)
+    if np.mean(off > np.maximum(VAGUE * damping, SMALL)) <= 0.5:
+        return ()
+    if not np.all(np.isfinite(off)):
+        return ("too few swings tell no error: follow the motion for longer",)
+    row = int(np.argsort(off / np.maximum(damping, 1e-300))[off.size // 2])
+    return (
+        f"the damping lies between {ends[row, 0]:.3g} and {ends[row, 1]:.3g} as far as the record "
+        f"tells: follow more cycles, or with less noise",
+    )
+
+
+def _has_another(fitted: Decay, band: tuple[float, float] = (0.0, np.inf)) -> bool:
+    """True if the fit leaves another vibration in the band that is no multiple of the first."""
+    if not band[0] < fitted.other_omega / (2.0 * np.pi) < band[1]:
+        return False
+    multiple = fitted.other_omega / float(fitted.omega[-1])
+    order = round(multiple)
+    return fitted.other > OTHER and (order not in range(6) or abs(multiple - order) > HARMONICS)
+
+
+def _doubts_of_record(fitted: Decay, step: float, band: tuple[float, float]) -> tuple[str, ...]:
+    """Doubts about a record with another vibration, or with few samples of a period."""
+    omega, other, doubts = float(fitted.omega[-1]), fitted.other_omega, []
+    if _has_another(fitted, band):
+        between = float(np.sqrt(omega * other))
+        top = min(2.0 * omega, 0.9 * np.pi / step)
+        ends = (between, top) if other < omega else (0.5 * omega, between)
+        words = ", ".join(f"{end / (2.0 * np.pi):.3g}" for end in ends)
+        doubts.append(
+            f"another vibration of frequency {other / (2.0 * np.pi):.4g} is left, "
+            f"{100.0 * fitted.other:.2g} % of the one that was fitted: give band=({words})"
+        )
+    if omega * step > 2.0 * np.pi / COARSE:
+        doubts.append(
+            f"a period has {2.0 * np.pi / (omega * step):.2g} samples, and faster vibrations look "
+            "like slower ones below two: sample faster"
+        )
+    return tuple(doubts)
 
 
 def _within(
@@ -204,96 +267,3 @@ def _within(
     require("band", tuple(band), known, f"give two rising frequencies below {0.5 / step:.6g}")
     sections = butter(ORDER, band, "bandpass", fs=1.0 / step, output="sos")
     return np.asarray(sosfiltfilt(sections, signal))
-
-
-def _mean_and_noise(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Mean of a column, and the noise of that mean beside a straight trend over x."""
-    along, left = x - np.mean(x), y - np.mean(y)
-    left = left - along * (along @ left) / max(float(along @ along), np.finfo(float).tiny)
-    scatter = float(np.std(left, ddof=2))
-    square = float(left @ left)
-    after = float(left[1:] @ left[:-1]) / square if square > 0.0 else 0.0
-    # n points of a first-order process with correlation rho tell as much as n (1-rho)/(1+rho).
-    share = np.clip((1.0 - after) / (1.0 + after), 1.0 / x.size, 1.0)
-    least = np.finfo(float).eps * float(np.max(np.abs(y)))
-    return float(np.mean(y)), max(scatter / float(np.sqrt(x.size * share)), least)
-
-
-def extrema(time: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
-    """Times and values of maxima and minima in alternation, by parabolas through three samples.
-
-    Ripples much shorter than the period are left out.
-    """
-    times, signal = np.asarray(time, float), np.asarray(values, float)
-    spectrum = np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(signal.size)))
-    main_frequency = max(int(np.argmax(spectrum)), 1) / (signal.size * (times[1] - times[0]))
-    apart = max(1, int(SHORTEST / main_frequency / (times[1] - times[0])))
-    picked = []
-    for sign in (1.0, -1.0):
-        picked += [(peak, sign) for peak in _peaks(sign * signal, 2 * apart)]
-    picked.sort()
-    kept: list[tuple[int, float]] = []
-    for peak, sign in picked:
-        if kept and kept[-1][1] == sign:  # of two maxima in a row the larger
-            if sign * signal[peak] > sign * signal[kept[-1][0]]:
-                kept[-1] = (peak, sign)
-        else:
-            kept.append((peak, sign))
-    index = np.array([peak for peak, _ in kept], int)
-    before, here, after = signal[index - 1], signal[index], signal[index + 1]
-    bend = before - 2.0 * here + after
-    shift = np.where(bend != 0.0, 0.5 * (before - after) / np.where(bend != 0.0, bend, 1.0), 0.0)
-    return times[index] + shift * (times[1] - times[0]), here - 0.25 * (before - after) * shift
-
-
-def _peaks(signal: NDArray[np.float64], apart: int) -> list[int]:
-    """Places of maxima; of those nearer to each other than some samples only the highest."""
-    inner = signal[1:-1]
-    tops = 1 + np.flatnonzero((inner > signal[:-2]) & (inner >= signal[2:]))
-    free = np.ones(signal.size, bool)
-    found = []
-    for top in tops[np.argsort(-signal[tops], kind="stable")].tolist():
-        if free[top]:
-            free[max(0, top - apart + 1) : top + apart] = False
-            found.append(top)
-    return found
-
-
-def _from_swings(at: NDArray[np.float64], reached: NDArray[np.float64]) -> RingDown:
-    """Ring-down from the times and values of the extrema."""
-    swings = 0.5 * np.abs(np.diff(reached))
-    # The mean over a swing forth and one back cancels the difference between the two.
-    decrease = np.log(swings[:-2] / swings[2:]) / (2.0 * np.pi)
-    return RingDown(
-        time=0.5 * (at[1:-2] + at[2:-1]),
-        amplitude=swings[1:-1],
-        frequency=1.0 / (0.5 * (at[2:-1] + at[3:] - at[:-3] - at[1:-2])),
-        damping=decrease,
-    )
-
-
-def _from_envelope(
-    times: NDArray[np.float64], signal: NDArray[np.float64], period: float, smoothing: float
-) -> RingDown:
-    """Ring-down from the analytic signal."""
-    import scipy.signal
-
-    step = times[1] - times[0]
-    window = 2 * (max(3, int(smoothing * period / step)) // 2) + 1
-    slow = scipy.signal.savgol_filter(signal, min(_odd(4.0 * period / step), _odd(signal.size)), 1)
-    analytic = scipy.signal.hilbert(signal - slow)
-    level, phase = np.log(np.abs(analytic)), np.unwrap(np.angle(analytic))
-    smooth, slope = (
-        scipy.signal.savgol_filter(column, min(window, _odd(signal.size)), 1, deriv=d, delta=step)
-        for column, d in ((level, 0), (level, 1))
-    )
-    rate = scipy.signal.savgol_filter(phase, min(window, _odd(signal.size)), 1, 1, step)
-    inside = slice(int(EDGE * signal.size), int((1.0 - EDGE) * signal.size))
-    return RingDown(
-        times[inside], np.exp(smooth)[inside], rate[inside] / (2.0 * np.pi), -(slope / rate)[inside]
-    )
-
-
-def _odd(count: float) -> int:
-    """Largest odd number not above a number."""
-    return 2 * ((int(count) - 1) // 2) + 1

@@ -401,7 +401,7 @@ class Scene(Tree):
         """Copy that is solved in load steps, if how it is solved was left open."""
         support = self.member.support
         fix = "is for loads under constant pressures, at rest; for vibrations take "
-        fix += "jb.dynamics.Joint.of(scene) in a structure"
+        fix += "jb.dynamics.let_go, or Joint.of(scene) in a structure"
         require("member.support", support, support == "none", fix)
         found = self
         if "solution" in self.model.open and self.model.solution != "stepwise":

@@ -53,3 +53,39 @@ def test_bad_input_is_one_line(capsys, tmp_path, words, complaint):
     assert complaint in err
     assert err.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+BOLTED = ["--set", "contact.bolts=[[0.5, 0.5, 0.3]]", "--cycles", "8"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [BOLTED, [*BOLTED, "--set", "load.control=displacement", "--set", "load.amplitude=1e-6"]],
+    ids=["force", "displacement"],
+)
+@pytest.mark.doubtful("dissipation may be off")
+def test_a_bolted_strip_is_pulled_below_gross_slip(capsys, words):
+    code = main.main(["ringdown", *words, "--json"])
+    out, err = capsys.readouterr()
+    assert code == 0
+    assert "gross slip, 0.05: the mass is pulled with half of it" in err
+    figures = json.loads(out)
+    assert figures["largest_displacement"] == pytest.approx(1.12e-6, rel=0.05)
+    assert 0.0 < figures["damping"][-1] < figures["damping"][0] < 0.01
+
+
+@pytest.mark.doubtful("dissipation may be off")
+def test_the_fix_of_a_pull_beyond_gross_slip_works(capsys):
+    assert main.main(["ringdown", *BOLTED, "--force", "0.08"]) == 2
+    err = capsys.readouterr().err
+    assert "force = 0.08: must stay below gross slip" in err
+    half = err.split()[-1]
+    assert main.main(["ringdown", *BOLTED, "--force", half, "--json"]) == 0
+
+
+def test_a_lap_joint_rings_down_by_its_sliders(capsys):
+    assert main.main(["ringdown", "single-lap", "--json", "--cycles", "8"]) == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["damping"][-1] == pytest.approx(figures["predicted_damping"][-1], rel=0.1)
+    assert main.main(["ringdown", "single-lap", "--strip", "whole"]) == 2
+    assert "--strip auto" in capsys.readouterr().err

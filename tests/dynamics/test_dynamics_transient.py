@@ -73,7 +73,7 @@ class TestRingDown:
 
     @pytest.mark.slow
     def test_friction_is_found_again_from_damping_over_amplitude(self, study):
-        late = dynamics.RingDown(*(column[5:] for column in study.found))
+        late = study.found.part(slice(5, None))
         curves = late.curves(study.payload)
         start = study.motion.scene.replace({"contact.friction": 0.15, "load.cycles": 1})
         fit = identify.fit(curves, start, ["contact.friction"])

@@ -170,6 +170,9 @@ class Joint(Backbone):
         >>> joint.dissipation(joint.displacement[-1])  # energy per cycle
         """
         force = largest_force(scene, force)
+        if scene.load.control != "force":
+            load = dataclasses.replace(scene.load, control="force", amplitude=as_leaf(force))
+            scene = dataclasses.replace(scene, load=load)
         require_number("width", width)
         require_choice("by", by, (None, *BY))
         bolted = scene.contact.bolt_stiffness is not None  # which holds beyond
@@ -411,6 +414,7 @@ def _longer(places: Array) -> Array:
 
 def largest_force(scene: Scene, force: Any = None) -> Any:
     """Force up to which a joint is wanted, checked; None is the scene's amplitude."""
+    key = "force" if force is not None else "load.amplitude"
     if force is None:
         control = scene.load.control
         fix = "is no force: give force=, or take load.control = 'force'"
@@ -419,7 +423,10 @@ def largest_force(scene: Scene, force: Any = None) -> Any:
     require_number("force", force)
     if not is_traced(scene, force):
         by_force = dataclasses.replace(scene.load, control="force")
-        gross_slip_rule(by_force, scene.member, scene.number, force)._replace(key="force").demand()
+        rule = gross_slip_rule(by_force, scene.member, scene.number, force)
+        limit = float(gross_slip(scene))
+        fix = f"must stay below gross slip, mu F_N L = {limit:.6g}: take less, such as half of it, "
+        rule._replace(key=key, fix=f"{fix}{0.5 * limit:.4g}").demand()
     return force
 
 
