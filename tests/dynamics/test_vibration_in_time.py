@@ -48,7 +48,8 @@ def random_structure(seed):
     draw = np.random.default_rng(seed)
     mass, coupling = draw.uniform(0.5, 2.0, 2), draw.uniform(2.0, 6.0)
     scale = draw.uniform(0.01, 0.03)
-    joint = Joint(U, scale * np.tanh(U))
+    force = scale * np.tanh(U)
+    joint = Joint(U, force, capacity=force[-1])
     cubic = CubicSpring(draw.uniform(0.2, 1.0), draw.uniform(0.1, 0.4))
     stiffness = coupling / 3.0 * SPRING
     held = [Attachment(joint, 0), Attachment(cubic, 1)]
