@@ -29,6 +29,7 @@ from jbeamshell.identify.results import Fit, fit_at
 from jbeamshell.identify.rig import RiggedObservation
 from jbeamshell.identify.search import StoppingRule, minimise
 from jbeamshell.identify.search_space import SearchSpace, search_space
+from jbeamshell.identify.settling import settle
 from jbeamshell.identify.specimens import Specimen, as_specimens
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.recordings import FEWEST_POINTS
@@ -171,7 +172,7 @@ def _searched(problem: Problem, space: SearchSpace, stopping: StoppingRule) -> F
     at_noise = problem.experiment.weight.size if problem.experiment.noisy else 0
     rule = stopping._replace(noise_cost=at_noise)
     end = minimise(lambda point: problem(space, point), np.zeros(len(space.names)), rule)
-    return fit_at(problem, space, end.point, [""], end.status, [])
+    return fit_at(problem, space, settle(problem, space, end.point), [""], end.status, [])
 
 
 def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:

@@ -18,7 +18,8 @@ from jbeamshell.identify.model_error import LIMITS, model_misfit
 from jbeamshell.identify.models import Driven, Model
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
-from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
+from jbeamshell.identify.settling import Settled
+from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_at
 from jbeamshell.laws import Law
 
 WRONG_MODEL = 2.0  # misfit over noise above which the model must be wrong
@@ -211,7 +212,7 @@ class Fit(NamedTuple):
 def fit_at(
     problem: Problem,
     space: SearchSpace,
-    point: NDArray[np.float64],
+    end: Settled,
     labels: Sequence[str],
     status: str,
     minima: Sequence[tuple[NDArray[np.float64], float]],
@@ -222,28 +223,15 @@ def fit_at(
     ----------
     problem : least-squares problem
     space : search space, n axes
-    point : (n,) end of the best search
+    end : end of the best search
     labels : labels of the specimens
     status : status of the best search
-    describes : False if the model leaves more of a measurement than `LIMITS` say; its values then
-        mean little
     minima : values and cost at the end of each search
     """
-    experiment = problem.experiment
+    experiment, point = problem.experiment, end.point
     best, values = problem(space, point), space.values(point)
-    rows = experiment.weight.size
-    uncertainty = uncertainty_of(
-        space,
-        point,
-        best.residual,
-        best.jacobian,
-        emphasis=experiment.emphasis,
-        relative=experiment.relative,
-        slices=experiment.slices,
-        noisy=experiment.noisy,
-        model_error=experiment.model_error,
-    )
-    plain = best.residual[:rows] / experiment.emphasis
+    uncertainty = uncertainty_at(problem, space, point, end.jacobian)
+    plain = best.residual[: experiment.weight.size] / experiment.emphasis
     relative = plain * experiment.relative
     left = [model_misfit(relative[own]) for own in experiment.slices]
     undescribed = _undescribed(experiment, left)

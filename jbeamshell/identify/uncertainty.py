@@ -18,6 +18,7 @@ from scipy import stats
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.model_error import independent_points
+from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 
 LEVELS = (0.68, 0.95)
@@ -171,6 +172,24 @@ class Uncertainty(NamedTuple):
         logs = np.array([bijection.log for bijection in self.space.bijections])
         sizes = np.where(logs, np.abs(values), np.maximum(np.abs(values), np.abs(starts)))
         return np.where(sizes > 0.0, sizes, 1.0)
+
+
+def uncertainty_at(
+    problem: Problem, space: SearchSpace, point: NDArray[np.float64], jacobian: NDArray[np.float64]
+) -> Uncertainty:
+    """Uncertainty at a minimum (n,) of a problem with derivatives (rows, n) there."""
+    experiment = problem.experiment
+    return uncertainty_of(
+        space,
+        point,
+        problem(space, point).residual,
+        jacobian,
+        emphasis=experiment.emphasis,
+        relative=experiment.relative,
+        slices=experiment.slices,
+        noisy=experiment.noisy,
+        model_error=experiment.model_error,
+    )
 
 
 def uncertainty_of(
