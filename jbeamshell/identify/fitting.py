@@ -15,6 +15,7 @@ from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.progress import bar
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.identify.assembly import Assembly
+from jbeamshell.identify.copies import counted_once
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.models import Driven
 from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
@@ -25,6 +26,7 @@ from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, SearchResult, Stopp
 from jbeamshell.identify.search_space import SearchSpace, search_space
 from jbeamshell.identify.settling import Settled, settle
 from jbeamshell.identify.specimens import Specimen, as_specimens, free_of, inspected
+from jbeamshell.identify.starts import check_starts
 from jbeamshell.laws import Law
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.recordings import FEWEST_POINTS
@@ -161,7 +163,7 @@ def fit(
     valid = solver is None or isinstance(solver, Newton)
     require("solver", solver, valid, "give a jbeamshell.Newton")
     require_choice("unchecked", unchecked, (False, True))
-    specimens = as_specimens(data, scene, weights)
+    specimens, copies = counted_once(as_specimens(data, scene, weights))
     if max_iterations is None:
         of_law = isinstance(specimens[0].scene, Driven)
         max_iterations = OF_LAWS * MAX_ITERATIONS if of_law else MAX_ITERATIONS
@@ -172,6 +174,7 @@ def fit(
     parameters = with_starts(parameters, specimens)
     space, scenes = search_space(parameters, {one.label: one.scene for one in specimens})
     specimens = [one._replace(scene=scenes[one.label]) for one in specimens]
+    check_starts(specimens, parameters)
     experiment = Experiment(specimens, points=points, noise=noise, free=space.keys)
     problem = Problem(experiment, space, solver or Newton(), save)
     if starts is None:
@@ -206,7 +209,7 @@ def fit(
             f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations"
         )
     found = fit_at(problem, space, end, list(scenes), status, minima)
-    return found._replace(warnings=[*found.warnings, *doubts])
+    return found._replace(warnings=[*found.warnings, *copies, *doubts])
 
 
 def fit_kappa_s(curve: Measurement | Sequence[Measurement], scene: Scene, **options: Any) -> Fit:

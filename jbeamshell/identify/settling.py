@@ -21,6 +21,8 @@ ROUNDS = 12  # most moves along weakest directions
 SHORTEST, LONGEST = 0.02, 0.7  # half widths over which the response is compared
 GAIN = 1e-3  # relative gain in cost below which a search has settled
 ROUNDING = 1e-9  # residual that is rounding
+WORTH = 0.1  # part of the rise in cost that the other directions must take back to be moved
+WIDER = 1.5  # factor by which an interval may exceed the width over which it was found
 STRAIGHT = 0.05  # part by which a derivative may differ over the interval and still stand
 
 Vector = NDArray[np.float64]
@@ -57,44 +59,73 @@ def settle(
     report : called after every move with the point and the cost
     """
     here = problem(space, point)
-    least = ROUNDING**2 * here.residual.size
+    jacobian, least = here.jacobian, ROUNDING**2 * here.residual.size
     for _ in range(ROUNDS):
-        found = uncertainty_at(problem, space, point, here.jacobian)
-        jacobian, tried = _over_interval(problem, space, found, here)
+        found = uncertainty_at(problem, space, point, jacobian)
+        width = _width(found)
+        jacobian, tried = _over_interval(problem, found, here, width)
         trial = point + _step(jacobian, here, ~found.at_bound)
         best, there = min(
             ((at, problem(space, at)) for at in (*tried, trial)), key=lambda pair: pair[1].cost
         )
-        if not here.cost - there.cost > max(GAIN * here.cost, least):
+        if here.cost - there.cost > max(GAIN * here.cost, least):
+            point, here, jacobian = best, there, there.jacobian
+            if report:
+                report(point, here.cost)
+        elif _width(uncertainty_at(problem, space, point, jacobian)) <= WIDER * width:
             return Settled(point, jacobian, True)
-        point, here = best, there
-        if report:
-            report(point, here.cost)
-    return Settled(point, here.jacobian, False)
+    return Settled(point, jacobian, False)
+
+
+def _width(found: Uncertainty) -> float:
+    """Half width of the interval along the weakest direction, within bounds."""
+    weakest = (1.0 / np.sqrt(direction.eigenvalue) for direction in found.directions()[:1])
+    return float(np.clip(found.quantile(0.95) * sum(weakest), SHORTEST, LONGEST))
 
 
 def _over_interval(
-    problem: Problem, space: SearchSpace, found: Uncertainty, here: Evaluation
+    problem: Problem, found: Uncertainty, here: Evaluation, width: float
 ) -> tuple[Vector, list[Vector]]:
     """Derivatives with those of the weakest direction over its interval, and the interval's ends.
 
-    A derivative that holds over the interval is kept as it is.
+    Where the model finds no equilibrium at an end, such as beyond gross slip, the other side
+    counts alone.  A derivative that holds over the interval is kept as it is.
     """
-    directions = found.directions()
+    directions = [direction.vector for direction in found.directions()]
     if not directions:
         return here.jacobian, []
-    eigenvalue, vector = directions[0]
-    width = float(np.clip(found.quantile(0.95) / np.sqrt(eigenvalue), SHORTEST, LONGEST))
-    ends = [found.point + side * width * vector for side in (-1.0, 1.0)]
-    below, above = (problem(space, end) for end in ends)
-    if not (below.converged and above.converged):
-        return here.jacobian, ends
-    at_point = here.jacobian @ vector
-    over_interval = (above.residual - below.residual) / (2.0 * width)
-    change = over_interval - at_point
-    if np.linalg.norm(change) <= STRAIGHT * np.linalg.norm(at_point):
-        return here.jacobian, ends
-    return here.jacobian + np.outer(change, vector), ends
+    others = np.array(directions[1:]).reshape(-1, found.point.size).T
+    ends = [
+        _relaxed(problem, found.space, found.point + side * width * directions[0], here, others)
+        for side in (-1.0, 1.0)
+    ]
+    ways = [end for end in ends if problem(found.space, end).converged]
+    if not ways:
+        return here.jacobian, []
+    first = ways[0] if len(ways) > 1 else found.point
+    way = ways[-1] - first
+    residuals = [problem(found.space, at).residual for at in (first, ways[-1])]
+    foreseen, change = here.jacobian @ way, residuals[1] - residuals[0]
+    missed = change - foreseen
+    if np.linalg.norm(missed) <= STRAIGHT * np.linalg.norm(foreseen):
+        return here.jacobian, ways
+    return here.jacobian + np.outer(missed, way) / (way @ way), ways
+
+
+def _relaxed(
+    problem: Problem, space: SearchSpace, end: Vector, here: Evaluation, others: Vector
+) -> Vector:
+    """End of an interval after a Gauss-Newton step along the other directions (n, others)."""
+    there = problem(space, end)
+    if not (there.converged and others.size):
+        return end
+    slopes = here.jacobian @ others
+    step = np.linalg.lstsq(slopes, -there.residual)[0]
+    rest = there.residual + slopes @ step
+    if there.cost - rest @ rest < WORTH * abs(there.cost - here.cost):
+        return end
+    relaxed = end + others @ np.clip(step, -LONGEST, LONGEST)
+    return min(end, relaxed, key=lambda at: problem(space, at).cost)
 
 
 def _step(jacobian: Vector, here: Evaluation, inside: NDArray[np.bool_]) -> Vector:
