@@ -123,7 +123,7 @@ def minimise(
         before, after = cost, 0.5 * float(there.residual @ there.residual)
         foreseen = 0.5 * wanted @ (damping * wanted - jacobian.T @ here.residual)
         gain = before - after
-        taken = gain > 0.0
+        taken = gain > 0.0 and bool(np.all(np.isfinite(there.jacobian)))
         if taken:
             current, here, cost = trial, there, after
             damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain / foreseen - 1.0) ** 3)

@@ -17,9 +17,10 @@ from jbeamshell.identify.problem import Evaluation, Problem
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.uncertainty import Uncertainty, uncertainty_at
 
-ROUNDS = 12  # most moves along weakest directions
+ROUNDS = 8  # most moves along weakest directions
 SHORTEST, LONGEST = 0.02, 0.7  # half widths over which the response is compared
-GAIN = 1e-3  # relative gain in cost below which a search has settled
+NEARER = 0.3  # part of the width at which a minimum is looked for too
+GAIN = 1e-2  # relative gain in cost below which a search has settled
 ROUNDING = 1e-9  # residual that is rounding
 WORTH = 0.1  # part of the rise in cost that the other directions must take back to be moved
 WIDER = 1.5  # factor by which an interval may exceed the width over which it was found
@@ -59,22 +60,36 @@ def settle(
     report : called after every move with the point and the cost
     """
     here = problem(space, point)
-    jacobian, least = here.jacobian, ROUNDING**2 * here.residual.size
+    jacobian, rounding = here.jacobian, ROUNDING**2 * here.residual.size
     for _ in range(ROUNDS):
         found = uncertainty_at(problem, space, point, jacobian)
         width = _width(found)
         jacobian, tried = _over_interval(problem, found, here, width)
         trial = point + _step(jacobian, here, ~found.at_bound)
-        best, there = min(
-            ((at, problem(space, at)) for at in (*tried, trial)), key=lambda pair: pair[1].cost
-        )
-        if here.cost - there.cost > max(GAIN * here.cost, least):
+        best = _cheapest(problem, space, [*tried, trial])
+        least = here.cost - max(GAIN * here.cost, rounding)
+        if jacobian is not here.jacobian and not problem(space, best).cost < least:
+            # The kinks that the width bridges may hide a minimum nearer by.
+            _, nearer = _over_interval(problem, found, here, NEARER * width)
+            best = _cheapest(problem, space, [best, *nearer])
+        there = problem(space, best)
+        if there.cost < least and np.all(np.isfinite(there.jacobian)):
             point, here, jacobian = best, there, there.jacobian
             if report:
                 report(point, here.cost)
         elif _width(uncertainty_at(problem, space, point, jacobian)) <= WIDER * width:
             return Settled(point, jacobian, True)
     return Settled(point, jacobian, False)
+
+
+def _cheapest(problem: Problem, space: SearchSpace, points: list[Vector]) -> Vector:
+    """Point (n,) of least cost among those where the response has a derivative, if any has."""
+
+    def cost(point: Vector) -> float:
+        at = problem(space, point)
+        return at.cost if bool(np.all(np.isfinite(at.jacobian))) else np.inf
+
+    return min(points, key=cost)
 
 
 def _width(found: Uncertainty) -> float:

@@ -3,8 +3,8 @@
 All follow from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where
 most parameters are logarithms.  The parameters' bijections map them to values.  Where the residuals
 are correlated, or more than measured noise, the model is wrong in some way: their variance is then
-that of the few independent points they are worth, see `jbeamshell.identify.model_error`.  It is
-what the model's own grid may leave adds to it.
+that of the few independent points they are worth, see `jbeamshell.identify.model_error`.  What the
+model's own grid may leave adds to it.
 """
 
 from __future__ import annotations
