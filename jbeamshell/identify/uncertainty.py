@@ -243,8 +243,8 @@ def uncertainty_of(
     relative : factors of the same rows from residuals to parts of the range
     slices : rows of each measurement
     noisy : True if the residuals are in units of measured noise
-    model_error : size of what the model's own grid may leave in a residual.  It is smooth, so that
-        a curve of it is worth `FEWEST` independent points
+    model_error : size of what the model's own grid may leave in a residual.  It is smooth and alike
+        in all curves, so that all together are worth `FEWEST` independent points of it
     """
     values = space.values(point)
     pairs = zip(space.bijections, values.tolist(), strict=True)
@@ -271,7 +271,7 @@ def uncertainty_of(
         sigma = max(sigma, 1.0)
         if explained and independent == left.size:
             sigma, freedom = 1.0, None
-    sigma = float(np.hypot(sigma, model_error * np.sqrt(left.size / (FEWEST * len(slices)))))
+    sigma = float(np.hypot(sigma, model_error * np.sqrt(left.size / FEWEST)))
     factors = np.append(emphasis, priors / sigma)
     if np.any(factors != 1.0):
         # Sandwich estimator: the factors change the minimum, not the noise; priors keep theirs.
