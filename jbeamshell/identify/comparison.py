@@ -58,6 +58,11 @@ class Compared(NamedTuple):
         """Count of fitted numbers."""
         return 0 if self.fit is None else len(self.fit.values)
 
+    @property
+    def points(self) -> int:
+        """Count of fitted points; 0 without a fit."""
+        return sum(rows.size for rows in self.fit.residuals) if self.fit is not None else 0
+
 
 class Comparison(NamedTuple):
     """Models fitted to one target; print it, or draw it by `plot`.
@@ -76,6 +81,17 @@ class Comparison(NamedTuple):
     drive: str
     rows: tuple[Compared, ...]
 
+    @property
+    def chosen(self) -> Compared | None:
+        """Model that the data speak for; None if no fitted one describes them.
+
+        It has the least Bayesian information criterion, n log(cost/n) + k log n of k numbers and n
+        points (Schwarz, Ann. Stat. 6, 1978), of the models that answer the most points.
+        """
+        rows = [row for row in self.rows if row.fit is not None and row.fit.describes]
+        most = max((row.points for row in rows), default=0)
+        return min((row for row in rows if row.points == most), key=_criterion, default=None)
+
     def error(self, row: Compared) -> Floats:
         """Relative error (n,) of a model's energies."""
         return np.asarray(row.energy / self.energy - 1.0)
@@ -92,6 +108,10 @@ class Comparison(NamedTuple):
             worst = f"{100 * np.max(error):5.3g} %  {1e6 * row.seconds:6.0f} us"
             note = f"  ({row.told})" if row.told else ""
             lines.append(f"  {row.name:12s} {row.numbers:7d}  {figures}  {worst}{note}")
+        if (chosen := self.chosen) is not None:
+            lines.append(f"  the data speak for {chosen.name} (Bayesian information criterion)")
+        elif any(isinstance(row.fit, Fit) for row in self.rows):
+            lines.append("  no model describes these data")
         return "\n".join(lines)
 
     def figures(self) -> dict[str, Any]:
@@ -100,6 +120,7 @@ class Comparison(NamedTuple):
             "drive": self.drive,
             "amplitude": self.amplitude.tolist(),
             "energy": self.energy.tolist(),
+            "chosen": None if self.chosen is None else self.chosen.name,
             "models": {
                 row.name: {
                     "values": {} if row.fit is None else row.fit.values,
@@ -192,6 +213,14 @@ def _with_strip(
         for model in models
     ]
     return Comparison(amplitude, energy, "force", (own, *rows))
+
+
+def _criterion(row: Compared) -> float:
+    """Bayesian information criterion of a fitted model, whose noise is estimated."""
+    assert row.fit is not None
+    size = sum(float(own @ own) for own in row.fit.residuals) / row.points
+    least = np.finfo(float).eps ** 2  # a model fitted to its own data leaves rounding alone
+    return float(row.points * np.log(max(size, least)) + row.numbers * np.log(row.points))
 
 
 def _energies(data: Sequence[Measurement]) -> tuple[Floats, Floats, str]:

@@ -20,6 +20,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import counting
 from jbeamshell.common.summary import Summary
 from jbeamshell.common.threads import in_one_lapack_thread
+from jbeamshell.identify.copies import counted_once
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.fitting import MAX_ITERATIONS, POINTS, check_start
 from jbeamshell.identify.models import Model
@@ -29,7 +30,9 @@ from jbeamshell.identify.results import Fit, fit_at
 from jbeamshell.identify.rig import RiggedObservation
 from jbeamshell.identify.search import StoppingRule, minimise
 from jbeamshell.identify.search_space import SearchSpace, search_space
+from jbeamshell.identify.settling import settle
 from jbeamshell.identify.specimens import Specimen, as_specimens
+from jbeamshell.identify.starts import check_starts
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.recordings import FEWEST_POINTS
 from jbeamshell.numerics.newton import Newton
@@ -145,8 +148,9 @@ def fit_each(
 
     def one(place: int) -> Fit:
         try:
-            specimen = Specimen(start, data[place])
-            experiment = Experiment([specimen], points=points, noise=noise, free=space.keys)
+            specimens, _ = counted_once([Specimen(start, data[place])])
+            check_starts(specimens, space.parameters)
+            experiment = Experiment(specimens, points=points, noise=noise, free=space.keys)
             return _searched(Problem(experiment, space, Newton()), space, stopping)
         except InputError as error:
             raise InputError(f"fit {place + 1} of {len(data)}: {error}") from None
@@ -171,7 +175,7 @@ def _searched(problem: Problem, space: SearchSpace, stopping: StoppingRule) -> F
     at_noise = problem.experiment.weight.size if problem.experiment.noisy else 0
     rule = stopping._replace(noise_cost=at_noise)
     end = minimise(lambda point: problem(space, point), np.zeros(len(space.names)), rule)
-    return fit_at(problem, space, end.point, [""], end.status, [])
+    return fit_at(problem, space, settle(problem, space, end.point), [""], end.status, [])
 
 
 def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:

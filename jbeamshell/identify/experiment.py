@@ -34,6 +34,7 @@ from jbeamshell.scene.choice import is_elastic
 from jbeamshell.scene.scene import Scene
 
 FINER = 0.5  # part of the tolerance that plane elasticity keeps: fitted numbers amplify its error
+GRIDS = float(np.hypot(1.0, 1.0 / FINER))  # errors of both grids over that of the finer one
 
 
 class Prediction(NamedTuple):
@@ -145,11 +146,14 @@ class Experiment:
 
     @property
     def model_error(self) -> float:
-        """Size of what a grid of plane elasticity may leave in a residual; 0 for other models."""
+        """Size of what a grid of plane elasticity may leave in a residual; 0 for other models.
+
+        It counts that of data computed at the scene's own tolerance, which is coarser, as well.
+        """
         left = np.zeros(self.weight.size)
         for rows, (observation, scene) in zip(self.slices, self._runs, strict=True):
             if isinstance(scene, Scene) and scene.model.solution == "plane":
-                left[rows] = observation.own_error * scene.model.tolerance
+                left[rows] = observation.own_error * GRIDS * scene.model.tolerance
         return float(np.sqrt(np.mean((left / self.relative) ** 2)))
 
     def __call__(

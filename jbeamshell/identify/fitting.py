@@ -15,6 +15,7 @@ from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.progress import bar
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.identify.assembly import Assembly
+from jbeamshell.identify.copies import counted_once
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.models import Driven
 from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
@@ -23,7 +24,9 @@ from jbeamshell.identify.results import Fit, fit_at
 from jbeamshell.identify.rig import with_starts
 from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, SearchResult, StoppingRule
 from jbeamshell.identify.search_space import SearchSpace, search_space
+from jbeamshell.identify.settling import Settled, settle
 from jbeamshell.identify.specimens import Specimen, as_specimens, free_of, inspected
+from jbeamshell.identify.starts import check_starts
 from jbeamshell.laws import Law
 from jbeamshell.measured.curves import Measurement
 from jbeamshell.measured.recordings import FEWEST_POINTS
@@ -160,7 +163,7 @@ def fit(
     valid = solver is None or isinstance(solver, Newton)
     require("solver", solver, valid, "give a jbeamshell.Newton")
     require_choice("unchecked", unchecked, (False, True))
-    specimens = as_specimens(data, scene, weights)
+    specimens, copies = counted_once(as_specimens(data, scene, weights))
     if max_iterations is None:
         of_law = isinstance(specimens[0].scene, Driven)
         max_iterations = OF_LAWS * MAX_ITERATIONS if of_law else MAX_ITERATIONS
@@ -171,6 +174,7 @@ def fit(
     parameters = with_starts(parameters, specimens)
     space, scenes = search_space(parameters, {one.label: one.scene for one in specimens})
     specimens = [one._replace(scene=scenes[one.label]) for one in specimens]
+    check_starts(specimens, parameters)
     experiment = Experiment(specimens, points=points, noise=noise, free=space.keys)
     problem = Problem(experiment, space, solver or Newton(), save)
     if starts is None:
@@ -188,7 +192,7 @@ def fit(
                 shown.set_postfix_str(str(now))
                 shown.update()
 
-            ends = _search(problem, space, method, starts, stopping, progress or show)
+            end, ends = _search(problem, space, method, starts, stopping, progress or show)
     except KeyboardInterrupt:
         kept = (
             "nothing was saved: give save= (--save on the command line), a file, to continue later"
@@ -198,8 +202,8 @@ def fit(
         raise KeyboardInterrupt(f"interrupted after {problem.runs} model runs; {kept}") from None
     except UnconvergedError as error:
         raise UnconvergedError(f"{error}{told}") from None
-    minima = [(space.values(end.point), problem(space, end.point).cost) for end in ends]
-    best, status = ends[0]
+    minima = [(space.values(own.point), problem(space, own.point).cost) for own in ends]
+    status = ends[0].status
     if throw and status != "converged":
         values, cost = minima[0]
         named = ", ".join(f"{name} = {value:.6g}" for name, value in space.named(values).items())
@@ -207,8 +211,8 @@ def fit(
             f"the fit has not converged after {max_iterations} iterations, at {named}, cost "
             f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations{told}"
         )
-    found = fit_at(problem, space, best, list(scenes), status, minima)
-    return found._replace(warnings=[*found.warnings, *doubts])
+    found = fit_at(problem, space, end, list(scenes), status, minima)
+    return found._replace(warnings=[*found.warnings, *copies, *doubts])
 
 
 def fit_kappa_s(curve: Measurement | Sequence[Measurement], scene: Scene, **options: Any) -> Fit:
@@ -249,14 +253,21 @@ class _Monitor:
     ) -> None:
         self._space, self._searches, self._most = space, searches, most_steps
         self._progress, self._steps, self._begin = progress, 0, time.perf_counter()
+        self._last = (0, 0)
 
     def __call__(self, search: int, step: int, values: Vector, cost: float) -> None:
         """Count one step and report it."""
         self._steps += 1
+        self._last = (search, step)
         elapsed = time.perf_counter() - self._begin
         left = elapsed / self._steps * max(self._most - self._steps, 0)
         named = self._space.named(values)
         self._progress(FitProgress(search, self._searches, step, cost, named, elapsed, left))
+
+    def settling(self, point: Vector, cost: float) -> None:
+        """Count a step after the last search and report it."""
+        search, step = self._last
+        self(search, step + 1, self._space.values(point), cost)
 
 
 def _search(
@@ -266,8 +277,8 @@ def _search(
     starts: int,
     stopping: StoppingRule,
     progress: Callable[[FitProgress], None],
-) -> list[SearchResult]:
-    """Ends of the searches from all starts, the best first."""
+) -> tuple[Settled, list[SearchResult]]:
+    """Ends of the searches from all starts, the best first, and where that settles."""
     check_start(problem, space)
     first = np.zeros(len(space.names))
     if method == "adam":
@@ -283,7 +294,10 @@ def _search(
             report(0, number, space.values(point), costs[-1])
         points = [points[i] for i in np.argsort(costs, kind="stable")[: starts - 1]]
     ends = SEARCHES[method](problem, space, [first, *points], stopping, report)
-    return sorted(ends, key=lambda end: problem(space, end.point).cost)
+    ends = sorted(ends, key=lambda end: problem(space, end.point).cost)
+    best = settle(problem, space, ends[0].point, report.settling)
+    status = ends[0].status if best.settled else "max_iterations"
+    return best, [SearchResult(best.point, status), *ends[1:]]
 
 
 def check_start(problem: Problem, space: SearchSpace) -> None:

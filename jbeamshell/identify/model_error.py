@@ -15,7 +15,6 @@ Vector = NDArray[np.float64]
 
 SURE = 1.65  # standard errors beyond which a correlation is no chance; white noise is in 5 of 100
 LAGS = 1.3  # lags over the root of the points, over which slow correlation shows
-LIMITS = {"linear": 0.05, "log": 0.3}  # misfit by the model above which it does not describe data
 
 
 def independent_points(residuals: Sequence[Vector]) -> float:
@@ -54,10 +53,15 @@ def independent_points(residuals: Sequence[Vector]) -> float:
 
 
 def model_misfit(residual: Vector) -> float:
-    """Root mean square of the part of a residual along a curve that is no white noise.
+    """Root mean square of the part of a residual along a curve that is no white noise."""
+    return float(np.sqrt(max(float(np.mean(residual**2)) - white_noise(residual) ** 2, 0.0)))
 
-    The noise is taken from the differences of neighbours (von Neumann, Ann. Math. Stat. 12, 1941).
+
+def white_noise(residual: Vector) -> float:
+    """Size of the white noise of a residual along a curve, from the differences of neighbours.
+
+    See von Neumann, Ann. Math. Stat. 12, 1941.
     """
-    square = float(np.mean(residual**2))
-    noise = float(np.mean(np.diff(residual) ** 2)) / 2.0 if residual.size > 1 else 0.0
-    return float(np.sqrt(max(square - noise, 0.0)))
+    if residual.size < 2:
+        return 0.0
+    return float(np.sqrt(np.mean(np.diff(residual) ** 2) / 2.0))

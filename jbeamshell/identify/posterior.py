@@ -80,7 +80,8 @@ class Posterior(NamedTuple):
     def logdensity(self, theta: ArrayLike) -> Array:
         """Logarithm of the posterior density at a point (n,) of the search space.
 
-        It can be traced, mapped and differentiated once.
+        The point is no value of a parameter, see `constrain`; the density is that of points, with
+        the factor of the change of variables. It can be traced, mapped and differentiated once.
         """
         point = jnp.asarray(theta)
         values, scales = self._values_and_scales(point)

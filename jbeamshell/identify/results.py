@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require
 from jbeamshell.common.summary import Summary
 from jbeamshell.identify.contradictions import contradiction
-from jbeamshell.identify.experiment import Experiment
-from jbeamshell.identify.model_error import LIMITS, model_misfit
+from jbeamshell.identify.model_error import model_misfit
 from jbeamshell.identify.models import Driven, Model
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
-from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_of
+from jbeamshell.identify.settling import Settled
+from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_at
+from jbeamshell.identify.verdict import undescribed
 from jbeamshell.laws import Law
 
 WRONG_MODEL = 2.0  # misfit over noise above which the model must be wrong
@@ -46,8 +47,9 @@ class Fit(NamedTuple):
     scenes : scene of every specimen by its label, with the fitted values
     intervals : 95 % confidence interval by key
     warnings : sentences on what to know before using the values
-    describes : False if the model leaves more of a measurement than `LIMITS` say; its values then
-        mean little
+    describes : False if the model leaves too much of a measurement, or misses the energy per cycle
+        or the secant stiffness of a loop, see `jbeamshell.identify.verdict`; its values then mean
+        little
     minima : values and cost at the end of each search, the best first
     uncertainty : what the data do not determine, for other levels and noise
     problem : least-squares problem, for `bands` and `identify.profile`
@@ -211,7 +213,7 @@ class Fit(NamedTuple):
 def fit_at(
     problem: Problem,
     space: SearchSpace,
-    point: NDArray[np.float64],
+    end: Settled,
     labels: Sequence[str],
     status: str,
     minima: Sequence[tuple[NDArray[np.float64], float]],
@@ -222,31 +224,18 @@ def fit_at(
     ----------
     problem : least-squares problem
     space : search space, n axes
-    point : (n,) end of the best search
+    end : end of the best search
     labels : labels of the specimens
     status : status of the best search
-    describes : False if the model leaves more of a measurement than `LIMITS` say; its values then
-        mean little
     minima : values and cost at the end of each search
     """
-    experiment = problem.experiment
+    experiment, point = problem.experiment, end.point
     best, values = problem(space, point), space.values(point)
-    rows = experiment.weight.size
-    uncertainty = uncertainty_of(
-        space,
-        point,
-        best.residual,
-        best.jacobian,
-        emphasis=experiment.emphasis,
-        relative=experiment.relative,
-        slices=experiment.slices,
-        noisy=experiment.noisy,
-        model_error=experiment.model_error,
-    )
-    plain = best.residual[:rows] / experiment.emphasis
+    uncertainty = uncertainty_at(problem, space, point, end.jacobian)
+    plain = best.residual[: experiment.weight.size] / experiment.emphasis
     relative = plain * experiment.relative
     left = [model_misfit(relative[own]) for own in experiment.slices]
-    undescribed = _undescribed(experiment, left)
+    unlike = undescribed(experiment, left, best.prediction)
     scenes = {
         label: scene.replace(space.of(values, specimen))
         for specimen, (label, scene) in enumerate(zip(labels, experiment.scenes, strict=True))
@@ -267,29 +256,16 @@ def fit_at(
         scenes=scenes,
         intervals={k: (low, high) for k, (low, high) in zip(space.names, ends, strict=True)},
         warnings=[
-            *undescribed,
+            *unlike,
             *_contradiction(problem, space, point),
             *_warnings(problem, uncertainty, values, left, minima),
         ],
         left=left,
-        describes=not undescribed,
+        describes=not unlike,
         minima=[(space.named(own), cost) for own, cost in minima],
         uncertainty=uncertainty,
         problem=problem,
     )
-
-
-def _undescribed(experiment: Experiment, left: Sequence[float]) -> list[str]:
-    """Sentence on the measurement that the model describes worst; none if it describes all."""
-    limits = [LIMITS[measurement.form.scale] for measurement in experiment.measurements]
-    worst = int(np.argmax(np.divide(left, limits)))
-    if left[worst] <= limits[worst]:
-        return []
-    of = "of the range" if experiment.measurements[worst].form.scale == "linear" else "of the value"
-    return [
-        f"this model does not describe these data: it leaves {100.0 * left[worst]:.3g} % {of} of "
-        f"{experiment.labels[worst]} that is no white noise, more than {100.0 * limits[worst]:g} %"
-    ]
 
 
 def _contradiction(problem: Problem, space: SearchSpace, point: NDArray[np.float64]) -> list[str]:

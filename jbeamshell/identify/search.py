@@ -21,6 +21,8 @@ from jbeamshell.identify.search_space import SearchSpace
 DAMPING = 1e-4  # first damping of a Gauss-Newton step, in parameters of equal influence
 MAX_STEP = 1.0  # longest step along an axis of the search space, for most parameters a factor e
 FLAT = 1e-6  # relative gain in cost below which a search has converged
+REFUSED = 5  # steps in a row, each shorter than the last, that do not gain: the cost has a kink
+SHORT = 0.01  # length of a step, of which a kink may refuse so many
 ADAM_STEPS = 25
 ADAM_RATE = 0.15  # step in the search space, where most parameters are logarithms
 
@@ -110,7 +112,7 @@ def minimise(
     scale = np.where(influence > 0.0, influence, 1.0)
     cost = 0.5 * float(here.residual @ here.residual)
     damping = DAMPING * float(np.max(np.sum((here.jacobian / scale) ** 2, axis=0), initial=0.0))
-    growth = 2.0
+    growth, refused = 2.0, 0
     for step in range(1, stopping.max_iterations + 1):
         # The normal equations would square the condition number.
         jacobian = here.jacobian / scale
@@ -121,18 +123,19 @@ def minimise(
         before, after = cost, 0.5 * float(there.residual @ there.residual)
         foreseen = 0.5 * wanted @ (damping * wanted - jacobian.T @ here.residual)
         gain = before - after
-        taken = gain > 0.0
+        taken = gain > 0.0 and bool(np.all(np.isfinite(there.jacobian)))
         if taken:
             current, here, cost = trial, there, after
             damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain / foreseen - 1.0) ** 3)
-            growth = 2.0
+            growth, refused = 2.0, 0
         else:
-            damping, growth = damping * growth, 2.0 * growth
+            damping, growth, refused = damping * growth, 2.0 * growth, refused + 1
         if report:
             report(step, current, 2.0 * cost)
         change = np.max(np.abs(wanted / scale), initial=0.0)
         flat = FLAT * max(before, 0.5 * stopping.noise_cost)
-        if change < stopping.tolerance or (taken and gain < flat):
+        kink = refused >= REFUSED and change < SHORT
+        if change < stopping.tolerance or (taken and gain < flat) or kink:
             return SearchResult(current, "converged")
     return SearchResult(current, "max_iterations")
 

@@ -16,11 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.specimens import plausible_stiffness
-from jbeamshell.measured.curves import Backbone
+from jbeamshell.identify.parameters import Parameter
+from jbeamshell.identify.specimens import Specimen, plausible_stiffness
+from jbeamshell.measured.curves import Backbone, DissipationCurve, StiffnessCurve
 from jbeamshell.measured.findings import TOO_LARGE, TOO_SMALL, TOO_SOFT, TOO_STIFF, UNIT_ERROR
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop
+from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import overridden, scene_from_values
@@ -218,6 +220,43 @@ def _check_modulus(modulus: float) -> None:
             f"{TOO_SOFT if modulus < low else TOO_STIFF}, or is --width wrong; if all are right, "
             "give --modulus"
         )
+
+
+def check_starts(specimens: Sequence[Specimen], parameters: Sequence[Parameter]) -> None:
+    """Raise `InputError` if a free number starts a strip so that a measured force slides it off.
+
+    Parameters
+    ----------
+    specimens : strips at the start, and what was measured on them
+    parameters : free numbers
+    """
+    free = {parameter.key for parameter in parameters}
+    for scene, found in ((one.scene, _peak(one.measurements)) for one in specimens):
+        if not isinstance(scene, Scene):
+            continue
+        rule = gross_slip_rule(scene.load, scene.member, scene.number, found)
+        if np.all(rule.holds):
+            continue
+        gross = float(scene.contact.friction) * _pressing(scene)
+        for key in ("contact.friction", "contact.pressure"):
+            if key in free:
+                start = float(scene.get(key))
+                raise InputError(
+                    f"free {key!r}: starts at {start:.4g}, where the strip slides at mu F_N L = "
+                    f"{gross:.4g}; the measured force reaches {found:.4g} and must stay below "
+                    f"gross slip: start from {start * found / gross / MOST:.3g}"
+                )
+
+
+def _peak(measurements: Sequence[Any]) -> float:
+    """Largest force of loops and backbones, or amplitude of curves over it."""
+    forces = [item.force for item in measurements if isinstance(item, Loop | Backbone)]
+    forces += [
+        item.amplitude
+        for item in measurements
+        if isinstance(item, DissipationCurve | StiffnessCurve)
+    ]
+    return max((float(np.max(np.abs(force))) for force in forces), default=0.0)
 
 
 def suits(known: Mapping[str, Any], found: Estimate) -> bool:

@@ -3,12 +3,13 @@
 All follow from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where
 most parameters are logarithms.  The parameters' bijections map them to values.  Where the residuals
 are correlated, or more than measured noise, the model is wrong in some way: their variance is then
-that of the few independent points they are worth, see `jbeamshell.identify.model_error`.  It is
-never less than what the model's own grid may leave.
+that of the few independent points they are worth, see `jbeamshell.identify.model_error`.  What the
+model's own grid may leave adds to it.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from scipy import stats
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.model_error import independent_points
+from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 
 LEVELS = (0.68, 0.95)
@@ -25,6 +27,9 @@ LEAST = 1e-14  # eigenvalue of J'J over the largest one, below which it is round
 HARDLY, NOT = 0.1, 0.5  # relative standard errors above which a parameter is hardly or not known
 ALARM = 0.99  # part of fits whose residuals measured noise explains, if the model is right
 FEWEST = 3.0  # degrees of freedom: with fewer, Student's distribution has no variance
+WORTH_SAYING = 5e-3  # relative interval below which a parameter is known, whatever it goes with
+TOGETHER = 0.12  # interval of a product over that of one factor, below which only it is known
+SIMPLE = 0.1  # difference of a power from 1 up to which it is named a product or a ratio
 TAKES_PART = 0.3  # component of a direction over its largest one, above which it is named
 STEP = 0.1  # relative change by which a direction is described
 
@@ -132,13 +137,37 @@ class Uncertainty(NamedTuple):
                 how = "not" if share >= NOT else "hardly"
                 begin = f"{name} is {how} identifiable from these data"
                 sentences.append(f"{begin}: {noise} leaves it {where}")
-        sentences += self._trades(values)
+        pairs = self._pairs(values, level)
+        return sentences + list(pairs.values()) + self._trades(values, set(pairs))
+
+    def _pairs(self, values: NDArray[np.float64], level: float) -> dict[tuple[int, ...], str]:
+        """Sentences on pairs of positive parameters of which one product is known far better."""
+        scale = self.space.slopes(self.point) / self._sizes(values)
+        relative = self.quantile(level) ** 2 * self.covariance * np.outer(scale, scale)
+        free = [i for i in np.flatnonzero(~self.at_bound).tolist() if self.space.bijections[i].log]
+        sentences: dict[tuple[int, ...], str] = {}
+        for i, j in itertools.combinations(free, 2):
+            power = -relative[i, j] / relative[j, j]
+            alone = np.sqrt(np.array([relative[i, i], relative[j, j]]))
+            both = float(np.sqrt(max(relative[i, i] + power * relative[i, j], 0.0)))
+            if np.min(alone) < WORTH_SAYING or both > TOGETHER * alone[0]:
+                continue
+            one, other = self.space.names[i], self.space.names[j]
+            which = f"the ratio of {one} and {other}"
+            if power > 0.0:
+                which = f"the product of {one} and {other}"
+            if abs(abs(power) - 1.0) > SIMPLE:
+                which = f"{one} times {other} to the power {power:.2g}"
+            sentences[i, j] = (
+                f"only {which} is known well: to {_percent(both)}, each alone to "
+                f"{' and '.join(map(_percent, alone.tolist()))} ({100.0 * level:g} %)"
+            )
         return sentences
 
-    def _trades(self, values: NDArray[np.float64]) -> list[str]:
+    def _trades(self, values: NDArray[np.float64], named: set[tuple[int, ...]]) -> list[str]:
         """Sentences on combinations of parameters that change the response less than the noise."""
         sizes, slopes = self._sizes(values), self.space.slopes(self.point)
-        sentences, named = [], set()
+        sentences = []
         for eigenvalue, vector in self.directions():
             change = vector * slopes / sizes  # relative, for a unit step
             largest = np.max(np.abs(change))
@@ -147,8 +176,8 @@ class Uncertainty(NamedTuple):
             change = STEP * change / change[np.argmax(np.abs(change))]
             part = np.flatnonzero(np.abs(change) >= TAKES_PART * STEP)
             # The least known direction speaks for all that mix the same parameters.
-            if part.size > 1 and tuple(part) not in named:
-                named.add(tuple(part))
+            if part.size > 1 and tuple(part.tolist()) not in named:
+                named.add(tuple(part.tolist()))
                 names = " and ".join(self.space.names[i] for i in part)
                 steps = " with ".join(
                     f"{100.0 * abs(change[i]):.2g} % {'more' if change[i] > 0 else 'less'} "
@@ -171,6 +200,24 @@ class Uncertainty(NamedTuple):
         logs = np.array([bijection.log for bijection in self.space.bijections])
         sizes = np.where(logs, np.abs(values), np.maximum(np.abs(values), np.abs(starts)))
         return np.where(sizes > 0.0, sizes, 1.0)
+
+
+def uncertainty_at(
+    problem: Problem, space: SearchSpace, point: NDArray[np.float64], jacobian: NDArray[np.float64]
+) -> Uncertainty:
+    """Uncertainty at a minimum (n,) of a problem with derivatives (rows, n) there."""
+    experiment = problem.experiment
+    return uncertainty_of(
+        space,
+        point,
+        problem(space, point).residual,
+        jacobian,
+        emphasis=experiment.emphasis,
+        relative=experiment.relative,
+        slices=experiment.slices,
+        noisy=experiment.noisy,
+        model_error=experiment.model_error,
+    )
 
 
 def uncertainty_of(
@@ -196,8 +243,8 @@ def uncertainty_of(
     relative : factors of the same rows from residuals to parts of the range
     slices : rows of each measurement
     noisy : True if the residuals are in units of measured noise
-    model_error : size of what the model's own grid may leave in a residual.  It is smooth, so that
-        a curve of it is worth `FEWEST` independent points
+    model_error : size of what the model's own grid may leave in a residual.  It is smooth and alike
+        in all curves, so that all together are worth `FEWEST` independent points of it
     """
     values = space.values(point)
     pairs = zip(space.bijections, values.tolist(), strict=True)
@@ -224,7 +271,7 @@ def uncertainty_of(
         sigma = max(sigma, 1.0)
         if explained and independent == left.size:
             sigma, freedom = 1.0, None
-    sigma = max(sigma, model_error * float(np.sqrt(left.size / (FEWEST * len(slices)))))
+    sigma = float(np.hypot(sigma, model_error * np.sqrt(left.size / FEWEST)))
     factors = np.append(emphasis, priors / sigma)
     if np.any(factors != 1.0):
         # Sandwich estimator: the factors change the minimum, not the noise; priors keep theirs.
@@ -236,6 +283,11 @@ def uncertainty_of(
         max(size, np.finfo(float).tiny ** 0.25) for size in (sigma, scatter, noise)
     )
     return Uncertainty(space, point, inverse, at_bound, sigma, scatter, freedom, noise, independent)
+
+
+def _percent(part: float) -> str:
+    """Half of a relative interval in percent; beyond 100 % it is a factor, which says nothing."""
+    return f"{100.0 * part:.2g} %" if part < 1.0 else "a factor of 2 and more"
 
 
 def check_level(level: float) -> None:

@@ -83,7 +83,7 @@ def test_a_parameter_without_influence_is_left_at_zero_in_few_steps():
     data = readings(1e-4, **{KAPPA: -0.05})
     fit = identify.fit(data, scene(), KEYS)
     assert fit.values[KAPPA] < 1e-3
-    assert fit.model_runs < 35
+    assert fit.model_runs < 40  # with the last ones, along the weakest direction
     edge = identify.fit(data, scene(), [MU, ETA, Parameter(KAPPA, scale="linear")])
     np.testing.assert_allclose(values_of(fit)[:2], values_of(edge)[:2], rtol=1e-3)
 

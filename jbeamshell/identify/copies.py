@@ -1,0 +1,124 @@
+"""Measurements that are copies of others: they say nothing new, so each counts once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jbeamshell.identify.specimens import Specimen
+from jbeamshell.measured.curves import ROUNDING
+from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.recordings import FEWEST_POINTS
+
+DISSIPATES = 1e-3  # work over that of the rectangle about a loop, below which the loop is a line
+
+
+def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[str]]:
+    """Specimens without copies among their measurements, and a sentence on each copy.
+
+    A copy holds the points of another measurement, all or some of them, or the columns of another
+    loop times factors of other units.  A loop that repeats one cycle point by point keeps one.  A
+    copy of a measurement of another specimen stays, as that may be what its own numbers rest on.
+    """
+    kept: list[Specimen] = []
+    said: list[str] = []
+    others: list[Any] = []
+    for specimen in specimens:
+        if not all(hasattr(item, "form") for item in specimen.measurements):
+            kept.append(specimen)  # no measurement, which the fit refuses
+            continue
+        single = [_one_cycle(item) for item in specimen.measurements]
+        for item, repeats in single:
+            if repeats > 1:
+                said.append(
+                    f"{item.label} repeats one cycle {repeats} times, point by point: it counts "
+                    "once"
+                )
+        own = [item for item, _ in single]
+        weights = specimen.checked_weights()
+        fullest = sorted(range(len(own)), key=lambda place: -_columns(own[place])[0].size)
+        places: list[int] = []
+        for place in fullest:
+            copied = [(own[i].label, told) for i in places if (told := _copy(own[place], own[i]))]
+            if copied:
+                said.append(f"{own[place].label} is {copied[0][0]} {copied[0][1]}: it counts once")
+            else:
+                places.append(place)
+        for item, other in ((own[i], other) for i in places for other in others):
+            if told := _copy(item, other) or _copy(other, item):
+                said.append(
+                    f"{item.label} of {specimen.label} and {other.label} of another specimen are "
+                    f"copies ({told}): errors of numbers that both share are too small"
+                )
+        others += own
+        chosen = sorted(places)
+        kept.append(
+            specimen._replace(data=[own[i] for i in chosen], weights=weights[chosen].tolist())
+        )
+    return kept, said
+
+
+def _columns(item: Any) -> list[NDArray[np.float64]]:
+    """Columns (points,) of a measurement."""
+    return [getattr(item, name) for name in item.form.columns]
+
+
+def _copy(item: Any, other: Any) -> str:
+    """Words on how a measurement copies another of as many points or more; empty if it does not."""
+    if type(item) is not type(other) or not isinstance(item, Loop):
+        same = type(item) is type(other) and all(
+            map(np.array_equal, _columns(item), _columns(other))
+        )
+        return "once more" if same else ""
+    points, all_points = (one.force + 1j * one.displacement for one in (item, other))
+    if bool(np.all(np.isin(points, all_points))):
+        return "once more" if points.size == all_points.size else "with fewer points"
+    if points.size != all_points.size:
+        return ""
+    factors = []
+    for column, base in zip(_columns(item), _columns(other), strict=True):
+        factor = float(column @ base / (base @ base))
+        if np.max(np.abs(column - factor * base)) > ROUNDING * np.ptp(column):
+            return ""
+        factors.append(factor)
+    force, displacement = factors
+    tens = [abs(np.log10(abs(factor))) for factor in factors]
+    units = all(abs(power - round(power)) < ROUNDING for power in tens)
+    one_column = min(tens) < ROUNDING
+    alike = abs(force / displacement - 1.0) < ROUNDING and _dissipates(item)
+    if not (units or one_column or alike):
+        return ""  # such as loops of Goodman's bar, whose displacement goes with the force squared
+    return f"with force times {force:.6g} and displacement times {displacement:.6g}"
+
+
+def _dissipates(loop: Loop) -> bool:
+    around = float(np.ptp(loop.force) * np.ptp(loop.displacement))
+    return abs(loop.work) > DISSIPATES * around
+
+
+def _one_cycle(item: Any) -> tuple[Any, int]:
+    """Measurement with one cycle of a loop that repeats it point by point, and their number."""
+    if not isinstance(item, Loop):
+        return item, 1
+    slack = [ROUNDING * float(np.ptp(column)) for column in _columns(item)]
+
+    def repeats(period: int) -> bool:
+        return all(
+            bool(np.all(np.abs(column[period:] - column[:-period]) <= allowed))
+            for column, allowed in zip(_columns(item), slack, strict=True)
+        )
+
+    size = item.force.size
+    back = np.all(
+        [np.abs(c - c[0]) <= a for c, a in zip(_columns(item), slack, strict=True)], axis=0
+    )
+    for period in np.flatnonzero(back).tolist():
+        if FEWEST_POINTS <= period <= size // 2 and repeats(period):
+            scatter = None if item.scatter is None else item.scatter[: period + 1]
+            force, displacement = (column[: period + 1] for column in _columns(item))
+            one = item._replace(force=force, displacement=displacement, scatter=scatter)
+            return one, round((size - 1) / period)
+    return item, 1

@@ -1,0 +1,39 @@
+"""A model that misses energy or stiffness does not describe the data, whatever its misfit."""
+
+import numpy as np
+import pytest
+from identify.test_law_fits import NOISE, PLANTED, loops
+
+from jbeamshell import identify
+
+
+def test_a_law_without_loss_does_not_describe_loops():
+    pair = loops(PLANTED["iwan4"], np.random.default_rng(0), sizes=(0.006, 0.012))
+    fit = identify.fit(pair, "jenkins", starts=1, throw=False)
+    assert fit.misfit < 0.05
+    assert not fit.describes
+    assert "its energy per cycle is" in fit.warnings[0]
+
+
+@pytest.mark.parametrize("noise", [NOISE, 0.03])
+def test_noise_alone_is_no_fault_of_energy_or_stiffness(noise):
+    """Loops that are narrow, so that noise moves their energy much."""
+    random = np.random.default_rng(7)
+    for _ in range(4):
+        data = [
+            loop._replace(force=loop.force + noise * np.ptp(loop.force) * random.normal(size=65))
+            for loop in loops(PLANTED["iwan4"], sizes=(0.003, 0.012))
+        ]
+        fit = identify.fit(data, "iwan4", starts=1, throw=False)
+        assert fit.describes, fit.warnings
+
+
+@pytest.mark.slow
+def test_the_right_law_of_four_is_chosen():
+    names, right = ("iwan4", "bouc-wen", "jenkins", "sliders4"), 0
+    for seed in range(20):
+        planted = names[seed % 4]
+        data = loops(PLANTED[planted], np.random.default_rng(seed))
+        chosen = identify.compare(data, names).chosen
+        right += chosen is not None and chosen.name == planted
+    assert right >= 19
