@@ -124,9 +124,9 @@ def grid_error(work: Array) -> Array:
     numbers: Any = np if isinstance(work, np.ndarray) else jax.numpy
     total = numbers.sum(work)
     slips = total > 0.0
-    return numbers.where(
-        slips, numbers.sum((work / numbers.where(slips, total, 1.0)) ** 2) ** 1.5, numbers.inf
-    )
+    whole = numbers.where(slips, total, 1.0)
+    grid = numbers.sum((work / whole) ** 2) ** 1.5
+    return numbers.where(slips, grid, numbers.inf)
 
 
 def slip_and_cap(cycle: SlipCycle) -> tuple[Array, Array]:
