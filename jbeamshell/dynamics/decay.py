@@ -268,12 +268,17 @@ def _fits(y: Floats, fall: float, about: float, band: tuple[float, float]) -> li
             moved, level = float(np.max(np.abs(fit.level - level))), fit.level
             if moved < SETTLED:
                 break
-        if fit is None or fit.rates(fit.level)[1].min() <= 0.0:
+        if fit is None or not _is_seen(fit.rates(fit.level)[1]):
             break
         fits.append(fit)
         if len(fits) - 1 - int(np.argmin(_scores(fits))) >= 2:
             break
     return fits
+
+
+def _is_seen(omega: Floats) -> bool:
+    """True for frequencies per sample that samples tell: positive, with two samples a period."""
+    return bool(np.all((omega > 0.0) & (omega < np.pi)))
 
 
 def _least_squares(
