@@ -166,7 +166,7 @@ class Sweep:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What may be wrong with lanes that were solved, by how much, and what to change."""
+        """Doubt about lanes that were solved: how many, by how much they are off, and the fix."""
         allowed = doubted_from(self.scene.model.tolerance)
         beyond = self._errors[self._errors > allowed]
         if not beyond.size:

@@ -53,7 +53,7 @@ def planted(seed):
 
 
 def inside(seed):
-    """Which of a pair's true values lie in their intervals."""
+    """True values of a pair that lie in their intervals."""
     data, start, values = planted(seed)
     fit = identify.fit(data, start, list(values), points=48, throw=False)
     return [low <= values[key] <= high for key, (low, high) in fit.intervals.items()]
