@@ -135,7 +135,8 @@ def sweep_contour(
 
     Examples
     --------
-    >>> plotting.sweep_contour(result, figure="loss_factor")
+    >>> axes = {"load.amplitude": np.linspace(0.2, 1.6, 8), "strip.height_ratio": [0.05, 0.1, 0.2]}
+    >>> plotting.sweep_contour(jb.sweep(jb.Scene(), axes), figure="loss_factor")
     """
     along, per = _keys(result, along, per)
     if per is None or result.paired:
