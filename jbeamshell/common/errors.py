@@ -30,8 +30,8 @@ class DoubtfulWarning(UserWarning):
     """Result that converged and may still be wrong; see `jbeamshell.History.doubts`."""
 
 
-def warn_of_doubts(doubts: Iterable[str], stacklevel: int) -> None:
-    """Warn of everything that is doubtful about a result, at the line of a caller."""
+def warn_of_doubts(doubts: Iterable[str], stacklevel: int = 2) -> None:
+    """Warn of everything doubtful about a result, by default where the caller was called."""
     for doubt in doubts:
         warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=stacklevel + 1)
 

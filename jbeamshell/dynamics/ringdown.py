@@ -9,13 +9,12 @@ near gross slip, is measured swing by swing.
 from __future__ import annotations
 
 import dataclasses
-import warnings
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import require, require_choice
-from jbeamshell.common.errors import DoubtfulWarning, InputError
+from jbeamshell.common.errors import InputError, warn_of_doubts
 from jbeamshell.dynamics.decay import Decay, evidence_needed, fit_decay
 from jbeamshell.dynamics.envelopes import Envelope, extrema, from_analytic_signal, from_swings
 from jbeamshell.dynamics.over_amplitude import RingDown
@@ -124,8 +123,7 @@ def ring_down(
     if method in ("turning-points", "hilbert"):
         points = _points(times, signal, method, smoothing, band)
         result = _measured(points, method)
-    for doubt in result.doubts:
-        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=2)
+    warn_of_doubts(result.doubts)
     return dataclasses.replace(
         result, amplitude=result.amplitude / result.omega ** KINDS.index(kind)
     )

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import enum
-import warnings
 from typing import Any, Protocol
 
 import equinox as eqx
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.errors import DoubtfulWarning, UnconvergedError
+from jbeamshell.common.errors import UnconvergedError
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
@@ -62,12 +61,6 @@ def doubts_of_balance(motion: Balance) -> tuple[str, ...]:
         f"the energy balance is open by {100.0 * part:.2g} % of the energy that moved: take "
         "shorter time steps (a smaller step or tolerance)",
     )
-
-
-def warn_of_doubts(doubts: tuple[str, ...]) -> None:
-    """Warn of doubts at the line that called the caller."""
-    for doubt in doubts:
-        warnings.warn(f"doubtful: {doubt}", DoubtfulWarning, stacklevel=3)
 
 
 class Ending(enum.IntEnum):

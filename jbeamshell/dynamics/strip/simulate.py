@@ -16,6 +16,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import POSITIVE, is_traced, require, require_choice, require_number
+from jbeamshell.common.errors import warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.progress import watched
 from jbeamshell.dynamics.strip import rate_friction
@@ -29,7 +30,6 @@ from jbeamshell.dynamics.strip.motion import (
     Ending,
     InterruptedMotionError,
     Motion,
-    warn_of_doubts,
 )
 from jbeamshell.dynamics.strip.step_equations import StepMatrices
 from jbeamshell.dynamics.strip.stepsize import EXPLICIT, METHODS, STIFF, longest_step

@@ -30,11 +30,10 @@ from jax import Array, lax
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.checks import in_transformation, is_traced, require
-from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
 from jbeamshell.common.summary import Summary, ranged
-from jbeamshell.dynamics.strip.motion import warn_of_doubts
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration.reduction import basis_of

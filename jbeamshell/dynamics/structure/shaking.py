@@ -29,10 +29,10 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import POSITIVE, require, require_count, require_number
-from jbeamshell.common.errors import InputError, UnconvergedError
+from jbeamshell.common.errors import InputError, UnconvergedError, warn_of_doubts
 from jbeamshell.common.precision import doubled
 from jbeamshell.common.summary import Summary, with_unit
-from jbeamshell.dynamics.strip.motion import doubts_of_balance, warn_of_doubts
+from jbeamshell.dynamics.strip.motion import doubts_of_balance
 from jbeamshell.dynamics.structure.matrices import Structure, dense
 from jbeamshell.dynamics.vibration.elements import Laws, laws_of
 
