@@ -139,6 +139,11 @@ def test_a_heavy_library_stays_at_home(library):
     assert all(user.startswith(HOMES[library]) for user in users), users
 
 
+def test_no_module_takes_what_jax_does_not_publish():
+    private = {name for names in NAMES.values() for name in names if name.startswith("jax._src")}
+    assert not private
+
+
 def test_the_package_needs_nothing_of_its_clone():
     tops = {name.split(".")[0] for names in NAMES.values() for name in names}
     assert not tops & {"calibration", "tests"}

@@ -92,9 +92,14 @@ def is_asynchronous() -> bool:
 
 def started() -> bool:
     """True if JAX has started; its compiler takes no options afterwards."""
-    from jax._src import xla_bridge  # no public function tells without starting it
-
-    return xla_bridge.backends_are_initialized()
+    config: Any = jax.config
+    before = config.jax_num_cpu_devices
+    try:
+        config.update("jax_num_cpu_devices", before + 1)  # refused once JAX has started
+    except RuntimeError:
+        return True
+    config.update("jax_num_cpu_devices", before)
+    return False
 
 
 def memory() -> float:

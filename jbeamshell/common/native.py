@@ -11,7 +11,7 @@ import jax
 from jax.experimental.xla_metadata import set_xla_metadata
 from jax.flatten_util import ravel_pytree
 
-from jbeamshell.common.checks import in_transformation, is_traced
+from jbeamshell.common.checks import is_staged, is_traced
 from jbeamshell.common.threads import in_one_lapack_thread
 
 # The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
@@ -69,7 +69,7 @@ class Native:
         """Value for numbers; None if a JAX transformation asks with traced values."""
         if is_traced(given):
             return None
-        if not in_transformation():
+        if not is_staged():
             return self._value(*given)
         # Elsewhere each operation on constants would be compiled and run by itself.
         with jax.ensure_compile_time_eval():  # now, while another function is traced

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jbeamshell.common.checks import in_transformation, is_traced
+from jbeamshell.common.checks import is_staged, is_traced
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -30,7 +30,7 @@ def in_double(function: Callable[P, R], within: Callable[P, R] | None = None) ->
 
     @functools.wraps(function)
     def precise(*given: P.args, **options: P.kwargs) -> R:
-        if in_transformation() or is_traced(given, options):
+        if is_staged() or is_traced(given, options):
             return usual(*given, **options)
         if not is_single(given, options):
             return function(*given, **options)

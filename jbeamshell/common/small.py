@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jbeamshell.common.checks import in_transformation
+from jbeamshell.common.checks import is_staged
 
 QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
 VECTORS = "xla_backend_optimization_level"  # option without which loops stay vectorised
@@ -73,7 +73,7 @@ class Small:
     def __call__(self, given: Any, *static: Hashable) -> Any:
         """Value of the function."""
         leaves, tree = jax.tree.flatten(given)
-        if in_transformation() or not all(map(_is_number, leaves)):
+        if is_staged() or not all(map(_is_number, leaves)):
             return self._inside(given, *static)
         return self._quick(leaves, tree, static)
 

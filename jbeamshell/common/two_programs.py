@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from jbeamshell.common.checks import in_transformation, is_traced
+from jbeamshell.common.checks import is_staged, is_traced
 from jbeamshell.common.small import QUICK, VECTORS, known_options
 
 # Compiler options of the two programs; the loops of the second stay vectorised.
@@ -64,7 +64,7 @@ class TwoPrograms:
         given : arguments of the function
         native : False where its loops are known not to fit in native calls
         """
-        if in_transformation() or is_traced(given):
+        if is_staged() or is_traced(given):
             return self._inside(*given)
         leaves, tree = jax.tree.flatten(given)
         arrays = [leaf for leaf in leaves if _is_array(leaf)]

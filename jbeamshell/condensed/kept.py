@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from jbeamshell.common.checks import in_transformation, is_traced
+from jbeamshell.common.checks import is_staged, is_traced
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
 
@@ -36,7 +36,7 @@ def kept(build: Build) -> Build:
 
     @functools.wraps(build)
     def found(scene: Scene) -> Any:
-        if scene.model.solution != "plane" or in_transformation() or is_traced(scene):
+        if scene.model.solution != "plane" or is_staged() or is_traced(scene):
             return build(scene)
         template, numbers = Template.of(alike(scene))
         return built(template, np.asarray(numbers, template.dtype).tobytes())

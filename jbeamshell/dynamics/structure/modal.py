@@ -29,7 +29,7 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import ArrayLike
 
-from jbeamshell.common.checks import in_transformation, is_traced, require
+from jbeamshell.common.checks import is_staged, is_traced, require
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
@@ -179,7 +179,7 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
         )
     structure.knows(curve.joints, f"the modal displacement {amplitude[-1]:.6g}")
     curve = jax.tree.map(np.asarray, curve)
-    if not in_transformation():
+    if not is_staged():
         warn_of_doubts(curve.doubts)
     return curve
 

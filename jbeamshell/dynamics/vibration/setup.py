@@ -13,7 +13,7 @@ import numpy as np
 
 from jbeamshell.common.checks import (
     as_leaf,
-    in_transformation,
+    is_staged,
     is_traced,
     require,
     require_count,
@@ -35,7 +35,7 @@ AMPLITUDES = "give positive modal displacements that rise"
 
 def precise(traced: bool) -> Any:
     """Context of double precision; within a transformation the precision stays as it is."""
-    plain = traced or in_transformation()
+    plain = traced or is_staged()
     return contextlib.nullcontext() if plain else jax.enable_x64(True)
 
 
