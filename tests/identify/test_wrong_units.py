@@ -56,7 +56,7 @@ def test_a_start_that_is_only_far_off_says_nothing():
 
 
 def test_a_bound_that_a_wrong_unit_meets_says_so():
-    found = fitted(1e3, bounds=(5e3, 1e5))
+    found = fitted(1e3, low=5e3, high=1e5)
     assert any("at its bound: are kilonewtons taken" in warning for warning in found.warnings)
 
 
