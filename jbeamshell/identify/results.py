@@ -242,7 +242,9 @@ def fit_at(
         label: scene.replace(space.of(values, specimen))
         for specimen, (label, scene) in enumerate(zip(labels, experiment.scenes, strict=True))
     }
-    ends = uncertainty.intervals().tolist()
+    ends, statics = uncertainty.intervals().tolist(), list[str]()
+    if best.converged:
+        statics = doubt_of_statics(experiment, list(scenes.values()), uncertainty, end.jacobian)
     return Fit(
         scene=next(iter(scenes.values())),
         values=space.named(values),
@@ -261,7 +263,7 @@ def fit_at(
             *unlike,
             *_contradiction(problem, space, point),
             *doubt_of_units(space, values.tolist()),
-            *doubt_of_statics(experiment, list(scenes.values()), uncertainty, end.jacobian),
+            *statics,
             *_warnings(problem, uncertainty, values, left, minima),
         ],
         left=left,

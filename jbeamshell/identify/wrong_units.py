@@ -52,4 +52,4 @@ def _far(bijection: Bijection, value: float) -> str:
         return "at its bound"
     ratio = value / bijection.start
     factor, side = (ratio, "above") if ratio > 1.0 else (1.0 / ratio, "below")
-    return f"{factor:.3g} times {side} its start, which no other material explains"
+    return f"{factor:.4g} times {side} its start, which no other material explains"
