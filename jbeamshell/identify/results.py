@@ -242,7 +242,8 @@ def fit_at(
         label: scene.replace(space.of(values, specimen))
         for specimen, (label, scene) in enumerate(zip(labels, experiment.scenes, strict=True))
     }
-    ends, statics = uncertainty.intervals().tolist(), list[str]()
+    ends = uncertainty.intervals().tolist()
+    statics: list[str] = []
     if best.converged:
         statics = doubt_of_statics(experiment, list(scenes.values()), uncertainty, end.jacobian)
     return Fit(
