@@ -18,6 +18,8 @@ from jbeamshell.identify.models import Model
 from jbeamshell.identify.observations import ModalObservation
 from jbeamshell.identify.uncertainty import Uncertainty
 
+ROUNDED = 1.0 - 5e-4  # of an amplitude, so that its four digits are no larger
+
 
 def doubt_of_statics(
     experiment: Experiment,
@@ -59,7 +61,7 @@ def doubt_of_statics(
     fix = "compare the fitted structure with nonlinear_mode"
     fix = f"fit smaller amplitudes alone, or {fix}" if np.any(sizes < first) else fix
     return [
-        f"from the amplitude {first:.4g} on, the fitted damping may be off by up to {damping:.0%} "
+        f"from the amplitude {ROUNDED * first:.4g} on, the fitted damping may be off by up to {damping:.0%} "
         f"and the frequency by {frequency:.1%}, as statics know no inertia and no shape of the "
         f"loop, which may move {moved}: {fix}"
     ]
