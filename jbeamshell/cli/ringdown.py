@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from jbeamshell.scene.scene import Scene
 
 SMALL = 0.05  # part of gross slip below which the default amplitude is no pull of a ring-down
+LOW, HIGH = "_low", "_high"  # endings of the names of an interval's ends
 ROWS = 12  # rows of the printed table, about
 
 
@@ -116,8 +117,7 @@ def _pull(scene: Scene, chosen: bool) -> float:
     The latter is taken where the amplitude is no force below gross slip, or where nobody chose it
     and it is a small part of gross slip.
     """
-    from jbeamshell.dynamics.steady_cycles import gross_slip
-    from jbeamshell.dynamics.structure.joint import largest_force
+    from jbeamshell.dynamics.steady_cycles import gross_slip, largest_force
 
     limit = float(gross_slip(scene))
     with contextlib.suppress(InputError):
@@ -137,10 +137,22 @@ def _table(figures: dict[str, Any]) -> str:
     """Figures as text to read: single ones by name, then some rows of the lists."""
     lists = _lists(figures)
     lines = [f"{name:24s} {value}" for name, value in figures.items() if name not in lists]
-    lines += ["", "".join(f"{name:>21s}" for name in lists)]
-    rows = list(zip(*lists.values(), strict=True))
-    lines += ["".join(f"{x:21.5g}" for x in row) for row in rows[:: max(1, len(rows) // ROWS)]]
+    if any(name.endswith(LOW) for name in lists):
+        lines.append(f"{'+-':24s} half of the 95 % interval")
+    shown = [name for name in lists if not name.endswith((LOW, HIGH))]
+    lines += ["", "".join(f"{name:>22s}" for name in shown)]
+    count = len(lists["amplitude"])
+    for row in range(0, count, max(1, count // ROWS)):
+        lines.append("".join(f"{_cell(lists, name, row):>22s}" for name in shown))
     return "\n".join(lines)
+
+
+def _cell(lists: dict[str, list[float]], name: str, row: int) -> str:
+    """Number of a table, with half of its interval if that is known."""
+    text = f"{lists[name][row]:.5g}"
+    if name + LOW not in lists:
+        return text
+    return f"{text} +- {0.5 * (lists[name + HIGH][row] - lists[name + LOW][row]):.2g}"
 
 
 def _lists(figures: dict[str, Any]) -> dict[str, list[float]]:

@@ -18,15 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jbeamshell.dynamics.decay_start import DENSEST, begins_at, strongest
+
 Floats = NDArray[np.float64]
 
 NUMBERS = (1, 2, 3, 4, 6, 9)  # of each rate
-DENSEST = 32.0  # samples of a period, beyond which neighbours are averaged
-ZETAS = (0.0, 0.003, 0.01, 0.03, 0.1, 0.2, 0.35)  # at which a first fit starts
-FACTORS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)  # of a broad peak's frequency
-SHARP = 0.05  # zeta of a narrow peak
-PEAKS = 3  # of the spectrum, at which it starts
-MOST = 4000  # samples of a first fit
 VISIBLE = 2.0  # smallest amplitude that tells a rate, over the noise of one cycle's amplitude
 ROUNDING = 1e-9  # of the signal, below which nothing is told
 BAND = 0.5  # half width of the band about the frequency that tells the noise, over the frequency
@@ -118,9 +114,9 @@ def fit_decay(
 
     step, size = float(time[1] - time[0]), float(np.ptp(signal))
     y = (signal - np.mean(signal)) / size
-    begun = _begin(y)
+    begun = begins_at(y)
     y, time, band = y[begun:], time[begun:], (step * band[0], step * band[1])
-    start = _start(y)
+    start = strongest(y)
     if start is None:
         return None
     merged = max(1, int(2.0 * np.pi / start[2] / DENSEST))
@@ -155,7 +151,7 @@ def fit_decay(
     complex_rate = -decay + 1j * omega
     within = (np.arange(merged) - 0.5 * (merged - 1)) / merged
     shrunk = np.abs(np.exp(complex_rate[:, None] * within).mean(axis=1))
-    rest, quiet = _start(best.left), _quiet(best.left)
+    rest, quiet = strongest(best.left), _quiet(best.left)
     seen = rest is not None and rest[0] > evidence_needed(y.size) * quiet
     if at.size > 1:
         decay = decay + np.gradient(np.log(shrunk), at)
@@ -180,53 +176,6 @@ def fit_decay(
 def evidence_needed(samples: int) -> float:
     """Power that a vibration among some samples must have over the noise of one, to be one."""
     return EVIDENCE * float(np.log(samples))
-
-
-def _begin(y: Floats) -> int:
-    """First sample of the decay: where a cycle is strongest, if the signal begins with less."""
-    omega = _peaks(y)[0]
-    length = max(3, round(2.0 * np.pi / omega))
-    if y.size < 3 * length:
-        return 0
-    total = np.cumsum(np.concatenate([[0.0], (y - np.median(y)) ** 2]))
-    power = total[length:] - total[:-length]
-    return 0 if power[0] > 0.5 * power.max() else int(np.argmax(power))
-
-
-def _peaks(y: Floats) -> list[float]:
-    """Angular frequencies per sample of the highest peaks of the spectrum, the highest first."""
-    count = 4 * y.size
-    y = y - np.polynomial.Polynomial.fit(np.arange(y.size), y, 1)(np.arange(y.size))
-    power = np.abs(np.fft.rfft(y, count)) ** 2
-    power += np.abs(np.fft.rfft(y * np.hanning(y.size), count)) ** 2
-    power[:3] = 0.0
-    tops = 1 + np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:]))
-    tops = tops if tops.size else np.array([max(int(np.argmax(power)), 1)])
-    order = np.argsort(-power[tops])[:PEAKS]
-    return [2.0 * np.pi * float(top) / count for top in tops[order]]
-
-
-def _start(y: Floats) -> tuple[float, float, float] | None:
-    """Strongest of many decaying vibrations: its power, decay and angular frequency per sample."""
-    best, found = 0.0, None
-    for peak in _peaks(y):
-        merged = max(1, int(2.0 * np.pi / peak / DENSEST))
-        z = y[: y.size // merged * merged].reshape(-1, merged).mean(axis=1)[:MOST]
-        n = np.arange(z.size)
-        total = float(np.sum((z - z.mean()) ** 2))
-        for zeta in ZETAS:
-            for factor in FACTORS if zeta > SHARP else (1.0,):
-                omega = factor * peak * merged
-                if omega >= np.pi:
-                    continue
-                size = np.exp(-zeta * omega * n)
-                columns = [size * np.cos(omega * n), size * np.sin(omega * n), np.ones(n.size), n]
-                given = np.stack(columns, axis=1)
-                values = np.linalg.lstsq(given, z, rcond=None)[0]
-                power = merged * (total - float(np.sum((z - given @ values) ** 2)))
-                if power > best:
-                    best, found = power, (power, zeta * omega / merged, omega / merged)
-    return found
 
 
 def _fits(y: Floats, fall: float, about: float, band: tuple[float, float]) -> list[_Fit]:

@@ -26,9 +26,10 @@ from jbeamshell.condensed.network import Network
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.over_amplitude import RingDown
 from jbeamshell.dynamics.ringdown import ring_down
+from jbeamshell.dynamics.steady_cycles import largest_force
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.motion import Motion
-from jbeamshell.dynamics.structure.joint import Joint, largest_force
+from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.modal import ModalCurve
 from jbeamshell.scene.scene import Scene
 
@@ -87,11 +88,18 @@ class RingDownStudy(NamedTuple):
         return np.interp(at, self.predicted.amplitude, column)
 
     def figures(self) -> dict[str, Any]:
-        """Summary and curves by name, in numbers and lists that JSON takes."""
-        columns = {
-            "amplitude": self.found.amplitude,
-            "frequency": self.found.frequency,
-            "damping": self.found.damping,
+        """Summary and curves by name, in numbers and lists that JSON takes.
+
+        ``frequency_low`` and ``frequency_high`` are the ends of 95 % intervals, and so are those of
+        the damping; they are there where the intervals are known.
+        """
+        columns = {"amplitude": self.found.amplitude}
+        for name in ("frequency", "damping"):
+            columns[name] = getattr(self.found, name)
+            ends = getattr(self.found, f"{name}_interval")
+            if ends is not None:
+                columns[f"{name}_low"], columns[f"{name}_high"] = ends.T
+        columns |= {
             "predicted_frequency": self._prediction(self.predicted.frequency) / (2.0 * np.pi),
             "predicted_damping": self._prediction(self.predicted.damping),
         }

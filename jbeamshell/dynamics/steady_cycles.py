@@ -1,7 +1,8 @@
-"""Steady cycles of a scene at several amplitudes of its end force."""
+"""Steady cycles of a scene at several amplitudes of its end force, and how large that may be."""
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -9,10 +10,11 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import is_traced
+from jbeamshell.common.checks import is_traced, require, require_number
 from jbeamshell.common.errors import Status
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
@@ -65,3 +67,21 @@ def gross_slip(scene: Scene) -> Any:
     contact, length = scene.contact, scene.strip.length
     down, _ = resultant(contact.pressure, contact.bottom_pressure, length, scene.member.support)
     return contact.friction * down
+
+
+def largest_force(scene: Scene, force: Any = None) -> Any:
+    """Force up to which a joint is wanted, checked; None is the scene's amplitude."""
+    key = "force" if force is not None else "load.amplitude"
+    if force is None:
+        control = scene.load.control
+        fix = "is no force: give force=, or take load.control = 'force'"
+        require("load.amplitude", scene.load.amplitude, control == "force", fix)
+        force = scene.load.amplitude
+    require_number("force", force)
+    if not is_traced(scene, force):
+        by_force = dataclasses.replace(scene.load, control="force")
+        rule = gross_slip_rule(by_force, scene.member, scene.number, force)
+        limit = float(gross_slip(scene))
+        fix = f"must stay below gross slip, mu F_N L = {limit:.6g}: take less, such as half of it, "
+        rule._replace(key=key, fix=f"{fix}{0.5 * limit:.4g}").demand()
+    return force

@@ -10,12 +10,12 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import as_leaf, is_traced, require, require_number
-from jbeamshell.common.errors import InputError
+from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require, require_number
+from jbeamshell.common.errors import InputError, warn_of_doubts
 from jbeamshell.dynamics.steady_cycles import gross_slip
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Attachment, Structure
-from jbeamshell.dynamics.structure.modal import ModalCurve, modal_curve
+from jbeamshell.dynamics.structure.modal import ModalCurve, by_statics
 from jbeamshell.identify.drive import Drive
 from jbeamshell.identify.rig_keys import OF_STRUCTURE
 from jbeamshell.scene.scene import Scene
@@ -138,8 +138,17 @@ class Assembly(eqx.Module):
         return built
 
     def curve(self, amplitudes: ArrayLike) -> ModalCurve:
-        """Frequency and damping of the mode over the displacement amplitudes of the point."""
-        return self.response(amplitudes)[0]
+        """Frequency and damping of the mode over the displacement amplitudes of the point.
+
+        Warns
+        -----
+        DoubtfulWarning
+            as `jbeamshell.dynamics.modal_curve` does; `response` does not
+        """
+        found = self.response(amplitudes)[0]
+        if not (is_traced(found) or is_staged()):
+            warn_of_doubts(found.doubts)
+        return found
 
     def response(self, amplitudes: ArrayLike) -> tuple[ModalCurve, Array]:
         """Curve as `curve` has it, and the modal force of a unit force at the driven point.
@@ -153,7 +162,7 @@ class Assembly(eqx.Module):
         seen = jnp.asarray(1.0) if self.point is None else jnp.abs(shape[self.point])
         driven = self.point if self.driven is None else self.driven
         felt = jnp.asarray(1.0) if driven is None else jnp.abs(shape[driven])
-        found = modal_curve(structure, jnp.asarray(amplitudes) / seen, self.mode)
+        found = by_statics(structure, jnp.asarray(amplitudes) / seen, self.mode)
         return found._replace(amplitude=amplitudes), felt * seen
 
 

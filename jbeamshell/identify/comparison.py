@@ -101,12 +101,16 @@ class Comparison(NamedTuple):
         lines = [head]
         for row in self.rows:
             error = np.abs(self.error(row))
-            if np.all(np.isnan(error)):
-                lines.append(f"  {row.name:12s} {row.told}")
+            known = np.isfinite(error)
+            without = f"no energy at {np.sum(~known)} of {known.size} amplitudes"
+            told = "; ".join(filter(None, (row.told, "" if np.all(known) else without)))
+            if not np.any(known):
+                lines.append(f"  {row.name:12s} {row.told or without}")
                 continue
+            error = error[known]
             figures = f"{100 * row.misfit:5.2g} %  {100 * np.median(error):16.2g} %"
             worst = f"{100 * np.max(error):5.3g} %  {1e6 * row.seconds:6.0f} us"
-            note = f"  ({row.told})" if row.told else ""
+            note = f"  ({told})" if told else ""
             lines.append(f"  {row.name:12s} {row.numbers:7d}  {figures}  {worst}{note}")
         if (chosen := self.chosen) is not None:
             lines.append(f"  the data speak for {chosen.name} (Bayesian information criterion)")

@@ -18,6 +18,7 @@ from jax import Array, lax
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.dynamics.structure.modal import ModalCurve
 from jbeamshell.identify.models import (
     FIGURES,
     Model,
@@ -49,6 +50,7 @@ RUN_IN = 32  # approximate load steps of a closed loop's first, uncompared pass
 POSITION_ROUNDING = 1e-6  # distance over L by which tables may round a position off the strip
 UNSOLVED_RESIDUAL = 10.0  # residual over the range of a trial without equilibrium: never accepted
 MODAL: tuple[type[AmplitudeCurve], ...] = (FrequencyCurve, DampingCurve, ForcedCurve)
+LEAST_PART = 0.1  # of a frequency or damping, that its error leaves
 NEGLIGIBLE = 1e-6  # least figure over the measured one, so that its logarithm exists
 
 
@@ -310,19 +312,33 @@ class ModalObservation(LogObservation):
             require_point(curve.label, model)
             omega = 2.0 * np.pi * curve.frequency
         level, place = np.unique(curve.amplitude, return_inverse=True)
-        model.curve(level)  # raises for wrong input
+        model.response(level)  # raises for wrong input
         figure = MODAL.index(type(curve))
         return cls(*cls.columns(curve), *map(jnp.asarray, (level, place, figure, omega)))
 
     def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
         """Logarithms (n,) of the figure, and whether all static equilibria were found."""
+        values = self._figures(*of_structures_alone("modal curve", scene).response(self.level))
+        return _logarithm(values, self.measured)
+
+    def without_errors(self, scene: Model) -> tuple[ModalCurve, NDArray[np.float64]]:
+        """Curve, and change (n,) of the logarithms if it were without the errors that it states."""
         curve, mobility = of_structures_alone("modal curve", scene).response(self.level)
-        natural, ratio = curve.frequency[self.place], curve.damping[self.place]
+        parts = (1.0 - np.asarray([curve.frequency_error, curve.damping_error])).clip(LEAST_PART)
+        exact = curve._replace(
+            frequency=parts[0] * curve.frequency, damping=parts[1] * curve.damping
+        )
+        own, other = (np.asarray(self._figures(each, mobility)) for each in (curve, exact))
+        return curve, np.log(other / own)
+
+    def _figures(self, curve: ModalCurve, mobility: Array) -> Array:
+        """Figures (n,) of a curve over the levels."""
+        frequency, damping = jnp.asarray(curve.frequency), jnp.asarray(curve.damping)
+        natural, ratio = frequency[self.place], damping[self.place]
         elastic = natural**2 - self.omega**2
         size = jnp.hypot(elastic, 2.0 * ratio * natural * self.omega)
         force = self.level[self.place] * size / mobility
-        values = lax.select_n(self.figure, natural / (2.0 * jnp.pi), ratio, force)
-        return _logarithm(values, self.measured)
+        return lax.select_n(self.figure, natural / (2.0 * jnp.pi), ratio, force)
 
 
 def _logarithm(values: Array, measured: Array) -> tuple[Array, Array]:

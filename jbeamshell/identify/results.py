@@ -18,8 +18,10 @@ from jbeamshell.identify.models import Driven, Model
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.settling import Settled
+from jbeamshell.identify.statics import doubt_of_statics
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_at
 from jbeamshell.identify.verdict import undescribed
+from jbeamshell.identify.wrong_units import doubt_of_units
 from jbeamshell.laws import Law
 
 WRONG_MODEL = 2.0  # misfit over noise above which the model must be wrong
@@ -241,6 +243,9 @@ def fit_at(
         for specimen, (label, scene) in enumerate(zip(labels, experiment.scenes, strict=True))
     }
     ends = uncertainty.intervals().tolist()
+    statics: list[str] = []
+    if best.converged:
+        statics = doubt_of_statics(experiment, list(scenes.values()), uncertainty, end.jacobian)
     return Fit(
         scene=next(iter(scenes.values())),
         values=space.named(values),
@@ -258,6 +263,8 @@ def fit_at(
         warnings=[
             *unlike,
             *_contradiction(problem, space, point),
+            *doubt_of_units(space, values.tolist()),
+            *statics,
             *_warnings(problem, uncertainty, values, left, minima),
         ],
         left=left,

@@ -158,6 +158,7 @@ def ring_down_sheet(study: RingDownComparison) -> Figure:
             below.set_xlabel(OF_STRIP)
             mark_decades(below.xaxis)
             below.set_ylim(known.min() / room, known.max() * room)
+        mark_decades(axes[1, 1].yaxis)
     return axes[0, 0].figure
 
 
@@ -181,5 +182,5 @@ def _pair(
         pair[0].set(xlabel=along, ylabel=FREQUENCY, xscale="log")
         pair[1].set(xlabel=along, ylabel=DAMPING, xscale="log", yscale="log")
         pair[1].legend(loc="upper left")
-        mark_decades(pair[0].xaxis, pair[1].xaxis)
+        mark_decades(pair[0].xaxis, pair[1].xaxis, pair[1].yaxis)
     return pair

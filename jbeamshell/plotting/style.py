@@ -198,14 +198,15 @@ def beside(axes: Axes) -> None:
 def mark_decades(*axes_of_one: Axis) -> None:
     """Mark 1, 2 and 5 of every decade on logarithmic axes of less than two decades.
 
-    Axes of less than half a decade have a few even marks.
+    Axes of more than 20 to 1 have 1 and 3, whose labels would touch otherwise; those of less than
+    half a decade have a few even marks.
     """
     for axis in axes_of_one:
         low, high = axis.get_view_interval()
         if high >= 100.0 * low:
             continue
-        wide = high >= 5.0 * low
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if wide else MaxNLocator(FEW))
+        marks = LogLocator(subs=(1.0, 3.0) if high > 20.0 * low else (1.0, 2.0, 5.0))
+        axis.set_major_locator(marks if high >= 5.0 * low else MaxNLocator(FEW))
         axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(99, 99)))
         axis.set_minor_formatter(NullFormatter())
 

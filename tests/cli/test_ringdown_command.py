@@ -32,6 +32,12 @@ def test_it_reports_and_writes_what_it_says(capsys, tmp_path, words):
     table = np.genfromtxt(folder / "motion.csv", delimiter=",", names=True)
     assert table["displacement"][0] == pytest.approx(figures["largest_displacement"])
     assert json.loads((folder / "result.json").read_text()) == figures
+    table = np.genfromtxt(folder / "ringdown.csv", delimiter=",", names=True)
+    for name in ("frequency", "damping"):
+        low, high = table[f"{name}_low"], table[f"{name}_high"]
+        assert np.all((low < table[name]) & (table[name] < high))
+        assert low == pytest.approx(figures[f"{name}_low"])
+        assert np.all(high - low < 0.5 * table[name].max())
 
 
 @pytest.mark.parametrize(
@@ -84,8 +90,14 @@ def test_the_fix_of_a_pull_beyond_gross_slip_works(capsys):
 
 
 def test_a_lap_joint_rings_down_by_its_sliders(capsys):
+    assert main.main(["ringdown", "single-lap", "--cycles", "8"]) == 0
+    text = capsys.readouterr().out
     assert main.main(["ringdown", "single-lap", "--json", "--cycles", "8"]) == 0
     figures = json.loads(capsys.readouterr().out)
+    ends = (figures[f"damping_{end}"][0] for end in ("low", "high"))
+    half = -0.5 * np.subtract(*ends)
+    assert f"{figures['damping'][0]:.5g} +- {half:.2g} " in text
+    assert "half of the 95 % interval" in text
     assert figures["damping"][-1] == pytest.approx(figures["predicted_damping"][-1], rel=0.1)
     assert main.main(["ringdown", "single-lap", "--strip", "whole"]) == 2
     assert "--strip auto" in capsys.readouterr().err

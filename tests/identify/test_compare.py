@@ -58,6 +58,18 @@ def test_a_comparison_is_printed_and_recorded(made):
     assert json.dumps(figures, allow_nan=False)
 
 
+def test_no_comparison_prints_nan(made):
+    """A law whose energy is not known at some amplitudes, or at none, says so instead."""
+    right, _, wrong = made.rows
+    some = right._replace(energy=np.append(np.nan, right.energy[1:]), told="not converged")
+    text = str(made._replace(rows=(some, wrong._replace(told=""))))
+    assert "nan" not in text
+    lines = text.splitlines()
+    assert lines[1].endswith("(not converged; no energy at 1 of 7 amplitudes)")
+    assert lines[1].split()[4] == "10"
+    assert lines[2].endswith("no energy at 7 of 7 amplitudes")
+
+
 def test_a_comparison_is_drawn(made):
     fitted = made.rows[1]._replace(fit=SimpleNamespace(values={"a": 1.0}))
     energies, errors = made._replace(rows=(made.rows[0], fitted, made.rows[2])).plot()

@@ -1,5 +1,7 @@
 """Structures with joints, fitted to frequency and damping over amplitude and forced responses."""
 
+import re
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -101,6 +103,42 @@ def test_planted_numbers_are_recovered_within_their_intervals():
     assert isinstance(found.scene, Assembly)
     again = found.scene.curve(SIZE).damping
     np.testing.assert_allclose(again, found.model[1].damping, rtol=1e-6)
+
+
+def soft(scene, numbers):
+    """One mass on a joint alone that softens much, whose secant is not its first harmonic."""
+    force = np.linspace(0.02, 0.9, 60) * numbers["limit"]
+    joint = Joint(force + 4.0 * force**4 / numbers["limit"] ** 3, force)
+    return Structure(np.eye(1), 0.01 * np.eye(1), [Attachment(joint, 0)], damping_ratio=0.004)
+
+
+def test_a_fit_by_statics_says_how_far_it_may_be_off():
+    """Data that differ by the stated errors of statics move the value by what the doubt says."""
+    start, size = Assembly(soft, numbers={"limit": 1.0}, point=0), np.geomspace(0.1, 3.0, 8)
+    curve = start.replace({"structure.limit": 1.2}).response(size)[0]
+
+    def found(size, frequency, damping):
+        data = [FrequencyCurve(size, frequency / (2.0 * np.pi)), DampingCurve(size, damping)]
+        return fit(data, start, ["structure.limit"])
+
+    own = found(size, curve.frequency, curve.damping)
+    assert own.values["structure.limit"] == pytest.approx(1.2, rel=1e-4)
+    (doubt,) = (warning for warning in own.warnings if "statics" in warning)
+    told = re.search(r"amplitude (.*) on, .*to (.*)% and .*by (.*)%, .*limit by (.*): ", doubt)
+    first, damping, frequency, moved = map(float, told.groups())
+    off = np.abs([curve.frequency_error, curve.damping_error])
+    assert first == pytest.approx(size[np.argmax(np.max(off, axis=0) > 0.02)], rel=2e-3)
+    assert frequency == pytest.approx(100.0 * off[0].max(), abs=0.051)
+    assert damping == pytest.approx(100.0 * off[1].max(), abs=0.51)
+    true = (
+        curve.frequency / (1.0 - curve.frequency_error),
+        curve.damping / (1.0 - curve.damping_error),
+    )
+    other = found(size, *true).values["structure.limit"]
+    assert abs(other - 1.2) == pytest.approx(moved, rel=0.3)
+    small = size < first  # the fix
+    well = found(size[small], curve.frequency[small], curve.damping[small])
+    assert not [warning for warning in well.warnings if "statics" in warning]
 
 
 @pytest.mark.slow

@@ -1,6 +1,8 @@
 """Pictures: what is drawn is what was solved, with its axes labelled, and files are whole."""
 
 import dataclasses
+import itertools
+from types import SimpleNamespace
 
 import jax
 import matplotlib.pyplot as plt
@@ -445,3 +447,34 @@ class TestSave:
         with pytest.raises(InputError, match=r"end the name in .*\.png"):
             plotting.save(plotting.loop(history).figure, tmp_path / name)
         assert not list(tmp_path.iterdir())
+
+
+def gaps_between_labels(axis):
+    """Distances of the labels of an axis from the ones before, in pixels."""
+    figure = axis.axes.figure
+    figure.canvas.draw()
+    low, high = axis.get_view_interval()
+    boxes = [
+        mark.label1.get_window_extent()
+        for mark in (*axis.get_major_ticks(), *axis.get_minor_ticks())
+        if low <= mark.get_loc() <= high and mark.label1.get_text()
+    ]
+    ends = sorted(tuple(box.intervalx if axis.axis_name == "x" else box.intervaly) for box in boxes)
+    return [after[0] - before[1] for before, after in itertools.pairwise(ends)]
+
+
+@pytest.mark.parametrize("ratio", [1.15, 8.0, 60.0])
+def test_labels_of_a_ring_down_do_not_touch(ratio):
+    amplitude, time = np.geomspace(1.3e-6, 1.3e-6 / ratio, 9), np.linspace(0.0, 1.0, 9)
+    part = amplitude / amplitude[0]
+    found = SimpleNamespace(amplitude=amplitude, frequency=90.0 - part, damping=0.05 * part)
+    names = ("kinetic", "stored", "friction_work", "damping_work", "external_work")
+    motion = SimpleNamespace(time=time, displacement=time, **dict.fromkeys(names, time))
+    study = SimpleNamespace(found=found, predicted=found, motion=motion, payload=1.0)
+    figure = plotting.ring_down_sheet(study)
+    for axes in figure.axes[2:]:
+        for axis in (axes.xaxis, axes.yaxis):
+            gaps = gaps_between_labels(axis)
+            assert gaps
+            assert min(gaps) > 2.0
+    plotting.close(figure)

@@ -76,6 +76,16 @@ class Backbone(eqx.Module):
         count = 1 + int(jnp.argmax(self.force >= self.force[-1]))
         return self.displacement[:count], self.force[:count]
 
+    @property
+    def _ends_in_gross_slip(self) -> bool:
+        """True if the last point is gross slip, and no plateau follows yet."""
+        u, f = self.displacement, self.force
+        paired = u.ndim == 1 and u.shape == f.shape and u.size > 0
+        if is_traced(u, f, self.capacity) or not paired or np.ndim(self.capacity):
+            return False
+        rising = f.size == 1 or float(f[-1]) > float(f[-2])
+        return rising and float(f[-1]) >= GROSS * float(self.capacity)
+
     def unknown_at(self, u: float) -> str:
         """Words of an error at a displacement beyond the reach, with the fix."""
         capacity, top = float(self.capacity), float(self.force[-1])

@@ -45,8 +45,8 @@ from jbeamshell.dynamics.four_parameters import (
     FRACTIONS,
     FourParameters,
 )
-from jbeamshell.dynamics.steady_cycles import gross_slip
-from jbeamshell.dynamics.structure.backbone import GROSS, Backbone
+from jbeamshell.dynamics.steady_cycles import gross_slip, largest_force
+from jbeamshell.dynamics.structure.backbone import Backbone
 from jbeamshell.dynamics.structure.strip_line import (
     cycled_line,
     network_forces,
@@ -55,7 +55,6 @@ from jbeamshell.dynamics.structure.strip_line import (
     walked_forces,
 )
 from jbeamshell.laws.four_parameters import iwan4_through
-from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
 BACKBONE = "give as many displacements as forces, both rising from above zero, softening throughout"
@@ -211,16 +210,6 @@ class Joint(Backbone):
         """
         u, f, about = table.read(path)
         return cls(u, f, **about)
-
-    @property
-    def _ends_in_gross_slip(self) -> bool:
-        """True if the last point is gross slip, and no plateau follows yet."""
-        u, f = self.displacement, self.force
-        paired = u.ndim == 1 and u.shape == f.shape and u.size > 0
-        if is_traced(u, f, self.capacity) or not paired or np.ndim(self.capacity):
-            return False
-        rising = f.size == 1 or float(f[-1]) > float(f[-2])
-        return rising and float(f[-1]) >= GROSS * float(self.capacity)
 
     def in_series(self, stiffness: Any) -> Joint:
         """Joint with a spring in series, which its points then contain.
@@ -410,24 +399,6 @@ class Joint(Backbone):
 def _longer(places: Array) -> Array:
     """Displacements (..., k + 1) with a point on the plateau of gross slip."""
     return jnp.append(places, 2.0 * places[..., -1:], axis=-1)
-
-
-def largest_force(scene: Scene, force: Any = None) -> Any:
-    """Force up to which a joint is wanted, checked; None is the scene's amplitude."""
-    key = "force" if force is not None else "load.amplitude"
-    if force is None:
-        control = scene.load.control
-        fix = "is no force: give force=, or take load.control = 'force'"
-        require("load.amplitude", scene.load.amplitude, control == "force", fix)
-        force = scene.load.amplitude
-    require_number("force", force)
-    if not is_traced(scene, force):
-        by_force = dataclasses.replace(scene.load, control="force")
-        rule = gross_slip_rule(by_force, scene.member, scene.number, force)
-        limit = float(gross_slip(scene))
-        fix = f"must stay below gross slip, mu F_N L = {limit:.6g}: take less, such as half of it, "
-        rule._replace(key=key, fix=f"{fix}{0.5 * limit:.4g}").demand()
-    return force
 
 
 def _is_word(text: object) -> bool:

@@ -80,7 +80,7 @@ class ModalCurve(NamedTuple):
             return ()
         worst = np.max(errors, axis=1)
         return (
-            f"from the modal displacement {np.asarray(self.amplitude)[np.argmax(off)]:.4g} on, the "
+            f"from the amplitude {np.asarray(self.amplitude)[np.argmax(off)]:.4g} on, the "
             f"damping may be off by up to {worst[1]:.0%} and the frequency by {worst[0]:.1%}, as "
             "statics know no inertia and no shape of the loop: take nonlinear_mode there",
         )
@@ -149,6 +149,14 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
     >>> modal_curve(structure, [0.5, 2.0]).frequency.round(3).tolist()
     [1.0, 0.866]
     """
+    curve = by_statics(structure, amplitudes, mode)
+    if not (is_traced(curve) or is_staged()):
+        warn_of_doubts(curve.doubts)
+    return curve
+
+
+def by_statics(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> ModalCurve:
+    """Curve as `modal_curve` has it, without a warning."""
     amplitude = _checked(amplitudes)
     require("attachments", 0, bool(structure.attachments), LINEAR)
     omega, shapes = structure.modes(mode + 1)
@@ -178,10 +186,7 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
             f"{amplitude[int(np.argmin(sound))]:.6g}: give more amplitudes below it"
         )
     structure.knows(curve.joints, f"the modal displacement {amplitude[-1]:.6g}")
-    curve = jax.tree.map(np.asarray, curve)
-    if not is_staged():
-        warn_of_doubts(curve.doubts)
-    return curve
+    return jax.tree.map(np.asarray, curve)
 
 
 class _Statics(NamedTuple):
