@@ -41,7 +41,8 @@ class SlipCycle(NamedTuple):
     friction : Coulomb friction coefficient mu
     slip_stiffness : (n,) k_t, traction per slip
     half_height : H, length
-    dissipation : work of friction in the cycle, force; None is that of the slip and the mean caps
+    dissipation : work of friction in the cycle, force; None is that of the slip and the mean caps,
+        which load steps know well, and turning points alone do not
     """
 
     x: Array

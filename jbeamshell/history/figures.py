@@ -66,6 +66,7 @@ class CycleFigures(Record, LoopFigures):
         """Slip, traction and reaction of the contact in the last cycle."""
         start, _, stop = self._last
         cycle = slice(start, stop + 1)
+        work = self.slip_work[start + 1 : stop + 1].sum()  # of NumPy or of JAX
         return SlipCycle(
             x=self.x,
             tributary=self.tributary,
@@ -75,7 +76,7 @@ class CycleFigures(Record, LoopFigures):
             friction=self.scene.contact.friction,
             slip_stiffness=self.scene.slip_stiffness(self.tributary),
             half_height=self.scene.strip.half_height,
-            dissipation=self.slip_work[start + 1 : stop + 1].sum(),  # of NumPy or of JAX
+            dissipation=work if self.scene.model.condensed else None,
         )
 
     @property
