@@ -30,7 +30,7 @@ import jbeamshell as jb
 from calibration import charts
 from jbeamshell import plotting
 from jbeamshell.common.files import write_text
-from jbeamshell.history import reliability
+from jbeamshell.history import error_estimates, reliability
 from jbeamshell.mechanics.friction import ElasticSlip
 
 HERE = Path(__file__).parent
@@ -120,7 +120,7 @@ def runner(settings: tuple[tuple[str, Any], ...]) -> Callable[[jax.Array], jax.A
     @jax.jit
     def run(numbers: jax.Array) -> jax.Array:
         history = jb.solve(scene_of(base, numbers), throw=False, solver=jb.Newton(tolerance))
-        grid, corner = reliability.dissipation_errors(history.slip_cycle)
+        grid, corner = error_estimates.dissipation_errors(history.slip_cycle)
         effort = jnp.sum(history.iterations) / history.force.size
         found = (history.dissipation_ratio, grid, corner, history.closure, effort)
         return jnp.stack([*found, jnp.max(history.status)]).astype(float)

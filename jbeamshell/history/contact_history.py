@@ -13,9 +13,10 @@ from jax import Array
 
 from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.summary import Summary, in_words
+from jbeamshell.history.error_estimates import grid_error
 from jbeamshell.history.figures import UNITS
 from jbeamshell.history.loop_figures import LoopFigures
-from jbeamshell.history.reliability import CLOSES, doubts_of_mesh, grid_error
+from jbeamshell.history.reliability import CLOSES, doubts_of_mesh
 
 FIGURES = (
     "dissipation",
@@ -108,7 +109,7 @@ class ContactHistory(LoopFigures, eqx.Module):
     def dissipation_error(self) -> Array:
         """Estimated relative error of the dissipation that the mesh of the contact makes.
 
-        See `jbeamshell.history.reliability.grid_error`; infinite if nothing slips.
+        See `jbeamshell.history.error_estimates.grid_error`; infinite if nothing slips.
         """
         start, _, stop = self._last
         slip, cap = self.slip[start : stop + 1], self.friction * self.reaction[start : stop + 1]

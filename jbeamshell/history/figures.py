@@ -5,9 +5,9 @@ from __future__ import annotations
 import jax.numpy as jnp
 from jax import Array
 
+from jbeamshell.history.error_estimates import SlipCycle, estimates
 from jbeamshell.history.loop_figures import LoopFigures
 from jbeamshell.history.record import Record
-from jbeamshell.history.reliability import SlipCycle, estimates
 from jbeamshell.mechanics.bar import cubic_law, lap_cubic_law
 
 UNITS = {  # of the figures that are no pure numbers, in words
@@ -66,6 +66,7 @@ class CycleFigures(Record, LoopFigures):
         """Slip, traction and reaction of the contact in the last cycle."""
         start, _, stop = self._last
         cycle = slice(start, stop + 1)
+        work = self.slip_work[start + 1 : stop + 1].sum()  # of NumPy or of JAX
         return SlipCycle(
             x=self.x,
             tributary=self.tributary,
@@ -75,6 +76,7 @@ class CycleFigures(Record, LoopFigures):
             friction=self.scene.contact.friction,
             slip_stiffness=self.scene.slip_stiffness(self.tributary),
             half_height=self.scene.strip.half_height,
+            dissipation=work if self.scene.model.condensed else None,
         )
 
     @property

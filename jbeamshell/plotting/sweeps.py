@@ -114,24 +114,12 @@ def sweep_contour(
 ) -> Axes:
     """Draw a figure as a map over two keys; crosses are lanes not to rely on.
 
-    Further keys stay at their middle value.
-
-    Parameters
-    ----------
-    result : result of `jbeamshell.sweep` over two keys or more
-    axes : where to draw; new ones when not given
-    figure : name of one of the result's figures
-    along, per : keys along the axis and up; chosen as in `sweep` when not given
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        the axes drawn into
+    Parameters and choices are those of `sweep`, but that ``per`` is the key up.
 
     Raises
     ------
     InputError
-        if the result has no such figure or key, or is over one key alone
+        as in `sweep`, and if the result is over one key alone
 
     Examples
     --------

@@ -26,7 +26,6 @@ from jbeamshell.sweeping.lanes import Lanes, Outcome
 
 PURE = dict.fromkeys(("dissipation_ratio", "dissipation_error", "loss_factor"), "1")
 NEGLIGIBLE = 1e-4  # dissipation over the bar's below which errors are over this share of the bar's
-LOOSE = 2.0  # estimate of plane elasticity's grid over the largest error of 913 lanes beyond 2 %
 ROWS = 4096  # rows of a table that are turned into text at a time
 
 
@@ -157,8 +156,6 @@ class Sweep:
     def _errors(self) -> np.ndarray:
         """Estimated errors of the dissipation, an array of the lanes' shape; 0 if unknown."""
         errors = self.values.get("dissipation_error", np.zeros(self.shape))
-        if self.scene.model.solution == "plane":
-            errors = errors / LOOSE
         ratio = self.values.get("dissipation_ratio", np.ones(self.shape))
         known = np.isfinite(ratio) & np.isfinite(errors)  # infinite where nothing slips
         share = np.where(known, np.minimum(ratio / NEGLIGIBLE, 1.0), 1.0)

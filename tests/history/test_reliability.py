@@ -15,7 +15,7 @@ from toy import STRIP
 import jbeamshell as jb
 from calibration.charts.failures import outcome
 from jbeamshell.cli import main
-from jbeamshell.history import reliability
+from jbeamshell.history import error_estimates, reliability
 from jbeamshell.history.reliability import TOLERANCE
 
 RECORD = json.loads(
@@ -65,7 +65,7 @@ def check_random_scenes(count, settings, in_vain):
         history = jb.solve(scene, throw=False)
         found = (
             history.dissipation_ratio,
-            *reliability.dissipation_errors(history.slip_cycle),
+            *error_estimates.dissipation_errors(history.slip_cycle),
             history.closure,
         )
         return jnp.stack([*found, jnp.max(history.iterations), jnp.max(history.status)])
@@ -104,7 +104,7 @@ def test_the_recorded_scenes_hold_no_silent_failure(name, least):
 def even_cycle(nodes, slip=1.0):
     """Cycle in which rigid sliders of equal length under even pressure all slip by the same."""
     there = np.outer([0.0, 1.0, 0.0], np.ones(nodes))
-    return reliability.SlipCycle(
+    return error_estimates.SlipCycle(
         x=np.arange(nodes) + 1.0,
         tributary=np.ones(nodes),
         v=slip * there,
@@ -120,35 +120,49 @@ def even_cycle(nodes, slip=1.0):
 def test_the_error_of_the_grid_counts_the_nodes_that_share_the_work(nodes):
     even = even_cycle(nodes)
     slip = even.v
-    grid, corner = reliability.dissipation_errors(even)
+    grid, corner = error_estimates.dissipation_errors(even)
     assert grid == pytest.approx(nodes**-1.5)
     assert corner == 0.0
     # A reaction that gathers in the corner matters so far as slip falls within H of the end.
     gathered = even._replace(reaction=even.reaction + 2.0 * (even.x == nodes))
-    assert reliability.dissipation_errors(gathered)[1] == 0.0
+    assert error_estimates.dissipation_errors(gathered)[1] == 0.0
     falling = gathered._replace(v=slip * np.where(even.x < nodes, 0.5, 1.0))
-    found = reliability.dissipation_errors(falling)[1]
+    found = error_estimates.dissipation_errors(falling)[1]
     work = 0.5 * (nodes - 1.0) + 2.0  # of caps 1 and 2, in each half of the cycle
-    assert found == pytest.approx(reliability.SAFETY * 0.5 * 1.0 / work)
+    assert found == pytest.approx(error_estimates.SAFETY * 0.5 * 1.0 / work)
+
+
+def test_slip_that_does_no_work_leaves_few_nodes_that_share_it():
+    """Nodes that open before they move, and round-off where nothing slips."""
+    even = even_cycle(64)
+    whole = 2.0 * 64.0  # of slip by 1 in both halves of the cycle, against a cap of 1
+    for dissipation in (whole, 2.0 * whole):
+        known = even._replace(dissipation=np.asarray(dissipation))
+        assert error_estimates.dissipation_errors(known)[0] == pytest.approx(64**-1.5)
+    half = even._replace(dissipation=np.asarray(0.5 * whole))
+    assert error_estimates.dissipation_errors(half)[0] == pytest.approx(16**-1.5)
+    for nothing in (0.0, -1e-30, 1e-12):
+        stuck = even._replace(dissipation=np.asarray(nothing))
+        assert error_estimates.dissipation_errors(stuck)[0] > 1.0
 
 
 def test_long_load_steps_are_doubted_for_a_reaction_that_changes_within_them():
     even = even_cycle(64)
     changing = even._replace(reaction=even.reaction * np.array([[0.5], [1.5], [0.5]]))
-    assert reliability.step_error(even) == 0.0
-    assert reliability.step_error(changing) == pytest.approx(reliability.WITHIN_STEPS)
-    assert reliability.step_error(even_cycle(64, slip=0.0)) == 0.0
+    assert error_estimates.step_error(even) == 0.0
+    assert error_estimates.step_error(changing) == pytest.approx(error_estimates.WITHIN_STEPS)
+    assert error_estimates.step_error(even_cycle(64, slip=0.0)) == 0.0
     line, steps = jb.Scene(), jb.Scene().replace({"model.solution": "stepwise"})
-    assert reliability.estimates(line, changing)[3] == 0.0
-    assert reliability.estimates(steps, changing)[3] == reliability.step_error(changing)
+    assert error_estimates.estimates(line, changing)[3] == 0.0
+    assert error_estimates.estimates(steps, changing)[3] == error_estimates.step_error(changing)
 
 
 @pytest.mark.parametrize("rung", ["condensed-squeeze", "masing"])
 def test_where_nothing_slips_the_estimate_is_infinite(rung):
     scene = jb.Scene().replace({"model.rung": rung})
-    errors = reliability.estimates(scene, even_cycle(4, slip=0.0))
+    errors = error_estimates.estimates(scene, even_cycle(4, slip=0.0))
     assert np.max(errors) == np.inf
-    assert np.max(reliability.estimates(scene, even_cycle(64))) == pytest.approx(64**-1.5)
+    assert np.max(error_estimates.estimates(scene, even_cycle(64))) == pytest.approx(64**-1.5)
 
 
 def test_a_corner_that_may_open_counts_where_friction_is_elastic():
@@ -161,13 +175,34 @@ def test_a_corner_that_may_open_counts_where_friction_is_elastic():
     line, steps = jb.Scene(), jb.Scene().replace({"model.solution": "stepwise"})
     lifting = steps.replace({"model.fields": ["v", "w", "beta", "psi"]})
     soft, soft_lifting = (s.replace({"contact.stick_stiffness": 999.0}) for s in (line, lifting))
-    open_ends = [reliability.estimates(scene, rigid)[1] for scene in (line, lifting)]
-    held = [reliability.estimates(scene, elastic)[1] for scene in (soft, soft_lifting, steps)]
+    open_ends = [error_estimates.estimates(scene, rigid)[1] for scene in (line, lifting)]
+    held = [error_estimates.estimates(scene, elastic)[1] for scene in (soft, soft_lifting, steps)]
     assert open_ends == [0.0, 0.0]
     assert held[0] == held[1] == held[2] > 0.0
-    refined = reliability.estimates(soft, elastic, np.asarray(0.01))
-    grid = reliability.dissipation_errors(elastic)[0]
-    assert refined[:2] == (max(0.01, reliability.REFINED * grid), 0.0)
+    refined = error_estimates.estimates(soft, elastic, np.asarray(0.01))
+    grid = error_estimates.dissipation_errors(elastic)[0]
+    assert refined[:2] == (max(0.01, error_estimates.REFINED * grid), 0.0)
+
+
+def test_the_corner_of_plane_elasticity_counts_its_element_over_the_slip_zone():
+    even, plane = even_cycle(400), jb.Scene().replace({"model.rung": "plane"})
+    last = even.x == 400
+    gathered = even._replace(
+        reaction=even.reaction + 1000.0 * last, v=even.v * np.where(last, 1.0, 0.5)
+    )
+    assert error_estimates.dissipation_errors(gathered)[1] > 0.1
+    even_pull = plane.replace({"load.entry": "traction"})
+    for scene, part in ((plane, error_estimates.BEYOND), (even_pull, error_estimates.SINGULAR)):
+        found = error_estimates.singular_corner_error(scene, gathered)
+        assert found == pytest.approx(part / 400)
+    stuck = even_cycle(400, slip=0.0)
+    assert error_estimates.singular_corner_error(plane, stuck) == np.inf
+    grid, corner, *_ = error_estimates.estimates(plane, gathered)
+    assert corner == error_estimates.singular_corner_error(plane, gathered)
+    assert grid == pytest.approx(
+        error_estimates.SAFETY * error_estimates.dissipation_errors(gathered)[0]
+    )
+    assert error_estimates.estimates(plane, even)[1] == 0.0  # no reaction gathers
 
 
 @pytest.mark.parametrize(("steps", "doubted"), [(40, True), (80, False), ("auto", False)])
@@ -196,8 +231,8 @@ def test_the_dissipation_of_a_nearly_incompressible_strip_is_as_recorded():
 
 def test_the_error_of_the_grid_is_larger_where_the_pressure_has_steps():
     even, part = even_cycle(64), [[0.0, 0.0], [0.5, 0.0], [0.5, 9.0], [2.0, 9.0]]
-    stepped = reliability.estimates(jb.Scene().replace({"contact.pressure": part}), even)
-    assert stepped[0] == pytest.approx(reliability.STEPS * 64**-1.5)
+    stepped = error_estimates.estimates(jb.Scene().replace({"contact.pressure": part}), even)
+    assert stepped[0] == pytest.approx(error_estimates.STEPS * 64**-1.5)
 
 
 @pytest.mark.doubtful("in the corner", "the section squeeze")
@@ -271,7 +306,7 @@ def test_the_estimate_falls_with_the_elements():
     scene = STRIP.replace({"load.amplitude": 0.3} | COARSE)
     sizes = (1.0 / 6.0, 1.0 / 24.0, 1.0 / 96.0)
     runs = [jb.solve(scene.replace({"model.end_size": size})) for size in sizes]
-    grid = [float(reliability.dissipation_errors(run.slip_cycle)[0]) for run in runs]
+    grid = [float(error_estimates.dissipation_errors(run.slip_cycle)[0]) for run in runs]
     assert grid[0] > 2.0 * grid[1] > 4.0 * grid[2]
 
 
@@ -317,17 +352,18 @@ def one_resting_node(k_t):
     traction[:, 0] = 2.0 * v[:, -1]
     traction[:, -1] = np.clip(min(k_t, 1e3) * v[:, -1], -6.0, 6.0)
     x = np.array([0.0, 1.0, 2.0, 2.3, 2.4])
-    return reliability.SlipCycle(x, tributary, v, traction, reaction, 0.1, k_t, 0.3)
+    return error_estimates.SlipCycle(x, tributary, v, traction, reaction, 0.1, k_t, 0.3)
 
 
 def test_an_elastic_slider_of_a_single_node_is_doubted():
-    soft, stiff, rigid = (reliability.slider_error(one_resting_node(k)) for k in (3.0, 6e2, np.inf))
+    found = [error_estimates.slider_error(one_resting_node(k)) for k in (3.0, 6e2, np.inf)]
+    soft, stiff, rigid = found
     for found, held in ((soft, 3.0 * 0.05), (stiff, 6.0 * 0.05)):  # it sticks, and it slides
-        assert found == pytest.approx(reliability.RESTING * held / (2.0 + held))
+        assert found == pytest.approx(error_estimates.RESTING * held / (2.0 + held))
     assert rigid == 0.0
     even = one_resting_node(3.0)._replace(reaction=np.full((5, 5), 10.0))
-    assert reliability.slider_error(even) == 0.0
-    traced = jax.jit(reliability.slider_error)(one_resting_node(3.0))
+    assert error_estimates.slider_error(even) == 0.0
+    traced = jax.jit(error_estimates.slider_error)(one_resting_node(3.0))
     assert float(traced) == pytest.approx(float(soft))
 
 
@@ -365,13 +401,15 @@ def test_a_laminate_that_rests_on_its_corner_is_doubted_as_much_as_it_is_off():
 @pytest.mark.doubtful("few nodes")
 def test_the_estimate_knows_no_units(unit):
     history = jb.solve(STRIP.replace(COARSE))
-    cycle = history.slip_cycle
+    cycle = history.slip_cycle._replace(dissipation=history.dissipation)
     scaled = cycle._replace(
         **{name: unit * getattr(cycle, name) for name in ("x", "tributary", "v", "half_height")},
         slip_stiffness=cycle.slip_stiffness / unit,
+        dissipation=cycle.dissipation * unit**2,
     )
     own, other = (
-        [*reliability.dissipation_errors(c), reliability.slider_error(c)] for c in (cycle, scaled)
+        [*error_estimates.dissipation_errors(c), error_estimates.slider_error(c)]
+        for c in (cycle, scaled)
     )
     np.testing.assert_allclose(other, own, rtol=1e-12)
 
