@@ -53,7 +53,7 @@ def doubt_of_statics(
         ]
     )
     frequency, damping = np.max(errors, axis=1).tolist()
-    first = np.min(sizes[np.max(errors, axis=0) > DOUBTED])
+    first = ROUNDED * np.min(sizes[np.max(errors, axis=0) > DOUBTED])
     inside, step = ~uncertainty.at_bound, np.zeros(uncertainty.point.size)
     step[inside] = np.linalg.lstsq(jacobian[:, inside], change)[0]
     off = np.abs(uncertainty.space.slopes(uncertainty.point) * step)
@@ -61,7 +61,7 @@ def doubt_of_statics(
     fix = "compare the fitted structure with nonlinear_mode"
     fix = f"fit smaller amplitudes alone, or {fix}" if np.any(sizes < first) else fix
     return [
-        f"from the amplitude {ROUNDED * first:.4g} on, the fitted damping may be off by up to {damping:.0%} "
+        f"from the amplitude {first:.4g} on, the fitted damping may be off by up to {damping:.0%} "
         f"and the frequency by {frequency:.1%}, as statics know no inertia and no shape of the "
         f"loop, which may move {moved}: {fix}"
     ]
