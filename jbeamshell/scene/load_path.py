@@ -53,12 +53,13 @@ def whole_path(
     amplitude = numbers.asarray(scene.load.amplitude)
     if path is None:
         targets = amplitude * known.astype(amplitude.dtype)
-        pressures = numbers.ones_like(targets)
+        pressures = np.ones(targets.shape, targets.dtype)
     else:
         loads = numbers.asarray(as_leaf(path, "path", LOADS), amplitude.dtype)
         shaped = loads.size > 0 and (loads.ndim == 1 or (loads.ndim == 2 and loads.shape[1] == 2))
         require("path", np.shape(path), shaped, LOADS)
-        targets, pressures = (loads, numbers.ones_like(loads)) if loads.ndim == 1 else loads.T
+        constant = np.ones(loads.shape, loads.dtype)
+        targets, pressures = (loads, constant) if loads.ndim == 1 else loads.T
         if not is_traced(loads):
             known, finite = np.asarray(targets), np.isfinite(loads)
             require("path", loads[~finite], bool(np.all(finite)), "must hold finite loads only")
@@ -73,7 +74,7 @@ def whole_path(
     before = (np.arange(1, pressing + 1) / pressing).astype(amplitude.dtype)
     whole = LoadPath(
         numbers.append(np.zeros_like(before), targets),
-        numbers.append(before, pressures),
+        (jnp if is_traced(pressures) else np).append(before, pressures),
         numbers.append(np.zeros_like(before), numbers.ones_like(targets)),
     )
     last = pressing - 1
@@ -127,7 +128,7 @@ class LoadPath(NamedTuple):
     Attributes
     ----------
     target : controlled load: F, u(L) or, for the arc length, the way along the path, signed
-    pressure : part of the pressures that acts
+    pressure : part of the pressures that acts; traced only if the path changes it
     rough : 1 with friction, 0 while the strip is pressed down before it
     """
 
