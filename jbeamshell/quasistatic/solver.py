@@ -62,8 +62,8 @@ def solve(
     ----------
     scene : strip, contact, load and model; traced leaves pass, so `jax.grad` and `jax.vmap` work
     path : loads after the pressing, (steps,): F, u(L) or the arc length, by ``scene.load.control``;
-        or (steps, 2) with the part of the pressures that acts in the second column; None is the
-        scene's own cycles
+        or (steps, 2) with the part of the pressures that acts in the second column, both of which
+        change evenly from step to step; None is the scene's own cycles
     contact : (n,) True at the nodes in contact where the search for the contact starts; None starts
         with all of them
     solver : settings of Newton's method, which strips on their contact line do not need

@@ -92,7 +92,7 @@ def _own_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
     return _cycles_of(Load(cycles=cycles, steps_per_half_cycle=steps).unit_path())
 
 
-def _below_gross_slip(scene: Scene, targets: Array, pressures: Array) -> Array:
+def _below_gross_slip(scene: Scene, targets: Array, pressures: Array | np.ndarray) -> Array:
     """Forces of a traced path, NaN from gross slip on, where no step finds an equilibrium."""
     contact, support = scene.contact, scene.member.support
     force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length, support)
