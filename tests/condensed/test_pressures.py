@@ -12,6 +12,7 @@ from jbeamshell.condensed import branches, drives, events, strip
 from jbeamshell.condensed.assembly import press_roughly
 from jbeamshell.condensed.body import Body
 from jbeamshell.condensed.pressures import Press, walk_with_pressures
+from jbeamshell.scene.load_path import whole_path
 
 MU, NODES = 0.3, 21
 SCENE = jb.Scene().replace(
@@ -19,11 +20,11 @@ SCENE = jb.Scene().replace(
         "model.rung": "condensed-squeeze",
         "strip.height_ratio": 0.3,
         "contact.friction": MU,
-        "contact.pressure": [[0.0, 14.0], [0.7, 4.0], [2.0, 12.0]],
+        "contact.pressure": [[0.0, 14.0], [0.7, 12.0], [2.0, 3.0]],
         "model.nodes": NODES,
     }
 )
-PATH = np.array([[2.0, 1.0], [2.0, 0.6], [-1.0, 0.7], [-1.5, 1.4], [-1.5, 1.4], [1.8, 1.0]])
+PATH = np.array([[4.5, 1.0], [2.8, 0.6], [-2.8, 0.7], [-5.5, 1.4], [-5.5, 1.4], [4.5, 1.0]])
 WALK = jax.jit(walk_with_pressures)
 
 
@@ -122,7 +123,6 @@ class TestPath:
     def test_levels_only_say_where_a_step_is_looked_at(self, found):
         few, many = found
         assert np.all(few.settled)
-        assert np.any(few.lift > 0.0)
         np.testing.assert_allclose(
             few.slip_work,
             np.sum(np.reshape(many.slip_work, (-1, 8)), axis=1),
@@ -140,13 +140,16 @@ class TestPath:
         np.testing.assert_allclose(lift * state.r_n, 0.0, atol=1e-12 * most)
 
     def test_displacement_control_walks_the_path_of_the_force(self, found, pressed):
-        few, ((body, press, friction, start), rough) = found[0], pressed
+        # Between two levels the displacement goes evenly, which the load then does not.
+        many, ((body, press, friction, start), rough) = found[1], pressed
         driven = drives.driven_by_displacement(body)
-        given = press.driven_by_displacement(driven), friction, start, few.state.displacement
-        back = WALK(driven, *given, PATH[:, 1], rough.lift)
+        given = press.driven_by_displacement(driven), friction, start, many.state.displacement
+        back = WALK(driven, *given, finer(PATH, 8)[:, 1], rough.lift)
         state = jax.vmap(drives.exchanged)(back.state)
-        np.testing.assert_allclose(state.force, PATH[:, 0], atol=1e-9)
-        np.testing.assert_allclose(back.slip_work, few.slip_work, rtol=1e-9, atol=1e-16)
+        assert np.all(back.settled)
+        np.testing.assert_allclose(state.force, many.state.force, atol=2e-3)
+        total = float(np.sum(many.slip_work))
+        np.testing.assert_allclose(back.slip_work, many.slip_work, atol=5e-3 * total)
 
     def test_taylor_slope_is_two_and_reverse_is_forward(self, pressed):
         (body, press, _, start), rough = pressed
@@ -172,14 +175,22 @@ class TestPath:
 
 def test_works_of_the_load_and_of_the_pressures_are_kept_or_taken_by_friction():
     scene, path = SCENE.replace({"contact.friction": 0.1}), PATH * [0.2, 1.0]
-    few, many = (jb.solve(scene, finer(path, parts)) for parts in (4, 16))
+    few, many = (jb.solve(scene, finer(path, parts), throw=False) for parts in (4, 16))
+    assert many.converged
     np.testing.assert_array_equal(few.pressure[few.pressed + 1 :], finer(path, 4)[:, 1])
     left = [float(np.abs(run.energy_imbalance).max()) for run in (few, many)]
     assert left[1] < 0.1 * left[0]  # trapezoids of the works are of second order
     assert left[1] < 0.01 * float(np.sum(many.slip_work))
-    further = few.continued([[0.3, 0.9]])
-    whole = jb.solve(scene, np.append(finer(path, 4), [[0.3, 0.9]], axis=0))
+    further = few.continued([[0.3, 0.9]], throw=False)
+    whole = jb.solve(scene, np.append(finer(path, 4), [[0.3, 0.9]], axis=0), throw=False)
     np.testing.assert_array_equal(further.displacement, whole.displacement)
+
+
+def test_a_cycle_of_the_load_is_none_where_the_pressures_do_not_close():
+    loads = [[1.0, 1.0], [-1.0, 0.9], [1.0, 1.0]]
+    assert len(whole_path(SCENE, loads)[1]) == 1
+    loads[2][1] = 0.9
+    assert whole_path(SCENE, loads)[1] == ()
 
 
 @pytest.mark.slow
@@ -190,6 +201,7 @@ def test_load_steps_come_near():
     stepwise = {"model.solution": "stepwise", "contact.stick_stiffness": 1e4}
     near = jb.solve(scene.replace(stepwise), finer(path, 40))
     works = np.add.reduceat(np.asarray(near.slip_work)[near.pressed + 1 :], np.arange(0, 160, 40))
-    np.testing.assert_allclose(works, exact.slip_work[exact.pressed + 1 :], rtol=0.02)
+    own = np.asarray(exact.slip_work)[exact.pressed + 1 :]
+    np.testing.assert_allclose(works, own, atol=0.01 * np.sum(own))
     ends = np.asarray(near.displacement)[near.pressed + 40 :: 40] - near.displacement[near.pressed]
     np.testing.assert_allclose(ends, exact.displacement[exact.pressed + 1 :], rtol=0.01)
