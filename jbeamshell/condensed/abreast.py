@@ -86,7 +86,6 @@ def walk_abreast(
     forces: Array,
     lift: Array,
     turns: tuple[bool, ...],
-    lifting: int | None,
 ) -> Level:
     """Levels (loads, levels, ...) of the paths of many loads on one body; see `events.walk`.
 
@@ -96,15 +95,13 @@ def walk_abreast(
     start, forces, lift : contact at the start (loads, ...), end loads (loads, levels), lift at the
         start (loads, n)
     turns : True where the loads have turned since the level before
-    lifting : number of nodes that may lift; None is all
     """
-    loads, lifting = forces.shape[0], lift.shape[1] if lifting is None else lifting
+    loads = forces.shape[0]
     bounds = _bounds(turns)
     longest = _longest(bounds)
 
     none = jnp.zeros(start.v.shape, bool)
-    down = jnp.all(lift[:, lifting:] <= 0.0, axis=1)
-    begin = Level(start, lift, jnp.zeros_like(start.force), none, down)
+    begin = Level(start, lift, jnp.zeros_like(start.force), none, jnp.ones(loads, bool))
     parts = [forces[:, a:b] for a, b in itertools.pairwise(bounds)]
     branches = jnp.stack([_filled(part, longest) for part in parts])
 
@@ -113,10 +110,10 @@ def walk_abreast(
 
         def anew() -> Level:
             if loads == 1:
-                only = _alone(system, jax.tree.map(lambda a: a[0], origin), targets[0], lifting)
+                only = _alone(system, jax.tree.map(lambda a: a[0], origin), targets[0])
                 return jax.tree.map(lambda a: a[None], only._replace(slip_work=_steps(only)))
             each = jax.tree.map(lambda a: jnp.repeat(a, longest, axis=0), origin)
-            found = _branch(system, each, targets.ravel(), lifting)
+            found = _branch(system, each, targets.ravel())
             found = jax.tree.map(lambda a: a.reshape(loads, longest, *a.shape[1:]), found)
             return found._replace(slip_work=_steps(found))
 
@@ -149,7 +146,7 @@ def _filled(forces: Array, longest: int) -> Array:
     return jnp.pad(forces, ((0, 0), (0, longest - forces.shape[1])), mode="edge")
 
 
-def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
+def _branch(system: System, last: Level, forces: Array) -> Level:
     """Levels (loads, ...) at the end of one branch, with the work along it."""
     friction = system.friction
     sense = jnp.where(forces >= last.state.force, 1.0, -1.0)
@@ -163,7 +160,7 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
         first = leader(waiting)
 
         def begin(state: ContactState, lift: Array) -> Tableau:
-            return reversed_at(system, state, lift, opened[first], sense[first], lifting)
+            return reversed_at(system, state, lift, opened[first], sense[first])
 
         at = jax.vmap(begin, out_axes=OWN)(last.state, last.lift)
         alike = (sense == sense[first]) & jnp.all(opened == opened[first], axis=1)
@@ -182,7 +179,7 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
         wait = jnp.stack([each[node] for each in waits])[kind]
         # Negations count loads without numbers in: the leader arrives in the end, whatever it is.
         follows = walking & ~(wait > own + SAME * reach)
-        arrives = walking & (~(comes < reach) | (follows & ~goes_on(at, event)))
+        arrives = walking & (~(comes < reach) | (follows & ~goes_on(at)))
         found, _ = lax.while_loop(
             lambda both: jnp.any(both[1]), functools.partial(arrive, at, comes), (found, arrives)
         )
@@ -206,7 +203,7 @@ def _branch(system: System, last: Level, forces: Array, lifting: int) -> Level:
     return lax.while_loop(lambda left: jnp.any(left[0]), set_out, (everyone, last))[1]
 
 
-def _alone(system: System, last: Level, forces: Array, lifting: int) -> Level:
+def _alone(system: System, last: Level, forces: Array) -> Level:
     """Levels (levels, ...) along a branch of one load, each with the work since its start."""
     friction, start = system.friction, last.state
     sense = jnp.where(forces[-1] >= start.force, 1.0, -1.0)
@@ -220,12 +217,12 @@ def _alone(system: System, last: Level, forces: Array, lifting: int) -> Level:
         tau = jnp.abs(force - start.force)
 
         def unfinished(now: tuple[Tableau, Event]) -> Array:
-            return (now[1].tau < tau) & goes_on(*now)
+            return (now[1].tau < tau) & goes_on(now[0])
 
         at, event = lax.while_loop(unfinished, on, (at, next_event(at, friction)))
         return ended(system, at, event.tau, last, start, force)
 
-    at = reversed_at(system, start, last.lift, last.lift > 0.0, sense, lifting)
+    at = reversed_at(system, start, last.lift, last.lift > 0.0, sense)
     return lax.scan(to, at, forces)[1]
 
 

@@ -38,11 +38,11 @@ from jbeamshell.condensed.contact_input import (
 )
 from jbeamshell.condensed.drives import driven_by_displacement, exchanged
 from jbeamshell.condensed.events import walk
-from jbeamshell.condensed.levels import turns_of
 from jbeamshell.condensed.pair import together
 from jbeamshell.condensed.pressing import press
 from jbeamshell.condensed.stretch import SLIDES, Level
 from jbeamshell.condensed.substructure import Substructure, potential
+from jbeamshell.condensed.turns import turns_of
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.keys import ASSEMBLIES, CONTROLS

@@ -53,7 +53,6 @@ def walk(
     lift: Array | None = None,
     needed: Array | None = None,
     *,
-    lifting: int | None = None,
     alike: bool = True,
 ) -> Level:
     """Levels of a load path, stacked along the first axis.
@@ -71,8 +70,6 @@ def walk(
     lift : (n,) lift at the start; None is none
     needed : False to leave out the walk at no cost; its levels mean nothing then.  None is True,
         and compiles quicker
-    lifting : number of nodes that may lift off, from the loaded end, which is quicker if few do;
-        from where another one opens levels are not settled; None is all
     alike : False if other loads on one body meet other events, so that none are shared
 
     Returns
@@ -82,7 +79,7 @@ def walk(
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
     given = body, jnp.asarray(friction), start, forces, lift
-    return _walk(*given, turns=turns, needed=needed, lifting=lifting, alike=alike)
+    return _walk(*given, turns=turns, needed=needed, alike=alike)
 
 
 @eqx.filter_custom_jvp
@@ -95,12 +92,11 @@ def _walk(
     *,
     turns: ArrayLike | tuple[bool, ...],
     needed: Array | None,
-    lifting: int | None,
     alike: bool,
 ) -> Level:
     known = turns if isinstance(turns, tuple) else None
     given = body, friction, start, forces, lift, jnp.asarray(turns), needed
-    return _one_or_many(known, lifting, alike)(*given)
+    return _one_or_many(known, alike)(*given)
 
 
 @_walk.def_jvp
@@ -110,39 +106,33 @@ def _walk_jvp(
     *,
     turns: ArrayLike | tuple[bool, ...],
     needed: Array | None,
-    lifting: int | None,
     alike: bool,
 ) -> tuple[Level, Level]:
     changes = tuple(jax.tree.map(_full, *both) for both in zip(primals, tangents, strict=True))
     turns = jnp.asarray(turns)
-    path = functools.partial(_differentiable, turns=turns, needed=needed, lifting=lifting)
+    path = functools.partial(_differentiable, turns=turns, needed=needed)
     return jax.jvp(path, primals, changes)
 
 
 @functools.cache
-def _one_or_many(
-    known: tuple[bool, ...] | None, lifting: int | None, alike: bool
-) -> Callable[..., Level]:
+def _one_or_many(known: tuple[bool, ...] | None, alike: bool) -> Callable[..., Level]:
     """Levels of a path.
 
     Loads on one body walk together, if they meet alike events, their turns are known, and that
     pays.  Other lanes of a batch run one after the other, which a loop in step is slower than.
     Lanes that need no walk cost nothing.
     """
-    path = functools.partial(_differentiable, lifting=lifting)
 
     def together(*given: PyTree) -> Level:
         assert known is not None
         body, friction, start, forces, lift, _, needed = given
         system = _system(body, friction, jnp.zeros(()))
-        return _if_needed(
-            needed, lambda: abreast.walk_abreast(system, start, forces, lift, known, lifting)
-        )
+        return _if_needed(needed, lambda: abreast.walk_abreast(system, start, forces, lift, known))
 
     @jax.custom_batching.custom_vmap
     def lane(*given: PyTree) -> Level:
         if known is None:
-            return _if_needed(given[-1], lambda: path(*given))
+            return _if_needed(given[-1], lambda: _differentiable(*given))
         body, friction, *at, turns, needed = given
         one = jax.tree.map(lambda a: a[None], at)
         return jax.tree.map(lambda a: a[0], together(body, friction, *one, turns, needed))
@@ -194,19 +184,16 @@ def _differentiable(
     lift: Array,
     turns: Array,
     needed: Array | None,
-    lifting: int | None = None,
 ) -> Level:
     """Levels of a path, level by level differentiable; see `walk`."""
     needed = jnp.asarray(True) if needed is None else needed
     k, n = start.v.size, lift.size
-    lifting = n if lifting is None else lifting
     system = _system(body, friction, start.force)
     forces_then = jnp.concatenate([start.r_t, start.r_n]) + system.pull * start.force
     reference = forces_then - system.matrix @ jnp.concatenate([start.v, lift])
     system = system._replace(reference=reference)
     none = jnp.zeros_like(start.v, bool)
-    down = jnp.all(lift[lifting:] <= 0.0)
-    first = Level(start, lift, jnp.zeros_like(body.c), none, down)
+    first = Level(start, lift, jnp.zeros_like(body.c), none, jnp.asarray(True))
 
     def go(
         carry: tuple[Tableau, ContactState, Level], to: tuple[Array, Array]
@@ -220,7 +207,7 @@ def _differentiable(
         )
         return (lax.stop_gradient(at), origin, level), level
 
-    carry = (empty(k, n, lifting), lax.stop_gradient(start), first)
+    carry = (empty(k, n), lax.stop_gradient(start), first)
     found = lax.scan(go, carry, (forces, turns))[1]
     change = jnp.concatenate([found.state.v - start.v, found.lift - lift], axis=1)
     displacement = start.displacement + body.c * (forces - start.force) + change @ system.pull
@@ -249,7 +236,7 @@ def _run(
     def turn(both: tuple[Tableau, Array]) -> tuple[Tableau, Array]:
         wanted = last.lift > 0.0
         given = last.state, last.lift, wanted, sense
-        return reversed_at(system, *given, at.lifting), jnp.asarray(False)
+        return reversed_at(system, *given), jnp.asarray(False)
 
     # Loops that run once: in a batch they cost nothing where no lane needs them.
     at, _ = lax.while_loop(lambda both: both[1], turn, (at, turned & needed))
@@ -262,7 +249,7 @@ def _run(
         return stops & slopes.is_full(now.trace) & (now.event.kind != STICK)
 
     def unfinished(now: Walk) -> Array:
-        return needed & (now.event.tau < tau) & goes_on(now.at, now.event) & ~full(now)
+        return needed & (now.event.tau < tau) & goes_on(now.at) & ~full(now)
 
     def go(now: Walk) -> Walk:
         event, trace = now.event, now.trace

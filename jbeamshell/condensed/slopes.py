@@ -163,8 +163,7 @@ def _answer(
     row = at.matrix[number]
     slips = jnp.where(at.sigma == 0.0, 0.0, row[:k])
     sticks = jnp.where(at.sigma == 0.0, row[:k], 0.0)
-    lifts = jnp.pad(row[k:], (0, at.opened.size - at.lifting))
-    normal = jnp.where(at.opened, -lifts, 0.0).at[:k].add(-at.sigma * system.friction * slips)
+    normal = jnp.where(at.opened, -row[k:], 0.0).at[:k].add(-at.sigma * system.friction * slips)
     return Row(
         held=jnp.zeros(2 * k).at[trace.instance].add(sticks),
         forces=jnp.concatenate([-slips, normal]),
@@ -215,7 +214,7 @@ def level_slopes(
     sum_of_both = pushed[:k] + at.sigma * (
         change.friction * last.r_n[:k] + system.friction * pushed[k : 2 * k]
     )
-    free = jnp.where(at.opened, -pushed[k:], 0.0)[: at.lifting]
+    free = jnp.where(at.opened, -pushed[k:], 0.0)
     held = jnp.concatenate([jnp.where(at.sigma == 0.0, stuck, -sum_of_both), free])
     answer = at.matrix[:-1] @ held
     dv = jnp.where(at.sigma == 0.0, stuck, answer[:k])

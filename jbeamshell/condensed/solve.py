@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import math
-from typing import Literal
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,7 +14,7 @@ from jbeamshell.common.precision import in_double, is_single
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.above import Movement, Unread
 from jbeamshell.condensed.bearings import bearing_energy, with_bearings, with_gaps
-from jbeamshell.condensed.branches import pressed
+from jbeamshell.condensed.branches import ContactState, pressed
 from jbeamshell.condensed.drives import (
     driven_by_displacement,
     exchanged,
@@ -28,19 +24,16 @@ from jbeamshell.condensed.drives import (
 from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.events import walk
 from jbeamshell.condensed.kept import kept
-from jbeamshell.condensed.levels import Turns, levels, nested_levels, turns_of
+from jbeamshell.condensed.pressures import Press, walk_with_pressures
 from jbeamshell.condensed.stretch import Level
 from jbeamshell.condensed.strip import Strip, condensed, spring_stiffness, stays_flat
+from jbeamshell.condensed.turns import Turns, known_turns, turns_of, turns_of_cycles
 from jbeamshell.history.history import History
 from jbeamshell.scene.load_path import LoadPath
-from jbeamshell.scene.parts import Load
 from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 
 Cycles = tuple[tuple[int, int, int], ...]
-Search = Literal["events", "near events", "either"]
-LIFTING = 0.125  # of the nodes, that most often lift off at the loaded end
-NESTED_FROM = 6  # order of a section from which on no point reaction disturbs the corner's slip
 
 
 def solve(
@@ -48,7 +41,6 @@ def solve(
     path: LoadPath,
     cycles: Cycles,
     *,
-    by: Search = "events",
     own: bool = True,
     strip: Strip | None = None,
 ) -> History:
@@ -66,9 +58,6 @@ def solve(
     scene : scene on a condensed rung; may be traced
     path, cycles : whole path of the scene and its closed cycles, see
         `jbeamshell.scene.load_path.check`
-    by : "events" walks any path event by event.  "near events" does so while only nodes near the
-        loaded end lift off, and marks other steps unconverged.  "either" takes factors where slip
-        zones are nested, and events elsewhere: derivatives of factors are ten times as quick
     own : True if the loads are the scene's own cycles, whose turns are always known
     strip : the scene's strip, if it is known
 
@@ -81,11 +70,20 @@ def solve(
     Raises
     ------
     InputError
-        if the pressures lift the strip or change along the path, or if loads act on a strip without
-        a foundation
+        if the pressures lift the strip, or change along the path beside elastic sliders, a gap or
+        holes, or if loads act on a strip without a foundation
     """
     now = is_traced(scene, path, strip) or is_staged() or is_single(scene)
-    return _solved(scene, path, cycles, by, own, strip, now)
+    return _solved(scene, path, cycles, own, strip, now)
+
+
+def walks_pressures(scene: Scene) -> bool:
+    """True if pressures that change along a path are walked on the contact line.
+
+    Elastic sliders and what holds two members apart would have to move with them.
+    """
+    joint = scene.contact.gap is None and scene.contact.holes is None
+    return joint and scene.ideal_friction
 
 
 @in_double
@@ -93,23 +91,22 @@ def _solved(
     scene: Scene,
     path: LoadPath,
     cycles: Cycles,
-    by: Search,
     own: bool,
     strip: Strip | None,
     now: bool,
 ) -> History:
     """History, whose fields above the contact are found now or when they are read."""
-    before = scene.load.pressure_steps
-    whole = is_traced(path.pressure) or bool(np.all(np.asarray(path.pressure)[before:] == 1.0))
-    rung = scene.model.rung
-    fix = f"must act wholly for model.rung = {rung}: take {general_rung(rung)} to change them"
-    require("path", "pressures", whole, fix)
-    targets = path.target[before:]
+    before, rung = scene.load.pressure_steps, scene.model.rung
+    targets, parts = path.target[before:], path.pressure[before:]
+    whole = not is_traced(parts) and bool(np.all(np.asarray(parts) == 1.0))
+    fix = "must act wholly beside elastic sliders, a gap or holes: leave these out, or take "
+    fix += f"model.rung = {general_rung(rung)} to change them"
+    require("path", "pressures", whole or walks_pressures(scene), fix)
     base = scene.contact.normal == "rigid" or not targets.size
     fix = f"leaves {rung} nothing but the pressures: set load.cycles = 0, or take "
     fix += general_rung(rung)
     require("contact.normal", scene.contact.normal, base, fix)
-    turns = _turns(scene, targets, own)
+    turns = _turns(scene, targets, own) if whole else ()
     strip = strip_of(scene) if strip is None else strip
     if not is_traced(strip.lift):
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
@@ -117,57 +114,18 @@ def _solved(
         require("contact.pressure", scene.contact.pressure, down, fix)
     soft = not scene.ideal_friction
     known = isinstance(turns, tuple)
-    given = (scene, strip, targets, () if known else turns)
-    history, movement = _walk(given, turns if known else (), cycles, by, soft)
+    given = (scene, strip, targets, None if whole else parts, () if known else turns)
+    history, movement = _walk(given, turns if known else (), cycles, soft)
     above = Unread(strip, movement)
     found: History = history.but(scene=scene, above=above.found if now else above)
     return found
 
 
-def quickest(scene: Scene) -> Search:
-    """Search that most often is the quickest for a scene's cycles.
-
-    Many nodes of plane elasticity lift off, those under a member that goes on, and those of a lap
-    joint at both ends.  So do elastic sliders, whose grid is fine where a strip lifts off.
-    """
-    warps = scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
-    any_may_lift = warps or goes_on(scene) or scene.member.support != "none"
-    any_may_lift = any_may_lift or not scene.ideal_friction
-    return "events" if any_may_lift else "near events"
-
-
-def to_differentiate(scene: Scene) -> Search:
-    """Search whose derivatives are the quickest.
-
-    Slip zones are nested where no point reaction at the loaded corner slips and opens out of turn,
-    as that of sections of low order and that of a rigid face do, and the edge of the contact under
-    a member that goes on.
-    """
-    warps = scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
-    nested = warps and scene.load.entry == "traction" and scene.member.support == "none"
-    return "either" if nested else "events"
-
-
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
     """True for each level before which the load has turned; an array if the loads are traced."""
     if own:
-        return _turns_of_cycles(scene.load.cycles, scene.load.steps_per_half_cycle)
-    return turns_of(targets) if is_traced(targets) else _known_turns(np.asarray(targets))
-
-
-@functools.cache
-def _turns_of_cycles(cycles: int, steps: int) -> tuple[bool, ...]:
-    return _known_turns(Load(cycles=cycles, steps_per_half_cycle=steps).unit_path())
-
-
-def _known_turns(loads: np.ndarray) -> tuple[bool, ...]:
-    """Turns as `turns_of` finds them: where a load rests, the step that leaves it has turned."""
-    turns = np.zeros(loads.size, bool)
-    moves = np.sign(np.diff(loads, prepend=0.0))
-    moving = np.flatnonzero(moves)
-    turns[moving[np.diff(moves[moving], prepend=0.0) != 0.0]] = True
-    turns[:1] = True
-    return tuple(turns.tolist())
+        return turns_of_cycles(scene.load.cycles, scene.load.steps_per_half_cycle)
+    return turns_of(targets) if is_traced(targets) else known_turns(np.asarray(targets))
 
 
 @kept
@@ -181,10 +139,9 @@ def strip_of(scene: Scene) -> Strip:
 
 @Small
 def _walk(
-    given: tuple[Scene, Strip, Array, Turns],
+    given: tuple[Scene, Strip, Array, Array | None, Turns],
     known: tuple[bool, ...],
     cycles: Cycles,
-    by: Search,
     soft: bool,
 ) -> tuple[History, Movement]:
     """History of a strip pressed down and loaded along targets; see `solve`.
@@ -193,19 +150,25 @@ def _walk(
 
     Parameters
     ----------
-    given : scene, its strip, loads after the pressing, and the turns before them if traced, else ()
+    given : scene, its strip, loads after the pressing, parts of the pressures then if they change,
+        else None, and the turns before the loads if traced, else ()
     known : turns if they are known
     """
-    scene, strip, targets, traced = given
+    scene, strip, targets, parts, traced = given
     turns = known if isinstance(traced, tuple) else traced
-    found = _levels(scene, strip, targets, turns, by, soft)
-    history, movement = _history(scene, strip, found, cycles, soft)
+    found = _levels(scene, strip, targets, parts, turns, soft)
+    history, movement = _history(scene, strip, found, parts, cycles, soft)
     # The scene's numbers would be copied, and they would no longer tell ideal sliders.
     return history.but(scene=None), movement
 
 
 def _levels(
-    scene: Scene, strip: Strip, targets: Array, turns: Turns, by: Search, soft: bool
+    scene: Scene,
+    strip: Strip,
+    targets: Array,
+    parts: Array | None,
+    turns: Turns,
+    soft: bool,
 ) -> Level:
     """Levels after the pressing; the last contact nodes are bearings, if the scene has any."""
     body, contact, friction = strip.body, scene.contact, scene.contact.friction
@@ -216,22 +179,22 @@ def _levels(
         lift = with_gaps(lift, 0.0 if contact.clearance is None else contact.clearance)
     if soft:
         body, springs = with_springs(body, spring_stiffness(scene, strip))
+    press = Press.of(strip.loaded.hessian, body.f_t.size, body.f_n.size - strip.x.size)
     if scene.load.control == "displacement":
         body = driven_by_displacement(body)
+        press = press.driven_by_displacement(body)
     start = pressed(body)
+    # The pressures squeeze an even strip flat.
+    flat = None if stays_flat(scene) else lift
     if not targets.size:
-        found, sound = nested_levels(body, friction, start, targets, turns)
+        none = Level(start, lift, start.force, start.v > 0.0, start.force >= 0.0)
+        found = jax.tree.map(lambda a: jnp.zeros((0, *a.shape), a.dtype), none)
+    elif parts is not None:
+        found = walk_with_pressures(body, press, friction, start, targets, parts, flat)
     else:
-        # Factors overflow in single precision.
-        flat = None if stays_flat(scene) else lift
-        if by == "either" and bearing is None and body.f_t.dtype == np.float64:
-            found = levels(body, friction, start, targets, turns, flat)
-        else:
-            lifting = math.ceil(LIFTING * strip.x.size) if by == "near events" else None
-            alike = not goes_on(scene)  # the edge of the contact opens at other events at each load
-            loads = body, friction, start, targets, turns, flat
-            found = walk(*loads, lifting=lifting, alike=alike)
-        sound = jnp.all(jnp.isfinite(strip.lift))
+        alike = not goes_on(scene)  # the edge of the contact opens at other events at each load
+        found = walk(body, friction, start, targets, turns, flat, alike=alike)
+    sound = jnp.all(jnp.isfinite(strip.lift))
     state = found.state
     if scene.load.control == "displacement":
         state = jax.vmap(exchanged)(state)
@@ -242,74 +205,112 @@ def _levels(
 
 
 def _history(
-    scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bool
+    scene: Scene, strip: Strip, levels: Level, parts: Array | None, cycles: Cycles, soft: bool
 ) -> tuple[History, Movement]:
-    """History of the levels after the pressing, whose steps come first, and the movement."""
-    body, state = strip.body, levels.state
-    before = scene.load.pressure_steps
-    n, k, steps = strip.x.size, body.f_t.size, before + state.force.size
-    part = jnp.asarray(np.minimum(np.arange(1, steps + 1) / before, 1.0), state.force.dtype)
-    pressing = part[:, None] * (np.arange(steps) < before)[:, None]  # zero at the levels
+    """History of the levels after the pressing, whose steps come first, and the movement.
 
-    def along(values: Array) -> Array:  # (levels, n or k) to (steps, n) from the far end
-        return jnp.pad(values[:, ::-1], ((before, 0), (n - values.shape[1], 0)))
+    Parameters
+    ----------
+    parts : parts (levels,) of the pressures that act; None is all of them
+    """
+    before, state = scene.load.pressure_steps, levels.state
+    steps = before + state.force.size
+    part = jnp.asarray(np.minimum(np.arange(1, steps + 1) / before, 1.0), state.force.dtype)
+    pressure = part if parts is None else jnp.append(part[:before], parts)
+    sound = jnp.append(jnp.ones(before, bool), levels.settled)
+    movement = _movement(strip, levels, part, pressure, sound)
+    energy, sinking = _energy(scene, strip, movement, state, soft)
+    traction, reaction = _on_base(strip, state, part[:before])
+    moved = part[:, None] * movement.at_rest + movement.change
+    driven = state.displacement if scene.load.control == "displacement" else state.force
+    status = jnp.where(sound, Status.CONVERGED, Status.MAX_ITERATIONS)
 
     def every(values: Array) -> Array:
         return jnp.pad(values, (before, 0))
 
-    settled, held = (jnp.pad(each[::-1], (n - k, 0)) for each in (strip.settled, body.t_0))
-    driven = state.displacement if scene.load.control == "displacement" else state.force
-    risen = along(levels.lift[:, :n] - strip.lift)
-    w = risen + part[:, None] * strip.lift[::-1]
-    force = every(state.force)
-    # The pressed strip, and what the load adds to it.
-    at_rest = jnp.stack([settled, strip.lift[::-1]], axis=1).ravel()
-    at_rest = jnp.concatenate([at_rest, jnp.array([0.0, 1.0])])
-    change = jnp.stack([along(state.v), risen], axis=2).reshape(steps, 2 * n)
-    change = jnp.pad(jnp.concatenate([change, force[:, None]], axis=1), ((0, 0), (0, 1)))
-    reaction = along(state.r_n[:, :n]) / strip.tributary
-    reaction = reaction + pressing * body.r_0[::-1] / strip.tributary
-    traction = -along(state.r_t) / strip.tributary
-    traction = traction - pressing * held / strip.tributary
-    slipping = along(levels.slipping).astype(bool)
-    # Conjugate to v and w, minus the end load, and the pressure.
-    resting, added = at_rest @ strip.pressed.hessian, change @ strip.loaded.hessian
-    energy = 0.5 * part**2 * (resting @ at_rest) + change[:, :-2] @ resting[:-2]
-    energy = energy + 0.5 * jnp.sum(added * change, axis=1) - added[:, -2] * force
-    sinking = part * resting[-1] + added[:, -1]
-    if soft:
-        energy = energy + every(spring_energy(spring_stiffness(scene, strip), state.r_t))
-    if scene.contact.bearing_stiffness is not None:
-        energy = energy + every(bearing_energy(scene.contact.bearing_stiffness, state.r_n[:, n:]))
-    status = jnp.where(levels.settled, Status.CONVERGED, Status.MAX_ITERATIONS)
-    sound = jnp.append(jnp.ones(before, bool), levels.settled)
-
     def masked(values: Array) -> Array:
         return nan_unless(sound, values)
 
-    movement = Movement(at_rest, change, part, sound)
     history = History(
         scene=scene,
         x=strip.x,
         middles=0.5 * (strip.x[1:] + strip.x[:-1]),
         tributary=strip.tributary,
         load=strip.load,
-        force=masked(force),
+        force=masked(every(state.force)),
         displacement=masked(every(state.displacement)),
-        contact_v=masked(part[:, None] * at_rest[:-2:2] + change[:, :-2:2]),
+        contact_v=masked(moved[:, :-2:2]),
         above=None,
-        gap=masked(w),
+        gap=masked(moved[:, 1:-2:2]),
         traction=masked(traction),
         reaction=masked(reaction),
-        slipping=slipping,
+        slipping=_along(levels.slipping, strip.x.size, before),
         slip_work=masked(every(levels.slip_work)),
         stored_energy=masked(energy),
-        pressure=part,
+        pressure=pressure,
         sinking=masked(sinking),
         iterations=jnp.zeros(part.size, int),
         error=jnp.zeros(part.size),
-        status=jnp.append(jnp.full(before, Status.CONVERGED), status),
+        status=status,
         cycles=cycles,
         target=masked(every(driven)),
     )
     return history, movement
+
+
+def _along(values: Array, nodes: int, before: int) -> Array:
+    """Values (levels, k) as (before + levels, nodes) from the far end, zero before the levels."""
+    return jnp.pad(values[:, ::-1], ((before, 0), (nodes - values.shape[1], 0)))
+
+
+def _movement(strip: Strip, levels: Level, part: Array, pressure: Array, sound: Array) -> Movement:
+    """Movement of the strip as it is pressed, and what the levels add to it.
+
+    Parameters
+    ----------
+    part : (steps,) part of the pressures that presses the strip down, 1 at the levels
+    pressure : (steps,) part of the pressures that acts
+    sound : (steps,) False from the first step on that has no equilibrium
+    """
+    n, before = strip.x.size, part.size - levels.settled.size
+    settled = _along(strip.settled[None], n, 0)[0]
+    at_rest = jnp.append(jnp.stack([settled, strip.lift[::-1]], axis=1), jnp.array([0.0, 1.0]))
+    slip, risen = (
+        _along(values, n, before) for values in (levels.state.v, levels.lift[:, :n] - strip.lift)
+    )
+    change = jnp.stack([slip, risen], axis=2).reshape(part.size, 2 * n)
+    force = jnp.pad(levels.state.force, (before, 0))
+    change = jnp.column_stack([change, force, pressure - part])
+    return Movement(at_rest, change, part, sound)
+
+
+def _energy(
+    scene: Scene, strip: Strip, movement: Movement, state: ContactState, soft: bool
+) -> tuple[Array, Array]:
+    """Stored energy (steps,) with the potential of the pressures, and their sinking."""
+    at_rest, change, part, _ = movement
+    n, before = strip.x.size, part.size - state.force.size
+    # Conjugate to v and w, minus the end load, and the pressure.
+    resting, added = at_rest @ strip.pressed.hessian, change @ strip.loaded.hessian
+    energy = 0.5 * part**2 * (resting @ at_rest) + change @ resting.at[-2].set(0.0)
+    energy = energy + 0.5 * jnp.sum(added * change, axis=1) - added[:, -2] * change[:, -2]
+    bearing = scene.contact.bearing_stiffness
+    if soft:
+        springs = spring_energy(spring_stiffness(scene, strip), state.r_t)
+        energy = energy.at[before:].add(springs)
+    if bearing is not None:
+        energy = energy.at[before:].add(bearing_energy(bearing, state.r_n[:, n:]))
+    return energy, part * resting[-1] + added[:, -1]
+
+
+def _on_base(strip: Strip, state: ContactState, pressing: Array) -> tuple[Array, Array]:
+    """Traction on the strip and reaction of the base (steps, n) from the far end.
+
+    Parameters
+    ----------
+    pressing : (before,) part of the pressures while they press the strip down
+    """
+    n, share = strip.x.size, pressing[:, None]
+    r_t = jnp.concatenate([share * strip.body.t_0, state.r_t])
+    r_n = jnp.concatenate([share * strip.body.r_0, state.r_n[:, :n]])
+    return -_along(r_t, n, 0) / strip.tributary, r_n[:, ::-1] / strip.tributary

@@ -44,16 +44,16 @@ class System(NamedTuple):
 
 
 class Tableau(NamedTuple):
-    """Contact between two events; k of n nodes may slip, and the first m may lift.
+    """Contact between two events; k of n nodes may slip.
 
     Rows are the k tangential and the n normal ones, and the displacement of the loaded end.
-    Columns are the k tangential and the first m normal ones.  Loads of one body that have met the
-    same events share all but the value, what is held, tau and the work, which then have one more
-    axis, the last.
+    Columns are the tangential and the normal ones.  Loads of one body that have met the same
+    events share all but the value, what is held, tau and the work, which then have one more axis,
+    the last.
 
     Attributes
     ----------
-    matrix : (k + n + 1, k + m)
+    matrix : (k + n + 1, k + n)
     value, rate : (k + n + 1,) answers at tau = 0, and their rates over tau
     sigma : (k,) 1 and -1 for nodes that slip along and against v, 0 for those that stick
     opened : (n,) True for open nodes
@@ -73,11 +73,6 @@ class Tableau(NamedTuple):
     work: Array
     events: Array
 
-    @property
-    def lifting(self) -> int:
-        """Number m of nodes that may lift."""
-        return int(self.matrix.shape[1] - self.sigma.size)
-
     def at(self, tau: Array) -> Array:
         """All answers at a tau of this stretch; (rows, loads) at those of many loads."""
         return self.value + jnp.multiply.outer(self.rate, tau)
@@ -92,11 +87,11 @@ class Tableau(NamedTuple):
         return jnp.concatenate([origin + slip, lift]), jnp.where(self.opened, 0.0, normal)
 
 
-def empty(k: int, n: int, lifting: int) -> Tableau:
+def empty(k: int, n: int) -> Tableau:
     """Tableau of no contact, to be filled at the first reversal."""
     zero, rows = jnp.zeros(()), jnp.zeros(k + n + 1)
     return Tableau(
-        matrix=jnp.zeros((k + n + 1, k + lifting)),
+        matrix=jnp.zeros((k + n + 1, k + n)),
         value=rows,
         rate=rows,
         sigma=jnp.zeros(k),
@@ -109,12 +104,12 @@ def empty(k: int, n: int, lifting: int) -> Tableau:
 
 
 def reversed_at(
-    system: System, state: ContactState, lift: Array, wanted: Array, sense: Array, lifting: int
+    system: System, state: ContactState, lift: Array, wanted: Array, sense: Array
 ) -> Tableau:
     """Tableau at a reversal: all closed nodes stick, the ``wanted`` ones (n,) stay open."""
     k, n = state.v.size, lift.size
-    start = empty(k, n, lifting)._replace(
-        matrix=jnp.concatenate([system.matrix, system.pull[None]])[:, : k + lifting],
+    start = empty(k, n)._replace(
+        matrix=jnp.concatenate([system.matrix, system.pull[None]]),
         value=jnp.concatenate([state.r_t, state.r_n, state.displacement[None]]),
         rate=sense * jnp.append(-system.pull, system.c),
     )

@@ -17,7 +17,6 @@ from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.native import Native
 from jbeamshell.common.precision import doubled, in_double, is_single
 from jbeamshell.condensed.shared import Layout, Shared, shared
-from jbeamshell.condensed.solve import quickest
 from jbeamshell.condensed.strip import Strip
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
@@ -180,9 +179,7 @@ def _programs(template: Template, asked: _Asked, layout: Layout | None = None) -
 
     shape = jax.ShapeDtypeStruct((), template.dtype)
     scene = template.scene([shape] * template.numbers)
-    staged = slip_patterns.applies(scene)
-    staged = staged or (scene.model.condensed and quickest(scene) != "events")
-    again = method is None and staged  # what does not settle, by Newton or by events
+    again = method is None and slip_patterns.applies(scene)  # what does not settle, by Newton
     first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
     first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)
     compiled = jax.jit(solved_by(method or Method.NEWTON))

@@ -16,7 +16,7 @@ from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, 
 from jbeamshell.common.precision import is_single
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.common.two_programs import TwoPrograms
-from jbeamshell.condensed.solve import Cycles, quickest, to_differentiate
+from jbeamshell.condensed.solve import Cycles, walks_pressures
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.condensed.strip import Strip
 from jbeamshell.history.history import History
@@ -62,8 +62,8 @@ def solve(
     ----------
     scene : strip, contact, load and model; traced leaves pass, so `jax.grad` and `jax.vmap` work
     path : loads after the pressing, (steps,): F, u(L) or the arc length, by ``scene.load.control``;
-        or (steps, 2) with the part of the pressures that acts in the second column; None is the
-        scene's own cycles
+        or (steps, 2) with the part of the pressures that acts in the second column, both of which
+        change evenly from step to step; None is the scene's own cycles
     contact : (n,) True at the nodes in contact where the search for the contact starts; None starts
         with all of them
     solver : settings of Newton's method, which strips on their contact line do not need
@@ -101,7 +101,7 @@ def solve(
     if scene.model.condensed:
         found = f"is found from the pressures for model.rung = {scene.model.rung}: leave it out"
         require("contact", "given", contact is None, found)
-        return _condensed(scene, whole, cycles, throw, method, path is None, strip)
+        return _condensed(scene, whole, cycles, throw, path is None, strip)
     solver = solver or Newton()
     touching = None if contact is None else check_contact(scene, contact)
     method = method or _first_method(scene, whole)
@@ -131,7 +131,8 @@ def _able(scene: Scene, path: ArrayLike | None, contact: ArrayLike | None) -> Sc
     """Scene by load steps, if its solution was left open and what it is asked for needs them."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     pressures = path is not None and as_leaf(path, "path", LOADS).ndim > 1
-    return scene.by_load_steps() if pressures or contact is not None else scene
+    steps = contact is not None or (pressures and not walks_pressures(scene))
+    return scene.by_load_steps() if steps else scene
 
 
 def _condensed(
@@ -139,22 +140,16 @@ def _condensed(
     path: LoadPath,
     cycles: Cycles,
     throw: bool,
-    method: Method | None,
     own: bool,
     strip: Strip | None = None,
 ) -> History:
-    """History on the contact line, by the quickest search unless derivatives may be taken."""
+    """History on the contact line."""
     traced = is_traced(scene, path) or is_staged()
     if traced and not _precise(scene):
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
 
     def walked(scene: Scene, strip: Strip | None = None) -> History:
-        by = quickest(scene)
-        if method is Method.NEWTON or (traced and method is None):
-            by = to_differentiate(scene) if traced else "events"
-        history = solve_condensed(scene, path, cycles, by=by, own=own, strip=strip)
-        if not traced and by != "events" and not history.converged:
-            history = solve_condensed(scene, path, cycles, own=own, strip=strip)
+        history = solve_condensed(scene, path, cycles, own=own, strip=strip)
         return history.but(end=WholePath())
 
     history = walked(scene, strip)
@@ -220,13 +215,12 @@ class WholePath(eqx.Module):
         throw: bool = True,
     ) -> History:
         """History with further loads; see `PathEnd.continued`."""
-        scene, before = history.scene, np.asarray(history.target)[history.pressed + 1 :]
-        further = further_path(scene, float(before[-1]) if before.size else 0.0, path)
-        whole = bool(np.all(further.pressure == 1.0))
-        fix = f"must stay as they are for model.rung = {scene.model.rung}: take "
-        fix += "model.solution = stepwise"
-        require("path", "pressures", whole, fix)
-        return solve(scene, np.append(before, further.target), solver=solver, throw=throw)
+        scene, first = history.scene, history.pressed + 1
+        loads, parts = (np.asarray(a)[first:] for a in (history.target, history.pressure))
+        further = further_path(scene, float(loads[-1]) if loads.size else 0.0, path)
+        loads, parts = np.append(loads, further.target), np.append(parts, further.pressure)
+        whole = loads if np.all(parts == 1.0) else np.stack([loads, parts], axis=1)
+        return solve(scene, whole, solver=solver, throw=throw)
 
 
 def compile_for(
@@ -236,7 +230,7 @@ def compile_for(
     scene = _able(scene, path, None)
     whole, cycles = whole_path(scene, path)
     if scene.model.condensed:
-        _condensed(scene, whole, cycles, False, None, path is None)
+        _condensed(scene, whole, cycles, False, path is None)
         return
     method = _first_method(scene, whole)
     given = scene, None, whole, np.asarray(False), solver or Newton(), method

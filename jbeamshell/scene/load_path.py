@@ -53,45 +53,49 @@ def whole_path(
     amplitude = numbers.asarray(scene.load.amplitude)
     if path is None:
         targets = amplitude * known.astype(amplitude.dtype)
-        pressures = numbers.ones_like(targets)
+        pressures = np.ones(targets.shape, targets.dtype)
     else:
         loads = numbers.asarray(as_leaf(path, "path", LOADS), amplitude.dtype)
         shaped = loads.size > 0 and (loads.ndim == 1 or (loads.ndim == 2 and loads.shape[1] == 2))
         require("path", np.shape(path), shaped, LOADS)
-        targets, pressures = (loads, numbers.ones_like(loads)) if loads.ndim == 1 else loads.T
+        constant = np.ones(loads.shape, loads.dtype)
+        targets, pressures = (loads, constant) if loads.ndim == 1 else loads.T
         if not is_traced(loads):
-            known, finite = np.asarray(targets), np.isfinite(loads)
+            known, parts, finite = np.asarray(targets), np.asarray(pressures), np.isfinite(loads)
             require("path", loads[~finite], bool(np.all(finite)), "must hold finite loads only")
             pulling = pressures < 0.0
             fix = "the part of the pressures that acts must not be negative"
             require("path", np.asarray(pressures)[pulling], not np.any(pulling), fix)
         else:
-            known = np.zeros(0)
-        closed = functools.partial(_cycles_of, known)
+            known = parts = np.zeros(0)
+        closed = functools.partial(_cycles_of, known, parts)
     if is_traced(scene, targets) and scene.load.control == "force":
         targets, numbers = _below_gross_slip(scene, targets, pressures), jnp
     before = (np.arange(1, pressing + 1) / pressing).astype(amplitude.dtype)
     whole = LoadPath(
         numbers.append(np.zeros_like(before), targets),
-        numbers.append(before, pressures),
+        (jnp if is_traced(pressures) else np).append(before, pressures),
         numbers.append(np.zeros_like(before), numbers.ones_like(targets)),
     )
     last = pressing - 1
     return whole, tuple((a + last, b + last, c + last) for a, b, c in closed())
 
 
-def _cycles_of(loads: np.ndarray) -> tuple[tuple[int, int, int], ...]:
-    """Closed cycles of loads that start from zero; none of none."""
-    return tuple(closed_cycles(np.append(0.0, loads))) if loads.size else ()
+def _cycles_of(loads: np.ndarray, parts: np.ndarray) -> tuple[tuple[int, int, int], ...]:
+    """Closed cycles of loads that start from zero, whose pressures close too; none of none."""
+    cycles = closed_cycles(np.append(0.0, loads)) if loads.size else ()
+    parts = np.append(1.0, parts)
+    return tuple(cycle for cycle in cycles if parts[cycle[0]] == parts[cycle[2]])
 
 
 @functools.cache
 def _own_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
     """Closed cycles of a scene's own path."""
-    return _cycles_of(Load(cycles=cycles, steps_per_half_cycle=steps).unit_path())
+    loads = Load(cycles=cycles, steps_per_half_cycle=steps).unit_path()
+    return _cycles_of(loads, np.ones_like(loads))
 
 
-def _below_gross_slip(scene: Scene, targets: Array, pressures: Array) -> Array:
+def _below_gross_slip(scene: Scene, targets: Array, pressures: Array | np.ndarray) -> Array:
     """Forces of a traced path, NaN from gross slip on, where no step finds an equilibrium."""
     contact, support = scene.contact, scene.member.support
     force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length, support)
@@ -127,7 +131,7 @@ class LoadPath(NamedTuple):
     Attributes
     ----------
     target : controlled load: F, u(L) or, for the arc length, the way along the path, signed
-    pressure : part of the pressures that acts
+    pressure : part of the pressures that acts; traced only if the path changes it
     rough : 1 with friction, 0 while the strip is pressed down before it
     """
 

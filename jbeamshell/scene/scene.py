@@ -400,8 +400,8 @@ class Scene(Tree):
     def by_load_steps(self) -> Scene:
         """Copy that is solved in load steps, if how it is solved was left open."""
         support = self.member.support
-        fix = "is for loads under constant pressures, at rest; for vibrations take "
-        fix += "jb.dynamics.let_go, or Joint.of(scene) in a structure"
+        fix = "is for loads at rest, and beside elastic sliders, a gap or holes for pressures that "
+        fix += "stay; for vibrations take jb.dynamics.let_go, or Joint.of(scene) in a structure"
         require("member.support", support, support == "none", fix)
         found = self
         if "solution" in self.model.open and self.model.solution != "stepwise":

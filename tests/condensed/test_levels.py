@@ -1,4 +1,4 @@
-"""Levels of load paths: factors or events by themselves, in batches, and their slopes."""
+"""Levels of load paths: events beside factors, in batches, and their slopes; turns of loads."""
 
 import dataclasses
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.condensed import branches, drives, events, levels, strip
-from jbeamshell.condensed.solve import _known_turns
+from jbeamshell.condensed import branches, drives, events, strip
+from jbeamshell.condensed.turns import known_turns, turns_of
 
 NODES = 21
 TURNS = jnp.asarray([1.0, 0.3, -1.0, -0.2, 1.0])
@@ -37,7 +37,7 @@ def path(body, friction, amplitude):
     start = branches.pressed(body)
     lift = jnp.where(body.r_0 > 0.0, 0.0, 1e-5 * body.x)
     # Gross slip of the standard pressure is at 20 mu.
-    return levels.levels(body, friction, start, 20.0 * amplitude * TURNS, TURNED, lift)
+    return events.walk(body, friction, start, 20.0 * amplitude * TURNS, TURNED, lift)
 
 
 def figures(body, friction, amplitude):
@@ -90,27 +90,12 @@ class TestSlopes:
         @jax.jit
         def works(friction):
             path = 2.3e-4 * TURNS
-            return levels.levels(body, friction, start, path, TURNED).slip_work
+            return events.walk(body, friction, start, path, TURNED).slip_work
 
         slope = jax.jit(jax.jacfwd(works))(0.4)
         assert np.all(np.isfinite(slope))
         change = (works(0.4 + 1e-6) - works(0.4 - 1e-6)) / 2e-6
         np.testing.assert_allclose(slope, change, rtol=1e-6)
-
-    def test_few_columns_give_the_slopes_of_all(self):
-        body, friction = strip_body(0.3), jnp.asarray(0.3)
-        start, forces = branches.pressed(body), 20.0 * 0.2 * TURNS
-
-        def work(friction, lifting):
-            found = events.walk(body, friction, start, forces, jnp.asarray(TURNED), lifting=lifting)
-            return found.slip_work[4], (found.settled, found.lift)
-
-        few = jax.jit(jax.value_and_grad(lambda mu: work(mu, 6), has_aux=True))(friction)
-        every = jax.jit(jax.value_and_grad(lambda mu: work(mu, None), has_aux=True))(friction)
-        (settled, lift), slope = few[0][1], few[1]
-        assert np.all(settled)
-        assert np.any(lift > 0.0)
-        assert float(slope) == pytest.approx(float(every[1]), rel=1e-9)
 
     def test_lift_and_sticking_again_are_among_the_cases(self):
         body = strip_body(0.2)
@@ -121,12 +106,18 @@ class TestSlopes:
 
 class TestLevels:
     def test_factors_and_events_tell_the_same(self):
-        body = strip_body(0.1)
-        start, forces = branches.pressed(body), 1.2 * TURNS
-        fast = jax.jit(levels.levels, static_argnums=4)(body, 0.1, start, forces, TURNED)
-        slow = jax.jit(events.walk)(body, 0.1, start, forces, jnp.asarray(TURNED))
+        body, friction = strip_body(0.1), 0.1
+        start, turns = branches.pressed(body), 1.2 * jnp.asarray([1.0, -1.0, 1.0])
+
+        @jax.jit
+        def nested(body):
+            return branches.path(body, branches.factorise(body, friction), friction, start, turns)
+
+        fast = nested(body)
+        slow = jax.jit(events.walk)(body, friction, start, turns, jnp.ones(3, bool))
+        assert np.all(fast.valid)
         np.testing.assert_allclose(fast.slip_work, slow.slip_work, rtol=1e-9)
-        np.testing.assert_allclose(fast.state.v, slow.state.v, atol=1e-12 * fast.state.v.max())
+        np.testing.assert_allclose(fast.at.v, slow.state.v, atol=1e-12 * fast.at.v.max())
         np.testing.assert_array_equal(fast.slipping, slow.slipping)
 
     def test_a_batch_is_its_lanes(self):
@@ -142,29 +133,27 @@ class TestLevels:
 
 class TestTurns:
     def test_a_load_that_rests_turns_when_it_leaves(self):
-        assert _known_turns(np.array([1.0, 1.0, 0.5, 0.5, -1.0])) == (
+        assert known_turns(np.array([1.0, 1.0, 0.5, 0.5, -1.0])) == (
             True,
             False,
             True,
             False,
             False,
         )
-        assert _known_turns(np.array([0.0, 1.0, 2.0])) == (True, True, False)
+        assert known_turns(np.array([0.0, 1.0, 2.0])) == (True, True, False)
 
     def test_known_turns_are_those_of_a_traced_path(self):
-        traced = jax.jit(levels.turns_of)
+        traced = jax.jit(turns_of)
         for seed in range(20):
             moves = np.random.default_rng(seed).integers(-1, 2, 12)
             loads = np.cumsum(moves).astype(float)
-            assert _known_turns(loads) == tuple(np.asarray(traced(loads)).tolist())
+            assert known_turns(loads) == tuple(np.asarray(traced(loads)).tolist())
 
     def test_traced_turns_are_walked_as_known_ones(self):
         body = strip_body(0.1)
         given = body, 0.1, branches.pressed(body), 1.2 * TURNS
-        known, sound = jax.jit(levels.nested_levels, static_argnums=4)(*given, TURNED)
-        traced, also = jax.jit(levels.nested_levels)(*given, jnp.asarray(TURNED))
-        assert sound
-        assert also
+        known = jax.jit(events.walk, static_argnums=4)(*given, TURNED)
+        traced = jax.jit(events.walk)(*given, jnp.asarray(TURNED))
         np.testing.assert_allclose(traced.slip_work, known.slip_work, rtol=1e-9)
         np.testing.assert_allclose(traced.state.displacement, known.state.displacement, rtol=1e-9)
 

@@ -10,7 +10,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell import condensed
-from jbeamshell.condensed import branches, events, levels, strip
+from jbeamshell.condensed import branches, events, strip
 from jbeamshell.condensed.ends import end_section
 from jbeamshell.mechanics.layered import Material, layered_form
 from jbeamshell.scene.rungs import PLANE_NODES
@@ -58,13 +58,6 @@ def by_factors(body, friction, amplitude):
 def by_events(body, friction, amplitude):
     start, turned = branches.pressed(body), jnp.ones(TURNS.size, bool)
     return events.walk(body, friction, start, amplitude * TURNS, turned)
-
-
-@jax.jit
-def by_levels(body, friction, amplitude):
-    """By factors where they hold, else by events."""
-    turned = (True,) * TURNS.size
-    return levels.levels(body, friction, branches.pressed(body), amplitude * TURNS, turned)
 
 
 def two_layers():
@@ -181,7 +174,7 @@ class TestEvents:
         body = STRIP(scene_of(eta)).body
         for row in rows("energy.csv"):
             if row["eta"] == eta and row["ratio"] > 1e-4:
-                found = by_levels(body, 0.1, row["A"])
+                found = by_events(body, 0.1, row["A"])
                 assert np.all(found.settled)
                 error = abs(float(jnp.sum(found.slip_work[-2:])) / row["D"] - 1.0)
                 assert error < (0.01 if row["ratio"] > 0.1 else 0.03), row
@@ -196,7 +189,7 @@ class TestEvents:
         ]
         for eta, amplitude, dissipated in cells:
             body = STRIP(scene_of(eta).replace({"strip.far_end": "pinned"})).body
-            found = by_levels(body, 0.1, amplitude)
+            found = by_events(body, 0.1, amplitude)
             work = 3.4e4 * float(jnp.sum(found.slip_work[-2:]))
             assert work == pytest.approx(dissipated, rel=0.01), (eta, amplitude)
 
@@ -207,7 +200,7 @@ class TestEvents:
             if ratio < 0.01:
                 continue
             scene = scene_of(row["eta"], row["mu"], row["nu"])
-            found = by_levels(STRIP(scene).body, row["mu"], row["A"])
+            found = by_events(STRIP(scene).body, row["mu"], row["A"])
             assert np.all(found.settled)
             lifted += bool(np.any(found.lift > 0.0))
             work = float(jnp.sum(found.slip_work[-2:])) * 3.4e4

@@ -283,12 +283,13 @@ def test_a_doubt_about_chosen_nodes_names_the_tolerance():
     assert "more model.nodes" in given.doubts[0]
 
 
-def test_pressures_that_change_take_load_steps():
+def test_pressures_that_change_beside_elastic_sliders_take_load_steps():
     path = np.array([[0.2, 1.0], [0.2, 0.5]])
-    history = jb.solve(jb.Scene().replace({"model.nodes": 11}), path, throw=False)
+    soft = jb.Scene().replace({"model.nodes": 11, "contact.stick_stiffness": 10.0})
+    history = jb.solve(soft, path, throw=False)
     assert history.scene.model.solution == "stepwise"
-    with pytest.raises(jb.InputError, match="must act wholly for model"):
-        jb.solve(jb.Scene().pinned(), path)
+    with pytest.raises(jb.InputError, match="must act wholly beside elastic sliders"):
+        jb.solve(soft.pinned(), path)
 
 
 def test_a_history_on_the_contact_line_goes_on():
