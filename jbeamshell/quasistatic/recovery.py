@@ -15,12 +15,6 @@ from jbeamshell.scene.scene import Scene
 PIECES = (8, 64)  # numbers of pieces of a failed load step, tried in this order
 
 
-def walk(scene: Scene, start: PathState, path: LoadPath, solver: Newton) -> StepResults:
-    """Walk along a load path; a step that fails is walked again in pieces."""
-    steps = compiled_march(scene, start, path, solver, Method.STATUS_ITERATION)
-    return steps if _converged(steps) else recover(scene, steps, path, solver, start)
-
-
 def recover(
     scene: Scene, steps: StepResults, path: LoadPath, solver: Newton, start: PathState
 ) -> StepResults:

@@ -22,8 +22,8 @@ from jbeamshell.condensed.strip import Strip
 from jbeamshell.history.history import History
 from jbeamshell.history.reliability import change_of, misses_tolerance
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic.closed_bar import bar_cycles
 from jbeamshell.quasistatic.continuation import further_path, with_end
-from jbeamshell.quasistatic.masing import bar_cycles, masing
 from jbeamshell.quasistatic.outcome import ADVICE, check_solver, history_of, raise_if_failed
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
@@ -116,8 +116,6 @@ def solve(
         start = initial_state(scene, touching)
         if scene.model.solution == "stepwise":
             steps = recover(scene, steps, whole, solver, start)
-        else:
-            steps = masing(scene, start, whole, solver, recovering=True)
         if throw:
             raise_if_failed(scene, steps, whole)
         history = with_end(history_of(scene, steps, whole.pressure), steps)
@@ -264,8 +262,6 @@ def _solve(
     start = initial_state(scene, touching)._replace(converged=jnp.asarray(enabled))
     if scene.model.solution == "closed-form":
         steps = bar_cycles(scene, path)
-    elif scene.model.solution == "stepwise":
-        steps = march(scene, start, path, solver, method, native)
     else:
-        steps = masing(scene, start, path, solver, method, native=native)
+        steps = march(scene, start, path, solver, method, native)
     return steps, with_end(history_of(scene, steps, path.pressure), steps)

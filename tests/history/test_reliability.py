@@ -143,7 +143,7 @@ def test_long_load_steps_are_doubted_for_a_reaction_that_changes_within_them():
     assert reliability.estimates(steps, changing)[3] == reliability.step_error(changing)
 
 
-@pytest.mark.parametrize("rung", ["condensed-squeeze", "masing"])
+@pytest.mark.parametrize("rung", ["condensed-squeeze", "shell"])
 def test_where_nothing_slips_the_estimate_is_infinite(rung):
     scene = jb.Scene().replace({"model.rung": rung})
     errors = reliability.estimates(scene, even_cycle(4, slip=0.0))
