@@ -13,9 +13,9 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, warn_of_doubts
+from jbeamshell.common.native import Program
 from jbeamshell.common.precision import is_single
 from jbeamshell.common.threads import in_one_lapack_thread
-from jbeamshell.common.two_programs import TwoPrograms
 from jbeamshell.condensed.solve import Cycles, quickest, to_differentiate
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.condensed.strip import Strip
@@ -27,7 +27,7 @@ from jbeamshell.quasistatic.continuation import further_path, with_end
 from jbeamshell.quasistatic.outcome import ADVICE, check_solver, history_of, raise_if_failed
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
-from jbeamshell.quasistatic.stepping import Method, fits_native, march
+from jbeamshell.quasistatic.stepping import fits_native, march
 from jbeamshell.scene.choice import is_elastic, refinements
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
 from jbeamshell.scene.scene import Scene
@@ -53,7 +53,7 @@ def solve(
     contact: ArrayLike | None = None,
     solver: Newton | None = None,
     throw: bool = True,
-    method: Method | None = None,
+    quick: bool = False,
     strip: Strip | None = None,
 ) -> History:
     """Press the strip down and walk along a load path.
@@ -69,7 +69,8 @@ def solve(
     solver : settings of Newton's method, which strips on their contact line do not need
     throw : True raises for a step without equilibrium and warns of doubts; False leaves both to
         ``history.status`` and ``history.doubts``
-    method : method of the load steps; None is the fastest that the run allows
+    quick : True takes the quickest search of the contact line in a transformation too, where its
+        result has no derivatives
     strip : strip of the scene on its contact line, if it is known
 
     Returns
@@ -101,12 +102,11 @@ def solve(
     if scene.model.condensed:
         found = f"is found from the pressures for model.rung = {scene.model.rung}: leave it out"
         require("contact", "given", contact is None, found)
-        return _condensed(scene, whole, cycles, throw, method, path is None, strip)
+        return _condensed(scene, whole, cycles, throw, quick, path is None, strip)
     solver = solver or Newton()
     touching = None if contact is None else check_contact(scene, contact)
-    method = method or _first_method(scene, whole)
     native, walked = fits_native(scene), np.asarray(True)
-    steps, history = _solve(scene, touching, whole, walked, solver, method, native=native)
+    steps, history = _solve(scene, touching, whole, walked, solver, native=native)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
@@ -137,7 +137,7 @@ def _condensed(
     path: LoadPath,
     cycles: Cycles,
     throw: bool,
-    method: Method | None,
+    quick: bool,
     own: bool,
     strip: Strip | None = None,
 ) -> History:
@@ -147,9 +147,7 @@ def _condensed(
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
 
     def walked(scene: Scene, strip: Strip | None = None) -> History:
-        by = quickest(scene)
-        if method is Method.NEWTON or (traced and method is None):
-            by = to_differentiate(scene) if traced else "events"
+        by = to_differentiate(scene) if traced and not quick else quickest(scene)
         history = solve_condensed(scene, path, cycles, by=by, own=own, strip=strip)
         if not traced and by != "events" and not history.converged:
             history = solve_condensed(scene, path, cycles, own=own, strip=strip)
@@ -234,28 +232,20 @@ def compile_for(
     scene = _able(scene, path, None)
     whole, cycles = whole_path(scene, path)
     if scene.model.condensed:
-        _condensed(scene, whole, cycles, False, None, path is None)
+        _condensed(scene, whole, cycles, False, False, path is None)
         return
-    method = _first_method(scene, whole)
-    given = scene, None, whole, np.asarray(False), solver or Newton(), method
+    given = scene, None, whole, np.asarray(False), solver or Newton()
     compiled = _solve(*given, native=fits_native(scene))
     jax.block_until_ready(compiled)
 
 
-def _first_method(scene: Scene, path: LoadPath) -> Method:
-    """Method of a first attempt: Newton's where derivatives may be taken, else statuses."""
-    traced = is_traced(scene, path) or is_staged()  # the latter by a caller's jit
-    return Method.NEWTON if traced else Method.STATUS_ITERATION
-
-
-@TwoPrograms
+@Program
 def _solve(
     scene: Scene,
     touching: np.ndarray | None,
     path: LoadPath,
     enabled: ArrayLike,
     solver: Newton,
-    method: Method,
     native: bool,
 ) -> tuple[StepResults, History]:
     """Results and history of a load path, from the nodes in contact and True to walk it."""
@@ -263,5 +253,5 @@ def _solve(
     if scene.model.solution == "closed-form":
         steps = bar_cycles(scene, path)
     else:
-        steps = march(scene, start, path, solver, method, native)
+        steps = march(scene, start, path, solver, native)
     return steps, with_end(history_of(scene, steps, path.pressure), steps)
