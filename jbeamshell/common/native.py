@@ -13,7 +13,7 @@ from jax.experimental.xla_metadata import set_xla_metadata
 from jax.flatten_util import ravel_pytree
 
 from jbeamshell.common.checks import in_transformation, is_traced
-from jbeamshell.common.small import quick_options
+from jbeamshell.common.small import SOONEST, known_options, quick_options
 from jbeamshell.common.threads import in_one_lapack_thread
 
 # The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
@@ -47,9 +47,11 @@ def _many(arrays: Any) -> bool:
 class Program:
     """Function with one program for values of one kind, whose loops are native calls.
 
-    What the compiler cannot do in native calls it calls operation by operation.  Within a JAX
-    transformation the function is an ordinary compiled one, because JAX takes compiler options for
-    whole programs only.
+    It is compiled with few optimisations, in less than half the time.  Native calls make up for
+    them: with all optimisations a run takes two fifths of the time, but hundreds of runs to make up
+    for the compilation.  What the compiler cannot do in native calls it calls operation by
+    operation, with all optimisations.  Within a JAX transformation the function is an ordinary
+    compiled one, because JAX takes compiler options for whole programs only.
 
     Parameters
     ----------
@@ -78,20 +80,26 @@ class Program:
         kind = tree, static, tuple((array.shape, array.dtype) for array in arrays)
         if native and kind not in self._refused and jax.default_backend() == "cpu":
             try:
-                return self._compiled(arrays, tree, static, True)
+                return self._compiled[True](arrays, tree, static)
             except jax.errors.JaxRuntimeError:  # the compiler refuses an operation
                 self._refused.add(kind)
-        return self._compiled(arrays, tree, static, False)
+        return self._compiled[False](arrays, tree, static)
 
     @functools.cached_property
-    def _compiled(self) -> Any:
-        def flat(arrays: list[Any], tree: Any, static: tuple[Hashable, ...], native: bool) -> Any:
-            rest = iter(arrays)
-            leaves = [next(rest) if leaf is None else leaf for leaf in static]
-            return self._function(*jax.tree.unflatten(tree, leaves), native=native)
+    def _compiled(self) -> dict[bool, Any]:
+        """Compiled functions of arrays, structure and static values, by ``native``."""
 
-        flat.__name__ = self._function.__name__
-        return jax.jit(flat, static_argnums=(1, 2, 3), compiler_options=quick_options())
+        def made(native: bool) -> Any:
+            def flat(arrays: list[Any], tree: Any, static: tuple[Hashable, ...]) -> Any:
+                rest = iter(arrays)
+                leaves = [next(rest) if leaf is None else leaf for leaf in static]
+                return self._function(*jax.tree.unflatten(tree, leaves), native=native)
+
+            flat.__name__ = self._function.__name__
+            options = known_options(SOONEST) if native else quick_options(vectors=True)
+            return jax.jit(flat, static_argnums=(1, 2), compiler_options=options)
+
+        return {native: made(native) for native in (True, False)}
 
 
 def _is_array(leaf: Any) -> bool:

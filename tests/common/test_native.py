@@ -151,7 +151,7 @@ class TestProgram:
         function, given = Program(polynomial), np.array([1.0, -2.0, 3.0])
         for x, power in ((0.7, 2), (0.8, 2), (0.7, 3)):
             function(jnp.asarray(x), given, power)
-        assert function._compiled._cache_size() == 2
+        assert function._compiled[True]._cache_size() == 2
 
     def test_what_cannot_be_one_call_runs_as_it_is(self):
         def sorted_by_compiler(x, native):
