@@ -69,7 +69,6 @@ SOLVERS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "smooth, m = 16": (SMOOTH, EXACT),
     "single precision": ({"single": True}, EXACT),
     "one step": ({"load.steps_per_half_cycle": 1}, EXACT),
-    "masing": ({"model.rung": "masing"}, EXACT),
 }
 MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "compliant": (COMPLIANT, COMPLIANT | FINE),

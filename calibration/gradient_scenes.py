@@ -52,8 +52,6 @@ SETTINGS: dict[str, Values] = {
     "plane, guided": FEW | {"model.rung": "plane", "load.entry": "guided"},
     "plane, overhang": FEW | {"model.rung": "plane", "strip.overhang": 0.3},
     "bar": FEW | {"model.rung": "bar"},
-    "masing": FEW | {"model.rung": "masing"},
-    "masing of a pull": FEW | {"model.rung": "masing-pull"},
     "stepwise sharp": STEPWISE,
     "stepwise smooth": STEPWISE | SMOOTH,
     "stepwise shell": STEPWISE | {"model.rung": "shell"},

@@ -135,16 +135,6 @@ def higher(random: Random) -> Values:
     return make(random) | {"model.rung": rung}
 
 
-def masing(random: Random) -> Values:
-    """Masing's rule on scenes without symmetry and of large friction."""
-    make, rung = ((plain, "masing"), (pressed_in_part, "masing-pull"))[random.integers(2)]
-    found = make(random) | {"model.rung": rung}
-    larger = random.uniform(1.0, 2.0)
-    found["contact.friction"] *= larger
-    found["load.amplitude"] *= larger
-    return found
-
-
 def few_steps(random: Random) -> Values:
     """One, two and four load steps at a friction coefficient near one."""
     found, mu = plain(random), random.uniform(0.5, 1.0)
@@ -345,7 +335,6 @@ KINDS = {
     "shells and order 2": Kind(shells, STEPWISE, 60),
     "assumed and printed": Kind(squeezed, None, 40),
     "slender": Kind(slender, EXACT | LIFT, 20),
-    "Masing": Kind(masing, EXACT | LIFT | MANY_STEPS, 20),
     "few steps": Kind(few_steps, MANY_STEPS, 20),
     "given settings": Kind(given, FINE, 40),
     "lap joints": Kind(lap, None, 20),

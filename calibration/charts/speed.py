@@ -25,7 +25,6 @@ FAMILIES: dict[str, str] = {
 }
 MARKERS = "osD^vP*X<"  # of the members of a family
 SMALLEST = 1e-3  # per cent, of errors drawn
-STRIPS = "strips of a sweep per second  [1/s]"
 NODES = "nodes  [1]"
 
 
@@ -59,19 +58,6 @@ def _nodes(section: Any) -> Iterator[Curve]:
     yield Curve("best", count, column(rows, "best_us"), look=blue | {"ls": "", "marker": "."})
     dashed = {"color": FAINT, "linestyle": "--", "linewidth": 1.2, "marker": ""}
     yield Curve(f"slope {slope:.2f}", count, fit, look=dashed)
-
-
-def _batches(section: Any) -> Iterator[Curve]:
-    """Strips that a sweep runs per second, by grid, with the errors in the legend."""
-    for row in section["rows"]:
-        own = [size for size in section["sizes"] if size["nodes"] == row["nodes"]]
-        steps = f"{row['steps']} step" + "s" * (row["steps"] > 1)
-        median, most, worst = (
-            _per_cent(row[f"error_{name}"]) for name in ("median", "p90", "worst")
-        )
-        label = f"{row['nodes']} nodes, {steps}\nerror {median:.2g} %, 90 % below {most:.2g} %"
-        label += f", worst {worst:.2g} %"
-        yield Curve(label, column(own, "lanes"), column(own, "lanes_per_s"))
 
 
 def _derivative(section: Any) -> Iterator[Curve]:
@@ -137,15 +123,6 @@ CHARTS = {
         "xy",
         ticks=lambda section: column(section["rows"], "nodes"),
     ),
-    "batches": Chart(
-        "batch",
-        "strips of the sweep  [1]",
-        STRIPS,
-        "",
-        _batches,
-        "xy",
-        ticks=lambda section: np.unique(column(section["sizes"], "lanes")),
-    ),
     "gradients": Chart(
         "gradient",
         "",
@@ -162,13 +139,6 @@ CHARTS = {
         "xy",
         ticks=lambda section: np.unique(column(_compared(section), "nodes")),
         extra=lambda axes, _: axes.yaxis.set_major_formatter(table.PLAIN),
-    ),
-    "processes": Chart(
-        "processes",
-        "",
-        f"{STRIPS}\nwithout starting and compiling",
-        lambda section: f"{section['lanes']:,} strips, {section['about']['machine']}",
-        extra=lambda axes, section: _bars(axes, section["rows"], "lanes_per_s"),
     ),
 }
 draw = functools.partial(table.draw, CHARTS)

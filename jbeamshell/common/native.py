@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any
 
 import equinox as eqx
 import jax
+import numpy as np
 from jax.experimental.xla_metadata import set_xla_metadata
 from jax.flatten_util import ravel_pytree
 
 from jbeamshell.common.checks import is_staged, is_traced
+from jbeamshell.common.small import SOONEST, known_options, quick_options
 from jbeamshell.common.threads import in_one_lapack_thread
 
 # The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
@@ -40,6 +42,68 @@ def one_call(function: Callable[..., Any], *given: Any) -> Any:
 
 def _many(arrays: Any) -> bool:
     return len(jax.tree.leaves(arrays)) > MOST_ARRAYS
+
+
+class Program:
+    """Function with one program for values of one kind, whose loops are native calls.
+
+    It is compiled with few optimisations, in less than half the time.  Native calls make up for
+    them: with all optimisations a run takes two fifths of the time, but hundreds of runs to make up
+    for the compilation.  What the compiler cannot do in native calls it calls operation by
+    operation, with all optimisations.  Within a JAX transformation the function is an ordinary
+    compiled one, because JAX takes compiler options for whole programs only.
+
+    Parameters
+    ----------
+    function : function of pytrees of arrays and static values, and of ``native``: True where its
+        loops may be marked as one call each, see `one_call`
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._inside = eqx.filter_jit(functools.partial(function, native=False))
+        self._refused: set[Hashable] = set()  # kinds of values whose loops cannot be one call each
+
+    def __call__(self, *given: Any, native: bool = True) -> Any:
+        """Value of the function.
+
+        Parameters
+        ----------
+        given : arguments of the function
+        native : False where its loops are known not to fit in native calls
+        """
+        if is_staged() or is_traced(given):
+            return self._inside(*given)
+        leaves, tree = jax.tree.flatten(given)
+        arrays = [leaf for leaf in leaves if _is_array(leaf)]
+        static = tuple(None if _is_array(leaf) else leaf for leaf in leaves)
+        kind = tree, static, tuple((array.shape, array.dtype) for array in arrays)
+        if native and kind not in self._refused and jax.default_backend() == "cpu":
+            try:
+                return self._compiled[True](arrays, tree, static)
+            except jax.errors.JaxRuntimeError:  # the compiler refuses an operation
+                self._refused.add(kind)
+        return self._compiled[False](arrays, tree, static)
+
+    @functools.cached_property
+    def _compiled(self) -> dict[bool, Any]:
+        """Compiled functions of arrays, structure and static values, by ``native``."""
+
+        def made(native: bool) -> Any:
+            def flat(arrays: list[Any], tree: Any, static: tuple[Hashable, ...]) -> Any:
+                rest = iter(arrays)
+                leaves = [next(rest) if leaf is None else leaf for leaf in static]
+                return self._function(*jax.tree.unflatten(tree, leaves), native=native)
+
+            flat.__name__ = self._function.__name__
+            options = known_options(SOONEST) if native else quick_options(vectors=True)
+            return jax.jit(flat, static_argnums=(1, 2), compiler_options=options)
+
+        return {native: made(native) for native in (True, False)}
+
+
+def _is_array(leaf: Any) -> bool:
+    return isinstance(leaf, np.ndarray | jax.Array)
 
 
 class Native:

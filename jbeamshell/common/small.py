@@ -14,6 +14,7 @@ from jbeamshell.common.checks import is_staged
 
 QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
 VECTORS = "xla_backend_optimization_level"  # option without which loops stay vectorised
+SOONEST = QUICK | {VECTORS: 0}  # for native loops, which run well as they are
 
 
 @functools.cache

@@ -89,23 +89,22 @@ def solve(matrix: BlockTridiagonal, rhs: Array) -> Array:
     if m > SMALL:
         return _solve_blocks(matrix, rhs)
     entries = [[[blocks[i, j] for j in range(m)] for i in range(m)] for blocks in matrix]
-    return jnp.stack(solve_entries(entries, [rhs[:, i] for i in range(m)]), axis=1)
+    return jnp.stack(_solve_entries(entries, [rhs[:, i] for i in range(m)]), axis=1)
 
 
-def solve_entries(matrix: Sequence, rhs: Sequence[Array]) -> list[Array]:
+def _solve_entries(matrix: Sequence, rhs: Sequence[Array]) -> list[Array]:
     """Solve matrix x = rhs by block elimination with every entry of a block as a scalar.
 
     It is twice as fast as with whole blocks if the compiler makes the loop one function.
 
     Parameters
     ----------
-    matrix : lower, diagonal and upper blocks, m x m entries (n, ...) each; axes behind the rows are
-        systems that are solved together
-    rhs : m entries (n, ...)
+    matrix : lower, diagonal and upper blocks, m x m entries (n,) each
+    rhs : m entries (n,)
 
     Returns
     -------
-    m entries (n, ...) of x
+    m entries (n,) of x
     """
     m = len(rhs)
 
@@ -131,8 +130,6 @@ def solve_entries(matrix: Sequence, rhs: Sequence[Array]) -> list[Array]:
 def _divided(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Array]]:
     """Inverse of a small block times some columns, entry by entry."""
     m = len(pivot)
-    if pivot[0][0].ndim:
-        return _by_quotients(pivot, known)
     if m == 3:  # cofactors have the shortest chain of operations
         pairs = [(1, 2), (2, 0), (0, 1)]
         cofactors = [
@@ -162,28 +159,6 @@ def divided(pivot: Sequence[Sequence[Array]], known: Sequence[Sequence[Array]]) 
         for i in set(range(m)) - {k}:
             factor = rows[i][k]
             rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k], strict=True)]
-    return [row[m:] for row in rows]
-
-
-def _by_quotients(pivot: list[list[Array]], known: list[list[Array]]) -> list[list[Array]]:
-    """Inverse of a block times some columns for entries that are vectors.
-
-    The compiler keeps quotients, but computes all other terms again for each use.
-    """
-    m = len(pivot)
-    rows = [[*p, *k] for p, k in zip(pivot, known, strict=True)]
-
-    def less(row: list[Array], factor: Array, other: list[Array], first: int) -> list[Array]:
-        pairs = zip(row[first:], other[first:], strict=True)
-        return [*row[:first], *(a - factor * b for a, b in pairs)]
-
-    for k in range(m):
-        for i in range(k):
-            rows[k] = less(rows[k], rows[k][i], rows[i], i + 1)
-        rows[k] = [*rows[k][: k + 1], *(a / rows[k][k] for a in rows[k][k + 1 :])]
-    for k in reversed(range(m)):
-        for i in range(k + 1, m):
-            rows[k] = less(rows[k], rows[k][i], rows[i], m)
     return [row[m:] for row in rows]
 
 

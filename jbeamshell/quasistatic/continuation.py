@@ -19,7 +19,7 @@ from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.outcome import check_solver, history_of, raise_if_failed
 from jbeamshell.quasistatic.path_state import PathState, StepResults
 from jbeamshell.quasistatic.recovery import recover
-from jbeamshell.quasistatic.stepping import Method, compiled_march
+from jbeamshell.quasistatic.stepping import compiled_march
 from jbeamshell.scene.load_path import LoadPath, check
 from jbeamshell.scene.scene import Scene
 
@@ -71,7 +71,7 @@ class PathEnd(eqx.Module):
         walked: LoadPath = jax.tree.map(
             lambda a: np.pad(a, (0, least - count), mode="edge"), further
         )
-        steps = compiled_march(scene, self.state, walked, solver, Method.STATUS_ITERATION)
+        steps = compiled_march(scene, self.state, walked, solver)
         if not np.asarray(steps.state.converged)[count - 1]:
             steps = recover(scene, steps, walked, solver, self.state)
             if throw:

@@ -16,11 +16,9 @@ from jbeamshell.mechanics.kinematics import (
     FIELDS,
     KINEMATICS,
     Kinematics,
-    Section,
     Strains,
     rotated,
 )
-from jbeamshell.mechanics.section_form import section_stiffness
 from jbeamshell.scene.parts import Model
 from jbeamshell.scene.scene import Scene
 
@@ -190,18 +188,6 @@ class ElasticStrip(eqx.Module):
             each = each._replace(psi=stretch * strains.psi)
         weights = self.element_rule.weights
         return jax.tree.map(lambda f: jnp.sum(weights[:, None] * f, axis=0), each)
-
-    def section_stiffness(self) -> Array:
-        """Hessian (2, m, 2, m) of a section's strain energy in its fields and slopes at zero."""
-
-        def energy(section: Section, slope: Section) -> Array:
-            if self.section is not None:
-                return self.section.energy(section, slope)
-            return self.energy(
-                *self._kinematics.strains(section, slope, self.half_height, self.curvature)
-            )
-
-        return section_stiffness(energy, jnp.zeros(self.model.width, self.x.dtype))
 
     def _fields_and_slopes(self, q: Array) -> tuple[list[Array], list[Array]]:
         """Fields and their slopes at all points of all elements, (points, elements) each."""

@@ -18,7 +18,7 @@ from jbeamshell.quasistatic.path_state import (
     slipping_nodes,
     status_codes,
 )
-from jbeamshell.quasistatic.prediction import BeforeStep, Reversal, first_to_slip, last_reversal
+from jbeamshell.quasistatic.prediction import Reversal, first_to_slip, last_reversal
 from jbeamshell.quasistatic.system import ContactInput, LoadLevel, Prescribed, System, V
 from jbeamshell.quasistatic.tangent import (
     Stiffness,
@@ -159,8 +159,7 @@ def guess_from_bar(
 ) -> StepGuess:
     """Guess that takes those nodes to their caps which would slip in a bar."""
     level = state.level
-    before = BeforeStep(level.traction, level.cap, state.target, state.reversal)
-    reversal = last_reversal(system, before, to)
+    reversal = last_reversal(system, state, to)
     slips = first_to_slip(system, reversal, to.target)
     beyond = (2.0 * level.cap - slips * level.traction) / system.foundation.slip_stiffness
     slip = slips * jnp.maximum(beyond, 0.0)

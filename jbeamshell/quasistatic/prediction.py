@@ -32,25 +32,16 @@ class Reversal(NamedTuple):
     left: Array
 
 
-class BeforeStep(NamedTuple):
-    """State before a step: traction and cap (n,), controlled load, and the last reversal."""
-
-    traction: Array
-    cap: Array
-    target: Array
-    reversal: Reversal
-
-
-def last_reversal(system: System, before: Any, to: Any) -> Reversal:
+def last_reversal(system: System, state: Any, to: Any) -> Reversal:
     """Last reversal of the load, which may be at the start of this step.
 
     Parameters
     ----------
-    system : its arrays may have lanes behind their nodes
-    before : traction (n,), cap (n,), target and reversal before the step, see `BeforeStep`
+    system : equations of equilibrium
+    state : `PathState` before the step
     to : target, pressure and roughness of the step
     """
-    travel, rough = to.target - before.target, to.rough > 0.0
+    before, travel, rough = state.level, to.target - state.target, to.rough > 0.0
     along = jnp.where(travel >= 0.0, 1.0, -1.0)
     # The end load's part of the cap changes sign with the load.
     mean = (
@@ -64,9 +55,9 @@ def last_reversal(system: System, before: Any, to: Any) -> Reversal:
     used = jnp.cumsum(share[::-1], axis=0)[::-1] - 0.5 * share
     away = (system.x[-1] - system.x) / (REACH * system.half_height)
     corner = CORNER * system.half_height * (1.0 - jnp.exp(-away))
-    now = Reversal(before.target, used + corner * left, left[-1])
-    back = rough & (travel * (before.target - before.reversal.target) <= 0.0)
-    return jax.tree.map(lambda new, old: jnp.where(back, new, old), now, before.reversal)
+    now = Reversal(state.target, used + corner * left, left[-1])
+    back = rough & (travel * (state.target - state.reversal.target) <= 0.0)
+    return jax.tree.map(lambda new, old: jnp.where(back, new, old), now, state.reversal)
 
 
 def first_to_slip(system: System, reversal: Reversal, target: Array) -> Array:

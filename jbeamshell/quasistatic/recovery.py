@@ -8,23 +8,17 @@ import numpy as np
 
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.path_state import PathState, StepResults
-from jbeamshell.quasistatic.stepping import Method, compiled_march
+from jbeamshell.quasistatic.stepping import compiled_march
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
 PIECES = (8, 64)  # numbers of pieces of a failed load step, tried in this order
 
 
-def walk(scene: Scene, start: PathState, path: LoadPath, solver: Newton) -> StepResults:
-    """Walk along a load path; a step that fails is walked again in pieces."""
-    steps = compiled_march(scene, start, path, solver, Method.STATUS_ITERATION)
-    return steps if _converged(steps) else recover(scene, steps, path, solver, start)
-
-
 def recover(
     scene: Scene, steps: StepResults, path: LoadPath, solver: Newton, start: PathState
 ) -> StepResults:
-    """Walk every failed step of a march in pieces by Newton's method, and go on from there.
+    """Walk every failed step of a march in pieces, and go on from there.
 
     Parameters
     ----------
@@ -52,7 +46,7 @@ def recover(
         # The path's end is repeated: with the shapes of the first march nothing compiles again.
         further = jnp.minimum(jnp.arange(count) + first + 1, count - 1)
         onward = jax.tree.map(lambda a: a[further], path)  # noqa: B023
-        tail = compiled_march(scene, joined.state, onward, solver, Method.NEWTON)
+        tail = compiled_march(scene, joined.state, onward, solver)
         steps = jax.tree.map(
             lambda head, piece, end: jnp.concatenate(
                 [head[:first], piece[None], end[: count - first - 1]]  # noqa: B023
@@ -75,7 +69,7 @@ def _walk_in_pieces(
             start.pressure + part * (to.pressure - start.pressure),
             jnp.full_like(part, to.rough),
         )
-        pieces = compiled_march(scene, start, path, solver, Method.NEWTON)
+        pieces = compiled_march(scene, start, path, solver)
         if _converged(pieces):
             return pieces
     return None

@@ -13,16 +13,14 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import check_words, is_traced, require, require_choice
-from jbeamshell.common.errors import InputError, Status
+from jbeamshell.common.errors import InputError
 from jbeamshell.common.native import Native
 from jbeamshell.common.precision import doubled, in_double, is_single
 from jbeamshell.condensed.shared import Layout, Shared, shared
 from jbeamshell.condensed.strip import Strip
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.solver import solve
-from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.scene.choice import FEW_STEPS
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
@@ -48,7 +46,6 @@ def response(
     figures: Sequence[str] = ("dissipation",),
     *,
     solver: Newton | None = None,
-    method: Method | None = None,
 ) -> Response:
     """Make a pure function of some of a scene's numbers, for `jax.jit`, `jax.vmap`, `jax.grad`.
 
@@ -56,7 +53,7 @@ def response(
     outside of a transformation runs as one native function on a CPU, if the compiler allows
     that: for some dozen nodes handing parts to threads takes longer than the arithmetic.
 
-    Many strips on a condensed rung are faster with `jax.lax.map` than with `jax.vmap`.
+    Many strips are faster with `jax.lax.map` than with `jax.vmap`.
 
     Parameters
     ----------
@@ -64,8 +61,6 @@ def response(
     over : dotted keys of the numbers that vary, in the order of the function's arguments
     figures : names of `jbeamshell.History`, such as "dissipation" or "secant_stiffness"
     solver : settings of Newton's method
-    method : method of the load steps; None is status iteration where it applies and Newton's method
-        elsewhere, in transformations and for steps that do not settle
 
     Returns
     -------
@@ -97,7 +92,7 @@ def response(
         require_choice("figures", name, RESPONSES)
 
     served = pinned(scene.serving(over), figures)
-    return Answers(served, _Asked(tuple(over), tuple(figures), solver, method))
+    return Answers(served, _Asked(tuple(over), tuple(figures), solver))
 
 
 class _Asked(NamedTuple):
@@ -106,7 +101,6 @@ class _Asked(NamedTuple):
     over: tuple[str, ...]
     figures: tuple[str, ...]
     solver: Newton | None
-    method: Method | None
 
 
 class Answers:
@@ -165,30 +159,22 @@ def _programs(template: Template, asked: _Asked, layout: Layout | None = None) -
 
     With a layout the numbers of shared strips come before the values.
     """
-    over, solver, method = asked.over, asked.solver, asked.method
+    over, solver = asked.over, asked.solver
     apart = 0 if layout is None else 1
 
-    def solved_by(method: Method) -> Response:
-        def figures_of(fixed: Sequence[Array], *given: Array) -> dict[str, Array]:
-            values = dict(zip(over, given[apart:], strict=True))
-            varied = template.scene(list(fixed)).replace(values)
-            strip = None if layout is None else layout.strip(given[0], varied)
-            return figures(varied, asked.figures, strip, solver, method)
-
-        return figures_of
+    def figures_of(fixed: Sequence[Array], *given: Array) -> dict[str, Array]:
+        values = dict(zip(over, given[apart:], strict=True))
+        varied = template.scene(list(fixed)).replace(values)
+        strip = None if layout is None else layout.strip(given[0], varied)
+        return figures(varied, asked.figures, strip, solver)
 
     shape = jax.ShapeDtypeStruct((), template.dtype)
     scene = template.scene([shape] * template.numbers)
-    again = method is None and slip_patterns.applies(scene)  # what does not settle, by Newton
-    first_method = Method.STATUS_ITERATION if again else method or Method.NEWTON
-    first = Native(solved_by(first_method), worth=scene.model.nodes <= FEW)
-    compiled = jax.jit(solved_by(method or Method.NEWTON))
+    program = Native(figures_of, worth=scene.model.nodes <= FEW)
 
     def ask(*given: Any) -> dict[str, Array]:
-        found: dict[str, Array] | None = first.now(*given)
-        if found is None or (again and np.asarray(found["status"]).item() != Status.CONVERGED):
-            return compiled(*given)
-        return found
+        found: dict[str, Array] | None = program.now(*given)
+        return program.ordinary(*given) if found is None else found
 
     return ask
 
@@ -198,7 +184,6 @@ def figures(
     names: Sequence[str],
     strip: Strip | None,
     solver: Newton | None,
-    method: Method | None,
 ) -> dict[str, Array]:
     """Figures of a scene by name, and ``status``; see `response`.
 
@@ -206,7 +191,7 @@ def figures(
     ----------
     strip : the scene's strip on its contact line, if it is known
     """
-    history = solve(scene, throw=False, solver=solver, method=method, strip=strip)
+    history = solve(scene, throw=False, solver=solver, strip=strip)
     found = {name: getattr(history, name) for name in names}
     return found | {"status": jnp.max(history.status)}
 

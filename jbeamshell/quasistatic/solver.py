@@ -13,21 +13,21 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, warn_of_doubts
+from jbeamshell.common.native import Program
 from jbeamshell.common.precision import is_single
 from jbeamshell.common.threads import in_one_lapack_thread
-from jbeamshell.common.two_programs import TwoPrograms
 from jbeamshell.condensed.solve import Cycles, walks_pressures
 from jbeamshell.condensed.solve import solve as solve_condensed
 from jbeamshell.condensed.strip import Strip
 from jbeamshell.history.history import History
 from jbeamshell.history.reliability import change_of, misses_tolerance
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.quasistatic.closed_bar import bar_cycles
 from jbeamshell.quasistatic.continuation import further_path, with_end
-from jbeamshell.quasistatic.masing import bar_cycles, masing
 from jbeamshell.quasistatic.outcome import ADVICE, check_solver, history_of, raise_if_failed
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
-from jbeamshell.quasistatic.stepping import Method, fits_native, march
+from jbeamshell.quasistatic.stepping import fits_native, march
 from jbeamshell.scene.choice import is_elastic, refinements
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
 from jbeamshell.scene.scene import Scene
@@ -53,7 +53,6 @@ def solve(
     contact: ArrayLike | None = None,
     solver: Newton | None = None,
     throw: bool = True,
-    method: Method | None = None,
     strip: Strip | None = None,
 ) -> History:
     """Press the strip down and walk along a load path.
@@ -69,7 +68,6 @@ def solve(
     solver : settings of Newton's method, which strips on their contact line do not need
     throw : True raises for a step without equilibrium and warns of doubts; False leaves both to
         ``history.status`` and ``history.doubts``
-    method : method of the load steps; None is the fastest that the run allows
     strip : strip of the scene on its contact line, if it is known
 
     Returns
@@ -104,9 +102,8 @@ def solve(
         return _condensed(scene, whole, cycles, throw, path is None, strip)
     solver = solver or Newton()
     touching = None if contact is None else check_contact(scene, contact)
-    method = method or _first_method(scene, whole)
     native, walked = fits_native(scene), np.asarray(True)
-    steps, history = _solve(scene, touching, whole, walked, solver, method, native=native)
+    steps, history = _solve(scene, touching, whole, walked, solver, native=native)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
@@ -116,8 +113,6 @@ def solve(
         start = initial_state(scene, touching)
         if scene.model.solution == "stepwise":
             steps = recover(scene, steps, whole, solver, start)
-        else:
-            steps = masing(scene, start, whole, solver, recovering=True)
         if throw:
             raise_if_failed(scene, steps, whole)
         history = with_end(history_of(scene, steps, whole.pressure), steps)
@@ -232,34 +227,24 @@ def compile_for(
     if scene.model.condensed:
         _condensed(scene, whole, cycles, False, path is None)
         return
-    method = _first_method(scene, whole)
-    given = scene, None, whole, np.asarray(False), solver or Newton(), method
+    given = scene, None, whole, np.asarray(False), solver or Newton()
     compiled = _solve(*given, native=fits_native(scene))
     jax.block_until_ready(compiled)
 
 
-def _first_method(scene: Scene, path: LoadPath) -> Method:
-    """Method of a first attempt: Newton's where derivatives may be taken, else statuses."""
-    traced = is_traced(scene, path) or is_staged()  # the latter by a caller's jit
-    return Method.NEWTON if traced else Method.STATUS_ITERATION
-
-
-@TwoPrograms
+@Program
 def _solve(
     scene: Scene,
     touching: np.ndarray | None,
     path: LoadPath,
     enabled: ArrayLike,
     solver: Newton,
-    method: Method,
     native: bool,
 ) -> tuple[StepResults, History]:
     """Results and history of a load path, from the nodes in contact and True to walk it."""
     start = initial_state(scene, touching)._replace(converged=jnp.asarray(enabled))
     if scene.model.solution == "closed-form":
         steps = bar_cycles(scene, path)
-    elif scene.model.solution == "stepwise":
-        steps = march(scene, start, path, solver, method, native)
     else:
-        steps = masing(scene, start, path, solver, method, native=native)
+        steps = march(scene, start, path, solver, native)
     return steps, with_end(history_of(scene, steps, path.pressure), steps)

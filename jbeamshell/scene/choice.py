@@ -9,8 +9,7 @@ rules were measured (calibration/campaign.py, calibration/default_settings.py).
 * A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
   in time.  Any other strip is solved in load steps.
 * A strip that bends may lift off.  Where strips that lift were held down, their dissipation was off
-  by 1 to 10 %.  Linear load steps with sharp friction keep the fields that they are given, because
-  their fast solver knows no lift.
+  by 1 to 10 %.  Linear load steps with sharp friction keep the fields that they are given.
 * Where the corner may open, elements are smaller at the loaded end.  In load steps this is so only
   if friction is without elastic slip, and not under curved strips, whose large motions round off on
   small elements.  On the contact line elastic sliders have far smaller ones.  The strip rests on

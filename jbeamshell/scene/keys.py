@@ -34,7 +34,7 @@ NORMALS = ("rigid", "compliant", "none")
 SQUEEZES = ("field", "assumed")
 LOADED_ENDS = ("free", "level")
 MEMBERS = ("none", "rolling", "clamped")
-SOLUTIONS = ("stepwise", "masing", "masing-pull", "closed-form", *CONDENSED)
+SOLUTIONS = ("stepwise", "closed-form", *CONDENSED)
 
 TOLERANCE = 0.01
 FINEST, COARSEST = 1e-4, 0.1  # tolerance: below, the finest mesh may not reach it
@@ -272,8 +272,8 @@ class ModelKeys(Part):
     solution: str = word(
         AUTO,
         SOLUTIONS,
-        "Solution: stepwise, masing or masing-pull (a loop from backbones), closed-form (the bar), "
-        "condensed (a linear section on its contact line) or plane (elasticity there).",
+        "Solution: stepwise, closed-form (the bar), condensed (a linear section on its contact "
+        "line) or plane (elasticity there).",
     )
     end_size: float = setting(
         AUTO, "Smallest elements, at the loaded end and at steps of the pressure.", unit="H"
@@ -378,7 +378,7 @@ INDIRECT = (
         "model.rung",
         "word",
         "squeeze",
-        "Fields, order and solution by one name: bar, shell, squeeze, p2, p3, ..., masing, "
+        "Fields, order and solution by one name: bar, shell, squeeze, p2, p3, ..., "
         "condensed-squeeze, ..., plane.",
     ),
 )

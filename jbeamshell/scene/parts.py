@@ -286,10 +286,9 @@ class Model(ModelKeys):
     ``squeeze`` is "field" (psi has its own balance) or "assumed" (psi = -(F_N + R)/(2E), the
     earlier theory of Brink 2015, section 4.2, without Poisson's effect).  ``order`` p from 1 up is
     a section of order p, see `jbeamshell.mechanics.hierarchic`.  ``solution`` is "stepwise"
-    (Newton's method at every load level), "masing" (the loop is the mean backbone of a pull and a
-    push, doubled), "masing-pull" (of a pull alone), "closed-form" (Goodman's bar), "condensed" or
-    "plane" (see `jbeamshell.condensed`).  ``end_size`` is that before the node count scales all
-    elements; below 1e-4 it serves the last node alone, and elements below H/48 grow fast.
+    (Newton's method at every load level), "closed-form" (Goodman's bar), "condensed" or "plane"
+    (see `jbeamshell.condensed`).  ``end_size`` is that before the node count scales all elements;
+    below 1e-4 it serves the last node alone, and elements below H/48 grow fast.
     """
 
     def __check_init__(self) -> None:

@@ -6,9 +6,6 @@
 | ``shell`` | fields v and beta |
 | ``squeeze`` | fields v, beta and psi |
 | ``p1``, ``p2``, ``p3``, ... | sections of order p, see `jbeamshell.mechanics.hierarchic` |
-| ``masing`` | Masing's rule from a pull and a push of ``squeeze`` |
-| ``masing-shell``, ``masing-p2``, ... | the same with another section |
-| ``masing-pull``, ``masing-pull-p2``, ... | Masing's rule from a pull alone |
 | ``stepwise-bar`` | field v by Newton's method, for bars without a closed form |
 | ``condensed-squeeze``, ``condensed-p2``, ... | linear section on its contact line, exact in time |
 | ``plane`` | plane elasticity on its contact line, exact in time, see `jbeamshell.condensed` |
@@ -33,7 +30,8 @@ SETS = ("model.fields", "model.order", "model.solution")  # keys that a rung's n
 CONDENSED = ("condensed", "plane")  # solutions on the contact line, exact in time
 PLANE_NODES = 129  # of the rung ``plane``, for a tolerance of .5 %
 IDEAL = 1000.0  # contact.stick_stiffness from which on there friction is without elastic slip
-_NAME = re.compile(r"(?P<prefix>(masing-pull|masing|stepwise|condensed)-)?(?P<section>[a-z]+|p\d+)")
+_NAME = re.compile(r"(?P<prefix>(stepwise|condensed)-)?(?P<section>[a-z]+|p\d+)")
+_OLD = re.compile(r"masing(-pull)?(-(?P<section>bar|shell|squeeze|p\d+))?")
 
 
 def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
@@ -52,8 +50,8 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     text = rung if isinstance(rung, str) else repr(rung)
     if text == AUTO:
         return dict(zip(SETS, (AUTO, 0, AUTO), strict=True))
-    full = f"{text}-squeeze" if text in ("masing", "masing-pull") else text
-    match = _NAME.fullmatch(full)
+    _refuse_old(text)
+    match = _NAME.fullmatch(text)
     prefix = (match["prefix"] or "").rstrip("-") if match else ""
     section = match["section"] if match else ""
     order = int(section[1:]) if re.fullmatch(r"p\d+", section) else 0
@@ -63,8 +61,7 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
     if not match or not bar.get(prefix, True) or not (ordered or plane or section in FIELDS_OF):
         raise InputError(
             f"model.rung = {rung!r}: choose 'auto', 'bar', 'shell', 'squeeze', "
-            f"'p1' to 'p{LARGEST_ORDER}', 'plane', 'masing' (of squeeze), or 'masing-' or "
-            "'condensed-' and one of these"
+            f"'p1' to 'p{LARGEST_ORDER}', 'plane', or 'condensed-' and one of these"
         )
     fields = FIELDS_OF.get(section, FIELDS_OF["squeeze"])
     closed = section == "bar" and not prefix
@@ -74,6 +71,13 @@ def values_of(rung: Any, lift: bool = False) -> dict[str, Any]:
         fields = ("v", "w", *fields[1:])
     values = dict(zip(SETS, (fields, order, solution), strict=True))
     return values | ({"model.kinematics": "linear"} if condensed else {})
+
+
+def _refuse_old(rung: str) -> None:
+    """Raise `InputError` with the name to use for a rung by Masing's rule, which there was once."""
+    if old := _OLD.fullmatch(rung):
+        section = old["section"] or "squeeze"
+        raise InputError(f"model.rung = {rung!r}: is no model any more: take {section!r}")
 
 
 def general_rung(rung: str) -> str:
@@ -93,8 +97,7 @@ def name_of(fields: Sequence[str], order: int, solution: str) -> str:
         return section
     if solution in ("stepwise", AUTO):
         return "stepwise-bar" if section == "bar" else section
-    masing = solution in ("masing", "masing-pull")
-    return solution if masing and section == "squeeze" else f"{solution}-{section}"
+    return f"{solution}-{section}"
 
 
 def spelled_out(
@@ -111,8 +114,11 @@ def spelled_out(
     Raises
     ------
     InputError
-        if the rung is unknown, or if the values disagree with it
+        if the rung is unknown or there is it no more, or if the values disagree with it
     """
+    if values.get("model.solution") in ("masing", "masing-pull"):
+        fix = "is no solution any more: leave it out, which solves whole cycles"
+        raise InputError(f"model.solution = {values['model.solution']!r}: {fix}")
     if "model.rung" not in values:
         return values
     rung, given = values["model.rung"], values.get("model.fields", fields)

@@ -23,15 +23,13 @@ from jbeamshell.condensed.interpolation import Range
 from jbeamshell.condensed.shared import Layout, shared
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic import slip_patterns
 from jbeamshell.quasistatic.response import Response, figures, response
 from jbeamshell.quasistatic.solver import solve
-from jbeamshell.quasistatic.stepping import Method
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
 from jbeamshell.sweeping.lanes import Outcome
 
-ABREAST = 32  # lanes of a chunk on a core, if slip patterns are iterated side by side
+ABREAST = 32  # most lanes of a chunk on a core, where they share a condensed body
 BLOCK = 1024  # lanes of the largest block, for which the program is compiled
 KEPT = 4  # compiled models that are kept
 PER_LANE = ("load.amplitude", "contact.pressure")
@@ -67,9 +65,8 @@ def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
     On the contact line it is the one by which all lanes cost least, if a body and its factors cost
     as much as `BODY` lanes: lanes that share no body run alone, and so do those under a member that
     goes on, which meet other events at each load.  Elsewhere it is a whole block on a GPU.  On a
-    core it is `ABREAST` if only slip patterns are iterated, because vector instructions then run
-    over the lanes.  Otherwise each lane runs alone: a wide chunk would wait for its slowest lane,
-    and vector instructions run over the nodes.
+    core each lane runs alone: a wide chunk would wait for its slowest lane, and vector instructions
+    run over the nodes.
 
     Parameters
     ----------
@@ -81,9 +78,7 @@ def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
         widths = 2 ** np.arange(ABREAST.bit_length())
         costs = [np.sum(-(-alike // width)) * (BODY + width) for width in widths]
         return int(widths[np.argmin(costs)])
-    if jax.default_backend() != "cpu":
-        return BLOCK
-    return ABREAST if slip_patterns.applies(scene) else 1
+    return 1 if jax.default_backend() == "cpu" else BLOCK
 
 
 def shared_keys(scene: Scene, keys: Sequence[str]) -> list[int]:
@@ -259,7 +254,6 @@ def _compiled(
     begun = time.perf_counter()
     keys, axes, names, solver = asked
     shape, size = given
-    method = Method.UNCHECKED_STATUS_ITERATION
 
     def chunk(ask: Response, lanes: Array) -> tuple[Array, Array]:
         width = lanes.shape[-1]
@@ -275,7 +269,7 @@ def _compiled(
         def ask(*values: Array) -> dict[str, Array]:
             own = scene.replace(dict(zip(keys, values, strict=True)))
             strip = None if layout is None else layout.strip(strips, own)
-            return figures(own, names, strip, solver, method)
+            return figures(own, names, strip, solver)
 
         def step(i: Array, found: tuple[Array, Array]) -> tuple[Array, Array]:
             values, status = chunk(ask, lanes[:, i])

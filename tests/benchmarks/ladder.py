@@ -31,7 +31,7 @@ from jbeamshell.measured.example import data_folder  # noqa: E402
 ROOT = Path(__file__).parents[2]
 RECORD = Path(__file__).with_suffix(".json")
 CYCLES = 2
-RUNGS = ("bar", "masing", "shell", "squeeze", "p2", "p3", "p4", "p6", "masing-pull")
+RUNGS = ("bar", "shell", "squeeze", "p2", "p3", "p4", "p6")
 QUICK = ("bar", "squeeze", "p3")
 NODES, STEPS = 81, 10  # load steps per half cycle
 
@@ -57,7 +57,6 @@ def modelled(strip: tuple[float, float], rung: str) -> jb.Scene:
     tension.
     """
     eta, amplitude = strip
-    general = rung != "bar" and "masing" not in rung
     return jb.library.standard().replace(
         {
             "strip.height_ratio": eta,
@@ -69,7 +68,7 @@ def modelled(strip: tuple[float, float], rung: str) -> jb.Scene:
             "model.nodes": NODES,
             "model.end_size": 1.0 / 12.0 if rung.startswith("p") else 1.0 / 6.0,
         }
-        | ({"model.solution": "stepwise"} if general else {})
+        | ({"model.solution": "stepwise"} if rung != "bar" else {})
     )
 
 

@@ -8,12 +8,10 @@ sections, any of which ``--only`` does alone while the rest of the record stays:
 
 - one: a run of the standard strip by all variants and rivals, interleaved;
 - nodes: the same over nodes;
-- batch: sweeps over batch sizes, their errors and memory;
 - gradient: gradients in four parameters beside a run, and dD/d(eta) over nodes;
-- processes: a sweep in one process, two, and on two devices;
-- start: fresh processes, with and without compiled programs at hand;
-- limit: floating-point operations over what the core could do;
-- unsettled: lanes of a wide field that do not converge.
+- start: fresh processes, with and without compiled programs at hand.
+
+Sweeps are those of sweeps.py.
 
 ``--quick`` measures little of everything, to try it out, into a temporary folder.
 
@@ -39,7 +37,7 @@ import jax
 jax.config.update("jax_enable_x64", True)
 
 from ladder import as_text  # noqa: E402
-from speeds import batches, gradients, limits, machine, single, starting  # noqa: E402
+from speeds import gradients, machine, single, starting  # noqa: E402
 from speeds.common import QUICK, Plan  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -51,17 +49,11 @@ RECORD = Path(__file__).with_suffix(".json")
 SECTIONS = {
     "one": single.one,
     "nodes": single.nodes,
-    "batch": batches.batch,
     "gradient": gradients.gradient,
-    "processes": batches.processes,
     "start": starting.start,
-    "limit": limits.limit,
-    "unsettled": batches.unsettled,
 }
 CHILDREN = {
     "unflagged": single.unflagged,
-    "memory": batches.memory,
-    "devices": batches.devices,
 }
 
 
@@ -99,7 +91,7 @@ def report(record: dict[str, Any]) -> str:
             words = (
                 f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
                 for key, value in row.items()
-                if key not in ("returns", "worst_at", "took_s")
+                if key not in ("returns", "took_s")
             )
             lines.append("    " + ", ".join(words))
     return "\n".join(lines)

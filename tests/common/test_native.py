@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.common.native import Native
-from jbeamshell.quasistatic import slip_patterns
+from jbeamshell.common.native import Native, Program, one_call
 
 
 def looped(x, y):
@@ -85,10 +84,10 @@ def test_what_is_not_worth_it_is_not_tried():
     assert native.fits is False
 
 
-def test_a_response_is_native_and_falls_back(monkeypatch):
+def test_a_response_is_native(monkeypatch):
     numbers = {"model.nodes": 11, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
     scene = jb.Scene().replace(numbers | {"load.cycles": 1, "model.solution": "stepwise"})
-    amplitude, made = float(scene.load.amplitude), []
+    made = []
 
     def native(*given, **more):
         made.append(Native(*given, **more))
@@ -96,24 +95,17 @@ def test_a_response_is_native_and_falls_back(monkeypatch):
 
     module = importlib.import_module("jbeamshell.quasistatic.response")  # jb.response is a function
     monkeypatch.setattr(module, "Native", native)
-    foreseen = jb.response(scene, ("load.amplitude",))(amplitude)
+    found = jb.response(scene, ("load.amplitude",))(scene.load.amplitude)
     assert made[0].fits is True
-    assert foreseen["status"] == 0
-
-    # What is not foreseen is found by Newton's method, once it is traced anew.
-    monkeypatch.setattr(slip_patterns, "MOST", 0)
-    module._programs.cache_clear()
-    walked = jb.response(scene, ("load.amplitude",))(amplitude)
-    assert made[1].fits is True
-    assert walked["status"] == 0
-    np.testing.assert_allclose(walked["dissipation"], foreseen["dissipation"], rtol=1e-9)
+    assert found["status"] == 0
+    alone = jb.solve(scene, throw=False)
+    np.testing.assert_allclose(found["dissipation"], alone.dissipation, rtol=1e-9)
     module._programs.cache_clear()  # no other test gets what was made here
 
 
 def test_a_response_of_a_traced_scene():
     small = {"model.nodes": 11, "model.fields": ["v"], "model.kinematics": "linear"}
     scene = jb.Scene().replace(small | {"load.cycles": 1, "load.steps_per_half_cycle": 2})
-    assert slip_patterns.applies(scene)
 
     def of_height(ratio):
         ask = jb.response(scene.replace({"strip.height_ratio": ratio}), ("load.amplitude",))
@@ -121,3 +113,72 @@ def test_a_response_of_a_traced_scene():
 
     found = jax.jit(of_height)(scene.strip.height_ratio)
     np.testing.assert_allclose(found, jb.solve(scene, throw=False).dissipation, rtol=1e-9)
+
+
+def polynomial(x, coefficients, power, native):
+    def body(i, at):
+        return at * x**power + coefficients[i]
+
+    def loop(x):
+        return jax.lax.fori_loop(0, 3, body, jnp.zeros_like(x))
+
+    return one_call(loop, x) if native else loop(x)
+
+
+class TestProgram:
+    @pytest.fixture
+    def optimised(self):
+        jax.config.update("jax_disable_most_optimizations", False)
+        yield
+        jax.config.update("jax_disable_most_optimizations", True)
+
+    def test_native_calls_and_plain_ones_have_the_same_values(self, optimised):
+        function, x, given = Program(polynomial), jnp.asarray(0.7), np.array([1.0, -2.0, 3.0])
+        expected = (1.0 * 0.49 - 2.0) * 0.49 + 3.0
+        for native in (True, False):
+            assert function(x, given, 2, native=native) == pytest.approx(expected, rel=1e-14)
+
+    def test_the_first_run_has_the_digits_of_the_hundredth(self, optimised):
+        few = {"model.nodes": 5, "model.fields": ["v"], "model.kinematics": "exact"}
+        scene = jb.Scene().replace(few | {"load.cycles": 1, "load.steps_per_half_cycle": 2})
+        first, *rest = (jb.solve(scene, throw=False) for _ in range(100))
+        assert first.converged
+        for name in ("force", "displacement", "traction", "slip_work"):
+            values = np.asarray(getattr(first, name))
+            assert all(np.array_equal(values, getattr(history, name)) for history in rest)
+
+    def test_one_program_serves_values_of_one_kind(self):
+        function, given = Program(polynomial), np.array([1.0, -2.0, 3.0])
+        for x, power in ((0.7, 2), (0.8, 2), (0.7, 3)):
+            function(jnp.asarray(x), given, power)
+        assert function._compiled[True]._cache_size() == 2
+
+    def test_what_cannot_be_one_call_runs_as_it_is(self):
+        def sorted_by_compiler(x, native):
+            return one_call(jnp.sort, x) if native else jnp.sort(x)
+
+        function, x = Program(sorted_by_compiler), jnp.asarray([3.0, 1.0, 2.0])
+        for _ in range(2):
+            assert function(x).tolist() == [1.0, 2.0, 3.0]
+        assert len(function._refused) == 1
+
+    def test_other_errors_of_the_compiler_pass(self):
+        def failing(x, native):
+            raise jax.errors.JaxRuntimeError("out of memory")
+
+        with pytest.raises(jax.errors.JaxRuntimeError, match="out of memory"):
+            Program(failing)(jnp.asarray(1.0))
+
+    def test_it_goes_into_every_transformation(self):
+        function, x = Program(polynomial), jnp.asarray(0.7)
+        given = jnp.asarray([1.0, -2.0, 3.0])
+
+        def of(x):
+            return function(x, given, 2)
+
+        slope = 4.0 * x**3 - 4.0 * x
+        assert jax.jit(of)(x) == pytest.approx(of(x))
+        assert jax.jacfwd(of)(x) == pytest.approx(slope)
+        assert jax.grad(of)(x) == pytest.approx(slope)
+        both = jax.vmap(of)(jnp.stack([x, 2.0 * x]))
+        np.testing.assert_allclose(both, [of(x), of(2.0 * x)])

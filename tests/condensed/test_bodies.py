@@ -258,7 +258,7 @@ def test_a_rung_has_its_name(rung):
     assert values["model.kinematics"] == "linear"
 
 
-@pytest.mark.parametrize("rung", ["condensed", "condensed-bar", "condensed-plane", "masing-plane"])
+@pytest.mark.parametrize("rung", ["condensed", "condensed-bar", "condensed-plane", "bar-plane"])
 def test_a_rung_that_does_not_exist_is_refused(rung):
     with pytest.raises(jb.InputError, match=f"model.rung = '{rung}': choose .*condensed-"):
         values_of(rung)

@@ -157,7 +157,7 @@ def test_long_load_steps_are_doubted_for_a_reaction_that_changes_within_them():
     assert error_estimates.estimates(steps, changing)[3] == error_estimates.step_error(changing)
 
 
-@pytest.mark.parametrize("rung", ["condensed-squeeze", "masing"])
+@pytest.mark.parametrize("rung", ["condensed-squeeze", "shell"])
 def test_where_nothing_slips_the_estimate_is_infinite(rung):
     scene = jb.Scene().replace({"model.rung": rung})
     errors = error_estimates.estimates(scene, even_cycle(4, slip=0.0))

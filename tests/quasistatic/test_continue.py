@@ -100,9 +100,9 @@ def test_what_cannot_go_on_says_why(begun):
             begun.continued(path)
     with pytest.raises(jb.InputError, match="must stay below gross slip"):
         begun.continued([2.5])
-    doubled = SCENE.replace({"model.solution": "masing"})
+    closed = SCENE.replace({"model.rung": "bar"})
     with pytest.raises(jb.InputError, match="take 'stepwise'"):
-        dataclasses.replace(begun, scene=doubled).continued()
+        dataclasses.replace(begun, scene=closed).continued()
     with pytest.raises(jb.InputError, match="was made by hand"):
         dataclasses.replace(begun, end=None).continued(MORE)
     lost = PathEnd(begun.end.state._replace(converged=np.array(False)))

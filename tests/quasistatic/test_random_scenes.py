@@ -51,6 +51,17 @@ def test_random_strips_converge_and_obey_friction(smoothing):
             check(history)
 
 
+def test_random_linear_steps_converge_without_recovery():
+    random = np.random.default_rng(3)
+    linear = {"model.kinematics": "linear", "model.solution": "stepwise", "load.cycles": 1}
+    stepped = {"contact.pressure": [[0.0, 8.0], [0.9, 12.0], [0.9, 9.0], [2.0, 11.0]]}
+    base = STRIP.replace(SMALL | linear | stepped)
+    run = jax.jit(lambda v: jnp.max(jb.solve(base.replace(v), throw=False).status))
+    for _ in range(40):
+        values = random_values(random)
+        assert int(run(values)) == 0, values
+
+
 @pytest.mark.slow(minutes=5)
 @pytest.mark.parametrize("smoothing", ["sharp", 16.0])
 def test_hundreds_of_random_strips_converge_without_recovery(smoothing):

@@ -15,7 +15,6 @@ SCENES = {
     "plane": {"model.rung": "plane"},
     "stepwise": COARSE | {"model.solution": "stepwise", "model.kinematics": "exact"},
     "smooth": COARSE | {"contact.smoothing": 8.0},
-    "masing": COARSE | {"model.rung": "masing"},
     "p3": COARSE | {"model.rung": "p3", "model.solution": "stepwise", "load.entry": "face"},
     "compliant": COARSE
     | {"model.fields": ["v", "w", "beta", "psi"], "contact.normal": "compliant"},

@@ -11,7 +11,6 @@ from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.measured.example import data_folder, example_loops
-from jbeamshell.quasistatic.stepping import Method
 
 # Dissipation over that of finite elements by fields: eta, then A = .3247, .5851, 1.0, 1.6, from an
 # independent prototype with 40 steps per half cycle, 82 to 95 nodes and alpha = 1000.
@@ -44,8 +43,8 @@ def sweep(fields, cells):
     scene = STRIP.replace({"model.fields": fields} | settings)
     keys = ("strip.height_ratio", "load.amplitude")
     names = ("dissipation", "dissipation_loop", "dissipation_ratio", "reaction_min", "closure")
-    ask = jb.response(scene, keys, names, method=Method.STATUS_ITERATION)
-    found = jax.vmap(ask)(*jnp.asarray(cells).T)
+    ask = jb.response(scene, keys, names)
+    found = jax.lax.map(lambda cell: ask(*cell), jnp.asarray(cells))
     by_loop = found["dissipation_loop"] * found["dissipation_ratio"] / found["dissipation"]
     rest = (found[name] for name in ("reaction_min", "status", "closure"))
     return found["dissipation_ratio"], by_loop, *rest

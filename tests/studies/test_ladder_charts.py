@@ -29,8 +29,8 @@ def test_what_the_record_lacks_is_said(record):
 
 
 def test_a_map_shows_all_cells(record):
-    axes = charts.ladder.error_map(record, "masing")
+    axes = charts.ladder.error_map(record, "squeeze")
     cells = record["map"]["cells"]
     drawn = np.asarray(axes.collections[0].get_array()).ravel()
-    off = sorted(100.0 * abs(cell["masing"] - 1.0) for cell in cells)
+    off = sorted(100.0 * abs(cell["squeeze"] - 1.0) for cell in cells)
     np.testing.assert_allclose(sorted(drawn), off, rtol=1e-9)

@@ -20,8 +20,6 @@ def timed(what, by, us, error, to_elements):
 
 @pytest.fixture
 def record():
-    grid = {"nodes": 41, "steps": 1, "end_size": 1.0 / 36.0}
-    off = {"error_median": 0.002, "error_p90": 0.004, "error_worst": 0.02}
     study = [
         {"end_size": size, "nodes": n, "D_error": 1.0 / n**2, "error": 0.0 if n == 81 else 1.0 / n}
         for size in ("1/36", "1/3")
@@ -42,10 +40,6 @@ def record():
             "slope": 1.0,
             "rows": [{"nodes": n, "median_us": 2.0 * n, "best_us": 1.5 * n} for n in (33, 65, 129)],
         },
-        "batch": {
-            "rows": [grid | off],
-            "sizes": [grid | {"lanes": n, "lanes_per_s": 1e4} for n in (16, 64)],
-        },
         "gradient": {
             "parameters": ["contact.friction", "strip.kappa_s"],
             "rows": [
@@ -57,14 +51,6 @@ def record():
                 "against": {"nodes": 81, "end_size": "1/3"},
                 "rows": study,
             },
-        },
-        "processes": {
-            "about": {"machine": "two cores"},
-            "lanes": 64,
-            "rows": [
-                {"what": "1 process", "lanes_per_s": 1e4},
-                {"what": "2 processes", "lanes_per_s": 1.9e4},
-            ],
         },
     }
 
@@ -96,10 +82,6 @@ def test_slopes_and_ratios_are_those_of_the_record(record):
     assert "slope 1.00" in told
     shown = [text.get_text() for text in charts.speed.draw(record, "gradients").texts]
     assert shown == ["1.00", "4.00"]
-    shown = [text.get_text() for text in charts.speed.draw(record, "processes").texts]
-    assert shown == ["1.00", "1.90"]
-    (label,) = (t.get_text() for t in charts.speed.draw(record, "batches").get_legend().get_texts())
-    assert "worst 2 %" in label
 
 
 def test_the_reference_itself_is_left_out(record):
@@ -109,7 +91,7 @@ def test_the_reference_itself_is_left_out(record):
 
 
 def test_a_sheet_holds_what_the_record_has(record):
-    assert sum(axes.axison for axes in charts.speed.sheet(record).axes) == 6
+    assert sum(axes.axison for axes in charts.speed.sheet(record).axes) == 4
     del record["one"]
     assert len(charts.speed.sheet({"nodes": record["nodes"]}).axes) == 1
     with pytest.raises(jb.InputError, match="no section 'one'"):

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from tqdm import tqdm
 
 import jbeamshell as jb
@@ -29,7 +28,6 @@ STANDARD = {
     "model.end_size": 1.0 / 36.0,
 }
 FINE = {"model.nodes": 321, "model.end_size": 1.0 / 3.0, "load.steps_per_half_cycle": 40}
-RANGE = {"strip.height_ratio": (0.03, 0.4), "load.amplitude": (0.3, 1.6)}
 MOST = 200  # calls in a spell
 
 Call = Callable[[], Any]
@@ -42,11 +40,8 @@ class Plan(NamedTuple):
     ----------
     rounds : in each of which every variant is timed
     spell : seconds for which it is called again and again there
-    lanes, sample : of a sweep, and of those how many are solved on the fine grid
-    sizes : of batches
     nodes : of grids
     studied : nodes of the study of derivatives, the finest last
-    unsettled, unsettled_sample : lanes in which steps may not settle, and those solved finely
     starts : of a command that finds its programs compiled
     calculix : whether CalculiX is run where it is found
     peer : script of condensed finite elements, timed if given
@@ -54,13 +49,8 @@ class Plan(NamedTuple):
 
     rounds: int = 7
     spell: float = 0.1
-    lanes: int = 16384
-    sample: int = 256
-    sizes: tuple[int, ...] = (16, 64, 256, 1024, 4096, 16384)
     nodes: tuple[int, ...] = (33, 65, 129, 257, 513, 1025)
     studied: tuple[int, ...] = (41, 81, 161, 321)
-    unsettled: int = 65536
-    unsettled_sample: int = 200
     starts: int = 1
     calculix: bool = True
     peer: str | None = None
@@ -69,13 +59,8 @@ class Plan(NamedTuple):
 QUICK = Plan(
     rounds=2,
     spell=0.02,
-    lanes=256,
-    sample=8,
-    sizes=(16, 64, 256),
     nodes=(33, 65, 129),
     studied=(41, 81),
-    unsettled=512,
-    unsettled_sample=8,
     starts=1,
     calculix=False,
 )
@@ -99,37 +84,6 @@ def truth() -> float:
             if (float(row["eta"]), float(row["A"])) == (ETA, AMPLITUDE)
         )
     return float(row["D"])
-
-
-def lanes(count: int, ranges: Mapping[str, tuple[float, float]] = RANGE) -> dict[str, np.ndarray]:
-    """Values that are uniform in their logarithms, paired; the same in every run."""
-    random = np.random.default_rng(1)
-    return {key: np.exp(random.uniform(*np.log(pair), count)) for key, pair in ranges.items()}
-
-
-def swept(values: Mapping[str, np.ndarray], change: Mapping[str, Any], **options: Any) -> Any:
-    """A sweep for the dissipation."""
-    return jb.sweep(scene(change), values, ("dissipation",), paired=True, **options)
-
-
-def errors(
-    values: Mapping[str, np.ndarray], found: np.ndarray, sample: int, change: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Errors of the lanes, from some of them on the fine grid."""
-    chosen = np.random.default_rng(2).choice(found.size, min(sample, found.size), replace=False)
-    some = {key: column[chosen] for key, column in values.items()}
-    right = swept(some, dict(change) | FINE)
-    off = np.abs(found[chosen] / right.values["dissipation"] - 1.0)
-    known = np.isfinite(off)
-    worst = int(np.nanargmax(off))
-    return {
-        "sample": int(known.sum()),
-        "without_answer": int((~known).sum()),
-        "error_median": float(np.median(off[known])),
-        "error_p90": float(np.quantile(off[known], 0.9)),
-        "error_worst": float(off[worst]),
-        "worst_at": {key: float(column[worst]) for key, column in some.items()},
-    }
 
 
 # --- timing ---------------------------------------------------------------------------------------

@@ -4,7 +4,6 @@ import json
 import os
 import platform
 import re
-import resource
 import subprocess
 import sys
 import time
@@ -62,16 +61,6 @@ def peak_gflops() -> float:
         a @ a
         seconds.append(time.perf_counter() - begin)
     return 2e-9 * PEAK_SIZE**3 / min(seconds)
-
-
-def peak_memory_mb() -> float:
-    """Largest resident memory that this process has had."""
-    status = Path("/proc/self/status")
-    if status.exists():  # there ru_maxrss would count the parent's, from before this program began
-        (peak,) = re.findall(r"VmHWM:\s*(\d+) kB", status.read_text(encoding="utf-8"))
-        return 1.024e-3 * int(peak)
-    unit = 1 if sys.platform == "darwin" else 1024
-    return 1e-6 * unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def environment(**changes: str) -> dict[str, str]:
