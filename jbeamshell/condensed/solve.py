@@ -56,7 +56,7 @@ def solve(
 
     Between the events at which a node starts to slip, sticks, opens or closes everything is linear
     in the load, so that load steps only say where the path is looked at.  Friction is Coulomb's,
-    without elastic slip if contact.stick_stiffness is 1000 or more; contact is unilateral.
+    without elastic slip unless contact.stick_stiffness is given; contact is unilateral.
     Nodes are those of the load steps of the same section; plane elasticity resolves singular
     stresses at the loaded corner to 1e-4 H.  Fields above the contact are found when they are read
     first, because that takes twice as long as the walk.
@@ -115,10 +115,9 @@ def _solved(
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
         fix = f"must press the strip down for model.rung = {rung}"
         require("contact.pressure", scene.contact.pressure, down, fix)
-    soft = not scene.ideal_friction
     known = isinstance(turns, tuple)
     given = (scene, strip, targets, () if known else turns)
-    history, movement = _walk(given, turns if known else (), cycles, by, soft)
+    history, movement = _walk(given, turns if known else (), cycles, by)
     above = Unread(strip, movement)
     found: History = history.but(scene=scene, above=above.found if now else above)
     return found
@@ -132,7 +131,7 @@ def quickest(scene: Scene) -> Search:
     """
     warps = scene.model.solution == "plane" or scene.model.order >= NESTED_FROM
     any_may_lift = warps or goes_on(scene) or scene.member.support != "none"
-    any_may_lift = any_may_lift or not scene.ideal_friction
+    any_may_lift = any_may_lift or scene.contact.stick_stiffness is not None
     return "events" if any_may_lift else "near events"
 
 
@@ -185,7 +184,6 @@ def _walk(
     known: tuple[bool, ...],
     cycles: Cycles,
     by: Search,
-    soft: bool,
 ) -> tuple[History, Movement]:
     """History of a strip pressed down and loaded along targets; see `solve`.
 
@@ -198,15 +196,12 @@ def _walk(
     """
     scene, strip, targets, traced = given
     turns = known if isinstance(traced, tuple) else traced
-    found = _levels(scene, strip, targets, turns, by, soft)
-    history, movement = _history(scene, strip, found, cycles, soft)
-    # The scene's numbers would be copied, and they would no longer tell ideal sliders.
+    found = _levels(scene, strip, targets, turns, by)
+    history, movement = _history(scene, strip, found, cycles)
     return history.but(scene=None), movement
 
 
-def _levels(
-    scene: Scene, strip: Strip, targets: Array, turns: Turns, by: Search, soft: bool
-) -> Level:
+def _levels(scene: Scene, strip: Strip, targets: Array, turns: Turns, by: Search) -> Level:
     """Levels after the pressing; the last contact nodes are bearings, if the scene has any."""
     body, contact, friction = strip.body, scene.contact, scene.contact.friction
     lift, bearing = strip.lift, contact.bearing_stiffness
@@ -214,6 +209,7 @@ def _levels(
         share = (strip.load / jnp.sum(strip.load))[::-1]
         body = with_bearings(body, bearing, share)
         lift = with_gaps(lift, 0.0 if contact.clearance is None else contact.clearance)
+    soft = contact.stick_stiffness is not None
     if soft:
         body, springs = with_springs(body, spring_stiffness(scene, strip))
     if scene.load.control == "displacement":
@@ -241,9 +237,7 @@ def _levels(
     return found._replace(state=state, settled=found.settled & sound)
 
 
-def _history(
-    scene: Scene, strip: Strip, levels: Level, cycles: Cycles, soft: bool
-) -> tuple[History, Movement]:
+def _history(scene: Scene, strip: Strip, levels: Level, cycles: Cycles) -> tuple[History, Movement]:
     """History of the levels after the pressing, whose steps come first, and the movement."""
     body, state = strip.body, levels.state
     before = scene.load.pressure_steps
@@ -277,7 +271,7 @@ def _history(
     energy = 0.5 * part**2 * (resting @ at_rest) + change[:, :-2] @ resting[:-2]
     energy = energy + 0.5 * jnp.sum(added * change, axis=1) - added[:, -2] * force
     sinking = part * resting[-1] + added[:, -1]
-    if soft:
+    if scene.contact.stick_stiffness is not None:
         energy = energy + every(spring_energy(spring_stiffness(scene, strip), state.r_t))
     if scene.contact.bearing_stiffness is not None:
         energy = energy + every(bearing_energy(scene.contact.bearing_stiffness, state.r_n[:, n:]))

@@ -23,7 +23,7 @@ from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.choice import may_condense
 from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.linearisation import linear_error
-from jbeamshell.scene.rungs import IDEAL, general_rung
+from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import doubt_of_section
 
@@ -210,8 +210,7 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     the last node by a slider that is the softer, the shorter the elements.  A refined grid has told
     what that makes.
 
-    Sliders from `IDEAL` on stand for friction without elastic slip, which single nodes hold on any
-    grid that is used.
+    Single nodes hold rigid sliders on any grid that is used.
 
     Where the pressure has steps, small elements lie there too, and the slip zone holds larger ones
     (measured by calibration/campaign.py).
@@ -222,11 +221,11 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
         grid = numbers.maximum(change, REFINED * grid)
     elif scene.contact.jumps > 1:
         grid = STEPS * grid
-    soft = numbers.asarray(scene.contact.stick_stiffness) < IDEAL
+    soft = scene.contact.stick_stiffness is not None
     opens = "w" in scene.model.fields and scene.model.solution != "plane"
     if opens or scene.member.support != "none":
-        corner = numbers.where(soft & (change is None), corner, 0.0)
-    slider = numbers.where(soft, slider_error(cycle), 0.0)
+        corner = corner if soft and change is None else numbers.zeros(())
+    slider = slider_error(cycle) if soft else numbers.zeros(())
     steps = step_error(cycle) if scene.model.solution == "stepwise" else numbers.zeros(())
     return grid, corner, slider, steps
 
@@ -377,7 +376,7 @@ def _section(history: Run) -> tuple[str, ...]:
 
 def _slider_fix(scene: Scene) -> str:
     """Fix for a strip that rests on single nodes with elastic sliders."""
-    others = f"contact.stick_stiffness = {IDEAL:g}, or model.rung = plane"
+    others = "no contact.stick_stiffness, or model.rung = plane"
     if scene.model.condensed:
         return f"take {others}"
     if scene.model.kinematics == "linear" and may_condense(scene):

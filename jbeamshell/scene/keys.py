@@ -142,9 +142,9 @@ class ContactKeys(Part):
         table=True,
         fix=PRESSURE,
     )
-    stick_stiffness: Array = number(
-        1000.0,
-        "Elastic slip stiffness in units of G/H: k_t = alpha G/H; friction is ideal from 1000 on.",
+    stick_stiffness: Array | None = number(
+        None,
+        "Stiffness of elastic sliders in units of G/H: k_t = alpha G/H; none is rigid sliders.",
         symbol=r"\alpha",
     )
     normal: str = word(

@@ -344,7 +344,7 @@ BAD = [
         (key, value, "number|thickness, E")
         for key in NUMBERS
         for value in NO_NUMBERS
-        if value is not None or key not in ("strip.layers", "strip.curvature", *OF_JOINT)
+        if value is not None or not TABLE_OF_KEYS[key].optional
         if key != "member.layers" or not isinstance(value, list | np.ndarray)
     ],
     *[("contact.friction", value, "a number, not negative") for value in (-2.0, np.nan, np.inf)],

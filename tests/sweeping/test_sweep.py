@@ -138,7 +138,6 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
 
 @pytest.mark.doubtful("lanes may be off")
 def test_a_lane_that_is_solved_alone_has_the_estimate_of_its_run(monkeypatch):
-    """On the contact line that of rigid sliders, which its compiled figures have to be told."""
     failing, scene = runner.Runner._answers, jb.Scene().replace({"model.nodes": 17})
 
     def failed(self, batches):
