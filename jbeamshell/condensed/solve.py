@@ -198,7 +198,7 @@ def _walk(
     turns = known if isinstance(traced, tuple) else traced
     found = _levels(scene, strip, targets, turns, by)
     history, movement = _history(scene, strip, found, cycles)
-    return history.but(scene=None), movement
+    return history.but(scene=None), movement  # its numbers would be copied
 
 
 def _levels(scene: Scene, strip: Strip, targets: Array, turns: Turns, by: Search) -> Level:

@@ -202,7 +202,6 @@ EDGES = {
     "strip.youngs_modulus": (0.0, 1e4),
     "strip.poisson_ratio": (-1.0, -0.9, 0.0, 0.49, 0.5),
     "strip.kappa_s": (0.0, 0.4),
-    "strip.deviation": (-1.0, 0.0),
     "strip.curvature": (-0.01, 0.0),
     "contact.friction": (-0.1, 0.0, 0.03, 0.5),
     "contact.pressure": (-1.0, 0.0, 3.0, 30.0),
