@@ -15,11 +15,11 @@ KINDS = {
     "plane": FEW | {"model.rung": "plane"},
     "contact line": SQUEEZE,
     "elastic sliders": SQUEEZE | {"contact.stick_stiffness": 50.0},
-    "lap joint": FEW | JOINT,
+    "lap joint": FEW | JOINT | {"load.amplitude": 1.5},
     "displacement": SQUEEZE | {"load.control": "displacement", "load.amplitude": 2e-5},
     "exact rotations": SQUEEZE | {"model.kinematics": "exact"},
 }
-STEP = 1e-6  # of every number, for differences
+STEP = 1e-5  # of every number, for differences
 
 
 def dissipation(scene):
@@ -35,11 +35,12 @@ def test_whole_scenes_may_be_compiled_stacked_and_differentiated(kind):
     both = jax.jit(jax.vmap(jax.value_and_grad(dissipation, has_aux=True)))
     found, gradient = both(stacked)
     for place, scene in enumerate(scenes):
-        for value, expected in zip(
-            jax.tree.leaves(found), jax.tree.leaves(dissipation(scene)), strict=True
-        ):
-            scale = np.max(np.abs(expected))
-            np.testing.assert_allclose(value[place], expected, rtol=1e-10, atol=1e-10 * scale)
+        alone = dissipation(scene)
+        force, displacement, reaction = (float(jnp.max(jnp.abs(column))) for column in alone[1])
+        scales = force * displacement, force, displacement, reaction
+        columns = zip(jax.tree.leaves(found), jax.tree.leaves(alone), scales, strict=True)
+        for lanes, expected, scale in columns:
+            np.testing.assert_allclose(lanes[place], expected, rtol=0.0, atol=1e-10 * scale)
 
     leaves, tree = jax.tree.flatten(one)
     parts = np.random.default_rng(0).uniform(-1.0, 1.0, len(leaves))
@@ -55,4 +56,4 @@ def test_whole_scenes_may_be_compiled_stacked_and_differentiated(kind):
         for part, leaf, slope in zip(parts, leaves, jax.tree.leaves(gradient), strict=True)
     ]
     difference = (moved(STEP) - moved(-STEP)) / (2.0 * STEP)
-    assert np.sum(slopes) == pytest.approx(difference, rel=1e-5)
+    assert np.sum(slopes) == pytest.approx(difference, rel=1e-4)
