@@ -85,7 +85,7 @@ def by_the_other(values: Values, scene: jb.Scene, other: Values) -> jb.Scene:
     """Scene with the same model and another solver; elastic sliders keep their last element."""
     given = {key: value for key, value in values.items() if key != "model.rung"}
     section: Values = {"model.fields": list(scene.model.fields), "model.order": scene.model.order}
-    if scene.model.condensed and not scene.ideal_friction:
+    if scene.model.condensed and scene.contact.stick_stiffness is not None:
         section["model.end_size"] = scene.model.end_size
     return jb.library.standard().replace(TO_ITSELF | given | section | other)
 

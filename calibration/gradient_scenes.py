@@ -20,7 +20,6 @@ BOTH_FACES = {
 }
 LAYERS = {
     "strip.layers": [[0.05, 2e5, 0.2], [0.1, 1e5, 0.35], [0.0752, 3e5, 0.25]],
-    "strip.deviation": 0.01,
 }
 DISPLACED = {"load.control": "displacement", "load.amplitude": 1.5e-5}
 DOUBLE = {
@@ -93,7 +92,6 @@ SETTINGS: dict[str, Values] = {
 }
 # Distances for numbers that are zero, or small beside what they are added to.
 SIZES = {
-    "strip.deviation": 0.1,
     "strip.curvature": 1e-4,
     "contact.bottom_pressure": 1.0,
     "contact.gap": 1e-6,

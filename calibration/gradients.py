@@ -39,7 +39,6 @@ import jbeamshell as jb  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 from jbeamshell.quasistatic.response import RESPONSES  # noqa: E402
 from jbeamshell.scene.keys import NUMBERS, TABLE  # noqa: E402
-from jbeamshell.scene.rungs import IDEAL  # noqa: E402
 
 RECORD = Path(__file__).parent / "gradients.json"
 SEED = 22
@@ -86,9 +85,8 @@ class Walk(NamedTuple):
 def numbers_of(scene: jb.Scene, given: Values) -> Walk:
     """Every number that a scene holds, each entry of its tables a direction of its own."""
     keys, values, directions = [], [], []
-    ideal = scene.model.condensed and float(scene.contact.stick_stiffness) >= IDEAL
     for key in NUMBERS:
-        if key == "contact.holes" or (key == "contact.stick_stiffness" and ideal):
+        if key == "contact.holes":
             continue
         if TABLE[key].through and key != "contact.bolts":
             continue

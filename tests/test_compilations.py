@@ -85,7 +85,7 @@ def test_responses_share_programs_and_derivatives_whatever_the_scene_s_other_num
 
 def test_a_response_is_made_of_traced_numbers_and_tables():
     table = np.array([[0.0, 8.0], [1.0, 8.0], [1.0, 0.0], [2.0, 0.0]])
-    few = {"model.nodes": 17, "load.amplitude": 0.3, "contact.stick_stiffness": 1e4}
+    few = {"model.nodes": 17, "load.amplitude": 0.3}
 
     def dissipation(friction, table):
         scene = jb.Scene().replace(few | {"contact.friction": friction, "contact.pressure": table})

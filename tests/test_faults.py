@@ -94,7 +94,7 @@ SETTINGS = [(key, kind) for key in KEYS for kind in hostile.WORDS]
 TYPED = [(key, "not a number") for key in KEYS] + [("strip.length", kind) for kind in hostile.WORDS]
 HANDED = [(key, kind) for key in KEYS for kind in hostile.OBJECTS]
 PARTS = {
-    jb.Strip: "length height_ratio axial_stiffness poisson_ratio kappa_s far_end layers deviation "
+    jb.Strip: "length height_ratio axial_stiffness poisson_ratio kappa_s far_end layers "
     "plane curvature",
     jb.Contact: "friction pressure bottom_pressure stick_stiffness law normal normal_stiffness",
     jb.Load: "control amplitude cycles steps_per_half_cycle pressure_steps",

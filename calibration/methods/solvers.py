@@ -23,6 +23,7 @@ from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.quasistatic.system import LoadLevel, Prescribed, System, V
 from jbeamshell.quasistatic.tangent import Stiffness, initial_stiffness, matrix
+from jbeamshell.scene.scene import ALMOST_RIGID
 
 TOLERANCE = 1e-10  # of mu F_N L, as the library's
 TRIES, HALVINGS = 100, 8
@@ -65,7 +66,12 @@ class Method(NamedTuple):
 def softer(part: float) -> Callable[[jb.Scene], jb.Scene]:
     """The scene with sliders of a part of their stiffness."""
     key = "contact.stick_stiffness"
-    return lambda scene: scene.replace({key: part * scene.contact.stick_stiffness})
+
+    def changed(scene: jb.Scene) -> jb.Scene:
+        alpha = scene.contact.stick_stiffness
+        return scene.replace({key: part * (ALMOST_RIGID if alpha is None else alpha)})
+
+    return changed
 
 
 def smoother(exponent: float) -> Callable[[jb.Scene], jb.Scene]:

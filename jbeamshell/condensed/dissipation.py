@@ -49,11 +49,11 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int | None = None
 
     Notes
     -----
-    To ask one strip again and again, keep its `factors`.  Elastic slip (contact.stick_stiffness
-    below 1000) leaves no nested zones at the corner; where it is traced, friction is without it.
+    To ask one strip again and again, keep its `factors`.  Elastic slip (contact.stick_stiffness)
+    leaves no nested zones at the corner.
     """
     scene = on_contact_line(scene, nodes)
-    found = _dissipation(scene, jnp.asarray(amplitudes), _is_soft(scene))
+    found = _dissipation(scene, jnp.asarray(amplitudes))
     if is_traced(scene, amplitudes, found):
         return found
     sizes, works = np.asarray(amplitudes, dtype=float), np.array(found)
@@ -101,7 +101,7 @@ def factors(scene: Scene, *, nodes: int | None = None) -> SteadyCycles:
     fix = "opens the edge of the contact, so that no slip zones are nested: take traction, face or "
     fix += "guided, or jbeamshell.condensed.dissipation"
     require("load.entry", scene.load.entry, not goes_on(scene), fix)
-    return _factors(scene, _is_soft(scene))
+    return _factors(scene)
 
 
 def on_contact_line(scene: Scene, nodes: int | None) -> Scene:
@@ -114,20 +114,15 @@ def on_contact_line(scene: Scene, nodes: int | None) -> Scene:
     return scene if nodes is None else scene.replace({"model.nodes": nodes})
 
 
-def _is_soft(scene: Scene) -> bool:
-    """True if sliders are known to yield before they slip."""
-    return not is_traced(scene.contact.stick_stiffness) and not scene.ideal_friction
-
-
 @eqx.filter_jit
-def _factors(scene: Scene, soft: bool) -> SteadyCycles:
+def _factors(scene: Scene) -> SteadyCycles:
     strip = condensed(scene, scene.model.nodes)
     body = strip.body
-    if soft:
+    if scene.contact.stick_stiffness is not None:
         body, _ = with_springs(body, spring_stiffness(scene, strip))
     return steady_cycles(body, scene.contact.friction)
 
 
 @eqx.filter_jit
-def _dissipation(scene: Scene, amplitudes: Array, soft: bool) -> Array:
-    return _factors(scene, soft).dissipation(amplitudes)
+def _dissipation(scene: Scene, amplitudes: Array) -> Array:
+    return _factors(scene).dissipation(amplitudes)

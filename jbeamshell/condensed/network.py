@@ -90,17 +90,14 @@ class Network(eqx.Module):
     volume: Array
 
     @classmethod
-    def of(cls, scene: Scene, soft: bool = False) -> Network:
-        """Network of a scene on a condensed rung; may be traced.
+    def of(cls, scene: Scene) -> Network:
+        """Network of a scene on a condensed rung, whose load is not used; may be traced.
 
-        Parameters
-        ----------
-        scene : scene, whose load is not used
-        soft : True for sliders with elastic slip, see `Scene.ideal_friction`; slip is then plastic
+        Slip of elastic sliders is the plastic one.
         """
         strip, friction = condensed(scene, scene.model.nodes), scene.contact.friction
         body = strip.body
-        if soft:
+        if scene.contact.stick_stiffness is not None:
             body, _ = with_springs(body, spring_stiffness(scene, strip))
         return cls(body, factorise(body, friction), friction, moving_volume(strip))
 

@@ -163,7 +163,9 @@ def _answer(
     row = at.matrix[number]
     slips = jnp.where(at.sigma == 0.0, 0.0, row[:k])
     sticks = jnp.where(at.sigma == 0.0, row[:k], 0.0)
-    normal = jnp.where(at.opened, -row[k:], 0.0).at[:k].add(-at.sigma * system.friction * slips)
+    resisted = at.sigma * system.friction * slips
+    # Not .at[:k], whose index is a constant that custom batching refuses where k is the whole size.
+    normal = jnp.where(at.opened, -row[k:], 0.0) - jnp.pad(resisted, (0, at.opened.size - k))
     return Row(
         held=jnp.zeros(2 * k).at[trace.instance].add(sticks),
         forces=jnp.concatenate([-slips, normal]),

@@ -48,7 +48,7 @@ def solve(
 
     Between the events at which a node starts to slip, sticks, opens or closes everything is linear
     in the load, so that load steps only say where the path is looked at.  Friction is Coulomb's,
-    without elastic slip if contact.stick_stiffness is 1000 or more; contact is unilateral.
+    without elastic slip unless contact.stick_stiffness is given; contact is unilateral.
     Nodes are those of the load steps of the same section; plane elasticity resolves singular
     stresses at the loaded corner to 1e-4 H.  Fields above the contact are found when they are read
     first, because that takes twice as long as the walk.
@@ -83,7 +83,7 @@ def walks_pressures(scene: Scene) -> bool:
     Elastic sliders and what holds two members apart would have to move with them.
     """
     joint = scene.contact.gap is None and scene.contact.holes is None
-    return joint and scene.ideal_friction
+    return joint and scene.contact.stick_stiffness is None
 
 
 @in_double
@@ -112,10 +112,9 @@ def _solved(
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
         fix = f"must press the strip down for model.rung = {rung}"
         require("contact.pressure", scene.contact.pressure, down, fix)
-    soft = not scene.ideal_friction
     known = isinstance(turns, tuple)
     given = (scene, strip, targets, None if whole else parts, () if known else turns)
-    history, movement = _walk(given, turns if known else (), cycles, soft)
+    history, movement = _walk(given, turns if known else (), cycles)
     above = Unread(strip, movement)
     found: History = history.but(scene=scene, above=above.found if now else above)
     return found
@@ -142,7 +141,6 @@ def _walk(
     given: tuple[Scene, Strip, Array, Array | None, Turns],
     known: tuple[bool, ...],
     cycles: Cycles,
-    soft: bool,
 ) -> tuple[History, Movement]:
     """History of a strip pressed down and loaded along targets; see `solve`.
 
@@ -156,20 +154,12 @@ def _walk(
     """
     scene, strip, targets, parts, traced = given
     turns = known if isinstance(traced, tuple) else traced
-    found = _levels(scene, strip, targets, parts, turns, soft)
-    history, movement = _history(scene, strip, found, parts, cycles, soft)
-    # The scene's numbers would be copied, and they would no longer tell ideal sliders.
-    return history.but(scene=None), movement
+    found = _levels(scene, strip, targets, parts, turns)
+    history, movement = _history(scene, strip, found, parts, cycles)
+    return history.but(scene=None), movement  # its numbers would be copied
 
 
-def _levels(
-    scene: Scene,
-    strip: Strip,
-    targets: Array,
-    parts: Array | None,
-    turns: Turns,
-    soft: bool,
-) -> Level:
+def _levels(scene: Scene, strip: Strip, targets: Array, parts: Array | None, turns: Turns) -> Level:
     """Levels after the pressing; the last contact nodes are bearings, if the scene has any."""
     body, contact, friction = strip.body, scene.contact, scene.contact.friction
     lift, bearing = strip.lift, contact.bearing_stiffness
@@ -177,6 +167,7 @@ def _levels(
         share = (strip.load / jnp.sum(strip.load))[::-1]
         body = with_bearings(body, bearing, share)
         lift = with_gaps(lift, 0.0 if contact.clearance is None else contact.clearance)
+    soft = contact.stick_stiffness is not None
     if soft:
         body, springs = with_springs(body, spring_stiffness(scene, strip))
     press = Press.of(strip.loaded.hessian, body.f_t.size, body.f_n.size - strip.x.size)
@@ -205,7 +196,7 @@ def _levels(
 
 
 def _history(
-    scene: Scene, strip: Strip, levels: Level, parts: Array | None, cycles: Cycles, soft: bool
+    scene: Scene, strip: Strip, levels: Level, parts: Array | None, cycles: Cycles
 ) -> tuple[History, Movement]:
     """History of the levels after the pressing, whose steps come first, and the movement.
 
@@ -219,7 +210,7 @@ def _history(
     pressure = part if parts is None else jnp.append(part[:before], parts)
     sound = jnp.append(jnp.ones(before, bool), levels.settled)
     movement = _movement(strip, levels, part, pressure, sound)
-    energy, sinking = _energy(scene, strip, movement, state, soft)
+    energy, sinking = _energy(scene, strip, movement, state)
     traction, reaction = _on_base(strip, state, part[:before])
     moved = part[:, None] * movement.at_rest + movement.change
     driven = state.displacement if scene.load.control == "displacement" else state.force
@@ -285,7 +276,7 @@ def _movement(strip: Strip, levels: Level, part: Array, pressure: Array, sound: 
 
 
 def _energy(
-    scene: Scene, strip: Strip, movement: Movement, state: ContactState, soft: bool
+    scene: Scene, strip: Strip, movement: Movement, state: ContactState
 ) -> tuple[Array, Array]:
     """Stored energy (steps,) with the potential of the pressures, and their sinking."""
     at_rest, change, part, _ = movement
@@ -295,7 +286,7 @@ def _energy(
     energy = 0.5 * part**2 * (resting @ at_rest) + change @ resting.at[-2].set(0.0)
     energy = energy + 0.5 * jnp.sum(added * change, axis=1) - added[:, -2] * change[:, -2]
     bearing = scene.contact.bearing_stiffness
-    if soft:
+    if scene.contact.stick_stiffness is not None:
         springs = spring_energy(spring_stiffness(scene, strip), state.r_t)
         energy = energy.at[before:].add(springs)
     if bearing is not None:

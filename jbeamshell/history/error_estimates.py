@@ -17,7 +17,6 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.mechanics.friction import coulomb_cap
-from jbeamshell.scene.rungs import IDEAL
 from jbeamshell.scene.scene import Scene
 
 NEGLIGIBLE = 1e-9  # slip over the sticking range, taken as zero
@@ -203,8 +202,7 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     refined grid has told what that makes.  That of plane elasticity has no point reaction, and its
     error is at most that of `singular_corner_error`.
 
-    Sliders from `IDEAL` on stand for friction without elastic slip, which single nodes hold on any
-    grid that is used.
+    Single nodes hold rigid sliders on any grid that is used.
 
     Where the pressure has steps, small elements lie there too, and the slip zone holds larger ones
     (measured by calibration/campaign.py).
@@ -218,11 +216,11 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
         grid = STEPS * grid
     elif plane:
         grid = SAFETY * grid
-    soft = numbers.asarray(scene.contact.stick_stiffness) < IDEAL
+    soft = scene.contact.stick_stiffness is not None
     if plane:
         corner = numbers.minimum(corner, singular_corner_error(scene, cycle))
     elif "w" in scene.model.fields or scene.member.support != "none":
-        corner = numbers.where(soft & (change is None), corner, 0.0)
-    slider = numbers.where(soft, slider_error(cycle), 0.0)
+        corner = corner if soft and change is None else numbers.zeros(())
+    slider = slider_error(cycle) if soft else numbers.zeros(())
     steps = step_error(cycle) if scene.model.solution == "stepwise" else numbers.zeros(())
     return grid, corner, slider, steps

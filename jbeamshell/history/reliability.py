@@ -17,7 +17,7 @@ from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.choice import may_condense
 from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.linearisation import linear_error
-from jbeamshell.scene.rungs import IDEAL, general_rung
+from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import doubt_of_section
 
@@ -206,7 +206,7 @@ def _section(history: Run) -> tuple[str, ...]:
 
 def _slider_fix(scene: Scene) -> str:
     """Fix for a strip that rests on single nodes with elastic sliders."""
-    others = f"contact.stick_stiffness = {IDEAL:g}, or model.rung = plane"
+    others = "no contact.stick_stiffness, or model.rung = plane"
     if scene.model.condensed:
         return f"take {others}"
     if scene.model.kinematics == "linear" and may_condense(scene):

@@ -21,7 +21,6 @@ from jbeamshell.identify.rig_keys import OF_STRUCTURE
 from jbeamshell.scene.scene import Scene
 
 REACH = 0.9  # force up to which a joint is computed, over its gross slip
-STICK = "contact.stick_stiffness"
 NUMBERS = "give numbers by name, such as {'damping_ratio': 0.001}"
 
 Build = Callable[[Scene | None, Mapping[str, Array]], Structure]
@@ -40,8 +39,6 @@ class Assembly(eqx.Module):
     point : degree of freedom whose displacement amplitudes were measured; None is the modal
         displacement
     driven : degree of freedom that a force drives; None is that of ``point``
-    ideal : True if the sliders of the scene are rigid until they slip, which a traced scene cannot
-        tell; None asks the scene
 
     Raises
     ------
@@ -69,7 +66,6 @@ class Assembly(eqx.Module):
     mode: int = eqx.field(static=True)
     point: int | None = eqx.field(static=True)
     driven: int | None = eqx.field(static=True)
-    ideal: bool = eqx.field(static=True)
 
     def __init__(
         self,
@@ -80,7 +76,6 @@ class Assembly(eqx.Module):
         mode: int = 0,
         point: int | None = None,
         driven: int | None = None,
-        ideal: bool | None = None,
     ) -> None:
         require("build", build, callable(build), "give a function of a scene and numbers")
         given = {} if numbers is None else numbers
@@ -93,7 +88,6 @@ class Assembly(eqx.Module):
         self.build, self.scene = build, scene
         self.numbers = {name: as_leaf(value, name, NUMBERS) for name, value in given.items()}
         self.mode, self.point, self.driven = mode, point, driven
-        self.ideal = (scene is not None and scene.ideal_friction) if ideal is None else ideal
 
     def get(self, key: str) -> Any:
         """Number of the structure, or of its scene, by dotted key."""
@@ -121,15 +115,11 @@ class Assembly(eqx.Module):
             mode=self.mode,
             point=self.point,
             driven=self.driven,
-            ideal=None if STICK in of_scene else self.ideal,
         )
 
     def structure(self) -> Structure:
         """Structure with these numbers."""
-        scene = self.scene
-        if scene is not None and self.ideal and is_traced(scene):
-            scene = scene.with_rigid_sliders()
-        built = self.build(scene, self.numbers)
+        built = self.build(self.scene, self.numbers)
         fix = "must return a jbeamshell.dynamics.Structure"
         require("build", built, isinstance(built, Structure), fix)
         for name, place in {"point": self.point, "driven": self.driven}.items():

@@ -15,7 +15,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.identify.driving import as_model
 from jbeamshell.identify.fitting import fit
-from jbeamshell.identify.models import Driven, Model, is_rigid
+from jbeamshell.identify.models import Driven, Model
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.specimens import Specimen
@@ -275,18 +275,17 @@ def _is_power(model: str | Law) -> bool:
 
 def _seconds(data: Sequence[Measurement], model: Model) -> float:
     """Time of one response of a model to all data, compiled, the fastest of some."""
-    observations, rigid = [observe(item, model) for item in data], is_rigid(model)
-    jax.block_until_ready(_respond(observations, model, rigid))
+    observations = [observe(item, model) for item in data]
+    jax.block_until_ready(_respond(observations, model))
     times = []
     for _ in range(REPEATS):
         begin = time.perf_counter()
-        jax.block_until_ready(_respond(observations, model, rigid))
+        jax.block_until_ready(_respond(observations, model))
         times.append(time.perf_counter() - begin)
     return min(times)
 
 
 @eqx.filter_jit
-def _respond(observations: Sequence[Observation], model: Model, rigid: bool) -> list[Any]:
+def _respond(observations: Sequence[Observation], model: Model) -> list[Any]:
     """Responses of a model to all observations."""
-    model = model.with_rigid_sliders() if rigid and isinstance(model, Scene) else model
     return [observation.predict(model, Newton())[0] for observation in observations]

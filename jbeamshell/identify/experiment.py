@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import Small
 from jbeamshell.condensed.shared import Layout, Shared, shared
-from jbeamshell.identify.models import Model, Prepared, Runnable, is_rigid
+from jbeamshell.identify.models import Model, Prepared, Runnable
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.rig import rigged, with_rig
 from jbeamshell.identify.rig_keys import RIG
@@ -310,12 +310,9 @@ def _response(
     numbers: Any,
     solver: Newton,
     keys: tuple[str, ...],
-    rigid: bool,
     layout: Layout | None,
 ) -> tuple[Array, Array, Array, Array]:
     """Residual (n,), its derivatives (n, k), prediction (n,) and convergence of a run."""
-    if rigid and isinstance(scene, Scene):
-        scene = scene.with_rigid_sliders()
 
     def residual(own: Array) -> tuple[Array, tuple[Array, Array, Array]]:
         given = dict(zip(keys, own, strict=True))
@@ -351,11 +348,9 @@ def _respond(
     numbers, layout = (None, None) if strip is None else (strip.numbers, strip.layout)
     given = values, observation, scene, numbers, solver
     if isinstance(scene, Scene) and scene.model.condensed:
-        found: tuple[Array, Array, Array, Array] = _respond_small(
-            given, keys, is_rigid(scene), layout
-        )
+        found: tuple[Array, Array, Array, Array] = _respond_small(given, keys, layout)
         return found
-    return _respond_whole(*given, keys, False, None)
+    return _respond_whole(*given, keys, None)
 
 
 def _respond_batch(
@@ -369,11 +364,11 @@ def _respond_batch(
     """Compiled responses to several values (tables, k)."""
     numbers, layout = (None, None) if strip is None else (strip.numbers, strip.layout)
     given = values, observation, scene, numbers, solver
-    found: tuple[Array, ...] = _batch(*given, keys, is_rigid(scene), layout)
+    found: tuple[Array, ...] = _batch(*given, keys, layout)
     return found
 
 
-_batch = eqx.filter_jit(eqx.filter_vmap(_response, in_axes=(0, *[None] * 7)))
+_batch = eqx.filter_jit(eqx.filter_vmap(_response, in_axes=(0, *[None] * 6)))
 
 
 def _shape(run: tuple[Observation, Model]) -> Any:

@@ -305,8 +305,8 @@ def check_start(problem: Problem, space: SearchSpace) -> None:
     start = problem(space, np.zeros(len(space.names)))
     if not start.converged:
         raise UnconvergedError(
-            "the model finds no equilibrium at the start values: start closer, or lower "
-            "contact.stick_stiffness"
+            "the model finds no equilibrium at the start values: start closer, or take "
+            "softer sliders (contact.stick_stiffness = 100 or less)"
         )
     data = start.jacobian[: start.prediction.size]
     for name, column in zip(space.names, data.T, strict=True):

@@ -115,11 +115,6 @@ def check_forces(model: Driven, force: ArrayLike) -> None:
     require("force", largest, largest < float(law.capacity), f"{fix} a larger one")
 
 
-def is_rigid(model: Model) -> bool:
-    """True for a strip whose sliders are rigid, which a compiled function has to be told."""
-    return isinstance(model, Scene) and model.ideal_friction
-
-
 def response_along(model: Runnable, path: Array, solver: Newton) -> tuple[Array, Array]:
     """Answering column (T,) on a path (T,) of the driving one, and whether all of it converged."""
     by_force = model.load.control == "force"

@@ -20,7 +20,7 @@ from jbeamshell.measured.recordings import as_column
 from jbeamshell.scene.keys import CONTROLS, FAR_ENDS
 from jbeamshell.scene.scene import Scene
 
-OF_SHEAR = ("strip.kappa_s", "strip.poisson_ratio", "strip.deviation", "strip.curvature")
+OF_SHEAR = ("strip.kappa_s", "strip.poisson_ratio", "strip.curvature")
 
 
 class Specimen(NamedTuple):

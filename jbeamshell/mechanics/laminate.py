@@ -6,11 +6,10 @@ sigma_y = q uniform over the height h and psi the mean of eps_y, eliminating q g
     Phi = A e^2/2 - B e k + D k^2/2 + (h psi + P0 e - P1 k)^2/(2 F) + shear,
     A, B, D = int Eb (1, s, s^2) ds,   P0, P1 = int nb (1, s) ds,   F = int (1 - nb^2)/Eb ds,
     q = (h psi + P0 e - P1 k)/F,   chi = h q,
-    shear = int G (sqrt(kappa) (g + d psi') + sqrt(kappa_s) (s - d) psi')^2/2 ds,
+    shear = int G (sqrt(kappa) g + sqrt(kappa_s) s psi')^2/2 ds,
 
 with eps_x = e - s k, gamma = g + s psi', s from -h/2 at the bottom to h/2 at the top, and per layer
-Eb = E, nb = nu in plane stress, Eb = E/(1-nu^2), nb = nu/(1-nu) in plane strain.  At the height d
-the shear is split into its mean and its squeeze part; nothing else depends on d.  The shear energy
+Eb = E, nb = nu in plane stress, Eb = E/(1-nu^2), nb = nu/(1-nu) in plane strain.  The shear energy
 is an integral of squares, hence never negative; its coupling factor is sqrt(kappa kappa_s).
 
 If all layers share one psi instead (Brink 2015, eqs. 4.79-4.86), eps_y = psi in every layer:
@@ -52,7 +51,6 @@ class Laminate(eqx.Module):
     ----------
     layers : (n, 3) rows from the bottom to the top: thickness (length), E (stress), nu
     kappa_s : squeeze-shear factor, positive
-    deviation : height d above mid-height at which the shear is split, length
     plane : "strain" or "stress"
     squeeze : True if psi is a field; if not, sigma_y = q = 0
     constants : "consistent", or "printed" for one psi shared by all layers (Brink 2015, eqs.
@@ -72,7 +70,6 @@ class Laminate(eqx.Module):
 
     layers: Array = eqx.field(converter=jnp.asarray)
     kappa_s: Array = eqx.field(converter=jnp.asarray)
-    deviation: Array = eqx.field(converter=jnp.asarray, default=0.0)
     plane: str = eqx.field(static=True, default="strain")
     squeeze: bool = eqx.field(static=True, default=True)
     constants: str = eqx.field(static=True, default="consistent")
@@ -196,10 +193,10 @@ class Laminate(eqx.Module):
         return 0.5 * stretching * (e - neutral * k) ** 2 + 0.5 * bending * k**2
 
     def _shear(self, g: Array, dpsi: Array) -> Array:
-        """Shear energy of a section with psi, split at the height d."""
-        mean = jnp.sqrt(self.shear_coefficient) * (g + self.deviation * dpsi)
+        """Shear energy of a section with psi."""
+        mean = jnp.sqrt(self.shear_coefficient) * g
         squeeze = jnp.sqrt(self.kappa_s) * dpsi
-        zeroth, first, second = self._integrals(self._shear_moduli, self.deviation)
+        zeroth, first, second = self._integrals(self._shear_moduli)
         if self.constants == "printed":
             first, second = 0.0, 24.0 * second
         return 0.5 * zeroth * mean**2 + first * mean * squeeze + 0.5 * second * squeeze**2

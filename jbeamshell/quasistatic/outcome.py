@@ -20,7 +20,8 @@ from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
 
 ADVICE = (
-    "take more load.steps_per_half_cycle, a lower contact.stick_stiffness, or fewer model.nodes"
+    "take more load.steps_per_half_cycle, softer sliders (contact.stick_stiffness = 100 or less), "
+    "or fewer model.nodes"
 )
 
 

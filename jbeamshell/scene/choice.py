@@ -36,7 +36,7 @@ from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS, KAPPA_S, TABLE
 from jbeamshell.scene.linearisation import Parts, linear_errors
 from jbeamshell.scene.parts import Model
 from jbeamshell.scene.rows import AUTO
-from jbeamshell.scene.rungs import CONDENSED, FIELDS_OF, IDEAL, PLANE_NODES
+from jbeamshell.scene.rungs import CONDENSED, FIELDS_OF, PLANE_NODES
 from jbeamshell.scene.section_error import known_beforehand
 
 SQUEEZE = FIELDS_OF["squeeze"]
@@ -164,12 +164,10 @@ def _grid(solution: str, opens: bool, soft: bool) -> Grid:
 
 
 def _is_soft(scene: Parts, numbers: Numbers | None) -> bool:
-    """True if sliders are known to yield before they slip, in any of many scenes."""
-    stiffness = scene.contact.stick_stiffness
-    if is_traced(stiffness):
-        return False
-    values = stiffness if numbers is None else numbers("contact.stick_stiffness")
-    return bool(np.min(np.asarray(values)) < IDEAL)
+    """True if sliders are elastic, in any of many scenes."""
+    if numbers is None or scene.contact.stick_stiffness is not None:
+        return scene.contact.stick_stiffness is not None
+    return not np.all(np.isnan(numbers("contact.stick_stiffness")))
 
 
 def _nodes(grid: Grid, scene: Parts) -> int:

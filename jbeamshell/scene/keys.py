@@ -97,14 +97,6 @@ class StripKeys(Part):
         table=True,
         fix=LAYERS,
     )
-    deviation: Array = number(
-        0.0,
-        "Height above mid-height at which a laminate's shear is split from its squeeze-shear.",
-        symbol="d",
-        unit="length",
-        low=-math.inf,
-        scale="linear",
-    )
     plane: str = word("strain", PLANES, "Plane strain or plane stress.")
     curvature: Array | None = number(
         None,
@@ -142,9 +134,9 @@ class ContactKeys(Part):
         table=True,
         fix=PRESSURE,
     )
-    stick_stiffness: Array = number(
-        1000.0,
-        "Elastic slip stiffness in units of G/H: k_t = alpha G/H; friction is ideal from 1000 on.",
+    stick_stiffness: Array | None = number(
+        None,
+        "Stiffness of elastic sliders in units of G/H: k_t = alpha G/H; none is rigid sliders.",
         symbol=r"\alpha",
     )
     normal: str = word(
@@ -392,6 +384,8 @@ for _part in (StripKeys, ContactKeys, LoadKeys, ModelKeys, MemberKeys):
 DERIVED = {row.name: row.through for row in INDIRECT if row.through}
 KEYS = tuple(TABLE)
 NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
+# Keys of old files, with what is to be done about them.
+FORMER = {"strip.deviation": "a laminate's shear is split at mid-height: leave it out"}
 
 
 def key_table(section: str = "") -> str:
@@ -413,6 +407,8 @@ def check_key(key: str) -> None:
     """Raise `InputError` for a key that does not exist, with the nearest one that does."""
     if not isinstance(key, str):
         raise InputError(f"{key!r}: is no key; keys are {', '.join(KEYS)}")
+    if key in FORMER:
+        raise InputError(f"{key}: is no key any more; {FORMER[key]}")
     if key not in TABLE:
         near = difflib.get_close_matches(key, KEYS, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"keys are {', '.join(KEYS)}"

@@ -89,7 +89,7 @@ class Strip(StripKeys):
         """Laminated section; None for a homogeneous strip."""
         if self.layers is None:
             return None
-        return Laminate(self.layers, self.kappa_s, self.deviation, self.plane)
+        return Laminate(self.layers, self.kappa_s, self.plane)
 
     @property
     def stretching_stiffness(self) -> Array:
@@ -150,7 +150,6 @@ class Member(MemberKeys):
             kappa_s=strip.kappa_s,
             far_end="guided",
             layers=layers,
-            deviation=strip.deviation,
             plane=strip.plane,
         )
 

@@ -29,7 +29,6 @@ FIELDS_OF = {"bar": ("v",), "shell": ("v", "beta"), "squeeze": ("v", "beta", "ps
 SETS = ("model.fields", "model.order", "model.solution")  # keys that a rung's name sets
 CONDENSED = ("condensed", "plane")  # solutions on the contact line, exact in time
 PLANE_NODES = 129  # of the rung ``plane``, for a tolerance of .5 %
-IDEAL = 1000.0  # contact.stick_stiffness from which on there friction is without elastic slip
 _NAME = re.compile(r"(?P<prefix>(stepwise|condensed)-)?(?P<section>[a-z]+|p\d+)")
 _OLD = re.compile(r"masing(-pull)?(-(?P<section>bar|shell|squeeze|p\d+))?")
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Collection, Mapping
-from typing import Any
+from typing import Any, cast
 
 import equinox as eqx
 import jax
@@ -40,8 +40,10 @@ from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Part,
 from jbeamshell.scene.pressure import bolt_pressure
 from jbeamshell.scene.quadratic import check_quadratic
 from jbeamshell.scene.rows import AUTO
-from jbeamshell.scene.rungs import IDEAL, general_rung, spelled_out
+from jbeamshell.scene.rungs import general_rung, spelled_out
 from jbeamshell.scene.text import summary
+
+ALMOST_RIGID = 1000.0  # stiffness of rigid sliders in load steps, in units of G/l
 
 
 def _standard(part: type[Part]) -> Any:
@@ -254,18 +256,13 @@ class Scene(Tree):
         of_member: Scene = eqx.tree_at(lambda scene: scene.strip, self, strip)
         return of_member
 
-    @property
-    def ideal_friction(self) -> bool:
-        """True if sliders are rigid until they slip, as on the contact line if alpha is large."""
-        alpha = self.contact.stick_stiffness
-        return self.model.condensed and not is_traced(alpha) and float(alpha) >= IDEAL
-
     def slip_stiffness(self, tributary: ArrayLike) -> Array:
         """Elastic stiffness k_t of the sliders at nodes, traction per slip.
 
-        It is alpha G/H.  Sliders from alpha = `IDEAL` on stand for friction without elastic slip.
-        On the contact line they are rigid.  In load steps a node of length l < H has alpha G/l, so
-        that its slider is as stiff as that of a longer one.
+        It is alpha G/H with alpha = contact.stick_stiffness.  Without alpha sliders are rigid, and
+        k_t is infinite.  Load steps need a finite one: a node of length l then has
+        `ALMOST_RIGID` G/min(l, H), so that the slider of a short node is as stiff as that of a
+        longer one.
 
         Parameters
         ----------
@@ -273,12 +270,14 @@ class Scene(Tree):
         """
         strip, alpha = self.strip, self.contact.stick_stiffness
         numbers: Any = jnp if is_traced(strip, alpha, tributary) else np  # much faster
-        if self.ideal_friction:
-            rigid: Array = numbers.full_like(tributary, np.inf)
-            return rigid
-        length = numbers.where(alpha >= IDEAL, tributary, strip.half_height)
-        each: Array = alpha * strip.shear_modulus / numbers.minimum(length, strip.half_height)
-        return each
+        if alpha is not None:
+            each = numbers.full_like(tributary, alpha * strip.shear_modulus / strip.half_height)
+        elif self.model.condensed:
+            each = numbers.full_like(tributary, np.inf)
+        else:
+            length = numbers.minimum(tributary, strip.half_height)
+            each = ALMOST_RIGID * strip.shear_modulus / length
+        return cast(Array, each)
 
     def get(self, key: str) -> Any:
         """Value of a dotted key, such as ``scene.get("strip.height_ratio")``."""
@@ -390,12 +389,6 @@ class Scene(Tree):
         if KAPPA_S not in keys:
             return self.as_elasticity()
         return self.pinned(lambda key: np.array(np.nan) if key == KAPPA_S else self.number(key))
-
-    def with_rigid_sliders(self) -> Scene:
-        """Copy that knows that its sliders are rigid, which traced numbers do not tell."""
-        rigid = np.asarray(IDEAL, self.strip.length.dtype)
-        scene: Scene = eqx.tree_at(lambda scene: scene.contact.stick_stiffness, self, rigid)
-        return scene
 
     def by_load_steps(self) -> Scene:
         """Copy that is solved in load steps, if how it is solved was left open."""

@@ -19,8 +19,8 @@ class Template(NamedTuple):
     ----------
     tree : structure of the scene
     dtype : name of the numbers' type
-    tables : what stays in the program, by its place: tables, whose rows may have a meaning, and the
-        stick stiffness, which may be that of rigid sliders; no traced ones
+    tables : tables by their place, which stay in the program because their rows may have a
+        meaning; no traced ones
     """
 
     tree: Any
@@ -31,11 +31,11 @@ class Template(NamedTuple):
     def of(scene: Scene) -> tuple[Template, list[Array]]:
         """Template of a scene, and the numbers that it takes."""
         leaves, tree = jax.tree.flatten(scene)
-        stick, dtype = scene.contact.stick_stiffness, scene.strip.length.dtype
+        dtype = scene.strip.length.dtype
         tables, numbers = [], []
         for place, leaf in enumerate(leaves):
             number = np.ndim(leaf) == 0 and getattr(leaf, "dtype", None) == dtype
-            if isinstance(leaf, jax.core.Tracer) or (number and leaf is not stick):
+            if isinstance(leaf, jax.core.Tracer) or number:
                 numbers.append(leaf)
             else:
                 table = np.asarray(leaf)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -220,7 +219,7 @@ class Runner:
         except InputError:
             return np.full(len(self.figures), np.nan), Outcome.OUTSIDE
         status = Outcome(int(np.max(np.asarray(history.status))))
-        values = np.asarray(_figures(history, self.figures, scene.ideal_friction))
+        values = np.asarray(_figures(history, self.figures))
         if status != Outcome.CONVERGED:
             return np.full_like(values, np.nan), status
         values = np.where(self._known(values), values, np.nan)
@@ -298,8 +297,6 @@ def _compiled(
 
 
 @eqx.filter_jit
-def _figures(history: History, figures: tuple[str, ...], rigid: bool) -> Array:
+def _figures(history: History, figures: tuple[str, ...]) -> Array:
     """Figures of the last cycle; a figure of every step is that of the last step."""
-    if rigid:
-        history = dataclasses.replace(history, scene=history.scene.with_rigid_sliders())
     return jnp.stack([jnp.ravel(getattr(history, name))[-1] for name in figures])

@@ -317,7 +317,7 @@ class TestRung:
         few = {"model.nodes": 33, "load.steps_per_half_cycle": 8}
         ideal, soft = (
             plane(scene_of(0.1126), **few, **{"contact.stick_stiffness": alpha})
-            for alpha in (1e3, 0.3)
+            for alpha in (None, 0.3)
         )
         assert float(soft.secant_stiffness) < 0.95 * float(ideal.secant_stiffness)
         for history in (ideal, soft):

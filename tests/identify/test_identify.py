@@ -223,9 +223,10 @@ def test_a_state_that_can_no_longer_be_written(tmp_path):
     ("options", "message"),
     [
         ({"free": ()}, "name at least one"),
-        ({"free": (MU, "contact.stick_stiffness")}, r"'contact.stick_stiffness'.*do not depend"),
+        ({"free": (MU, "contact.stick_stiffness")}, "no value for it; give a start"),
+        ({"free": (MU, "contact.normal_stiffness")}, "'contact.normal_stiffness'.*do not depend"),
         (
-            {"free": (MU, Parameter("contact.stick_stiffness", prior=(1e3, 10.0))), "noise": 0.01},
+            {"free": (MU, Parameter("contact.normal_stiffness", prior=(50, 1.0))), "noise": 0.01},
             "do not depend",
         ),
         ({"free": Parameter(MU, high=0.15)}, "start = 0.2.*must lie between"),

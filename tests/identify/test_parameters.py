@@ -135,7 +135,6 @@ def test_shared_and_own_values():
         ("strip.height_ratio", 0.1126),
         ("strip.half_height", 0.1126),
         ("strip.youngs_modulus", 3.4e4 / (2 * 0.1126) * (1.0 - 0.3**2)),
-        ("contact.stick_stiffness", 1000.0),
         ("strip.kappa_s", 0.44),
         (MU, 0.1),
     ],

@@ -2,7 +2,6 @@
 
 import re
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -263,12 +262,3 @@ def test_bad_input_is_one_clear_line(name):
     with pytest.raises(jb.InputError, match=message) as refusal:
         call()
     assert "\n" not in str(refusal.value)
-
-
-def test_traced_sliders_stay_rigid():
-    """A fit traces the whole scene, which cannot tell then that its sliders do not yield."""
-    scene = jb.Scene().replace({"model.rung": "plane", "model.nodes": 17})
-    assert jointed(scene, [[1.0]], [[1e5]]).ideal
-    soft = jointed(scene, [[1.0]], [[1e5]]).replace({"contact.stick_stiffness": 50.0})
-    assert not soft.ideal
-    assert jnp.asarray(soft.get("contact.stick_stiffness")) == 50.0

@@ -50,11 +50,9 @@ def random_strains():
     return Strains(*np.random.default_rng(1).uniform(-1e-2, 1e-2, (5, SAMPLES)))
 
 
-def laminates(layers, deviation=0.0, **choices):
+def laminates(layers, **choices):
     """Batch of laminates from (count, n, 3) layers."""
-    deviation = np.broadcast_to(deviation, len(layers))
-    make = jax.vmap(lambda layers, d: Laminate(layers, KAPPA_S, d, **choices))
-    return make(jnp.asarray(layers), jnp.asarray(deviation))
+    return jax.vmap(lambda layers: Laminate(layers, KAPPA_S, **choices))(jnp.asarray(layers))
 
 
 def in_plane(layers, plane):
@@ -264,7 +262,7 @@ def test_uniform_strains_of_one_layer_store_the_plane_stress_energy():
     np.testing.assert_allclose(of.psi, thickness * sigma_y, rtol=1e-10)
 
 
-# --- shear, deviation and symmetry ---------------------------------------------------------------
+# --- shear and symmetry --------------------------------------------------------------------------
 
 
 def shear_points(layers):
@@ -278,50 +276,36 @@ def sheared(strains):
     return strains._replace(e=0 * strains.e, k=0 * strains.k, psi=0 * strains.psi)
 
 
-def deviations(batch):
-    return np.random.default_rng(3).uniform(-0.5, 0.5, len(batch)) * batch[..., 0].sum(1)
-
-
-@pytest.mark.parametrize("choices", [{}, {"squeeze": False}, {"constants": "printed"}])
-def test_stretching_bending_and_squeeze_do_not_see_the_deviation(choices):
-    batch, strains = random_layers(3), random_strains()
-    flat = strains._replace(g=0 * strains.g, dpsi=0 * strains.dpsi)
-    here, there = (laminates(batch, d, **choices) for d in (0.0, deviations(batch)))
-    np.testing.assert_allclose(evaluate(there, flat), evaluate(here, flat), rtol=1e-13)
-
-
-def test_the_shear_is_split_at_the_deviation():
-    """Shear energy in three terms by quadrature, with g taken at the height d."""
+def test_the_shear_is_split_at_mid_height():
+    """Shear energy in three terms by quadrature."""
     batch, strains = random_layers(3), sheared(random_strains())
-    heights = deviations(batch)
     consistent, printed, without = (
-        evaluate(laminates(batch, heights, **choices), strains)
+        evaluate(laminates(batch, **choices), strains)
         for choices in ({}, {"constants": "printed"}, {"squeeze": False})
     )
-    for i, (layers, d) in enumerate(zip(batch[:20], heights[:20], strict=True)):
+    for i, layers in enumerate(batch[:20]):
         rigidity, s, kappa = shear_points(layers)
         g, dpsi = strains.g[i], strains.dpsi[i]
-        mean = 0.5 * kappa * (g + d * dpsi) ** 2 * rigidity.sum()
-        both = np.sqrt(kappa * KAPPA_S) * (g + d * dpsi) * dpsi * (rigidity @ (s - d))
-        squeeze = 0.5 * KAPPA_S * dpsi**2 * (rigidity @ (s - d) ** 2)
+        mean = 0.5 * kappa * g**2 * rigidity.sum()
+        both = np.sqrt(kappa * KAPPA_S) * g * dpsi * (rigidity @ s)
+        squeeze = 0.5 * KAPPA_S * dpsi**2 * (rigidity @ s**2)
         np.testing.assert_allclose(consistent[i], mean + both + squeeze, rtol=1e-11)
         np.testing.assert_allclose(printed[i], mean + 24 * squeeze, rtol=1e-11)
-        np.testing.assert_allclose(without[i], 0.5 * kappa * g**2 * rigidity.sum(), rtol=1e-11)
+        np.testing.assert_allclose(without[i], mean, rtol=1e-11)
 
 
-def test_equal_shear_factors_make_the_deviation_immaterial():
+def test_equal_shear_factors_make_one_square():
     layers, strains = random_layers(3)[0], Strains(*jnp.array([0.0, 3e-3, 0.0, 0.0, 2e-3]))
     rigidity, s, kappa = shear_points(layers)
     expected = 0.5 * kappa * rigidity @ (strains.g + s * strains.dpsi) ** 2
-    for d in (0.0, -0.7, 1.9):
-        np.testing.assert_allclose(Laminate(layers, kappa, d)(*strains), expected, rtol=1e-12)
+    np.testing.assert_allclose(Laminate(layers, kappa)(*strains), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("constants", ["consistent", "printed"])
 @pytest.mark.parametrize("plane", PLANES)
 def test_positive_definite(plane, constants):
     batch = random_layers(3)
-    sections = laminates(batch, deviations(batch), plane=plane, constants=constants)
+    sections = laminates(batch, plane=plane, constants=constants)
     of = np.asarray(eqx.filter_jit(jax.vmap(stiffness))(sections))
     np.testing.assert_allclose(of, of.transpose(0, 2, 1))
     scale = 1 / np.sqrt(np.diagonal(of, axis1=1, axis2=2))
@@ -331,11 +315,10 @@ def test_positive_definite(plane, constants):
 @pytest.mark.parametrize("constants", ["consistent", "printed"])
 @pytest.mark.parametrize("plane", PLANES)
 def test_upside_down(plane, constants):
-    """In a laminate turned over, s, k, g and d change sign; e, psi and psi' do not."""
+    """In a laminate turned over, s, k and g change sign; e, psi and psi' do not."""
     batch, strains = random_layers(3), random_strains()
-    heights, choices = deviations(batch), {"plane": plane, "constants": constants}
-    upright = laminates(batch, heights, **choices)
-    over = laminates(batch[:, ::-1], -heights, **choices)
+    choices = {"plane": plane, "constants": constants}
+    upright, over = laminates(batch, **choices), laminates(batch[:, ::-1], **choices)
     turned = strains._replace(k=-strains.k, g=-strains.g)
     np.testing.assert_allclose(evaluate(over, turned), evaluate(upright, strains), rtol=1e-11)
     of, of_over = evaluate_forces(upright, strains), evaluate_forces(over, turned)

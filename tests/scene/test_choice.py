@@ -130,8 +130,9 @@ def test_ideal_sliders_hold_as_much_on_small_elements_as_on_large_ones():
     unit = float(strip.shear_modulus / strip.half_height)
     ideal = steps.slip_stiffness(lengths)
     np.testing.assert_allclose(ideal / unit, 1000.0 / np.array([0.01, 0.5, 1.0, 1.0]))
-    soft = steps.replace({"contact.stick_stiffness": 999.0}).slip_stiffness(lengths)
-    np.testing.assert_allclose(soft / unit, 999.0)
+    for alpha in (50.0, 1000.0):
+        soft = steps.replace({"contact.stick_stiffness": alpha}).slip_stiffness(lengths)
+        np.testing.assert_allclose(soft / unit, alpha)
     assert np.all(jb.Scene().slip_stiffness(lengths) == np.inf)
 
 
@@ -179,17 +180,20 @@ def test_elements_at_the_loaded_end_are_small_where_the_corner_opens():
     def grid(known):
         return known.nodes, known.end_size
 
-    assert chosen(**{"contact.stick_stiffness": 999.0}) == grid(SOFT_CONTACT_LINE)
-    assert chosen(**{"contact.stick_stiffness": 1000.0}) == grid(CONTACT_LINE)
-    given = {"contact.stick_stiffness": 999.0, "model.nodes": 41}
+    soft = {"contact.stick_stiffness": 1000.0}
+    assert chosen(**soft) == grid(SOFT_CONTACT_LINE)
+    assert chosen() == grid(CONTACT_LINE)
+    given = soft | {"model.nodes": 41}
     assert chosen(**given) == (41, CONTACT_LINE.end_size)
     steps = {"model.kinematics": "exact"}
     assert chosen(**steps) == grid(LIFTING)
-    assert chosen(**steps, **{"contact.stick_stiffness": 999.0}) == grid(STEPWISE)
+    assert chosen(**steps, **soft) == grid(STEPWISE)
     assert chosen(**steps, **{"model.fields": ["v"]}) == grid(STEPWISE)
     assert chosen(**{"strip.curvature": 0.01}) == grid(STEPWISE)
-    over = {"contact.stick_stiffness": [50.0, 1000.0]}
-    assert SQUEEZE.replace(FINE).pinned(_numbers(over)).model.nodes == SOFT_CONTACT_LINE.nodes
+    over = _numbers({"contact.stick_stiffness": [50.0, 1000.0]})
+    assert SQUEEZE.replace(FINE).pinned(over).model.nodes == SOFT_CONTACT_LINE.nodes
+    over = _numbers({"contact.friction": [0.1, 0.2]})
+    assert SQUEEZE.replace(FINE).pinned(over).model.nodes == CONTACT_LINE.nodes
 
 
 @pytest.mark.slow

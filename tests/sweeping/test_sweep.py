@@ -138,7 +138,6 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
 
 @pytest.mark.doubtful("lanes may be off")
 def test_a_lane_that_is_solved_alone_has_the_estimate_of_its_run(monkeypatch):
-    """On the contact line that of rigid sliders, which its compiled figures have to be told."""
     failing, scene = runner.Runner._answers, jb.Scene().replace({"model.nodes": 17})
 
     def failed(self, batches):
@@ -203,7 +202,6 @@ EDGES = {
     "strip.youngs_modulus": (0.0, 1e4),
     "strip.poisson_ratio": (-1.0, -0.9, 0.0, 0.49, 0.5),
     "strip.kappa_s": (0.0, 0.4),
-    "strip.deviation": (-1.0, 0.0),
     "strip.curvature": (-0.01, 0.0),
     "contact.friction": (-0.1, 0.0, 0.03, 0.5),
     "contact.pressure": (-1.0, 0.0, 3.0, 30.0),

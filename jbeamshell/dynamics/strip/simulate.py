@@ -300,6 +300,7 @@ def _raise_if_interrupted(motion: Motion, span: float) -> None:
     reason = Ending(int(motion.status)).name.lower().replace("_", " ")
     raise InterruptedMotionError(
         f"the motion ends at t = {motion.reached:.6g} of {span:.6g} ({reason}, {int(motion.steps)} "
-        "steps): take a larger tolerance, a shorter step or a lower contact.stick_stiffness",
+        "steps): take a larger tolerance, a shorter step or softer sliders "
+        "(contact.stick_stiffness = 100 or less)",
         motion,
     )

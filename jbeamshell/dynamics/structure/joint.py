@@ -180,10 +180,9 @@ class Joint(Backbone):
         traced = is_traced(scene, force)
         opens = scene.member.support != "none" or (condensed and goes_on(scene))
         if condensed and by != "cycles" and not (traced and opens and by is None):
-            soft = not scene.ideal_friction
             inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
             line = slider_line if inside else slider_line_once
-            network, found = line(scene, as_leaf(force, "force"), soft)
+            network, found = line(scene, as_leaf(force, "force"))
             u, sides, f, asymmetry, count = found if is_traced(found) else jax.device_get(found)
             if is_traced(u):
                 return cls(u, width * f, network, width, asymmetry, capacity, sides)

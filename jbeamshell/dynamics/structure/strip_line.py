@@ -31,7 +31,7 @@ def mean_of(pull: Any, push: Any) -> tuple[Any, Any]:
     return mean, jnp.max(jnp.abs(0.5 * (pull - push) / mean))
 
 
-def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, tuple[Array, ...]]:
+def slider_line(scene: Scene, force: Array) -> tuple[Network, tuple[Array, ...]]:
     """Network and backbone of a scene.
 
     The backbone is the mean displacements (k + 1,), those (2, k + 1) of pull and push, the forces
@@ -40,7 +40,7 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, tuple[
     one below it.  The displacements are NaN where the slip zones are not nested, and for a joint
     with bearings.
     """
-    network = Network.of(scene, soft)
+    network = Network.of(scene)
     ways = jnp.asarray([1.0, -1.0])
     branches = jax.vmap(lambda way: network.sliders(network.rest, way))(ways)
     levels = jnp.mean(branches.force, axis=0)[1:]
@@ -65,7 +65,7 @@ def slider_line(scene: Scene, force: Array, soft: bool) -> tuple[Network, tuple[
     return network, (mean, sides, f, asymmetry, count)
 
 
-slider_line_once = jax.jit(slider_line, static_argnums=2, compiler_options=ONCE)
+slider_line_once = jax.jit(slider_line, compiler_options=ONCE)
 
 
 def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, Array, Array]:
