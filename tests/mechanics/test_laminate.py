@@ -117,7 +117,7 @@ def test_equal_layers_are_one(plane, constants):
     five = np.repeat(one, 5, axis=1)
     five[..., 0] *= shares
     got, expected = (
-        evaluate(laminates(rows, 0.3, plane=plane, constants=constants), random_strains())
+        evaluate(laminates(rows, plane=plane, constants=constants), random_strains())
         for rows in (five, one)
     )
     np.testing.assert_allclose(got, expected, rtol=1e-12)
@@ -337,7 +337,7 @@ def test_upside_down(plane, constants):
 @pytest.mark.parametrize(("plane", "constants"), [("strain", "consistent"), ("stress", "printed")])
 def test_gradients_with_respect_to_every_number(plane, constants):
     layers = jnp.array([[0.3, 2.0, 0.3], [1.1, 40.0, 0.1], [0.2, 0.7, -0.4]])
-    laminate = Laminate(layers, KAPPA_S, 0.1, plane=plane, constants=constants)
+    laminate = Laminate(layers, KAPPA_S, plane=plane, constants=constants)
     strains = jnp.array([1.1e-3, -0.7e-3, 2.3e-3, 0.9e-3, -1.7e-3])
 
     @eqx.filter_jit
