@@ -146,7 +146,7 @@ OVER = {"load.amplitude": np.linspace(0.2, 2.2, 12), "strip.height_ratio": [0.05
 
 
 def cut(done, total):
-    if done >= 16:
+    if done >= 32:
         raise KeyboardInterrupt
 
 

@@ -125,7 +125,7 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
     monkeypatch.setattr(runner, "solve", solve)
     over = {"load.amplitude": [0.3, 1.9, 1.1, 0.7], "strip.height_ratio": [0.05] * 31 + [0.4]}
     hurt = jb.sweep(SCENE, over, FIGURES)
-    assert len(alone) == 4
+    assert len(alone) == 128 // job.LEAST
     assert set(alone) <= {0.3, 1.9, 1.1, 0.7}
     assert hurt.failed == alone.count(1.1)
     assert hurt.outside == alone.count(0.7)
@@ -352,7 +352,7 @@ def test_a_sweep_that_was_cut_off_goes_on(tmp_path):
         jb.sweep(SCENE, over, FIGURES, out=out, progress=cut)
     assert not out.exists()
     blocks = sorted(parts.glob("block-*"))
-    assert len(blocks) == 2
+    assert len(blocks) == 40 // job.LEAST
     blocks[0].write_bytes(blocks[0].read_bytes()[:100])  # a disk that ran full
     (parts / ".draft.npz").touch()
 
