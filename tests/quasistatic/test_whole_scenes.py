@@ -24,7 +24,8 @@ STEP = 1e-5  # of every number, for differences
 
 def dissipation(scene):
     history = jb.solve(scene, throw=False)
-    return history.dissipation, (history.force, history.displacement, history.reaction)
+    pressed = history.reaction * history.tributary  # stresses of short elements round off
+    return history.dissipation, (history.force, history.displacement, pressed)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -36,8 +37,8 @@ def test_whole_scenes_may_be_compiled_stacked_and_differentiated(kind):
     found, gradient = both(stacked)
     for place, scene in enumerate(scenes):
         alone = dissipation(scene)
-        force, displacement, reaction = (float(jnp.max(jnp.abs(column))) for column in alone[1])
-        scales = force * displacement, force, displacement, reaction
+        force, displacement, pressed = (float(jnp.max(jnp.abs(column))) for column in alone[1])
+        scales = force * displacement, force, displacement, pressed
         columns = zip(jax.tree.leaves(found), jax.tree.leaves(alone), scales, strict=True)
         for lanes, expected, scale in columns:
             np.testing.assert_allclose(lanes[place], expected, rtol=0.0, atol=1e-10 * scale)
