@@ -173,16 +173,28 @@ class TestPath:
         assert float(np.dot(back, way)) == pytest.approx(float(slope[2]), rel=1e-9)
 
 
-def test_works_of_the_load_and_of_the_pressures_are_kept_or_taken_by_friction():
-    scene, path = SCENE.replace({"contact.friction": 0.1}), PATH * [0.2, 1.0]
+@pytest.mark.parametrize(
+    ("scene", "load"),
+    [
+        (SCENE.replace({"contact.friction": 0.1}), 0.2),
+        (jb.library.single_lap().replace({"model.nodes": 33}), 0.1),
+    ],
+    ids=["strip", "lap joint"],
+)
+def test_works_of_the_load_and_of_the_pressures_are_kept_or_taken_by_friction(scene, load):
+    path = PATH * [load, 1.0]
     few, many = (jb.solve(scene, finer(path, parts), throw=False) for parts in (4, 16))
     assert many.converged
     np.testing.assert_array_equal(few.pressure[few.pressed + 1 :], finer(path, 4)[:, 1])
     left = [float(np.abs(run.energy_imbalance).max()) for run in (few, many)]
     assert left[1] < 0.1 * left[0]  # trapezoids of the works are of second order
     assert left[1] < 0.01 * float(np.sum(many.slip_work))
-    further = few.continued([[0.3, 0.9]], throw=False)
-    whole = jb.solve(scene, np.append(finer(path, 4), [[0.3, 0.9]], axis=0), throw=False)
+
+
+def test_a_path_of_pressures_goes_on():
+    scene, path = SCENE.replace({"contact.friction": 0.1}), finer(PATH * [0.2, 1.0], 4)
+    further = jb.solve(scene, path, throw=False).continued([[0.3, 0.9]], throw=False)
+    whole = jb.solve(scene, np.append(path, [[0.3, 0.9]], axis=0), throw=False)
     np.testing.assert_array_equal(further.displacement, whole.displacement)
 
 
