@@ -19,7 +19,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import (
+    LogFormatterSciNotation,
+    LogLocator,
+    MaxNLocator,
+    NullFormatter,
+    ScalarFormatter,
+)
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
@@ -199,15 +205,19 @@ def mark_decades(*axes_of_one: Axis) -> None:
     """Mark 1, 2 and 5 of every decade on logarithmic axes of less than two decades.
 
     Axes of more than 20 to 1 have 1 and 3, whose labels would touch otherwise; those of less than
-    half a decade have a few even marks.
+    5 to 1 have a few even marks, whose power of ten stands at the axis's end.
     """
     for axis in axes_of_one:
         low, high = axis.get_view_interval()
         if high >= 100.0 * low:
             continue
-        marks = LogLocator(subs=(1.0, 3.0) if high > 20.0 * low else (1.0, 2.0, 5.0))
-        axis.set_major_locator(marks if high >= 5.0 * low else MaxNLocator(FEW))
-        axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(99, 99)))
+        if high < 5.0 * low:
+            axis.set_major_locator(MaxNLocator(FEW))
+            axis.set_major_formatter(ScalarFormatter())
+        else:
+            marks = (1.0, 3.0) if high > 20.0 * low else (1.0, 2.0, 5.0)
+            axis.set_major_locator(LogLocator(subs=marks))
+            axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(99, 99)))
         axis.set_minor_formatter(NullFormatter())
 
 
