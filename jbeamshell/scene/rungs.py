@@ -113,7 +113,7 @@ def spelled_out(
     Raises
     ------
     InputError
-        if the rung is unknown or there is it no more, or if the values disagree with it
+        if the rung is unknown or a former one, or if the values disagree with it
     """
     if values.get("model.solution") in ("masing", "masing-pull"):
         fix = "is no solution any more: leave it out, which solves whole cycles"
