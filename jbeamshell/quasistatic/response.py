@@ -115,7 +115,7 @@ class Answers:
     def __init__(self, scene: Scene, asked: _Asked) -> None:
         self._given = scene, asked
         self._ask = _response(scene, asked)
-        if scene.model.condensed and not is_traced(scene) and is_single(scene):
+        if not is_traced(scene) and is_single(scene):
             with jax.enable_x64(True):
                 precise = _response(doubled(scene), asked)
             self._ask = in_double(precise, within=self._ask)

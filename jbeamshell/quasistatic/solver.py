@@ -14,7 +14,7 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, warn_of_doubts
 from jbeamshell.common.native import Program
-from jbeamshell.common.precision import is_single
+from jbeamshell.common.precision import in_double, is_single
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.condensed.solve import Cycles, walks_pressures
 from jbeamshell.condensed.solve import solve as solve_condensed
@@ -102,23 +102,29 @@ def solve(
         return _condensed(scene, whole, cycles, throw, path is None, strip)
     solver = solver or Newton()
     touching = None if contact is None else check_contact(scene, contact)
+    history = _by_load_steps(scene, whole, touching, solver, throw).but(cycles=cycles)
+    if throw and not is_traced(history):
+        warn_of_doubts(history.doubts, stacklevel=STACK)
+    return history
+
+
+@in_double
+def _by_load_steps(
+    scene: Scene, path: LoadPath, touching: np.ndarray | None, solver: Newton, throw: bool
+) -> History:
+    """History by load steps; a failed step is walked again in pieces."""
     native, walked = fits_native(scene), np.asarray(True)
-    steps, history = _solve(scene, touching, whole, walked, solver, native=native)
+    steps, history = _solve(scene, touching, path, walked, solver, native=native)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
-        history = eqx.error_if(history, ~converged, message) if throw else history
-        return history.but(cycles=cycles)
+        return eqx.error_if(history, ~converged, message) if throw else history
     if not np.asarray(steps.state.converged)[-1]:  # indexing a JAX array would compile
-        start = initial_state(scene, touching)
         if scene.model.solution == "stepwise":
-            steps = recover(scene, steps, whole, solver, start)
+            steps = recover(scene, steps, path, solver, initial_state(scene, touching))
         if throw:
-            raise_if_failed(scene, steps, whole)
-        history = with_end(history_of(scene, steps, whole.pressure), steps)
-    history = history.but(cycles=cycles)
-    if throw:
-        warn_of_doubts(history.doubts, stacklevel=STACK)
+            raise_if_failed(scene, steps, path)
+        history = with_end(history_of(scene, steps, path.pressure), steps)
     return history
 
 

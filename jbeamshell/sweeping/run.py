@@ -124,7 +124,7 @@ def sweep(
     place = _Place(processes, executor, devices)
     with contextlib.ExitStack() as stack:
         names, lanes = _lanes_of(scene, over, figures, paired)
-        if lanes.scene.model.condensed and is_single(lanes.scene):
+        if is_single(lanes.scene):
             stack.enter_context(jax.enable_x64(True))
             lanes = dataclasses.replace(lanes, scene=doubled(lanes.scene))
         job = _job(lanes, names, solver)
