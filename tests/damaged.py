@@ -53,7 +53,7 @@ amplitude = 0.5
 [upper]
 file = "matrix.sti"
 contact = "contact.csv"
-held = [[3, 1], [3, 2]]
+held = [[3, 2]]
 pull = [[9, 1, 1.0]]
 [lower]
 file = "body.npz"

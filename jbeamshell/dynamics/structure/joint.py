@@ -131,7 +131,8 @@ class Joint(Backbone):
         require("joint.force", f.shape, paired, BACKBONE)
         slopes = np.diff(f, prepend=0.0) / np.diff(u, prepend=0.0)
         rising = bool(np.all(np.diff(u, prepend=0.0) > 0.0) and np.all(slopes >= 0.0))
-        softening = bool(np.all(np.diff(slopes) <= 1e-9 * slopes[0]))
+        rounding = np.finfo(u.dtype).eps * u[1:] / np.diff(u)  # of slopes, where points lie close
+        softening = bool(np.all(np.diff(slopes) <= (1e-9 + 4.0 * rounding) * slopes[0]))
         require("joint.force", f, rising and softening and slopes[0] > 0.0, BACKBONE)
 
     @classmethod
