@@ -264,7 +264,7 @@ READERS = {
     "block-000000": _block,
     "sweep": lambda path: Store(path.parent).read()[1],
     "fit": _state,
-    "table": lambda path: list(table.read(path)),
+    "table": lambda path: jax.tree.leaves(table.read(path)),
     "curve": _curve,
 }
 
