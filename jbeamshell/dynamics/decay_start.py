@@ -1,4 +1,4 @@
-"""Where a decaying vibration begins, and a first guess of its decay and frequency."""
+"""Beginning of a decaying vibration, and a first guess of its decay and frequency."""
 
 from __future__ import annotations
 

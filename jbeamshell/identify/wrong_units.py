@@ -47,7 +47,7 @@ def _beyond(bijection: Bijection, value: float) -> int:
 
 
 def _far(bijection: Bijection, value: float) -> str:
-    """How far from its start a value ended, in words."""
+    """Distance of a value from its start, in words."""
     if bijection.bound_at(value) is not None:
         return "at its bound"
     ratio = value / bijection.start
