@@ -94,10 +94,7 @@ def scene_of(options: argparse.Namespace) -> Scene:
 
 def assignments(texts: Sequence[str]) -> dict[str, Any]:
     """Values by key from texts KEY=VALUE."""
-    values = {key: _value(text) for key, text in pairs(texts, "contact.friction=0.2").items()}
-    if isinstance(values.get("model.fields"), str):  # one field alone has no comma
-        values["model.fields"] = [values["model.fields"]]
-    return values
+    return {key: _value(text) for key, text in pairs(texts, "contact.friction=0.2").items()}
 
 
 def pairs(texts: Sequence[str], example: str) -> dict[str, str]:

@@ -46,7 +46,7 @@ from jbeamshell.condensed.turns import turns_of
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.keys import ASSEMBLIES, CONTROLS
-from jbeamshell.scene.parts import Load
+from jbeamshell.scene.parts import unit_path
 
 STEPS = 16  # per half cycle
 HARDLY = 1e-11  # energy of a movement over that of the nodes alone, from which nothing resists
@@ -136,11 +136,11 @@ def solve_contact(
     words = control, assembly, steps_per_half_cycle if until_steady else None
     levels, walked, error = _walked((contact, distance, targets), held, words)
     if until_steady and not is_traced(levels):
-        targets = targets[: _unit_path(int(walked), steps_per_half_cycle).size]
+        targets = targets[: unit_path(int(walked), steps_per_half_cycle).size]
         levels, error = jax.tree.map(lambda a: a[: targets.size + 1], (levels, error))
     if not is_traced(levels) and throw:
         _demand(levels, targets)
-    unit = _unit_path(MOST_CYCLES if cycles is None else cycles, steps_per_half_cycle)
+    unit = unit_path(MOST_CYCLES if cycles is None else cycles, steps_per_half_cycle)
     loads = unit[: targets.size] if path is None else targets
     history = _history(
         upper, levels, held, error, _cycles(loads), as_leaf(friction), control, assembly
@@ -159,17 +159,12 @@ def _targets(
         if cycles is not None:
             require_count("cycles", cycles, 1)
         count = MOST_CYCLES if cycles is None else cycles
-        return as_leaf(amplitude) * jnp.asarray(_unit_path(count, steps_per_half_cycle))
+        return as_leaf(amplitude) * jnp.asarray(unit_path(count, steps_per_half_cycle))
     require("cycles", cycles, cycles is None, "is given beside path: leave one of them out")
     loads = as_leaf(path, "path")
     require("path", loads.shape, loads.ndim == 1 and loads.size > 0, "give (levels,) loads")
     require_finite("path", loads)
     return loads
-
-
-def _unit_path(cycles: int, steps: int) -> np.ndarray:
-    """Loads of the cycles for the amplitude 1."""
-    return Load(amplitude=jnp.ones(()), cycles=cycles, steps_per_half_cycle=steps).unit_path()
 
 
 @jax.jit

@@ -16,7 +16,8 @@ from jbeamshell.condensed.entry import goes_on
 from jbeamshell.condensed.solve import solve
 from jbeamshell.condensed.strip import condensed, spring_stiffness
 from jbeamshell.scene.load_path import check
-from jbeamshell.scene.rungs import PLANE_NODES
+from jbeamshell.scene.planning import PLANE_NODES
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 
 NODES = 49  # 1 % of elasticity where D exceeds a tenth of the bar's cubic law, 3 % down to 1e-4
@@ -63,7 +64,7 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int | None = None
     for i in np.flatnonzero(np.isnan(works)):
         steady = {"load.amplitude": sizes[i], "load.cycles": STEADY, "load.steps_per_half_cycle": 1}
         # Events leave steps of whole elements in D, which this many nodes make small.
-        lone = scene.replace(steady | {"model.nodes": max(scene.model.nodes, PLANE_NODES)})
+        lone = scene.replace(steady | {"model.nodes": max(scene.plan.nodes, PLANE_NODES)})
         history = solve(lone, *check(lone))
         if not history.converged:
             raise UnconvergedError(f"amplitudes = {sizes[i]:.6g}: its events come to no end")
@@ -109,14 +110,16 @@ def on_contact_line(scene: Scene, nodes: int | None) -> Scene:
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     force = scene.load.control == "force"
     require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
-    if scene.model.given("solution") != "condensed":  # chosen or another: elasticity
-        scene = scene.replace({"model.rung": "plane", "model.nodes": NODES})
+    if scene.model.section == AUTO or not scene.plan.on_contact_line:
+        scene = scene.replace({"model.section": "plane", "model.kinematics": "linear"})
+    if scene.plan.elastic:
+        scene = scene.replace({"model.nodes": NODES})
     return scene if nodes is None else scene.replace({"model.nodes": nodes})
 
 
 @eqx.filter_jit
 def _factors(scene: Scene) -> SteadyCycles:
-    strip = condensed(scene, scene.model.nodes)
+    strip = condensed(scene, scene.plan.nodes)
     body = strip.body
     if scene.contact.stick_stiffness is not None:
         body, _ = with_springs(body, spring_stiffness(scene, strip))

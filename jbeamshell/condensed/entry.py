@@ -47,7 +47,7 @@ class Held(NamedTuple):
 
 def goes_on(scene: Scene) -> bool:
     """True if members go on beyond the contact by a length that is not given."""
-    return scene.load.entry == "member" and scene.model.warps
+    return scene.load.entry == "member" and scene.plan.warps
 
 
 def states(scene: Scene) -> tuple[bool, ...]:
@@ -130,7 +130,7 @@ def leaving_end(
 
 def _count(scene: Scene) -> int:
     """Number of elements of a length beyond that is not given."""
-    return max(LEAST, round(PER_REACH * (scene.model.nodes - 1)))
+    return max(LEAST, round(PER_REACH * (scene.plan.nodes - 1)))
 
 
 def _lengths(length: Array, half_height: Array, count: int) -> Array:

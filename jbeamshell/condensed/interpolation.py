@@ -113,7 +113,7 @@ def may_be_interpolated(scene: Scene) -> bool:
     pressed = is_pressed_evenly(scene) and contact.normal == "rigid" and contact.gap is None
     pressed = pressed and contact.holes is None and contact.assembly != "frictional"
     pulled = load.kind == "force" and load.arm is None
-    return scene.model.solution == "plane" and homogeneous and alone and pressed and pulled
+    return scene.plan.elastic and homogeneous and alone and pressed and pulled
 
 
 def built(scene: Scene, height_ratios: Range, poisson_ratios: Range) -> Bodies | None:
@@ -150,7 +150,7 @@ def _built(given: tuple[Scene, Array]) -> Body:
 
     def one(point: Array) -> Body:
         own = scene.replace({HEIGHT: jnp.exp(point[0]), POISSON: -0.5 * jnp.expm1(-point[1])})
-        body, modulus = condensed(own, own.model.nodes).body, own.strip.plane_modulus
+        body, modulus = condensed(own, own.plan.nodes).body, own.strip.plane_modulus
         stiffness = {name: getattr(body, name) / modulus for name in ("K_tt", "K_tn", "K_nn")}
         return body.but(**stiffness, c=body.c * modulus, x=body.x / own.strip.length)
 

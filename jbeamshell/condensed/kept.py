@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from jbeamshell.common.checks import is_staged, is_traced
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
 
@@ -36,7 +37,7 @@ def kept(build: Build) -> Build:
 
     @functools.wraps(build)
     def found(scene: Scene) -> Any:
-        if scene.model.solution != "plane" or is_staged() or is_traced(scene):
+        if not scene.plan.elastic or is_staged() or is_traced(scene):
             return build(scene)
         template, numbers = Template.of(alike(scene))
         return built(template, np.asarray(numbers, template.dtype).tobytes())
@@ -47,8 +48,8 @@ def kept(build: Build) -> Build:
 def alike(scene: Scene) -> Scene:
     """One scene for all that share a condensed strip."""
     none, contact = np.zeros_like(scene.load.amplitude), scene.contact
-    load = scene.load.but(amplitude=none, cycles=1, steps_per_half_cycle=1, as_given=())
-    model = scene.model.but(tolerance=1.0, as_given=())
+    load = scene.load.but(amplitude=none, cycles=1, steps_per_half_cycle=AUTO)
+    model = scene.model.but(tolerance=1.0, section=AUTO, kinematics=AUTO, nodes=AUTO, end_size=AUTO)
     if contact.assembly != "frictional":
         contact = contact.but(friction=none)
-    return scene.but(load=load, contact=contact, model=model)
+    return scene.but(load=load, contact=contact, model=model, plan=scene.plan._replace(steps=1))

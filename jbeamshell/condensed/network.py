@@ -95,7 +95,7 @@ class Network(eqx.Module):
 
         Slip of elastic sliders is the plastic one.
         """
-        strip, friction = condensed(scene, scene.model.nodes), scene.contact.friction
+        strip, friction = condensed(scene, scene.plan.nodes), scene.contact.friction
         body = strip.body
         if scene.contact.stick_stiffness is not None:
             body, _ = with_springs(body, spring_stiffness(scene, strip))
@@ -115,7 +115,7 @@ class Network(eqx.Module):
         InputError
             for a backbone along which nothing slips
         """
-        moving = jax.jit(lambda scene: moving_volume(condensed(scene, scene.model.nodes)))
+        moving = jax.jit(lambda scene: moving_volume(condensed(scene, scene.plan.nodes)))
         slopes = jnp.diff(displacement, prepend=0.0) / jnp.diff(force, prepend=0.0)
         kept = np.append(np.diff(np.asarray(slopes)) > SOFTENS * slopes[0], True)
         require("force", float(force[-1]), bool(np.sum(kept) > 1), STUCK)

@@ -17,8 +17,8 @@ V, W, BETA, PSI = range(len(FIELDS))
 
 
 def section_form(scene: Scene) -> SectionForm:
-    """Form of the section of a scene: its own if it is condensed, else that of plane elasticity."""
-    return _beam(scene) if scene.model.solution == "condensed" else _plane(scene)
+    """Form of the section of a scene: its own, or that of plane elasticity."""
+    return _plane(scene) if scene.plan.elastic else _beam(scene)
 
 
 def thicknesses(scene: Scene) -> Array:
@@ -46,10 +46,10 @@ def _beam(scene: Scene) -> SectionForm:
 
     The elements are those of the finite differences of `jbeamshell.mechanics.elements`.
     """
-    model, half_height = scene.model, scene.strip.half_height
+    plan, half_height = scene.plan, scene.strip.half_height
     section, phi = scene.hierarchic_section(), scene.strain_energy()
-    still = jnp.zeros(model.width, half_height.dtype)
-    active = np.array(model.active)
+    still = jnp.zeros(plan.width, half_height.dtype)
+    active = np.array(plan.active)
 
     def energy(fields: Section, slopes: Section) -> Array:
         if section is not None:
@@ -80,7 +80,7 @@ def _beam(scene: Scene) -> SectionForm:
     modes = modes.at[2, 1, V].set(half_height).at[4, 1, W].set(-half_height)
 
     thickness = thicknesses(scene)
-    points, weights = np.polynomial.legendre.leggauss(max(model.order, 1) + 1)
+    points, weights = np.polynomial.legendre.leggauss(max(plan.order, 1) + 1)
     bottom = jnp.cumsum(thickness) - thickness - half_height
     heights = bottom[:, None] + 0.5 * thickness[:, None] * (1.0 + points)
     shapes = jax.vmap(jax.vmap(lambda height: parts(still, height)))(heights)

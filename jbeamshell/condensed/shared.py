@@ -108,7 +108,7 @@ def shared(
     figures : names of `jbeamshell.History` that are asked for
     ranges : least and most height ratio and Poisson's ratio, by key; None is not known
     """
-    if not scene.model.condensed or not OF_CONTACT.issuperset(figures) or is_traced(scene):
+    if not scene.plan.on_contact_line or not OF_CONTACT.issuperset(figures) or is_traced(scene):
         return None
     vary, strip = set(over), scene.strip
     if vary <= LOADS:

@@ -30,7 +30,6 @@ from jbeamshell.condensed.strip import Strip, condensed, spring_stiffness, stays
 from jbeamshell.condensed.turns import Turns, known_turns, turns_of, turns_of_cycles
 from jbeamshell.history.history import History
 from jbeamshell.scene.load_path import LoadPath
-from jbeamshell.scene.rungs import general_rung
 from jbeamshell.scene.scene import Scene
 
 Cycles = tuple[tuple[int, int, int], ...]
@@ -55,7 +54,7 @@ def solve(
 
     Parameters
     ----------
-    scene : scene on a condensed rung; may be traced
+    scene : scene that is solved on its contact line; may be traced
     path, cycles : whole path of the scene and its closed cycles, see
         `jbeamshell.scene.load_path.check`
     own : True if the loads are the scene's own cycles, whose turns are always known
@@ -96,21 +95,21 @@ def _solved(
     now: bool,
 ) -> History:
     """History, whose fields above the contact are found now or when they are read."""
-    before, rung = scene.load.pressure_steps, scene.model.rung
+    before = scene.load.pressure_steps
     targets, parts = path.target[before:], path.pressure[before:]
     whole = not is_traced(parts) and bool(np.all(np.asarray(parts) == 1.0))
-    fix = "must act wholly beside elastic sliders, a gap or holes: leave these out, or take "
-    fix += f"model.rung = {general_rung(rung)} to change them"
+    fix = "must act wholly beside elastic sliders, a gap or holes: leave these out, or take load "
+    fix += "steps (by='steps') of another section than plane"
     require("path", "pressures", whole or walks_pressures(scene), fix)
     base = scene.contact.normal == "rigid" or not targets.size
-    fix = f"leaves {rung} nothing but the pressures: set load.cycles = 0, or take "
-    fix += general_rung(rung)
+    fix = "leaves plane elasticity nothing but the pressures: set load.cycles = 0, or take another "
+    fix += "model.section"
     require("contact.normal", scene.contact.normal, base, fix)
     turns = _turns(scene, targets, own) if whole else ()
     strip = strip_of(scene) if strip is None else strip
     if not is_traced(strip.lift):
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
-        fix = f"must press the strip down for model.rung = {rung}"
+        fix = f"must press the strip down for model.section = {scene.plan.section}"
         require("contact.pressure", scene.contact.pressure, down, fix)
     known = isinstance(turns, tuple)
     given = (scene, strip, targets, None if whole else parts, () if known else turns)
@@ -123,7 +122,7 @@ def _solved(
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
     """True for each level before which the load has turned; an array if the loads are traced."""
     if own:
-        return turns_of_cycles(scene.load.cycles, scene.load.steps_per_half_cycle)
+        return turns_of_cycles(scene.load.cycles, scene.plan.steps)
     return turns_of(targets) if is_traced(targets) else known_turns(np.asarray(targets))
 
 
@@ -131,7 +130,7 @@ def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
 @Small
 def strip_of(scene: Scene) -> Strip:
     """Strip of a scene on its contact line."""
-    strip = condensed(scene, scene.model.nodes)
+    strip = condensed(scene, scene.plan.nodes)
     no_masses = strip.form.masses[:0]  # of no use without inertia, and slow to compile
     return strip._replace(form=strip.form._replace(masses=no_masses))
 

@@ -262,11 +262,11 @@ def stations(scene: Scene, nodes: int) -> Array:
     The latter are denser at the singular loaded corner and at steps of the pressure.
     """
     length, half_height = scene.strip.length, scene.strip.half_height
-    steps, model = scene.contact.steps(length), scene.model
+    steps, plan = scene.contact.steps(length), scene.plan
     if scene.member.support != "none":
         return _joint_stations(scene, nodes)
-    if model.solution == "condensed":
-        grading = (model.end_size, steps, elements.GROWTH, model.far_size, model.small_growth)
+    if not plan.elastic:
+        grading = (plan.end_size, steps, elements.GROWTH, plan.far_size, plan.small_growth)
         return elements.vertices(nodes - 1, length, half_height, *grading)
     if steps is None:
         return _plane_vertices(scene, nodes, PLANE_END_SIZE, None, PLANE_GROWTH)
@@ -279,11 +279,11 @@ def stations(scene: Scene, nodes: int) -> Array:
 def _joint_stations(scene: Scene, nodes: int) -> Array:
     """Stations of a lap joint, which are denser at both its ends and at steps of the pressure."""
     length, half_height = scene.strip.length, scene.strip.half_height
-    steps, model = scene.contact.steps(length), scene.model
-    if model.solution == "condensed":
+    steps, plan = scene.contact.steps(length), scene.plan
+    if not plan.elastic:
         start = jnp.zeros_like(length)[None]
         foci = start if steps is None else jnp.append(start, steps)
-        grading = (model.end_size, foci, elements.GROWTH, model.far_size, model.small_growth)
+        grading = (plan.end_size, foci, elements.GROWTH, plan.far_size, plan.small_growth)
         return elements.vertices(nodes - 1, length, half_height, *grading)
     none = jnp.zeros((0,), length.dtype) if steps is None else steps
     foci = jnp.append(jnp.zeros_like(length), none)

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from jbeamshell.scene.parts import Load
+from jbeamshell.scene.parts import unit_path
 
 Turns = tuple[bool, ...] | Array
 
@@ -40,4 +40,4 @@ def turns_of(loads: Array) -> Array:
 @functools.cache
 def turns_of_cycles(cycles: int, steps: int) -> tuple[bool, ...]:
     """Turns of a scene's own cycles with so many load steps per half cycle."""
-    return known_turns(Load(cycles=cycles, steps_per_half_cycle=steps).unit_path())
+    return known_turns(unit_path(cycles, steps))

@@ -71,7 +71,7 @@ def four_parameters(scene: Scene, *, width: float = 1.0) -> FourParameters:
 
     Parameters
     ----------
-    scene : scene, whose load is not used; take ``model.rung = plane`` for elasticity's figures
+    scene : scene, whose load is not used; take ``model.section = plane`` for elasticity's figures
     width : of the strip, by which forces and energies are multiplied
 
     Raises
@@ -83,7 +83,7 @@ def four_parameters(scene: Scene, *, width: float = 1.0) -> FourParameters:
 
     Examples
     --------
-    >>> print(jb.dynamics.four_parameters(jb.Scene().replace({"model.rung": "plane"})))
+    >>> print(jb.dynamics.four_parameters(jb.Scene().replace({"model.section": "plane"})))
     """
     require_number("width", width)
     force = scene.load.control == "force"

@@ -12,6 +12,7 @@ of gross slip, frequencies without the strip's inertia are too high by m_1/2m an
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import jax
@@ -31,6 +32,7 @@ from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.motion import Motion
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.modal import ModalCurve
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 
 LIGHT = 0.005  # largest m_1/m at which the strip's inertia is left out by itself
@@ -180,7 +182,7 @@ def let_go(
             nested = bool(motion.nested)
     if motion is None or not nested:
         require("whole", whole, whole is not False and not lap, NOT_NESTED)
-        require("model.rung", scene.model.rung, not scene.model.condensed, NO_INERTIA)
+        require("model.section", scene.plan.section, not scene.plan.on_contact_line, NO_INERTIA)
         motion = _whole(scene, end_force, mass, inertia, cycles, per_cycle, samples, progress)
         joint = Joint.of(scene, end_force)
     try:
@@ -226,12 +228,14 @@ def _cycles(given: tuple[Network, Array]) -> tuple[Array, Array]:
 
 def on_contact_line(scene: Scene) -> Scene | None:
     """Scene as it is condensed, or as plane elasticity; None for bars, shells and the rest."""
-    if scene.model.condensed:
+    if scene.plan.on_contact_line:
         return scene
-    if scene.model.order == 0 and "psi" not in scene.model.fields:
+    if "psi" not in scene.plan.fields:
         return None
+    open_grid: dict[str, Any] = {"nodes": AUTO, "end_size": AUTO, "by": AUTO}
+    model = dataclasses.replace(scene.model, section="plane", kinematics="linear", **open_grid)
     try:
-        return scene.replace({"model.rung": "plane"})
+        return dataclasses.replace(scene, model=model)
     except InputError:
         return None
 

@@ -294,13 +294,13 @@ class Page:
 
     def _say(self, view: View, drawing: float) -> None:
         """Say what was computed, or why to doubt it."""
-        model, own = view.history.scene.model, self.scene.model.nodes
+        plan, own = view.history.scene.plan, self.scene.plan.nodes
         if view.doubts:
-            fewer = f" ({model.nodes} here, {own} in the scene)" if model.nodes != own else ""
+            fewer = f" ({plan.nodes} here, {own} in the scene)" if plan.nodes != own else ""
             self._tell(view.doubts[0] + fewer, "error")
             return
         self._tell(
-            f"rung {model.rung}, {model.nodes} nodes: computed in {1e3 * view.seconds:.0f} ms, "
+            f"section {plan.section}, {plan.nodes} nodes: computed in {1e3 * view.seconds:.0f} ms, "
             f"drawn in {1e3 * drawing:.0f} ms"
         )
 

@@ -14,6 +14,7 @@ from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.explorer.controls import gross_slip
 from jbeamshell.history.history import History
 from jbeamshell.quasistatic.solver import solve
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 
 Numbers = NDArray[np.float64]
@@ -69,8 +70,8 @@ def drawable(scene: Scene) -> Scene:
     gets as many nodes as can be drawn while a slider moves, unless the scene says how many.
     """
     found = scene.serving(()).pinned()
-    if found.model.solution == "plane" and "nodes" in scene.model.open:
-        return found.replace({"model.nodes": min(found.model.nodes, PLANE_NODES)})
+    if found.plan.elastic and scene.model.nodes == AUTO:
+        return found.replace({"model.nodes": min(found.plan.nodes, PLANE_NODES)})
     return found
 
 
@@ -114,7 +115,7 @@ def curve_of(scene: Scene) -> Curve:
     limit = gross_slip(scene) if scene.load.control == "force" else np.inf
     own = LARGEST * float(scene.load.amplitude)
     amplitudes = CURVE * (limit if np.isfinite(limit) else own)
-    half = CURVE_STEPS if scene.model.solution == "stepwise" else 1
+    half = 1 if scene.plan.on_contact_line else CURVE_STEPS
     history = solve(scene, _growing(amplitudes, half), throw=False)
     work = np.asarray(history.slip_work)[scene.load.pressure_steps :]
     return Curve(amplitudes, np.sum(work.reshape(amplitudes.size, 3, half)[:, 1:], axis=(1, 2)))

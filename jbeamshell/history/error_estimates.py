@@ -209,7 +209,7 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     """
     grid, corner = dissipation_errors(cycle)
     numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
-    plane = scene.model.solution == "plane"
+    plane = scene.plan.elastic
     if change is not None:
         grid = numbers.maximum(change, REFINED * grid)
     elif scene.contact.jumps > 1:
@@ -219,8 +219,8 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     soft = scene.contact.stick_stiffness is not None
     if plane:
         corner = numbers.minimum(corner, singular_corner_error(scene, cycle))
-    elif "w" in scene.model.fields or scene.member.support != "none":
+    elif scene.plan.lifts or scene.member.support != "none":
         corner = corner if soft and change is None else numbers.zeros(())
     slider = slider_error(cycle) if soft else numbers.zeros(())
-    steps = step_error(cycle) if scene.model.solution == "stepwise" else numbers.zeros(())
+    steps = step_error(cycle) if scene.plan.engine == "load steps" else numbers.zeros(())
     return grid, corner, slider, steps

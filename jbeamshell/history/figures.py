@@ -76,7 +76,7 @@ class CycleFigures(Record, LoopFigures):
             friction=self.scene.contact.friction,
             slip_stiffness=self.scene.slip_stiffness(self.tributary),
             half_height=self.scene.strip.half_height,
-            dissipation=work if self.scene.model.condensed else None,
+            dissipation=work if self.scene.plan.on_contact_line else None,
         )
 
     @property

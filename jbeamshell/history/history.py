@@ -18,7 +18,7 @@ from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
 from jbeamshell.history.profiles import Profiles
 from jbeamshell.history.reliability import doubts_of_run
 from jbeamshell.history.saved import write_history
-from jbeamshell.scene import choice, section_error
+from jbeamshell.scene import planning, section_error
 
 FIGURES = (
     "dissipation",
@@ -93,7 +93,7 @@ class History(Profiles, ContactLine, CycleFigures):
     @property
     def _contact_figures(self) -> tuple[str, ...]:
         """Names of the figures of the contact that this scene has."""
-        fields, founded = self.scene.model.fields, self.scene.contact.normal != "none"
+        fields, founded = self.scene.plan.fields, self.scene.contact.normal != "none"
         names: tuple[str, ...] = () if founded else ("tip_deflection", "curvature")
         if "w" in fields and founded:
             names += ("contact_end", "tip_deflection", "lift_slope")
@@ -112,10 +112,10 @@ class History(Profiles, ContactLine, CycleFigures):
         if not pulled:
             what = f"pressed by {float(np.sum(self.load)):.4g}"
         title = (
-            f"{self.force.size} levels of {' '.join(self.scene.model.fields)} on "
+            f"{self.force.size} levels of {' '.join(self.scene.plan.fields)} on "
             f"{self.x.size} nodes, eta = {float(strip.height_ratio):.4g}, {what}"
         )
-        chosen = choice.in_words(self.scene)
+        chosen = planning.in_words(self.scene)
         if self.change is not None and np.isfinite(self.change):  # something slips
             percent = 100.0 * float(self.change)
             chosen += f"; halving the elements changed the loop by {percent:.2g} %"
@@ -154,9 +154,9 @@ class History(Profiles, ContactLine, CycleFigures):
             if it was not solved step by step, if its last step found no equilibrium, or if the
             path makes no sense
         """
-        solution = self.scene.model.solution
-        fix = "keeps no state of the contact from which to go on: take 'stepwise'"
-        require("model.solution", solution, self.scene.model.walks, fix)
+        fix = "keeps no state of the contact from which to go on: take jb.solve(..., by='steps')"
+        plan = self.scene.plan
+        require("model.section", f"{plan.section} in {plan.engine}", plan.walks_any_path, fix)
         if self.end is None:
             raise InputError("history: was made by hand and has no end to continue: solve it")
         further: History = self.end.continued(self, path, **options)
@@ -176,7 +176,7 @@ class History(Profiles, ContactLine, CycleFigures):
             "pressure": self.pressure,
             "friction_work": np.cumsum(self.slip_work),
         }
-        if "w" in scene.model.fields and scene.contact.normal != "none":
+        if scene.plan.lifts and scene.contact.normal != "none":
             columns["contact_end"] = self.contact_end
         columns |= {"newton_iterations": self.iterations, "error": self.error}
         return {name: np.asarray(column) for name, column in columns.items()}

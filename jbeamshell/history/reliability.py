@@ -14,10 +14,10 @@ from jax import Array
 
 from jbeamshell.history.error_estimates import SlipCycle, estimates
 from jbeamshell.scene.buckling import sway, weakest_column
-from jbeamshell.scene.choice import may_condense
 from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.linearisation import linear_error
-from jbeamshell.scene.rungs import general_rung
+from jbeamshell.scene.plan import CLOSED
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import doubt_of_section
 
@@ -25,7 +25,7 @@ NEGLIGIBLE = 1e-9  # tension over the pressure, taken as zero
 CLOSES = 1e-3  # distance between the ends of a steady loop, over its width
 TOLERANCE = 0.02  # relative error of the dissipation below which there is never a doubt
 OVERSHOOT = 1.0  # error under arc-length control, times the load steps per half cycle
-FINER = "take a smaller model.end_size or more model.nodes"
+FINER = "take more model.nodes"
 
 
 class Run(Protocol):
@@ -86,7 +86,7 @@ def doubts_of_run(history: Run) -> tuple[str, ...]:
     if not plain.converged:
         return ("a load step found no equilibrium: that step and all after it hold NaN",)
     scene = plain.scene
-    if scene.model.solution == "closed-form":
+    if scene.plan.engine == CLOSED:
         return _section(plain)
     if scene.contact.normal == "none":
         return _buckling(scene)
@@ -99,13 +99,14 @@ def doubts_of_run(history: Run) -> tuple[str, ...]:
 
 def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
-    model, found = scene.model, []
-    error = linear_error(scene) + sway(scene) if model.kinematics == "linear" else 0.0
-    if error > doubted_from(model.tolerance):
+    allowed, found = doubted_from(scene.model.tolerance), []
+    linear = scene.plan.kinematics == "linear"
+    error = linear_error(scene) + sway(scene) if linear else 0.0
+    if error > allowed:
         found.append(f"{_off(error)}: kinematics are linear; {_exact(scene)}")
     found += _buckling(scene)
-    bent = OVERSHOOT / scene.load.steps_per_half_cycle
-    if scene.load.control == ARC_LENGTH and bent > doubted_from(model.tolerance):
+    bent = OVERSHOOT / scene.plan.steps
+    if scene.load.control == ARC_LENGTH and bent > allowed:
         found.append(
             f"{_off(bent)}: arc length is measured along the load steps, and goes too far where "
             "the path bends; take more load.steps_per_half_cycle"
@@ -115,17 +116,15 @@ def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
 
 def _exact(scene: Scene) -> str:
     """Fix that makes a scene's kinematics exact."""
-    model = scene.model
     if scene.member.support != "none":
         return "a lap joint knows no others: take a smaller load.amplitude"
-    rung = f"model.rung = {general_rung(model.rung)} with " if model.condensed else ""
-    return f"take {rung}model.kinematics = exact"
+    section = "model.section = p6 with " if scene.plan.elastic else ""
+    return f"take {section}model.kinematics = exact"
 
 
 def _buckling(scene: Scene) -> tuple[str, ...]:
     """Doubt about a part of a strip under compression, of which linear kinematics know nothing."""
-    model = scene.model
-    if model.kinematics == "exact" or "w" not in model.fields:
+    if scene.plan.kinematics == "exact" or not scene.plan.lifts:
         return ()
     column = weakest_column(scene)
     if not column.near:
@@ -156,7 +155,7 @@ def _resolution(history: Run) -> tuple[str, ...]:
         cycle = jax.tree.map(np.asarray, history.slip_cycle)
         errors = estimates(history.scene, cycle, history.change)
         grid, corner, slider, steps = map(float, errors)
-    plane, finer = history.scene.model.solution == "plane", finer_grid(history.scene)
+    finer = finer_grid(history.scene)
     if np.isinf(grid):
         return (
             "nothing slips in the last cycle: slip that is smaller than the elements would not be "
@@ -169,14 +168,15 @@ def _resolution(history: Run) -> tuple[str, ...]:
         halved = ", and halving the elements changed the loop by as much" * refined
         found.append(f"{_off(grid)}: few nodes do the slipping{halved}; {finer}")
     if corner > allowed:
-        fix = "compare with more model.nodes" if plane else "compare with a smaller model.end_size"
-        if "w" not in history.scene.model.fields:
-            fix = "add w to model.fields and " + fix
+        fix = "compare with more model.nodes"
+        if not history.scene.plan.lifts:
+            fix = "let it lift off (contact.normal = rigid), and " + fix
         found.append(f"{_off(corner)}: the reaction gathers in the corner at the loaded end; {fix}")
     if slider > allowed:
         found.append(
             f"{_off(slider)}: the strip rests on single nodes, whose elastic sliders are the "
-            f"softer, the shorter the elements; {_slider_fix(history.scene)}"
+            "softer, the shorter the elements; take no contact.stick_stiffness, or model.section = "
+            "plane"
         )
     if steps > allowed:
         found.append(
@@ -188,30 +188,17 @@ def _resolution(history: Run) -> tuple[str, ...]:
 
 def finer_grid(scene: Scene) -> str:
     """Fix that makes a scene's grid finer."""
-    if "nodes" in scene.model.open:  # given nodes may change how the scene is solved
-        return "take a smaller model.tolerance"
-    plane = scene.model.solution == "plane"  # it has a grid of its own
-    return "take more model.nodes" if plane else FINER
+    return "take a smaller model.tolerance" if scene.model.nodes == AUTO else FINER
 
 
 def _section(history: Run) -> tuple[str, ...]:
     """Doubt about a section that the user names."""
     model = history.scene.model
-    if {"fields", "solution"} <= set(model.open) or not history.cycles:
+    if (model.section == AUTO and model.by == AUTO) or not history.cycles:
         return ()
     allowed = doubted_from(model.tolerance)
     doubt = doubt_of_section(history.scene, float(history.slip_length), allowed)
     return (doubt,) if doubt else ()
-
-
-def _slider_fix(scene: Scene) -> str:
-    """Fix for a strip that rests on single nodes with elastic sliders."""
-    others = "no contact.stick_stiffness, or model.rung = plane"
-    if scene.model.condensed:
-        return f"take {others}"
-    if scene.model.kinematics == "linear" and may_condense(scene):
-        return f"leave model.solution open, or take {others}"
-    return f"take {others}, or a smaller model.end_size"
 
 
 def doubts_of_mesh(error: float) -> tuple[str, ...]:
@@ -237,9 +224,9 @@ def _tension(history: Run) -> tuple[str, ...]:
     if history.cycles and scene.contact.friction > 0.0:
         reaction = reaction[:, history.x < history.x[-1] - scene.strip.half_height]
     least = float(np.min(reaction, initial=0.0))
-    if "w" in scene.model.fields or least >= -NEGLIGIBLE * np.max(np.abs(history.reaction)):
+    if scene.plan.lifts or least >= -NEGLIGIBLE * np.max(np.abs(history.reaction)):
         return ()
     return (
-        f"tension at the contact (reaction_min = {least:.4g}): the strip may not lift; add w to "
-        "model.fields for unilateral contact, or take fewer model.nodes",
+        f"tension at the contact (reaction_min = {least:.4g}): the strip may not lift; take "
+        "contact.normal = rigid for unilateral contact, or fewer model.nodes",
     )

@@ -54,7 +54,7 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
         drawn["loop.png"] = history.plot()
         if float(scene.contact.friction) > 0.0:
             drawn["profiles.png"] = history.plot_profiles()
-    if {"w", "psi"} & set(scene.model.fields):
+    if {"w", "psi"} & set(scene.plan.fields):
         drawn["contact.png"] = history.plot_contact()
     if scene.member.support != "none":
         drawn["joint.png"] = history.plot_deformed()

@@ -20,7 +20,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.files import as_path
 from jbeamshell.scene.toml import scene_to_toml
 
-FORMAT = "jbeamshell history 5"
+FORMAT = "jbeamshell history 6"
 
 
 def write_history(history: Any, path: str | os.PathLike[str]) -> None:
@@ -39,6 +39,8 @@ def write_history(history: Any, path: str | os.PathLike[str]) -> None:
     about = {
         "format": FORMAT,
         "scene": scene_to_toml(history.scene.pinned()),
+        "by": history.scene.model.by,
+        "end_size": history.scene.plan.end_size,
         "dtype": history.x.dtype.name,
         "cycles": history.cycles,
     }

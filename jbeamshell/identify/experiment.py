@@ -30,7 +30,7 @@ from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Measurement, noise_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.scene.choice import is_elastic
+from jbeamshell.scene.planning import may_be_elastic
 from jbeamshell.scene.scene import Scene
 
 FINER = 0.5  # part of the tolerance that plane elasticity keeps: fitted numbers amplify its error
@@ -152,7 +152,7 @@ class Experiment:
         """
         left = np.zeros(self.weight.size)
         for rows, (observation, scene) in zip(self.slices, self._runs, strict=True):
-            if isinstance(scene, Scene) and scene.model.solution == "plane":
+            if isinstance(scene, Scene) and scene.plan.elastic:
                 left[rows] = observation.own_error * GRIDS * scene.model.tolerance
         return float(np.sqrt(np.mean((left / self.relative) ** 2)))
 
@@ -300,7 +300,7 @@ def _served(scene: Model, free: Sequence[str]) -> Model:
     if not isinstance(scene, Scene):
         return scene
     finer = {"model.tolerance": FINER * scene.model.tolerance}
-    return scene.replace(finer if is_elastic(scene) else {}).serving(free).pinned()
+    return scene.replace(finer if may_be_elastic(scene) else {}).serving(free).pinned()
 
 
 def _response(
@@ -347,7 +347,7 @@ def _respond(
     """Compiled response; that of a strip on its contact line is a small program."""
     numbers, layout = (None, None) if strip is None else (strip.numbers, strip.layout)
     given = values, observation, scene, numbers, solver
-    if isinstance(scene, Scene) and scene.model.condensed:
+    if isinstance(scene, Scene) and scene.plan.on_contact_line:
         found: tuple[Array, Array, Array, Array] = _respond_small(given, keys, layout)
         return found
     return _respond_whole(*given, keys, None)

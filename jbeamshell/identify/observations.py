@@ -210,10 +210,10 @@ class SqueezeObservation(Observation):
     def of(cls, curve: SqueezeCurve, scene: Model) -> SqueezeObservation:
         """Run of a curve; raises `InputError` if the scene cannot reproduce it."""
         scene = of_strips_alone(f"{curve.label}: squeeze stress", scene)
-        if "psi" not in scene.model.fields:
+        if "psi" not in scene.plan.fields:
             raise InputError(
-                f"{curve.label}: model.fields = {list(scene.model.fields)} have no squeeze stress: "
-                "add psi"
+                f"{curve.label}: model.section = {scene.plan.section} has no squeeze stress: "
+                "take squeeze"
             )
         length = float(scene.strip.length)
         slack = POSITION_ROUNDING * length

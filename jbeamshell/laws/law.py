@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
@@ -100,7 +101,9 @@ class Law(Part):
 
     def replace(self, values: Mapping[str, Any]) -> Self:
         """Copy with other numbers, by dotted key; they may be traced."""
-        return self.changed(**{self._field_of(key): value for key, value in values.items()})
+        return dataclasses.replace(
+            self, **{self._field_of(key): value for key, value in values.items()}
+        )
 
     def as_toml(self) -> str:
         """Entries of a plan of a fit that has this law: its name, and its numbers."""
@@ -117,7 +120,7 @@ class Law(Part):
         work : energy per cycle of it
         stiffness : slope right after a reversal
         """
-        return cls().changed(**cls._start(force, displacement, work, stiffness))
+        return dataclasses.replace(cls(), **cls._start(force, displacement, work, stiffness))
 
     @staticmethod
     @abc.abstractmethod

@@ -233,14 +233,14 @@ def _checked_panels(
     history: LoadPath, panels: Sequence[str] | None, reference: Mapping[str, Any]
 ) -> list[str]:
     """Names of the panels; raises `InputError` for one that the scene does not have."""
-    fields = history.scene.model.fields
+    fields = history.scene.plan.fields
     needs = {"gap": "w", "beta": "beta"} | dict.fromkeys(
         ("squeeze_stress", "psi", "squeeze_couple"), "psi"
     )
     known = [name for name in PROFILES if name not in needs or needs[name] in fields]
     if history.scene.contact.normal == "none":
         known.remove("reaction")
-    if history.scene.model.squeeze == "assumed":
+    if history.scene.plan.section == "assumed":
         known.remove("squeeze_couple")
     for key, names in (("panels", panels or ()), ("reference", reference)):
         for name in names:
@@ -251,7 +251,7 @@ def _checked_panels(
 
 def _contact_ends(history: LoadPath) -> np.ndarray:
     """Ends of contact X, (steps+1,); NaN without equilibrium, or where it does not end before L."""
-    if "w" not in history.scene.model.fields or history.scene.contact.normal == "none":
+    if not history.scene.plan.lifts or history.scene.contact.normal == "none":
         return np.full(history.force.shape, np.nan)
     ends, failed = np.asarray(history.contact_end), np.isnan(np.asarray(history.force))
     return np.where(failed | (ends >= float(history.x[-1])), np.nan, ends)

@@ -100,7 +100,7 @@ def profiles(
     contact = history.scene.contact
     pressure = float(contact.largest_pressure)
     cap = float(contact.friction) * pressure
-    squeezes = "psi" in history.scene.model.fields
+    squeezes = "psi" in history.scene.plan.fields
     with style():
         grid = _four(axes)
         slip, rotation, traction, reaction = grid.ravel()

@@ -9,13 +9,14 @@ import numpy as np
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.friction import SharpSlip
-from jbeamshell.scene.choice import is_elastic, may_condense, reference
 from jbeamshell.scene.keys import CONTROLS, KAPPA_S, TABLE
 from jbeamshell.scene.load_path import check
+from jbeamshell.scene.planning import has_contact_line, may_be_elastic, reference
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import SectionError, known_beforehand
 
-CHOSEN = ("rung", "kinematics", "nodes")
+CHOSEN = ("section", "kinematics", "nodes")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,7 +40,7 @@ class Advice:
     @property
     def settings(self) -> dict[str, Any]:
         """Dotted values of the model, for `Scene.replace`."""
-        return {f"model.{name}": getattr(self.scene.model, name) for name in CHOSEN}
+        return {f"model.{name}": getattr(self.scene.plan, name) for name in CHOSEN}
 
     def figures(self) -> dict[str, Any]:
         """Advice as plain values for JSON."""
@@ -47,9 +48,8 @@ class Advice:
         return own | {"section_error": self.section_error, "settings": self.settings}
 
     def __str__(self) -> str:
-        model = self.scene.model
-        title = f"{model.rung} on {model.nodes} nodes with {model.kinematics} kinematics"
-        return f"{title}, for {100.0 * model.tolerance:g} % of {self.to}: {self.reason}"
+        percent = 100.0 * self.scene.model.tolerance
+        return f"{self.scene.plan}, for {percent:g} % of {self.to}: {self.reason}"
 
 
 def advise(scene: Scene, tolerance: float | None = None) -> Advice:
@@ -81,10 +81,10 @@ def advise(scene: Scene, tolerance: float | None = None) -> Advice:
     scene = within(scene, tolerance)
     check(scene)
     known = known_beforehand(scene, "squeeze", scene.number)
-    if not is_elastic(scene):
+    if not may_be_elastic(scene):
         return Advice(scene, reference(scene), _why_not(scene), None)
     at = "for slip as long as a bar's"
-    if scene.model.solution == "plane":
+    if scene.plan.elastic:
         if known is None:
             text = "no curve says how far a squeeze section is off for such a scene"
         else:
@@ -105,8 +105,8 @@ def _why_not(scene: Scene) -> str:
     strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
     kappa_s = TABLE[KAPPA_S].default
     reasons = {
-        "its section is named": "fields" not in model.open or model.order > 0,
-        "its solution is named": "solution" not in model.open,
+        "its section is named": model.section != AUTO,
+        "it is to be solved in load steps": model.by != AUTO,
         "it has a strain energy of its own": scene.energy is not None,
         "it is curved": strip.curvature is not None,
         "its base is not rigid": contact.normal != "rigid",
@@ -114,7 +114,7 @@ def _why_not(scene: Scene) -> str:
         f"elasticity has no load.control = {load.control}": load.control not in CONTROLS,
         "elasticity has no strip.kappa_s of its own": bool(np.any(strip.kappa_s != kappa_s)),
         "it has no load cycle": load.cycles == 0,
-        "its grid, its squeeze strain or its constants are named": not may_condense(scene)
+        "its grid or its constants are named": not has_contact_line(scene)
         or model.constants != "consistent",
     }
     return next(reason for reason, holds in reasons.items() if holds)

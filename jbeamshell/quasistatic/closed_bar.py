@@ -25,7 +25,7 @@ from jbeamshell.scene.scene import Scene
 def bar_cycles(scene: Scene, path: LoadPath) -> StepResults:
     """Results of the scene's own cycles; of those after the pressing, NaN beyond gross slip."""
     system, strip, load, contact = System(scene), scene.strip, scene.load, scene.contact
-    half, stiffness = load.steps_per_half_cycle, strip.stretching_stiffness
+    half, stiffness = scene.plan.steps, strip.stretching_stiffness
     resistance = contact.friction * (contact.pressure - contact.bottom_pressure)
     part = jnp.arange(half + 1) / half  # of the amplitude in a first pull
     if load.control == "force":
@@ -55,7 +55,7 @@ def bar_cycles(scene: Scene, path: LoadPath) -> StepResults:
 
     reaction = path.pressure[:, None] * ((system.load - system.bottom_load) / system.tributary)
     level = LoadLevel(
-        q=along_path(jnp.zeros((*slid.shape, scene.model.width)).at[..., V].set(slid)),
+        q=along_path(jnp.zeros((*slid.shape, scene.plan.width)).at[..., V].set(slid)),
         traction=along_path(traction),
         cap=coulomb_cap(contact.friction, reaction),
         reaction=reaction,

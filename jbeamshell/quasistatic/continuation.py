@@ -21,6 +21,7 @@ from jbeamshell.quasistatic.path_state import PathState, StepResults
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import compiled_march
 from jbeamshell.scene.load_path import LoadPath, check
+from jbeamshell.scene.plan import STEPS
 from jbeamshell.scene.scene import Scene
 
 
@@ -96,7 +97,7 @@ class PathEnd(eqx.Module):
 def further_path(scene: Scene, last: float, path: ArrayLike | None) -> LoadPath:
     """Loads that follow the last one; None is the scene's own cycles once more."""
     whole, _ = check(scene, path)
-    begun, half = scene.load.pressure_steps, scene.load.steps_per_half_cycle
+    begun, half = scene.load.pressure_steps, scene.plan.steps
     if path is None:
         amplitude = float(scene.load.amplitude)
         require("path", None, scene.load.cycles > 0, "the scene has no cycles: give the loads")
@@ -109,7 +110,7 @@ def further_path(scene: Scene, last: float, path: ArrayLike | None) -> LoadPath:
 
 def with_end(history: History, steps: StepResults) -> History:
     """History with the end of its path, if that was walked step by step."""
-    if history.scene.model.solution != "stepwise":
+    if history.scene.plan.engine != STEPS:
         return history
     last = jax.tree.map(lambda a: a[-1], steps.state)
     return dataclasses.replace(history, end=PathEnd(last))

@@ -19,7 +19,7 @@ from jbeamshell.mechanics.kinematics import (
     Strains,
     rotated,
 )
-from jbeamshell.scene.parts import Model
+from jbeamshell.scene.plan import Plan
 from jbeamshell.scene.scene import Scene
 
 V, W, BETA, PSI = range(len(FIELDS))
@@ -41,7 +41,8 @@ class ElasticStrip(eqx.Module):
     half_height : H
     curvature : alpha' before loading; None for a straight strip
     youngs_modulus : E; None for a laminate
-    model : choices of the model
+    plan : section, kinematics and grid
+    grid : "finite-difference" or "collocation"
     contraction : fall of e per psi at constant N, Phi_epsi/Phi_ee of small strains
     quadratic_energy : True if the strain energy is a quadratic form of the strains
     """
@@ -57,22 +58,24 @@ class ElasticStrip(eqx.Module):
     curvature: Array | None
     youngs_modulus: Array | None
     contraction: Array
-    model: Model = eqx.field(static=True)
+    plan: Plan = eqx.field(static=True)
+    grid: str = eqx.field(static=True)
     quadratic_energy: bool = eqx.field(static=True)
 
     def __init__(self, scene: Scene) -> None:
-        strip, contact, self.model = scene.strip, scene.contact, scene.model
+        strip, contact, self.plan = scene.strip, scene.contact, scene.plan
+        self.grid = scene.model.grid
         self.energy, self.section = scene.strain_energy(), scene.hierarchic_section()
         self.contraction = contraction(self.energy, jnp.zeros_like(strip.half_height))
         self.quadratic_energy = scene.energy is None
         ends = elements.vertices(
-            (self.model.nodes - 1) // self.element_order,
+            (self.plan.nodes - 1) // self.element_order,
             strip.length,
             strip.half_height,
-            self.model.end_size,
+            self.plan.end_size,
             contact.steps(strip.length),
-            far_size=self.model.far_size,
-            small_growth=self.model.small_growth,
+            far_size=self.plan.far_size,
+            small_growth=self.plan.small_growth,
         )
         rule = self.element_rule
         self.x, self.lengths = elements.nodes(rule, ends), jnp.diff(ends)
@@ -85,12 +88,12 @@ class ElasticStrip(eqx.Module):
     @property
     def element_rule(self) -> elements.Rule:
         """Nodes, points and weights of an element."""
-        return elements.element_rule(self.model.grid)
+        return elements.element_rule(self.grid)
 
     @property
     def element_order(self) -> int:
         """Polynomial order p of an element, which has p+1 nodes."""
-        return elements.ORDER[self.model.grid]
+        return elements.ORDER[self.grid]
 
     @property
     def middles(self) -> Array:
@@ -103,12 +106,12 @@ class ElasticStrip(eqx.Module):
 
     @property
     def _kinematics(self) -> Kinematics:
-        return KINEMATICS[self.model.kinematics]
+        return KINEMATICS[self.plan.kinematics]
 
     def embed(self, active: Array) -> Array:
         """All fields (n, m) of the sections from the active ones; frozen fields are zero."""
-        columns = [jnp.zeros_like(self.x)] * self.model.width
-        for column, field in enumerate(self.model.active):
+        columns = [jnp.zeros_like(self.x)] * self.plan.width
+        for column, field in enumerate(self.plan.active):
             columns[field] = active[:, column]
         return jnp.stack(columns, axis=1)
 
@@ -183,7 +186,7 @@ class ElasticStrip(eqx.Module):
             each = jax.vmap(jax.vmap(lambda s: forces(self.energy, s)))(strains)
         else:
             each = jax.vmap(jax.vmap(self.section.forces))(*self._fields_and_slopes(q))
-        if self.model.squeeze == "assumed":
+        if self.plan.section == "assumed":
             stretch = 2.0 * self.half_height * jnp.asarray(self.youngs_modulus)
             each = each._replace(psi=stretch * strains.psi)
         weights = self.element_rule.weights
@@ -197,7 +200,7 @@ class ElasticStrip(eqx.Module):
             return jnp.asarray(sum(s[:, None] * v for s, v in zip(shape.T, values.T, strict=True)))
 
         rule = self.element_rule
-        shapes = [rule.values] * self.model.width
+        shapes = [rule.values] * self.plan.width
         if self.section is None:
             shapes[PSI] = rule.squeeze
         nodal = [elements.gather(column, self.element_order) for column in q.T]

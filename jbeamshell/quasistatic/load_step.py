@@ -163,7 +163,7 @@ def guess_from_bar(
     slips = first_to_slip(system, reversal, to.target)
     beyond = (2.0 * level.cap - slips * level.traction) / system.foundation.slip_stiffness
     slip = slips * jnp.maximum(beyond, 0.0)
-    fields = jnp.zeros_like(level.q).at[:, V].set(slip)[:, list(system.model.active)]
+    fields = jnp.zeros_like(level.q).at[:, V].set(slip)[:, list(system.plan.active)]
     bar = in_blocks(fields, state.change)
     change = lax.stop_gradient(jnp.where(to.rough > 0.0, bar, state.change))
     return StepGuess(reversal, change, stiffness)

@@ -66,11 +66,11 @@ def initial_state(scene: Scene, touching: ArrayLike | None = None) -> PathState:
     touching : (n,) True at the nodes that are in contact where the search for the contact starts;
         None starts with all of them
     """
-    system, fields = System(scene), scene.model.fields
+    system, fields = System(scene), scene.plan.fields
     change, zero = zero_unknowns(system), jnp.zeros_like(system.x)
     if touching is not None:
         raised = jnp.where(jnp.asarray(touching), 0.0, scene.strip.half_height)
-        lifted = jnp.zeros((zero.size, len(system.model.active)), zero.dtype)
+        lifted = jnp.zeros((zero.size, len(system.plan.active)), zero.dtype)
         change = in_blocks(lifted.at[:, fields.index("w")].set(raised), change)
     return PathState(
         level=system.unloaded(),

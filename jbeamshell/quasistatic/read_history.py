@@ -24,6 +24,7 @@ from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.quasistatic.continuation import PathEnd
 from jbeamshell.quasistatic.path_state import initial_state
 from jbeamshell.quasistatic.solver import WholePath
+from jbeamshell.scene.plan import STEPS
 from jbeamshell.scene.toml import scene_from_values
 
 # Names of a history's arrays, by what their axes run along.
@@ -79,11 +80,13 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     tables = tomllib.loads(about["scene"])
     flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
     scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
+    hidden = {name: about[name] for name in ("by", "end_size")}
+    scene = dataclasses.replace(scene, model=dataclasses.replace(scene.model, **hidden))
     number = functools.partial(jax.ShapeDtypeStruct, dtype=jnp.dtype(about["dtype"]))
     count = functools.partial(jax.ShapeDtypeStruct, dtype=jnp.result_type(int))
     steps, elements = len(arrays["force"]), len(arrays["middles"])
     sections: list[Any] = [number((steps, elements))] * len(Strains._fields)
-    nodes, width = scene.model.nodes, scene.model.width
+    nodes, width = scene.plan.nodes, scene.plan.width
     fields: Any = number((steps, nodes, width))
     shapes: dict[str, Any] = {name: number((steps,)) for name in ALONG_PATH}
     shapes |= {name: count((steps,)) for name in COUNTS}
@@ -100,8 +103,8 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     if "change" in arrays:
         shapes["change"] = number(())
     cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])
-    stepwise = scene.model.solution == "stepwise"
+    stepwise = scene.plan.engine == STEPS
     end: Any = PathEnd(eqx.filter_eval_shape(initial_state, scene)) if stepwise else None
-    if scene.model.condensed:
+    if scene.plan.on_contact_line:
         end = WholePath()
     return History(scene=scene, cycles=cycles, end=end, **shapes)

@@ -21,9 +21,10 @@ from jbeamshell.condensed.strip import Strip
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.solver import solve
-from jbeamshell.scene.choice import FEW_STEPS
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
+from jbeamshell.scene.planning import FEW_STEPS
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
 
@@ -170,7 +171,7 @@ def _programs(template: Template, asked: _Asked, layout: Layout | None = None) -
 
     shape = jax.ShapeDtypeStruct((), template.dtype)
     scene = template.scene([shape] * template.numbers)
-    program = Native(figures_of, worth=scene.model.nodes <= FEW)
+    program = Native(figures_of, worth=scene.plan.nodes <= FEW)
 
     def ask(*given: Any) -> dict[str, Array]:
         found: dict[str, Array] | None = program.now(*given)
@@ -206,7 +207,7 @@ def pinned(scene: Scene, figures: Sequence[str], numbers: Numbers | None = None)
     numbers : values by dotted key of the strips of a sweep, see `Scene.pinned`
     """
     found = scene.pinned(numbers)
-    few = found.model.condensed and "steps_per_half_cycle" in scene.load.open
+    few = found.plan.on_contact_line and scene.load.steps_per_half_cycle == AUTO
     if few and EXACT.issuperset(figures):
         return found.replace({"load.steps_per_half_cycle": FEW_STEPS})
     return found

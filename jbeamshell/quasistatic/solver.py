@@ -28,8 +28,9 @@ from jbeamshell.quasistatic.outcome import ADVICE, check_solver, history_of, rai
 from jbeamshell.quasistatic.path_state import StepResults, initial_state
 from jbeamshell.quasistatic.recovery import recover
 from jbeamshell.quasistatic.stepping import fits_native, march
-from jbeamshell.scene.choice import is_elastic, refinements
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
+from jbeamshell.scene.plan import CLOSED, STEPS
+from jbeamshell.scene.planning import may_be_elastic, refinements
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import section_error
 
@@ -96,8 +97,8 @@ def solve(
     check_solver(solver)
     scene = _able(scene, path, contact)
     whole, cycles = check(scene, path)
-    if scene.model.condensed:
-        found = f"is found from the pressures for model.rung = {scene.model.rung}: leave it out"
+    if scene.plan.on_contact_line:
+        found = "is found from the pressures on the contact line: leave it out"
         require("contact", "given", contact is None, found)
         return _condensed(scene, whole, cycles, throw, path is None, strip)
     solver = solver or Newton()
@@ -120,7 +121,7 @@ def _by_load_steps(
         message = f"a load step found no equilibrium: {ADVICE}"
         return eqx.error_if(history, ~converged, message) if throw else history
     if not np.asarray(steps.state.converged)[-1]:  # indexing a JAX array would compile
-        if scene.model.solution == "stepwise":
+        if scene.plan.engine == STEPS:
             steps = recover(scene, steps, path, solver, initial_state(scene, touching))
         if throw:
             raise_if_failed(scene, steps, path)
@@ -132,8 +133,9 @@ def _able(scene: Scene, path: ArrayLike | None, contact: ArrayLike | None) -> Sc
     """Scene by load steps, if its solution was left open and what it is asked for needs them."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     pressures = path is not None and as_leaf(path, "path", LOADS).ndim > 1
-    steps = contact is not None or (pressures and not walks_pressures(scene))
-    return scene.by_load_steps() if steps else scene
+    line = contact is None and (walks_pressures(scene) or not pressures)
+    able = line if scene.plan.on_contact_line else path is None or scene.plan.walks_any_path
+    return scene if able or scene.model.section == "plane" else scene.by_load_steps()
 
 
 def _condensed(
@@ -191,7 +193,7 @@ def _refined(history: History, walked: Callable[[Scene], History]) -> History:
 def _needs_elasticity(history: History) -> bool:
     """True if a section that was left open is further off than the tolerance, by its own slip."""
     scene = history.scene
-    if scene.model.solution == "plane" or not is_elastic(scene):
+    if scene.plan.elastic or not may_be_elastic(scene):
         return False
     own = section_error(scene, float(history.slip_length))
     return own is None or own.largest > scene.model.tolerance
@@ -199,8 +201,7 @@ def _needs_elasticity(history: History) -> bool:
 
 def _precise(scene: Scene) -> bool:
     """True if a transformation's precision is enough for a scene on its contact line."""
-    model = scene.model
-    few = model.nodes <= SINGLE_NODES and model.solution != "plane"
+    few = scene.plan.nodes <= SINGLE_NODES and not scene.plan.elastic
     return few or not is_single(scene)
 
 
@@ -230,7 +231,7 @@ def compile_for(
     """Compile the programs that `solve` needs; only strips on their contact line are solved."""
     scene = _able(scene, path, None)
     whole, cycles = whole_path(scene, path)
-    if scene.model.condensed:
+    if scene.plan.on_contact_line:
         _condensed(scene, whole, cycles, False, path is None)
         return
     given = scene, None, whole, np.asarray(False), solver or Newton()
@@ -249,7 +250,7 @@ def _solve(
 ) -> tuple[StepResults, History]:
     """Results and history of a load path, from the nodes in contact and True to walk it."""
     start = initial_state(scene, touching)._replace(converged=jnp.asarray(enabled))
-    if scene.model.solution == "closed-form":
+    if scene.plan.engine == CLOSED:
         steps = bar_cycles(scene, path)
     else:
         steps = march(scene, start, path, solver, native)

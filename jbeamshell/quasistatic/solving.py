@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from jax.typing import ArrayLike
 
+from jbeamshell.common.checks import require
 from jbeamshell.common.progress import patience
 from jbeamshell.history.history import History
 from jbeamshell.numerics.newton import Newton
@@ -20,6 +21,7 @@ def solve(
     solver: Newton | None = None,
     throw: bool = True,
     tolerance: float | None = None,
+    by: str | None = None,
 ) -> History:
     """Press the strip down, follow a load path, and return the history of all load steps.
 
@@ -31,6 +33,8 @@ def solve(
     ----------
     scene, path, contact, solver, throw : see `jbeamshell.quasistatic.solver.solve`
     tolerance : ``model.tolerance``, .0001 to .1; None is the scene's own
+    by : "steps" solves in load steps by Newton's method, to check what the contact line or a closed
+        form says; None leaves it to the plan
 
     Returns
     -------
@@ -54,8 +58,9 @@ def solve(
     ::
 
         history = jb.solve(jb.library.standard(), tolerance=0.02)
-        history.dissipation, history.scene.model.rung
+        history.dissipation, history.scene.plan
     """
     with patience("solving"):
-        scene = within(scene, tolerance)
+        require("by", by, by in (None, "steps"), "choose None or 'steps'")
+        scene = within(scene, tolerance) if by is None else within(scene, tolerance).by_load_steps()
         return quasistatic.solve(scene, path, contact=contact, solver=solver, throw=throw)

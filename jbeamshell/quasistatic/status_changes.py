@@ -28,7 +28,7 @@ TURN = 25  # iterations before the order of the nodes is reversed
 
 def applies(system: System) -> bool:
     """True if nodes have a contact status, which Newton's method must find."""
-    return isinstance(system.foundation.normal_law, Rigid) and W in system.model.active
+    return isinstance(system.foundation.normal_law, Rigid) and W in system.plan.active
 
 
 def one_change(
@@ -51,7 +51,7 @@ def one_change(
     changes : True if there is a node that changes
     """
     law = cast(Rigid, system.foundation.normal_law)
-    forces, column = nodal(system, residual), system.model.active.index(W)
+    forces, column = nodal(system, residual), system.plan.active.index(W)
     pressed, gap = contact.lift_force / system.tributary, system.gap_from_lift(contact.w)
     changing = jax.vmap(law.changes_status)(pressed, gap)
     must = changing & (-forces[:, column] > tolerance)

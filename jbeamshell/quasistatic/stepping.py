@@ -56,9 +56,9 @@ def fits_native(scene: Scene) -> bool:
 
     It does for small blocks, as long as it gives no sum to a library.
     """
-    model = scene.model
-    size = ORDER[model.grid] * len(model.active)
-    probes = 3 * size * POINTS * (model.nodes - 1)  # values to find the stiffness
+    plan = scene.plan
+    size = ORDER[scene.model.grid] * len(plan.active)
+    probes = 3 * size * POINTS * (plan.nodes - 1)  # values to find the stiffness
     return size <= block_tridiagonal.SMALL and probes <= LARGEST_SUM
 
 

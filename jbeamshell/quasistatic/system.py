@@ -130,7 +130,7 @@ class System(ElasticStrip):
     @property
     def linear(self) -> bool:
         """True if all but the foundation's response is linear in the fields."""
-        return self.model.kinematics == "linear" and self.quadratic_energy
+        return self.plan.kinematics == "linear" and self.quadratic_energy
 
     @property
     def ends_depend_on_friction(self) -> bool:
@@ -140,13 +140,13 @@ class System(ElasticStrip):
     def enters_residual(self, part: str) -> bool:
         """True if that part of a `ContactResponse` enters the residual."""
         fields = {"traction": "v", "normal_residual": "w", "reaction": "psi"}
-        used = part != "reaction" or self.model.squeeze == "assumed"
-        return used and fields[part] in self.model.fields
+        used = part != "reaction" or self.plan.section == "assumed"
+        return used and fields[part] in self.plan.fields
 
     def unloaded(self) -> LoadLevel:
         """State of the strip before anything acts on it."""
         zero = jnp.zeros_like(self.x)
-        fields = jnp.zeros((self.x.size, self.model.width), zero.dtype)
+        fields = jnp.zeros((self.x.size, self.plan.width), zero.dtype)
         return LoadLevel(fields, zero, zero, zero, zero[0])
 
     # --- equilibrium ----------------------------------------------------------------------------
@@ -204,14 +204,14 @@ class System(ElasticStrip):
         """
         forces = forces.at[:, V].add(self.tributary * response.traction)
         forces = forces.at[:, W].set(self.tributary * response.normal_residual)
-        if self.model.squeeze == "assumed":
+        if self.plan.section == "assumed":
             mean = 0.5 * (prescribed.pressure * self.load / self.tributary + response.reaction)
             assumed = jnp.asarray(self.youngs_modulus) * q[:, PSI] + mean
             forces = forces.at[:, PSI].set(2.0 * self.half_height * self.tributary * assumed)
         force, forces = self._end_load(forces, q, prescribed)
         forces = self._hold_ends(forces, q, prescribed.rough)
-        per_force = jnp.stack([self._per_force(field) for field in range(self.model.width)])
-        residual = (forces * per_force / self.force_scale)[:, list(self.model.active)]
+        per_force = jnp.stack([self._per_force(field) for field in range(self.plan.width)])
+        residual = (forces * per_force / self.force_scale)[:, list(self.plan.active)]
         return force, residual
 
     def _end_load(self, forces: Array, q: Array, prescribed: Prescribed) -> tuple[Array, Array]:
@@ -258,7 +258,7 @@ class System(ElasticStrip):
             ends.append(LAST)
         held |= {(node, BETA): turning for node in ends}
         # A section of order p also has displacements along X beyond its rotation.
-        further = range(len(FIELDS), self.model.width, 2)
+        further = range(len(FIELDS), self.plan.width, 2)
         ends += [LAST] if self.entry == "face" else []
         return held | {(node, field): self.stiffness_scale for node in ends for field in further}
 

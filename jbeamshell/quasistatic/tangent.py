@@ -54,7 +54,7 @@ def zero_unknowns(system: System) -> Array:
     An element's later nodes share a block, so that blocks couple to their neighbours only.  Where
     the first block has too few nodes it is padded with unknowns that stay zero.
     """
-    order, active = system.element_order, len(system.model.active)
+    order, active = system.element_order, len(system.plan.active)
     blocks = (system.x.size + order - 1) // order
     return jnp.zeros((blocks, order * active), system.x.dtype)
 
@@ -68,7 +68,7 @@ def block_of_node(system: System) -> np.ndarray:
 
 def nodal(system: System, unknown: Array) -> Array:
     """Active fields at the nodes (n, active) from the unknowns in blocks (blocks, size)."""
-    active = len(system.model.active)
+    active = len(system.plan.active)
     padding = unknown.size - system.x.size * active
     return unknown.ravel()[padding:].reshape(-1, active)
 
@@ -114,7 +114,7 @@ def stiffness_at(
     zero, no_response = jnp.zeros_like(q), jax.tree.map(jnp.zeros_like, response)
     columns = jax.vmap(jax.vmap(lambda f, q: residual(f, q, no_response)))(along, fields)
     entries = jnp.moveaxis(blocked(columns), 1, 2)
-    filling = np.arange(like.size - system.x.size * len(system.model.active))
+    filling = np.arange(like.size - system.x.size * len(system.plan.active))
     if filling.size:
         entries = entries.at[1, filling, filling, 0].set(1.0)
     one = jnp.ones_like(system.x)
@@ -138,9 +138,9 @@ def stiffness_at(
 def _probes(system: System, like: Array) -> np.ndarray:
     """Fields (3, size, n, m) of unit unknowns in every third block."""
     units = block_tridiagonal.seeds(like)
-    active = list(system.model.active)
+    active = list(system.plan.active)
     nodes = units.reshape(*units.shape[:2], -1)[..., like.size - system.x.size * len(active) :]
-    fields = np.zeros((*units.shape[:2], system.x.size, system.model.width), units.dtype)
+    fields = np.zeros((*units.shape[:2], system.x.size, system.plan.width), units.dtype)
     fields[..., active] = nodes.reshape(*units.shape[:2], -1, len(active))
     return fields
 
@@ -172,7 +172,7 @@ def matrix(
 
 def _in_rows(system: System, response: Array) -> Array:
     """Responses of nodes (..., k, n), by rows of the blocks: (..., size or 1, k, blocks)."""
-    order, active = system.element_order, len(system.model.active)
+    order, active = system.element_order, len(system.plan.active)
     if order == 1:
         return response[..., None, :, :]
     filled = jnp.pad(response, [(0, 0)] * (response.ndim - 1) + [(-response.shape[-1] % order, 0)])

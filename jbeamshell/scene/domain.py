@@ -16,7 +16,8 @@ import numpy as np
 from jbeamshell.common.checks import require
 from jbeamshell.mechanics.bar import bar_backbone
 from jbeamshell.scene.keys import FAR_ENDS
-from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
+from jbeamshell.scene.parts import Contact, Load, Member, Strip
+from jbeamshell.scene.plan import CLOSED, Plan
 from jbeamshell.scene.pressure import face_resultant, is_table, resultant
 
 EDGE = 1e-12  # part of the length by which a table may run beyond the strip, for round-off
@@ -49,13 +50,13 @@ class Rule(NamedTuple):
 
 @np.errstate(over="ignore", invalid="ignore")  # one of the rules refuses infinite forces
 def support_rules(
-    strip: Strip, member: Member, contact: Contact, model: Model, load: Load, numbers: Numbers
+    strip: Strip, member: Member, contact: Contact, plan: Plan, load: Load, numbers: Numbers
 ) -> list[Rule]:
     """Rules by which pressures, friction and supports hold the strip, in the order of the checks.
 
     Parameters
     ----------
-    strip, member, contact, model, load : parts of the scene, for their words
+    strip, member, contact, plan, load : parts of the scene, for their words
     numbers : values by dotted key
     """
     length, friction = numbers("strip.length"), numbers("contact.friction")
@@ -66,7 +67,7 @@ def support_rules(
     rough = (friction > 0.0) | ("v" in held)
     fix = "nothing holds the strip along X (rigid-body motion): give strip.far_end or friction"
     rules = [Rule("contact.friction", friction, rough, fix)]
-    if model.solution == "closed-form":
+    if plan.engine == CLOSED:
         fix = "the bar needs friction: give a positive number"
         rules.append(Rule("contact.friction", friction, friction > 0.0, fix))
     for key, pressure in (("contact.pressure", top), ("contact.bottom_pressure", bottom)):
@@ -84,7 +85,7 @@ def support_rules(
     if contact.normal != "none":
         fix = "nothing holds the strip down (rigid-body motion): press more on top"
         rules.append(Rule("contact.bottom_pressure", bottom, force > 0.0, fix))
-        if "beta" not in held and "w" in model.fields:
+        if "beta" not in held and plan.lifts:
             inside = (moment >= 0.0) & (moment <= force * length)
             fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
             rules.append(Rule("contact.bottom_pressure", bottom, inside, fix))
@@ -136,18 +137,18 @@ def stays_below(size: Any, limit: Any, part: Any) -> Any:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def bar_rule(load: Load, model: Model, numbers: Numbers) -> Rule:
+def bar_rule(load: Load, plan: Plan, numbers: Numbers) -> Rule:
     """Rule that a controlled displacement stays below the gross slip of a bar in closed form."""
     key, amplitude = "load.amplitude", numbers("load.amplitude")
-    if model.solution != "closed-form" or load.control == "force":
+    if plan.engine != CLOSED or load.control == "force":
         return Rule(key, amplitude, True, "")
     net = numbers("contact.pressure") - numbers("contact.bottom_pressure")
     per_length = numbers("contact.friction") * net
     with jax.ensure_compile_time_eval():
         slipping = per_length * numbers("strip.length")
         limit = np.asarray(bar_backbone(slipping, numbers("strip.axial_stiffness"), per_length))
-    fix = f"must stay below the bar's gross slip, {np.max(limit):.6g}; take model.fields = ['v']"
-    return Rule(key, amplitude, amplitude < limit, f"{fix} beyond")
+    fix = f"must stay below the bar's gross slip, {np.max(limit):.6g}; take model.section = shell"
+    return Rule(key, amplitude, amplitude < limit, f"{fix} beyond, or jb.solve(..., by='steps')")
 
 
 def _on_strip(key: str, x: np.ndarray, length: np.ndarray) -> Rule:

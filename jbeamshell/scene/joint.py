@@ -7,9 +7,12 @@ from typing import Protocol
 import numpy as np
 
 from jbeamshell.common.checks import is_traced, require
+from jbeamshell.mechanics.friction import SharpSlip, law_name
 from jbeamshell.mechanics.homogeneous import Energy
+from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
+from jbeamshell.scene.plan import Plan
 from jbeamshell.scene.pressure import pressure_values
 from jbeamshell.scene.rows import rows
 
@@ -23,11 +26,12 @@ class Parts(Protocol):
     model: Model
     member: Member
     energy: Energy | None
+    plan: Plan
 
 
 def check_joint(scene: Parts) -> None:
     """Raise `InputError` for a lap joint that is none, or that cannot be solved."""
-    strip, contact, model, member = scene.strip, scene.contact, scene.model, scene.member
+    strip, contact, member, plan = scene.strip, scene.contact, scene.member, scene.plan
     if member.support == "none":
         _check_alone(scene)
         return
@@ -38,8 +42,20 @@ def check_joint(scene: Parts) -> None:
     require("energy", scene.energy, scene.energy is None, "must be left out in a lap joint")
     fix = "must be 'rigid' in a lap joint, whose second member is elastic"
     require("contact.normal", contact.normal, contact.normal == "rigid", fix)
-    fix = "must be 'condensed' or 'plane' in a lap joint: leave it out, or take model.rung = plane"
-    require("model.solution", model.solution, model.condensed, fix)
+    fix = "must be linear in a lap joint, which is solved on its contact line: leave it out"
+    require("model.kinematics", plan.kinematics, plan.kinematics == "linear", fix)
+    fix = "is no section of a lap joint: take plane, squeeze, shell or p1 to p12"
+    bends = plan.section not in ("bar", "assumed")
+    require("model.section", plan.section, bends, fix)
+    grid, sharp = scene.model.grid, isinstance(contact.law, SharpSlip)
+    fix = "must be finite-difference in a lap joint: leave it out"
+    require("model.grid", grid, grid == "finite-difference", fix)
+    fix = "must be the sharp slider in a lap joint: leave contact.smoothing out"
+    require("contact.law", law_name(contact.law), sharp, fix)
+    control = scene.load.control
+    require(
+        "load.control", control, control in CONTROLS, "must be force or displacement in a lap joint"
+    )
     _check_section(strip, member)
     fix = "needs contact.bearing_stiffness"
     bears = contact.clearance is None or contact.bearing_stiffness is not None
@@ -56,16 +72,16 @@ def check_joint(scene: Parts) -> None:
     fix = "may not turn: take member, face or traction, or a force without load.arm"
     require("load.entry", load.entry, load.entry != "guided" or not turned, fix)
     plain = member.layers is None and strip.layers is None
-    fix = "is for homogeneous members; take 0"
-    require("model.order", model.order, model.order == 0 or plain, fix)
+    fix = "is for homogeneous members: take plane, squeeze or shell"
+    require("model.section", plan.section, plan.order == 0 or plain, fix)
     if member.support != "rolling":
         return
     below = contact.bottom_pressure
     none = is_traced(below) or not np.any(pressure_values(np.asarray(below)))
     fix = "must be 0 on a symmetry plane: take member.support = clamped"
     require("contact.bottom_pressure", below, none, fix)
-    squeezed = "psi" in model.fields or strip.loaded_end == "free"
-    fix = "leaves no lift to a shell on a symmetry plane: take model.rung = squeeze or plane"
+    squeezed = plan.section != "shell" or strip.loaded_end == "free"
+    fix = "leaves no lift to a shell on a symmetry plane: take model.section = squeeze or plane"
     require("strip.loaded_end", strip.loaded_end, squeezed, fix)
 
 
@@ -89,9 +105,9 @@ def _check_alone(scene: Parts) -> None:
     fix = "needs a second member: take 'free', or give member.support"
     end = scene.strip.loaded_end
     require("strip.loaded_end", end, end == "free", fix)
-    fix = "needs linear kinematics on the contact line: leave it out, or take model.rung = "
-    fix += f"condensed-{scene.model.rung}"
-    linear = scene.strip.overhang is None or scene.model.condensed
+    fix = "needs the contact line of a linear strip: leave it out, or take model.kinematics = "
+    fix += "linear and the sharp slider on a rigid base"
+    linear = scene.strip.overhang is None or scene.plan.on_contact_line
     require("strip.overhang", scene.strip.overhang, linear, fix)
     fix = "needs a second member: leave it out, or give member.support (a curved strip on a rigid "
     fix += "base has strip.curvature)"

@@ -20,7 +20,7 @@ from jbeamshell.mechanics.friction import LAWS
 from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES
 from jbeamshell.mechanics.kinematics import KINEMATICS
 from jbeamshell.scene.rows import AUTO, Key, Part, count, number, rows, setting, word
-from jbeamshell.scene.rungs import CONDENSED, LARGEST_ORDER
+from jbeamshell.scene.sections import SECTIONS
 
 FAR_ENDS = {"guided": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held at X = 0
 ENTRIES = ("member", "face", "guided", "traction")
@@ -30,11 +30,9 @@ KAPPA_S = "strip.kappa_s"  # squeeze-shear factor, which plane elasticity does n
 LENGTHS = ("displacement", ARC_LENGTH)  # controls whose amplitude is a length
 LOAD_KINDS = ("force", "moment")
 ASSEMBLIES = ("frictionless", "frictional")
-NORMALS = ("rigid", "compliant", "none")
-SQUEEZES = ("field", "assumed")
+NORMALS = ("rigid", "held", "compliant", "none")
 LOADED_ENDS = ("free", "level")
 MEMBERS = ("none", "rolling", "clamped")
-SOLUTIONS = ("stepwise", "closed-form", *CONDENSED)
 
 TOLERANCE = 0.01
 FINEST, COARSEST = 1e-4, 0.1  # tolerance: below, the finest mesh may not reach it
@@ -140,7 +138,10 @@ class ContactKeys(Part):
         symbol=r"\alpha",
     )
     normal: str = word(
-        "rigid", NORMALS, "Normal contact: rigid, compliant, or none (no foundation)."
+        "rigid",
+        NORMALS,
+        "Normal contact: rigid, held (rigid, and the strip may not lift off), compliant, or none "
+        "(no foundation).",
     )
     assembly: str = word(
         "frictionless",
@@ -242,33 +243,21 @@ class ModelKeys(Part):
 
     heading: ClassVar[str] = "model"
 
-    fields: tuple[str, ...] = word(
-        AUTO, (), "Fields of a section: v, with beta, with psi; w lets it lift off."
+    section: str = word(
+        AUTO,
+        SECTIONS,
+        "Section: bar, shell, squeeze, assumed (its squeeze strain from the pressures), p1 to p12 "
+        "(displacements of that order) or plane (elasticity).",
     )
     kinematics: str = word(AUTO, KINEMATICS, "Rotations: exact or linear.")
     grid: str = word(
         "finite-difference",
         ORDER,
-        "Grid: finite-difference (second order) or collocation (fourth).",
+        "Grid of load steps: finite-difference (second order) or collocation (fourth).",
     )
     nodes: int = count(AUTO, 3, "Nodes along X.")
     constants: str = word(
         "consistent", CONSTANTS, "Section constants: consistent, or printed (the dissertation's)."
-    )
-    squeeze: str = word(
-        "field", SQUEEZES, "Squeeze strain: a field, or assumed from the pressures."
-    )
-    order: int = count(
-        0, 0, "Order p of the displacements through the height; 0 is the beamshell.", LARGEST_ORDER
-    )
-    solution: str = word(
-        AUTO,
-        SOLUTIONS,
-        "Solution: stepwise, closed-form (the bar), condensed (a linear section on its contact "
-        "line) or plane (elasticity there).",
-    )
-    end_size: float = setting(
-        AUTO, "Smallest elements, at the loaded end and at steps of the pressure.", unit="H"
     )
     tolerance: float = setting(
         TOLERANCE,
@@ -366,13 +355,6 @@ INDIRECT = (
         scale="linear",
         fix="must be a number above 1, or 'sharp'",
     ),
-    Key(
-        "model.rung",
-        "word",
-        "squeeze",
-        "Fields, order and solution by one name: bar, shell, squeeze, p2, p3, ..., "
-        "condensed-squeeze, ..., plane.",
-    ),
 )
 
 
@@ -385,7 +367,16 @@ DERIVED = {row.name: row.through for row in INDIRECT if row.through}
 KEYS = tuple(TABLE)
 NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
 # Keys of old files, with what is to be done about them.
-FORMER = {"strip.deviation": "a laminate's shear is split at mid-height: leave it out"}
+_SECTION = "say model.section: bar, shell, squeeze, p1 to p12 or plane"
+FORMER = {
+    "strip.deviation": "a laminate's shear is split at mid-height: leave it out",
+    "model.fields": f"{_SECTION}; a strip lifts off unless contact.normal = held",
+    "model.rung": _SECTION,
+    "model.order": _SECTION,
+    "model.solution": "leave it out; jb.solve(scene, by='steps') takes load steps",
+    "model.squeeze": "say model.section = assumed",
+    "model.end_size": "elements follow from model.nodes: leave it out",
+}
 
 
 def key_table(section: str = "") -> str:

@@ -12,6 +12,7 @@ from jbeamshell.mechanics.bar import bar_force
 from jbeamshell.mechanics.homogeneous import Energy, shear_modulus
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
+from jbeamshell.scene.plan import Plan
 from jbeamshell.scene.pressure import is_table
 
 # Constants of `bound`, fitted by calibration/map_kinematics.py to map_kinematics.json beside it.
@@ -55,6 +56,7 @@ class Parts(Protocol):
     model: Model
     energy: Energy | None
     member: Member
+    plan: Plan
 
     def number(self, key: str) -> np.ndarray: ...
 
@@ -66,7 +68,7 @@ def linear_error(scene: Parts) -> float:
     ----------
     scene : scene with a foundation and without traced leaves
     """
-    elastic = scene.model.order > 0 or scene.model.solution == "plane"
+    elastic = scene.plan.order > 0 or scene.plan.elastic
     return float(linear_errors(scene.strip, scene.load, elastic, scene.number))
 
 

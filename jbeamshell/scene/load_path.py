@@ -15,7 +15,7 @@ from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.jax_options import memory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.domain import bar_rule, gross_slip_rule, stays_below
-from jbeamshell.scene.parts import Load
+from jbeamshell.scene.parts import unit_path
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
@@ -32,7 +32,7 @@ def check(
         _check_size(scene, whole)
         parts = scene.load, scene.member, scene.number
         gross_slip_rule(*parts, whole.target, whole.pressure).demand()
-        bar_rule(scene.load, scene.model, scene.number).demand()
+        bar_rule(scene.load, scene.plan, scene.number).demand()
     return whole, cycles
 
 
@@ -43,12 +43,8 @@ def whole_path(
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     if path is not None or scene.load.cycles > 0:
         scene.check_entry()
-    pressing, known = scene.load.pressure_steps, scene.load.unit_path()
-    closed = functools.partial(_own_cycles, scene.load.cycles, scene.load.steps_per_half_cycle)
-    solution = scene.model.solution
-    any_path = path is None or scene.model.walks
-    fix = "knows the scene's own cycles only: leave the path out, or take 'stepwise'"
-    require("model.solution", solution, any_path, fix)
+    pressing, whole_cycles = scene.load.pressure_steps, (scene.load.cycles, scene.plan.steps)
+    known, closed = unit_path(*whole_cycles), functools.partial(_own_cycles, *whole_cycles)
     numbers: Any = jnp if is_traced(scene.load.amplitude, path) else np  # NumPy is faster
     amplitude = numbers.asarray(scene.load.amplitude)
     if path is None:
@@ -91,7 +87,7 @@ def _cycles_of(loads: np.ndarray, parts: np.ndarray) -> tuple[tuple[int, int, in
 @functools.cache
 def _own_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
     """Closed cycles of a scene's own path."""
-    loads = Load(cycles=cycles, steps_per_half_cycle=steps).unit_path()
+    loads = unit_path(cycles, steps)
     return _cycles_of(loads, np.ones_like(loads))
 
 
@@ -108,19 +104,19 @@ def _below_gross_slip(scene: Scene, targets: Array, pressures: Array | np.ndarra
 def check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:
     """Nodes in contact (n,) where a search starts; `InputError` if they do not fit the scene."""
     try:
-        touching, nodes = np.asarray(contact, dtype=bool), scene.model.nodes
+        touching, nodes = np.asarray(contact, dtype=bool), scene.plan.nodes
     except (TypeError, ValueError):
         require("contact", contact, False, "give True or False for each of the nodes")
-    fits = touching.shape == (nodes,) and "w" in scene.model.fields
-    fix = f"give True or False for each of the {nodes} nodes, and w in model.fields"
+    fits = touching.shape == (nodes,) and scene.plan.lifts
+    fix = f"give True or False for each of the {nodes} nodes of a strip that may lift off"
     require("contact", touching.shape, fits, fix)
     return touching
 
 
 def _check_size(scene: Scene, path: LoadPath) -> None:
     """Raise `InputError` for a path whose results would fill this machine's memory."""
-    levels, nodes = path.target.size, scene.model.nodes
-    need, most = 8.0 * levels * nodes * (2 * scene.model.width + NUMBERS_PER_NODE), memory()
+    levels, nodes = path.target.size, scene.plan.nodes
+    need, most = 8.0 * levels * nodes * (2 * scene.plan.width + NUMBERS_PER_NODE), memory()
     fix = f"and {levels} load steps take {need:.2g} bytes of memory, this machine has {most:.2g}"
     require("model.nodes", nodes, need < most, f"{fix}: take fewer")
 

@@ -18,18 +18,9 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import is_traced, require
-from jbeamshell.mechanics.elements import (
-    CONTACT_LINE_FAR_SIZE,
-    FAR_SIZE,
-    GROWTH,
-    ORDER,
-    SMALL_GROWTH,
-    TINY,
-    table_steps,
-)
+from jbeamshell.mechanics.elements import ORDER, table_steps
 from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
 from jbeamshell.mechanics.homogeneous import shear_modulus, youngs_modulus
-from jbeamshell.mechanics.kinematics import FIELDS
 from jbeamshell.mechanics.laminate import Laminate
 from jbeamshell.scene.keys import (
     TABLE,
@@ -44,16 +35,6 @@ from jbeamshell.scene.keys import (
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.pressure import check_gap, check_holes, check_pressure, pressure_values
 from jbeamshell.scene.rows import AUTO
-from jbeamshell.scene.rungs import CONDENSED, name_of
-
-MODELS = (
-    ("v",),
-    ("v", "beta"),
-    ("v", "beta", "psi"),
-    ("v", "w", "beta"),
-    ("v", "w", "beta", "psi"),
-)
-MOST_LEVELS = 10**7  # load steps of a path
 
 
 class Strip(StripKeys):
@@ -261,96 +242,52 @@ class Load(LoadKeys):
     def __check_init__(self) -> None:
         half = self.steps_per_half_cycle
         if half == AUTO:
-            return  # until a scene has chosen
+            return  # the plan's
         fix = "must be 1, or even, so that the path passes through zero"
         require("load.steps_per_half_cycle", half, half == 1 or half % 2 == 0, fix)
-        few = 2 * self.cycles * half <= MOST_LEVELS
-        fix = f"with {half} steps per half cycle are more than {MOST_LEVELS} load steps: take fewer"
-        require("load.cycles", self.cycles, few, fix)
 
-    def unit_path(self) -> np.ndarray:
-        """Load levels after zero for unit amplitude: 0 to 1, then ``cycles`` times 1, -1, 1."""
-        half = self.steps_per_half_cycle
-        if self.cycles == 0:
-            return np.zeros(0)
-        down = 1.0 - 2.0 * np.arange(1, half + 1) / half
-        quarter = max(half // 2, 1)
-        first = np.arange(1, quarter + 1) / quarter
-        return np.concatenate([first, *[down, -down] * self.cycles])
+
+def unit_path(cycles: int, steps: int) -> np.ndarray:
+    """Load levels after zero for unit amplitude: 0 to 1, then ``cycles`` times 1, -1, 1.
+
+    Parameters
+    ----------
+    cycles, steps : full cycles, and load steps per half cycle
+    """
+    if cycles == 0:
+        return np.zeros(0)
+    down = 1.0 - 2.0 * np.arange(1, steps + 1) / steps
+    quarter = max(steps // 2, 1)
+    first = np.arange(1, quarter + 1) / quarter
+    return np.concatenate([first, *[down, -down] * cycles])
 
 
 class Model(ModelKeys):
     """Extent and resolution of the model.
 
-    ``squeeze`` is "field" (psi has its own balance) or "assumed" (psi = -(F_N + R)/(2E), the
-    earlier theory of Brink 2015, section 4.2, without Poisson's effect).  ``order`` p from 1 up is
-    a section of order p, see `jbeamshell.mechanics.hierarchic`.  ``solution`` is "stepwise"
-    (Newton's method at every load level), "closed-form" (Goodman's bar), "condensed" or "plane"
-    (see `jbeamshell.condensed`).  ``end_size`` is that before the node count scales all elements;
-    below 1e-4 it serves the last node alone, and elements below H/48 grow fast.
+    Attributes
+    ----------
+    by : "steps" if the scene is to be solved in load steps, else "auto"
+    end_size : smallest elements in units of H, before the number of nodes scales all; "auto"
+        follows from the plan
     """
 
+    by: str = eqx.field(static=True, default=AUTO)
+    end_size: float | str = eqx.field(static=True, default=AUTO)
+
     def __check_init__(self) -> None:
-        if self.fields == AUTO:
-            return  # until a scene has chosen
-        require("model.fields", self.fields, isinstance(self.fields, tuple), "give a list of words")
-        unknown = [f for f in self.fields if f not in FIELDS]
-        require("model.fields", list(self.fields), not unknown, f"fields are {', '.join(FIELDS)}")
-        fix = "make no model; choose " + " or ".join(str(list(m)) for m in MODELS)
-        require("model.fields", list(self.fields), self.fields in MODELS, fix)
-        both = self.squeeze == "field" or {"w", "psi"} <= set(self.fields)
-        require("model.squeeze", self.squeeze, both, "needs w and psi in model.fields")
-        straight = {"beta", "psi"} <= set(self.fields) and self.squeeze == "field"
-        fix = "needs beta and psi in model.fields, and the squeeze strain as a field"
-        require("model.order", self.order, self.order == 0 or straight, fix)
-        bar = self.solution != "closed-form" or self.fields == ("v",)
-        require("model.solution", self.solution, bar, "is the bar's: take ['v'] as model.fields")
-        odd = "nodes" in self.open or (self.nodes - 1) % ORDER[self.grid] == 0
+        require("by", self.by, self.by in (AUTO, "steps"), "choose 'auto' or 'steps'")
+        if isinstance(self.end_size, str):
+            require("end_size", self.end_size, self.end_size == AUTO, "give a number or 'auto'")
+        elif isinstance(self.end_size, int | float):
+            require("end_size", self.end_size, 0.0 < self.end_size < np.inf, "must be positive")
+        odd = self.nodes == AUTO or (self.nodes - 1) % ORDER[self.grid] == 0
         fix = "must be odd for the collocation grid (two elements' ends and their middle)"
         require("model.nodes", self.nodes, odd, fix)
 
-    @property
-    def active(self) -> tuple[int, ...]:
-        """Positions of the active fields among (v, w, beta, psi, and a section's further ones)."""
-        return (*(FIELDS.index(f) for f in self.fields), *range(len(FIELDS), self.width))
 
-    @property
-    def rung(self) -> str:
-        """Name of the model on the ladder; see `jbeamshell.scene.rungs`."""
-        return name_of(self.fields, self.order, self.solution)
-
-    @property
-    def condensed(self) -> bool:
-        """True if the strip is solved on its contact line, see `jbeamshell.condensed`."""
-        return self.solution in CONDENSED
-
-    @property
-    def far_size(self) -> float:
-        """Largest elements before the node count scales all, over L."""
-        return CONTACT_LINE_FAR_SIZE if self.solution == "condensed" else FAR_SIZE
-
-    @property
-    def small_growth(self) -> float:
-        """Growth of elements below H/48: fast if the smallest ones serve the last node alone."""
-        return SMALL_GROWTH if self.end_size < TINY else GROWTH
-
-    @property
-    def walks(self) -> bool:
-        """True if the solution follows any path of loads."""
-        return self.solution == "stepwise" or self.condensed
-
-    @property
-    def warps(self) -> bool:
-        """True if a section may warp, so that its end is no rigid face by nature."""
-        return self.solution == "plane" or self.order > 1
-
-    @property
-    def width(self) -> int:
-        """Number of fields of a section, active or not."""
-        return len(FIELDS) + 2 * max(self.order - 1, 0)
-
-
-_PARTS = (Strip, Contact, Load, Model, Member)
-SECTIONS: dict[str, type[Part]] = {part.heading: part for part in _PARTS}
-for _section, _part in SECTIONS.items():  # `help` shows the keys of every part
-    _part.__doc__ = f"{_part.__doc__}\n{textwrap.indent(key_table(_section), '    ')}\n"
+PARTS: dict[str, type[Part]] = {
+    part.heading: part for part in (Strip, Contact, Load, Model, Member)
+}
+for _heading, _part in PARTS.items():  # `help` shows the keys of every part
+    _part.__doc__ = f"{_part.__doc__}\n{textwrap.indent(key_table(_heading), '    ')}\n"

@@ -8,7 +8,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import require
 from jbeamshell.mechanics.homogeneous import Energy, forces
 from jbeamshell.mechanics.kinematics import Strains
 
@@ -16,30 +15,27 @@ SIZES = (1e-4, 1e-2, -1e-2, 0.3)  # of the strains at which the forces must be p
 WEAKEST = 1e-8  # stiffness over the largest one that counts as none
 
 
-def check_quadratic(energy: Energy, half_height: Array, squeeze: bool, fix: str) -> None:
-    """Raise `InputError` for a strain energy that is not quadratic, or without stiffness.
+def is_quadratic(energy: Energy, half_height: Array, squeeze: bool) -> bool:
+    """True if a strain energy is a quadratic form of its strains with stiffness against all.
 
     Parameters
     ----------
     energy : Phi(e, g, k, psi, psi')
     half_height : H, by which k and psi' are made strains
-    squeeze : True if psi is a field
-    fix : the model to take instead
+    squeeze : True if psi is a field; psi' may have no stiffness
     """
     with jax.ensure_compile_time_eval():
         stiffness, at, found = map(np.asarray, _probed(energy, half_height))
-    finite = bool(np.all(np.isfinite(stiffness)) and np.all(np.isfinite(found)))
-    require("energy", energy, finite, "has derivatives that are not finite: mend it")
+    if not (np.all(np.isfinite(stiffness)) and np.all(np.isfinite(found))):
+        return False
     close = np.sqrt(np.finfo(found.dtype).eps) * np.abs(at) @ np.abs(stiffness)
     quadratic = bool(np.all(np.abs(found - at @ stiffness) <= close))
-    require("energy", energy, quadratic, f"is not quadratic in the strains: {fix}")
     fields = stiffness[:4, :4] if squeeze else stiffness[:3, :3]
     least, most = np.linalg.eigvalsh(fields)[[0, -1]]
     strong = bool(least > WEAKEST * most)
-    if squeeze:  # psi' may have none
+    if squeeze:
         strong = strong and bool(np.linalg.eigvalsh(stiffness)[0] > -WEAKEST * most)
-    fix = "has strains without stiffness: make it positive definite in e, g, k and psi"
-    require("energy", energy, strong, fix)
+    return quadratic and strong
 
 
 @eqx.filter_jit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -46,7 +46,7 @@ class Key:
     whole : True if the setting is a whole number
     choices : words to choose from; empty if they are checked elsewhere
     table : True if rows of numbers are allowed as well
-    open : True if a scene chooses the value where it is `AUTO`, see `jbeamshell.scene.choice`
+    open : True if a scene chooses the value where it is `AUTO`, see `jbeamshell.scene.planning`
     through : key of the number that this one sets, if it is another form of it
     fix : fix in the message for a number outside its domain; None is made from the bounds
     """
@@ -173,15 +173,9 @@ def _field(
 
 
 class Part(Tree):
-    """Section of the table as a frozen pytree, which converts and checks its values when made.
-
-    Attributes
-    ----------
-    as_given : names of the fields that a scene has chosen, with the values that they were given
-    """
+    """Section of the table as a frozen pytree, which converts and checks its values when made."""
 
     heading: ClassVar[str]
-    as_given: tuple[tuple[str, Any], ...] = eqx.field(static=True, default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         for name, key in rows(type(self)).items():
@@ -194,42 +188,6 @@ class Part(Tree):
 
     def __check_init__(self) -> None:
         """Raise `InputError` for values that do not go together."""
-
-    def given(self, name: str) -> Any:
-        """Value of a field as it was given, `AUTO` where the scene is to choose it."""
-        return dict(self.as_given).get(name, getattr(self, name))
-
-    @property
-    def open(self) -> list[str]:
-        """Names of the fields that the scene is to choose."""
-        given = dict(self.as_given)
-        return [
-            name for name in settings_of(type(self)) if given.get(name, getattr(self, name)) == AUTO
-        ]
-
-    def changed(self, **values: Any) -> Self:
-        """Copy with other given values."""
-        kept = tuple((name, value) for name, value in self.as_given if name not in values)
-        return dataclasses.replace(self, as_given=kept, **values)
-
-    def pinned(self) -> Self:
-        """Copy whose values are all given."""
-        return dataclasses.replace(self, as_given=())
-
-    def chosen(self, **values: Any) -> Self:
-        """Copy with chosen values, which keeps those that were given."""
-        given = dict(self.as_given)
-        given |= {name: self.given(name) for name in values}
-        kept = {name: value for name, value in given.items() if values.get(name) != value}
-        copy = self.but(as_given=tuple(sorted(kept.items())), **values)
-        copy.__check_init__()
-        return copy
-
-
-@functools.cache
-def settings_of(part: type[Part]) -> tuple[str, ...]:
-    """Names of a part's fields that a scene may choose."""
-    return tuple(name for name, key in rows(part).items() if key.open)
 
 
 @functools.cache

@@ -32,17 +32,17 @@ from jbeamshell.mechanics.friction import (
 )
 from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
-from jbeamshell.scene.choice import choose, elasticity, finer, is_elastic
 from jbeamshell.scene.domain import Numbers, support_rules
 from jbeamshell.scene.joint import check_joint
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, KAPPA_S, TABLE, check_key
-from jbeamshell.scene.parts import SECTIONS, Contact, Load, Member, Model, Part, Strip
+from jbeamshell.scene.parts import PARTS, Contact, Load, Member, Model, Part, Strip
+from jbeamshell.scene.plan import Plan
+from jbeamshell.scene.planning import elasticity, finer, may_be_elastic, plan
 from jbeamshell.scene.pressure import bolt_pressure
-from jbeamshell.scene.quadratic import check_quadratic
 from jbeamshell.scene.rows import AUTO
-from jbeamshell.scene.rungs import general_rung, spelled_out
 from jbeamshell.scene.text import summary
 
+MOST_LEVELS = 10**7  # load steps of a path
 ALMOST_RIGID = 1000.0  # stiffness of rigid sliders in load steps, in units of G/l
 
 
@@ -63,9 +63,8 @@ def _standard(part: type[Part]) -> Any:
 class Scene(Tree):
     """Strip, its contact, its load and the model of it.
 
-    Settings that are "auto" are chosen when the scene is made, see `jbeamshell.scene.choice`; its
-    load and its model hold what was chosen.  In a JAX transformation they stay as they were chosen
-    before.
+    Settings that are "auto" are decided when the scene is made, see `jbeamshell.scene.planning`;
+    its plan holds them.  In a JAX transformation the plan stays that of the scene that was changed.
 
     Attributes
     ----------
@@ -73,6 +72,7 @@ class Scene(Tree):
     energy : strain energy Phi(e, g, k, psi, psi') per unit length of the user's own, any JAX
         function of five scalars, such as ``lambda e, g, k, psi, dpsi: ...`` or an
         `equinox.Module` that carries parameters; None is the strip's own section
+    plan : how the scene is solved, see `jbeamshell.scene.plan`; it is made with the scene
 
     Raises
     ------
@@ -92,27 +92,24 @@ class Scene(Tree):
     model: Model = _standard(Model)
     energy: Energy | None = None
     member: Member = _standard(Member)
+    plan: Plan = eqx.field(static=True, default=cast(Plan, None), kw_only=True, repr=False)
 
     def __post_init__(self) -> None:
-        for name, kind in SECTIONS.items():
+        for name, kind in PARTS.items():
             part = getattr(self, name)
             require(name, part, isinstance(part, kind), f"give a jbeamshell.{kind.__name__}")
         self.energy = as_energy(self.energy)
-        of_load, of_model = choose(self)
-        if of_load:
-            self.load = self.load.chosen(**of_load)
-        if of_model:
-            self.model = self.model.chosen(**of_model)
+        self.plan = plan(self)
 
     def __check_init__(self) -> None:
-        self._check_rung()
+        self._check_plan()
         self._check_contact()
         check_joint(self)
         if self.energy is not None:
             self._check_energy(self.energy)
 
     def _check_energy(self, energy: Energy) -> None:
-        """Refuse what is no strain energy, or on the contact line none of a linear section."""
+        """Refuse what is no strain energy."""
         fix = "must be a function of (e, g, k, psi, psi')"
         require("energy", energy, callable(energy), fix)
         probe = [jax.ShapeDtypeStruct((), self.strip.length.dtype)] * 5
@@ -126,9 +123,6 @@ class Scene(Tree):
             getattr(shape, "shape", None) == (),
             f"must return one number, not {shape}",
         )
-        if self.model.condensed and not is_traced(energy, self.strip.half_height):
-            fix = f"take model.rung = {general_rung(self.model.rung)}"
-            check_quadratic(energy, self.strip.half_height, "psi" in self.model.fields, fix)
 
     def __str__(self) -> str:
         return summary(self, self.energy is not None).as_text(28)
@@ -138,7 +132,7 @@ class Scene(Tree):
         if self.energy is not None:
             return self.energy
         strip = self.strip
-        squeeze = "psi" in self.model.fields and self.model.squeeze == "field"
+        squeeze = "psi" in self.plan.fields and self.plan.section != "assumed"
         if strip.section is not None:
             return dataclasses.replace(
                 strip.section, squeeze=squeeze, constants=self.model.constants
@@ -155,90 +149,65 @@ class Scene(Tree):
 
     def hierarchic_section(self) -> Hierarchic | None:
         """Section of order p; None if the section is the beamshell's."""
-        strip, model = self.strip, self.model
-        if model.order == 0:
+        strip, plan = self.strip, self.plan
+        if plan.order == 0:
             return None
         return Hierarchic(
             half_height=strip.half_height,
             plane_modulus=strip.plane_modulus,
             poisson_ratio=jnp.asarray(strip.poisson_ratio),
-            order=model.order,
-            kinematics=model.kinematics,
+            order=plan.order,
+            kinematics=plan.kinematics,
             plane=strip.plane,
         )
 
-    def _check_rung(self) -> None:
-        """Refuse what the model cannot represent."""
-        strip, contact, model = self.strip, self.contact, self.model
+    def _check_plan(self) -> None:
+        """Refuse what the planned section and engine cannot represent."""
+        strip, plan, load = self.strip, self.plan, self.load
+        levels = 2 * load.cycles * plan.steps
+        fix = f"with {plan.steps} steps per half cycle are more than {MOST_LEVELS} load steps: "
+        require("load.cycles", load.cycles, levels <= MOST_LEVELS, f"{fix}take fewer")
         plain = self.energy is None and strip.layers is None and strip.curvature is None
-        fix = "is for a straight homogeneous strip without an energy of its own; take 0"
-        require("model.order", model.order, model.order == 0 or plain, fix)
-        uniform = contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0
-        bar = plain and uniform and contact.normal == "rigid"
-        closed = model.solution == "closed-form"
-        fix = "needs a straight homogeneous strip on a rigid foundation under uniform pressures: "
-        require(
-            "model.solution", model.solution, bar or not closed, f"{fix}take another model.rung"
-        )
-        if model.condensed:
-            self._check_condensed(plain)
-        either = model.solution == "stepwise" or self.load.control in CONTROLS
-        require("model.solution", model.solution, either, "knows no arc length: take 'stepwise'")
-        cycling = model.walks or self.load.cycles > 0
-        fix = "needs load.cycles of 1 or more: give them, or take 'stepwise'"
-        require("model.solution", model.solution, cycling, fix)
-        half = self.load.steps_per_half_cycle
-        fix = f"must be even if model.solution is {model.solution!r}"
-        enough = model.walks or half % 2 == 0
-        require("load.steps_per_half_cycle", half, enough, fix)
+        fix = "is for a straight homogeneous strip without an energy of its own: take squeeze"
+        fix += " or plane" * (self.energy is None and strip.curvature is None)
+        require("model.section", plan.section, plain or plan.order == 0, fix)
+        fix = "is for a homogeneous strip: take squeeze"
+        homogeneous = strip.layers is None or plan.section != "assumed"
+        require("model.section", plan.section, homogeneous, fix)
+        if plan.elastic:
+            self._check_elasticity()
 
-    def _check_condensed(self, plain: bool) -> None:
-        """Refuse what no linear section on its contact line can represent.
-
-        Parameters
-        ----------
-        plain : True for a straight homogeneous strip without an energy of its own
-        """
-        model, curvature, contact = self.model, self.strip.curvature, self.contact
-        rung, plane = model.rung, model.solution == "plane"
-        take = f"take model.rung = {general_rung(rung) if plain or not plane else 'squeeze'}"
-        linear = model.kinematics == "linear"
-        fix = f"must be linear for model.rung = {rung}: {take} for rotations"
-        require("model.kinematics", model.kinematics, linear, fix)
-        fix = f"must be 'field' for model.rung = {rung}: {take}"
-        require("model.squeeze", model.squeeze, model.squeeze == "field", fix)
-        if plane:
-            fix = "must be 0 for plane elasticity: leave it out"
-            require("model.order", model.order, model.order == 0, fix)
-            whole = model.fields == ("v", "w", "beta", "psi")
-            fix = "must be ['v', 'w', 'beta', 'psi'] for plane elasticity: leave it out"
-        else:
-            whole = "w" in model.fields
-            known = f"condensed-{general_rung(rung)}" if "beta" in model.fields else "bar"
-            fix = f"must hold w for model.solution = condensed: give model.rung = {known} instead"
-            grid = model.grid == "finite-difference"
-            require("model.grid", model.grid, grid, f"must be finite-difference for {rung}: {take}")
-        require("model.fields", list(model.fields), whole, fix)
-        fix = f"must be left out for model.rung = {rung}, whose strip is straight: {take}"
-        require("strip.curvature", curvature, curvature is None, fix)
-        elastic = self.energy is None or not plane
-        fix = f"must be left out for model.rung = plane, which is elasticity: {take}"
-        require("energy", self.energy, elastic, fix)
+    def _check_elasticity(self) -> None:
+        """Refuse what is not plane elasticity."""
+        strip, contact, model, energy = self.strip, self.contact, self.model, self.energy
+        other = "squeeze, or p6 of a homogeneous strip"
+        section = f"model.section = {other}"
+        fix = f"must be linear for plane elasticity: take {section} for rotations"
+        require("model.kinematics", model.kinematics, self.plan.kinematics == "linear", fix)
+        fix = f"is solved on its contact line: take {other} for load steps"
+        require("model.section", "plane", model.by == AUTO, fix)
+        for key, value in (("strip.curvature", strip.curvature), ("energy", energy)):
+            fix = f"must be left out for plane elasticity: take {section}"
+            require(key, value, value is None, fix)
         sharp = isinstance(contact.law, SharpSlip)
-        fix = f"must be the sharp slider for model.rung = {rung}: leave contact.smoothing out, or "
-        require("contact.law", law_name(contact.law), sharp, f"{fix}{take}")
-        fix = f"must be rigid for model.rung = {rung}: {take}"
-        require("contact.normal", contact.normal, contact.normal != "compliant", fix)
+        fix = f"must be the sharp slider for plane elasticity: take it, or {section}"
+        require("contact.law", law_name(contact.law), sharp, fix)
+        fix = f"must be rigid for plane elasticity, which may lift off: take {section}"
+        based = contact.normal in ("rigid", "none")
+        require("contact.normal", contact.normal, based, fix)
+        control = self.load.control
+        fix = f"must be force or displacement for plane elasticity: take {section}"
+        require("load.control", control, control in CONTROLS, fix)
 
     def _check_contact(self) -> None:
         """Refuse a strip that nothing holds, and a load off the strip."""
-        strip, contact, model = self.strip, self.contact, self.model
-        lift = "w" in model.fields
-        needs = "needs w in model.fields"
-        require("contact.normal", contact.normal, lift or contact.normal == "rigid", needs)
-        require("strip.curvature", strip.curvature, lift or strip.curvature is None, needs)
-        layered = model.squeeze == "assumed" and strip.layers is not None
-        require("model.squeeze", "assumed", not layered, "is for a homogeneous strip")
+        strip, contact, plan = self.strip, self.contact, self.plan
+        stiff = contact.normal in ("rigid", "held")
+        fix = "needs a section that may lift off: take another model.section than bar"
+        require("contact.normal", contact.normal, plan.lifts or stiff, fix)
+        fix = "needs a strip that may lift off: take contact.normal = rigid and another "
+        fix += "model.section than bar"
+        require("strip.curvature", strip.curvature, plan.lifts or strip.curvature is None, fix)
         if contact.normal == "none":
             held = "beta" in FAR_ENDS[strip.far_end]
             fix = "is all that holds a strip without a foundation: take 'guided' (rigid-body "
@@ -246,7 +215,7 @@ class Scene(Tree):
             require("strip.far_end", strip.far_end, held, fix)
         pressures = (contact.pressure, contact.bottom_pressure)
         if not is_traced(strip.length, contact.friction, *pressures):
-            parts = strip, self.member, contact, model, self.load
+            parts = strip, self.member, contact, plan, self.load
             for rule in support_rules(*parts, self.number):
                 rule.demand()
 
@@ -272,7 +241,7 @@ class Scene(Tree):
         numbers: Any = jnp if is_traced(strip, alpha, tributary) else np  # much faster
         if alpha is not None:
             each = numbers.full_like(tributary, alpha * strip.shear_modulus / strip.half_height)
-        elif self.model.condensed:
+        elif self.plan.on_contact_line:
             each = numbers.full_like(tributary, np.inf)
         else:
             length = numbers.minimum(tributary, strip.half_height)
@@ -282,10 +251,10 @@ class Scene(Tree):
     def get(self, key: str) -> Any:
         """Value of a dotted key, such as ``scene.get("strip.height_ratio")``."""
         check_key(key)
-        section, name = key.split(".")
+        heading, name = key.split(".")
         if key == "contact.law":
             return law_name(self.contact.law)
-        return getattr(getattr(self, section), name)
+        return getattr(getattr(self, heading), name)
 
     def number(self, key: str) -> np.ndarray:
         """Number or table of a dotted key in double precision, for the rules of `domain`."""
@@ -311,15 +280,13 @@ class Scene(Tree):
             check_word(key, value)
             if DERIVED.get(key) in values:
                 raise InputError(f"{key} and {DERIVED[key]} say the same thing: give one of them")
-        if is_traced(values.get(KAPPA_S)) and is_elastic(self):
+        if is_traced(values.get(KAPPA_S)) and may_be_elastic(self):
             return self.serving([KAPPA_S]).replace(values)
-        given = self.model.given("fields"), self.model.given("solution")
-        values = spelled_out(dict(values), *given)
-        parts: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
+        parts: dict[str, dict[str, Any]] = {heading: {} for heading in PARTS}
         for key, value in values.items():
             if key not in DERIVED:
-                section, name = key.split(".")
-                parts[section][name] = value
+                heading, name = key.split(".")
+                parts[heading][name] = value
         if "strip.half_height" in values:
             height = _number("strip.half_height", values["strip.half_height"])
             length = parts["strip"].get("length", self.strip.length)
@@ -342,8 +309,8 @@ class Scene(Tree):
             if parts["load"].get(word, getattr(self.load, word)) != getattr(self.load, word):
                 parts["load"].setdefault("amplitude", None)
         fresh = {
-            section: getattr(self, section).changed(**changes) if changes else None
-            for section, changes in parts.items()
+            heading: dataclasses.replace(getattr(self, heading), **changes) if changes else None
+            for heading, changes in parts.items()
         }
         scene = dataclasses.replace(self, **{k: v for k, v in fresh.items() if v is not None})
         if "strip.youngs_modulus" in values:
@@ -352,28 +319,27 @@ class Scene(Tree):
         return scene
 
     def pinned(self, numbers: Numbers | None = None) -> Scene:
-        """Copy whose settings are given as they were chosen, so that no change chooses others.
+        """Copy whose settings are given as they are planned, so that no change decides others.
 
         Parameters
         ----------
         numbers : values by dotted key of many scenes, all of which the settings are to serve; None
             is those of this scene
         """
-        of_load, of_model = ({}, {}) if numbers is None else choose(self, numbers)
-        load, model = self.load.chosen(**of_load), self.model.chosen(**of_model)
-        return dataclasses.replace(self, load=load.pinned(), model=model.pinned())
+        its = self.plan if numbers is None else plan(self, numbers)
+        model = self.model.but(
+            section=its.section, kinematics=its.kinematics, nodes=its.nodes, end_size=its.end_size
+        )
+        load = self.load.but(steps_per_half_cycle=its.steps)
+        return self.but(load=load, model=model, plan=its)
 
     def refined(self) -> Scene:
-        """Copy on elements half as large, from which any change goes back to the chosen grid."""
-        model = self.model.chosen(**finer(self.model))
-        scene: Scene = eqx.tree_at(lambda scene: scene.model, self, model)
-        return scene
+        """Copy on elements half as large, from which any change goes back to the planned grid."""
+        return self.but(plan=finer(self))
 
     def as_elasticity(self) -> Scene:
-        """Copy as plane elasticity, from which any change goes back to the chosen section."""
-        model = self.model.chosen(**elasticity(self))
-        scene: Scene = eqx.tree_at(lambda scene: scene.model, self, model)
-        return scene
+        """Copy as plane elasticity, from which any change goes back to the planned section."""
+        return self.but(plan=elasticity(self))
 
     def serving(self, keys: Collection[str]) -> Scene:
         """Copy on the section that serves any values of some numbers, if the section is open.
@@ -384,30 +350,41 @@ class Scene(Tree):
         ----------
         keys : dotted keys of the numbers
         """
-        if not is_elastic(self):
+        if not may_be_elastic(self):
             return self
         if KAPPA_S not in keys:
             return self.as_elasticity()
         return self.pinned(lambda key: np.array(np.nan) if key == KAPPA_S else self.number(key))
 
     def by_load_steps(self) -> Scene:
-        """Copy that is solved in load steps, if how it is solved was left open."""
+        """Copy that is solved in load steps, of any section but plane elasticity."""
         support = self.member.support
         fix = "is for loads at rest, and beside elastic sliders, a gap or holes for pressures that "
         fix += "stay; for vibrations take jb.dynamics.let_go, or Joint.of(scene) in a structure"
         require("member.support", support, support == "none", fix)
-        found = self
-        if "solution" in self.model.open and self.model.solution != "stepwise":
-            found = self.replace({"model.solution": "stepwise"})
-        found.check_entry()
-        return found
+        model = dataclasses.replace(self.model, by="steps")
+        scene = dataclasses.replace(self, model=model)
+        scene.check_entry()
+        return scene
+
+    def on_grid(self, nodes: int, end_size: float) -> Scene:
+        """Copy on a grid of its own, for studies of convergence.
+
+        Parameters
+        ----------
+        nodes : number of nodes along X
+        end_size : smallest elements in units of H, before the number of nodes scales all of them;
+            below 1e-4 it serves the last node alone
+        """
+        model = dataclasses.replace(self.model, nodes=nodes, end_size=end_size)
+        return dataclasses.replace(self, model=model)
 
     def check_entry(self) -> None:
         """Refuse a member that goes on where load steps cannot continue its section."""
-        model, entry = self.model, self.load.entry
-        fix = f"has no section of order {model.order} in load steps: take load.entry = face, "
-        fix += f"guided or traction, or model.rung = condensed-p{model.order} or squeeze"
-        ends = model.condensed or not model.warps or entry != "member"
+        plan, entry = self.plan, self.load.entry
+        fix = f"has no section of order {plan.order} in load steps: take load.entry = face, "
+        fix += "guided or traction, linear kinematics, or model.section = squeeze"
+        ends = plan.on_contact_line or not plan.warps or entry != "member"
         require("load.entry", entry, ends, fix)
 
 
@@ -451,9 +428,6 @@ def check_word(name: str, value: Any) -> None:
         require(name, value, known, f"choose {' or '.join(map(repr, LAWS))}")
     elif name == "contact.smoothing" and isinstance(value, str):
         require(name, value, value == "sharp", key.words)
-    elif name == "model.fields" and not (isinstance(value, str) and value == AUTO):
-        words = isinstance(value, list | tuple) and all(isinstance(f, str) for f in value)
-        require(name, value, words, "give a list such as ['v', 'beta', 'psi']")
     elif key.kind == "word":
         require(name, value, isinstance(value, str), "must be a word")
     elif key.kind == "number" and not key.optional:

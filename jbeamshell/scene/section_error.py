@@ -84,14 +84,10 @@ def kind_of(scene: Parts) -> str:
 
 def section_of(scene: Parts) -> str:
     """Section of a scene for which curves are recorded; empty if there are none for it."""
-    model = scene.model
-    if model.solution == "plane":
-        return ""
-    if "beta" not in model.fields:
-        return "bar"
-    if model.order > 0:
-        return next((f"p{p}" for p in KNOWN_ORDERS if p <= model.order), "")
-    return "squeeze" if "psi" in model.fields else "shell"
+    section, order = scene.plan.section, scene.plan.order
+    if order > 0:
+        return next((f"p{known}" for known in KNOWN_ORDERS if known <= order), "")
+    return section if section in ("bar", "shell", "squeeze") else ""
 
 
 def section_error(scene: Parts, slip_length: float) -> SectionError | None:
@@ -198,7 +194,7 @@ def doubt_of_section(scene: Parts, slip_length: float, allowed: float) -> str:
     return (
         f"where slip reaches {reach:.2g} H the section {section_of(scene)} typically loses "
         f"{_compared(found.typical)} plane elasticity, and one strip in ten is off by {off}; leave "
-        "model.rung open, or take model.rung = plane"
+        "model.section open, or take model.section = plane"
     )
 
 

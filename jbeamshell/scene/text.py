@@ -9,14 +9,15 @@ import numpy as np
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.summary import Summary
 from jbeamshell.mechanics.friction import law_name
-from jbeamshell.scene.choice import Parts, in_words
 from jbeamshell.scene.keys import TABLE, unit_of
+from jbeamshell.scene.linearisation import Parts
+from jbeamshell.scene.planning import in_words
 
 ALWAYS = {
     *("strip.length", "strip.height_ratio", "strip.axial_stiffness", "strip.poisson_ratio"),
     *("contact.friction", "contact.pressure", "load.control", "load.amplitude"),
 }
-TITLE = ("model.fields", "model.nodes", "model.solution", "model.rung")
+TITLE = ("model.section", "model.kinematics", "model.nodes")
 
 
 def summary(scene: Parts, own_energy: bool) -> Summary:
@@ -31,16 +32,15 @@ def summary(scene: Parts, own_energy: bool) -> Summary:
     for name, key in TABLE.items():
         if key.through or name in TITLE:
             continue
-        section, field = name.split(".")
-        value = getattr(getattr(scene, section), field)
+        heading, field = name.split(".")
+        value = getattr(getattr(scene, heading), field)
         value = law_name(value) if name == "contact.law" else value
         if value is None or not (name in ALWAYS or _differs(value, key.default)):
             continue
         unit = unit_of(name, scene.load) if key.kind == "number" else ""
         rows.append((name, _shown(value) + (f"  [{unit}]" if unit not in ("", "1") else "")))
     own = " with a strain energy of its own" * own_energy
-    fields = " ".join(scene.model.fields)
-    title = f"Strip of {fields} on {scene.model.nodes} nodes{own}, rung {scene.model.rung}"
+    title = f"Strip{own}: {scene.plan}"
     return Summary(title, rows, tuple(filter(None, [in_words(scene)])))
 
 

@@ -16,9 +16,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml, write_text
 from jbeamshell.mechanics.friction import law_name
 from jbeamshell.scene.keys import DERIVED, KEYS, LENGTHS, NUMBERS
-from jbeamshell.scene.parts import SECTIONS, Load
-from jbeamshell.scene.rungs import spelled_out
-from jbeamshell.scene.scene import Scene, check_word
+from jbeamshell.scene.parts import PARTS, Load
+from jbeamshell.scene.scene import Scene
 
 FEW_DIGITS = {4: 6, 8: 12}  # of a number that somebody wrote, by the bytes of its precision
 
@@ -34,11 +33,6 @@ def scene_from_values(values: Mapping[str, Any]) -> Scene:
 def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Dotted keys with others on top, in which ``half_height`` replaces ``height_ratio``, etc."""
     same = DERIVED | {primary: derived for derived, primary in DERIVED.items()}
-    for given in (values, overrides):
-        if "model.rung" in given:
-            check_word("model.rung", given["model.rung"])
-    values = spelled_out(dict(values))
-    overrides = spelled_out(dict(overrides), values.get("model.fields", ()))
     displaced = {same[key] for key in overrides if key in same}
     return {k: v for k, v in values.items() if k not in displaced} | dict(overrides)
 
@@ -47,9 +41,9 @@ def read_values(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Values of a TOML file by dotted key."""
     values: dict[str, Any] = {}
     for section, table in read_toml(path).items():
-        if section not in SECTIONS:
+        if section not in PARTS:
             raise InputError(
-                f"{path}: unknown section {section!r}; sections are {', '.join(SECTIONS)}"
+                f"{path}: unknown section {section!r}; sections are {', '.join(PARTS)}"
             )
         if not isinstance(table, dict):
             raise InputError(f"{path}: {section} must be a table: write [{section}] above its keys")
@@ -100,20 +94,20 @@ def scene_to_toml(scene: Scene) -> str:
         raise InputError(
             "energy, law: a function of your own cannot be written to TOML; keep it in code"
         )
-    tables: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
+    tables: dict[str, dict[str, Any]] = {heading: {} for heading in PARTS}
     said = _in_few_digits(scene)
     for key in KEYS:
-        if (key in DERIVED and key not in said) or key == "model.rung":
+        if key in DERIVED and key not in said:
             continue
-        section, name = key.split(".")
-        value = said.get(key, dict(getattr(scene, section).as_given).get(name, scene.get(key)))
+        heading, name = key.split(".")
+        value = said.get(key, scene.get(key))
         if value is None:  # such as no layers
             continue
         if key in NUMBERS:
             value = _shortest(value)
         if key == "contact.smoothing" and np.isinf(value):
             value = "sharp"
-        tables[section][name] = list(value) if isinstance(value, tuple) else value
+        tables[heading][name] = list(value) if isinstance(value, tuple) else value
     return tomli_w.dumps(tables)
 
 

@@ -106,7 +106,7 @@ class Job:
     @property
     def _rank(self) -> np.ndarray:
         """Rank of every lane in the order in which chunks are cut, (lanes,)."""
-        shares = self.lanes.scene.model.condensed and self.width > 1
+        shares = self.lanes.scene.plan.on_contact_line and self.width > 1
         return self._body if shares else self.lanes.difficulty.ravel()
 
     @functools.cached_property

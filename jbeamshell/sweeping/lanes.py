@@ -17,7 +17,6 @@ from jbeamshell.mechanics.homogeneous import plane_modulus
 from jbeamshell.scene.domain import bar_rule, gross_slip_rule, support_rules
 from jbeamshell.scene.keys import DERIVED, NUMBERS, TABLE, check_key
 from jbeamshell.scene.layers import fill_height
-from jbeamshell.scene.parts import SECTIONS
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
@@ -155,15 +154,16 @@ class Lanes:
         """Truths of every rule, broadcasting to the lanes' shape."""
         for key in self.axes:
             yield TABLE[key].holds(self.grid(key))
-        strip, contact, load, model, member = (getattr(self.scene, part) for part in SECTIONS)
+        scene = self.scene
+        strip, contact, load, member = scene.strip, scene.contact, scene.load, scene.member
         if strip.layers is not None:
             thickness = np.sum(np.asarray(strip.layers)[:, 0])
             yield fill_height(thickness, 2.0 * self.value("strip.half_height"))
         targets = self.value("load.amplitude") if load.cycles else 0.0
         for rule in (
-            *support_rules(strip, member, contact, model, load, self.value),
+            *support_rules(strip, member, contact, scene.plan, load, self.value),
             gross_slip_rule(load, member, self.value, targets),
-            bar_rule(load, model, self.value),
+            bar_rule(load, scene.plan, self.value),
         ):
             yield rule.holds
 

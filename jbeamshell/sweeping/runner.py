@@ -71,7 +71,7 @@ def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
     ----------
     alike : (groups,) numbers of lanes that may share a body
     """
-    if scene.model.condensed:
+    if scene.plan.on_contact_line:
         if goes_on(scene):
             return 1
         widths = 2 ** np.arange(ABREAST.bit_length())
@@ -82,7 +82,7 @@ def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
 
 def shared_keys(scene: Scene, keys: Sequence[str]) -> list[int]:
     """Places of the keys whose numbers lanes with one condensed body share."""
-    if not scene.model.condensed:
+    if not scene.plan.on_contact_line:
         return []
     return [place for place, key in enumerate(keys) if key not in PER_LANE]
 
@@ -290,7 +290,7 @@ def _compiled(
     lanes = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
     fixed = [jax.ShapeDtypeStruct((), dtype, sharding=_everywhere(mesh))] * template.numbers
     strips = jax.ShapeDtypeStruct((size,), dtype, sharding=_everywhere(mesh))
-    small = template.scene(fixed).model.condensed
+    small = template.scene(fixed).plan.on_contact_line
     options = quick_options(vectors=many) if small else None
     program = jax.jit(run, compiler_options=options).lower(fixed, strips, *lanes).compile()
     return program, time.perf_counter() - begun

@@ -130,7 +130,7 @@ class Equations(eqx.Module):
 
     def with_chain(self, nodal: Array, chain: Array) -> Array:
         """Active fields (b, a) from all fields (n, m) of the nodes and those (k,) of the chain."""
-        active = nodal[:, list(self.system.model.active)]
+        active = nodal[:, list(self.system.plan.active)]
         rows = jnp.zeros((chain.size, active.shape[1]), active.dtype)
         return jnp.append(active, rows.at[:, 0].set(chain), 0)
 
@@ -242,9 +242,9 @@ def _scales(scene: Scene, system: System, time: Array) -> MotionState:
     strip = scene.strip
     stretch = system.force_scale * strip.length / strip.stretching_stiffness
     traction = system.force_scale / jnp.sum(system.tributary)
-    sizes = [stretch] * system.model.width
+    sizes = [stretch] * system.plan.width
     sizes[2], sizes[3] = stretch / strip.half_height, stretch / strip.length
-    fields = jnp.stack(sizes)[np.array(system.model.active)]
+    fields = jnp.stack(sizes)[np.array(system.plan.active)]
     energy = system.force_scale * stretch
     # Vibrations far faster than those of interest need no accuracy in rates and tractions.
     rates = LOOSE * fields / time
@@ -253,20 +253,18 @@ def _scales(scene: Scene, system: System, time: Array) -> MotionState:
 
 
 def movable(scene: Scene, inertia: Inertia) -> Scene:
-    """Scene by load steps; raises `InputError` for one that has no equations of motion here."""
+    """Scene by load steps; raises `InputError` for one that has no equations of motion here.
+
+    A rigid contact that may open is an algebraic constraint, which solvers of ordinary differential
+    equations do not accept: the strip is held down, unless ``contact.normal`` is compliant.
+    """
     scene = scene.by_load_steps()
-    contact, model, strip = scene.contact, scene.model, scene.strip
-    rigid = contact.normal == "rigid" and "w" in model.fields
-    fix = (
-        "with w in model.fields a rigid contact is an algebraic constraint, which solvers of "
-        "ordinary differential equations do not accept: set contact.normal to 'compliant'"
-    )
-    require("contact.normal", contact.normal, not rigid, fix)
+    if scene.contact.normal == "rigid":
+        scene = scene.replace({"contact.normal": "held"})
+    contact, strip = scene.contact, scene.strip
     require("load.control", scene.load.control, scene.load.control == "force", "must be 'force'")
-    fix = "has no inertia: take 'field'"
-    require("model.squeeze", model.squeeze, model.squeeze == "field", fix)
-    fix = "is quasi-static: take 'stepwise'"
-    require("model.solution", model.solution, model.solution == "stepwise", fix)
+    section = scene.plan.section
+    require("model.section", section, section != "assumed", "has no inertia: take 'squeeze'")
     fix = "is not possible in dynamics: take a straight strip"
     require("strip.curvature", strip.curvature, strip.curvature is None, fix)
     rate_friction.exponent(contact.law)

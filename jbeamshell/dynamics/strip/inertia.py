@@ -85,13 +85,13 @@ class Inertia(eqx.Module):
         fits = self.density.ndim == 0 or self.density.shape == (layers,)
         require("inertia.density", self.density, fits, DENSITY)
         fix = "is constant with linear kinematics only: take model.kinematics = 'linear'"
-        constant = self.mass == "lumped" or scene.model.kinematics == "linear"
+        constant = self.mass == "lumped" or scene.plan.kinematics == "linear"
         require("inertia.mass", self.mass, constant, fix)
 
     def through_height(self, scene: Scene) -> tuple[Array, Array]:
         """Heights s above mid-height and weights rho ds of the integral over it, (points,) each."""
         strip, half = scene.strip, scene.strip.half_height
-        points, weights = legendre.leggauss(scene.model.order + 3)
+        points, weights = legendre.leggauss(scene.plan.order + 3)
         if strip.layers is None:
             return half * jnp.asarray(points), jnp.mean(self.density) * half * jnp.asarray(weights)
         thick = strip.layers[:, 0]

@@ -64,7 +64,7 @@ class MassMatrix(eqx.Module):
         self.heights, self.weights = inertia.through_height(scene)
         moment = (self.heights**2 * self.weights).sum()
         self.extra = (inertia.squeeze_factor - 1.0) * moment
-        self.linear = scene.model.kinematics == "linear"
+        self.linear = scene.plan.kinematics == "linear"
         self.blocks_at_rest = self.factor = self.inverse = None
         if self.kind == "consistent":
             self.factor = jnp.linalg.cholesky(self.dense())
@@ -84,7 +84,7 @@ class MassMatrix(eqx.Module):
             system = self.system
             if system.section is not None:
                 return jnp.stack(system.section.displacement(fields, height))
-            place = KINEMATICS[system.model.kinematics].position
+            place = KINEMATICS[system.plan.kinematics].position
             return jnp.stack(place(fields[: len(FIELDS)], system.half_height, height))
 
         def squared_speed(height: Array) -> Array:
@@ -107,8 +107,8 @@ class MassMatrix(eqx.Module):
         if self.kind == "lumped":
             sections = jax.vmap(self.section_energy)(q, rate)
             return payload + jnp.sum(self.system.tributary * sections)
-        values, weights = _exact_rule(self.system.model.grid)
-        order = elements.ORDER[self.system.model.grid]
+        values, weights = _exact_rule(self.system.grid)
+        order = elements.ORDER[self.system.grid]
 
         def at_points(nodal: Array) -> Array:  # (points, elements, m)
             return jnp.einsum("pk,ekm->pem", values, elements.gather(nodal, order))
@@ -157,7 +157,7 @@ class MassMatrix(eqx.Module):
     @property
     def free(self) -> np.ndarray:
         """True for the active fields (n, a) that no support holds."""
-        active = self.system.model.active
+        active = self.system.plan.active
         free = np.ones((self.system.x.size, len(active)), bool)
         for node, field in self.system.supports(True):
             if field in active:
@@ -166,7 +166,7 @@ class MassMatrix(eqx.Module):
 
     def accelerations(self, q: Array, forces: Array) -> Array:
         """Accelerations (n, m) under forces (n, m); zero for frozen and held fields."""
-        columns = list(self.system.model.active)
+        columns = list(self.system.plan.active)
         free = jnp.asarray(self.free)
         active = jnp.where(free, forces[:, columns], 0.0)
         if self.factor is not None:
@@ -179,7 +179,7 @@ class MassMatrix(eqx.Module):
 
     def dense(self) -> Array:
         """Mass matrix at rest of the active fields (n a, n a); held fields have unit mass."""
-        q, columns = self.system.unloaded().q, list(self.system.model.active)
+        q, columns = self.system.unloaded().q, list(self.system.plan.active)
         free = jnp.asarray(self.free)
 
         def forces(active: Array) -> Array:
@@ -191,7 +191,7 @@ class MassMatrix(eqx.Module):
 
     def _free_blocks(self, blocks: Array) -> Array:
         """Blocks (n, a, a) of the active fields; held fields have unit mass."""
-        columns = np.array(self.system.model.active)
+        columns = np.array(self.system.plan.active)
         free = self.free.astype(float)
         held = (1.0 - free)[:, :, None] * np.eye(columns.size)
         active = blocks[:, columns[:, None], columns]

@@ -68,10 +68,10 @@ def modes(
     free = np.flatnonzero(moves)
     pick = np.ix_(free, free)
     values, vectors = scipy.linalg.eigh(stiffness[pick], mass[pick])
-    shapes = np.zeros((free.size, x.size, scene.model.width))
+    shapes = np.zeros((free.size, x.size, scene.plan.width))
     active = np.zeros((free.size, moves.size))
     active[:, free] = vectors.T
-    shapes[..., list(scene.model.active)] = active.reshape(-1, *moves.shape)
+    shapes[..., list(scene.plan.active)] = active.reshape(-1, *moves.shape)
     return Modes(np.sqrt(np.maximum(values, 0.0)), x, shapes)
 
 
@@ -81,7 +81,7 @@ def _matrices(
 ) -> tuple[Array, ...]:
     """Mass and stiffness (n a, n a) of the active fields, nodes (n,), and free fields (n, a)."""
     equations = Equations(scene, inertia, attached, Excitation())
-    system, columns = equations.system, list(scene.model.active)
+    system, columns = equations.system, list(scene.plan.active)
     foundation = system.foundation
 
     def forces(active: Array) -> Array:

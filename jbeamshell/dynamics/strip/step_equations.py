@@ -55,7 +55,7 @@ class StepMatrices(eqx.Module):
             return equations.mass.momentum(q, system.embed(nodal(system, unknown)))
 
         def rows(unknown: Array) -> Array:
-            residual = (inertia_forces(unknown) * scales)[:, list(system.model.active)]
+            residual = (inertia_forces(unknown) * scales)[:, list(system.plan.active)]
             return in_blocks(jnp.where(equations.mass.free, residual, 0.0), like)
 
         self.mass = jnp.stack(block_tridiagonal.jacobian(rows, like))
@@ -82,7 +82,7 @@ class StepMatrices(eqx.Module):
             massive = massive + inertia.damping_mass / step.h
         entries = elastic * static.entries + massive * self.mass
         conjugate = equations.end_conjugate(q)
-        active = np.array(equations.system.model.active)
+        active = np.array(equations.system.plan.active)
         end = end_slope * conjugate[active, None] * conjugate[active]
         end = end * _residual_scales(equations.system)[active, None]
         entries = entries.at[1, -active.size :, -active.size :, -1].add(-end)
@@ -179,7 +179,7 @@ class StepEquations(NamedTuple):
     def guess(self) -> Array:
         """Unknowns (blocks, size) of a motion at constant rates."""
         system = self.equations.system
-        change = self.step.h * self.p[:, list(system.model.active)]
+        change = self.step.h * self.p[:, list(system.plan.active)]
         return in_blocks(change, zero_unknowns(system))
 
     def end_change(self, change: Array) -> Array:
@@ -225,7 +225,7 @@ class StepEquations(NamedTuple):
 
 def _residual_scales(system: System) -> Array:
     """Residual per force or moment (m,) of every field's balance."""
-    return jnp.stack([system.residual_scale(field) for field in range(system.model.width)])
+    return jnp.stack([system.residual_scale(field) for field in range(system.plan.width)])
 
 
 def _prescribed(force: Array) -> Prescribed:

@@ -177,7 +177,7 @@ class Joint(Backbone):
         require_choice("by", by, (None, *BY))
         bolted = scene.contact.bolt_stiffness is not None  # which holds beyond
         capacity = np.inf if bolted else width * gross_slip(scene)
-        condensed = scene.model.condensed
+        condensed = scene.plan.on_contact_line
         traced = is_traced(scene, force)
         opens = scene.member.support != "none" or (condensed and goes_on(scene))
         if condensed and by != "cycles" and not (traced and opens and by is None):

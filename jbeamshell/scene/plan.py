@@ -1,0 +1,101 @@
+"""Plan of a scene: the record of how it is solved."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from jbeamshell.mechanics.elements import (
+    CONTACT_LINE_FAR_SIZE,
+    FAR_SIZE,
+    GROWTH,
+    SMALL_GROWTH,
+    TINY,
+)
+from jbeamshell.mechanics.kinematics import FIELDS
+from jbeamshell.scene.sections import ORDERS, fields_of
+
+LINE = "contact line"  # event by event, exact in time
+STEPS = "load steps"  # Newton's method
+CLOSED = "closed form"  # Goodman's bar
+
+
+class Plan(NamedTuple):
+    """How a scene is solved.
+
+    Attributes
+    ----------
+    section : name of the section, see `jbeamshell.scene.sections`
+    kinematics : rotations, "exact" or "linear"
+    engine : "contact line", "load steps" or "closed form"
+    lifts : True if the strip may lift off
+    nodes : number of nodes along X
+    end_size : smallest elements in units of H, before the number of nodes scales all of them; below
+        1e-4 it serves the last node alone
+    steps : load steps per half cycle
+    """
+
+    section: str
+    kinematics: str
+    engine: str
+    lifts: bool
+    nodes: int
+    end_size: float
+    steps: int
+
+    @property
+    def on_contact_line(self) -> bool:
+        """True if the strip is solved on its contact line, exactly in time."""
+        return self.engine == LINE
+
+    @property
+    def walks_any_path(self) -> bool:
+        """True if the engine follows any path of loads."""
+        return self.engine != CLOSED
+
+    @property
+    def elastic(self) -> bool:
+        """True for plane elasticity."""
+        return self.section == "plane"
+
+    @property
+    def order(self) -> int:
+        """Order p of the displacements through the height; 0 for the beamshell and elasticity."""
+        return ORDERS.get(self.section, 0)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Fields of a section among v, w, beta and psi."""
+        return fields_of(self.section, self.lifts)
+
+    @property
+    def width(self) -> int:
+        """Number of fields of a section, active or not."""
+        return len(FIELDS) + 2 * max(self.order - 1, 0)
+
+    @property
+    def active(self) -> tuple[int, ...]:
+        """Positions of the active fields among (v, w, beta, psi, and a section's further ones)."""
+        return (*(FIELDS.index(f) for f in self.fields), *range(len(FIELDS), self.width))
+
+    @property
+    def warps(self) -> bool:
+        """True if a section may warp, so that its end is no rigid face by nature."""
+        return self.elastic or self.order > 1
+
+    @property
+    def far_size(self) -> float:
+        """Largest elements before the number of nodes scales all, over L."""
+        return CONTACT_LINE_FAR_SIZE if self.on_contact_line else FAR_SIZE
+
+    @property
+    def small_growth(self) -> float:
+        """Growth of elements below H/48: fast if the smallest ones serve the last node alone."""
+        return SMALL_GROWTH if self.end_size < TINY else GROWTH
+
+    def __str__(self) -> str:
+        held = "" if self.lifts or self.section == "bar" else " held down"
+        by = {LINE: "on its contact line", STEPS: "in load steps", CLOSED: "in closed form"}
+        return (
+            f"section {self.section}{held} {by[self.engine]}, {self.kinematics} kinematics, "
+            f"{self.nodes} nodes"
+        )

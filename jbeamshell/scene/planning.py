@@ -1,0 +1,290 @@
+"""Rules by which a scene is planned: section, kinematics, engine, grid and load steps.
+
+A setting that is `AUTO` is decided here, when a scene is made, for its ``model.tolerance``.  The
+rules were measured (calibration/campaign.py, calibration/default_settings.py).
+
+* Rotations are linear where the bound on what that leaves out is a small part of the tolerance,
+  see `jbeamshell.scene.linearisation`.
+* The section is the beamshell's with its squeeze strain, or plane elasticity where that is known to
+  be needed, see `jbeamshell.scene.section_error`.
+* A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
+  in time; its strain energy may be a quadratic one of the user's own.  So are plane elasticity and
+  lap joints.  A bar under an even pressure has a closed form.  Any other strip is solved in load
+  steps.
+* A strip that bends may lift off.  Where strips that lift were held down, their dissipation was off
+  by 1 to 10 %.
+* Where the corner may open, elements are smaller at the loaded end.  In load steps this is so only
+  if friction is without elastic slip, and not under curved strips, whose large motions round off on
+  small elements.  On the contact line elastic sliders have far smaller ones.  The strip rests on
+  its last node there, and the slider of a single node is as stiff as the node is long: in the limit
+  it holds nothing.
+
+In a JAX transformation numbers are unknown: a plan stays that of the scene that was changed.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from jbeamshell.common.checks import is_traced
+from jbeamshell.mechanics.elements import END_SIZE
+from jbeamshell.mechanics.friction import SharpSlip
+from jbeamshell.scene.buckling import weakest_column
+from jbeamshell.scene.domain import Numbers
+from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS, KAPPA_S, TABLE
+from jbeamshell.scene.linearisation import Parts, linear_errors
+from jbeamshell.scene.plan import CLOSED, LINE, STEPS, Plan
+from jbeamshell.scene.quadratic import is_quadratic
+from jbeamshell.scene.rows import AUTO
+from jbeamshell.scene.section_error import known_beforehand
+from jbeamshell.scene.sections import ORDERS
+
+LINEAR_PART = 0.2  # of the tolerance that linear rotations may take
+SECTION_PART = 0.8  # of the tolerance that the section may take
+FEW_STEPS = 1  # load steps per half cycle where only figures of a cycle are asked of exact events
+
+
+class Grid(NamedTuple):
+    """Grid of a kind of strip, and its error as it was measured.
+
+    Attributes
+    ----------
+    nodes : number of nodes for `KNOWN`
+    end_size : smallest elements before scaling, in units of H
+    order : order of the error in the number of nodes
+    steps : load steps per half cycle, which draw a loop; exact events need none of them
+    halvings : times that elements are halved to keep the tolerance, at most
+    """
+
+    nodes: int
+    end_size: float
+    order: float
+    steps: int
+    halvings: int = 0
+
+
+KNOWN = 0.005  # tolerance for which the grids were measured
+PLANE_NODES = 129  # of plane elasticity for that
+CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20, halvings=2)
+SOFT_CONTACT_LINE = Grid(97, 2.0**-16 / 48.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
+MOST_REFINED = 513  # nodes of a grid that was refined
+PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
+MOST_JUMPS = 4  # of the pressure that add nodes
+PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
+BOTH_ENDS = 1.75  # of the elements, for corners at both ends of a lap joint
+STEPWISE = Grid(161, END_SIZE, 1.5, 40)
+LIFTING = Grid(161, 1.0 / 48.0, 1.5, 40)  # load steps of a strip whose corner may open
+ARC_STEPS = 120  # load steps per half cycle, whose chords are shorter than a bending path
+
+
+def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
+    """Plan of a scene: what is given stays, what is open is decided.
+
+    Parameters
+    ----------
+    scene : scene, some of whose settings may be `AUTO`; its plan is that of the scene that was
+        changed, or None if it is new
+    numbers : values by dotted key of many scenes, all of which the plan is to serve; None is those
+        of the scene
+    """
+    load, model, contact = scene.load, scene.model, scene.contact
+    kinematics, section = model.kinematics, model.section
+    if kinematics == AUTO:
+        kinematics = _kinematics(scene, numbers)
+    if section == AUTO:
+        elastic = kinematics == "linear" and may_be_elastic(scene, numbers)
+        elastic = elastic and _squeeze_error(scene, numbers) > SECTION_PART * model.tolerance
+        section = "plane" if elastic else "squeeze"
+    engine = _engine(scene, section, kinematics)
+    lifts = section != "bar" and contact.normal != "held"
+    soft = _is_soft(scene, numbers) and (model.nodes == AUTO or engine != LINE)
+    grid = _grid(section, engine, lifts and scene.strip.curvature is None, soft)
+    many = ARC_STEPS if load.control == ARC_LENGTH else grid.steps
+    return Plan(
+        section,
+        kinematics,
+        engine,
+        lifts,
+        nodes=_nodes(grid, scene) if model.nodes == AUTO else model.nodes,
+        end_size=grid.end_size if model.end_size == AUTO else float(model.end_size),
+        steps=many if load.steps_per_half_cycle == AUTO else load.steps_per_half_cycle,
+    )
+
+
+def _engine(scene: Parts, section: str, kinematics: str) -> str:
+    """Engine of a section: the contact line or the closed form where they can stand for it."""
+    if scene.model.by == "steps":
+        return STEPS
+    if section == "plane" or scene.member.support != "none":
+        return LINE
+    if section == "bar":
+        return CLOSED if _has_closed_form(scene) else STEPS
+    line = kinematics == "linear" and section != "assumed" and has_contact_line(scene)
+    return LINE if line and _is_linear(scene, section) else STEPS
+
+
+def _is_linear(scene: Parts, section: str) -> bool:
+    """True if a strain energy of the user's own, if there is one, makes a linear section."""
+    energy, half_height = scene.energy, scene.strip.half_height
+    if energy is None:
+        return True
+    if is_traced(energy, half_height):
+        return scene.plan is not None and scene.plan.on_contact_line
+    return is_quadratic(energy, half_height, section != "shell")
+
+
+def _has_closed_form(scene: Parts) -> bool:
+    """True if a bar is Goodman's: homogeneous, straight, under even pressures and whole cycles."""
+    strip, contact, load = scene.strip, scene.contact, scene.load
+    plain = scene.energy is None and strip.layers is None and strip.curvature is None
+    even = contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0
+    base = contact.normal in ("rigid", "held") and isinstance(contact.law, SharpSlip)
+    halves = load.steps_per_half_cycle == AUTO or load.steps_per_half_cycle % 2 == 0
+    return plain and even and base and halves and load.control in CONTROLS and load.cycles > 0
+
+
+def has_contact_line(scene: Parts) -> bool:
+    """True if a strip with linear kinematics can be solved on its contact line."""
+    contact, load = scene.contact, scene.load
+    if scene.member.support != "none":
+        return True
+    base = contact.normal == "rigid" and isinstance(contact.law, SharpSlip)
+    straight = scene.strip.curvature is None and scene.model.grid == "finite-difference"
+    cycling = load.control in CONTROLS and load.cycles > 0
+    return base and straight and cycling
+
+
+def may_be_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
+    """True if a scene leaves its section open, and plane elasticity can stand for it.
+
+    A squeeze-shear factor of the user's own is a number that elasticity does not have.  A traced
+    one may be any number where a scene is made; in a scene that was made before it is as it was.
+
+    Parameters
+    ----------
+    scene, numbers : see `plan`
+    """
+    model, kappa_s = scene.model, scene.strip.kappa_s
+    if model.section != AUTO or model.by != AUTO or model.constants != "consistent":
+        return False
+    if scene.energy is not None:
+        return False
+    if is_traced(kappa_s):
+        return scene.plan is not None and has_contact_line(scene)
+    factors = (numbers or scene.number)(KAPPA_S)
+    return bool(np.all(factors == TABLE[KAPPA_S].default)) and has_contact_line(scene)
+
+
+def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:
+    """Error of the squeeze section beside plane elasticity; infinite where it is not known."""
+    if is_traced(scene.strip, scene.contact, scene.load):
+        return float(np.inf)
+    with jax.ensure_compile_time_eval():
+        known = known_beforehand(scene, "squeeze", numbers or scene.number)
+    return float(np.inf) if known is None else known.largest
+
+
+def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
+    """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown."""
+    strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
+    if scene.member.support != "none" or model.section == "plane":
+        return "linear"
+    if is_traced(strip, contact, load):
+        return "exact" if scene.plan is None else scene.plan.kinematics
+    bounded = strip.curvature is None and contact.normal in ("rigid", "held")
+    if not bounded or scene.energy is not None or load.control not in CONTROLS:
+        return "exact"
+    may_be = may_be_elastic(scene, numbers)
+    # Numbers stay numbers within a caller's jit; the largest there are may overflow.
+    with jax.ensure_compile_time_eval(), np.errstate(all="ignore"):
+        error = linear_errors(
+            strip, load, model.section in ORDERS or may_be, numbers or scene.number
+        )
+        column = weakest_column(scene, numbers)
+    known = error[np.isfinite(error)]  # lanes of a sweep outside the domain have none
+    allowed = LINEAR_PART * model.tolerance
+    if may_be:  # better linear than a section that is further off
+        allowed = max(allowed, _squeeze_error(scene, numbers))
+    small = known.size > 0 and np.max(known) <= allowed
+    return "linear" if small and not column.near else "exact"
+
+
+def _grid(section: str, engine: str, opens: bool, soft: bool) -> Grid:
+    """Grid of a kind of strip for the tolerance `KNOWN`."""
+    if section == "plane":
+        return PLANE
+    if engine == LINE:
+        return SOFT_CONTACT_LINE if soft else CONTACT_LINE
+    return LIFTING if opens and not soft else STEPWISE
+
+
+def _is_soft(scene: Parts, numbers: Numbers | None) -> bool:
+    """True if sliders are elastic, in any of many scenes."""
+    if numbers is None or scene.contact.stick_stiffness is not None:
+        return scene.contact.stick_stiffness is not None
+    return not np.all(np.isnan(numbers("contact.stick_stiffness")))
+
+
+def _nodes(grid: Grid, scene: Parts) -> int:
+    """Odd number of nodes of a grid for a scene's tolerance."""
+    elements = (grid.nodes - 1) * (KNOWN / scene.model.tolerance) ** (1.0 / grid.order)
+    if grid in (CONTACT_LINE, SOFT_CONTACT_LINE):
+        elements *= 1.0 + PER_STEP * min(scene.contact.jumps, MOST_JUMPS)
+    elif grid is PLANE and scene.member.support != "none":
+        elements *= BOTH_ENDS
+    return 2 * int(np.ceil(elements / 2.0)) + 1
+
+
+def refinements(scene: Parts) -> int:
+    """Number of times that a scene's elements may be halved to keep its tolerance.
+
+    The grid must be open and the contact line a section's: a finer one of plane elasticity takes
+    longer than what it leaves is worth.
+    """
+    if scene.model.nodes != AUTO:
+        return 0
+    its = scene.plan
+    opens = its.lifts and scene.strip.curvature is None
+    grid = _grid(its.section, its.engine, opens, _is_soft(scene, None))
+    halvings = range(1, grid.halvings + 1)
+    return sum(2**times * (its.nodes - 1) < MOST_REFINED for times in halvings)
+
+
+def finer(scene: Parts) -> Plan:
+    """Plan of a scene on elements half as large."""
+    its, given = scene.plan, scene.model.end_size != AUTO
+    return its._replace(
+        nodes=2 * its.nodes - 1, end_size=its.end_size if given else 0.5 * its.end_size
+    )
+
+
+def elasticity(scene: Parts) -> Plan:
+    """Plan of a scene as plane elasticity, on a grid of its own."""
+    its, model = scene.plan, scene.model
+    return its._replace(
+        section="plane",
+        kinematics="linear",
+        engine=LINE,
+        lifts=True,
+        nodes=_nodes(PLANE, scene) if model.nodes == AUTO else its.nodes,
+        end_size=PLANE.end_size if model.end_size == AUTO else its.end_size,
+    )
+
+
+def in_words(scene: Parts) -> str:
+    """One line that says what a scene has chosen; empty if it left nothing open."""
+    load, model = scene.load, scene.model
+    open_settings = (model.section, model.kinematics, model.nodes, load.steps_per_half_cycle)
+    if AUTO not in open_settings:
+        return ""
+    percent = 100.0 * model.tolerance
+    return f"chosen to be within {percent:g} % of {reference(scene)}: {scene.plan}"
+
+
+def reference(scene: Parts) -> str:
+    """Words for what a scene's tolerance is relative to."""
+    elastic = scene.plan.elastic or may_be_elastic(scene)
+    return "plane elasticity" if elastic else "its own fine mesh"
