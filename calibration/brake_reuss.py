@@ -134,7 +134,7 @@ def start(mass: float) -> Assembly:
     """Model from which the fit starts."""
     scene = jb.Scene().replace(
         {
-            "model.rung": "plane",
+            "model.section": "plane",
             "model.nodes": NODES,
             "strip.length": LENGTH,
             "strip.height_ratio": 0.5 * HEIGHT / LENGTH,

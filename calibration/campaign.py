@@ -62,13 +62,13 @@ def finer(scene: jb.Scene) -> jb.Scene:
     elements = 2 * elements if model.nodes <= MANY_NODES else elements + elements // 4 * 2
     mesh: Values = {"model.nodes": elements + 1, "model.end_size": 0.5 * model.end_size}
     if not model.condensed:
-        mesh["load.steps_per_half_cycle"] = 2 * scene.load.steps_per_half_cycle
+        mesh["load.steps_per_half_cycle"] = 2 * scene.plan.steps
     return scene.replace(mesh)
 
 
 def made(values: Values) -> jb.Scene:
     """Scene of these values, which is the beamshell if they name no section."""
-    section = {} if {"model.rung", "model.fields"} & set(values) else BEAMSHELL
+    section = {} if {"model.section", "model.fields"} & set(values) else BEAMSHELL
     return jb.library.standard().replace(TO_ITSELF | section | values)
 
 
@@ -83,10 +83,10 @@ def solved(scene: jb.Scene) -> jb.History | None:
 
 def by_the_other(values: Values, scene: jb.Scene, other: Values) -> jb.Scene:
     """Scene with the same model and another solver; elastic sliders keep their last element."""
-    given = {key: value for key, value in values.items() if key != "model.rung"}
-    section: Values = {"model.fields": list(scene.model.fields), "model.order": scene.model.order}
-    if scene.model.condensed and scene.contact.stick_stiffness is not None:
-        section["model.end_size"] = scene.model.end_size
+    given = {key: value for key, value in values.items() if key != "model.section"}
+    section: Values = {"model.fields": list(scene.plan.fields), "model.order": scene.plan.order}
+    if scene.plan.on_contact_line and scene.contact.stick_stiffness is not None:
+        section["model.end_size"] = scene.plan.end_size
     return jb.library.standard().replace(TO_ITSELF | given | section | other)
 
 

@@ -50,7 +50,7 @@ STANDARD = {
     "m": 16.0,
 }
 PRESSURE, LENGTH = 10.0, 2.0
-LIFT = {"model.fields": ["v", "w", "beta", "psi"]}
+LIFT = {"model.section": "squeeze"}
 FINE = {"model.nodes": 321, "model.end_size": 1.0 / 200.0}
 EXACT = LIFT | FINE
 COARSER = {"model.nodes": 161, "model.end_size": 1.0 / 48.0}  # where that finds no equilibrium
@@ -58,7 +58,7 @@ SMOOTH = {"contact.smoothing": 16.0}
 LINEAR = {"model.kinematics": "linear"}
 PRINTED = {"model.constants": "printed"}
 COMPLIANT = LIFT | {"contact.normal": "compliant"}
-SECOND = {"model.rung": "p2"}
+SECOND = {"model.section": "p2"}
 PULLED = {"load.control": "displacement", "load.amplitude": 1.0}
 # Of every method its settings, and those of its reference.
 SOLVERS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
@@ -73,7 +73,7 @@ SOLVERS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "compliant": (COMPLIANT, COMPLIANT | FINE),
     "displacement": (PULLED, PULLED | EXACT),
-    "shell": ({"model.rung": "shell"}, {"model.fields": ["v", "w", "beta"]} | FINE),
+    "shell": ({"model.section": "shell"}, {"model.section": "shell"} | FINE),
     "p2": (SECOND, SECOND | FINE),
     "printed": (PRINTED, PRINTED | EXACT),
 }

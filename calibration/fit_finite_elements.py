@@ -29,7 +29,7 @@ from jbeamshell.measured.example import HEIGHT_RATIOS, example_loops  # noqa: E4
 HERE = Path(__file__).parent
 FREE = ("contact.friction", "strip.height_ratio")
 SYMBOLS = (r"$\mu$", r"$\eta$")
-MODELS = {"plain call": {}, "beamshell": {"model.rung": "squeeze"}}
+MODELS = {"plain call": {}, "beamshell": {"model.section": "squeeze"}}
 LOADS = (0.4359, 0.7855, 1.3)  # in units of mu F_N L/2, so that gross slip is 2
 TRUE_FRICTION, OFF = 0.1, 1.2  # friction, and start over truth
 SHOWN = 0.1126  # height ratio whose loops are drawn

@@ -43,7 +43,7 @@ PATCHES: dict[str, Any] = {
 def scenes() -> Iterator[tuple[dict[str, Any], jb.Scene]]:
     """Varied numbers of a row, and its scene."""
     for patch, pressure in PATCHES.items():
-        scene = jb.library.standard().replace({"model.rung": "plane", "contact.pressure": pressure})
+        scene = jb.library.standard().replace({"model.section": "plane", "contact.pressure": pressure})
         for eta in HEIGHTS:
             cases = [(mu, 0.3) for mu in FRICTIONS]
             cases += [(0.1, nu) for nu in (0.0, 0.45) if eta in (0.05, 0.2, 0.4)]
@@ -51,7 +51,7 @@ def scenes() -> Iterator[tuple[dict[str, Any], jb.Scene]]:
                 given = {"strip.height_ratio": eta, "contact.friction": mu}
                 about = {"patch": patch, "eta": eta, "mu": mu, "nu": nu}
                 yield about, scene.replace(given | {"strip.poisson_ratio": nu})
-    lap = jb.library.single_lap().replace({"model.rung": "plane"})
+    lap = jb.library.single_lap().replace({"model.section": "plane"})
     for eta in (0.05, 0.1, 0.2, 0.3):
         for mu in (0.1, 0.3):
             given = {"strip.height_ratio": eta, "contact.friction": mu}

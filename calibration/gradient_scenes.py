@@ -7,7 +7,7 @@ Values = dict[str, Any]
 FEW = {"model.nodes": 17, "load.steps_per_half_cycle": 4, "load.cycles": 1}
 STEPWISE = FEW | {"model.solution": "stepwise", "model.kinematics": "linear"}
 EXACT = STEPWISE | {"model.kinematics": "exact"}
-LIFT = {"model.fields": ["v", "w", "beta", "psi"]}
+LIFT = {"model.section": "squeeze"}
 SMOOTH = {"contact.smoothing": 8.0}
 SOFT = {"contact.stick_stiffness": 100.0}
 TABLE_OF_STEPS = {
@@ -38,22 +38,22 @@ SINGLE = DOUBLE | {
 BOLTS = {"contact.bolts": [[0.5, 5.0, 0.4], [1.4, 6.0, 0.5]], "load.amplitude": 0.3}
 SETTINGS: dict[str, Values] = {
     "condensed squeeze": FEW,
-    "condensed shell": FEW | {"model.rung": "condensed-shell"},
-    "condensed p2": FEW | {"model.rung": "condensed-p2"},
+    "condensed shell": FEW | {"model.section": "shell", "model.kinematics": "linear"},
+    "condensed p2": FEW | {"model.section": "p2", "model.kinematics": "linear"},
     "condensed, soft sliders": FEW | SOFT,
     "condensed, displacement": FEW | DISPLACED,
     "condensed, steps of pressure": FEW | TABLE_OF_STEPS,
     "condensed, both faces": FEW | BOTH_FACES | SOFT,
     "condensed, layers": FEW | LAYERS | SOFT,
-    "plane": FEW | {"model.rung": "plane"},
-    "plane, traction": FEW | {"model.rung": "plane", "load.entry": "traction"},
-    "plane, face": FEW | {"model.rung": "plane", "load.entry": "face"},
-    "plane, guided": FEW | {"model.rung": "plane", "load.entry": "guided"},
-    "plane, overhang": FEW | {"model.rung": "plane", "strip.overhang": 0.3},
-    "bar": FEW | {"model.rung": "bar"},
+    "plane": FEW | {"model.section": "plane"},
+    "plane, traction": FEW | {"model.section": "plane", "load.entry": "traction"},
+    "plane, face": FEW | {"model.section": "plane", "load.entry": "face"},
+    "plane, guided": FEW | {"model.section": "plane", "load.entry": "guided"},
+    "plane, overhang": FEW | {"model.section": "plane", "strip.overhang": 0.3},
+    "bar": FEW | {"model.section": "bar"},
     "stepwise sharp": STEPWISE,
     "stepwise smooth": STEPWISE | SMOOTH,
-    "stepwise shell": STEPWISE | {"model.rung": "shell"},
+    "stepwise shell": STEPWISE | {"model.section": "shell"},
     "exact sharp": EXACT,
     "exact smooth that lifts": EXACT | SMOOTH | LIFT,
     "exact sharp that lifts": EXACT | LIFT,
@@ -62,10 +62,10 @@ SETTINGS: dict[str, Values] = {
     "exact, layers": EXACT | LAYERS,
     "stepwise, displacement": STEPWISE | DISPLACED,
     "exact, arc length": EXACT | DISPLACED | {"load.control": "arc-length"},
-    "stepwise p2": STEPWISE | {"model.rung": "p2", "load.entry": "guided"},
-    "stepwise p3, exact": EXACT | {"model.rung": "p3", "load.entry": "face"},
+    "stepwise p2": STEPWISE | {"model.section": "p2", "load.entry": "guided"},
+    "stepwise p3, exact": EXACT | {"model.section": "p3", "load.entry": "face"},
     "collocation": EXACT | {"model.grid": "collocation"},
-    "assumed squeeze": EXACT | LIFT | {"model.squeeze": "assumed"},
+    "assumed squeeze": EXACT | LIFT | {"model.section": "assumed"},
     "printed constants": STEPWISE | {"model.constants": "printed"},
     "compliant base": EXACT | LIFT | {"contact.normal": "compliant"},
     "pinned": FEW | SOFT | {"strip.far_end": "pinned"},
@@ -88,7 +88,7 @@ SETTINGS: dict[str, Values] = {
         "load.kind": "moment",
         "load.amplitude": 0.3,
     },
-    "plane lap": FEW | DOUBLE | {"model.rung": "plane"},
+    "plane lap": FEW | DOUBLE | {"model.section": "plane"},
 }
 # Distances for numbers that are zero, or small beside what they are added to.
 SIZES = {

@@ -59,7 +59,7 @@ def truth() -> dict[tuple[float, float], float]:
 
 def ratios(order: int) -> np.ndarray:
     """Dissipation over the cubic law on all cells, (16,)."""
-    base = {"model.rung": f"p{order}", "model.nodes": 81, "model.end_size": 1.0 / 12.0}
+    base = {"model.section": f"p{order}", "model.nodes": 81, "model.end_size": 1.0 / 12.0}
     scene = in_load_steps().replace(base | {"model.kinematics": "linear"})
 
     @eqx.filter_jit

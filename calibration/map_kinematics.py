@@ -59,9 +59,9 @@ HIGHEST = (1e-1, 0.4, 0.95, 0.6, 0.47)
 LOGARITHMIC = np.array([True, True, False, True, False])
 SCATTERED = {"squeeze": 256, "p3": 32, "lift": 64}  # the first of one sequence
 MODELS: dict[str, dict[str, Any]] = {
-    "squeeze": {"model.rung": "squeeze", "model.end_size": 1 / 6},
-    "p3": {"model.rung": "p3", "model.end_size": 1 / 12},
-    "lift": {"model.fields": ["v", "w", "beta", "psi"], "model.end_size": 1 / 6},
+    "squeeze": {"model.section": "squeeze", "model.end_size": 1 / 6},
+    "p3": {"model.section": "p3", "model.end_size": 1 / 12},
+    "lift": {"model.section": "squeeze", "model.end_size": 1 / 6},
 }
 COLUMNS = ("strain", "eta", "gross", "mu", "nu", "dissipation", "stiffness", "rotation", "state")
 LANES = 16  # solved at once

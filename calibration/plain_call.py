@@ -84,7 +84,7 @@ def solved(kind: str, scene: jb.Scene, work: float, stiffness: float | None) -> 
     place = {"eta": float(strip.height_ratio), "A": float(load.amplitude)}
     place["mu"] = float(scene.contact.friction)
     figures = {name: float(f"{value:.4g}") for name, value in (place | found).items()}
-    section = {"section": history.scene.model.rung, "nodes": int(history.x.size)}
+    section = {"section": history.scene.plan.section, "nodes": int(history.x.size)}
     return {"kind": kind} | section | figures | {"ms": 1e3 * taken, "doubts": list(history.doubts)}
 
 

@@ -14,7 +14,7 @@ from jbeamshell.mechanics.bar import bar_backbone
 Values = dict[str, Any]
 Random = np.random.Generator
 
-LIFT = {"model.fields": ["v", "w", "beta", "psi"]}
+LIFT = {"model.section": "squeeze"}
 STEPWISE = {"model.solution": "stepwise"}
 EXACT = {"model.solution": "stepwise", "model.kinematics": "exact"}
 MANY_STEPS = {"load.steps_per_half_cycle": 40}
@@ -119,20 +119,20 @@ def squeezed(random: Random) -> Values:
     """Assumed squeeze, or the printed constants."""
     kind = random.choice(["assumed", "printed"])
     return plain(random) | (
-        LIFT | {"model.squeeze": "assumed"} if kind == "assumed" else {"model.constants": "printed"}
+        LIFT | {"model.section": "assumed"} if kind == "assumed" else {"model.constants": "printed"}
     )
 
 
 def shells(random: Random) -> Values:
     """Sections without squeeze-shear, and of order 2."""
-    return plain(random) | {"model.rung": str(random.choice(["shell", "p2"]))}
+    return plain(random) | {"model.section": str(random.choice(["shell", "p2"]))}
 
 
 def higher(random: Random) -> Values:
     """Sections of order 3 to 6, and plane elasticity under pressures that leave gaps."""
     rung = str(random.choice(["p3", "p4", "p5", "p6", "plane", "plane"]))
     make = pressed_in_part if rung == "plane" else plain
-    return make(random) | {"model.rung": rung}
+    return make(random) | {"model.section": rung}
 
 
 def few_steps(random: Random) -> Values:
@@ -244,7 +244,7 @@ def given(random: Random) -> Values:
         "model.end_size": _log(random, 1.0 / 48.0, 1.0),
         "load.steps_per_half_cycle": steps,
         "model.kinematics": kinematics,
-        "model.rung": rung,
+        "model.section": rung,
     }
 
 
@@ -259,7 +259,7 @@ def lap(random: Random) -> Values:
         "member.height_ratio": thinner * found["strip.height_ratio"],
         "member.axial_stiffness": 3.4e4 * thinner * softer,
         "member.poisson_ratio": random.uniform(0.0, 0.45),
-        "model.rung": str(random.choice(["squeeze", "squeeze", "p2", "plane"])),
+        "model.section": str(random.choice(["squeeze", "squeeze", "p2", "plane"])),
     }
     if support == "clamped":
         found["strip.loaded_end"] = "level"

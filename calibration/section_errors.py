@@ -160,13 +160,13 @@ def beside_elasticity(kind: str, entry: str) -> Values:
             ("strip.poisson_ratio", 0.3),
         )
     )
-    plane = {"model.rung": "plane", "load.entry": entry}
+    plane = {"model.section": "plane", "load.entry": entry}
     exact = runs(scenes, gross, plane | {"model.nodes": FINE})
     coarse = runs(scenes, gross, plane | {"model.nodes": NODES})
     found: Values = {}
     for section in ("plane", *sections(kind)):
         rung = section if section == "bar" else f"condensed-{section}"
-        model = {"model.rung": rung, "load.entry": entry}
+        model = {"model.section": rung, "load.entry": entry}
         own = coarse
         if section != "plane":
             own = runs(scenes, gross, model | {"model.nodes": NODES})

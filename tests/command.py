@@ -2,7 +2,7 @@
 
 # One shape for nearly everything, so that it compiles once.
 COARSE = {
-    "model.rung": "squeeze",
+    "model.section": "squeeze",
     "model.nodes": 21,
     "model.kinematics": "linear",
     "load.steps_per_half_cycle": 8,

@@ -62,7 +62,7 @@ def test_sweeps_share_a_program_whatever_the_scene_s_other_numbers(compiled):
 
 def test_a_response_is_compiled_as_a_whole(compiled):
     """Not operation by operation, also of constants, which took 180 programs."""
-    ask = jb.response(jb.Scene().replace({"model.rung": "bar"}), ["load.amplitude"])
+    ask = jb.response(jb.Scene().replace({"model.section": "bar"}), ["load.amplitude"])
     compiled()
     first = float(ask(0.5)["dissipation"])
     assert "jit(one_call)" in (names := compiled())
@@ -73,7 +73,7 @@ def test_a_response_is_compiled_as_a_whole(compiled):
 
 def test_responses_share_programs_and_derivatives_whatever_the_scene_s_other_numbers(compiled):
     def slope(mu):
-        scene = jb.Scene().replace({"model.rung": "bar", "contact.friction": mu})
+        scene = jb.Scene().replace({"model.section": "bar", "contact.friction": mu})
         ask = jb.response(scene, ["load.amplitude"])
         return float(ask(0.5)["dissipation"]), float(jax.grad(lambda a: ask(a)["dissipation"])(0.5))
 

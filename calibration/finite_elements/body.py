@@ -46,7 +46,7 @@ class Slice(NamedTuple):
 def strip_slice(scene: jb.Scene, nodes: int, rows: int = ROWS) -> Slice:
     """Slice of a strip under an even pressure, held at X = 0, pulled evenly, of graded bricks."""
     strip, height = scene.strip, 2.0 * float(scene.strip.half_height)
-    x = np.asarray(stations(scene.replace({"model.rung": "plane"}), nodes))
+    x = np.asarray(stations(scene.replace({"model.section": "plane"}), nodes))
     y = height * np.expm1(np.linspace(0.0, np.log1p(RISE), rows)) / RISE
     front = np.arange(1, x.size * rows + 1).reshape(x.size, rows)
     both = np.stack([front, front + front.size])
@@ -100,7 +100,7 @@ def body_of(made: Slice, folder: Path, program: str | None = None) -> jb.Substru
 def main(nodes: int = 49) -> None:
     """Compare dissipation and stiffness with the rung ``plane`` on as many contact nodes."""
     jax.config.update("jax_enable_x64", True)
-    values = {"model.rung": "plane", "model.nodes": nodes, "load.entry": "traction"}
+    values = {"model.section": "plane", "model.nodes": nodes, "load.entry": "traction"}
     scene = jb.Scene().replace(values)
     with tempfile.TemporaryDirectory() as folder:
         body = body_of(strip_slice(scene, nodes), Path(folder))

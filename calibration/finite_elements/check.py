@@ -102,7 +102,7 @@ def entries() -> Iterator[tuple[jb.Scene, dict[str, float]]]:
 
 def entry(scene: jb.Scene, there: dict[str, float]) -> dict[str, Any]:
     """One entry of the force, by CalculiX on two meshes, beside both others."""
-    plane = jb.solve(scene.replace({"model.rung": "plane", "model.nodes": NODES}))
+    plane = jb.solve(scene.replace({"model.section": "plane", "model.nodes": NODES}))
     others = {
         "reference": there,
         "plane": {"D": float(plane.dissipation), "K": float(plane.secant_stiffness)},

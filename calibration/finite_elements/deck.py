@@ -243,7 +243,7 @@ def _step(
     """One step; what stays as it was in the step before, CalculiX keeps."""
     contact, controlled = scene.contact, scene.load.control == "displacement"
     founded = contact.normal != "none"
-    text = card(f"STEP, INC={MOST_PARTS}{', NLGEOM' if scene.model.kinematics == 'exact' else ''}")
+    text = card(f"STEP, INC={MOST_PARTS}{', NLGEOM' if scene.plan.kinematics == 'exact' else ''}")
     text += card("STATIC", [(1.0, 1.0, SMALLEST_PART, 1.0)])
     if founded and not step.rough and (step.begins or step.softer < 1.0):
         text += card("CHANGE SURFACE BEHAVIOR, INTERACTION=CONTACT")

@@ -140,7 +140,7 @@ def march(scene: jb.Scene, method: Method) -> Run:
     rough = jnp.ones_like(unit).at[0].set(0.0)
     start = (systems[-1].unloaded(), jnp.zeros_like(targets[0]))
     _, (work, given_up, tried) = lax.scan(step, start, (targets, rough))
-    cycle = 2 * scene.load.steps_per_half_cycle
+    cycle = 2 * scene.plan.steps
     return Run(jnp.sum(work[-cycle:]), jnp.sum(given_up), jnp.sum(tried), unit.size)
 
 
@@ -159,7 +159,7 @@ def _step(
         part = jnp.minimum(at.part + at.size, 1.0)
         zero = jnp.zeros_like(part)
         prescribed = Prescribed(begin + part * (end - begin), zero + 1.0, zero, rough)
-        change, tried = jnp.zeros_like(at.level.q[:, list(systems[-1].model.active)]), at.tried
+        change, tried = jnp.zeros_like(at.level.q[:, list(systems[-1].plan.active)]), at.tried
         for system, stiffness in zip(systems, stiffnesses, strict=True):
             change, error, more = _newton(system, stiffness, change, at.level, prescribed, method)
             tried = tried + more

@@ -33,7 +33,7 @@ def main() -> None:
     eta, amplitude = jnp.asarray(ETA), jnp.asarray([AMPLITUDE])
     for rung in options.rungs:
         scene = jb.library.standard().replace(
-            {"model.rung": f"condensed-{rung}", "model.nodes": options.nodes}
+            {"model.section": f"condensed-{rung}", "model.nodes": options.nodes}
         )
 
         def built(eta, amplitude, scene=scene):
@@ -42,9 +42,9 @@ def main() -> None:
 
         def walk(rung, steps, scene=scene, **values):
             half = {"load.steps_per_half_cycle": steps, "model.kinematics": "linear"}
-            return jb.response(scene.replace({"model.rung": rung} | half | values), KEYS)
+            return jb.response(scene.replace({"model.section": rung} | half | values), KEYS)
 
-        lift = {"model.fields": [f for f in scene.model.fields if f != "w"]}
+        lift = {"model.fields": [f for f in scene.plan.fields if f != "w"]}
         kept, whole = jb.condensed.factors(scene), jax.jit(built)
         few, some, many = (walk(rung, steps) for steps in (1, 30, MANY))
         frozen, frozen_some = (walk(rung, steps, **lift) for steps in (1, 30))

@@ -38,7 +38,7 @@ VARIANTS = {
         "load.steps_per_half_cycle": 10,
     },
     "fields v, beta": {"model.fields": ["v", "beta"]},
-    "fields v, w, beta, psi": {"model.fields": ["v", "w", "beta", "psi"]},
+    "fields v, w, beta, psi": {"model.section": "squeeze"},
     "collocation": {"model.grid": "collocation"},
     "collocation, 81 nodes": {"model.grid": "collocation", "model.nodes": 81},
     "m = 8": {"contact.smoothing": 8.0},

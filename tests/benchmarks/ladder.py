@@ -63,7 +63,7 @@ def modelled(strip: tuple[float, float], rung: str) -> jb.Scene:
             "load.amplitude": amplitude,
             "load.cycles": CYCLES,
             "load.steps_per_half_cycle": STEPS,
-            "model.rung": rung,
+            "model.section": rung,
             "model.kinematics": "linear",
             "model.nodes": NODES,
             "model.end_size": 1.0 / 12.0 if rung.startswith("p") else 1.0 / 6.0,

@@ -24,7 +24,7 @@ IN_LOAD_STEPS = {"model.solution": "stepwise", "model.kinematics": "exact"}
 
 SMALL = {"model.nodes": 21, "load.steps_per_half_cycle": 8, "load.cycles": 1}
 LINEAR = SMALL | {"model.kinematics": "linear"}
-LIFT = {"model.fields": ["v", "w", "beta", "psi"]}
+LIFT = {"model.section": "squeeze"}
 LAYERS = {"strip.layers": [[0.1, 2e5, 0.3], [0.0752, 1e5, 0.2], [0.05, 4e5, 0.1]]}
 TABLE = {"contact.pressure": [[0.0, 4.0], [0.9, 12.0], [0.9, 6.0], [2.0, 10.0]]}
 DISPLACED = {"load.control": "displacement", "load.amplitude": 2e-5}
@@ -50,17 +50,17 @@ SCENES: dict[str, dict] = {
     "linear": LINEAR,
     "one step": LINEAR | {"load.steps_per_half_cycle": 1},
     "two cycles": LINEAR | {"load.cycles": 2},
-    "bar": LINEAR | {"model.rung": "bar"},
-    "stepwise bar": LINEAR | {"model.rung": "stepwise-bar"},
-    "bar, displaced": LINEAR | {"model.rung": "bar"} | DISPLACED,
-    "shell": LINEAR | {"model.rung": "shell"},
-    "shell, exact": SMALL | {"model.rung": "shell"} | MILD,
+    "bar": LINEAR | {"model.section": "bar"},
+    "stepwise bar": LINEAR | {"model.section": "stepwise-bar"},
+    "bar, displaced": LINEAR | {"model.section": "bar"} | DISPLACED,
+    "shell": LINEAR | {"model.section": "shell"},
+    "shell, exact": SMALL | {"model.section": "shell"} | MILD,
     "squeeze, soft": SMALL | MILD,
-    "p1": LINEAR | {"model.rung": "p1"},
-    "p2": LINEAR | {"model.rung": "p2"},
-    "p2, exact": SMALL | {"model.rung": "p2"} | MILD,
-    "p3": LINEAR | {"model.rung": "p3"},
-    "p4": LINEAR | {"model.rung": "p4"},
+    "p1": LINEAR | {"model.section": "p1"},
+    "p2": LINEAR | {"model.section": "p2"},
+    "p2, exact": SMALL | {"model.section": "p2"} | MILD,
+    "p3": LINEAR | {"model.section": "p3"},
+    "p4": LINEAR | {"model.section": "p4"},
     "collocation": LINEAR | {"model.grid": "collocation"},
     "collocation, exact": SMALL | {"model.grid": "collocation"},
     "printed": LINEAR | {"model.constants": "printed"},
@@ -90,10 +90,10 @@ SCENES: dict[str, dict] = {
     "pressure in steps": LINEAR | {"load.pressure_steps": 3},
     "lift": LINEAR | LIFT,
     "lift, exact": SMALL | LIFT,
-    "lift, shell": LINEAR | {"model.fields": ["v", "w", "beta"]},
-    "lift, p2": LINEAR | {"model.rung": "p2"} | LIFT,
+    "lift, shell": LINEAR | {"model.section": "shell"},
+    "lift, p2": LINEAR | {"model.section": "p2"} | LIFT,
     "compliant": LINEAR | LIFT | {"contact.normal": "compliant"},
-    "assumed": LINEAR | LIFT | {"model.squeeze": "assumed"},
+    "assumed": LINEAR | LIFT | {"model.section": "assumed"},
     "curved": LINEAR | LIFT | {"strip.curvature": 0.001},
     "curved, exact": SMALL | LIFT | {"strip.curvature": 0.001},
     "layers": LINEAR | LAYERS,

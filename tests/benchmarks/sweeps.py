@@ -54,15 +54,15 @@ def swept(scene: jb.Scene, over: dict[str, np.ndarray], paired: bool, check: int
     for lane in lanes:
         places = np.unravel_index(lane, works.shape) * (len(over) if paired else 1)
         own = {key: values[at] for (key, values), at in zip(over.items(), places, strict=True)}
-        fine = scene.replace(own | {"model.rung": "plane", "model.nodes": FINE})
+        fine = scene.replace(own | {"model.section": "plane", "model.nodes": FINE})
         history = jb.solve(fine, throw=False)
         ratios.append(float(history.dissipation_ratio))
         errors.append(abs(works.ravel()[lane] / float(history.dissipation) - 1.0))
     seen = np.array(errors)[np.array(ratios) > 1e-3]
     return {
         "lanes": works.size,
-        "rung": found.scene.model.rung,
-        "nodes": found.scene.model.nodes,
+        "rung": found.scene.plan.section,
+        "nodes": found.scene.plan.nodes,
         "failed": int(np.sum(found.status != 0)),
         "cold_s": seconds[0],
         "lanes_per_s": works.size / seconds[1],

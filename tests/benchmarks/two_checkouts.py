@@ -43,7 +43,7 @@ def calls():
     loop = jb.response(many, over, ["force", "displacement", "dissipation"])
     rotated = jb.response(exact, over, ["dissipation"])
     slope = jax.jit(jax.grad(lambda eta, load: ask(eta, load)["dissipation"], (0, 1)))
-    walked = jb.library.standard().replace({"model.rung": "condensed-squeeze", "model.nodes": 33})
+    walked = jb.library.standard().replace({"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 33})
     lanes = {"strip.height_ratio": np.geomspace(0.02, 0.4, 64)}
     lanes["load.amplitude"] = np.linspace(0.3, 1.6, 64)
     return {

@@ -103,10 +103,10 @@ def ways(strip: tuple[float, float]) -> Iterator[Way]:
     plain = scene_of(strip)
     yield Way("plain call", "kept body", None, solved(plain, LOAD))
     yield Way("plain call", "new body", None, solved(plain, HEIGHT))
-    yield Way("bar", "bar", None, solved(scene_of(strip, {"model.rung": "bar"}), LOAD))
+    yield Way("bar", "bar", None, solved(scene_of(strip, {"model.section": "bar"}), LOAD))
     for section in SECTIONS:
         for nodes in NODES:
-            named = scene_of(strip, {"model.rung": section, "model.nodes": nodes})
+            named = scene_of(strip, {"model.section": section, "model.nodes": nodes})
             yield Way(section, section, nodes, solved(named, LOAD))
     ask = jb.response(plain, [LOAD])
     yield Way(

@@ -21,7 +21,7 @@ def test_the_answer_as_json(cli):
     code, out, err = cli("advise", "--tol", "0.05", "--json")
     told = json.loads(out)
     assert (code, err) == (0, "")
-    assert told["settings"]["model.rung"] == "condensed-squeeze"
+    assert told["settings"]["model.section"] == "condensed-squeeze"
     assert 0.0 < told["section_error"] <= 0.05
     assert told["tolerance"] == 0.05
     assert told["to"] == "plane elasticity"

@@ -105,7 +105,7 @@ TIPPING = {"contact.bottom_pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 19.0], [2.0
                 ("strip.poisson_ratio", 0.3),
             ]
         ],
-        (LIFTING | LAYERS | {"model.squeeze": "assumed"}, "'assumed': is for a homogeneous strip"),
+        (LIFTING | LAYERS | {"model.section": "assumed"}, "'assumed': is for a homogeneous strip"),
     ],
 )
 def test_settings_that_do_not_go_together_are_refused(refused, settings, told):

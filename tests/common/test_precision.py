@@ -56,7 +56,7 @@ class TestSinglePrecision:
     @pytest.mark.slow
     def test_gradients_of_a_section_are_right(self, single: None) -> None:
         def slope() -> float:
-            squeeze = jb.Scene().replace({"model.rung": "squeeze"})
+            squeeze = jb.Scene().replace({"model.section": "squeeze"})
             ask = jb.response(squeeze, ["contact.friction"])
             return float(jax.grad(lambda mu: ask(mu)["dissipation"])(jnp.asarray(0.1)))
 

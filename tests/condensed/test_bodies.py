@@ -18,7 +18,7 @@ SCENE = jb.library.standard().replace(COARSE)
 LAYERS = [[0.1, 2.0e4, 0.3], [0.1252, 1.5e5, 0.2]]
 AMPLITUDE = float(SCENE.load.amplitude)
 SOFT = {"contact.stick_stiffness": 50.0}  # load steps have no ideal friction
-condensed = jax.jit(lambda scene: strip.condensed(scene, scene.model.nodes))
+condensed = jax.jit(lambda scene: strip.condensed(scene, scene.plan.nodes))
 
 
 def built_in(e, g, k, psi, dpsi):
@@ -34,26 +34,26 @@ def built_in(e, g, k, psi, dpsi):
 
 def of_phi(energy, rung="condensed-squeeze"):
     """Standard strip with an energy of its own."""
-    start = SCENE.replace({"model.rung": "squeeze"})
+    start = SCENE.replace({"model.section": "squeeze"})
     own = jb.Scene(start.strip, start.contact, start.load, start.model, energy)
-    return own.replace({"model.rung": rung})
+    return own.replace({"model.section": rung})
 
 
 def beside(scene, **values):
     """Scene in load steps, with the fields and nodes of a condensed one."""
-    rung = scene.model.rung.removeprefix("condensed-")
-    return scene.replace({"model.rung": rung, "model.kinematics": "linear"} | values)
+    rung = scene.plan.section.removeprefix("condensed-")
+    return scene.replace({"model.section": rung, "model.kinematics": "linear"} | values)
 
 
 BODIES = {
-    "shell": SCENE.replace({"model.rung": "condensed-shell"}),
-    "squeeze": SCENE.replace({"model.rung": "condensed-squeeze"}),
-    "p2": SCENE.replace({"model.rung": "condensed-p2"}),
-    "p4": SCENE.replace({"model.rung": "condensed-p4", "strip.plane": "stress"}),
-    "face": SCENE.replace({"model.rung": "condensed-p3", "load.entry": "face"}),
-    "guided": SCENE.replace({"model.rung": "condensed-p3", "load.entry": "guided"}),
-    "laminate": SCENE.replace({"model.rung": "condensed-squeeze", "strip.layers": LAYERS}),
-    "printed": SCENE.replace({"model.rung": "condensed-squeeze", "model.constants": "printed"}),
+    "shell": SCENE.replace({"model.section": "shell", "model.kinematics": "linear"}),
+    "squeeze": SCENE.replace({"model.section": "squeeze", "model.kinematics": "linear"}),
+    "p2": SCENE.replace({"model.section": "p2", "model.kinematics": "linear"}),
+    "p4": SCENE.replace({"model.section": "p4", "model.kinematics": "linear", "strip.plane": "stress"}),
+    "face": SCENE.replace({"model.section": "p3", "model.kinematics": "linear", "load.entry": "face"}),
+    "guided": SCENE.replace({"model.section": "p3", "model.kinematics": "linear", "load.entry": "guided"}),
+    "laminate": SCENE.replace({"model.section": "squeeze", "model.kinematics": "linear", "strip.layers": LAYERS}),
+    "printed": SCENE.replace({"model.section": "squeeze", "model.kinematics": "linear", "model.constants": "printed"}),
     "coupled": of_phi(
         lambda e, g, k, psi, dpsi: built_in(e + 0.02 * k, g + 0.1 * psi, k, psi, dpsi)
     ),
@@ -66,9 +66,9 @@ class TestBody:
         """Elimination station by station is that of the whole potential's second derivatives."""
         scene = BODIES[name].replace({"model.nodes": 5})
         elastic = ElasticStrip(scene)
-        zero = jnp.zeros((5, scene.model.width))
+        zero = jnp.zeros((5, scene.plan.width))
         free = np.zeros(zero.shape, bool)
-        free[:, list(scene.model.active)] = True
+        free[:, list(scene.plan.active)] = True
         for (node, field), _ in System(scene).supports(True).items():
             free[node, field] &= field in (0, 1)  # the contact's own are held later
 
@@ -138,7 +138,7 @@ class TestHistory:
         check_against_load_steps(exact, steps)
         exact.save(tmp_path / "run.npz")
         again = jb.read_history(tmp_path / "run.npz")
-        assert again.scene.model.rung == "condensed-p2"
+        assert again.scene.plan.section == "condensed-p2"
         np.testing.assert_array_equal(again.fields, exact.fields)
 
     @pytest.mark.doubtful("few nodes", "in the corner", "single nodes", "the section squeeze")
@@ -204,19 +204,19 @@ class TestRefusals:
     )
     def test_what_is_not_linear_names_the_general_rung(self, values, said):
         with pytest.raises(jb.InputError, match=said):
-            SCENE.replace({"model.rung": "condensed-p2"} | values)
+            SCENE.replace({"model.section": "p2", "model.kinematics": "linear"} | values)
 
     @pytest.mark.parametrize(
         ("values", "said"),
         [
             ({"strip.curvature": 0.1}, "strip.curvature = 0.1: .* take model.rung = squeeze"),
-            ({"model.squeeze": "assumed"}, "model.squeeze = 'assumed': must be 'field'"),
+            ({"model.section": "assumed"}, "model.squeeze = 'assumed': must be 'field'"),
             ({"model.fields": ["v", "beta"]}, "give one"),
         ],
     )
     def test_so_do_the_beamshells(self, values, said):
         with pytest.raises(jb.InputError, match=said):
-            SCENE.replace({"model.rung": "condensed-squeeze"} | values)
+            SCENE.replace({"model.section": "squeeze", "model.kinematics": "linear"} | values)
 
     @pytest.mark.parametrize(
         ("fields", "said"), [(["v", "beta"], "= condensed-shell instead"), (["v"], "= bar instead")]

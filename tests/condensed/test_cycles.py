@@ -24,7 +24,7 @@ def scene_of(eta, mu=0.1, nu=0.3):
     """Standard strip with mu F_N = 1."""
     return jb.Scene().replace(
         {
-            "model.rung": "plane",
+            "model.section": "plane",
             "load.entry": "traction",
             "strip.height_ratio": eta,
             "strip.poisson_ratio": nu,

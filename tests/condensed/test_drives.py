@@ -20,7 +20,7 @@ STRIP = jax.jit(lambda scene: strip.condensed(scene, NODES))
 @pytest.fixture(scope="module", params=["guided", "free"])
 def body(request):
     changed = {
-        "model.rung": "plane",
+        "model.section": "plane",
         "load.entry": "traction",
         "contact.friction": MU,
         "contact.pressure": 1.0 / MU,
@@ -78,7 +78,7 @@ class TestDisplacementControl:
         np.testing.assert_allclose(driven.slip_work, pushed.slip_work, rtol=1e-10)
 
     def test_factors_serve_it_where_zones_are_nested(self):
-        changed = {"model.rung": "plane", "load.entry": "traction"}
+        changed = {"model.section": "plane", "load.entry": "traction"}
         body = STRIP(jb.Scene().replace(changed)).body
 
         @jax.jit

@@ -18,7 +18,7 @@ from jbeamshell.scene import library
 from jbeamshell.scene.keys import ENTRIES
 
 ELEMENTS = Path(__file__).parents[2] / "calibration/data/entry.csv"
-PLANE = jb.Scene().replace({"model.rung": "plane"})
+PLANE = jb.Scene().replace({"model.section": "plane"})
 FIGURES = ("dissipation", "secant_stiffness", "slip_length", "peak_displacement")
 NUMBERS = ("strip.height_ratio", "contact.friction", "load.amplitude")
 H = 0.1126  # half the height of the default strip
@@ -124,7 +124,7 @@ class TestBeyond:
 
 class TestSections:
     def test_a_straight_section_has_a_rigid_face_by_nature(self):
-        scene = jb.Scene().replace({"model.rung": "condensed-squeeze", "model.nodes": 33})
+        scene = jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 33})
         runs = [jb.solve(scene.replace({"load.entry": name}), throw=False) for name in ENTRIES]
         loss = [float(run.dissipation) for run in runs]
         member, face, guided, traction = loss
@@ -138,9 +138,9 @@ class TestSections:
         few |= {"contact.stick_stiffness": 50.0, "load.steps_per_half_cycle": 20}
         for rung in ("squeeze", "p3"):
             line, steps = (
-                jb.solve(jb.Scene().replace(few | {"model.rung": rung} | how), throw=False)
+                jb.solve(jb.Scene().replace(few | {"model.section": rung} | how), throw=False)
                 for how in (
-                    {"model.solution": "condensed", "model.fields": ["v", "w", "beta", "psi"]},
+                    {"model.solution": "condensed", "model.section": "squeeze"},
                     {"model.solution": "stepwise", "model.kinematics": "linear"},
                 )
             )
@@ -157,7 +157,7 @@ class TestSections:
             orders = [
                 jb.solve(
                     jb.Scene().replace(
-                        small | {"load.entry": name, "model.rung": f"condensed-p{p}"}
+                        small | {"load.entry": name, "model.section": f"condensed-p{p}"}
                     ),
                     throw=False,
                 )
@@ -271,7 +271,7 @@ def test_a_moment_turns_no_guided_face():
 
 
 def test_load_steps_cannot_continue_a_section_that_warps():
-    scene = jb.Scene().replace({"model.rung": "p3", "model.solution": "stepwise"})
+    scene = jb.Scene().replace({"model.section": "p3", "model.solution": "stepwise"})
     with pytest.raises(jb.InputError, match=r"load.entry = 'member': has no section of order 3"):
         jb.solve(scene)
 
@@ -279,4 +279,4 @@ def test_load_steps_cannot_continue_a_section_that_warps():
 def test_one_state_serves_where_the_ends_are_the_same():
     assert entry.states(PLANE) == (False, True)
     assert entry.states(PLANE.replace({"load.entry": "face"})) == (True,)
-    assert entry.states(jb.Scene().replace({"model.rung": "condensed-squeeze"})) == (True,)
+    assert entry.states(jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear"})) == (True,)

@@ -7,7 +7,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell.condensed.kept import kept
 
-PLANE = jb.Scene().replace({"model.rung": "plane", "model.nodes": 17})
+PLANE = jb.Scene().replace({"model.section": "plane", "model.nodes": 17})
 LAP = {"strip.far_end": "free", "member.support": "rolling"}
 
 
@@ -56,7 +56,7 @@ def test_a_joint_that_is_pressed_with_friction_depends_on_it(counted):
 
 def test_other_sections_and_traced_scenes_are_built_each_time(counted):
     found, built = counted
-    squeeze = PLANE.replace({"model.rung": "condensed-squeeze"})
+    squeeze = PLANE.replace({"model.section": "squeeze", "model.kinematics": "linear"})
     found(squeeze)
     found(squeeze)
 

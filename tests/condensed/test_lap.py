@@ -22,7 +22,7 @@ from jbeamshell.scene import library
 BOLTED = Path(lap.__file__).with_name("lap.json")
 ELEMENTS = Path(__file__).parents[2] / "calibration/data/lap_joints.csv"
 JOINT = {"strip.far_end": "free", "member.support": "rolling", "load.amplitude": 1.0}
-SQUEEZE = jb.Scene().replace(JOINT | {"model.rung": "squeeze"})
+SQUEEZE = jb.Scene().replace(JOINT | {"model.section": "squeeze"})
 pytestmark = pytest.mark.doubtful("the section squeeze")  # which these joints name
 BOLT = [[0.75, 0.0], [0.75, 40.0], [1.25, 40.0], [1.25, 0.0]]
 
@@ -80,7 +80,7 @@ class TestElements:
         (row,) = (r for r in elements("double-shear") if (r["A"], r["H2"]) == (1.0, 0.2358))
         errors = []
         for rung in ("squeeze", "p2", "p4", "p6"):
-            history = jb.solve(SQUEEZE.replace({"model.rung": rung} | of_row(row)))
+            history = jb.solve(SQUEEZE.replace({"model.section": rung} | of_row(row)))
             errors.append(float(history.dissipation) / row["D"] - 1.0)
         assert np.all(np.diff(errors) < 0.0)
         assert errors[-1] > 0.0
@@ -90,10 +90,10 @@ class TestLimits:
     @pytest.mark.slow
     def test_a_stiff_member_is_a_rigid_base(self, monkeypatch):
         alone = jb.Scene().replace(
-            {"strip.far_end": "free", "load.amplitude": 1.0, "model.rung": "condensed-squeeze"}
+            {"strip.far_end": "free", "load.amplitude": 1.0, "model.section": "squeeze", "model.kinematics": "linear"}
         )
         scene = SQUEEZE.replace({"member.axial_stiffness": 3.4e10})
-        x = stations(scene, scene.model.nodes)  # one grid for both
+        x = stations(scene, scene.plan.nodes)  # one grid for both
         monkeypatch.setattr(strip, "stations", lambda *_: x)
         base = jb.solve(alone.replace({"load.steps_per_half_cycle": 22}), throw=False)
         joint = jb.solve(scene.replace({"load.steps_per_half_cycle": 22}), throw=False)
@@ -141,7 +141,7 @@ class TestBalance:
         assert loop == pytest.approx(work, rel=1e-6)
 
     def test_members_move_apart_by_gap_and_slip(self):
-        values = {"model.rung": "shell", "member.support": "clamped", "load.amplitude": 0.5}
+        values = {"model.section": "shell", "member.support": "clamped", "load.amplitude": 0.5}
         values |= {"model.nodes": 65, "contact.pressure": BOLT, "contact.bottom_pressure": BOLT}
         history = jb.solve(SQUEEZE.replace(values), throw=False)
         scale = float(jnp.max(jnp.abs(history.v)))
@@ -225,7 +225,7 @@ class TestBearings:
 
 class TestHoles:
     def test_nothing_touches_in_a_hole(self):
-        values = {"model.rung": "shell", "model.nodes": 65, "contact.holes": [[1.0, 0.2]]}
+        values = {"model.section": "shell", "model.nodes": 65, "contact.holes": [[1.0, 0.2]]}
         history = jb.solve(library.single_lap().replace(values), throw=False)
         assert history.converged
         inside = np.abs(np.asarray(history.x) - 1.0) < 0.1
@@ -261,7 +261,7 @@ class TestMoments:
         "rung", ["squeeze", *(pytest.param(r, marks=pytest.mark.slow) for r in ("p3", "plane"))]
     )
     def test_an_arm_adds_the_rotation_of_the_end(self, rung):
-        scene = library.single_lap().replace({"model.rung": rung, "model.nodes": 25})
+        scene = library.single_lap().replace({"model.section": rung, "model.nodes": 25})
         of_body = jax.jit(lambda scene: strip.condensed(scene, 25).body.c)
 
         def compliance(values):
@@ -284,7 +284,7 @@ class TestMoments:
     def test_stuck_thin_members_bend_as_one_beam(self):
         errors = []
         for eta in (0.01, 0.005, 0.0025):
-            values = {"strip.height_ratio": eta, "contact.friction": 5.0, "model.rung": "squeeze"}
+            values = {"strip.height_ratio": eta, "contact.friction": 5.0, "model.section": "squeeze"}
             values |= {"contact.pressure": 10.0, "contact.bottom_pressure": 10.0}
             scene = moments(1e-4, **values, **{"strip.loaded_end": "free"})
             history = jb.solve(scene, throw=False)
@@ -342,7 +342,7 @@ class TestGap:
         values = {"contact.assembly": assembly, "contact.gap": BEND}
         bolts = jnp.array([[0.7, 12.0, 0.4], [1.3, 12.0, 0.4]])
         values |= {"model.nodes": 65, "load.steps_per_half_cycle": 2, "load.cycles": 1}
-        scene = library.single_lap().replace({"model.rung": "squeeze"} | values)
+        scene = library.single_lap().replace({"model.section": "squeeze"} | values)
         scene = scene.replace({"contact.bolts": bolts}).pinned()
 
         def work(numbers):
@@ -389,7 +389,7 @@ class TestGap:
 
 def test_a_single_lap_beyond_its_gross_slip_is_told():
     values = {"member.support": "clamped", "strip.loaded_end": "level", "load.amplitude": 1.99}
-    values |= {"contact.pressure": BOLT, "contact.bottom_pressure": BOLT, "model.rung": "shell"}
+    values |= {"contact.pressure": BOLT, "contact.bottom_pressure": BOLT, "model.section": "shell"}
     values |= {"model.nodes": 41, "load.steps_per_half_cycle": 2, "load.cycles": 1}
     with pytest.raises(jb.UnconvergedError, match="all of the contact slides"):
         jb.solve(SQUEEZE.replace(values))

@@ -14,7 +14,7 @@ from jbeamshell.condensed.turns import known_turns, turns_of
 NODES = 21
 TURNS = jnp.asarray([1.0, 0.3, -1.0, -0.2, 1.0])
 TURNED = (True, True, False, True, False)  # -1 and the last 1 go on
-PLANE = jb.library.standard().replace({"model.rung": "plane"})
+PLANE = jb.library.standard().replace({"model.section": "plane"})
 STRIP = jax.jit(lambda scene: strip.condensed(scene, NODES).body)
 LAYERS = np.array([[0.1, 2e5, 0.3], [0.1252, 4e5, 0.2]])
 
@@ -161,7 +161,7 @@ class TestTurns:
     @pytest.mark.parametrize("rung", ["plane", "condensed-squeeze"])
     def test_a_rest_changes_nothing(self, rung):
         # Samples of a sine are alike on both sides of its turn: a rest at every turn.
-        scene = jb.library.standard().replace({"model.rung": rung})
+        scene = jb.library.standard().replace({"model.section": rung})
         loads = np.sin(2.0 * np.pi * np.arange(1, 76) / 50)
         rests = np.flatnonzero(np.diff(loads, prepend=0.0) == 0.0)
         assert rests.size

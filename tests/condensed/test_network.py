@@ -10,7 +10,7 @@ import jbeamshell as jb
 from jbeamshell.condensed.branches import factorise
 from jbeamshell.condensed.network import Network
 
-PLANE = {"model.rung": "plane", "model.nodes": 33}
+PLANE = {"model.section": "plane", "model.nodes": 33}
 SCENE = jb.library.standard().replace(PLANE)
 NESTED = [0.5, 1.0, 0.6, -0.2, -0.6, -0.2, 0.2, -0.3, -0.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.1]
 of = eqx.filter_jit(Network.of)

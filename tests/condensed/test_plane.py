@@ -32,7 +32,7 @@ def scene_of(eta, mu=0.1, nu=0.3, amplitude=1.0):
     """Standard strip with mu F_N = 1."""
     return jb.Scene().replace(
         {
-            "model.rung": "plane",
+            "model.section": "plane",
             "load.entry": "traction",
             "strip.height_ratio": eta,
             "strip.poisson_ratio": nu,
@@ -45,7 +45,7 @@ def scene_of(eta, mu=0.1, nu=0.3, amplitude=1.0):
 
 def plane(scene, **values):
     """History of a scene on the rung of plane elasticity."""
-    return jb.solve(scene.replace({"model.rung": "plane"} | values))
+    return jb.solve(scene.replace({"model.section": "plane"} | values))
 
 
 @jax.jit
@@ -272,7 +272,7 @@ class TestHistory:
 class TestRung:
     @pytest.mark.slow
     def test_a_response_is_what_a_run_says(self):
-        scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 33})
+        scene = scene_of(0.1126).replace({"model.section": "plane", "model.nodes": 33})
         one_step = scene.replace({"load.steps_per_half_cycle": 1})
         ask = jb.response(one_step, ["contact.friction", "load.amplitude"], ["dissipation"])
         for mu, amplitude in ((0.1, 1.0), (0.5, 3.0)):  # nested, and walked event by event
@@ -287,12 +287,12 @@ class TestRung:
         history = plane(scene_of(0.1126), **{"model.nodes": 33, "load.steps_per_half_cycle": 1})
         history.save(tmp_path / "run.npz")
         again = jb.read_history(tmp_path / "run.npz")
-        assert again.scene.model.rung == "plane"
+        assert again.scene.plan.section == "plane"
         np.testing.assert_array_equal(again.fields, history.fields)
 
     @pytest.mark.doubtful("in the corner", "few nodes", "lanes may be off")
     def test_a_sweep_walks_what_is_not_nested_alone(self):
-        scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 33})
+        scene = scene_of(0.1126).replace({"model.section": "plane", "model.nodes": 33})
         scene = scene.replace({"load.steps_per_half_cycle": 1})
         table = jb.sweep(scene, {"contact.friction": [0.1, 0.5]})
         assert np.all(table.status == 0)
@@ -304,7 +304,7 @@ class TestRung:
         few = {"model.nodes": 33, "load.steps_per_half_cycle": 2}
         force = plane(scene_of(0.1126), **few)
         control = {"load.control": "displacement", "load.amplitude": force.displacement[1]}
-        driven = scene_of(0.1126).replace({"model.rung": "plane"} | few | control)
+        driven = scene_of(0.1126).replace({"model.section": "plane"} | few | control)
         moved = jb.solve(driven, force.displacement[1:])
         np.testing.assert_allclose(moved.force, force.force, atol=1e-9)
         np.testing.assert_allclose(moved.target, moved.displacement, rtol=1e-12)
@@ -326,7 +326,7 @@ class TestRung:
 
     @pytest.mark.slow
     def test_a_traced_path_is_the_path(self):
-        scene = scene_of(0.1126).replace({"model.rung": "plane", "model.nodes": 17})
+        scene = scene_of(0.1126).replace({"model.section": "plane", "model.nodes": 17})
         loads = np.array([0.5, 1.0, 0.4, -0.3, -0.8, -0.8, 0.1, 1.0])
         run = jb.solve(scene, loads)
         traced = jax.jit(lambda path: jb.solve(scene, path, throw=False))(loads)
@@ -338,7 +338,7 @@ class TestRung:
 
     @pytest.mark.slow
     def test_a_fit_finds_planted_parameters(self):
-        few = {"model.rung": "plane", "model.nodes": 49, "load.steps_per_half_cycle": 10}
+        few = {"model.section": "plane", "model.nodes": 49, "load.steps_per_half_cycle": 10}
         scene = jb.Scene().replace(few)
         planted = {"contact.friction": 0.12, "strip.height_ratio": 0.09}
         loop = jb.measured.make_loop(*map(np.asarray, jb.solve(scene.replace(planted)).loop))

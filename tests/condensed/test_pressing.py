@@ -13,8 +13,8 @@ from jbeamshell.condensed.pressing import press
 from jbeamshell.scene import library
 
 PRESS = jax.jit(press)
-STRIP = jax.jit(lambda scene: strip.condensed(scene, scene.model.nodes))
-PLANE = {"model.rung": "plane", "model.nodes": 129}
+STRIP = jax.jit(lambda scene: strip.condensed(scene, scene.plan.nodes))
+PLANE = {"model.section": "plane", "model.nodes": 129}
 
 
 def problem(seed, n=6, k=5):
@@ -93,7 +93,7 @@ class TestLaminate:
         layers = [[0.1, 2.0e4, 0.3], [0.1252, 1.5e5, 0.2]]
         found = {}
         for rung in ("plane", "condensed-squeeze"):
-            given = {"strip.layers": layers, "model.rung": rung, "model.nodes": 33}
+            given = {"strip.layers": layers, "model.section": rung, "model.nodes": 33}
             own = STRIP(jb.Scene().replace(given))
             assert float(jnp.sum(own.body.r_0)) == pytest.approx(20.0, rel=1e-9)
             reaction = np.asarray(own.body.r_0 / own.body.tributary)[::-1]

@@ -9,7 +9,7 @@ from jbeamshell.condensed.interpolation import CLOSE, Bodies, built
 from jbeamshell.condensed.shared import shared
 from jbeamshell.scene.keys import ENTRIES
 
-PLANE = jb.Scene().replace({"model.rung": "plane", "model.nodes": 25, "load.amplitude": 0.5})
+PLANE = jb.Scene().replace({"model.section": "plane", "model.nodes": 25, "load.amplitude": 0.5})
 HEIGHT, POISSON, FRICTION, LOAD = (
     "strip.height_ratio",
     "strip.poisson_ratio",

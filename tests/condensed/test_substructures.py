@@ -27,7 +27,7 @@ SCENE = jb.Scene().replace(
         "member.support": "rolling",
         "member.height_ratio": 0.2,
         "member.axial_stiffness": 8e4,
-        "model.rung": "squeeze",
+        "model.section": "squeeze",
         "model.nodes": 25,
         "load.amplitude": 1.0,
         "load.steps_per_half_cycle": 8,
@@ -46,7 +46,7 @@ def as_body(hessian, fixed, x, signs):
 @jax.jit
 def potentials(scene):
     """Stations, and of both members of a lap joint the Hessian and what is held."""
-    x = stations(scene, scene.model.nodes)
+    x = stations(scene, scene.plan.nodes)
     down, up = pressing(scene, x)
     upper, lower, _ = lap_members(scene, section_form(scene), x, down, up)[-1]
     return x, (upper.line.hessian, upper.fixed), (lower.line.hessian, lower.fixed)
@@ -250,7 +250,7 @@ class TestMatrices:
     @pytest.mark.slow
     @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
     def test_from_a_mesh_of_calculix_to_a_loop(self, tmp_path):
-        scene = jb.Scene().replace({"model.rung": "plane", "model.nodes": 49})
+        scene = jb.Scene().replace({"model.section": "plane", "model.nodes": 49})
         body = calculix.body_of(calculix.strip_slice(scene, 49), tmp_path)
         found = jb.solve_contact(body, amplitude=scene.load.amplitude, assembly="frictionless")
         plane = jb.solve(scene)

@@ -22,7 +22,7 @@ ALLOWED = 0.02
 POINTS = 24  # of a backbone, so that structures share compiled programs
 STEPS = 500  # of the shortest period
 LAWS = [laws.Jenkins, laws.Iwan4, laws.Bar, laws.Mindlin, laws.Dahl, laws.LuGre, laws.JangBarber]
-STRIP = {"model.rung": "plane", "model.nodes": 17}
+STRIP = {"model.section": "plane", "model.nodes": 17}
 
 
 def random_law(draw):

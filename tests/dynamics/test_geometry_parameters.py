@@ -47,7 +47,7 @@ def test_scenes_without_gross_slip_are_refused(values, complaint):
 class TestScenes:
     def test_a_bolt_and_its_formula(self):
         rows = [[0.5, 0.0], [0.5, 20.0], [1.5, 20.0], [1.5, 0.0]]
-        scene = jb.Scene().replace({"model.rung": "plane", "contact.pressure": rows})
+        scene = jb.Scene().replace({"model.section": "plane", "contact.pressure": rows})
         found = four_parameters(scene, width=3.0)
         assert float(found.law.slip_force) == pytest.approx(6.0)
         assert np.median(np.abs(found.dissipation_error)) < 0.12
@@ -65,7 +65,7 @@ class TestScenes:
 
     def test_an_even_pressure_up_to_the_end_is_none(self):
         found = four_parameters(
-            jb.library.standard().replace({"model.rung": "plane", "model.nodes": 129})
+            jb.library.standard().replace({"model.section": "plane", "model.nodes": 129})
         )
         assert np.max(found.exponents) > 6.0
         assert np.max(np.abs(found.dissipation_error)) > 5.0

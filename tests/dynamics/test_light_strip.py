@@ -9,7 +9,7 @@ from jbeamshell import dynamics
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.release import LIGHT, let_go
 
-SCENE = STRIP.replace({"model.rung": "plane", "model.nodes": 33, "load.entry": "traction"})
+SCENE = STRIP.replace({"model.section": "plane", "model.nodes": 33, "load.entry": "traction"})
 CYCLES = 20.0
 
 

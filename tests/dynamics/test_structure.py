@@ -19,7 +19,7 @@ JOINT = Joint(U, np.tanh(U), capacity=1.0)
 FINE = np.linspace(0.0, 1.0, 401)[1:] ** 2 / 2.0
 BAR = Joint(FINE, np.sqrt(2.0 * FINE))
 
-PLANE = STRIP.replace({"model.rung": "plane", "model.nodes": 33, "load.entry": "traction"})
+PLANE = STRIP.replace({"model.section": "plane", "model.nodes": 33, "load.entry": "traction"})
 LOADS = [0.5, 1.0, 0.6, -0.2, -0.6, -0.2, 0.2, -0.3, -0.6, -1.0, -0.5, 0.0, 0.5, 1.0, 1.1]
 
 
@@ -93,9 +93,9 @@ class TestJoint:
     @pytest.mark.slow
     @pytest.mark.parametrize("name", ["lap", "stepwise-bar"])
     def test_steady_cycles_have_derivatives_to_the_scene(self, name):
-        values = {"model.rung": name, "model.nodes": 41}
+        values = {"model.section": name, "model.nodes": 41}
         if name == "lap":
-            scene = jb.library.double_shear().replace(values | {"model.rung": "squeeze"})
+            scene = jb.library.double_shear().replace(values | {"model.section": "squeeze"})
         else:
             scene = jb.Scene().replace(values)
         plain = Joint.of(scene, 0.8)
@@ -118,7 +118,7 @@ class TestJoint:
 
     @pytest.mark.slow
     def test_a_bar_of_load_steps_has_goodmans_energy(self):
-        bar = STRIP.replace({"model.rung": "stepwise-bar", "model.nodes": 101})
+        bar = STRIP.replace({"model.section": "stepwise-bar", "model.nodes": 101})
         joint = Joint.of(bar, 1.2)
         assert joint.network is None
         u = 0.5 * float(joint.displacement[-1])
@@ -400,7 +400,7 @@ REFUSED = {
     ),
     "traced bar": (
         lambda: jax.jit(
-            lambda mu: Joint.of(STRIP.replace({"model.rung": "bar", "contact.friction": mu}), 0.1)
+            lambda mu: Joint.of(STRIP.replace({"model.section": "bar", "contact.friction": mu}), 0.1)
         )(0.2),
         "model.solution = 'closed-form'.*stepwise",
     ),
@@ -444,7 +444,7 @@ def test_pull_and_push_each_have_their_backbone():
 
 @pytest.mark.slow
 def test_a_lap_joint_is_walked_exactly_on_any_path():
-    values = {"model.rung": "squeeze", "model.nodes": 41, "load.amplitude": 1.2}
+    values = {"model.section": "squeeze", "model.nodes": 41, "load.amplitude": 1.2}
     lap = jb.library.double_shear().replace(values)
     joint = Joint.of(lap)
     forces = np.array([0.6, 1.2, 0.3, -0.9, 0.0, 1.0])

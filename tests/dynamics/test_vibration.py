@@ -125,7 +125,7 @@ class TestNonlinearMode:
 @pytest.mark.slow
 def test_a_mode_does_not_jump_to_another():
     """Three masses whose second mode has nearly three times the frequency of the first."""
-    joint = Joint.of(jb.Scene().replace({"model.rung": "plane"}), 1.99)
+    joint = Joint.of(jb.Scene().replace({"model.section": "plane"}), 1.99)
     stiff = float(joint.stiffness)
     spring = 0.5 * stiff * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
     structure = Structure(20.0 * np.eye(3), spring, [Attachment(joint, 0)])

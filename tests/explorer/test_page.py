@@ -22,7 +22,7 @@ COARSE = {"model.nodes": 33, "load.steps_per_half_cycle": 8, "load.cycles": 1}
 
 @pytest.fixture(scope="module")
 def scene():
-    return jb.Scene().replace(COARSE | {"model.rung": "squeeze"})
+    return jb.Scene().replace(COARSE | {"model.section": "squeeze"})
 
 
 @pytest.fixture(scope="module")
@@ -123,8 +123,8 @@ def test_settings_stay_as_they_were_chosen():
     fixed = drawable(scene)
     moved = fixed.replace({"strip.height_ratio": 0.012, "load.amplitude": 1.9})
     assert moved.model.solution == "plane"
-    assert drawable(jb.Scene().replace({"model.rung": "squeeze"})).model.solution == "condensed"
-    assert drawable(jb.library.single_lap()).model.nodes == 65
+    assert drawable(jb.Scene().replace({"model.section": "squeeze"})).model.solution == "condensed"
+    assert drawable(jb.library.single_lap()).plan.nodes == 65
     assert drawable(jb.library.single_lap().replace({"model.nodes": 97})).model.nodes == 97
 
 

@@ -33,7 +33,7 @@ KEYS = (
     "strip.kappa_s",
     "contact.stick_stiffness",
 )
-SQUEEZE = jb.Scene().replace({"model.rung": "squeeze", "model.tolerance": 0.005})
+SQUEEZE = jb.Scene().replace({"model.section": "squeeze", "model.tolerance": 0.005})
 COARSE = {"model.nodes": 41, "model.kinematics": "linear", "load.steps_per_half_cycle": 4}
 LITTLE = {"strip.height_ratio": 0.2, "load.amplitude": 0.3}  # only the corner slips
 
@@ -42,7 +42,7 @@ OVERHANG = {  # slender, and pressed over a third of its length
     "strip.height_ratio": 0.01,
     "contact.friction": 0.3,
     "contact.pressure": [[0, 30], [0.6, 30], [0.6, 0], [2, 0]],
-    "model.fields": ["v", "w", "beta", "psi"],
+    "model.section": "squeeze",
     "load.amplitude": 2.0,
 }
 
@@ -159,7 +159,7 @@ def test_long_load_steps_are_doubted_for_a_reaction_that_changes_within_them():
 
 @pytest.mark.parametrize("rung", ["condensed-squeeze", "shell"])
 def test_where_nothing_slips_the_estimate_is_infinite(rung):
-    scene = jb.Scene().replace({"model.rung": rung})
+    scene = jb.Scene().replace({"model.section": rung})
     errors = error_estimates.estimates(scene, even_cycle(4, slip=0.0))
     assert np.max(errors) == np.inf
     assert np.max(error_estimates.estimates(scene, even_cycle(64))) == pytest.approx(64**-1.5)
@@ -173,7 +173,7 @@ def test_a_corner_that_may_open_counts_where_friction_is_elastic():
     )
     elastic = rigid._replace(slip_stiffness=np.asarray([1e6]))
     line, steps = jb.Scene(), jb.Scene().replace({"model.solution": "stepwise"})
-    lifting = steps.replace({"model.fields": ["v", "w", "beta", "psi"]})
+    lifting = steps.replace({"model.section": "squeeze"})
     soft, soft_lifting = (s.replace({"contact.stick_stiffness": 999.0}) for s in (line, lifting))
     open_ends = [error_estimates.estimates(scene, rigid)[1] for scene in (line, lifting)]
     held = [error_estimates.estimates(scene, elastic)[1] for scene in (soft, soft_lifting, steps)]
@@ -185,7 +185,7 @@ def test_a_corner_that_may_open_counts_where_friction_is_elastic():
 
 
 def test_the_corner_of_plane_elasticity_counts_its_element_over_the_slip_zone():
-    even, plane = even_cycle(400), jb.Scene().replace({"model.rung": "plane"})
+    even, plane = even_cycle(400), jb.Scene().replace({"model.section": "plane"})
     last = even.x == 400
     gathered = even._replace(
         reaction=even.reaction + 1000.0 * last, v=even.v * np.where(last, 1.0, 0.5)
@@ -224,7 +224,7 @@ def test_a_nearly_incompressible_strip_does_not_lock():
 
 @pytest.mark.slow
 def test_the_dissipation_of_a_nearly_incompressible_strip_is_as_recorded():
-    fine = {"model.nodes": 513, "model.end_size": 1.0 / 384.0, "model.rung": "condensed-squeeze"}
+    fine = {"model.nodes": 513, "model.end_size": 1.0 / 384.0, "model.section": "squeeze", "model.kinematics": "linear"}
     found = jb.solve(jb.Scene().replace(SOFT | fine))
     assert float(found.dissipation) == pytest.approx(ON_513_NODES, rel=1e-6)
 
@@ -273,12 +273,12 @@ def relative_error(run, times=6):
 def test_elements_are_halved_until_the_tolerance_is_kept(load, nodes):
     run = jb.solve(SQUEEZE.replace({"load.amplitude": load}), throw=False)
     assert not any("elements" in doubt for doubt in run.doubts)
-    assert run.x.size == run.scene.model.nodes == nodes
+    assert run.x.size == run.scene.plan.nodes == nodes
     assert relative_error(run) <= float(run.dissipation_error) < run.scene.model.tolerance
     assert ("halving the elements" in str(run)) == (nodes > 65)
     # Only this run is on the finer grid: any change of its scene goes back to the chosen one.
     assert run.scene.replace({"load.amplitude": 1.0}).model == SQUEEZE.model
-    assert run.scene.pinned().model.nodes == nodes
+    assert run.scene.pinned().plan.nodes == nodes
 
 
 def test_a_given_grid_is_never_refined():
@@ -382,8 +382,8 @@ def test_a_laminate_that_rests_on_its_corner_is_doubted_as_much_as_it_is_off():
     )
     chosen = jb.solve(strip, tolerance=0.005)
     assert chosen.doubts == ()
-    lifts = {"model.fields": ["v", "w", "beta", "psi"], "model.kinematics": "linear"}
-    line = {"model.rung": "condensed-squeeze", "model.end_size": 1.0 / 48.0}
+    lifts = {"model.section": "squeeze", "model.kinematics": "linear"}
+    line = {"model.section": "squeeze", "model.kinematics": "linear", "model.end_size": 1.0 / 48.0}
     for coarse in (
         {"model.nodes": 65} | line,
         {"model.nodes": 129} | line,
@@ -393,7 +393,7 @@ def test_a_laminate_that_rests_on_its_corner_is_doubted_as_much_as_it_is_off():
         assert any("rests on single nodes" in doubt for doubt in run.doubts)
         off = 1.0 - float(run.dissipation / chosen.dissipation)
         assert 0.7 < float(run.dissipation_error) / off < 1.5
-    ideal = strip.replace({"contact.stick_stiffness": None, "model.rung": "condensed-squeeze"})
+    ideal = strip.replace({"contact.stick_stiffness": None, "model.section": "squeeze", "model.kinematics": "linear"})
     assert not any("single nodes" in doubt for doubt in jb.solve(ideal).doubts)
 
 

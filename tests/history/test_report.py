@@ -105,12 +105,12 @@ def test_a_frame_holds_the_load_path(history):
 
 
 def test_the_loop_table_says_where_unilateral_contact_ends(history):
-    lifting = pressed(history, 3, **{"model.fields": ["v", "w", "beta", "psi"]})
+    lifting = pressed(history, 3, **{"model.section": "squeeze"})
     header, rows = rows_of(report.loop_table(lifting))
     assert header.index("contact_end") == 5
     np.testing.assert_array_equal([float(row[5]) for row in rows], lifting.contact_end)
     hanging = pressed(
-        history, 3, **{"model.fields": ["v", "w", "beta", "psi"], "contact.normal": "none"}
+        history, 3, **{"model.section": "squeeze", "contact.normal": "none"}
     )
     assert "contact_end" not in rows_of(report.loop_table(hanging))[0]
 
@@ -196,7 +196,7 @@ def test_a_run_in_a_folder(history, tmp_path):
     ("values", "pictures"),
     [
         ({}, {"contact.png"}),
-        ({"model.fields": ["v", "w", "beta"]}, {"contact.png"}),
+        ({"model.section": "shell"}, {"contact.png"}),
         ({"model.fields": ["v", "beta"]}, set()),
     ],
 )

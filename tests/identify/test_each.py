@@ -8,7 +8,7 @@ from jbeamshell import identify
 from jbeamshell.measured.loops import make_loop
 
 MU, ETA = "contact.friction", "strip.height_ratio"
-START = jb.Scene().replace({"load.entry": "traction", "model.nodes": 33, "model.rung": "plane"})
+START = jb.Scene().replace({"load.entry": "traction", "model.nodes": 33, "model.section": "plane"})
 PLANTED = {MU: [0.08, 0.1, 0.14], ETA: [0.2, 0.25, 0.3]}
 POINTS = 32
 NOISE = 0.01  # of the range, more than what the grid leaves

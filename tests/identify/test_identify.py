@@ -295,7 +295,7 @@ def test_filling_up_adds_nothing(monkeypatch):
 @pytest.fixture(scope="module")
 def planted():
     """A loop of the contact line, and where a fit of it starts."""
-    coarse = {"model.rung": "squeeze", "model.nodes": 17}
+    coarse = {"model.section": "squeeze", "model.nodes": 17}
     start = jb.Scene().replace(coarse | {"load.amplitude": 0.6})
     return jb.solve(start.replace({MU: 0.27, ETA: 0.13}), throw=False), start
 
@@ -417,7 +417,7 @@ def test_planted_parameters_come_back_where_pairs_of_nodes_are_open():
     gap = [[0.0, 0.0], [1.0, 0.0], [2.0, 1e-3]]
     lap = {"strip.far_end": "free", "member.support": "rolling", "contact.gap": gap}
     planted = {MU: 0.27, "strip.axial_stiffness": 1.3e5}
-    start = jb.Scene().replace(lap | {"model.nodes": 33, "model.rung": "condensed-squeeze"})
+    start = jb.Scene().replace(lap | {"model.nodes": 33, "model.section": "squeeze", "model.kinematics": "linear"})
     loops = []
     for amplitude in (0.6, 1.2):
         drive = {"load.amplitude": amplitude}

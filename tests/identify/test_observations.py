@@ -122,7 +122,7 @@ def test_curves_that_a_scene_cannot_answer():
     with pytest.raises(jb.InputError, match=r"far end: x = 105 lies off the strip.*0 to 100"):
         identify.fit_kappa_s(SqueezeCurve(X + 60.0, STRESS, "far end"), scene)
     with pytest.raises(jb.InputError, match=r"have no squeeze stress: add psi"):
-        observe(SqueezeCurve(X, STRESS), scene.replace({"model.fields": ["v", "w", "beta"]}))
+        observe(SqueezeCurve(X, STRESS), scene.replace({"model.section": "shell"}))
     observe(SqueezeCurve(X + 45.00001, STRESS), scene)  # rounded by the table it came from
 
 

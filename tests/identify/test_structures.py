@@ -148,7 +148,7 @@ def test_a_strip_in_a_structure_is_recovered_with_honest_intervals():
         "structure.stiffness": 1.1,
         "structure.damping_ratio": 2e-3,
     }
-    scene = jb.Scene().replace({"model.rung": "plane", "model.nodes": 17})
+    scene = jb.Scene().replace({"model.section": "plane", "model.nodes": 17})
     stiffness = np.array([[1.0, -1.0], [-1.0, 1.5]]) * 1e5
     start = jointed(scene, np.diag([1.0, 0.3]), stiffness, point=1, damping_ratio=1e-3)
     true, size, errors = start.replace(truth), np.geomspace(1e-6, 1.5e-5, 24), []
@@ -172,7 +172,7 @@ def test_a_plan_names_the_structure(tmp_path):
     (tmp_path / "d.csv").write_text(rows)
     values = {
         "structure": {"mass": [[2.0]], "stiffness": [[1e4]], "point": 0, "damping_ratio": 0.01},
-        "set": {"model.rung": "plane", "model.nodes": 17},
+        "set": {"model.section": "plane", "model.nodes": 17},
         "free": {"contact.friction": {}, "structure.damping_ratio": {"high": 0.1}},
         "specimen": [{"data": ["d.csv"], "kind": "damping"}],
     }

@@ -140,9 +140,9 @@ def test_the_ladder_climbs_to_elasticity(order):
     [
         ({"model.order": -1}, "model.order = -1: must be a whole number, 0 to 12"),
         ({"model.order": 99}, "model.order = 99: must be a whole number, 0 to 12"),
-        ({"model.order": 2, "model.fields": ("v", "beta")}, "needs beta and psi in model.fields"),
+        ({"model.section": "p2", "model.fields": ("v", "beta")}, "needs beta and psi in model.fields"),
         (
-            {"model.order": 2, "strip.layers": [[0.2252, 2.0, 0.3]]},
+            {"model.section": "p2", "strip.layers": [[0.2252, 2.0, 0.3]]},
             "is for a straight homogeneous strip",
         ),
     ],

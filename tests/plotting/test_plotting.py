@@ -50,7 +50,7 @@ def clamped():
         "load.amplitude": 30.0,
         "load.pressure_steps": 4,
         "load.cycles": 1,
-        "model.fields": ["v", "w", "beta", "psi"],
+        "model.section": "squeeze",
         "model.nodes": 61,
     }
     return jb.solve(STRIP.replace(COARSE | values), throw=False)

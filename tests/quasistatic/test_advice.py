@@ -19,7 +19,7 @@ SHORT = {"load.amplitude": 0.4}  # a bar slips over 3.6 H
         (SHORT, "plane", "plane elasticity", "may be off by 6.8 %"),
         ({"load.amplitude": 0.03}, "plane", "plane elasticity", "off by a factor of"),
         ({"strip.far_end": "free"}, "plane", "plane elasticity", "no curve says"),
-        ({"model.rung": "squeeze"}, "condensed-squeeze", "its own fine mesh", "section is named"),
+        ({"model.section": "squeeze"}, "condensed-squeeze", "its own fine mesh", "section is named"),
         ({"model.solution": "stepwise"}, "squeeze", "its own fine mesh", "solution is named"),
         ({"strip.curvature": 1e-3}, "squeeze", "its own fine mesh", "it is curved"),
         ({"contact.normal": "compliant"}, "squeeze", "its own fine mesh", "base is not rigid"),
@@ -39,9 +39,9 @@ def test_what_is_taken_and_why(values, rung, to, reason):
     scene = jb.Scene().replace(values)
     advice = jb.advise(scene)
     assert advice.scene.model == scene.model
-    assert (advice.settings["model.rung"], advice.to) == (rung, to)
+    assert (advice.settings["model.section"], advice.to) == (rung, to)
     assert reason in advice.reason
-    assert str(advice).startswith(f"{rung} on {scene.model.nodes} nodes with ")
+    assert str(advice).startswith(f"{rung} on {scene.plan.nodes} nodes with ")
     assert f"for 1 % of {to}: " in str(advice)
     json.dumps(advice.figures())
 
@@ -54,7 +54,7 @@ def test_an_energy_of_ones_own_keeps_to_its_own_mesh():
 def test_a_tolerance_is_the_scenes_number():
     scene = jb.Scene().replace(SHORT)
     loose = jb.advise(scene, 0.1)
-    assert loose.settings["model.rung"] == "condensed-squeeze"
+    assert loose.settings["model.section"] == "condensed-squeeze"
     assert 0.01 < loose.section_error < 0.08
     assert jb.advise(scene).section_error == 0.0
     given = scene.replace({"model.tolerance": 0.1})
@@ -67,7 +67,7 @@ def test_a_tolerance_is_the_scenes_number():
 
 def test_a_lap_joint_is_plane_elasticity():
     named = library.double_shear()
-    for joint, reason in ((named, "is named"), (named.replace({"model.rung": "auto"}), "no curve")):
+    for joint, reason in ((named, "is named"), (named.replace({"model.section": "auto"}), "no curve")):
         advice = jb.advise(joint)
         assert (advice.scene.model.solution, advice.to) == ("plane", "plane elasticity")
         assert reason in advice.reason

@@ -54,4 +54,4 @@ def test_what_it_cannot_do_is_refused():
     ):
         jb.Load("arc-length")
     with pytest.raises(jb.InputError, match="'closed-form': knows no arc length"):
-        scene(FREE | {"model.rung": "bar"})
+        scene(FREE | {"model.section": "bar"})

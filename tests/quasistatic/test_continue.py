@@ -100,7 +100,7 @@ def test_what_cannot_go_on_says_why(begun):
             begun.continued(path)
     with pytest.raises(jb.InputError, match="must stay below gross slip"):
         begun.continued([2.5])
-    closed = SCENE.replace({"model.rung": "bar"})
+    closed = SCENE.replace({"model.section": "bar"})
     with pytest.raises(jb.InputError, match="take 'stepwise'"):
         dataclasses.replace(begun, scene=closed).continued()
     with pytest.raises(jb.InputError, match="was made by hand"):

@@ -54,7 +54,7 @@ def curved(curvature, nodes=41, **values):
         STRIP.replace(
             {
                 "model.nodes": nodes,
-                "model.fields": ["v", "w", "beta", "psi"],
+                "model.section": "squeeze",
                 "strip.curvature": curvature,
             }
             | values
@@ -276,7 +276,7 @@ def test_exact_and_linear_kinematics_agree_at_small_strain():
 
 def test_residual_couples_neighbours_only():
     """Blocks couple to their neighbours only, for friction, contact and both controls."""
-    scene = STRIP.replace({"model.nodes": 9, "model.fields": ["v", "w", "beta", "psi"]})
+    scene = STRIP.replace({"model.nodes": 9, "model.section": "squeeze"})
     for control in ("force", "displacement"):
         system = System(scene.replace({"load.control": control, "load.amplitude": 1e-6}))
         prescribed = Prescribed(*map(jnp.asarray, (1e-6, 1.0, 0.0, 1.0)))

@@ -80,7 +80,7 @@ def test_gradient_reaches_every_number_of_a_scene():
 @pytest.mark.parametrize("rung", ["bar", pytest.param("squeeze", marks=pytest.mark.slow)])
 def test_a_traced_force_beyond_gross_slip_has_no_result(rung):
     few = {"model.nodes": 9, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
-    ask = jb.response(STRIP.replace({"model.rung": rung} | few), ["contact.friction"])
+    ask = jb.response(STRIP.replace({"model.section": rung} | few), ["contact.friction"])
     both = jax.jit(jax.vmap(ask))(jnp.array([0.04, 0.039]))  # mu F_N L = 0.8 and 0.78
     assert both["status"].tolist() == [0, 3]
     assert np.isnan(both["dissipation"]).tolist() == [False, True]
@@ -89,7 +89,7 @@ def test_a_traced_force_beyond_gross_slip_has_no_result(rung):
 def test_a_lane_that_fails_has_no_derivative():
     few = {"model.nodes": 9, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
     keys = ["contact.friction", "load.amplitude", "strip.axial_stiffness"]
-    ask = jb.response(STRIP.replace({"model.rung": "bar"} | few), keys)
+    ask = jb.response(STRIP.replace({"model.section": "bar"} | few), keys)
 
     def dissipation(*values):
         return ask(*values)["dissipation"]

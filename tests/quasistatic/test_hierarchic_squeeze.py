@@ -52,7 +52,7 @@ def test_the_strip_stores_half_of_the_work_of_its_loads(squeezed):
 
 
 def test_tension_beyond_the_load_comes_with_the_bubbles(squeezed):
-    order, stress = squeezed.scene.model.order, np.asarray(squeezed.squeeze_stress[0])
+    order, stress = squeezed.scene.plan.order, np.asarray(squeezed.squeeze_stress[0])
     peak = int(np.argmax(stress))
     if order < 2:
         assert stress[peak] < 1e-6
@@ -67,7 +67,7 @@ def test_the_squeeze_against_finite_elements(squeezed):
     x = np.linspace(45.0, 55.0, 1001)
     model = np.interp(x, squeezed.middles, squeezed.squeeze_stress[0])
     rms = np.sqrt(np.mean((model - np.interp(x, measured["x_mm"], measured["sy_avg"])) ** 2))
-    assert rms == pytest.approx(RMS[squeezed.scene.model.order], rel=0.05)
+    assert rms == pytest.approx(RMS[squeezed.scene.plan.order], rel=0.05)
 
 
 @pytest.fixture(scope="module", params=[slow(2), slow(3)])
@@ -86,7 +86,7 @@ def test_contact_conditions_hold_and_the_reactions_carry_the_load(receding):
 
 def test_the_contact_ends_nearer_to_elasticity(receding):
     """Elasticity .779 and 1.9858e-4; the beamshell .618, and 1.9878e-4 by its fitted kappa_s."""
-    end, slope = {2: (0.718, 2.043e-4), 3: (0.748, 1.978e-4)}[receding.scene.model.order]
+    end, slope = {2: (0.718, 2.043e-4), 3: (0.748, 1.978e-4)}[receding.scene.plan.order]
     found = float(receding.contact_end[0]) - EDGE
     assert found == pytest.approx(end, abs=0.02)
     assert abs(found - 0.779) < 0.5 * abs(0.618 - 0.779)
@@ -100,7 +100,7 @@ def test_the_reaction_steps_at_the_edge_of_the_load(receding):
     apart = 1.5 * np.min(np.diff(x))  # the nodes beyond share nothing of the step
     sides = (np.flatnonzero(x < -apart)[-3:], np.flatnonzero(x > apart)[:3])
     before, after = (np.polyval(np.polyfit(x[s], reaction[s], 2), 0.0) for s in sides)
-    order = receding.scene.model.order
+    order = receding.scene.plan.order
     assert after - before == pytest.approx(-PRESSURE * (-1) ** order / (order + 1), rel=0.3)
 
 

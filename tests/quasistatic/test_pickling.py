@@ -24,7 +24,7 @@ def test_scenes_histories_and_sweeps_are_copied_whole(how):
         again = COPIES[how](made)
         assert jax.tree.structure(again) == jax.tree.structure(made)
         jax.tree.map(np.testing.assert_array_equal, again, made)
-    sweep = jb.sweep(jb.Scene().replace({"model.rung": "bar"}), {"load.amplitude": [0.5, 1.0]})
+    sweep = jb.sweep(jb.Scene().replace({"model.section": "bar"}), {"load.amplitude": [0.5, 1.0]})
     again = COPIES[how](sweep)
     assert again.scene.model == sweep.scene.model
     np.testing.assert_array_equal(again["dissipation"], sweep["dissipation"])

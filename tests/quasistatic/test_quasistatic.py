@@ -198,7 +198,7 @@ def test_plain_numbers_inside_a_callers_jit():
         ({"model.kinematics": "exact", "model.nodes": 171}, True),
         ({"model.kinematics": "exact", "model.nodes": 172}, False),
         ({"model.solution": "stepwise", "model.nodes": 321}, False),
-        ({"model.rung": "p2", "model.kinematics": "exact", "model.nodes": 33}, False),
+        ({"model.section": "p2", "model.kinematics": "exact", "model.nodes": 33}, False),
     ],
 )
 def test_what_the_compiler_makes_one_native_function_of(values, fits):

@@ -14,7 +14,7 @@ LINEAR = {"model.kinematics": "linear"}
 
 def from_all_nodes(scene):
     """History of a scene whose search for the contact starts as if no node were named."""
-    return jb.solve(scene, contact=np.full(scene.model.nodes, True))
+    return jb.solve(scene, contact=np.full(scene.plan.nodes, True))
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +178,7 @@ def test_an_open_contact_forgets_its_traction(clamped):
 @pytest.mark.slow
 def test_a_unilateral_end_does_not_mind_how_fine_it_is():
     """With the lift frozen the corner goes into tension, and D drifts with the end element."""
-    thick = {"model.fields": ["v", "w", "beta", "psi"], "load.amplitude": 0.3247}
+    thick = {"model.section": "squeeze", "load.amplitude": 0.3247}
     sizes = {12: 68, 24: 75, 96: 91}  # H over the end element, and nodes with all others alike
     dissipation = []
     for parts, nodes in sizes.items():

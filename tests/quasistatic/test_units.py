@@ -12,12 +12,12 @@ COARSE = {"model.nodes": 33, "load.steps_per_half_cycle": 8}
 SCENES = {
     "contact line": {},
     "bolt": {"contact.pressure": BOLT, "load.amplitude": 0.6},
-    "plane": {"model.rung": "plane"},
+    "plane": {"model.section": "plane"},
     "stepwise": COARSE | {"model.solution": "stepwise", "model.kinematics": "exact"},
     "smooth": COARSE | {"contact.smoothing": 8.0},
-    "p3": COARSE | {"model.rung": "p3", "model.solution": "stepwise", "load.entry": "face"},
+    "p3": COARSE | {"model.section": "p3", "model.solution": "stepwise", "load.entry": "face"},
     "compliant": COARSE
-    | {"model.fields": ["v", "w", "beta", "psi"], "contact.normal": "compliant"},
+    | {"model.section": "squeeze", "contact.normal": "compliant"},
     "displaced": COARSE | {"load.control": "displacement", "load.amplitude": 2e-5},
     "lap": {"strip.far_end": "free", "member.support": "rolling", "load.amplitude": 1.0},
 }

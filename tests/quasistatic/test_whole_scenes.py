@@ -8,11 +8,11 @@ import pytest
 import jbeamshell as jb
 
 FEW = {"model.nodes": 17, "load.steps_per_half_cycle": 2, "load.cycles": 1}
-SQUEEZE = FEW | {"model.rung": "squeeze"}
+SQUEEZE = FEW | {"model.section": "squeeze"}
 JOINT = {"strip.far_end": "free", "member.support": "rolling"}
 KINDS = {
     "default": FEW,
-    "plane": FEW | {"model.rung": "plane"},
+    "plane": FEW | {"model.section": "plane"},
     "contact line": SQUEEZE,
     "elastic sliders": SQUEEZE | {"contact.stick_stiffness": 50.0},
     "lap joint": FEW | JOINT | {"load.amplitude": 1.5},

@@ -15,7 +15,7 @@ LENGTH, STRETCHING, SHEAR = 2.0, 3.4e4, 1.0
 
 def layer(rung, eta, side, nodes=41):
     """Layer above or below the contact (side 1 or -1), clamped at X = 0, bent by half the force."""
-    form = section_form(jb.Scene().replace({"model.rung": rung, "strip.height_ratio": eta}))
+    form = section_form(jb.Scene().replace({"model.section": rung, "strip.height_ratio": eta}))
     x = jnp.linspace(0.0, LENGTH, nodes)
     weights = np.full(nodes, LENGTH / (nodes - 1))
     weights[[0, -1]] *= 0.5

@@ -11,7 +11,7 @@ SLENDER = jb.Scene().replace(
     {
         "strip.height_ratio": 0.003,
         "contact.friction": 0.3,
-        "model.fields": ["v", "w", "beta", "psi"],
+        "model.section": "squeeze",
         "model.solution": "stepwise",
     }
 )
@@ -84,7 +84,7 @@ def test_exact_rotations_lose_equilibrium_at_the_euler_load_of_a_gap():
         jb.solve(scene.replace({"model.kinematics": "exact"}))
 
 
-JOINT = {"strip.far_end": "free", "model.rung": "squeeze", "strip.height_ratio": 0.003}
+JOINT = {"strip.far_end": "free", "model.section": "squeeze", "strip.height_ratio": 0.003}
 
 
 def test_overhangs_of_a_joint_are_columns():

@@ -8,7 +8,7 @@ import jbeamshell as jb
 from jbeamshell.scene.choice import CONTACT_LINE, KNOWN, LIFTING, PLANE, SOFT_CONTACT_LINE, STEPWISE
 
 FINE = {"model.tolerance": KNOWN}  # for which grids were measured
-SQUEEZE = jb.Scene().replace({"model.rung": "squeeze"})
+SQUEEZE = jb.Scene().replace({"model.section": "squeeze"})
 ROTATING = {"contact.pressure": 500.0, "load.amplitude": 40.0}
 
 
@@ -37,18 +37,18 @@ def test_the_standard_strip_is_solved_on_its_contact_line():
         ({"load.control": "displacement", "load.amplitude": 1e-6}, "plane"),
         ({"strip.kappa_s": 0.5, "load.amplitude": 0.4}, "condensed-squeeze"),
         ({"strip.height_ratio": 0.4}, "plane"),  # though its rotations make more than .2 %
-        ({"model.rung": "squeeze", "load.amplitude": 0.4}, "condensed-squeeze"),
-        ({"model.rung": "auto", "load.amplitude": 0.4}, "plane"),
+        ({"model.section": "squeeze", "load.amplitude": 0.4}, "condensed-squeeze"),
+        ({"model.section": "auto", "load.amplitude": 0.4}, "plane"),
     ],
     ids=str,
 )
 def test_the_section_is_the_cheapest_that_keeps_the_tolerance(values, rung):
     assert (
         jb.Scene()
-        .replace({"model.rung": "squeeze"})
+        .replace({"model.section": "squeeze"})
         .replace(values)
-        .replace({"model.rung": values.get("model.rung", "auto")})
-        .model.rung
+        .replace({"model.section": values.get("model.section", "auto")})
+        .plan.section
         == rung
     )
 
@@ -56,13 +56,13 @@ def test_the_section_is_the_cheapest_that_keeps_the_tolerance(values, rung):
 def test_a_section_that_is_too_far_off_gives_way_to_elasticity():
     """A bar would slip over 4.4 H.  The section slips over 3 H, where it is some 5 % off."""
     scene = jb.Scene().replace({"load.amplitude": 0.5, "model.tolerance": 0.02})
-    assert scene.model.rung == "condensed-squeeze"
+    assert scene.plan.section == "condensed-squeeze"
     history = jb.solve(scene)
-    assert history.scene.model.rung == "plane"
-    exact = jb.solve(scene.replace({"model.rung": "plane", "model.nodes": 193}))
+    assert history.scene.plan.section == "plane"
+    exact = jb.solve(scene.replace({"model.section": "plane", "model.nodes": 193}))
     assert float(history.dissipation) == pytest.approx(float(exact.dissipation), rel=0.02)
     again = history.scene.replace({"load.amplitude": 1.2})
-    assert again.model.rung == "condensed-squeeze"
+    assert again.plan.section == "condensed-squeeze"
 
 
 @pytest.mark.parametrize(
@@ -98,12 +98,12 @@ def test_what_needs_load_steps_gets_them(values):
     ids=str,
 )
 def test_a_strip_may_lift(values):
-    assert jb.Scene().replace(values).model.fields == ("v", "w", "beta", "psi")
+    assert jb.Scene().replace(values).plan.fields == ("v", "w", "beta", "psi")
 
 
 @pytest.mark.parametrize("values", [{"contact.smoothing": 8.0}, {"model.kinematics": "exact"}])
 def test_a_bar_stays_a_bar(values):
-    assert jb.Scene().replace({"model.fields": ["v"]} | values).model.fields == ("v",)
+    assert jb.Scene().replace({"model.fields": ["v"]} | values).plan.fields == ("v",)
 
 
 def test_linear_load_steps_keep_their_fields():
@@ -116,7 +116,7 @@ def test_load_steps_lift_as_the_contact_line_does():
     """Kept down, this strip would dissipate 5 % less, and as much with sliders of alpha G/H."""
     thick = {"strip.height_ratio": 0.35, "contact.friction": 0.4, "load.amplitude": 2.0}
     scene = jb.Scene().replace(thick)
-    linear = {"model.kinematics": "linear", "model.nodes": 129, "model.rung": "squeeze"}
+    linear = {"model.kinematics": "linear", "model.nodes": 129, "model.section": "squeeze"}
     line = jb.solve(scene.replace(linear))
     steps = jb.solve(scene.replace({"model.kinematics": "exact"}), throw=False)
     assert (line.scene.model.solution, steps.scene.model.solution) == ("condensed", "stepwise")
@@ -137,24 +137,24 @@ def test_ideal_sliders_hold_as_much_on_small_elements_as_on_large_ones():
 
 
 def test_rotations_are_exact_where_their_bound_says_so():
-    assert jb.Scene().replace(ROTATING).model.kinematics == "exact"
+    assert jb.Scene().replace(ROTATING).plan.kinematics == "exact"
     loose = jb.Scene().replace(ROTATING | {"model.tolerance": 0.1})
-    assert loose.model.kinematics == "linear"
-    assert jb.Scene().replace({"model.rung": "p2"} | ROTATING).model.kinematics == "exact"
+    assert loose.plan.kinematics == "linear"
+    assert jb.Scene().replace({"model.section": "p2"} | ROTATING).plan.kinematics == "exact"
 
 
 def test_an_overhang_near_buckling_rotates():
     slender = {"strip.height_ratio": 0.01, "contact.friction": 0.3, "load.amplitude": 1.0}
     pressure = {"contact.pressure": [[0.0, 30.0], [0.6, 30.0], [0.6, 0.0], [2.0, 0.0]]}
-    assert jb.Scene().replace(slender | pressure).model.kinematics == "exact"
+    assert jb.Scene().replace(slender | pressure).plan.kinematics == "exact"
     thick = slender | pressure | {"strip.height_ratio": 0.1}
-    assert jb.Scene().replace(thick).model.kinematics == "linear"
+    assert jb.Scene().replace(thick).plan.kinematics == "linear"
 
 
 def test_given_settings_stay():
     scene = jb.Scene().replace({"model.nodes": 41})
     assert scene.replace({"contact.friction": 0.2}).model.nodes == 41
-    chosen = jb.Scene().model.nodes
+    chosen = jb.Scene().plan.nodes
     assert scene.replace({"model.nodes": "auto"}).model.nodes == chosen
     pinned = jb.Scene().pinned()
     assert pinned.replace({"model.tolerance": 0.05}).model.nodes == chosen
@@ -169,7 +169,7 @@ def test_nodes_follow_the_tolerance():
     assert nodes(0.02) < nodes(0.005)
     ramp = {"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]} | FINE
     # Half as many more for each row at which the pressure may jump.
-    assert SQUEEZE.replace(ramp).model.nodes - 1 == 1.5 * (nodes(0.005) - 1)
+    assert SQUEEZE.replace(ramp).plan.nodes - 1 == 1.5 * (nodes(0.005) - 1)
 
 
 def test_elements_at_the_loaded_end_are_small_where_the_corner_opens():
@@ -191,16 +191,16 @@ def test_elements_at_the_loaded_end_are_small_where_the_corner_opens():
     assert chosen(**steps, **{"model.fields": ["v"]}) == grid(STEPWISE)
     assert chosen(**{"strip.curvature": 0.01}) == grid(STEPWISE)
     over = _numbers({"contact.stick_stiffness": [50.0, 1000.0]})
-    assert SQUEEZE.replace(FINE).pinned(over).model.nodes == SOFT_CONTACT_LINE.nodes
+    assert SQUEEZE.replace(FINE).pinned(over).plan.nodes == SOFT_CONTACT_LINE.nodes
     over = _numbers({"contact.friction": [0.1, 0.2]})
-    assert SQUEEZE.replace(FINE).pinned(over).model.nodes == CONTACT_LINE.nodes
+    assert SQUEEZE.replace(FINE).pinned(over).plan.nodes == CONTACT_LINE.nodes
 
 
 @pytest.mark.slow
 def test_the_chosen_elements_resolve_the_slider_of_the_last_node():
     soft = {"contact.stick_stiffness": 33.0, "contact.friction": 0.19, "load.amplitude": 1.74}
     chosen = SQUEEZE.replace(FINE | soft | {"strip.height_ratio": 0.25}).pinned()
-    end = chosen.model.end_size
+    end = chosen.plan.end_size
 
     def dissipation(end_size):
         scene = chosen.replace({"model.end_size": end_size})
@@ -217,7 +217,7 @@ def test_traced_numbers_take_elasticity_unless_the_section_is_named():
     def dissipation(friction):
         for given in (jb.Scene(), SQUEEZE):
             scene = given.replace(FINE | {"contact.friction": friction})
-            found.append((scene.model.rung, scene.model.nodes))
+            found.append((scene.plan.section, scene.plan.nodes))
         return scene.contact.friction
 
     jax.jit(jax.grad(dissipation))(0.1)
@@ -251,12 +251,12 @@ def test_bad_settings_name_the_fix(key, value, fix):
 
 def test_a_sweep_chooses_for_all_its_strips():
     over = {"contact.pressure": [10.0, 500.0], "load.amplitude": [0.5]}
-    assert SQUEEZE.pinned(_numbers(over)).model.kinematics == "exact"
+    assert SQUEEZE.pinned(_numbers(over)).plan.kinematics == "exact"
     assert SQUEEZE.pinned(_numbers({"load.amplitude": [0.5]})).model.kinematics == "linear"
     slips = {"load.amplitude": [0.4, 1.2]}  # over 2.5 H at least
-    assert jb.Scene().pinned(_numbers(slips)).model.rung == "plane"
+    assert jb.Scene().pinned(_numbers(slips)).plan.section == "plane"
     slips = {"load.amplitude": [0.9, 1.2]}
-    assert jb.Scene().pinned(_numbers(slips)).model.rung == "condensed-squeeze"
+    assert jb.Scene().pinned(_numbers(slips)).plan.section == "condensed-squeeze"
 
 
 def _numbers(over):

@@ -16,7 +16,7 @@ STRIP = STRIP.replace(SMALL)
 
 
 def on(rung, **more):
-    return STRIP.replace({"model.rung": rung} | more)
+    return STRIP.replace({"model.section": rung} | more)
 
 
 NAMES = ("bar", "stepwise-bar", "shell", "squeeze", "p1", "p6")
@@ -25,11 +25,11 @@ NAMES = ("bar", "stepwise-bar", "shell", "squeeze", "p1", "p6")
 @pytest.mark.parametrize("rung", NAMES)
 def test_names_come_back(rung, tmp_path):
     scene = on(rung)
-    assert scene.model.rung == scene.get("model.rung") == rung
+    assert scene.plan.section == scene.get("model.section") == rung
     jb.write_scene(scene, tmp_path / "scene.toml")
     again = jb.read_scene(tmp_path / "scene.toml")
     assert again.model == scene.model
-    assert rungs.values_of(rung)["model.order"] == scene.model.order
+    assert rungs.values_of(rung)["model.order"] == scene.plan.order
 
 
 @pytest.mark.parametrize("rung", ["p0", "p13", "p99", "p-1", "p", "beam", "masing-", "Bar", ""])
@@ -54,22 +54,22 @@ def test_old_names_are_told_the_new_one(rung, now, tmp_path):
 
 
 def test_a_rung_keeps_the_lift():
-    lifting = STRIP.replace({"model.fields": ["v", "w", "beta", "psi"]})
-    assert lifting.replace({"model.rung": "p2"}).model.fields == ("v", "w", "beta", "psi")
-    assert lifting.replace({"model.rung": "shell"}).model.fields == ("v", "w", "beta")
-    assert lifting.replace({"model.rung": "bar"}).model.fields == ("v",)
-    given = {"model.fields": ["v", "w", "beta", "psi"], "model.nodes": 31}
-    merged = scene_from_values(overridden(given, {"model.rung": "p3"}))
-    assert general_rung(merged.model.rung) == "p3"
-    assert "w" in merged.model.fields
+    lifting = STRIP.replace({"model.section": "squeeze"})
+    assert lifting.replace({"model.section": "p2"}).model.fields == ("v", "w", "beta", "psi")
+    assert lifting.replace({"model.section": "shell"}).model.fields == ("v", "w", "beta")
+    assert lifting.replace({"model.section": "bar"}).model.fields == ("v",)
+    given = {"model.section": "squeeze", "model.nodes": 31}
+    merged = scene_from_values(overridden(given, {"model.section": "p3"}))
+    assert general_rung(merged.plan.section) == "p3"
+    assert "w" in merged.plan.fields
 
 
 def test_a_rung_and_what_it_stands_for_may_not_disagree():
     with pytest.raises(jb.InputError, match="disagree: give one"):
-        STRIP.replace({"model.rung": "p3", "model.order": 2})
-    assert STRIP.replace({"model.rung": "p3", "model.order": 3}).model.order == 3
-    merged = overridden({"model.rung": "p3"}, {"model.order": 2})
-    assert general_rung(scene_from_values(merged).model.rung) == "p2"
+        STRIP.replace({"model.section": "p3", "model.section": "p2"})
+    assert STRIP.replace({"model.section": "p3", "model.section": "p3"}).model.order == 3
+    merged = overridden({"model.section": "p3"}, {"model.section": "p2"})
+    assert general_rung(scene_from_values(merged).plan.section) == "p2"
 
 
 @pytest.mark.doubtful("the section bar")

@@ -38,7 +38,7 @@ OF_JOINT |= {"strip.overhang", "contact.gap", "contact.bolt_stiffness", "load.ki
 OF_JOINT |= {f"contact.{name}" for name in ("bearing_stiffness", "clearance", "holes")}
 OPTIONAL = {"strip.axial_stiffness", "strip.poisson_ratio", "strip.layers", "strip.curvature"}
 OPTIONAL |= OF_JOINT - {"member.support", "load.kind"}
-JOINT = {"member.support": "rolling", "strip.far_end": "free", "model.rung": "plane"}
+JOINT = {"member.support": "rolling", "strip.far_end": "free", "model.section": "plane"}
 
 
 @st.composite
@@ -142,7 +142,7 @@ def path(tmp_path_factory):
 
 @given(values=values_of_all_keys())
 def test_toml_keeps_every_bit(path, values):
-    assert set(values) | OPTIONAL == set(KEYS) - set(DERIVED) - {"model.rung"}
+    assert set(values) | OPTIONAL == set(KEYS) - set(DERIVED) - {"model.section"}
     scene = Scene().replace(values)
     write_scene(scene, path)
     again = read_scene(path)
@@ -479,11 +479,11 @@ def test_parts_check_themselves(make, told):
             r"strip.layers = \[0.1252, 1.+, 0.5\] \(row 2 from the bottom\): nu = 0.5 is",
         ),
         (
-            {"strip.layers": LAYERS, "model.squeeze": "assumed", "model.fields": LIFTING},
+            {"strip.layers": LAYERS, "model.section": "assumed", "model.fields": LIFTING},
             "model.squeeze = 'assumed': is for a homogeneous strip",
         ),
         (
-            {"model.squeeze": "assumed", "model.fields": ["v", "w", "beta"]},
+            {"model.section": "assumed", "model.section": "shell"},
             "model.squeeze = 'assumed': needs w and psi",
         ),
         (
@@ -721,7 +721,7 @@ SPECIMENS = {
         "strip.far_end": "free",
         "strip.loaded_end": "level",
         "load.entry": "traction",
-        "model.fields": ["v", "w", "beta", "psi"],
+        "model.section": "squeeze",
         "model.solution": "plane",
     },
     "numbers of the model": {

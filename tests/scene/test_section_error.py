@@ -8,7 +8,7 @@ from jbeamshell.scene import library, section_error
 from jbeamshell.scene.keys import ENTRIES
 from jbeamshell.scene.section_error import in_words
 
-SQUEEZE = jb.Scene().replace({"model.rung": "condensed-squeeze", "model.nodes": 65})
+SQUEEZE = jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 65})
 
 
 def test_every_kind_has_curves_that_rise_with_less_slip():
@@ -29,7 +29,7 @@ def test_a_strip_is_as_far_off_as_its_curve_says(entry):
     errors = []
     for amplitude in (0.3, 0.7):
         scene = SQUEEZE.replace({"load.entry": entry, "load.amplitude": amplitude})
-        plane = scene.replace({"model.rung": "plane", "model.nodes": 129})
+        plane = scene.replace({"model.section": "plane", "model.nodes": 129})
         own, exact = (jb.solve(each, throw=False) for each in (scene, plane))
         told = section_error.section_error(scene, float(own.slip_length))
         off = float(own.dissipation / exact.dissipation) - 1.0
@@ -52,7 +52,7 @@ def test_it_is_told_in_words():
 def test_a_section_that_the_user_names_is_doubted_where_slip_is_short(section):
     """The doubt says the size and the fix, which leaves none; much slip is never doubted."""
     little, much = (
-        jb.Scene().replace({"model.rung": section, "load.amplitude": load} | change)
+        jb.Scene().replace({"model.section": section, "load.amplitude": load} | change)
         for load, change in (
             (0.2, {}),
             (1.8, {"strip.height_ratio": 0.03, "model.tolerance": 0.05}),
@@ -62,9 +62,9 @@ def test_a_section_that_the_user_names_is_doubted_where_slip_is_short(section):
         history = jb.solve(little)
     (doubt,) = (doubt for doubt in history.doubts if section in doubt)
     assert "leave model.rung open, or take model.rung = plane" in doubt
-    assert section in jb.solve(much, throw=False).scene.model.rung
+    assert section in jb.solve(much, throw=False).scene.plan.section
     assert not any("typically" in doubt for doubt in jb.solve(much, throw=False).doubts)
-    assert jb.solve(little.replace({"model.rung": "auto"})).doubts == ()
+    assert jb.solve(little.replace({"model.section": "auto"})).doubts == ()
 
 
 def test_a_section_that_is_left_open_is_not_doubted_for_its_section():
@@ -76,7 +76,7 @@ def test_a_section_that_is_left_open_is_not_doubted_for_its_section():
 @pytest.mark.parametrize(
     "values",
     [
-        {"model.rung": "plane"},
+        {"model.section": "plane"},
         {"contact.normal": "compliant"},
         {"contact.smoothing": 16.0},
     ],

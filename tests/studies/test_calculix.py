@@ -150,7 +150,7 @@ def test_what_a_scene_is_made_of_shows_in_its_deck():
     assert "TYPE=CPE4, ELSET=STRIP" in plain
     assert "NLGEOM" not in plain
     assert "*EQUATION" not in plain
-    lifted = {"contact.normal": "none", "model.fields": ["v", "w", "beta", "psi"]}
+    lifted = {"contact.normal": "none", "model.section": "squeeze"}
     assert "*CONTACT PAIR" not in deck_of(STRIP.replace(lifted))[1]
 
 
@@ -320,7 +320,7 @@ def test_without_calculix_one_line_says_how_to_get_it(monkeypatch):
         (lambda: library.advancing(), "strip.curvature"),
         (
             lambda: STRIP.replace(
-                {"contact.normal": "compliant", "model.fields": ["v", "w", "beta", "psi"]}
+                {"contact.normal": "compliant", "model.section": "squeeze"}
             ),
             "contact.normal",
         ),
@@ -425,7 +425,7 @@ def test_an_entry_dissipates_what_plane_elasticity_says(entry):
     """The four entries' D are 2.47, 2.81, 7.19 and 2.66 here, in millionths."""
     change = {"load.entry": entry, "strip.height_ratio": 0.2358, "load.cycles": 1}
     history = solve(jb.Scene().replace(change | {"load.steps_per_half_cycle": 10}))
-    plane = jb.solve(jb.Scene().replace(change | {"model.rung": "plane", "model.nodes": 129}))
+    plane = jb.solve(jb.Scene().replace(change | {"model.section": "plane", "model.nodes": 129}))
     assert float(history.dissipation) == pytest.approx(float(plane.dissipation), rel=0.02)
     assert float(history.secant_stiffness) == pytest.approx(float(plane.secant_stiffness), rel=2e-3)
     assert float(history.dissipation_loop) == pytest.approx(float(history.dissipation), rel=0.02)
@@ -442,7 +442,7 @@ def test_a_rigid_face_may_be_driven(entry, control):
     amplitude = {"force": 0.7855, "displacement": 1e-5}[control]
     values = {"load.entry": entry, "load.control": control, "load.amplitude": amplitude}
     history = solve(STRIP.replace(COARSE | values), elements="linear", refinement=0.5)
-    plane = jb.solve(jb.Scene().replace(COARSE | values | {"model.rung": "plane"}))
+    plane = jb.solve(jb.Scene().replace(COARSE | values | {"model.section": "plane"}))
     assert float(np.max(history.force)) == pytest.approx(float(np.max(plane.force)), rel=0.01)
     assert float(history.secant_stiffness) == pytest.approx(float(plane.secant_stiffness), rel=0.01)
 

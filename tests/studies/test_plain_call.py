@@ -25,6 +25,6 @@ def test_a_scene_of_the_record(kind):
     own = [(row, scene) for row, scene in pairs if row["kind"] == kind]
     row, (_, scene, work, _) = own[len(own) // 2]
     history = jb.solve(scene, throw=False)
-    assert history.scene.model.rung == row["section"]
+    assert history.scene.plan.section == row["section"]
     off = 100.0 * (float(history.dissipation) / work - 1.0)
     assert off == pytest.approx(row["D_percent"], abs=1e-2)

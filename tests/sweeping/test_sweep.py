@@ -211,7 +211,7 @@ EDGES = {
     "contact.normal_stiffness": (0.0, 10.0),
     "load.amplitude": (-1.0, 0.0, 0.5, 1.9999, 2.0, 3.0),
 }
-LIFTED = {"model.fields": ["v", "w", "beta", "psi"]}
+LIFTED = {"model.section": "squeeze"}
 SCENES = {
     "standard": SCENE,
     "table": SCENE.replace({"contact.pressure": PATCH}),
@@ -222,7 +222,7 @@ SCENES = {
     "unfounded": SCENE.replace(LIFTED | {"contact.normal": "none", "load.amplitude": 0.1}),
     "layers": SCENE.replace({"strip.layers": [[0.1, 3e5, 0.3], [0.1252, 1e5, 0.2]]}),
     "bar": SCENE.replace(
-        {"model.rung": "bar", "load.control": "displacement", "load.amplitude": 1e-5}
+        {"model.section": "bar", "load.control": "displacement", "load.amplitude": 1e-5}
     ),
 }
 
@@ -235,7 +235,7 @@ def test_outside_is_what_a_scene_or_solve_refuses_one_by_one(name):
             values = (0.0, 1e-6, 1e-5, 1e-4)
         for value, outside in zip(values, lanes_of(scene, {key: values}).outside(), strict=True):
             try:
-                if key == "strip.curvature" and "w" not in scene.model.fields:
+                if key == "strip.curvature" and "w" not in scene.plan.fields:
                     continue  # refused whole
                 if name == "layers" and key in ("strip.axial_stiffness", "strip.youngs_modulus"):
                     continue
@@ -390,7 +390,7 @@ def test_chunks_hold_lanes_that_share_what_they_must():
 
 def test_lanes_advance_together_as_far_as_they_share_a_body():
     """Grids share one body for each height; pairs at random share none, and run alone."""
-    scene = jb.Scene().replace({"model.rung": "condensed-squeeze", "model.nodes": 17})
+    scene = jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 17})
     pressures, heights = np.linspace(5.0, 9.0, 64), np.linspace(0.05, 0.1, 64)
     over = {"contact.pressure": pressures, "strip.height_ratio": heights}
 
@@ -407,7 +407,7 @@ def test_lanes_advance_together_as_far_as_they_share_a_body():
 @pytest.mark.doubtful("few nodes")
 def test_lanes_of_plane_elasticity_share_their_bodies():
     """A grid whose heights share a body, beside the same strips paired at random."""
-    plane = {"model.rung": "plane", "model.nodes": 17, "load.steps_per_half_cycle": 1}
+    plane = {"model.section": "plane", "model.nodes": 17, "load.steps_per_half_cycle": 1}
     scene = STRIP.replace(plane)
     over = {"load.amplitude": [0.4, 0.8, 1.2], "strip.height_ratio": [0.05, 0.1]}
     grid = jb.sweep(scene, over, ["dissipation"])
@@ -440,7 +440,7 @@ def test_lanes_of_plane_elasticity_are_doubted_where_they_are_off():
     """At tall heights and small loads, where the corner matters, and far from there."""
     height, load, fine = np.array(ON_257_NODES).T
     over = {"strip.height_ratio": height, "load.amplitude": load}
-    found = jb.sweep(jb.Scene().replace({"model.rung": "plane"}), over, paired=True)
+    found = jb.sweep(jb.Scene().replace({"model.section": "plane"}), over, paired=True)
     off = np.abs(found["dissipation"] / fine - 1.0)
     assert np.all(off <= found["dissipation_error"])
     assert np.sum(off > 0.02) == 4

@@ -51,7 +51,7 @@ def gradient(plan: Plan) -> dict[str, Any]:
     return {
         "parameters": list(KEYS),
         "steps": 4,
-        "nodes": scene().model.nodes,
+        "nodes": scene().plan.nodes,
         "rows": rows,
         "forward_to_reverse": float(jnp.max(jnp.abs(forward / reverse - 1.0))),
         "memory": memory,

@@ -35,7 +35,7 @@ from .common import (
 
 STEPS = "load.steps_per_half_cycle"
 EXACT = {"model.kinematics": "exact"}
-LIFT = {"model.fields": ["v", "w", "beta", "psi"]}
+LIFT = {"model.section": "squeeze"}
 SMOOTH = {"contact.smoothing": 16.0}
 LOOP = ("force", "displacement", "dissipation")
 CALCULIX = machine.ROOT / "calibration" / "finite_elements" / "checked.json"
