@@ -45,7 +45,7 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run a scene, report and write; returns the exit code."""
     from jbeamshell.common import files
-    from jbeamshell.quasistatic import solver
+    from jbeamshell.quasistatic import solving
     from jbeamshell.quasistatic.advice import within
     from jbeamshell.scene import load_path
 
@@ -59,12 +59,12 @@ def run(options: argparse.Namespace) -> int:
         folder = check_folder(options.out)
     say("compiling ... (Ctrl+C stops it)")
     begin = time.perf_counter()
-    solver.compile_for(scene)
+    solving.compile_for(scene)
     compiled = time.perf_counter()
     say(f"compiled in {compiled - begin:.1f} s, solving ...")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DoubtfulWarning)  # printed below, one line each
-        history = jax.block_until_ready(solver.solve(scene))
+        history = jax.block_until_ready(solving.run(scene))
     finished = time.perf_counter()
     timing = {"wall_s": finished - compiled, "compile_s": compiled - begin}
     figures = history.figures() | timing

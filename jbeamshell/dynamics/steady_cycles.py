@@ -13,7 +13,7 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import is_traced, require, require_number
 from jbeamshell.common.errors import Status
 from jbeamshell.common.failed import nan_unless
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
@@ -46,7 +46,7 @@ class SteadyCycles(NamedTuple):
         """
         throw = not is_traced(scene, forces, jnp.zeros(()))
         levels = jnp.asarray(forces)
-        history = solve(scene, (levels[:, None] * CYCLE).ravel(), throw=throw)
+        history = run(scene, (levels[:, None] * CYCLE).ravel(), throw=throw)
         size = levels.size * CYCLE.size
         u, work = (
             each[-size:].reshape(levels.size, -1)

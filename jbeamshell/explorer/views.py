@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.explorer.controls import gross_slip
 from jbeamshell.history.history import History
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 
@@ -89,7 +89,7 @@ def view_of(scene: Scene) -> View:
     with warnings.catch_warnings(record=True) as met:
         warnings.simplefilter("ignore")
         warnings.simplefilter("always", DoubtfulWarning)
-        history: History = jax.tree.map(np.asarray, solve(scene))
+        history: History = jax.tree.map(np.asarray, run(scene))
     start, _, stop = history.cycles[-1] if history.cycles else (0, 0, history.force.size - 1)
     steps = np.arange(start, stop + 1)
     touching, slipping = (np.asarray(a)[steps] for a in (history.touching, history.slipping))
@@ -116,7 +116,7 @@ def curve_of(scene: Scene) -> Curve:
     own = LARGEST * float(scene.load.amplitude)
     amplitudes = CURVE * (limit if np.isfinite(limit) else own)
     half = 1 if scene.plan.on_contact_line else CURVE_STEPS
-    history = solve(scene, _growing(amplitudes, half), throw=False)
+    history = run(scene, _growing(amplitudes, half), throw=False)
     work = np.asarray(history.slip_work)[scene.load.pressure_steps :]
     return Curve(amplitudes, np.sum(work.reshape(amplitudes.size, 3, half)[:, 1:], axis=(1, 2)))
 

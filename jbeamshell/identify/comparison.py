@@ -23,7 +23,7 @@ from jbeamshell.laws import Law, PowerLaw
 from jbeamshell.measured.curves import DissipationCurve, Measurement, StiffnessCurve
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.scene import Scene
 
 MODELS = ("iwan4", "bouc-wen", "jenkins", "sliders4")
@@ -199,7 +199,7 @@ def _with_strip(
     given = LEVELS * float(scene.load.amplitude) if amplitudes is None else amplitudes
     amplitude = np.atleast_1d(np.asarray(given, dtype=float))
     cycles = [
-        solve(scene.replace({"load.amplitude": size, "load.cycles": max(scene.load.cycles, 1)}))
+        run(scene.replace({"load.amplitude": size, "load.cycles": max(scene.load.cycles, 1)}))
         for size in amplitude.tolist()
     ]
     energy = np.array([float(history.dissipation) for history in cycles])

@@ -19,7 +19,7 @@ from jbeamshell.identify.drive import Drive as Drive
 from jbeamshell.laws import Law, MasingLaw, PowerLaw
 from jbeamshell.measured.curves import AmplitudeCurve, DissipationCurve, StiffnessCurve
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.parts import Load
@@ -120,7 +120,7 @@ def response_along(model: Runnable, path: Array, solver: Newton) -> tuple[Array,
     by_force = model.load.control == "force"
     scene, strip = _parts(model)
     if scene is not None:
-        history = solve(scene, path, solver=solver, throw=False, strip=strip)
+        history = run(scene, path, solver=solver, throw=False, strip=strip)
         response = history.displacement if by_force else history.force
         return response[history.pressed + 1 :], jnp.all(history.status == 0)
     law = of_law("loop", model).law
@@ -149,7 +149,7 @@ def cycle_figures(
 
         def one(point: tuple[Array, Array]) -> tuple[Array, Array]:
             to = {"load.amplitude": point[0], "load.cycles": cycles}
-            history = solve(scene.replace(to), solver=solver, throw=False, strip=strip)
+            history = run(scene.replace(to), solver=solver, throw=False, strip=strip)
             figures = (getattr(history, name) for name in FIGURES.values())
             return lax.select_n(point[1], *figures), jnp.all(history.status == 0)
 

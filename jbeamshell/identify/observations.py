@@ -42,7 +42,7 @@ from jbeamshell.measured.curves import (
 )
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.solving import run
 
 LENGTH_STEP = 32  # runs are filled up to multiples of this, where further points are cheap
 APPROACH = 8  # load steps from zero to the first point of a loop
@@ -231,7 +231,7 @@ class SqueezeObservation(Observation):
     def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
         """Squeeze stress (n,), linear between element midpoints, and whether it converged."""
         strip = of_strips_alone("squeeze stress", scene)
-        history = solve(strip.replace({"load.cycles": 0}), solver=solver, throw=False)
+        history = run(strip.replace({"load.cycles": 0}), solver=solver, throw=False)
         stress = jnp.interp(self.x, history.middles, history.squeeze_stress[-1])
         return stress, jnp.all(history.status == 0)
 

@@ -23,7 +23,7 @@ from jbeamshell.history.saved import FORMAT, named_arrays, without_scene
 from jbeamshell.mechanics.kinematics import Strains
 from jbeamshell.quasistatic.continuation import PathEnd
 from jbeamshell.quasistatic.path_state import initial_state
-from jbeamshell.quasistatic.solver import WholePath
+from jbeamshell.quasistatic.solving import WholePath
 from jbeamshell.scene.plan import STEPS
 from jbeamshell.scene.toml import scene_from_values
 

@@ -20,7 +20,7 @@ from jbeamshell.condensed.shared import Layout, Shared, shared
 from jbeamshell.condensed.strip import Strip
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import NUMBERS, TABLE, check_key
 from jbeamshell.scene.planning import FEW_STEPS
@@ -192,7 +192,7 @@ def figures(
     ----------
     strip : the scene's strip on its contact line, if it is known
     """
-    history = solve(scene, throw=False, solver=solver, strip=strip)
+    history = run(scene, throw=False, solver=solver, strip=strip)
     found = {name: getattr(history, name) for name in names}
     return found | {"status": jnp.max(history.status)}
 

@@ -23,7 +23,7 @@ from jbeamshell.condensed.shared import Layout, shared
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.quasistatic.response import Response, figures, response
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
 from jbeamshell.sweeping.lanes import Outcome
@@ -215,7 +215,7 @@ class Runner:
         given = (jnp.asarray(number, self.dtype) for number in numbers)
         try:
             scene = self.scene.replace(dict(zip(self.keys, given, strict=True)))
-            history = solve(scene, throw=False, solver=self.solver)
+            history = run(scene, throw=False, solver=self.solver)
         except InputError:
             return np.full(len(self.figures), np.nan), Outcome.OUTSIDE
         status = Outcome(int(np.max(np.asarray(history.status))))

@@ -23,7 +23,7 @@ import jaxlib  # noqa: E402
 import numpy as np  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
-from jbeamshell.quasistatic import solver  # noqa: E402
+from jbeamshell.quasistatic.solving import compile_for  # noqa: E402
 
 IN_LOAD_STEPS = {"model.solution": "stepwise", "model.kinematics": "exact"}
 
@@ -67,7 +67,7 @@ def main() -> None:
     record: dict[str, dict] = {name: {"keys": VARIANTS[name]} for name in scenes}
     for name, scene in scenes.items():
         begin = time.perf_counter()
-        solver.compile_for(scene)
+        compile_for(scene)
         record[name]["compile_s"] = time.perf_counter() - begin
     times: dict[str, list[float]] = {name: [] for name in scenes}
     for _ in range(ROUNDS):

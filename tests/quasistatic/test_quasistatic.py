@@ -6,7 +6,7 @@ from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.mechanics import bar
-from jbeamshell.quasistatic import solver
+from jbeamshell.quasistatic.solving import compile_for
 from jbeamshell.quasistatic.stepping import fits_native
 
 SMALL = {
@@ -177,7 +177,7 @@ def test_beyond_gross_slip_force_control_is_refused():
 @pytest.mark.doubtful("few nodes")
 def test_compiling_alone_solves_nothing():
     scene = STRIP.replace(SMALL)
-    solver.compile_for(scene)
+    compile_for(scene)
     size = solver._solve._compiled[True]._cache_size()
     jb.solve(scene)
     assert solver._solve._compiled[True]._cache_size() == size

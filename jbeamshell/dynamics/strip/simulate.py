@@ -34,7 +34,7 @@ from jbeamshell.dynamics.strip.motion import (
 from jbeamshell.dynamics.strip.step_equations import StepMatrices
 from jbeamshell.dynamics.strip.stepsize import EXPLICIT, METHODS, STIFF, longest_step
 from jbeamshell.mechanics.friction import ElasticSlip
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.solving import run
 from jbeamshell.quasistatic.system import System
 from jbeamshell.scene.scene import Scene
 
@@ -158,7 +158,7 @@ def _start(scene: Scene, released: ArrayLike | None) -> tuple[Array, Array, Arra
     path = np.zeros(1) if released is None else np.atleast_1d(np.asarray(released, float))
     if path.size == 1:
         path = float(path[0]) * np.arange(1, RELEASE_STEPS + 1) / RELEASE_STEPS
-    history = solve(scene, path)
+    history = run(scene, path)
     pressed = _end_displacement(scene, history.fields[history.pressed])
     return history.fields[-1], history.traction[-1], pressed
 

@@ -15,7 +15,7 @@ from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.jax_options import ONCE
 from jbeamshell.condensed.network import Network, Response, Sliders
 from jbeamshell.dynamics.steady_cycles import SteadyCycles
-from jbeamshell.quasistatic.solver import solve
+from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.scene import Scene
 
 # Amplitudes of steady cycles, over the largest
@@ -83,7 +83,7 @@ def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, A
     levels = force * jnp.asarray(AMPLITUDES)
     throw = not is_traced(scene, force, jnp.zeros(()))
     ways = (1.0, -1.0)
-    sides = [way * solve(scene, way * levels, throw=throw).displacement for way in ways]
+    sides = [way * run(scene, way * levels, throw=throw).displacement for way in ways]
     sides = [side[-levels.size :] for side in sides]
     cycles = SteadyCycles.of(scene, levels)
     u, loss = cycles.displacement, cycles.dissipation
@@ -166,7 +166,7 @@ def walked_forces(scene: Scene, path: NDArray[np.float64]) -> Array:
     """Forces (T,) per width of a scene on its contact line, walked event by event."""
     size = max(float(np.max(np.abs(path), initial=0.0)), np.finfo(float).tiny)
     driven = scene.replace({"load.control": "displacement", "load.amplitude": size})
-    return solve(driven, path).force[-path.size :]
+    return run(driven, path).force[-path.size :]
 
 
 def network_forces(network: Network, path: NDArray[np.float64]) -> Array:
