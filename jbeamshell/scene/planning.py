@@ -100,8 +100,8 @@ def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
         section = "plane" if elastic else "squeeze"
     engine = _engine(scene, section, kinematics)
     lifts = section != "bar" and contact.normal != "held"
-    soft = _is_soft(scene, numbers) and (model.nodes == AUTO or engine != LINE)
-    grid = _grid(section, engine, lifts and scene.strip.curvature is None, soft)
+    opens = lifts and scene.strip.curvature is None
+    grid = _grid(section, engine, opens, _is_soft(scene, numbers))
     many = ARC_STEPS if load.control == ARC_LENGTH else grid.steps
     return Plan(
         section,
