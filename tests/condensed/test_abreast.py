@@ -10,7 +10,8 @@ from jbeamshell.condensed import branches, events, strip
 
 SCENE = jb.Scene().replace(
     {
-        "model.section": "squeeze", "model.kinematics": "linear",
+        "model.section": "squeeze",
+        "model.kinematics": "linear",
         "strip.height_ratio": 0.3,
         "strip.far_end": "free",
         "contact.friction": 0.3,

@@ -10,11 +10,9 @@ from jbeamshell.condensed import strip
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.quasistatic.elastic_strip import ElasticStrip, V, W
 from jbeamshell.quasistatic.system import System
-from jbeamshell.scene.rungs import name_of, values_of
 
 # Elements at the loaded end are so large that slip zones are nested.
-COARSE = {"model.nodes": 17, "model.end_size": 1.0 / 6.0, "load.steps_per_half_cycle": 2}
-SCENE = jb.library.standard().replace(COARSE)
+SCENE = jb.library.standard().on_grid(17, 1.0 / 6.0).replace({"load.steps_per_half_cycle": 2})
 LAYERS = [[0.1, 2.0e4, 0.3], [0.1252, 1.5e5, 0.2]]
 AMPLITUDE = float(SCENE.load.amplitude)
 SOFT = {"contact.stick_stiffness": 50.0}  # load steps have no ideal friction
@@ -32,28 +30,30 @@ def built_in(e, g, k, psi, dpsi):
     return stretch + kappa * shear * half * g**2 + bend
 
 
-def of_phi(energy, rung="condensed-squeeze"):
+def of_phi(energy, section="squeeze"):
     """Standard strip with an energy of its own."""
-    start = SCENE.replace({"model.section": "squeeze"})
-    own = jb.Scene(start.strip, start.contact, start.load, start.model, energy)
-    return own.replace({"model.section": rung})
+    own = linear(section)
+    return jb.Scene(own.strip, own.contact, own.load, own.model, energy)
 
 
 def beside(scene, **values):
-    """Scene in load steps, with the fields and nodes of a condensed one."""
-    rung = scene.plan.section.removeprefix("condensed-")
-    return scene.replace({"model.section": rung, "model.kinematics": "linear"} | values)
+    """The same scene in load steps."""
+    return scene.replace(values).by_load_steps()
+
+
+def linear(section, **values):
+    return SCENE.replace({"model.section": section, "model.kinematics": "linear"} | values)
 
 
 BODIES = {
-    "shell": SCENE.replace({"model.section": "shell", "model.kinematics": "linear"}),
-    "squeeze": SCENE.replace({"model.section": "squeeze", "model.kinematics": "linear"}),
-    "p2": SCENE.replace({"model.section": "p2", "model.kinematics": "linear"}),
-    "p4": SCENE.replace({"model.section": "p4", "model.kinematics": "linear", "strip.plane": "stress"}),
-    "face": SCENE.replace({"model.section": "p3", "model.kinematics": "linear", "load.entry": "face"}),
-    "guided": SCENE.replace({"model.section": "p3", "model.kinematics": "linear", "load.entry": "guided"}),
-    "laminate": SCENE.replace({"model.section": "squeeze", "model.kinematics": "linear", "strip.layers": LAYERS}),
-    "printed": SCENE.replace({"model.section": "squeeze", "model.kinematics": "linear", "model.constants": "printed"}),
+    "shell": linear("shell"),
+    "squeeze": linear("squeeze"),
+    "p2": linear("p2"),
+    "p4": linear("p4", **{"strip.plane": "stress"}),
+    "face": linear("p3", **{"load.entry": "face"}),
+    "guided": linear("p3", **{"load.entry": "guided"}),
+    "laminate": linear("squeeze", **{"strip.layers": LAYERS}),
+    "printed": linear("squeeze", **{"model.constants": "printed"}),
     "coupled": of_phi(
         lambda e, g, k, psi, dpsi: built_in(e + 0.02 * k, g + 0.1 * psi, k, psi, dpsi)
     ),
@@ -138,7 +138,7 @@ class TestHistory:
         check_against_load_steps(exact, steps)
         exact.save(tmp_path / "run.npz")
         again = jb.read_history(tmp_path / "run.npz")
-        assert again.scene.plan.section == "condensed-p2"
+        assert again.scene.plan == exact.scene.plan
         np.testing.assert_array_equal(again.fields, exact.fields)
 
     @pytest.mark.doubtful("few nodes", "in the corner", "single nodes", "the section squeeze")
@@ -186,79 +186,41 @@ class TestFigures:
         np.testing.assert_allclose(joint.path_forces(moved[steps]), history.force[steps], atol=1e-9)
 
 
-class TestRefusals:
+class TestEngine:
+    @pytest.mark.parametrize("section", ["squeeze", "p2"])
     @pytest.mark.parametrize(
-        ("values", "said"),
+        "values",
         [
-            ({"model.kinematics": "exact"}, "disagree: give one, or take p2, which rotates"),
-            ({"contact.smoothing": 16.0}, "contact.law = .*take model.rung = p2"),
-            (
-                {"contact.normal": "compliant"},
-                "contact.normal = 'compliant': must be rigid .* = p2",
-            ),
-            ({"strip.curvature": 0.1}, "model.order = 2"),
-            ({"model.grid": "collocation"}, "model.grid = 'collocation': must be .*rung = p2"),
-            ({"model.nodes": 2}, "model.nodes = 2"),
-            ({"load.control": "arc-length", "load.amplitude": 1e-5}, "model.solution"),
+            {"model.kinematics": "exact"},
+            {"contact.smoothing": 16.0},
+            {"contact.normal": "compliant"},
+            {"contact.normal": "held"},
+            {"model.grid": "collocation"},
+            {"load.control": "arc-length", "load.amplitude": 1e-5},
+        ],
+        ids=lambda values: next(iter(values)),
+    )
+    def test_what_is_not_linear_takes_load_steps(self, section, values):
+        assert linear(section).plan.on_contact_line
+        assert not linear(section, **values).plan.on_contact_line
+
+    @pytest.mark.parametrize(
+        "energy",
+        [
+            lambda *s: built_in(*s) + 10.0 * s[0] ** 3,
+            lambda *s: built_in(*s) + jnp.abs(s[3]),
+            lambda *s: built_in(*s) + 3.0 * s[2],
+            lambda *s: built_in(*s) + 5e4 * jnp.maximum(s[0], 0.0) ** 2,
+            lambda *s: built_in(*s) * jnp.nan,
+            lambda e, g, k, psi, dpsi: e**2 + g**2 + psi**2,
+            lambda *s: built_in(*s) - 1e9 * s[4] ** 2,
+            lambda e, *s: -built_in(e, *s),
         ],
     )
-    def test_what_is_not_linear_names_the_general_rung(self, values, said):
-        with pytest.raises(jb.InputError, match=said):
-            SCENE.replace({"model.section": "p2", "model.kinematics": "linear"} | values)
+    def test_so_does_a_phi_that_is_no_positive_quadratic_form(self, energy):
+        assert not of_phi(energy).plan.on_contact_line
 
-    @pytest.mark.parametrize(
-        ("values", "said"),
-        [
-            ({"strip.curvature": 0.1}, "strip.curvature = 0.1: .* take model.rung = squeeze"),
-            ({"model.section": "assumed"}, "model.squeeze = 'assumed': must be 'field'"),
-            ({"model.fields": ["v", "beta"]}, "give one"),
-        ],
-    )
-    def test_so_do_the_beamshells(self, values, said):
-        with pytest.raises(jb.InputError, match=said):
-            SCENE.replace({"model.section": "squeeze", "model.kinematics": "linear"} | values)
-
-    @pytest.mark.parametrize(
-        ("fields", "said"), [(["v", "beta"], "= condensed-shell instead"), (["v"], "= bar instead")]
-    )
-    def test_the_solution_alone_needs_the_lift(self, fields, said):
-        alone = {"model.solution": "condensed", "model.kinematics": "linear"}
-        with pytest.raises(jb.InputError, match=f"must hold w .*{said}"):
-            SCENE.replace(alone | {"model.fields": fields})
-
-    @pytest.mark.parametrize(
-        ("energy", "said"),
-        [
-            (
-                lambda *s: built_in(*s) + 10.0 * s[0] ** 3,
-                "not quadratic .* take model.rung = squeeze",
-            ),
-            (lambda *s: built_in(*s) + jnp.abs(s[3]), "not quadratic"),
-            (lambda *s: built_in(*s) + 3.0 * s[2], "not quadratic"),
-            (lambda *s: built_in(*s) + 5e4 * jnp.maximum(s[0], 0.0) ** 2, "not quadratic"),
-            (lambda *s: built_in(*s) * jnp.nan, "not finite"),
-            (lambda e, g, k, psi, dpsi: e**2 + g**2 + psi**2, "without stiffness"),
-            (lambda *s: built_in(*s) - 1e9 * s[4] ** 2, "without stiffness"),
-            (lambda e, *s: -built_in(e, *s), "without stiffness"),
-        ],
-    )
-    def test_a_phi_that_is_no_positive_quadratic_form(self, energy, said):
-        with pytest.raises(jb.InputError, match=f"energy.*{said}"):
-            of_phi(energy)
-
-    def test_a_shell_needs_no_stiffness_against_the_squeeze(self):
-        of_phi(lambda e, g, k, psi, dpsi: e**2 + g**2 + k**2, "condensed-shell")
-
-
-@pytest.mark.parametrize("rung", ["condensed-shell", "condensed-squeeze", "condensed-p3", "plane"])
-def test_a_rung_has_its_name(rung):
-    values = values_of(rung)
-    parts = (values[f"model.{name}"] for name in ("fields", "order", "solution"))
-    assert name_of(*parts) == rung
-    assert values["model.kinematics"] == "linear"
-
-
-@pytest.mark.parametrize("rung", ["condensed", "condensed-bar", "condensed-plane", "bar-plane"])
-def test_a_rung_that_does_not_exist_is_refused(rung):
-    with pytest.raises(jb.InputError, match=f"model.rung = '{rung}': choose .*condensed-"):
-        values_of(rung)
+    def test_a_quadratic_phi_is_on_the_contact_line(self):
+        assert of_phi(built_in).plan.on_contact_line
+        shell = of_phi(lambda e, g, k, psi, dpsi: e**2 + g**2 + k**2, "shell")
+        assert shell.plan.on_contact_line  # it needs no stiffness against the squeeze

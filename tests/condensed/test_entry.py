@@ -124,7 +124,9 @@ class TestBeyond:
 
 class TestSections:
     def test_a_straight_section_has_a_rigid_face_by_nature(self):
-        scene = jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 33})
+        scene = jb.Scene().replace(
+            {"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 33}
+        )
         runs = [jb.solve(scene.replace({"load.entry": name}), throw=False) for name in ENTRIES]
         loss = [float(run.dissipation) for run in runs]
         member, face, guided, traction = loss
@@ -134,31 +136,26 @@ class TestSections:
     @pytest.mark.parametrize("name", ["face", "guided"])
     def test_load_steps_and_the_contact_line_agree(self, name):
         """A section of order 3 and the beamshell, whose end is held alike in both."""
-        few = {"load.entry": name, "model.nodes": 17, "model.end_size": 1.0 / 6.0}
+        few = {"load.entry": name, "model.kinematics": "linear"}
         few |= {"contact.stick_stiffness": 50.0, "load.steps_per_half_cycle": 20}
-        for rung in ("squeeze", "p3"):
-            line, steps = (
-                jb.solve(jb.Scene().replace(few | {"model.section": rung} | how), throw=False)
-                for how in (
-                    {"model.solution": "condensed", "model.section": "squeeze"},
-                    {"model.solution": "stepwise", "model.kinematics": "linear"},
-                )
-            )
+        for section in ("squeeze", "p3"):
+            scene = jb.Scene().replace(few | {"model.section": section}).on_grid(17, 1.0 / 6.0)
+            line, steps = (jb.solve(scene, throw=False, by=by) for by in (None, "steps"))
+            assert line.scene.plan.on_contact_line
+            assert not steps.scene.plan.on_contact_line
             assert float(steps.dissipation) == pytest.approx(float(line.dissipation), rel=0.02)
             assert float(steps.secant_stiffness) == pytest.approx(
                 float(line.secant_stiffness), rel=5e-3
             )
 
     def test_sections_of_rising_order_climb_to_plane_elasticity(self):
-        small = {"load.amplitude": 0.2, "model.nodes": 65}
+        small = {"load.amplitude": 0.2, "model.nodes": 65, "model.kinematics": "linear"}
         for name in ("member", "traction"):
             fine = PLANE.replace(small | {"load.entry": name})
             plane = float(jb.solve(fine, throw=False).dissipation)
             orders = [
                 jb.solve(
-                    jb.Scene().replace(
-                        small | {"load.entry": name, "model.section": f"condensed-p{p}"}
-                    ),
+                    jb.Scene().replace(small | {"load.entry": name, "model.section": f"p{p}"}),
                     throw=False,
                 )
                 for p in (2, 4, 8)
@@ -256,7 +253,10 @@ class TestDerivatives:
     ("values", "said"),
     [
         ({"load.entry": "glue"}, "choose 'member' or 'face' or 'guided' or 'traction'"),
-        ({"strip.overhang": 0.3, "model.solution": "stepwise"}, "needs linear kinematics on the"),
+        (
+            {"strip.overhang": 0.3, "model.kinematics": "exact"},
+            "strip.overhang = 0.3: needs the contact line of a linear strip",
+        ),
     ],
 )
 def test_bad_input_is_one_line(values, said):
@@ -271,12 +271,16 @@ def test_a_moment_turns_no_guided_face():
 
 
 def test_load_steps_cannot_continue_a_section_that_warps():
-    scene = jb.Scene().replace({"model.section": "p3", "model.solution": "stepwise"})
-    with pytest.raises(jb.InputError, match=r"load.entry = 'member': has no section of order 3"):
-        jb.solve(scene)
+    scene = jb.Scene().replace({"model.section": "p3"})
+    exact = scene.replace({"model.kinematics": "exact"})
+    for solve in (scene.by_load_steps, lambda: jb.solve(exact)):
+        with pytest.raises(jb.InputError, match=r"load.entry = 'member': has no section of order"):
+            solve()
 
 
 def test_one_state_serves_where_the_ends_are_the_same():
     assert entry.states(PLANE) == (False, True)
     assert entry.states(PLANE.replace({"load.entry": "face"})) == (True,)
-    assert entry.states(jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear"})) == (True,)
+    assert entry.states(
+        jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear"})
+    ) == (True,)

@@ -79,8 +79,8 @@ class TestElements:
     def test_sections_of_higher_order_climb_to_them(self):
         (row,) = (r for r in elements("double-shear") if (r["A"], r["H2"]) == (1.0, 0.2358))
         errors = []
-        for rung in ("squeeze", "p2", "p4", "p6"):
-            history = jb.solve(SQUEEZE.replace({"model.section": rung} | of_row(row)))
+        for section in ("squeeze", "p2", "p4", "p6"):
+            history = jb.solve(SQUEEZE.replace({"model.section": section} | of_row(row)))
             errors.append(float(history.dissipation) / row["D"] - 1.0)
         assert np.all(np.diff(errors) < 0.0)
         assert errors[-1] > 0.0
@@ -90,7 +90,12 @@ class TestLimits:
     @pytest.mark.slow
     def test_a_stiff_member_is_a_rigid_base(self, monkeypatch):
         alone = jb.Scene().replace(
-            {"strip.far_end": "free", "load.amplitude": 1.0, "model.section": "squeeze", "model.kinematics": "linear"}
+            {
+                "strip.far_end": "free",
+                "load.amplitude": 1.0,
+                "model.section": "squeeze",
+                "model.kinematics": "linear",
+            }
         )
         scene = SQUEEZE.replace({"member.axial_stiffness": 3.4e10})
         x = stations(scene, scene.plan.nodes)  # one grid for both
@@ -258,10 +263,10 @@ def moments(amplitude, **values):
 
 class TestMoments:
     @pytest.mark.parametrize(
-        "rung", ["squeeze", *(pytest.param(r, marks=pytest.mark.slow) for r in ("p3", "plane"))]
+        "section", ["squeeze", *(pytest.param(r, marks=pytest.mark.slow) for r in ("p3", "plane"))]
     )
-    def test_an_arm_adds_the_rotation_of_the_end(self, rung):
-        scene = library.single_lap().replace({"model.section": rung, "model.nodes": 25})
+    def test_an_arm_adds_the_rotation_of_the_end(self, section):
+        scene = library.single_lap().replace({"model.section": section, "model.nodes": 25})
         of_body = jax.jit(lambda scene: strip.condensed(scene, 25).body.c)
 
         def compliance(values):
@@ -284,7 +289,11 @@ class TestMoments:
     def test_stuck_thin_members_bend_as_one_beam(self):
         errors = []
         for eta in (0.01, 0.005, 0.0025):
-            values = {"strip.height_ratio": eta, "contact.friction": 5.0, "model.section": "squeeze"}
+            values = {
+                "strip.height_ratio": eta,
+                "contact.friction": 5.0,
+                "model.section": "squeeze",
+            }
             values |= {"contact.pressure": 10.0, "contact.bottom_pressure": 10.0}
             scene = moments(1e-4, **values, **{"strip.loaded_end": "free"})
             history = jb.solve(scene, throw=False)
@@ -430,7 +439,9 @@ def test_a_sweep_runs_over_both_heights():
     [
         ({"strip.far_end": "guided"}, "strip.far_end = 'guided': must be 'free' in a lap joint"),
         ({"contact.normal": "compliant"}, "contact.normal"),
-        ({"model.solution": "stepwise"}, "model.solution = 'stepwise'"),
+        ({"model.kinematics": "exact"}, "model.kinematics = 'exact': must be linear in a lap"),
+        ({"contact.normal": "held"}, "contact.normal = 'held': must be 'rigid'"),
+        ({"model.section": "bar"}, "model.section = 'bar': is no section of a lap joint"),
         ({"contact.bottom_pressure": 3.0}, "must be 0 on a symmetry plane"),
         ({"strip.curvature": 0.1}, "strip.curvature"),
         ({"member.support": "none", "member.height_ratio": 0.1}, "give member.support"),
@@ -448,6 +459,12 @@ def test_a_sweep_runs_over_both_heights():
 def test_what_is_no_joint_is_refused(values, said):
     with pytest.raises(jb.InputError, match=said.replace("(", "\\(")):
         jb.solve(SQUEEZE.replace(values))
+
+
+def test_a_joint_knows_no_load_steps():
+    for refused in (SQUEEZE.by_load_steps, lambda: jb.solve(SQUEEZE, by="steps")):
+        with pytest.raises(jb.InputError, match="support = 'rolling': is for loads"):
+            refused()
 
 
 @pytest.mark.doubtful("few nodes")

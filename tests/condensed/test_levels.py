@@ -158,10 +158,10 @@ class TestTurns:
         np.testing.assert_allclose(traced.state.displacement, known.state.displacement, rtol=1e-9)
 
     @pytest.mark.slow
-    @pytest.mark.parametrize("rung", ["plane", "condensed-squeeze"])
-    def test_a_rest_changes_nothing(self, rung):
+    @pytest.mark.parametrize("section", ["plane", "squeeze"])
+    def test_a_rest_changes_nothing(self, section):
         # Samples of a sine are alike on both sides of its turn: a rest at every turn.
-        scene = jb.library.standard().replace({"model.section": rung})
+        scene = jb.library.standard().replace({"model.section": section})
         loads = np.sin(2.0 * np.pi * np.arange(1, 76) / 50)
         rests = np.flatnonzero(np.diff(loads, prepend=0.0) == 0.0)
         assert rests.size

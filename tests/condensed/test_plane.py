@@ -13,7 +13,7 @@ from jbeamshell import condensed
 from jbeamshell.condensed import branches, events, strip
 from jbeamshell.condensed.ends import end_section
 from jbeamshell.mechanics.layered import Material, layered_form
-from jbeamshell.scene.rungs import PLANE_NODES
+from jbeamshell.scene.planning import PLANE_NODES
 
 DATA = Path(__file__).parents[2] / "calibration" / "data"
 STRIP = jax.jit(lambda scene: strip.condensed(scene, PLANE_NODES))
@@ -44,7 +44,7 @@ def scene_of(eta, mu=0.1, nu=0.3, amplitude=1.0):
 
 
 def plane(scene, **values):
-    """History of a scene on the rung of plane elasticity."""
+    """History of a scene in plane elasticity."""
     return jb.solve(scene.replace({"model.section": "plane"} | values))
 
 

@@ -17,7 +17,8 @@ from jbeamshell.scene.load_path import whole_path
 MU, NODES = 0.3, 21
 SCENE = jb.Scene().replace(
     {
-        "model.section": "squeeze", "model.kinematics": "linear",
+        "model.section": "squeeze",
+        "model.kinematics": "linear",
         "strip.height_ratio": 0.3,
         "contact.friction": MU,
         "contact.pressure": [[0.0, 14.0], [0.7, 12.0], [2.0, 3.0]],
@@ -207,11 +208,12 @@ def test_a_cycle_of_the_load_is_none_where_the_pressures_do_not_close():
 
 @pytest.mark.slow
 def test_load_steps_come_near():
-    scene = jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 41})
+    scene = jb.Scene().replace(
+        {"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 41}
+    )
     path = np.array([[0.8, 1.0], [0.8, 0.6], [-0.5, 1.4], [0.9, 0.8]])
     exact = jb.solve(scene, path)
-    stepwise = {"model.solution": "stepwise"}
-    near = jb.solve(scene.replace(stepwise), finer(path, 40))
+    near = jb.solve(scene, finer(path, 40), by="steps")
     works = np.add.reduceat(np.asarray(near.slip_work)[near.pressed + 1 :], np.arange(0, 160, 40))
     own = np.asarray(exact.slip_work)[exact.pressed + 1 :]
     np.testing.assert_allclose(works, own, atol=0.01 * np.sum(own))

@@ -122,10 +122,10 @@ def test_settings_stay_as_they_were_chosen():
     scene = jb.Scene()
     fixed = drawable(scene)
     moved = fixed.replace({"strip.height_ratio": 0.012, "load.amplitude": 1.9})
-    assert moved.model.solution == "plane"
-    assert drawable(jb.Scene().replace({"model.section": "squeeze"})).model.solution == "condensed"
+    assert moved.plan.section == "plane"
+    assert drawable(jb.Scene().replace({"model.section": "squeeze"})).plan.section == "squeeze"
     assert drawable(jb.library.single_lap()).plan.nodes == 65
-    assert drawable(jb.library.single_lap().replace({"model.nodes": 97})).model.nodes == 97
+    assert drawable(jb.library.single_lap().replace({"model.nodes": 97})).plan.nodes == 97
 
 
 def test_without_panel_there_is_one_clear_line(monkeypatch):

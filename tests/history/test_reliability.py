@@ -152,14 +152,14 @@ def test_long_load_steps_are_doubted_for_a_reaction_that_changes_within_them():
     assert error_estimates.step_error(even) == 0.0
     assert error_estimates.step_error(changing) == pytest.approx(error_estimates.WITHIN_STEPS)
     assert error_estimates.step_error(even_cycle(64, slip=0.0)) == 0.0
-    line, steps = jb.Scene(), jb.Scene().replace({"model.solution": "stepwise"})
+    line, steps = jb.Scene(), jb.Scene().by_load_steps()
     assert error_estimates.estimates(line, changing)[3] == 0.0
     assert error_estimates.estimates(steps, changing)[3] == error_estimates.step_error(changing)
 
 
-@pytest.mark.parametrize("rung", ["condensed-squeeze", "shell"])
-def test_where_nothing_slips_the_estimate_is_infinite(rung):
-    scene = jb.Scene().replace({"model.section": rung})
+@pytest.mark.parametrize("section", ["squeeze", "shell"])
+def test_where_nothing_slips_the_estimate_is_infinite(section):
+    scene = jb.Scene().replace({"model.section": section})
     errors = error_estimates.estimates(scene, even_cycle(4, slip=0.0))
     assert np.max(errors) == np.inf
     assert np.max(error_estimates.estimates(scene, even_cycle(64))) == pytest.approx(64**-1.5)
@@ -172,8 +172,8 @@ def test_a_corner_that_may_open_counts_where_friction_is_elastic():
         v=even.v * np.where(even.x < 4, 0.5, 1.0),
     )
     elastic = rigid._replace(slip_stiffness=np.asarray([1e6]))
-    line, steps = jb.Scene(), jb.Scene().replace({"model.solution": "stepwise"})
-    lifting = steps.replace({"model.section": "squeeze"})
+    line, lifting = jb.Scene(), jb.Scene().by_load_steps()
+    steps = lifting.replace({"contact.normal": "held"})
     soft, soft_lifting = (s.replace({"contact.stick_stiffness": 999.0}) for s in (line, lifting))
     open_ends = [error_estimates.estimates(scene, rigid)[1] for scene in (line, lifting)]
     held = [error_estimates.estimates(scene, elastic)[1] for scene in (soft, soft_lifting, steps)]
@@ -224,8 +224,8 @@ def test_a_nearly_incompressible_strip_does_not_lock():
 
 @pytest.mark.slow
 def test_the_dissipation_of_a_nearly_incompressible_strip_is_as_recorded():
-    fine = {"model.nodes": 513, "model.end_size": 1.0 / 384.0, "model.section": "squeeze", "model.kinematics": "linear"}
-    found = jb.solve(jb.Scene().replace(SOFT | fine))
+    linear = {"model.section": "squeeze", "model.kinematics": "linear"}
+    found = jb.solve(jb.Scene().replace(SOFT | linear).on_grid(513, 1.0 / 384.0))
     assert float(found.dissipation) == pytest.approx(ON_513_NODES, rel=1e-6)
 
 
@@ -238,7 +238,7 @@ def test_the_error_of_the_grid_is_larger_where_the_pressure_has_steps():
 @pytest.mark.doubtful("in the corner", "the section squeeze")
 def test_a_doubtful_run_warns_with_the_fix():
     scene = STRIP.replace(LITTLE | COARSE)
-    with pytest.warns(jb.DoubtfulWarning, match=r"off by about \d+ %: few nodes do .*end_size"):
+    with pytest.warns(jb.DoubtfulWarning, match=r"off by about \d+ %: few nodes do .*model.nodes"):
         history = jb.solve(scene)
     assert history.figures()["doubts"] == list(history.doubts)
     assert f"doubtful: {history.doubts[0]}" in str(history)
@@ -258,12 +258,9 @@ def test_the_standard_strip_is_beyond_doubt():
 
 def relative_error(run, times=6):
     """Relative error of a run's dissipation, to the same model on elements of 1/times the size."""
-    coarse = jb.Scene().model
-    mesh = {
-        "model.nodes": times * (coarse.nodes - 1) + 1,
-        "model.end_size": coarse.end_size / times,
-    }
-    fine = jb.solve(run.scene.pinned().replace(mesh), throw=False)
+    coarse = jb.Scene().plan
+    mesh = times * (coarse.nodes - 1) + 1, coarse.end_size / times
+    fine = jb.solve(run.scene.pinned().on_grid(*mesh), throw=False)
     return abs(float(run.dissipation / fine.dissipation) - 1.0)
 
 
@@ -277,7 +274,7 @@ def test_elements_are_halved_until_the_tolerance_is_kept(load, nodes):
     assert relative_error(run) <= float(run.dissipation_error) < run.scene.model.tolerance
     assert ("halving the elements" in str(run)) == (nodes > 65)
     # Only this run is on the finer grid: any change of its scene goes back to the chosen one.
-    assert run.scene.replace({"load.amplitude": 1.0}).model == SQUEEZE.model
+    assert run.scene.replace({"load.amplitude": 1.0}).plan == SQUEEZE.plan
     assert run.scene.pinned().plan.nodes == nodes
 
 
@@ -305,7 +302,7 @@ def test_a_refined_run_that_misses_its_tolerance_is_doubted(tmp_path):
 def test_the_estimate_falls_with_the_elements():
     scene = STRIP.replace({"load.amplitude": 0.3} | COARSE)
     sizes = (1.0 / 6.0, 1.0 / 24.0, 1.0 / 96.0)
-    runs = [jb.solve(scene.replace({"model.end_size": size})) for size in sizes]
+    runs = [jb.solve(scene.on_grid(COARSE["model.nodes"], size)) for size in sizes]
     grid = [float(error_estimates.dissipation_errors(run.slip_cycle)[0]) for run in runs]
     assert grid[0] > 2.0 * grid[1] > 4.0 * grid[2]
 
@@ -382,18 +379,14 @@ def test_a_laminate_that_rests_on_its_corner_is_doubted_as_much_as_it_is_off():
     )
     chosen = jb.solve(strip, tolerance=0.005)
     assert chosen.doubts == ()
-    lifts = {"model.section": "squeeze", "model.kinematics": "linear"}
-    line = {"model.section": "squeeze", "model.kinematics": "linear", "model.end_size": 1.0 / 48.0}
-    for coarse in (
-        {"model.nodes": 65} | line,
-        {"model.nodes": 129} | line,
-        {"model.solution": "stepwise", "model.nodes": 161} | lifts,
-    ):
-        run = jb.solve(strip.replace(coarse))
+    linear = strip.replace({"model.section": "squeeze", "model.kinematics": "linear"})
+    steps = linear.replace({"model.nodes": 161}).by_load_steps()
+    for coarse in (linear.on_grid(65, 1.0 / 48.0), linear.on_grid(129, 1.0 / 48.0), steps):
+        run = jb.solve(coarse)
         assert any("rests on single nodes" in doubt for doubt in run.doubts)
         off = 1.0 - float(run.dissipation / chosen.dissipation)
         assert 0.7 < float(run.dissipation_error) / off < 1.5
-    ideal = strip.replace({"contact.stick_stiffness": None, "model.section": "squeeze", "model.kinematics": "linear"})
+    ideal = linear.replace({"contact.stick_stiffness": None})
     assert not any("single nodes" in doubt for doubt in jb.solve(ideal).doubts)
 
 
@@ -453,7 +446,7 @@ def test_a_thousand_cycles_neither_drift_nor_lose_energy():
 
 @pytest.mark.slow
 def test_load_steps_are_solved_in_double_precision():
-    shell = COARSE | {"model.fields": ["v", "beta"], "model.solution": "stepwise"}
+    shell = COARSE | {"model.section": "shell", "contact.normal": "held"}
     code = f"""
 import json, warnings
 import jbeamshell as jb

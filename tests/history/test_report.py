@@ -109,9 +109,7 @@ def test_the_loop_table_says_where_unilateral_contact_ends(history):
     header, rows = rows_of(report.loop_table(lifting))
     assert header.index("contact_end") == 5
     np.testing.assert_array_equal([float(row[5]) for row in rows], lifting.contact_end)
-    hanging = pressed(
-        history, 3, **{"model.section": "squeeze", "contact.normal": "none"}
-    )
+    hanging = pressed(history, 3, **{"model.section": "squeeze", "contact.normal": "none"})
     assert "contact_end" not in rows_of(report.loop_table(hanging))[0]
 
 
@@ -197,7 +195,7 @@ def test_a_run_in_a_folder(history, tmp_path):
     [
         ({}, {"contact.png"}),
         ({"model.section": "shell"}, {"contact.png"}),
-        ({"model.fields": ["v", "beta"]}, set()),
+        ({"model.section": "shell", "contact.normal": "held"}, set()),
     ],
 )
 def test_a_run_that_only_presses_has_no_loop_to_draw(history, tmp_path, values, pictures):

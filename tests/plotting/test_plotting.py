@@ -136,7 +136,7 @@ class TestProfiles:
         assert len(dots.get_xdata()) > 0
 
     def test_shows_the_squeeze_strain_only_where_it_is_modelled(self, pull):
-        flat_scene = pull.scene.replace({"model.fields": ["v", "beta"]})
+        flat_scene = pull.scene.replace({"model.section": "shell"})
         flat = dataclasses.replace(pull, scene=flat_scene)
         with_squeeze, without = (plotting.profiles(h, [-1]).ravel()[1] for h in (pull, flat))
         assert len(with_squeeze.get_lines()) == 2

@@ -7,13 +7,16 @@ import jbeamshell as jb
 from jbeamshell.history.reliability import doubts_of_scene
 from jbeamshell.scene.buckling import sway, unpressed_parts, weakest_column
 
-SLENDER = jb.Scene().replace(
-    {
-        "strip.height_ratio": 0.003,
-        "contact.friction": 0.3,
-        "model.section": "squeeze",
-        "model.solution": "stepwise",
-    }
+SLENDER = (
+    jb.Scene()
+    .replace(
+        {
+            "strip.height_ratio": 0.003,
+            "contact.friction": 0.3,
+            "model.section": "squeeze",
+        }
+    )
+    .by_load_steps()
 )
 OVERHANG = [[0, 30], [0.6, 30], [0.6, 0], [2, 0]]
 GAP = [[0, 30], [0.6, 30], [0.6, 0], [1.8, 0], [1.8, 0.5], [2, 0.5]]

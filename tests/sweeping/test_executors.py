@@ -31,7 +31,7 @@ from jbeamshell.sweeping.runner import Block
 TINY = {
     "model.nodes": 9,
     "model.kinematics": "linear",
-    "model.solution": "stepwise",
+    "contact.normal": "held",  # in load steps
     "load.steps_per_half_cycle": 2,
     "load.cycles": 1,
 }

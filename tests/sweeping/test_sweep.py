@@ -390,7 +390,9 @@ def test_chunks_hold_lanes_that_share_what_they_must():
 
 def test_lanes_advance_together_as_far_as_they_share_a_body():
     """Grids share one body for each height; pairs at random share none, and run alone."""
-    scene = jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 17})
+    scene = jb.Scene().replace(
+        {"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 17}
+    )
     pressures, heights = np.linspace(5.0, 9.0, 64), np.linspace(0.05, 0.1, 64)
     over = {"contact.pressure": pressures, "strip.height_ratio": heights}
 
@@ -408,7 +410,7 @@ def test_lanes_advance_together_as_far_as_they_share_a_body():
 def test_lanes_of_plane_elasticity_share_their_bodies():
     """A grid whose heights share a body, beside the same strips paired at random."""
     plane = {"model.section": "plane", "model.nodes": 17, "load.steps_per_half_cycle": 1}
-    scene = STRIP.replace(plane)
+    scene = jb.Scene().replace(plane)
     over = {"load.amplitude": [0.4, 0.8, 1.2], "strip.height_ratio": [0.05, 0.1]}
     grid = jb.sweep(scene, over, ["dissipation"])
     order = np.random.default_rng(0).permutation(6)

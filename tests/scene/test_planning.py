@@ -1,11 +1,24 @@
-"""Settings that a scene leaves open, and what it chooses for them."""
+"""Plan of a scene: what is given stays, what is left open is decided."""
+
+import dataclasses
 
 import jax
 import numpy as np
 import pytest
+from hypothesis import given, reject
+from hypothesis import strategies as st
 
 import jbeamshell as jb
-from jbeamshell.scene.choice import CONTACT_LINE, KNOWN, LIFTING, PLANE, SOFT_CONTACT_LINE, STEPWISE
+from jbeamshell.scene.keys import ENTRIES
+from jbeamshell.scene.plan import CLOSED, LINE, STEPS
+from jbeamshell.scene.planning import (
+    CONTACT_LINE,
+    KNOWN,
+    LIFTING,
+    PLANE,
+    SOFT_CONTACT_LINE,
+    STEPWISE,
+)
 
 FINE = {"model.tolerance": KNOWN}  # for which grids were measured
 SQUEEZE = jb.Scene().replace({"model.section": "squeeze"})
@@ -13,56 +26,51 @@ ROTATING = {"contact.pressure": 500.0, "load.amplitude": 40.0}
 
 
 def test_the_standard_strip_is_solved_on_its_contact_line():
-    model = jb.Scene().replace(FINE | {"load.amplitude": 1.8}).model
-    assert model.rung == "condensed-squeeze"
-    assert model.kinematics == "linear"
-    assert (model.nodes, model.end_size) == (CONTACT_LINE.nodes, CONTACT_LINE.end_size)
-    assert model.given("nodes") == model.given("solution") == model.given("fields") == "auto"
+    scene = jb.Scene().replace(FINE | {"load.amplitude": 1.8})
+    plan = scene.plan
+    assert (plan.section, plan.engine, plan.kinematics) == ("squeeze", LINE, "linear")
+    assert plan.lifts
+    assert (plan.nodes, plan.end_size) == (CONTACT_LINE.nodes, CONTACT_LINE.end_size)
+    model = scene.model
+    assert model.section == model.kinematics == model.nodes == model.end_size == "auto"
 
 
 @pytest.mark.parametrize(
-    ("values", "rung"),
+    ("values", "section"),
     [
-        ({}, "condensed-squeeze"),
+        ({}, "squeeze"),
         ({"load.amplitude": 0.4}, "plane"),  # its slip reaches 2.5 H
-        ({"load.amplitude": 0.4, "model.tolerance": 0.1}, "condensed-squeeze"),
+        ({"load.amplitude": 0.4, "model.tolerance": 0.1}, "squeeze"),
         ({"load.entry": "traction"}, "plane"),
         ({"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]}, "plane"),
-        ({"contact.pressure": [[0.0, 9.0], [2.0, 4.0]]}, "condensed-squeeze"),
+        ({"contact.pressure": [[0.0, 9.0], [2.0, 4.0]]}, "squeeze"),
         ({"contact.pressure": [[0.5, 10.0], [1.5, 10.0]]}, "plane"),  # a patch
         ({"strip.far_end": "free"}, "plane"),
         ({"strip.poisson_ratio": 0.495, "load.amplitude": 1.5}, "plane"),  # none was recorded
         ({"strip.layers": [[0.1, 1e5, 0.3], [0.1252, 2e5, 0.3]]}, "plane"),
-        ({"load.control": "displacement", "load.amplitude": 1e-5}, "condensed-squeeze"),
+        ({"load.control": "displacement", "load.amplitude": 1e-5}, "squeeze"),
         ({"load.control": "displacement", "load.amplitude": 1e-6}, "plane"),
-        ({"strip.kappa_s": 0.5, "load.amplitude": 0.4}, "condensed-squeeze"),
+        ({"strip.kappa_s": 0.5, "load.amplitude": 0.4}, "squeeze"),
         ({"strip.height_ratio": 0.4}, "plane"),  # though its rotations make more than .2 %
-        ({"model.section": "squeeze", "load.amplitude": 0.4}, "condensed-squeeze"),
-        ({"model.section": "auto", "load.amplitude": 0.4}, "plane"),
+        ({"model.section": "squeeze", "load.amplitude": 0.4}, "squeeze"),
     ],
     ids=str,
 )
-def test_the_section_is_the_cheapest_that_keeps_the_tolerance(values, rung):
-    assert (
-        jb.Scene()
-        .replace({"model.section": "squeeze"})
-        .replace(values)
-        .replace({"model.section": values.get("model.section", "auto")})
-        .plan.section
-        == rung
-    )
+def test_the_section_is_the_cheapest_that_keeps_the_tolerance(values, section):
+    plan = jb.Scene().replace(values).plan
+    assert (plan.section, plan.engine) == (section, LINE)
 
 
 def test_a_section_that_is_too_far_off_gives_way_to_elasticity():
     """A bar would slip over 4.4 H.  The section slips over 3 H, where it is some 5 % off."""
     scene = jb.Scene().replace({"load.amplitude": 0.5, "model.tolerance": 0.02})
-    assert scene.plan.section == "condensed-squeeze"
+    assert scene.plan.section == "squeeze"
     history = jb.solve(scene)
     assert history.scene.plan.section == "plane"
     exact = jb.solve(scene.replace({"model.section": "plane", "model.nodes": 193}))
     assert float(history.dissipation) == pytest.approx(float(exact.dissipation), rel=0.02)
     again = history.scene.replace({"load.amplitude": 1.2})
-    assert again.plan.section == "condensed-squeeze"
+    assert again.plan.section == "squeeze"
 
 
 @pytest.mark.parametrize(
@@ -74,15 +82,48 @@ def test_a_section_that_is_too_far_off_gives_way_to_elasticity():
         {"contact.smoothing": 8.0},
         {"model.grid": "collocation"},
         {"model.kinematics": "exact"},
-        {"model.nodes": 401},
         {"load.control": "arc-length", "load.amplitude": 1e-5},
     ],
     ids=lambda values: next(reversed(values)),
 )
 def test_what_needs_load_steps_gets_them(values):
     scene = jb.Scene().replace(values)
-    assert scene.model.solution == "stepwise"
-    assert scene.by_load_steps().model == scene.model
+    assert scene.plan.engine == STEPS
+    assert scene.by_load_steps().plan == scene.plan
+
+
+def test_the_contact_line_takes_any_number_of_nodes():
+    assert jb.Scene().replace({"model.nodes": 401}).plan.on_contact_line
+
+
+@pytest.mark.parametrize(
+    ("values", "engine"),
+    [
+        ({}, CLOSED),
+        ({"load.steps_per_half_cycle": 1}, STEPS),
+        ({"load.cycles": 0}, STEPS),
+        ({"contact.smoothing": 8.0}, STEPS),
+        ({"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]}, STEPS),
+    ],
+    ids=str,
+)
+def test_a_bar_has_a_closed_form_where_it_is_goodmans(values, engine):
+    bar = jb.Scene().replace({"model.section": "bar"} | values)
+    assert (bar.plan.engine, bar.plan.fields) == (engine, ("v",))
+    assert bar.by_load_steps().plan.engine == STEPS
+
+
+def test_load_steps_stick_until_they_are_given_up():
+    steps = jb.Scene().by_load_steps()
+    assert steps.plan.engine == STEPS
+    assert steps.replace({"contact.friction": 0.2, "model.section": "shell"}).plan.engine == STEPS
+    assert jb.Scene(model=jb.Model(by="steps")).plan == steps.plan
+    with pytest.raises(jb.InputError, match="section = 'plane': is solved on its contact"):
+        steps.replace({"model.section": "plane"})
+    with pytest.raises(jb.InputError, match="by = 'newton': choose 'auto' or 'steps'"):
+        jb.Model(by="newton")
+    with pytest.raises(jb.InputError, match="by = 'newton': choose None or 'steps'"):
+        jb.solve(jb.Scene(), by="newton")
 
 
 @pytest.mark.parametrize(
@@ -101,14 +142,11 @@ def test_a_strip_may_lift(values):
     assert jb.Scene().replace(values).plan.fields == ("v", "w", "beta", "psi")
 
 
-@pytest.mark.parametrize("values", [{"contact.smoothing": 8.0}, {"model.kinematics": "exact"}])
-def test_a_bar_stays_a_bar(values):
-    assert jb.Scene().replace({"model.fields": ["v"]} | values).plan.fields == ("v",)
-
-
-def test_linear_load_steps_keep_their_fields():
-    scene = jb.Scene().replace({"model.kinematics": "linear"})
-    assert scene.replace({"model.solution": "stepwise"}).model.fields == ("v", "beta", "psi")
+def test_a_strip_that_is_held_down_does_not_lift():
+    held = jb.Scene().replace({"contact.normal": "held"})
+    assert held.plan.fields == ("v", "beta", "psi")
+    assert held.plan.engine == STEPS
+    assert "held down in load steps" in str(held.plan)
 
 
 @pytest.mark.doubtful("the section squeeze")
@@ -119,13 +157,13 @@ def test_load_steps_lift_as_the_contact_line_does():
     linear = {"model.kinematics": "linear", "model.nodes": 129, "model.section": "squeeze"}
     line = jb.solve(scene.replace(linear))
     steps = jb.solve(scene.replace({"model.kinematics": "exact"}), throw=False)
-    assert (line.scene.model.solution, steps.scene.model.solution) == ("condensed", "stepwise")
+    assert (line.scene.plan.engine, steps.scene.plan.engine) == (LINE, STEPS)
     allowed = steps.scene.model.tolerance
     assert float(steps.dissipation) == pytest.approx(float(line.dissipation), rel=allowed)
 
 
 def test_ideal_sliders_hold_as_much_on_small_elements_as_on_large_ones():
-    steps = jb.Scene().replace({"model.solution": "stepwise"})
+    steps = jb.Scene().by_load_steps()
     strip, lengths = steps.strip, steps.strip.half_height * np.array([0.01, 0.5, 1.0, 3.0])
     unit = float(strip.shear_modulus / strip.half_height)
     ideal = steps.slip_stiffness(lengths)
@@ -153,16 +191,16 @@ def test_an_overhang_near_buckling_rotates():
 
 def test_given_settings_stay():
     scene = jb.Scene().replace({"model.nodes": 41})
-    assert scene.replace({"contact.friction": 0.2}).model.nodes == 41
+    assert scene.replace({"contact.friction": 0.2}).plan.nodes == 41
     chosen = jb.Scene().plan.nodes
-    assert scene.replace({"model.nodes": "auto"}).model.nodes == chosen
+    assert scene.replace({"model.nodes": "auto"}).plan.nodes == chosen
     pinned = jb.Scene().pinned()
-    assert pinned.replace({"model.tolerance": 0.05}).model.nodes == chosen
+    assert pinned.replace({"model.tolerance": 0.05}).plan.nodes == chosen
 
 
 def test_nodes_follow_the_tolerance():
     def nodes(tolerance):
-        return SQUEEZE.replace({"model.tolerance": tolerance}).model.nodes
+        return SQUEEZE.replace({"model.tolerance": tolerance}).plan.nodes
 
     assert nodes(0.005) == CONTACT_LINE.nodes
     assert (nodes(0.00125) - 1) == 2 * (nodes(0.005) - 1)  # second order
@@ -174,8 +212,8 @@ def test_nodes_follow_the_tolerance():
 
 def test_elements_at_the_loaded_end_are_small_where_the_corner_opens():
     def chosen(**values):
-        model = SQUEEZE.replace(FINE | values).model
-        return model.nodes, model.end_size
+        plan = SQUEEZE.replace(FINE | values).plan
+        return plan.nodes, plan.end_size
 
     def grid(known):
         return known.nodes, known.end_size
@@ -184,11 +222,12 @@ def test_elements_at_the_loaded_end_are_small_where_the_corner_opens():
     assert chosen(**soft) == grid(SOFT_CONTACT_LINE)
     assert chosen() == grid(CONTACT_LINE)
     given = soft | {"model.nodes": 41}
-    assert chosen(**given) == (41, CONTACT_LINE.end_size)
+    assert chosen(**given) == (41, SOFT_CONTACT_LINE.end_size)
     steps = {"model.kinematics": "exact"}
     assert chosen(**steps) == grid(LIFTING)
     assert chosen(**steps, **soft) == grid(STEPWISE)
-    assert chosen(**steps, **{"model.fields": ["v"]}) == grid(STEPWISE)
+    assert chosen(**steps, **{"model.section": "bar"}) == grid(STEPWISE)
+    assert chosen(**steps, **{"contact.normal": "held"}) == grid(STEPWISE)
     assert chosen(**{"strip.curvature": 0.01}) == grid(STEPWISE)
     over = _numbers({"contact.stick_stiffness": [50.0, 1000.0]})
     assert SQUEEZE.replace(FINE).pinned(over).plan.nodes == SOFT_CONTACT_LINE.nodes
@@ -203,7 +242,7 @@ def test_the_chosen_elements_resolve_the_slider_of_the_last_node():
     end = chosen.plan.end_size
 
     def dissipation(end_size):
-        scene = chosen.replace({"model.end_size": end_size})
+        scene = chosen.on_grid(chosen.plan.nodes, end_size)
         return float(jb.solve(scene, throw=False).dissipation)
 
     found = dissipation(end)
@@ -215,13 +254,13 @@ def test_traced_numbers_take_elasticity_unless_the_section_is_named():
     found = []
 
     def dissipation(friction):
-        for given in (jb.Scene(), SQUEEZE):
-            scene = given.replace(FINE | {"contact.friction": friction})
+        for before in (jb.Scene(), SQUEEZE):
+            scene = before.replace(FINE | {"contact.friction": friction})
             found.append((scene.plan.section, scene.plan.nodes))
         return scene.contact.friction
 
     jax.jit(jax.grad(dissipation))(0.1)
-    assert found == [("plane", PLANE.nodes), ("condensed-squeeze", CONTACT_LINE.nodes)]
+    assert found == [("plane", PLANE.nodes), ("squeeze", CONTACT_LINE.nodes)]
     whole = jax.jit(lambda: jb.Scene().contact.friction)  # numbers that are known within jit
     assert float(whole()) == 0.1
 
@@ -229,7 +268,8 @@ def test_traced_numbers_take_elasticity_unless_the_section_is_named():
 def test_a_file_keeps_what_was_left_open():
     text = jb.scene_to_toml(jb.Scene())
     assert 'nodes = "auto"' in text
-    assert 'fields = "auto"' in text
+    assert 'section = "auto"' in text
+    assert "end_size" not in text
     assert "nodes = 65" in jb.scene_to_toml(SQUEEZE.replace(FINE).pinned())
 
 
@@ -238,7 +278,7 @@ def test_a_file_keeps_what_was_left_open():
     [
         ("model.tolerance", 0.0, "must lie between 0.0001 and 0.1"),
         ("model.tolerance", 1e-6, "must lie between 0.0001 and 0.1"),
-        ("model.order", "auto", "must be a whole number"),
+        ("model.section", "beam", "choose 'auto' or 'bar' or 'shell'"),
         ("load.cycles", "auto", "must be a whole number"),
         ("model.nodes", "many", "must be a whole number"),
         ("model.kinematics", "best", "choose 'exact' or 'linear'"),
@@ -252,11 +292,11 @@ def test_bad_settings_name_the_fix(key, value, fix):
 def test_a_sweep_chooses_for_all_its_strips():
     over = {"contact.pressure": [10.0, 500.0], "load.amplitude": [0.5]}
     assert SQUEEZE.pinned(_numbers(over)).plan.kinematics == "exact"
-    assert SQUEEZE.pinned(_numbers({"load.amplitude": [0.5]})).model.kinematics == "linear"
+    assert SQUEEZE.pinned(_numbers({"load.amplitude": [0.5]})).plan.kinematics == "linear"
     slips = {"load.amplitude": [0.4, 1.2]}  # over 2.5 H at least
     assert jb.Scene().pinned(_numbers(slips)).plan.section == "plane"
     slips = {"load.amplitude": [0.9, 1.2]}
-    assert jb.Scene().pinned(_numbers(slips)).plan.section == "condensed-squeeze"
+    assert jb.Scene().pinned(_numbers(slips)).plan.section == "squeeze"
 
 
 def _numbers(over):
@@ -267,8 +307,8 @@ def _numbers(over):
 
 def test_history_says_what_was_chosen():
     history = jb.solve(jb.Scene())
-    rung = "chosen to be within 1 % of plane elasticity: rung condensed-squeeze that may lift off"
-    assert f"{rung}, linear kinematics, {history.x.size} nodes" in str(history)
+    section = "chosen to be within 1 % of plane elasticity: section squeeze on its contact line"
+    assert f"{section}, linear kinematics, {history.x.size} nodes" in str(history)
     assert history.doubts == ()
     assert "chosen" not in str(jb.solve(jb.Scene().pinned()))
     # Plane elasticity on 257 nodes.
@@ -291,7 +331,7 @@ def test_pressures_that_change_beside_elastic_sliders_take_load_steps():
     path = np.array([[0.2, 1.0], [0.2, 0.5]])
     soft = jb.Scene().replace({"model.nodes": 11, "contact.stick_stiffness": 10.0})
     history = jb.solve(soft, path, throw=False)
-    assert history.scene.model.solution == "stepwise"
+    assert history.scene.plan.engine == STEPS
     with pytest.raises(jb.InputError, match="must act wholly beside elastic sliders"):
         jb.solve(soft.pinned(), path)
 
@@ -305,9 +345,74 @@ def test_a_history_on_the_contact_line_goes_on():
     assert further.force.size == begun.force.size + 2
 
 
-def test_a_choice_does_not_depend_on_the_choice_before():
+def test_a_plan_does_not_depend_on_the_plan_before():
     little = {"strip.height_ratio": 0.3, "strip.kappa_s": 0.6, "load.amplitude": 0.02}
     strip = jb.Scene().replace({"load.entry": "traction"})
     before = [strip.replace({"load.amplitude": size}) for size in (0.5, 1.6)]
-    assert [scene.model.solution for scene in before] == ["plane", "condensed"]
-    assert before[0].replace(little).model == before[1].replace(little).model
+    assert [scene.plan.section for scene in before] == ["plane", "squeeze"]
+    assert before[0].replace(little).plan == before[1].replace(little).plan
+
+
+@st.composite
+def scenes(draw):
+    """Scenes of all engines, with settings open and given."""
+    values = {
+        "strip.height_ratio": draw(st.floats(0.01, 0.5)),
+        "contact.friction": draw(st.floats(0.05, 0.6)),
+        "load.entry": draw(st.sampled_from(ENTRIES)),
+        "load.cycles": draw(st.integers(0, 2)),
+        "model.tolerance": draw(st.sampled_from([0.005, 0.01, 0.05])),
+    }
+    gross = 20.0 * values["contact.friction"]
+    values["load.amplitude"] = gross * draw(st.floats(0.01, 0.9))
+    of = {
+        "strip.curvature": [0.01],
+        "strip.far_end": ["pinned", "free"],
+        "strip.kappa_s": [0.6],
+        "strip.layers": [[[0.5 * values["strip.height_ratio"], e, 0.3] for e in (1e5, 3e5)] * 2],
+        "contact.pressure": [500.0, [[0.0, 10.0], [2.0, 8.0]]],
+        "contact.stick_stiffness": [1.0, 50.0],
+        "contact.smoothing": [8.0],
+        "contact.normal": ["held", "compliant"],
+        "load.steps_per_half_cycle": [1, 6],
+        "model.section": ["bar", "shell", "squeeze", "assumed", "p1", "p3", "plane"],
+        "model.kinematics": ["exact", "linear"],
+        "model.grid": ["collocation"],
+        "model.nodes": [41, 401],
+    }
+    for key in draw(st.sets(st.sampled_from(sorted(of)), max_size=4)):
+        values[key] = draw(st.sampled_from(of[key]))
+    try:
+        scene = jb.Scene().replace(values)
+        return scene.by_load_steps() if draw(st.booleans()) else scene
+    except jb.InputError:  # they do not go together
+        reject()
+
+
+@given(scene=scenes())
+def test_a_pinned_scene_keeps_its_plan(scene, tmp_path_factory):
+    """Also in a file, which does not say what a convergence study or load steps are asked of."""
+    pinned = scene.pinned()
+    assert pinned.plan == scene.plan
+    assert dataclasses.replace(pinned).plan == scene.plan
+    assert pinned.replace({"contact.friction": 0.9 * scene.contact.friction}).plan == scene.plan
+    refined = scene.refined().pinned()
+    assert dataclasses.replace(refined).plan == refined.plan
+    if scene.model.by == "auto":
+        path = tmp_path_factory.getbasetemp() / "pinned.toml"
+        jb.write_scene(pinned, path)
+        assert jb.read_scene(path).plan == scene.plan
+
+
+@pytest.mark.parametrize("section", ["shell", "squeeze", "p2"])
+@pytest.mark.doubtful("the section")
+def test_load_steps_dissipate_as_the_contact_line_does(section):
+    """The two engines share the section and the base, not the grid nor the solver."""
+    scene = jb.Scene().replace({"model.section": section, "model.kinematics": "linear"})
+    scene = scene.replace({"load.entry": "face"})
+    line, steps = jb.solve(scene), jb.solve(scene, by="steps")
+    assert (line.scene.plan.engine, steps.scene.plan.engine) == (LINE, STEPS)
+    allowed = scene.model.tolerance
+    assert float(steps.dissipation) == pytest.approx(float(line.dissipation), rel=allowed)
+    stiffness = float(line.secant_stiffness)
+    assert float(steps.secant_stiffness) == pytest.approx(stiffness, rel=allowed)
