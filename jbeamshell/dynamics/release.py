@@ -37,7 +37,8 @@ from jbeamshell.scene.scene import Scene
 
 LIGHT = 0.005  # largest m_1/m at which the strip's inertia is left out by itself
 NO_NETWORK = (
-    "the rung plane does not cover this scene, so that it has no network: take True (--strip whole)"
+    "plane elasticity does not cover this scene, so that it has no network: take True "
+    "(--strip whole)"
 )
 NOT_NESTED = (
     "slip zones are not nested, so that it is no network of sliders: take True (--strip whole)"
@@ -46,7 +47,7 @@ LAP = "follows no lap joint in time steps: take None (--strip auto), for its sli
 DAMPED = "is for time steps, and a lap joint has none: leave it out"
 FEW = "shows too little of the motion: take more cycles, or a smaller force or a heavier payload"
 NO_INERTIA = (
-    "has no inertia here: take whole=False (--strip sliders), a heavier payload, or another rung"
+    "has no inertia here: take whole=False (--strip sliders), a heavier payload, or another section"
 )
 HEAVY = 50.0  # default payload, over the mass of the strip
 RELEASE = 0.1  # duration of the release in periods, long enough to excite the strip's waves little
@@ -136,10 +137,10 @@ def let_go(
     cycles : span of the transient, in periods of the stuck strip
     per_cycle : number of time steps in a period, of the whole strip
     whole : True to follow the whole strip in time steps; False to follow the network of sliders of
-        plane elasticity (or of the scene's own condensed rung), exact in time, without the strip's
-        inertia; None to take the network where the strip's inertia matters little (`LIGHT`), it is
-        not damped, its slip zones are nested, and the scene is not a bar or a shell without squeeze
-        strain.  A lap joint is always its sliders
+        plane elasticity (or of the section that the scene names, on its contact line), exact in
+        time, without the strip's inertia; None to take the network, if the scene has one, where the
+        strip's inertia matters little (`LIGHT`), it is not damped, and its slip zones are nested.
+        A lap joint is always its sliders
     progress : show a progress bar of the time steps; None shows it where a person watches
 
     Returns
@@ -162,29 +163,30 @@ def let_go(
     inertia, lap = inertia or Inertia(), scene.member.support != "none"
     require("whole", whole, not (lap and whole), LAP)
     require("inertia", "damped", not (lap and inertia.damped), DAMPED)
-    scene = scene if lap else scene.by_load_steps()
+    line = None if whole else on_contact_line(scene)
+    steps = not lap and scene.model.section != "plane"
+    scene = scene.by_load_steps() if steps else scene
     end_force = float(largest_force(scene, force))
     require_number("cycles", cycles, POSITIVE)
     inertia.check(scene)
     mass = HEAVY * _strip_mass(scene, inertia) if payload is None else payload
     require_number("payload", mass)
     samples = round(cycles * SAMPLES_PER_CYCLE) + 1
-    light = None if whole else on_contact_line(scene)
-    require("whole", whole, light is not None or whole is not False, NO_NETWORK)
+    require("whole", whole, line is not None or whole is not False, NO_NETWORK)
     motion: LightMotion | Motion | None = None
     share, nested = None, False
-    if light is not None and (whole is False or not inertia.damped):
-        joint = Joint.of(light, end_force)
-        network = joint.network or Network.nearest(light, *joint.below_gross_slip)
+    if line is not None and (whole is False or not inertia.damped):
+        joint = Joint.of(line, end_force)
+        network = joint.network or Network.nearest(line, *joint.below_gross_slip)
         share = _share(network, inertia, mass)
         if lap or whole is False or share <= LIGHT:
-            motion = ring(light, network, mass, end_force, cycles, samples)
+            motion = ring(line, network, mass, end_force, cycles, samples)
             nested = bool(motion.nested)
     if motion is None or not nested:
         require("whole", whole, whole is not False and not lap, NOT_NESTED)
-        require("model.section", scene.plan.section, not scene.plan.on_contact_line, NO_INERTIA)
+        require("model.section", scene.plan.section, steps, NO_INERTIA)
         motion = _whole(scene, end_force, mass, inertia, cycles, per_cycle, samples, progress)
-        joint = Joint.of(scene, end_force)
+        joint = Joint.of(motion.scene, end_force)  # which is held down as the motion is
     try:
         found = ring_down(motion.time, motion.displacement)
     except InputError as error:
@@ -227,8 +229,9 @@ def _cycles(given: tuple[Network, Array]) -> tuple[Array, Array]:
 
 
 def on_contact_line(scene: Scene) -> Scene | None:
-    """Scene as it is condensed, or as plane elasticity; None for bars, shells and the rest."""
-    if scene.plan.on_contact_line:
+    """Scene of a named section on its contact line, or plane elasticity; None where neither is."""
+    named = scene.model.section != AUTO or scene.member.support != "none"
+    if named and scene.plan.on_contact_line:
         return scene
     if "psi" not in scene.plan.fields:
         return None

@@ -32,7 +32,7 @@ ABREAST = 32  # most lanes of a chunk on a core, where they share a condensed bo
 BLOCK = 1024  # lanes of the largest block, for which the program is compiled
 KEPT = 4  # compiled models that are kept
 PER_LANE = ("load.amplitude", "contact.pressure")
-"""Numbers in which lanes of one chunk may differ on a condensed rung: the body and its factors are
+"""Numbers in which lanes of one chunk may differ on a contact line: the body and its factors are
 the same for all of them."""
 BODY = 8.0  # lanes that take as long as a condensed body and its factors
 

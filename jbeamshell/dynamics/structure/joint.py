@@ -141,10 +141,10 @@ class Joint(Backbone):
     ) -> Joint:
         """Joint with the mean backbone of a strip's pull and push.
 
-        Scenes on the rung ``plane``, or one such as ``condensed-squeeze``, give the sliders of
-        their contact where slip zones are nested.  Lap joints and members that go on open, and are
-        no network.  Their sliders, and those of other scenes, are those whose loops are nearest to
-        the scene's own steady cycles.
+        Scenes that are solved on their contact line give the sliders of their contact where slip
+        zones are nested.  Lap joints and members that go on open, and are no network.  Their
+        sliders, and those of other scenes, are those whose loops are nearest to the scene's own
+        steady cycles.
 
         All numbers may be traced by `jax.jit` and `jax.grad`.  A traced scene cannot tell whether
         its slip zones are nested, nor whether a load step failed: the joint then holds NaN.
