@@ -13,7 +13,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.cli import main
-from jbeamshell.quasistatic import recovery, solver
+from jbeamshell.quasistatic import recovery, solving
 from tests.command import BASE, options
 
 ROOT = Path(jb.__file__).parent.parent
@@ -35,7 +35,6 @@ ROOT = Path(jb.__file__).parent.parent
         ("strip.youngs_modulus=-3", "strip.youngs_modulus = -3.0: must be a positive number"),
         ("strip.axial_stiffness=0", "strip.axial_stiffness = 0.0: must be a positive number"),
         ("contact.friction=-.1", "contact.friction = -0.1: must be a number, not negative"),
-        ("contact.normal=none", "contact.normal = 'none': needs w in model.fields"),
         ("contact.pressure=[[0,1],[1,-1]]", "must be finite and nowhere negative (no tension)"),
         ("contact.pressure=[[0,1],[1,nan]]", "must be finite and nowhere negative (no tension)"),
         ("contact.pressure=[[1,1],[0,1]]", "its X must not decrease from row to row"),
@@ -45,7 +44,10 @@ ROOT = Path(jb.__file__).parent.parent
         ("strip.layers=[[1, 2, .3]]", "add up to 1, but the height 2H is 0.2252; make them equal"),
         ("strip.layers=[[1, 2, 0.3]]", "add up to 1, but the height 2H is 0.2252; make them equal"),
         ("strip.layers=[[0.2252, 2, 0.5]]", "nu = 0.5 is incompressible: C11 is infinite; give"),
-        ("model.squeeze=assumed", "model.squeeze = 'assumed': needs w and psi in model.fields"),
+        ("model.squeeze=assumed", "model.squeeze: is no key any more; say model.section = assu"),
+        ("model.rung=plane", "model.rung: is no key any more; say model.section: bar, shell, s"),
+        ("model.section=p13", "model.section = 'p13': choose 'bar' or 'shell' or 'squeeze' or"),
+        ("model.section=v,beta", "model.section = ['v', 'beta']: must be a word"),
         ("contact.smoothing=blunt", "contact.smoothing = 'blunt': must be a number above 1, or"),
         ("strip.poisson_ratio=0.5", "strip.poisson_ratio = 0.5: must lie between -1 and 0.5"),
         ("strip.poisson_ratio=-1", "strip.poisson_ratio = -1.0: must lie between -1 and 0.5"),
@@ -53,8 +55,6 @@ ROOT = Path(jb.__file__).parent.parent
         ("load.cycles=1.5", "load.cycles = 1.5: must be a whole number, 0 to"),
         ("load.cycles=-1", "load.cycles = -1: must be a whole number, 0 to"),
         ("load.control=displacement", "load.amplitude = None: give the amplitude"),
-        ("model.fields=v,psi", "model.fields = ['v', 'psi']: make no model; choose ['v'] or"),
-        ("model.fields=psi", "model.fields = ['psi']: make no model; choose ['v'] or"),
         ("model.nodes=2", "model.nodes = 2: must be a whole number, 3 to"),
         ("strip.length", "'strip.length': write KEY=VALUE, such as contact.friction=0.2"),
         ("contact.law=a,b", "contact.law = ['a', 'b']: choose 'elastic-slip' or"),
@@ -69,7 +69,6 @@ def test_bad_settings_are_refused(refused, setting, told):
     assert told in refused("run", "--set", setting)
 
 
-LIFTING = {"model.fields": "v,w,beta,psi"}
 LAYERS = {"strip.layers": [[0.1, 1e4, 0.3], [0.1252, 1e5, 0.2]]}
 TIPPING = {"contact.bottom_pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 19.0], [2.0, 19.0]]}
 
@@ -78,19 +77,31 @@ TIPPING = {"contact.bottom_pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 19.0], [2.0
     ("settings", "told"),
     [
         (
-            LIFTING | {"contact.normal": "compliant", "contact.normal_stiffness": 0},
+            {"model.section": "bar", "contact.normal": "none"},
+            "contact.normal = 'none': needs a section that may lift off: take another model.sect",
+        ),
+        (
+            {"contact.normal": "held", "strip.curvature": 0.1},
+            "strip.curvature = 0.1: needs a strip that may lift off: take contact.normal = rigid",
+        ),
+        (
+            {"contact.normal": "held", "model.section": "plane"},
+            "contact.normal = 'held': must be rigid for plane elasticity, which may lift off",
+        ),
+        (
+            {"contact.normal": "compliant", "contact.normal_stiffness": 0},
             "contact.normal_stiffness = 0.0: must be a positive number",
         ),
         (
-            LIFTING | {"contact.bottom_pressure": 10},
+            {"contact.bottom_pressure": 10},
             "contact.bottom_pressure = 10.0: nothing holds the strip down (rigid-body motion)",
         ),
         (
-            LIFTING | TIPPING | {"strip.far_end": "pinned"},
+            TIPPING | {"strip.far_end": "pinned"},
             ": the strip tips over (rigid-body motio",
         ),
         (
-            LIFTING | {"contact.normal": "none", "strip.far_end": "free"},
+            {"contact.normal": "none", "strip.far_end": "free"},
             "strip.far_end = 'free': is all that holds a strip without a foundation: take 'guided'",
         ),
         (
@@ -105,7 +116,7 @@ TIPPING = {"contact.bottom_pressure": [[0.0, 0.0], [1.0, 0.0], [1.0, 19.0], [2.0
                 ("strip.poisson_ratio", 0.3),
             ]
         ],
-        (LIFTING | LAYERS | {"model.section": "assumed"}, "'assumed': is for a homogeneous strip"),
+        (LAYERS | {"model.section": "assumed"}, "'assumed': is for a homogeneous strip"),
     ],
 )
 def test_settings_that_do_not_go_together_are_refused(refused, settings, told):
@@ -189,7 +200,7 @@ def test_options_that_messages_name_exist():
 
 def test_a_step_without_equilibrium(refused, monkeypatch):
     # One Newton iteration per step: enough for the pressure and for sticking, not for slip.
-    monkeypatch.setattr(solver, "Newton", functools.partial(jb.Newton, max_iterations=1))
+    monkeypatch.setattr(solving, "Newton", functools.partial(jb.Newton, max_iterations=1))
     monkeypatch.setattr(recovery, "PIECES", ())
     line = refused("run", *BASE, "--set", "contact.smoothing=16", "--json", code=3)
     pattern = r"load step \d+ of 20 \(load \S+\) found no equilibrium \(max iterations, .*\): take"
@@ -201,7 +212,7 @@ def test_an_interruption(refused, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(solver, "check", interrupted)
+    monkeypatch.setattr(solving, "check", interrupted)
     assert refused("run", code=130) == "interrupted; no file is left half-written"
 
 

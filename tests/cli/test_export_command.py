@@ -8,7 +8,7 @@ from jbeamshell.cli.terminal import doubts_in_lines
 from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.dynamics import Joint
 
-PLANE = ["--set", "model.rung=plane", "--set", "model.nodes=33"]
+PLANE = ["--set", "model.section=plane", "--set", "model.nodes=33"]
 
 
 def test_it_writes_a_joint(cli, tmp_path):

@@ -305,7 +305,7 @@ def test_bad_fits_are_refused(refused, words, told):
 
 @pytest.mark.slow
 def test_free_keys_that_the_loops_do_not_depend_on(refused, planted):
-    bar = options({"model.fields": "v", "model.nodes": 5, "model.kinematics": "linear"})
+    bar = options({"model.section": "bar", "model.nodes": 5, "model.kinematics": "linear"})
     line = refused("fit", planted, *bar, "--free", "strip.kappa_s")
     assert line == "free 'strip.kappa_s': the data do not depend on it at its start; leave it out"
 

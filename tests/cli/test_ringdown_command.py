@@ -9,7 +9,7 @@ from jbeamshell.cli import main
 
 COARSE = ["--set", "model.nodes=11", "--set", "model.kinematics=linear", "--cycles", "8"]
 WHOLE = [*COARSE, "--strip", "whole"]
-PLANE = ["--set", "model.rung=plane", "--set", "model.nodes=33", "--cycles", "8"]
+PLANE = ["--set", "model.section=plane", "--set", "model.nodes=33", "--cycles", "8"]
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_it_reports_and_writes_what_it_says(capsys, tmp_path, words):
         (["--force", "5"], "gross slip"),
         (["--payload", "0"], "payload = 0.0"),
         (["--cycles", "0"], "cycles = 0.0"),
-        (["--strip", "whole", "--set", "model.fields=v,w,beta,psi"], "compliant"),
+        (["--strip", "whole", "--set", "model.section=plane"], "model.section = 'plane'"),
         (["--strip", "sliders", "--set", "contact.smoothing=8"], "no network"),
     ],
 )
