@@ -8,23 +8,23 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.scene import library
+from jbeamshell.scene.plan import STEPS
 
 SHORT = {"load.amplitude": 0.4}  # a bar slips over 3.6 H
 
 
 @pytest.mark.parametrize(
-    ("values", "rung", "to", "reason"),
+    ("values", "section", "to", "reason"),
     [
-        ({}, "condensed-squeeze", "plane elasticity", "at most 0.77 % off"),
+        ({}, "squeeze", "plane elasticity", "at most 0.77 % off"),
         (SHORT, "plane", "plane elasticity", "may be off by 6.8 %"),
         ({"load.amplitude": 0.03}, "plane", "plane elasticity", "off by a factor of"),
         ({"strip.far_end": "free"}, "plane", "plane elasticity", "no curve says"),
-        ({"model.section": "squeeze"}, "condensed-squeeze", "its own fine mesh", "section is named"),
-        ({"model.solution": "stepwise"}, "squeeze", "its own fine mesh", "solution is named"),
+        ({"model.section": "squeeze"}, "squeeze", "its own fine mesh", "section is named"),
         ({"strip.curvature": 1e-3}, "squeeze", "its own fine mesh", "it is curved"),
         ({"contact.normal": "compliant"}, "squeeze", "its own fine mesh", "base is not rigid"),
         ({"contact.smoothing": 8.0}, "squeeze", "its own fine mesh", "friction is smooth"),
-        ({"strip.kappa_s": 0.5}, "condensed-squeeze", "its own fine mesh", "strip.kappa_s"),
+        ({"strip.kappa_s": 0.5}, "squeeze", "its own fine mesh", "strip.kappa_s"),
         ({"model.grid": "collocation"}, "squeeze", "its own fine mesh", "its grid"),
         (
             {"load.control": "arc-length", "load.amplitude": 1e-5},
@@ -35,15 +35,20 @@ SHORT = {"load.amplitude": 0.4}  # a bar slips over 3.6 H
     ],
     ids=str,
 )
-def test_what_is_taken_and_why(values, rung, to, reason):
+def test_what_is_taken_and_why(values, section, to, reason):
     scene = jb.Scene().replace(values)
     advice = jb.advise(scene)
     assert advice.scene.model == scene.model
-    assert (advice.settings["model.section"], advice.to) == (rung, to)
+    assert (advice.settings["model.section"], advice.to) == (section, to)
     assert reason in advice.reason
-    assert str(advice).startswith(f"{rung} on {scene.plan.nodes} nodes with ")
-    assert f"for 1 % of {to}: " in str(advice)
+    assert str(advice).startswith(f"{scene.plan}, for 1 % of {to}: ")
     json.dumps(advice.figures())
+
+
+def test_a_scene_by_load_steps_keeps_to_its_own_mesh():
+    advice = jb.advise(jb.Scene().by_load_steps())
+    assert (advice.scene.plan.engine, advice.to) == (STEPS, "its own fine mesh")
+    assert "to be solved in load steps" in advice.reason
 
 
 def test_an_energy_of_ones_own_keeps_to_its_own_mesh():
@@ -54,22 +59,25 @@ def test_an_energy_of_ones_own_keeps_to_its_own_mesh():
 def test_a_tolerance_is_the_scenes_number():
     scene = jb.Scene().replace(SHORT)
     loose = jb.advise(scene, 0.1)
-    assert loose.settings["model.section"] == "condensed-squeeze"
+    assert loose.settings["model.section"] == "squeeze"
     assert 0.01 < loose.section_error < 0.08
     assert jb.advise(scene).section_error == 0.0
     given = scene.replace({"model.tolerance": 0.1})
     assert loose.scene.model == given.model
     history = jb.solve(scene, tolerance=0.1, throw=False)
-    assert history.scene.model.given("tolerance") == 0.1
+    assert history.scene.model.tolerance == 0.1
     fine = jb.solve(given, throw=False)
     np.testing.assert_array_equal(history.displacement, fine.displacement)
 
 
 def test_a_lap_joint_is_plane_elasticity():
     named = library.double_shear()
-    for joint, reason in ((named, "is named"), (named.replace({"model.section": "auto"}), "no curve")):
+    for joint, reason in (
+        (named, "is named"),
+        (named.replace({"model.section": "auto"}), "no curve"),
+    ):
         advice = jb.advise(joint)
-        assert (advice.scene.model.solution, advice.to) == ("plane", "plane elasticity")
+        assert (advice.scene.plan.section, advice.to) == ("plane", "plane elasticity")
         assert reason in advice.reason
 
 

@@ -53,5 +53,3 @@ def test_what_it_cannot_do_is_refused():
         jb.InputError, match=r"load\.amplitude = None: give the amplitude under arc"
     ):
         jb.Load("arc-length")
-    with pytest.raises(jb.InputError, match="'closed-form': knows no arc length"):
-        scene(FREE | {"model.section": "bar"})

@@ -26,7 +26,7 @@ TABLE = jnp.array([[0.0, 10.0], [1.0, 9.0], [2.0, 10.0]])
 SCENE = jb.Scene(
     contact=jb.Contact(pressure=TABLE, stick_stiffness=900.0, law=ElasticSlip(16.0)),
     load=jb.Load(steps_per_half_cycle=20, cycles=1),
-    model=jb.Model(nodes=41, kinematics="linear", solution="stepwise"),
+    model=jb.Model(nodes=41, kinematics="linear", by="steps"),
 )
 
 
@@ -77,10 +77,15 @@ def test_gradient_reaches_every_number_of_a_scene():
     assert {path[-1].name for path, _ in names} - moved == {"normal_stiffness"}
 
 
-@pytest.mark.parametrize("rung", ["bar", pytest.param("squeeze", marks=pytest.mark.slow)])
-def test_a_traced_force_beyond_gross_slip_has_no_result(rung):
+BAR = jb.Scene().replace({"model.section": "bar"})
+
+
+@pytest.mark.parametrize(
+    "scene", [BAR, pytest.param(STRIP, marks=pytest.mark.slow)], ids=["closed form", "load steps"]
+)
+def test_a_traced_force_beyond_gross_slip_has_no_result(scene):
     few = {"model.nodes": 9, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
-    ask = jb.response(STRIP.replace({"model.section": rung} | few), ["contact.friction"])
+    ask = jb.response(scene.replace(few), ["contact.friction"])
     both = jax.jit(jax.vmap(ask))(jnp.array([0.04, 0.039]))  # mu F_N L = 0.8 and 0.78
     assert both["status"].tolist() == [0, 3]
     assert np.isnan(both["dissipation"]).tolist() == [False, True]
@@ -89,7 +94,7 @@ def test_a_traced_force_beyond_gross_slip_has_no_result(rung):
 def test_a_lane_that_fails_has_no_derivative():
     few = {"model.nodes": 9, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
     keys = ["contact.friction", "load.amplitude", "strip.axial_stiffness"]
-    ask = jb.response(STRIP.replace({"model.section": "bar"} | few), keys)
+    ask = jb.response(BAR.replace(few), keys)
 
     def dissipation(*values):
         return ask(*values)["dissipation"]

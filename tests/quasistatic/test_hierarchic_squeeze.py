@@ -22,8 +22,12 @@ TENSION = {3: (1.713, 1.285), 4: (1.410, 1.270)}
 RMS = {0: 0.74, 1: 2.65, 3: 0.76, 4: 0.34}  # of the mean sigma_y to finite elements
 
 
-def rung(scene, order):
-    change = {"model.order": order, "model.nodes": 101, "model.kinematics": "linear"}
+def solved(scene, order):
+    change = {
+        "model.section": f"p{order}" if order else "squeeze",
+        "model.nodes": 101,
+        "model.kinematics": "linear",
+    }
     return jb.solve(scene.replace(change))
 
 
@@ -33,7 +37,7 @@ def slow(order):
 
 @pytest.fixture(scope="module", params=[slow(0), slow(1), 3, slow(4)])
 def squeezed(request):
-    return rung(library.squeezed(), request.param)
+    return solved(library.squeezed(), request.param)
 
 
 def test_the_squeeze_is_the_pressure_under_the_load_and_nothing_far_from_it(squeezed):
@@ -72,7 +76,7 @@ def test_the_squeeze_against_finite_elements(squeezed):
 
 @pytest.fixture(scope="module", params=[slow(2), slow(3)])
 def receding(request):
-    return rung(library.receding(), request.param)
+    return solved(library.receding(), request.param)
 
 
 def test_contact_conditions_hold_and_the_reactions_carry_the_load(receding):
