@@ -69,7 +69,7 @@ def loaded_end(scene: Scene, form: SectionForm, mounted: bool) -> Held:
     mounted : see `states`
     """
     strip, entry = scene.strip, scene.load.entry
-    level = strip.loaded_end == "level"
+    level = scene.member.loaded_end == "level"
     along: Condition = entry if entry in ("face", "guided") else "free"  # type: ignore[assignment]
     if not mounted:
         return Held(end_section(form), FREE)
@@ -115,7 +115,7 @@ def leaving_end(
     if member.overhang is not None:
         lengths = _lengths(member.overhang, half_height, GIVEN)
     elif goes_on(scene):
-        reach, bends = REACH * half_height, clamped and scene.strip.loaded_end == "free"
+        reach, bends = REACH * half_height, clamped and scene.member.loaded_end == "free"
         lengths = _lengths(reach, half_height, _count(scene))
         stretch = reach * compliance(form, pull, bends, on_plane=not clamped and not flat)
     else:

@@ -110,8 +110,7 @@ def may_be_interpolated(scene: Scene) -> bool:
     homogeneous = strip.layers is None and scene.energy is None and strip.curvature is None
     homogeneous = homogeneous and strip.poisson_ratio is not None
     alone = scene.member.support == "none" and strip.overhang is None
-    pressed = is_pressed_evenly(scene) and contact.normal == "rigid" and contact.gap is None
-    pressed = pressed and contact.holes is None and contact.assembly != "frictional"
+    pressed = is_pressed_evenly(scene) and contact.normal == "rigid"
     pulled = load.kind == "force" and load.arm is None
     return scene.plan.elastic and homogeneous and alone and pressed and pulled
 

@@ -50,6 +50,6 @@ def alike(scene: Scene) -> Scene:
     none, contact = np.zeros_like(scene.load.amplitude), scene.contact
     load = scene.load.but(amplitude=none, cycles=1, steps_per_half_cycle=AUTO)
     model = scene.model.but(tolerance=1.0, section=AUTO, kinematics=AUTO, nodes=AUTO, end_size=AUTO)
-    if contact.assembly != "frictional":
+    if scene.member.assembly != "frictional":
         contact = contact.but(friction=none)
     return scene.but(load=load, contact=contact, model=model, plan=scene.plan._replace(steps=1))

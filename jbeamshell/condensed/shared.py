@@ -112,7 +112,7 @@ def shared(
         return None
     vary, strip = set(over), scene.strip
     if vary <= LOADS:
-        rough = scene.contact.assembly == "frictional" and "contact.friction" in vary
+        rough = scene.member.assembly == "frictional" and "contact.friction" in vary
         return None if rough else _of_one(*_numbers(scene))
     nu, known = strip.poisson_ratio, ranges is not None or POISSON not in vary
     if nu is None or not known or not may_be_interpolated(scene):

@@ -81,7 +81,7 @@ def walks_pressures(scene: Scene) -> bool:
 
     Elastic sliders and what holds two members apart would have to move with them.
     """
-    joint = scene.contact.gap is None and scene.contact.holes is None
+    joint = scene.member.gap is None and scene.member.holes is None
     return joint and scene.contact.stick_stiffness is None
 
 
@@ -160,13 +160,13 @@ def _walk(
 
 def _levels(scene: Scene, strip: Strip, targets: Array, parts: Array | None, turns: Turns) -> Level:
     """Levels after the pressing; the last contact nodes are bearings, if the scene has any."""
-    body, contact, friction = strip.body, scene.contact, scene.contact.friction
-    lift, bearing = strip.lift, contact.bearing_stiffness
+    body, friction, member = strip.body, scene.contact.friction, scene.member
+    lift, bearing = strip.lift, member.bearing_stiffness
     if bearing is not None:
         share = (strip.load / jnp.sum(strip.load))[::-1]
         body = with_bearings(body, bearing, share)
-        lift = with_gaps(lift, 0.0 if contact.clearance is None else contact.clearance)
-    soft = contact.stick_stiffness is not None
+        lift = with_gaps(lift, 0.0 if member.clearance is None else member.clearance)
+    soft = scene.contact.stick_stiffness is not None
     if soft:
         body, springs = with_springs(body, spring_stiffness(scene, strip))
     press = Press.of(strip.loaded.hessian, body.f_t.size, body.f_n.size - strip.x.size)
@@ -284,7 +284,7 @@ def _energy(
     resting, added = at_rest @ strip.pressed.hessian, change @ strip.loaded.hessian
     energy = 0.5 * part**2 * (resting @ at_rest) + change @ resting.at[-2].set(0.0)
     energy = energy + 0.5 * jnp.sum(added * change, axis=1) - added[:, -2] * change[:, -2]
-    bearing = scene.contact.bearing_stiffness
+    bearing = scene.member.bearing_stiffness
     if scene.contact.stick_stiffness is not None:
         springs = spring_energy(spring_stiffness(scene, strip), state.r_t)
         energy = energy.at[before:].add(springs)

@@ -101,7 +101,7 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     press_t, traction = press[v][:some], jnp.zeros_like(press[v])
     stiffness = k_tt[:some, :some], k_tn[:some], hessian[w, w]
     away = None if gap is None else gap[::-1]
-    if scene.contact.assembly == "frictional":
+    if scene.member.assembly == "frictional":
         loads = press[v], press[w], scene.contact.friction
         lift, settled, reaction, traction = press_roughly(k_tt, k_tn, hessian[w, w], *loads, away)
     elif stays_flat(scene):
@@ -114,8 +114,8 @@ def condensed(scene: Scene, nodes: int) -> Strip:
         under_pressure, under_load = (over_gap(each, gap) for each in (under_pressure, under_load))
     settled = jnp.pad(settled, (0, k_tt.shape[0] - settled.size))
     hessian = under_load.hessian
-    if scene.contact.bolt_stiffness is not None:
-        hessian = with_shanks(hessian, scene.contact.bolt_stiffness, down)
+    if scene.member.bolt_stiffness is not None:
+        hessian = with_shanks(hessian, scene.member.bolt_stiffness, down)
     body = Body(
         x=x[::-1],
         tributary=tributary[::-1],
@@ -212,13 +212,13 @@ def initial_gap(scene: Scene, x: Array) -> Array | None:
 
     A hole is a gap that nothing closes.
     """
-    given, holes = scene.contact.gap, scene.contact.holes
+    given, holes = scene.member.gap, scene.member.holes
     if given is None and holes is None:
         return None
     gap = jnp.zeros_like(x) if given is None else _on_stations(given, x)
     if holes is None:
         return gap
-    begin, end = scene.contact.hole_edges.T
+    begin, end = scene.member.hole_edges.T
     inside = jnp.any((x[:, None] > begin) & (x[:, None] < end), axis=1)
     return gap + jnp.where(inside, HOLE_DEPTH * scene.strip.half_height, 0.0)
 
@@ -277,9 +277,12 @@ def stations(scene: Scene, nodes: int) -> Array:
 
 
 def _joint_stations(scene: Scene, nodes: int) -> Array:
-    """Stations of a lap joint, which are denser at both its ends and at steps of the pressure."""
+    """Stations of a lap joint, denser at its ends, at steps of the pressure and edges of holes."""
     length, half_height = scene.strip.length, scene.strip.half_height
     steps, plan = scene.contact.steps(length), scene.plan
+    if scene.member.holes is not None:
+        edges = scene.member.hole_edges.ravel()
+        steps = jnp.sort(edges if steps is None else jnp.append(steps, edges))
     if not plan.elastic:
         start = jnp.zeros_like(length)[None]
         foci = start if steps is None else jnp.append(start, steps)

@@ -85,7 +85,7 @@ def _pressure(scene: Scene) -> Iterator[Control]:
             label = f"{name}: force [force/width]"
             yield _around(BOLT.format(number, "force"), label, force)
             low, high = 0.5 * width, length - 0.5 * width
-            if contact.holes is None and high > low:  # holes stay where they are
+            if scene.member.holes is None and high > low:  # holes stay where they are
                 label = f"{name}: place X [length]"
                 step = _nice((high - low) / STEPS)
                 yield Control(BOLT.format(number, "place"), label, place, low, high, step)
@@ -109,7 +109,7 @@ def bolts_of(scene: Scene) -> np.ndarray | None:
 
 def gross_slip(scene: Scene) -> float:
     """Force mu F_N L at which all of the contact slides; infinite where something else holds."""
-    if scene.contact.bolt_stiffness is not None or scene.load.kind == "moment":
+    if scene.member.bolt_stiffness is not None or scene.load.kind == "moment":
         return math.inf
     top, bottom = scene.number("contact.pressure"), scene.number("contact.bottom_pressure")
     length = scene.number("strip.length")

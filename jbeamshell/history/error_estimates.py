@@ -212,7 +212,7 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     plane = scene.plan.elastic
     if change is not None:
         grid = numbers.maximum(change, REFINED * grid)
-    elif scene.contact.jumps > 1:
+    elif scene.contact.jumps + scene.member.jumps > 1:
         grid = STEPS * grid
     elif plane:
         grid = SAFETY * grid

@@ -96,7 +96,7 @@ def _draw_supports(axes: Axes, history: LoadPath, bottom: float) -> None:
         face = (bottom, 0.0) if support != "none" else (0.0, top)
         first = 0.0 if scene.member.overhang is None else -float(scene.member.overhang)
         axes.plot([first, first], face, color=DATA, linewidth=3.5, solid_capstyle="butt")
-    if scene.strip.loaded_end == "level":
+    if scene.member.loaded_end == "level":
         end = float(history.x[-1])
         end += 0.0 if scene.strip.overhang is None else float(scene.strip.overhang)
         axes.plot([end, end], [0.0, top], color=DATA, linewidth=2.5, linestyle=(0, (1, 1)))

@@ -151,7 +151,7 @@ def _overhangs(
         strain = float(history.force[step]) / float(scene.strip.stretching_stiffness)
         s = np.linspace(0.0, 1.0, BEAM)
         _, w, beta, _ = (float(value) for value in fields[step, -1, :4])
-        bend = 0.0 if scene.strip.loaded_end == "free" else -(w + beta * size)
+        bend = 0.0 if scene.member.loaded_end == "free" else -(w + beta * size)
         lift = beta * size * s + bend * (1.5 * s**2 - 0.5 * s**3)  # no moment at the end
         turned = beta + bend * (3.0 * s - 1.5 * s**2) / size - beta
         part = _part(fields[step, -1], up, x[-1] + size * s, strain * size * s, lift, turned)

@@ -118,7 +118,7 @@ def _columns_of_joint(scene: Parts, numbers: Numbers) -> list[Column]:
     none = np.zeros(())
     far = none if member.overhang is None else numbers("member.overhang")
     beyond = none if strip.overhang is None else numbers("strip.overhang")
-    factor = OVERHANG if strip.loaded_end == "free" else HINGED
+    factor = OVERHANG if member.loaded_end == "free" else HINGED
     upper, lower = (_stiffnesses(scene, numbers, second) for second in (False, True))
     along = stretching(strip, numbers)
     Span = tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]

@@ -108,7 +108,7 @@ def gross_slip_rule(
     key, friction, size = "load.amplitude", numbers("contact.friction"), np.abs(np.asarray(targets))
     if load.control != "force" or load.kind == "moment":
         return Rule(key, size, True, "")
-    if np.all(numbers("contact.bolt_stiffness") > 0.0):
+    if np.all(numbers("member.bolt_stiffness") > 0.0):
         return Rule(key, size, True, "")  # bolts hold a joint beyond
     top, bottom = numbers("contact.pressure"), numbers("contact.bottom_pressure")
     force, _ = resultant(top, bottom, numbers("strip.length"), member.support)

@@ -13,7 +13,7 @@ from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
 from jbeamshell.scene.plan import Plan
-from jbeamshell.scene.pressure import pressure_values
+from jbeamshell.scene.pressure import check_holes, pressure_values
 from jbeamshell.scene.rows import rows
 
 
@@ -57,14 +57,16 @@ def check_joint(scene: Parts) -> None:
         "load.control", control, control in CONTROLS, "must be force or displacement in a lap joint"
     )
     _check_section(strip, member)
-    fix = "needs contact.bearing_stiffness"
-    bears = contact.clearance is None or contact.bearing_stiffness is not None
-    require("contact.clearance", contact.clearance, bears, fix)
-    if contact.holes is not None and not is_traced(strip.length):
-        edges, length = np.asarray(contact.hole_edges), float(strip.length)
+    fix = "needs member.bearing_stiffness"
+    bears = member.clearance is None or member.bearing_stiffness is not None
+    require("member.clearance", member.clearance, bears, fix)
+    if member.holes is not None:
+        check_holes(member.holes, contact.bolts)
+    if member.holes is not None and not is_traced(strip.length):
+        edges, length = np.asarray(member.hole_edges), float(strip.length)
         fix = f"lies off the overlap, X from 0 to {length:g}: move it or narrow it"
         inside = bool(np.all(edges >= 0.0) and np.all(edges <= length))
-        require("contact.holes", contact.holes, inside, fix)
+        require("member.holes", member.holes, inside, fix)
     load = scene.load
     fix = "is for a force: leave it out with load.kind = moment"
     require("load.arm", load.arm, load.arm is None or load.kind == "force", fix)
@@ -80,9 +82,9 @@ def check_joint(scene: Parts) -> None:
     none = is_traced(below) or not np.any(pressure_values(np.asarray(below)))
     fix = "must be 0 on a symmetry plane: take member.support = clamped"
     require("contact.bottom_pressure", below, none, fix)
-    squeezed = plan.section != "shell" or strip.loaded_end == "free"
+    squeezed = plan.section != "shell" or member.loaded_end == "free"
     fix = "leaves no lift to a shell on a symmetry plane: take model.section = squeeze or plane"
-    require("strip.loaded_end", strip.loaded_end, squeezed, fix)
+    require("member.loaded_end", member.loaded_end, squeezed, fix)
 
 
 def _check_section(strip: Strip, member: Member) -> None:
@@ -98,29 +100,17 @@ def _check_section(strip: Strip, member: Member) -> None:
 
 def _check_alone(scene: Parts) -> None:
     """Refuse what only a lap joint knows."""
-    for name in rows(Member):
+    fix = "needs a second member: leave it out, or give member.support, rolling or clamped"
+    for name, key in rows(Member).items():
         value = getattr(scene.member, name)
-        fix = "needs a second member: give member.support, rolling or clamped"
-        require(f"member.{name}", value, name == "support" or value is None, fix)
-    fix = "needs a second member: take 'free', or give member.support"
-    end = scene.strip.loaded_end
-    require("strip.loaded_end", end, end == "free", fix)
+        left_out = value is None if key.kind == "number" else value == key.default
+        require(f"member.{name}", value, left_out, fix)
     fix = "needs the contact line of a linear strip: leave it out, or take model.kinematics = "
     fix += "linear and the sharp slider on a rigid base"
     linear = scene.strip.overhang is None or scene.plan.on_contact_line
     require("strip.overhang", scene.strip.overhang, linear, fix)
-    fix = "needs a second member: leave it out, or give member.support (a curved strip on a rigid "
-    fix += "base has strip.curvature)"
-    require("contact.gap", scene.contact.gap, scene.contact.gap is None, fix)
     load = scene.load
     fix = "needs a second member: take 'force', or give member.support"
     require("load.kind", load.kind, load.kind == "force", fix)
     fix = "needs a second member: leave it out, or give member.support"
     require("load.arm", load.arm, load.arm is None, fix)
-    fix = "needs a second member: leave it out, or give member.support"
-    for name in ("bolt_stiffness", "bearing_stiffness", "clearance", "holes"):
-        value = getattr(scene.contact, name)
-        require(f"contact.{name}", value, value is None, fix)
-    fix = "needs a second member: take 'frictionless', or give member.support"
-    assembly = scene.contact.assembly
-    require("contact.assembly", assembly, assembly == "frictionless", fix)

@@ -77,11 +77,6 @@ class StripKeys(Part):
         FAR_ENDS,
         "Support at X = 0: guided (a rigid face at rest), pinned (its lower edge at rest) or free.",
     )
-    loaded_end: str = word(
-        "free",
-        LOADED_ENDS,
-        "Support at X = L beside the load: free, or level (no deflection; lap joints only).",
-    )
     overhang: Array | None = number(
         None,
         "Length beyond X = L, at whose end the load acts and u is taken; none is none.",
@@ -143,51 +138,6 @@ class ContactKeys(Part):
         "Normal contact: rigid, held (rigid, and the strip may not lift off), compliant, or none "
         "(no foundation).",
     )
-    assembly: str = word(
-        "frictionless",
-        ASSEMBLIES,
-        "Pressing: frictionless (locks no shear in), or frictional, as bolts are tightened (lap "
-        "joints only).",
-    )
-    gap: Array | None = number(
-        None,
-        "Distance to the second member before anything presses, of curved members: a number, or "
-        "rows [X, gap] (lap joints only); none is none.",
-        symbol="g_0",
-        unit="length",
-        closed=True,
-        table=True,
-        fix=GAP,
-    )
-    bolt_stiffness: Array | None = number(
-        None,
-        "Stiffness of the bolts' shanks against slip, which stays beyond gross slip; spread as the "
-        "pressure (lap joints only); none is none.",
-        symbol="k_b",
-        unit="stress",
-    )
-    bearing_stiffness: Array | None = number(
-        None,
-        "Stiffness of the bolts' shanks on their holes, once the bolts' mean slip exceeds the "
-        "clearance (lap joints only); none is none.",
-        symbol="k_c",
-        unit="stress",
-    )
-    clearance: Array | None = number(
-        None,
-        "Slip after the pressing beyond which the shanks bear on their holes; none is zero.",
-        symbol="c",
-        unit="length",
-        closed=True,
-    )
-    holes: Array | None = number(
-        None,
-        "Rows [X, diameter] of holes, in which the members do not touch (lap joints only); none is "
-        "none.",
-        unit="length",
-        table=True,
-        fix=HOLES,
-    )
     normal_stiffness: Array = number(
         50.0, "Stiffness of the compliant foundation, in units of E'/H.", symbol="k_n", unit="E'/H"
     )
@@ -207,7 +157,7 @@ class LoadKeys(Part):
     kind: str = word(
         "force",
         LOAD_KINDS,
-        "What acts on the end: a force F along X, or a moment M (lap joints only).  A moment opens "
+        "What acts on the end: a force F along X, or a moment M.  A moment opens "
         "the joint if positive; u is then the rotation of the end, and F is M.",
     )
     entry: str = word(
@@ -270,7 +220,7 @@ class ModelKeys(Part):
 
 
 class MemberKeys(Part):
-    """Second member of a lap joint, under the strip, section ``[member]``."""
+    """Second member of a lap joint, under the strip, and how the two are joined; ``[member]``."""
 
     heading: ClassVar[str] = "member"
 
@@ -310,6 +260,54 @@ class MemberKeys(Part):
         unit="mixed",
         table=True,
         fix=LAYERS,
+    )
+    loaded_end: str = word(
+        "free",
+        LOADED_ENDS,
+        "Support of the strip at X = L beside the load: free, or level (no deflection).",
+    )
+    assembly: str = word(
+        "frictionless",
+        ASSEMBLIES,
+        "Pressing: frictionless (locks no shear in), or frictional, as bolts are tightened.",
+    )
+    gap: Array | None = number(
+        None,
+        "Distance to the second member before anything presses, of curved members: a number, or "
+        "rows [X, gap]; none is none.",
+        symbol="g_0",
+        unit="length",
+        closed=True,
+        table=True,
+        fix=GAP,
+    )
+    bolt_stiffness: Array | None = number(
+        None,
+        "Stiffness of the bolts' shanks against slip, which stays beyond gross slip; spread as the "
+        "pressure; none is none.",
+        symbol="k_b",
+        unit="stress",
+    )
+    bearing_stiffness: Array | None = number(
+        None,
+        "Stiffness of the bolts' shanks on their holes, once the bolts' mean slip exceeds the "
+        "clearance; none is none.",
+        symbol="k_c",
+        unit="stress",
+    )
+    clearance: Array | None = number(
+        None,
+        "Slip after the pressing beyond which the shanks bear on their holes; none is zero.",
+        symbol="c",
+        unit="length",
+        closed=True,
+    )
+    holes: Array | None = number(
+        None,
+        "Rows [X, diameter] of holes, in which the members do not touch; none is none.",
+        unit="length",
+        table=True,
+        fix=HOLES,
     )
 
 
@@ -370,6 +368,7 @@ NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
 _SECTION = "say model.section: bar, shell, squeeze, p1 to p12 or plane"
 FORMER = {
     "strip.deviation": "a laminate's shear is split at mid-height: leave it out",
+    "strip.loaded_end": "say member.loaded_end",
     "model.fields": f"{_SECTION}; a strip lifts off unless contact.normal = held",
     "model.rung": _SECTION,
     "model.order": _SECTION,
@@ -377,6 +376,8 @@ FORMER = {
     "model.squeeze": "say model.section = assumed",
     "model.end_size": "elements follow from model.nodes: leave it out",
 }
+_OF_JOINT = ("assembly", "gap", "bolt_stiffness", "bearing_stiffness", "clearance", "holes")
+FORMER |= {f"contact.{name}": f"say member.{name}" for name in _OF_JOINT}
 
 
 def key_table(section: str = "") -> str:

@@ -93,9 +93,10 @@ def _own_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
 
 def _below_gross_slip(scene: Scene, targets: Array, pressures: Array | np.ndarray) -> Array:
     """Forces of a traced path, NaN from gross slip on, where no step finds an equilibrium."""
-    contact, support = scene.contact, scene.member.support
-    force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length, support)
-    if contact.bolt_stiffness is not None or scene.load.kind == "moment":  # nothing slides off
+    contact, member = scene.contact, scene.member
+    given = contact.pressure, contact.bottom_pressure, scene.strip.length
+    force, _ = resultant(*given, member.support)
+    if member.bolt_stiffness is not None or scene.load.kind == "moment":  # nothing slides off
         return targets
     below = stays_below(jnp.abs(targets), contact.friction * force, pressures)
     return nan_unless(below, targets)

@@ -33,7 +33,7 @@ from jbeamshell.scene.keys import (
     key_table,
 )
 from jbeamshell.scene.layers import check_layers
-from jbeamshell.scene.pressure import check_gap, check_holes, check_pressure, pressure_values
+from jbeamshell.scene.pressure import check_gap, check_pressure, pressure_values
 from jbeamshell.scene.rows import AUTO
 
 
@@ -106,12 +106,24 @@ class Member(MemberKeys):
     """
 
     def __check_init__(self) -> None:
-        if self.layers is None:
-            return
+        if self.gap is not None and not isinstance(self.gap, jax.core.Tracer):
+            check_gap(np.asarray(self.gap))
         for name in ("axial_stiffness", "poisson_ratio"):
             value = getattr(self, name)
             fix = "member.layers say it already; leave it out"
-            require(f"member.{name}", value, value is None, fix)
+            require(f"member.{name}", value, self.layers is None or value is None, fix)
+
+    @property
+    def hole_edges(self) -> Array:
+        """Positions X (k, 2) at which each hole begins and ends."""
+        assert self.holes is not None
+        middle, diameter = self.holes.T
+        return jnp.stack([middle - 0.5 * diameter, middle + 0.5 * diameter], axis=1)
+
+    @property
+    def jumps(self) -> int:
+        """Number of edges of holes, at which the contact ends."""
+        return 0 if self.holes is None else 2 * self.holes.shape[0]
 
     def beside(self, strip: Strip) -> Strip:
         """Member as a strip whose contact is its bottom face; what it leaves out is the strip's."""
@@ -156,10 +168,6 @@ class Contact(ContactKeys):
             pressure = getattr(self, key)
             if not isinstance(pressure, jax.core.Tracer):
                 check_pressure(f"contact.{key}", np.asarray(pressure))
-        if self.gap is not None and not isinstance(self.gap, jax.core.Tracer):
-            check_gap(np.asarray(self.gap))
-        if self.holes is not None:
-            check_holes(self.holes, self.bolts)
         if not isinstance(self.pressure, jax.core.Tracer):
             presses = bool(np.any(pressure_values(np.asarray(self.pressure)) > 0.0))
             require("contact.pressure", self.pressure, presses, "must press somewhere")
@@ -195,28 +203,18 @@ class Contact(ContactKeys):
 
     @property
     def jumps(self) -> int:
-        """Number of rows of the pressures' tables at which they may jump, and of holes' edges."""
+        """Number of rows of the pressures' tables at which they may jump."""
         tables = (self.pressure, self.bottom_pressure)
-        edges = 0 if self.holes is None else 2 * self.holes.shape[0]
-        return sum(p.shape[0] - 1 for p in tables if p.ndim == 2) + edges
+        return sum(p.shape[0] - 1 for p in tables if p.ndim == 2)
 
     def steps(self, length: Array) -> Array | None:
-        """Positions X at which a pressure jumps or a hole ends, rising; None if there are none.
+        """Positions X at which a pressure jumps, rising; None if there are none.
 
         Rows of a table between which it does not jump give L.
         """
         tables = [p for p in (self.pressure, self.bottom_pressure) if p.ndim == 2]
         found = [table_steps(table, length) for table in tables]
-        if self.holes is not None:
-            found.append(self.hole_edges.ravel())
         return jnp.sort(jnp.concatenate(found)) if found else None
-
-    @property
-    def hole_edges(self) -> Array:
-        """Positions X (k, 2) at which each hole begins and ends."""
-        assert self.holes is not None
-        middle, diameter = self.holes.T
-        return jnp.stack([middle - 0.5 * diameter, middle + 0.5 * diameter], axis=1)
 
 
 class Load(LoadKeys):

@@ -232,7 +232,7 @@ def _nodes(grid: Grid, scene: Parts) -> int:
     """Odd number of nodes of a grid for a scene's tolerance."""
     elements = (grid.nodes - 1) * (KNOWN / scene.model.tolerance) ** (1.0 / grid.order)
     if grid in (CONTACT_LINE, SOFT_CONTACT_LINE):
-        elements *= 1.0 + PER_STEP * min(scene.contact.jumps, MOST_JUMPS)
+        elements *= 1.0 + PER_STEP * min(scene.contact.jumps + scene.member.jumps, MOST_JUMPS)
     elif grid is PLANE and scene.member.support != "none":
         elements *= BOTH_ENDS
     return 2 * int(np.ceil(elements / 2.0)) + 1

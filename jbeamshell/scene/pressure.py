@@ -122,11 +122,11 @@ def bolt_pressure(bolts: Array, length: Array) -> Array:
 def check_gap(gap: np.ndarray) -> None:
     """Raise `InputError` unless a gap is a number or a table of [X, gap] rows, not negative."""
     table = is_table(gap)
-    require("contact.gap", gap, gap.ndim == 0 or table, GAP)
+    require("member.gap", gap, gap.ndim == 0 or table, GAP)
     good = bool(np.all(np.isfinite(gap)) and np.all(pressure_values(gap) >= 0.0))
-    require("contact.gap", gap, good, "must be finite and nowhere negative")
+    require("member.gap", gap, good, "must be finite and nowhere negative")
     rises = not table or bool(np.all(np.diff(gap[:, 0]) > 0.0))
-    require("contact.gap", gap, rises, "its X must rise from row to row")
+    require("member.gap", gap, rises, "its X must rise from row to row")
 
 
 def check_holes(holes: Array, bolts: Array | None) -> None:
@@ -137,7 +137,7 @@ def check_holes(holes: Array, bolts: Array | None) -> None:
     holes : (k, 2)
     bolts : (m, 3) rows of X, force and width of the patch; None for another pressure
     """
-    key = "contact.holes"
+    key = "member.holes"
     require(key, "traced", not is_traced(holes), "knows no derivatives: give plain numbers")
     rows = np.asarray(holes)
     require(key, rows, rows.ndim == 2 and rows.shape[1] == 2, HOLES)

@@ -69,8 +69,7 @@ def kind_of(scene: Parts) -> str:
         return ""
     if member.support != "none":
         return {"rolling": "double shear", "clamped": "single lap"}[member.support]
-    ends = strip.far_end, strip.loaded_end
-    if ends != (TABLE["strip.far_end"].default, TABLE["strip.loaded_end"].default):
+    if strip.far_end != TABLE["strip.far_end"].default:
         return ""
     if is_traced(contact.bottom_pressure) or np.any(contact.bottom_pressure):
         return ""

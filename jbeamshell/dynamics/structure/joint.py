@@ -175,7 +175,7 @@ class Joint(Backbone):
             scene = dataclasses.replace(scene, load=load)
         require_number("width", width)
         require_choice("by", by, (None, *BY))
-        bolted = scene.contact.bolt_stiffness is not None  # which holds beyond
+        bolted = scene.member.bolt_stiffness is not None  # which holds beyond
         capacity = np.inf if bolted else width * gross_slip(scene)
         condensed = scene.plan.on_contact_line
         traced = is_traced(scene, force)

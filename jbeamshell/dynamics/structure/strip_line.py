@@ -59,7 +59,7 @@ def slider_line(scene: Scene, force: Array) -> tuple[Network, tuple[Array, ...]]
     f, u = points(levels, last, force), jax.vmap(line)(branches)
     nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
     rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
-    series = scene.contact.bearing_stiffness is None  # a bearing is no slider
+    series = scene.member.bearing_stiffness is None  # a bearing is no slider
     sides = nan_unless(jnp.all(nested) & rising & series, u)
     mean, asymmetry = mean_of(*sides)
     return network, (mean, sides, f, asymmetry, count)
