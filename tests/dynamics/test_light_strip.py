@@ -9,7 +9,7 @@ from jbeamshell import dynamics
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.release import LIGHT, let_go
 
-SCENE = STRIP.replace({"model.section": "plane", "model.nodes": 33, "load.entry": "traction"})
+SCENE = jb.Scene().replace({"model.section": "plane", "model.nodes": 33, "load.entry": "traction"})
 CYCLES = 20.0
 
 
@@ -83,8 +83,7 @@ class TestLetGo:
 
     @pytest.mark.slow
     def test_the_strips_inertia_lowers_frequency_and_damping_as_said(self):
-        fine = {"model.kinematics": "linear", "model.nodes": 41, "model.end_size": 0.0278}
-        strip = STRIP.replace(fine)
+        strip = STRIP.replace({"model.kinematics": "linear"}).on_grid(41, 0.0278)
         strip_mass = 2.0 * float(strip.strip.half_height * strip.strip.length)
         curves = {}
         for times in (1000.0, 10.0):
