@@ -6,7 +6,7 @@ from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell.mechanics import bar
-from jbeamshell.quasistatic.solving import compile_for
+from jbeamshell.quasistatic import solving
 from jbeamshell.quasistatic.stepping import fits_native
 
 SMALL = {
@@ -177,10 +177,10 @@ def test_beyond_gross_slip_force_control_is_refused():
 @pytest.mark.doubtful("few nodes")
 def test_compiling_alone_solves_nothing():
     scene = STRIP.replace(SMALL)
-    compile_for(scene)
-    size = solver._solve._compiled[True]._cache_size()
+    solving.compile_for(scene)
+    size = solving._stepped._compiled[True]._cache_size()
     jb.solve(scene)
-    assert solver._solve._compiled[True]._cache_size() == size
+    assert solving._stepped._compiled[True]._cache_size() == size
 
 
 @pytest.mark.doubtful("few nodes")
@@ -197,7 +197,7 @@ def test_plain_numbers_inside_a_callers_jit():
     [
         ({"model.kinematics": "exact", "model.nodes": 171}, True),
         ({"model.kinematics": "exact", "model.nodes": 172}, False),
-        ({"model.solution": "stepwise", "model.nodes": 321}, False),
+        ({"contact.smoothing": 8.0, "model.nodes": 321}, False),
         ({"model.section": "p2", "model.kinematics": "exact", "model.nodes": 33}, False),
     ],
 )
@@ -210,6 +210,6 @@ def test_what_the_compiler_makes_one_native_function_of(values, fits):
 def test_the_compiler_refuses_no_loop_that_fits(values):
     scene = STRIP.replace(values)
     assert fits_native(scene)
-    refused = len(solver._solve._refused)
+    refused = len(solving._stepped._refused)
     jb.solve(scene)
-    assert len(solver._solve._refused) == refused
+    assert len(solving._stepped._refused) == refused

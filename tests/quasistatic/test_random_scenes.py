@@ -53,7 +53,7 @@ def test_random_strips_converge_and_obey_friction(smoothing):
 
 def test_random_linear_steps_converge_without_recovery():
     random = np.random.default_rng(3)
-    linear = {"model.kinematics": "linear", "model.solution": "stepwise", "load.cycles": 1}
+    linear = {"model.kinematics": "linear", "load.cycles": 1}
     stepped = {"contact.pressure": [[0.0, 8.0], [0.9, 12.0], [0.9, 9.0], [2.0, 11.0]]}
     base = STRIP.replace(SMALL | linear | stepped)
     run = jax.jit(lambda v: jnp.max(jb.solve(base.replace(v), throw=False).status))
@@ -104,9 +104,8 @@ def test_a_contact_that_goes_round_in_circles_is_found_node_by_node():
         "contact.pressure": [[0, pressure], [patch, pressure], [patch, 0.0], [length, 0.0]],
         "model.nodes": 41,
         "model.kinematics": "linear",
-        "model.solution": "stepwise",
     }
-    scene = library.receding_rough().replace(clamp)
+    scene = library.receding_rough().replace(clamp).by_load_steps()
     history = jax.jit(lambda load: jb.solve(scene, load[None], throw=False))(7.090942609)
     assert history.converged
     assert int(history.iterations[-1]) > 100
