@@ -269,7 +269,7 @@ class TestHistory:
             plane(jb.Scene(), **values)
 
 
-class TestRung:
+class TestScene:
     @pytest.mark.slow
     def test_a_response_is_what_a_run_says(self):
         scene = scene_of(0.1126).replace({"model.section": "plane", "model.nodes": 33})

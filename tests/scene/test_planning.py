@@ -113,7 +113,7 @@ def test_a_bar_has_a_closed_form_where_it_is_goodmans(values, engine):
     assert bar.by_load_steps().plan.engine == STEPS
 
 
-def test_load_steps_stick_until_they_are_given_up():
+def test_load_steps_stick_through_changes():
     steps = jb.Scene().by_load_steps()
     assert steps.plan.engine == STEPS
     assert steps.replace({"contact.friction": 0.2, "model.section": "shell"}).plan.engine == STEPS
