@@ -20,7 +20,8 @@ def recorded(name):
 
 @pytest.mark.parametrize("plane", ["stress", pytest.param("strain", marks=pytest.mark.slow)])
 def test_a_squeezed_laminate_bends_as_the_closed_form_and_the_finite_elements(plane):
-    history = jb.solve(library.bimaterial().replace({"strip.plane": plane}))
+    scene = library.bimaterial().replace({"strip.plane": plane})
+    history = jb.solve(scene.on_grid(41, 1.0 / 0.6))  # even elements: small ones round off by 1e-8
     closed = reference.bimetal_curvature(PRESSURE, 2.0, SOFT, 100 * SOFT, 0.3, plane)
     curvature = np.diff(history.beta[0]) / np.diff(history.x)
     np.testing.assert_allclose(curvature, closed, rtol=1e-8)
