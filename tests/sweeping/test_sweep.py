@@ -151,7 +151,7 @@ def test_a_lane_that_is_solved_alone_has_the_estimate_of_its_run(monkeypatch):
         np.testing.assert_allclose(alone[name], values, rtol=1e-9, err_msg=name)
 
 
-@pytest.mark.doubtful("in the corner", "few nodes", "lock")
+@pytest.mark.doubtful("in the corner", "few nodes", "lock", "the section squeeze")
 def test_a_figure_of_nought_over_nought_is_told_from_a_failure(result, monkeypatch):
     batched = runner.Runner._answers
 
