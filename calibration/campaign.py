@@ -33,6 +33,7 @@ jax.config.update("jax_enable_x64", True)
 import numpy as np  # noqa: E402
 from provenance import provenance  # noqa: E402
 from random_scenes import KINDS, Kind, Values  # noqa: E402
+from strip import changed  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -44,7 +45,7 @@ SEED = 22
 MANY_NODES = 129  # from which on a fine mesh has half as many more elements, else twice as many
 SAME = 1e-7  # relative change of a result that is the same
 DIGITS = 8  # of the numbers of the record
-BEAMSHELL: Values = {"model.fields": ["v", "beta", "psi"]}
+BEAMSHELL: Values = {"model.section": "squeeze"}
 TO_ITSELF: Values = {"model.tolerance": 0.005}
 Row = dict[str, Any]
 
@@ -57,19 +58,17 @@ def drawn(kind: str, seed: int, number: int) -> Values:
 
 def finer(scene: jb.Scene) -> jb.Scene:
     """Scene with the same model on a fine mesh, and with more load steps."""
-    model, scene = scene.model, scene.pinned()
-    elements = model.nodes - 1
-    elements = 2 * elements if model.nodes <= MANY_NODES else elements + elements // 4 * 2
-    mesh: Values = {"model.nodes": elements + 1, "model.end_size": 0.5 * model.end_size}
-    if not model.condensed:
-        mesh["load.steps_per_half_cycle"] = 2 * scene.plan.steps
-    return scene.replace(mesh)
+    its, scene = scene.plan, scene.pinned()
+    elements = its.nodes - 1
+    elements = 2 * elements if its.nodes <= MANY_NODES else elements + elements // 4 * 2
+    if not its.on_contact_line:
+        scene = scene.replace({"load.steps_per_half_cycle": 2 * its.steps})
+    return scene.on_grid(elements + 1, 0.5 * its.end_size)
 
 
 def made(values: Values) -> jb.Scene:
     """Scene of these values, which is the beamshell if they name no section."""
-    section = {} if {"model.section", "model.fields"} & set(values) else BEAMSHELL
-    return jb.library.standard().replace(TO_ITSELF | section | values)
+    return changed(jb.library.standard(), TO_ITSELF | BEAMSHELL | values)
 
 
 def solved(scene: jb.Scene) -> jb.History | None:
@@ -83,11 +82,10 @@ def solved(scene: jb.Scene) -> jb.History | None:
 
 def by_the_other(values: Values, scene: jb.Scene, other: Values) -> jb.Scene:
     """Scene with the same model and another solver; elastic sliders keep their last element."""
-    given = {key: value for key, value in values.items() if key != "model.section"}
-    section: Values = {"model.fields": list(scene.plan.fields), "model.order": scene.plan.order}
+    its: Values = {"model.section": scene.plan.section}
     if scene.plan.on_contact_line and scene.contact.stick_stiffness is not None:
-        section["model.end_size"] = scene.plan.end_size
-    return jb.library.standard().replace(TO_ITSELF | given | section | other)
+        its["end_size"] = scene.plan.end_size
+    return changed(jb.library.standard(), TO_ITSELF | values | its | other)
 
 
 def off(value: float, reference: float) -> float:
@@ -114,7 +112,7 @@ def errors_of(values: Values, found: jb.History, other: Values | None) -> Row:
         errors["refined"] = off(float(found.dissipation), float(fine.dissipation))
         errors["loop"] = loop_error(found, fine)
         errors["stiffness"] = off(float(found.secant_stiffness), float(fine.secant_stiffness))
-    if other is not None and scene.model.solution != "plane":
+    if other is not None and not scene.plan.elastic:
         unlike = by_the_other(values, scene, other)
         beside = solved(unlike)
         if beside is not None and beside.doubts and differs(found, beside):
@@ -155,16 +153,17 @@ def compared(values: Values, other: Values | None, before: Row | None = None) ->
         return {"outcome": "fails, and says so", "reason": str(error)}
     if not found.converged:
         return {"outcome": "fails, and says so"}
-    load, model = found.scene.load, found.scene.model
+    its = found.scene.plan
     row: Row = {
         "dissipation": float(found.dissipation),
         "bar_ratio": float(found.dissipation_ratio),
         "estimate": float(found.dissipation_error),
         "doubts": [doubt.partition("; ")[0] for doubt in found.doubts],
-        "rung": model.rung,
-        "kinematics": model.kinematics,
-        "nodes": model.nodes,
-        "chosen": "nodes" in model.open and "steps_per_half_cycle" in load.open,
+        "section": its.section,
+        "engine": its.engine,
+        "kinematics": its.kinematics,
+        "nodes": its.nodes,
+        "chosen": scene.model.nodes == scene.load.steps_per_half_cycle == "auto",
     }
     if before is None or off(row["dissipation"], before.get("dissipation", 0.0)) > SAME:
         row["errors"] = errors_of(values, found, other)

@@ -5,7 +5,7 @@
 solves plain random scenes for several tolerances, as they are and with the same model on a mesh
 twice as fine, and writes default_settings.json beside this file.  The errors are those of the
 dissipation and of the loop (largest difference of the response over its range).
-`jbeamshell.scene.choice` takes its numbers from here and from calibration/campaign.py, which has
+`jbeamshell.scene.planning` takes its numbers from here and from calibration/campaign.py, which has
 scenes of all kinds; calibration/charts/settings.py draws both records.
 """
 

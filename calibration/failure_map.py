@@ -23,7 +23,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from provenance import provenance
-from strip import in_load_steps
+from strip import changed, in_load_steps
 from tqdm import tqdm
 
 import jbeamshell as jb
@@ -50,14 +50,15 @@ STANDARD = {
     "m": 16.0,
 }
 PRESSURE, LENGTH = 10.0, 2.0
-LIFT = {"model.section": "squeeze"}
-FINE = {"model.nodes": 321, "model.end_size": 1.0 / 200.0}
+LIFT = {"contact.normal": "rigid"}
+FINE = {"model.nodes": 321, "end_size": 1.0 / 200.0}
 EXACT = LIFT | FINE
-COARSER = {"model.nodes": 161, "model.end_size": 1.0 / 48.0}  # where that finds no equilibrium
+COARSER = {"model.nodes": 161, "end_size": 1.0 / 48.0}  # where that finds no equilibrium
 SMOOTH = {"contact.smoothing": 16.0}
 LINEAR = {"model.kinematics": "linear"}
 PRINTED = {"model.constants": "printed"}
-COMPLIANT = LIFT | {"contact.normal": "compliant"}
+COMPLIANT = {"contact.normal": "compliant"}
+SHELL = {"model.section": "shell"}
 SECOND = {"model.section": "p2"}
 PULLED = {"load.control": "displacement", "load.amplitude": 1.0}
 # Of every method its settings, and those of its reference.
@@ -73,7 +74,7 @@ SOLVERS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "compliant": (COMPLIANT, COMPLIANT | FINE),
     "displacement": (PULLED, PULLED | EXACT),
-    "shell": ({"model.section": "shell"}, {"model.section": "shell"} | FINE),
+    "shell": (SHELL, SHELL | EXACT),
     "p2": (SECOND, SECOND | FINE),
     "printed": (PRINTED, PRINTED | EXACT),
 }
@@ -114,7 +115,7 @@ def runner(settings: tuple[tuple[str, Any], ...]) -> Callable[[jax.Array], jax.A
     given = {key: list(v) if isinstance(v, tuple) else v for key, v in settings}
     given.pop("single", None)
     tolerance = given.pop("tolerance", None)
-    base = in_load_steps().replace(given)
+    base = changed(in_load_steps(), given)
 
     @jax.jit
     def run(numbers: jax.Array) -> jax.Array:
@@ -171,7 +172,7 @@ def cell(
 
 def doubts_beforehand(settings: Mapping[str, Any], point: Mapping[str, float]) -> int:
     """Number of doubts that the scene alone raises."""
-    base = in_load_steps().replace({key: v for key, v in settings.items() if "." in key})
+    base = changed(in_load_steps(), settings)
     return len(reliability.doubts_of_scene(scene_of(base, list((STANDARD | point).values()))))
 
 
@@ -249,12 +250,12 @@ MAPS: dict[str, tuple[str, list[float], str, list[Row]]] = {
     ),
     "nodes and load": ("load", LOADS, "nodes", settings("model.nodes", NODES)),
     "nodes and alpha": ("alpha", KNOBS["alpha"], "nodes", settings("model.nodes", NODES)),
-    "end size and load": ("load", LOADS, "end size over H", settings("model.end_size", END_SIZES)),
+    "end size and load": ("load", LOADS, "end size over H", settings("end_size", END_SIZES)),
     "end size and load, lift-off": (
         "load",
         LOADS,
         "end size over H",
-        settings("model.end_size", END_SIZES, **LIFT),
+        settings("end_size", END_SIZES, **LIFT),
     ),
     "steps and load": (
         "load",

@@ -43,7 +43,9 @@ PATCHES: dict[str, Any] = {
 def scenes() -> Iterator[tuple[dict[str, Any], jb.Scene]]:
     """Varied numbers of a row, and its scene."""
     for patch, pressure in PATCHES.items():
-        scene = jb.library.standard().replace({"model.section": "plane", "contact.pressure": pressure})
+        scene = jb.library.standard().replace(
+            {"model.section": "plane", "contact.pressure": pressure}
+        )
         for eta in HEIGHTS:
             cases = [(mu, 0.3) for mu in FRICTIONS]
             cases += [(0.1, nu) for nu in (0.0, 0.45) if eta in (0.05, 0.2, 0.4)]

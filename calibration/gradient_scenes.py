@@ -1,13 +1,13 @@
-"""Scenes of all kinds, for calibration/gradients.py."""
+"""Scenes of all kinds, for calibration/gradients.py; values are as `strip.changed` reads them."""
 
 from typing import Any
 
 Values = dict[str, Any]
 
 FEW = {"model.nodes": 17, "load.steps_per_half_cycle": 4, "load.cycles": 1}
-STEPWISE = FEW | {"model.solution": "stepwise", "model.kinematics": "linear"}
-EXACT = STEPWISE | {"model.kinematics": "exact"}
-LIFT = {"model.section": "squeeze"}
+STEPS = FEW | {"by": "steps", "model.kinematics": "linear", "contact.normal": "held"}
+EXACT = STEPS | {"model.kinematics": "exact"}
+LIFT = {"contact.normal": "rigid"}
 SMOOTH = {"contact.smoothing": 8.0}
 SOFT = {"contact.stick_stiffness": 100.0}
 TABLE_OF_STEPS = {
@@ -37,39 +37,39 @@ SINGLE = DOUBLE | {
 }
 BOLTS = {"contact.bolts": [[0.5, 5.0, 0.4], [1.4, 6.0, 0.5]], "load.amplitude": 0.3}
 SETTINGS: dict[str, Values] = {
-    "condensed squeeze": FEW,
-    "condensed shell": FEW | {"model.section": "shell", "model.kinematics": "linear"},
-    "condensed p2": FEW | {"model.section": "p2", "model.kinematics": "linear"},
-    "condensed, soft sliders": FEW | SOFT,
-    "condensed, displacement": FEW | DISPLACED,
-    "condensed, steps of pressure": FEW | TABLE_OF_STEPS,
-    "condensed, both faces": FEW | BOTH_FACES | SOFT,
-    "condensed, layers": FEW | LAYERS | SOFT,
+    "contact line, squeeze": FEW,
+    "contact line, shell": FEW | {"model.section": "shell", "model.kinematics": "linear"},
+    "contact line, p2": FEW | {"model.section": "p2", "model.kinematics": "linear"},
+    "contact line, soft sliders": FEW | SOFT,
+    "contact line, displacement": FEW | DISPLACED,
+    "contact line, steps of pressure": FEW | TABLE_OF_STEPS,
+    "contact line, both faces": FEW | BOTH_FACES | SOFT,
+    "contact line, layers": FEW | LAYERS | SOFT,
     "plane": FEW | {"model.section": "plane"},
     "plane, traction": FEW | {"model.section": "plane", "load.entry": "traction"},
     "plane, face": FEW | {"model.section": "plane", "load.entry": "face"},
     "plane, guided": FEW | {"model.section": "plane", "load.entry": "guided"},
     "plane, overhang": FEW | {"model.section": "plane", "strip.overhang": 0.3},
     "bar": FEW | {"model.section": "bar"},
-    "stepwise sharp": STEPWISE,
-    "stepwise smooth": STEPWISE | SMOOTH,
-    "stepwise shell": STEPWISE | {"model.section": "shell"},
+    "load steps, sharp": STEPS,
+    "load steps, smooth": STEPS | SMOOTH,
+    "load steps, shell": STEPS | {"model.section": "shell"},
     "exact sharp": EXACT,
     "exact smooth that lifts": EXACT | SMOOTH | LIFT,
     "exact sharp that lifts": EXACT | LIFT,
-    "lift, steps of pressure": STEPWISE | LIFT | TABLE_OF_STEPS,
+    "lift, steps of pressure": STEPS | LIFT | TABLE_OF_STEPS,
     "lift, both faces, curved": EXACT | LIFT | BOTH_FACES | {"strip.curvature": 1e-4},
     "exact, layers": EXACT | LAYERS,
-    "stepwise, displacement": STEPWISE | DISPLACED,
+    "load steps, displacement": STEPS | DISPLACED,
     "exact, arc length": EXACT | DISPLACED | {"load.control": "arc-length"},
-    "stepwise p2": STEPWISE | {"model.section": "p2", "load.entry": "guided"},
-    "stepwise p3, exact": EXACT | {"model.section": "p3", "load.entry": "face"},
+    "load steps, p2": STEPS | {"model.section": "p2", "load.entry": "guided"},
+    "load steps, p3, exact": EXACT | {"model.section": "p3", "load.entry": "face"},
     "collocation": EXACT | {"model.grid": "collocation"},
     "assumed squeeze": EXACT | LIFT | {"model.section": "assumed"},
-    "printed constants": STEPWISE | {"model.constants": "printed"},
-    "compliant base": EXACT | LIFT | {"contact.normal": "compliant"},
+    "printed constants": STEPS | {"model.constants": "printed"},
+    "compliant base": EXACT | {"contact.normal": "compliant"},
     "pinned": FEW | SOFT | {"strip.far_end": "pinned"},
-    "plane stress, free": STEPWISE | {"strip.far_end": "free", "strip.plane": "stress"},
+    "plane stress, free": STEPS | {"strip.far_end": "free", "strip.plane": "stress"},
     "double shear": FEW | DOUBLE,
     "single lap with bolts": FEW
     | SINGLE

@@ -34,6 +34,7 @@ import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
 from gradient_scenes import SETTINGS, SIZES, Values  # noqa: E402
 from provenance import provenance  # noqa: E402
+from strip import changed  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
@@ -164,7 +165,7 @@ class Setting(NamedTuple):
 
 def setting_of(given: Values) -> Setting:
     """Functions of the numbers of a scene."""
-    scene = jb.Scene().replace(given).pinned()
+    scene = changed(jb.Scene(), given).pinned()
     walk = numbers_of(scene, given)
     names: list[str] = []
 

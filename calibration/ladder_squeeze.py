@@ -44,6 +44,7 @@ RECORD = HERE / "ladder_squeeze.json"
 ORDERS = (0, 1, 2, 3, 4, 6)
 NODES = (101, 201, 401, 801)
 SHOWN = 401  # nodes of the profiles
+END_SIZE = 0.02  # smallest elements over H, before the number of nodes scales all
 EXACT = [(order, 201) for order in (0, 3)]  # once more with exact kinematics
 ROUNDS = 5
 EDGE, PRESSURE = 50.0, 100.0  # mm, MPa
@@ -149,9 +150,10 @@ def profile(x: Any, values: Any) -> list[list[float]]:
 
 def climb(order: int, nodes: int, kinematics: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Figures and profiles of both problems on one grid."""
-    change = {"model.order": order, "model.nodes": nodes, "model.kinematics": kinematics}
-    squeezed, squeeze_time = timed(library.squeezed().replace(change))
-    receding, contact_time = timed(library.receding().replace(change))
+    section = f"p{order}" if order else "squeeze"
+    change = {"model.section": section, "model.kinematics": kinematics}
+    squeezed, squeeze_time = timed(library.squeezed().replace(change).on_grid(nodes, END_SIZE))
+    receding, contact_time = timed(library.receding().replace(change).on_grid(nodes, END_SIZE))
     jax.clear_caches()  # every case compiles programs of its own
     figures = {
         "order": order,
@@ -169,7 +171,7 @@ def climb(order: int, nodes: int, kinematics: str) -> tuple[dict[str, Any], dict
 
 
 def measure() -> dict[str, Any]:
-    """Record of all rungs and grids."""
+    """Record of all sections and grids."""
     cases = [(order, nodes, "linear") for order in ORDERS for nodes in NODES]
     cases += [(*case, "exact") for case in EXACT]
     b2, b3 = finite_elements("b2.csv"), finite_elements("b3.csv")
@@ -178,7 +180,7 @@ def measure() -> dict[str, Any]:
         "provenance": provenance(),
         "timing": f"run_ms: median of {ROUNDS} warm runs; first_s: with compilation",
         "finite_elements": {"tension_MPa": tension, "tension_at_mm": place - EDGE} | TRUTH,
-        "rungs": [],
+        "sections": [],
         "profiles": {
             "nodes": SHOWN,
             "finite elements": {
@@ -189,7 +191,7 @@ def measure() -> dict[str, Any]:
     }
     for case in tqdm(cases, disable=None, unit="case"):
         figures, profiles = climb(*case)
-        record["rungs"].append(figures)
+        record["sections"].append(figures)
         if case[1] == SHOWN:
             record["profiles"][str(case[0])] = profiles
     return record
@@ -202,16 +204,16 @@ def as_text(record: dict[str, Any]) -> str:
 
 
 def report(record: dict[str, Any]) -> str:
-    """Table of the rungs, as text."""
+    """Table of the sections, as text."""
     lines = [
         "p  nodes  kinematics  tension MPa at mm   rms MPa  x_c - a mm  R max MPa at mm     "
         "R across the step  lift slope  run ms"
     ]
-    for rung in record["rungs"]:
-        s, r = rung["squeezed"], rung["receding"]
+    for row in record["sections"]:
+        s, r = row["squeezed"], row["receding"]
         at = "-" if s["tension_at_mm"] is None else format(s["tension_at_mm"], ".3f")
         lines.append(
-            f"{rung['order']}  {rung['nodes']:5d}  {rung['kinematics']:10s}  "
+            f"{row['order']}  {row['nodes']:5d}  {row['kinematics']:10s}  "
             f"{s['tension_MPa']:11.4f} {at:>5s}   {s['rms_MPa']:7.4f}  {r['contact_end_mm']:10.4f}"
             f"  {r['reaction_max_MPa']:9.3f} {r['reaction_max_at_mm']:.3f}    "
             f"{r['reaction_before_step_MPa']:6.2f} -> {r['reaction_after_step_MPa']:6.2f}  "
@@ -229,14 +231,14 @@ def picture(record: dict[str, Any]) -> plt.Figure:
         figure, ((stress, reaction), (squeeze, contact)) = plt.subplots(2, 2, figsize=(11.0, 8.0))
         draw_stress(record["profiles"], stress)
         draw_reaction(record["profiles"], reaction)
-        draw_grids(record["rungs"], "squeezed", "rms_MPa", squeeze)
+        draw_grids(record["sections"], "squeezed", "rms_MPa", squeeze)
         squeeze.set(
             yscale="log",
             ylabel="rms error of the mean $\\sigma_y$  [MPa]",
             title="(c) squeezed: 101, 201, 401 and 801 nodes",
         )
         squeeze.yaxis.set_major_formatter(ScalarFormatter())
-        draw_grids(record["rungs"], "receding", "contact_end_mm", contact)
+        draw_grids(record["sections"], "receding", "contact_end_mm", contact)
         end = record["finite_elements"]["contact_end_mm"]
         label = "finite elements"
         contact.axhspan(
@@ -251,12 +253,12 @@ def picture(record: dict[str, Any]) -> plt.Figure:
 
 
 def name(order: int) -> str:
-    """Name of a rung."""
+    """Name of a section."""
     return f"$p$ = {order}" if order else "beamshell"
 
 
 def draw_profiles(profiles: dict[str, Any], what: str, axes: plt.Axes, dots: slice) -> None:
-    """Draw a profile of every rung over the finite elements."""
+    """Draw a profile of every section over the finite elements."""
     for order, colour in zip(ORDERS, plotting.colours(len(ORDERS)), strict=True):
         x, value = profiles[str(order)][what]
         axes.plot(x, value, color=colour, label=name(order), linewidth=1.3)
@@ -292,10 +294,10 @@ def draw_reaction(profiles: dict[str, Any], axes: plt.Axes) -> None:
     axes.legend(loc="lower left")
 
 
-def draw_grids(rungs: list[dict], problem: str, key: str, axes: plt.Axes) -> None:
-    """Draw a figure over run time, a line for every rung and a dot for every grid."""
+def draw_grids(sections: list[dict], problem: str, key: str, axes: plt.Axes) -> None:
+    """Draw a figure over run time, a line for every section and a dot for every grid."""
     for order, colour in zip(ORDERS, plotting.colours(len(ORDERS)), strict=True):
-        own = [r[problem] for r in rungs if r["order"] == order and r["kinematics"] == "linear"]
+        own = [r[problem] for r in sections if r["order"] == order and r["kinematics"] == "linear"]
         milliseconds, values = [r["run_ms"] for r in own], [r[key] for r in own]
         axes.plot(milliseconds, values, "o-", color=colour, label=name(order), markersize=4.0)
     axes.set(xscale="log", xlabel="warm run, one core  [ms]")

@@ -59,8 +59,8 @@ def truth() -> dict[tuple[float, float], float]:
 
 def ratios(order: int) -> np.ndarray:
     """Dissipation over the cubic law on all cells, (16,)."""
-    base = {"model.section": f"p{order}", "model.nodes": 81, "model.end_size": 1.0 / 12.0}
-    scene = in_load_steps().replace(base | {"model.kinematics": "linear"})
+    section = {"model.section": f"p{order}", "model.kinematics": "linear"}
+    scene = in_load_steps().replace(section).on_grid(81, 1.0 / 12.0)
 
     @eqx.filter_jit
     def one(eta, amplitude):

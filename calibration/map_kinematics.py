@@ -2,14 +2,15 @@
 
 A strip is given by five numbers: the load strain A/(E' 2H), the height ratio eta = H/(L/2), the
 load over gross slip A/(mu F_N L), mu and nu.  For a grid of the first four at nu = 0.3, and for
-strips scattered over all five, this runs the rung ``squeeze`` with both kinematics and writes how
-much the dissipation of the settled second cycle, and the secant stiffness, differ; for some strips
-also the rung ``p3`` (St. Venant and Kirchhoff's material) and ``squeeze`` with the lift w.
+strips scattered over all five, this runs the section ``squeeze`` with both kinematics, held down,
+and writes how much the dissipation of the settled second cycle, and the secant stiffness, differ;
+for some strips also the section ``p3`` (St. Venant and Kirchhoff's material) and ``squeeze`` that
+may lift off.
 
 The differences grow with the strain F_N/E' of the pressure and hardly depend on the strain of the
 load, up to a tenth.  With linear kinematics the ratios of a loop depend on neither.
 
-With w frozen a thin strip cannot buckle under a push.  Cells fail where Newton's method finds no
+Held down, a thin strip cannot buckle under a push.  Cells fail where Newton's method finds no
 equilibrium in the plain load steps (a batch does not retry in smaller ones), or where a section is
 pressed through itself, psi <= -1.
 
@@ -37,7 +38,7 @@ from matplotlib.colors import LogNorm  # noqa: E402
 from provenance import provenance  # noqa: E402
 from scipy.optimize import minimize  # noqa: E402
 from scipy.stats import qmc  # noqa: E402
-from strip import in_load_steps  # noqa: E402
+from strip import changed, in_load_steps  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
@@ -59,9 +60,9 @@ HIGHEST = (1e-1, 0.4, 0.95, 0.6, 0.47)
 LOGARITHMIC = np.array([True, True, False, True, False])
 SCATTERED = {"squeeze": 256, "p3": 32, "lift": 64}  # the first of one sequence
 MODELS: dict[str, dict[str, Any]] = {
-    "squeeze": {"model.section": "squeeze", "model.end_size": 1 / 6},
-    "p3": {"model.section": "p3", "model.end_size": 1 / 12},
-    "lift": {"model.section": "squeeze", "model.end_size": 1 / 6},
+    "squeeze": {"model.section": "squeeze", "end_size": 1 / 6},
+    "p3": {"model.section": "p3", "end_size": 1 / 12},
+    "lift": {"model.section": "squeeze", "end_size": 1 / 6, "contact.normal": "rigid"},
 }
 COLUMNS = ("strain", "eta", "gross", "mu", "nu", "dissipation", "stiffness", "rotation", "state")
 LANES = 16  # solved at once
@@ -84,7 +85,8 @@ LEAST = 1e-4  # a smaller difference is none
 def scene_of(strip: Any, model: str, kinematics: str) -> jb.Scene:
     """Strip of five numbers, with L = 2 and E' 2H = 1."""
     strain, eta, gross, mu, nu = strip
-    return in_load_steps().replace(
+    return changed(
+        in_load_steps(),
         {
             "strip.axial_stiffness": 1.0,
             "strip.height_ratio": eta,
@@ -96,7 +98,7 @@ def scene_of(strip: Any, model: str, kinematics: str) -> jb.Scene:
             "model.nodes": 81,
             "model.kinematics": kinematics,
             **MODELS[model],
-        }
+        },
     )
 
 

@@ -1,7 +1,7 @@
 """Random scenes of all kinds, for calibration/campaign.py.
 
 A kind is a function that draws the values of one scene, what the other solver sets, and how many
-scenes of it the campaign holds.
+scenes of it the campaign holds.  Values are as `strip.changed` reads them.
 """
 
 from collections.abc import Callable
@@ -14,11 +14,12 @@ from jbeamshell.mechanics.bar import bar_backbone
 Values = dict[str, Any]
 Random = np.random.Generator
 
-LIFT = {"model.section": "squeeze"}
-STEPWISE = {"model.solution": "stepwise"}
-EXACT = {"model.solution": "stepwise", "model.kinematics": "exact"}
+STEPS = {"by": "steps"}
+EXACT = STEPS | {"model.kinematics": "exact"}
+HELD = {"contact.normal": "held"}
+LIFT = {"contact.normal": "rigid"}
 MANY_STEPS = {"load.steps_per_half_cycle": 40}
-FINE = MANY_STEPS | {"model.nodes": 129, "model.end_size": 1.0 / 48.0}
+FINE = MANY_STEPS | {"model.nodes": 129, "end_size": 1.0 / 48.0}
 
 
 def _log(random: Random, low: float, high: float) -> float:
@@ -81,9 +82,7 @@ def curved(random: Random) -> Values:
     found = plain(random)
     height = found["strip.height_ratio"]
     flat = 10.0 * 2.0**2 / (3.4e4 * height**2)  # curvature of a strip as the pressure bends it
-    return (
-        found | LIFT | {"strip.curvature": random.choice([-1, 1]) * flat * random.uniform(0.01, 1)}
-    )
+    return found | {"strip.curvature": random.choice([-1, 1]) * flat * random.uniform(0.01, 1)}
 
 
 def supported(random: Random) -> Values:
@@ -118,9 +117,8 @@ def along_the_arc(random: Random) -> Values:
 def squeezed(random: Random) -> Values:
     """Assumed squeeze, or the printed constants."""
     kind = random.choice(["assumed", "printed"])
-    return plain(random) | (
-        LIFT | {"model.section": "assumed"} if kind == "assumed" else {"model.constants": "printed"}
-    )
+    assumed, printed = {"model.section": "assumed"}, {"model.constants": "printed"}
+    return plain(random) | (assumed if kind == "assumed" else printed)
 
 
 def shells(random: Random) -> Values:
@@ -130,9 +128,9 @@ def shells(random: Random) -> Values:
 
 def higher(random: Random) -> Values:
     """Sections of order 3 to 6, and plane elasticity under pressures that leave gaps."""
-    rung = str(random.choice(["p3", "p4", "p5", "p6", "plane", "plane"]))
-    make = pressed_in_part if rung == "plane" else plain
-    return make(random) | {"model.section": rung}
+    section = str(random.choice(["p3", "p4", "p5", "p6", "plane", "plane"]))
+    make = pressed_in_part if section == "plane" else plain
+    return make(random) | {"model.section": section}
 
 
 def few_steps(random: Random) -> Values:
@@ -140,7 +138,7 @@ def few_steps(random: Random) -> Values:
     found, mu = plain(random), random.uniform(0.5, 1.0)
     found["load.amplitude"] *= mu / found["contact.friction"]
     steps = {"load.steps_per_half_cycle": int(random.choice([1, 2, 4]))}
-    return found | EXACT | LIFT | steps | {"contact.friction": mu}
+    return found | EXACT | steps | {"contact.friction": mu}
 
 
 def layered(random: Random) -> Values:
@@ -198,16 +196,13 @@ def smooth(random: Random) -> Values:
 
 def compliant(random: Random) -> Values:
     """Compliant foundation."""
-    return (
-        plain(random)
-        | LIFT
-        | {"contact.normal": "compliant", "contact.normal_stiffness": _log(random, 5.0, 5e3)}
-    )
+    base = {"contact.normal": "compliant", "contact.normal_stiffness": _log(random, 5.0, 5e3)}
+    return plain(random) | base
 
 
 def frozen(random: Random) -> Values:
     """A strip that may not lift, under pressures with zeros and steps."""
-    return pressed_in_part(random) | EXACT
+    return pressed_in_part(random) | EXACT | HELD
 
 
 def rotating(random: Random) -> Values:
@@ -233,7 +228,7 @@ def sliders(random: Random) -> Values:
 
 def given(random: Random) -> Values:
     """Settings that a user gives, coarse ones among them, in place of those that are chosen."""
-    nodes, steps, kinematics, rung = (
+    nodes, steps, kinematics, section = (
         (17, 2, "linear", "squeeze"),
         (33, 4, "linear", "shell"),
         (65, 4, "exact", "squeeze"),
@@ -241,10 +236,10 @@ def given(random: Random) -> Values:
     make = (plain, pressed_in_part)[random.integers(2)]
     return make(random) | {
         "model.nodes": nodes,
-        "model.end_size": _log(random, 1.0 / 48.0, 1.0),
+        "end_size": _log(random, 1.0 / 48.0, 1.0),
         "load.steps_per_half_cycle": steps,
         "model.kinematics": kinematics,
-        "model.section": rung,
+        "model.section": section,
     }
 
 
@@ -322,24 +317,24 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "plain": Kind(plain, STEPWISE, 1000),
-    "pressed in part": Kind(pressed_in_part, STEPWISE, 150),
-    "both faces": Kind(both_faces, STEPWISE, 80),
-    "ramps": Kind(ramp, STEPWISE, 300),
-    "pinned and free": Kind(supported, STEPWISE, 300),
-    "displacement control": Kind(displaced, STEPWISE, 450),
-    "beyond gross slip": Kind(beyond, STEPWISE, 300),
-    "elastic sliders": Kind(sliders, STEPWISE, 300),
-    "layers that lift": Kind(layered, STEPWISE, 300),
-    "nearly incompressible": Kind(incompressible, STEPWISE | {"model.grid": "collocation"}, 100),
-    "shells and order 2": Kind(shells, STEPWISE, 60),
+    "plain": Kind(plain, STEPS, 1000),
+    "pressed in part": Kind(pressed_in_part, STEPS, 150),
+    "both faces": Kind(both_faces, STEPS, 80),
+    "ramps": Kind(ramp, STEPS, 300),
+    "pinned and free": Kind(supported, STEPS, 300),
+    "displacement control": Kind(displaced, STEPS, 450),
+    "beyond gross slip": Kind(beyond, STEPS, 300),
+    "elastic sliders": Kind(sliders, STEPS, 300),
+    "layers that lift": Kind(layered, STEPS, 300),
+    "nearly incompressible": Kind(incompressible, STEPS | {"model.grid": "collocation"}, 100),
+    "shells and order 2": Kind(shells, STEPS, 60),
     "assumed and printed": Kind(squeezed, None, 40),
-    "slender": Kind(slender, EXACT | LIFT, 20),
+    "slender": Kind(slender, EXACT, 20),
     "few steps": Kind(few_steps, MANY_STEPS, 20),
     "given settings": Kind(given, FINE, 40),
     "lap joints": Kind(lap, None, 20),
     "bolts, bearings, holes": Kind(bolted, None, 20),
-    "higher sections": Kind(higher, STEPWISE, 12),
+    "higher sections": Kind(higher, STEPS, 12),
     "smooth friction": Kind(smooth, None, 20),
     "compliant": Kind(compliant, None, 20),
     "frozen": Kind(frozen, EXACT | LIFT, 20),

@@ -165,8 +165,9 @@ def beside_elasticity(kind: str, entry: str) -> Values:
     coarse = runs(scenes, gross, plane | {"model.nodes": NODES})
     found: Values = {}
     for section in ("plane", *sections(kind)):
-        rung = section if section == "bar" else f"condensed-{section}"
-        model = {"model.section": rung, "load.entry": entry}
+        model = {"model.section": section, "load.entry": entry}
+        if section != "bar":
+            model["model.kinematics"] = "linear"
         own = coarse
         if section != "plane":
             own = runs(scenes, gross, model | {"model.nodes": NODES})

@@ -98,7 +98,7 @@ PARTS = {
     "plane curvature",
     jb.Contact: "friction pressure bottom_pressure stick_stiffness law normal normal_stiffness",
     jb.Load: "control amplitude cycles steps_per_half_cycle pressure_steps",
-    jb.Model: "fields kinematics grid nodes constants squeeze order solution end_size",
+    jb.Model: "section kinematics grid nodes constants tolerance by end_size",
     jb.Scene: "strip contact load model",
 }
 MADE = [

@@ -18,7 +18,6 @@ from jbeamshell.common.threads import VARIABLE, in_one_lapack_thread
 from jbeamshell.common.workers import without_main
 
 TINY = {"model.nodes": 9, "load.steps_per_half_cycle": 2, "load.cycles": 1}
-STEPWISE = {"model.kinematics": "linear", "model.solution": "stepwise"}
 OVER = {"load.amplitude": np.linspace(0.2, 1.5, 40), "strip.height_ratio": [0.05, 0.1, 0.2]}
 
 
@@ -81,7 +80,7 @@ def test_solves_sweeps_and_fits_at_once_answer_as_alone(tmp_path):
         return [list(found.values.values()), list(found.errors.values())]
 
     scenes = [jb.Scene().replace(TINY | {"contact.friction": mu}) for mu in (0.1, 0.2)]
-    scenes.append(scenes[0].replace(STEPWISE))
+    scenes.append(scenes[0].replace({"model.kinematics": "linear"}).by_load_steps())
     data = [
         loops(laws.Jenkins(limit, 100.0), np.random.default_rng(1), sizes=(0.03,))
         for limit in (1.0, 1.2)

@@ -9,7 +9,7 @@ from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.measured.curves import Curve
 from jbeamshell.measured.form import Column, Form
 
-# What tests of the general solver change: exact rotations on 161 nodes, 40 steps per half cycle.
+# What tests of the general solver change: load steps, 40 per half cycle, and exact rotations.
 STRIP = jb.Scene().replace({"model.kinematics": "exact"}).by_load_steps()
 X = np.linspace(0.05, 1.0, 20)
 TRUTH = {"contact.friction": 0.1, "strip.height_ratio": 0.2, "strip.kappa_s": 0.44}

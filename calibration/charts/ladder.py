@@ -1,4 +1,4 @@
-"""Charts of the record of tests/benchmarks/ladder.py: error of the rungs."""
+"""Charts of the record of tests/benchmarks/ladder.py: error of the sections."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ CELL = {"xlabel": "$\\eta = H/(L/2)$  [1]", "ylabel": "$A\\,/\\,(\\mu F_N L/2)$ 
 
 
 def error_map(
-    record: Record, rung: str, axes: Axes | None = None, *, colour_bar: bool = True
+    record: Record, section: str, axes: Axes | None = None, *, colour_bar: bool = True
 ) -> Axes:
-    """Draw the error of a rung's dissipation over heights and amplitudes.
+    """Draw the error of a section's dissipation over heights and amplitudes.
 
     Parameters
     ----------
     record : record of tests/benchmarks/ladder.py
-    rung : one of the record's map
+    section : one of the record's map
     axes : where to draw; new ones when not given
     colour_bar : True to explain the colours by a bar beside the axes
 
@@ -39,12 +39,12 @@ def error_map(
     Raises
     ------
     InputError
-        if the map does not have the rung
+        if the map does not have the section
     """
     chart = record["map"]
-    if rung not in chart["rungs"]:
-        raise InputError(f"rung = {rung!r}: the map has {', '.join(chart['rungs'])}")
-    eta, amplitude, ratio = _grid(chart["cells"], rung)
+    if section not in chart["sections"]:
+        raise InputError(f"section = {section!r}: the map has {', '.join(chart['sections'])}")
+    eta, amplitude, ratio = _grid(chart["cells"], section)
     off = np.maximum(100.0 * abs(ratio - 1.0), SMALLEST)
     with style():
         axes = single(axes)
@@ -56,7 +56,7 @@ def error_map(
         names = {np.log10(level): f"{level:g} %" for level in CONTOURS}
         for text in axes.clabel(lines, fmt=names, fontsize=8):
             text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8})
-        _cell_axes(axes, eta, rung)
+        _cell_axes(axes, eta, section)
         if colour_bar:
             axes.figure.colorbar(mesh, ax=axes, extend="both", label="error of the dissipation [%]")
     return axes

@@ -29,8 +29,7 @@ SMALLEST, LARGEST = 1e-5, 1.0  # errors that are drawn
 def _by_solution(rows: list[dict[str, Any]]) -> Iterable[Curve]:
     groups: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
-        rung = row.get("rung", "")
-        line = rung.startswith("condensed") or rung == "plane"
+        line = row.get("engine") == "contact line"
         groups.setdefault("on the contact line" if line else "in load steps", []).append(row)
     for words, group in groups.items():
         errors = np.sort([choice.error for choice in chosen(group)])

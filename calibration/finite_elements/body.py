@@ -98,7 +98,7 @@ def body_of(made: Slice, folder: Path, program: str | None = None) -> jb.Substru
 
 
 def main(nodes: int = 49) -> None:
-    """Compare dissipation and stiffness with the rung ``plane`` on as many contact nodes."""
+    """Compare dissipation and stiffness with the section ``plane`` on as many contact nodes."""
     jax.config.update("jax_enable_x64", True)
     values = {"model.section": "plane", "model.nodes": nodes, "load.entry": "traction"}
     scene = jb.Scene().replace(values)

@@ -23,6 +23,7 @@ from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.quasistatic.system import LoadLevel, Prescribed, System, V
 from jbeamshell.quasistatic.tangent import Stiffness, initial_stiffness, matrix
+from jbeamshell.scene.parts import unit_path
 from jbeamshell.scene.scene import ALMOST_RIGID
 
 TOLERANCE = 1e-10  # of mu F_N L, as the library's
@@ -128,7 +129,7 @@ def march(scene: jb.Scene, method: Method) -> Run:
     scenes = [*(stage(scene) for stage in method.stages), scene]
     systems = [System(one) for one in scenes]
     stiffnesses = [initial_stiffness(system, 1.0) for system in systems]
-    unit = jnp.asarray(np.append(0.0, scene.load.unit_path()))
+    unit = jnp.asarray(np.append(0.0, unit_path(scene.load.cycles, scene.plan.steps)))
 
     def step(state: tuple[LoadLevel, Array], load: tuple[Array, Array]) -> tuple[Any, Any]:
         level, target = state

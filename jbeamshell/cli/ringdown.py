@@ -67,8 +67,9 @@ def add_to(commands: Any) -> None:
         "--strip",
         choices=("auto", "whole", "sliders"),
         default="auto",
-        help="follow the whole strip in time steps, or plane elasticity's sliders without inertia, "
-        "exact in time; auto takes the sliders where inertia matters little (default)",
+        help="follow the whole strip in time steps, or the sliders of its contact without inertia, "
+        "exact in time (plane elasticity's, unless model.section is given); auto takes the sliders "
+        "where inertia matters little (default)",
     )
     add_settings(parser)
     add_folder(parser)
@@ -99,9 +100,10 @@ def run(options: argparse.Namespace) -> int:
             whole={"auto": None, "whole": True, "sliders": False}[options.strip],
         )
     if study.light:
-        other = "" if scene.member.support != "none" else " (--strip whole follows it)"
+        follows = scene.member.support == "none" and scene.model.section != "plane"
+        other = " (--strip whole follows it)" if follows else ""
         say(
-            "the strip is plane elasticity's network of sliders: its own mass, which adds "
+            "the strip is a network of sliders: its own mass, which adds "
             f"{study.share:.2g} of the payload, is left out{other}"
         )
     figures = study.figures()

@@ -1,8 +1,7 @@
 """Condensed contact: a linear elastic strip on its contact line, solved exactly in time.
 
-`solve` walks the load path of a scene on the rung ``plane``, or on one such as
-``condensed-squeeze``, which `jbeamshell.solve` does for such scenes; `dissipation` gives the work
-of a steady cycle at many amplitudes from one factorisation, which `factors` keeps.
+`solve` walks the load path of a scene that is planned so, as `jbeamshell.solve` does; `dissipation`
+gives the work of a steady cycle at many amplitudes from one factorisation, which `factors` keeps.
 `jbeamshell.solve_contact` takes bodies from other programs.
 """
 

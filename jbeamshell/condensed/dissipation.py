@@ -29,8 +29,8 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int | None = None
 
     Parameters
     ----------
-    scene : strip and contact; on a rung such as ``condensed-squeeze`` they are that model, else
-        plane elasticity; may be traced
+    scene : strip and contact; a section that is named and planned on its contact line is that
+        section, else they are plane elasticity; may be traced
     amplitudes : (k,) of the end force
     nodes : contact nodes; None is 49 for plane elasticity, which are within 1 % of it where the
         dissipation exceeds a tenth of the bar's cubic law, and 3 % down to a ten-thousandth (89
@@ -106,7 +106,7 @@ def factors(scene: Scene, *, nodes: int | None = None) -> SteadyCycles:
 
 
 def on_contact_line(scene: Scene, nodes: int | None) -> Scene:
-    """Scene on its condensed rung, or on ``plane``, with so many nodes; see `dissipation`."""
+    """Scene on its contact line, or as plane elasticity, with so many nodes; see `dissipation`."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     force = scene.load.control == "force"
     require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")

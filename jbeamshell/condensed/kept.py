@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from jbeamshell.common.checks import is_staged, is_traced
-from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
 
@@ -46,10 +45,10 @@ def kept(build: Build) -> Build:
 
 
 def alike(scene: Scene) -> Scene:
-    """One scene for all that share a condensed strip."""
-    none, contact = np.zeros_like(scene.load.amplitude), scene.contact
-    load = scene.load.but(amplitude=none, cycles=1, steps_per_half_cycle=AUTO)
-    model = scene.model.but(tolerance=1.0, section=AUTO, kinematics=AUTO, nodes=AUTO, end_size=AUTO)
+    """One scene for all that share a condensed strip, whose grid no further change decides."""
+    scene, none = scene.pinned(), np.zeros_like(scene.load.amplitude)
+    load = scene.load.but(amplitude=none, cycles=1, steps_per_half_cycle=1)
+    model, contact = scene.model.but(tolerance=1.0), scene.contact
     if scene.member.assembly != "frictional":
         contact = contact.but(friction=none)
     return scene.but(load=load, contact=contact, model=model, plan=scene.plan._replace(steps=1))

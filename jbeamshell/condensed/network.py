@@ -91,7 +91,7 @@ class Network(eqx.Module):
 
     @classmethod
     def of(cls, scene: Scene) -> Network:
-        """Network of a scene on a condensed rung, whose load is not used; may be traced.
+        """Network of a scene on its contact line, whose load is not used; may be traced.
 
         Slip of elastic sliders is the plastic one.
         """
@@ -107,7 +107,7 @@ class Network(eqx.Module):
 
         Parameters
         ----------
-        scene : scene on a condensed rung, for the mass that moves
+        scene : scene on its contact line, for the mass that moves
         displacement, force : (k,) points of the backbone, see `in_series`
 
         Raises

@@ -109,6 +109,7 @@ def _why_not(scene: Scene) -> str:
         "it is to be solved in load steps": model.by != AUTO,
         "it has a strain energy of its own": scene.energy is not None,
         "it is curved": strip.curvature is not None,
+        "it is held down": contact.normal == "held",
         "its base is not rigid": contact.normal != "rigid",
         "its friction is smooth": not isinstance(contact.law, SharpSlip),
         f"elasticity has no load.control = {load.control}": load.control not in CONTROLS,

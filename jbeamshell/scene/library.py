@@ -29,8 +29,8 @@ from jbeamshell.scene.toml import read_values, scene_from_values
 def standard() -> Scene:
     """The standard strip: a thin bar on a rough base, pulled to and fro at its end.
 
-    It is ``Scene()`` under an even traction, as the dissertation's finite elements are: fields v,
-    beta and psi, held at X = 0, two cycles of the end force (after chapter III).  Units are any
+    It is ``Scene()`` under an even traction, as the dissertation's finite elements are: held at
+    X = 0, two cycles of the end force (after chapter III).  Units are any
     consistent ones.  Gross slip begins at F = 2.
     """
     return named("standard")

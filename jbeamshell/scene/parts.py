@@ -34,7 +34,7 @@ from jbeamshell.scene.keys import (
 )
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.pressure import check_gap, check_pressure, pressure_values
-from jbeamshell.scene.rows import AUTO
+from jbeamshell.scene.rows import AUTO, Key
 
 
 class Strip(StripKeys):
@@ -260,6 +260,12 @@ def unit_path(cycles: int, steps: int) -> np.ndarray:
     return np.concatenate([first, *[down, -down] * cycles])
 
 
+UNWRITTEN = (  # fields of the model that no file holds
+    Key("by", "word", AUTO, "Engine that is asked for.", choices=(AUTO, "steps")),
+    Key("end_size", "setting", AUTO, "Smallest elements.", unit="H", open=True),
+)
+
+
 class Model(ModelKeys):
     """Extent and resolution of the model.
 
@@ -273,12 +279,14 @@ class Model(ModelKeys):
     by: str = eqx.field(static=True, default=AUTO)
     end_size: float | str = eqx.field(static=True, default=AUTO)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for key in UNWRITTEN:
+            value = key.convert(getattr(self, key.name))
+            key.check(value)
+            setattr(self, key.name, value)
+
     def __check_init__(self) -> None:
-        require("by", self.by, self.by in (AUTO, "steps"), "choose 'auto' or 'steps'")
-        if isinstance(self.end_size, str):
-            require("end_size", self.end_size, self.end_size == AUTO, "give a number or 'auto'")
-        elif isinstance(self.end_size, int | float):
-            require("end_size", self.end_size, 0.0 < self.end_size < np.inf, "must be positive")
         odd = self.nodes == AUTO or (self.nodes - 1) % ORDER[self.grid] == 0
         fix = "must be odd for the collocation grid (two elements' ends and their middle)"
         require("model.nodes", self.nodes, odd, fix)

@@ -62,10 +62,10 @@ def curves() -> dict[str, Any]:
 def kind_of(scene: Parts) -> str:
     """Kind of a scene for which curves are recorded; empty if there are none for it."""
     strip, contact, member, load = scene.strip, scene.contact, scene.member, scene.load
-    straight = strip.curvature is None and scene.energy is None and contact.normal == "rigid"
-    straight = straight and isinstance(contact.law, SharpSlip)
+    straight = strip.curvature is None and scene.energy is None
+    base = contact.normal in ("rigid", "held") and isinstance(contact.law, SharpSlip)
     pulled = load.kind == "force" and load.arm is None
-    if not straight or not pulled or strip.overhang is not None:
+    if not straight or not base or not pulled or strip.overhang is not None:
         return ""
     if member.support != "none":
         return {"rolling": "double shear", "clamped": "single lap"}[member.support]
@@ -190,10 +190,14 @@ def doubt_of_section(scene: Parts, slip_length: float, allowed: float) -> str:
         return ""
     reach = slip_length / float(scene.strip.half_height)
     off = f"more than {100.0 * min(found.usual, 1.0):.3g} %"
+    fix = "leave model.section open, or take model.section = plane"
+    if scene.model.by == "steps":
+        fix = "do without load steps, with model.section open or plane"
+    if scene.contact.normal == "held":
+        fix = "let it lift off (contact.normal = rigid), with model.section = plane"
     return (
         f"where slip reaches {reach:.2g} H the section {section_of(scene)} typically loses "
-        f"{_compared(found.typical)} plane elasticity, and one strip in ten is off by {off}; leave "
-        "model.section open, or take model.section = plane"
+        f"{_compared(found.typical)} plane elasticity, and one strip in ten is off by {off}; {fix}"
     )
 
 

@@ -40,7 +40,7 @@ def tables(root: Path) -> dict[str, str]:
         "table_condensed.md": condensed(_read(benchmarks / "condensed.json")),
         "table_peer.md": peer(_read(benchmarks / "condensed.json")["peer"]),
         "table_entries.md": entries(_read(root / "jbeamshell" / "scene" / "section_errors.json")),
-        "table_rungs.md": rungs(_read(benchmarks / "ladder.json")["map"]),
+        "table_sections.md": sections(_read(benchmarks / "ladder.json")["map"]),
         "table_identification.md": identification(_read(benchmarks / "identification.json")),
         "table_motion.md": motion(_read(benchmarks / "dynamics.json")),
         "table_laws.md": laws(_read(studies / "laws_of_a_strip.json")),
@@ -120,7 +120,7 @@ def starting(record: dict) -> str:
 
 
 def condensed(record: dict) -> str:
-    """Error of the rung plane over its nodes, and its cost."""
+    """Error of plane elasticity over its nodes, and its cost."""
     times = {row["nodes"]: row for row in record["peer"]["ours"]}
     rows = [
         (row["nodes"], percent(row["above_tenth"]), percent(row["above_ten_thousandth"]),
@@ -144,20 +144,21 @@ def peer(record: dict) -> str:
     return table(heads, rows)
 
 
-def rungs(record: dict) -> str:
-    """Dissipation of each rung over that of finite elements."""
+def sections(record: dict) -> str:
+    """Dissipation of each section over that of finite elements."""
     cells = {(cell["eta"], cell["A"]): cell for cell in record["cells"]}
     rows = [
         (
             eta,
             load,
             f"{load / eta:.1f}",
-            *(f"{cells[eta, load][rung]:.3g}" for rung in record["rungs"]),
+            *(f"{cells[eta, load][section]:.3g}" for section in record["sections"]),
         )
         for eta in HEIGHTS
         for load in LOADS
     ]
-    heads = ("height ratio", "A", "A over height ratio", *(f"`{rung}`" for rung in record["rungs"]))
+    names = (f"`{section}`" for section in record["sections"])
+    heads = ("height ratio", "A", "A over height ratio", *names)
     return table(heads, rows)
 
 
@@ -224,7 +225,7 @@ def squeeze(record: dict) -> str:
     exact = record["finite_elements"]
     finest = {
         row["order"]: row
-        for row in sorted(record["rungs"], key=lambda row: row["nodes"])
+        for row in sorted(record["sections"], key=lambda row: row["nodes"])
         if row["kinematics"] == "linear"
     }
     rows = [

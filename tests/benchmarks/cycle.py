@@ -25,10 +25,8 @@ import numpy as np  # noqa: E402
 import jbeamshell as jb  # noqa: E402
 from jbeamshell.quasistatic.solving import compile_for  # noqa: E402
 
-IN_LOAD_STEPS = {"model.solution": "stepwise", "model.kinematics": "exact"}
-
 ROUNDS = 7
-STANDARD = {"load.cycles": 1}
+STANDARD = {"load.cycles": 1, "model.kinematics": "exact", "contact.normal": "held"}
 VARIANTS = {
     "default": {},
     "linear kinematics": {"model.kinematics": "linear"},
@@ -37,8 +35,8 @@ VARIANTS = {
         "model.nodes": 41,
         "load.steps_per_half_cycle": 10,
     },
-    "fields v, beta": {"model.fields": ["v", "beta"]},
-    "fields v, w, beta, psi": {"model.section": "squeeze"},
+    "shell": {"model.section": "shell"},
+    "with lift": {"contact.normal": "rigid"},
     "collocation": {"model.grid": "collocation"},
     "collocation, 81 nodes": {"model.grid": "collocation", "model.nodes": 81},
     "m = 8": {"contact.smoothing": 8.0},
@@ -61,7 +59,7 @@ def drift(scene: jb.Scene) -> float:
 def main() -> None:
     """Measure all variants side by side and write the record."""
     scenes = {
-        name: jb.library.standard().replace(IN_LOAD_STEPS).replace(STANDARD | keys)
+        name: jb.library.standard().replace(STANDARD | keys).by_load_steps()
         for name, keys in VARIANTS.items()
     }
     record: dict[str, dict] = {name: {"keys": VARIANTS[name]} for name in scenes}
@@ -82,7 +80,7 @@ def main() -> None:
         record[name]["over_default"] = record[name]["run_ms"] / (
             1e3 * statistics.median(times["default"])
         )
-        if not name.startswith(("fields", "collocation")):
+        if not name.startswith(("shell", "with lift", "collocation")):
             record[name]["drift_per_cycle"] = drift(scene)
         print(name, {k: v for k, v in record[name].items() if k != "keys"})
     asked = ["git", "rev-parse", "--short", "HEAD"]

@@ -30,7 +30,8 @@ from jbeamshell import dynamics, plotting  # noqa: E402
 from jbeamshell.dynamics.release import HEAVY, let_go  # noqa: E402
 
 HERE = Path(__file__).parent
-STRIP = {"model.kinematics": "linear", "model.nodes": 41, "model.end_size": 0.0278}
+STRIP = {"model.kinematics": "linear", "contact.normal": "held"}
+GRID, FINE = (41, 0.0278), (161, 1.0 / 6.0)  # nodes, and smallest elements before scaling
 FORCES = [0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 1.6]
 STEPS = [100, 200, 400, 800, 1600, 3200]
 FINEST = 25600
@@ -45,8 +46,8 @@ def warm(run):
     return result, time.perf_counter() - begin
 
 
-def scene(**values):
-    return jb.Scene().replace(STRIP | values)
+def scene(grid=GRID, **values):
+    return jb.Scene().replace(STRIP | values).on_grid(*grid)
 
 
 def ringing(strip, cycles, per_cycle, **options):
@@ -106,11 +107,10 @@ def masing():
     study = let_go(scene(), 1.0, cycles=60.0, per_cycle=800, whole=True)
     late = study.found.damping < 0.02
     off = np.abs(study.ratio[late] - 1.0)
-    fine = {"model.nodes": 161, "model.end_size": 1.0 / 6.0}
-    joint = dynamics.Joint.of(scene(**fine), 1.7)
+    joint = dynamics.Joint.of(scene(FINE), 1.7)
     u = np.interp(FORCES, np.asarray(joint.force), np.asarray(joint.displacement))
     slopes = np.diff(np.log(np.asarray(joint.dissipation(u)))) / np.diff(np.log(FORCES))
-    bar = dynamics.Joint.of(scene(**fine, **{"strip.height_ratio": 0.02}), 1.7)
+    bar = dynamics.Joint.of(scene(FINE, **{"strip.height_ratio": 0.02}), 1.7)
     v = np.interp(FORCES, np.asarray(bar.force), np.asarray(bar.displacement))
     cubic = np.diff(np.log(np.asarray(bar.dissipation(v)))) / np.diff(np.log(FORCES))
     figures = {name: np.asarray(v).tolist() for name, v in study.figures().items() if "d" in name}
@@ -126,7 +126,7 @@ def masing():
 
 def work_precision():
     """Time and error of the solvers in a ring-down of four cycles with m = 16."""
-    strip = scene(**{"model.nodes": 21, "contact.smoothing": 16.0})
+    strip = scene((21, GRID[1]), **{"contact.smoothing": 16.0})
     reference = ringing(strip, 4, FINEST)
     size = float(np.abs(np.asarray(reference.displacement)).max())
     runs = [("midpoint", n, {}) for n in STEPS]

@@ -1,8 +1,8 @@
-"""Error of every rung of the ladder in load steps, over heights and loads.
+"""Error of every section in load steps, over heights and loads.
 
-    python tests/benchmarks/ladder.py           # --quick: a few rungs, no record
+    python tests/benchmarks/ladder.py           # --quick: a few sections, no record
 
-writes ladder.json beside this file: the rungs on one grid over all heights and amplitudes that
+writes ladder.json beside this file: the sections on one grid over all heights and amplitudes that
 finite elements have computed.  Times and errors side by side are those of work_precision.py.
 """
 
@@ -31,7 +31,7 @@ from jbeamshell.measured.example import data_folder  # noqa: E402
 ROOT = Path(__file__).parents[2]
 RECORD = Path(__file__).with_suffix(".json")
 CYCLES = 2
-RUNGS = ("bar", "shell", "squeeze", "p2", "p3", "p4", "p6")
+SECTIONS = ("bar", "shell", "squeeze", "p2", "p3", "p4", "p6")
 QUICK = ("bar", "squeeze", "p3")
 NODES, STEPS = 81, 10  # load steps per half cycle
 
@@ -50,26 +50,29 @@ def cells() -> dict[tuple[float, float], dict[str, float]]:
 # --- measuring ------------------------------------------------------------------------------------
 
 
-def modelled(strip: tuple[float, float], rung: str) -> jb.Scene:
-    """A standard strip by a rung in load steps, with linear kinematics.
+def modelled(strip: tuple[float, float], section: str) -> jb.Scene:
+    """A standard strip of a section in load steps, held down, with linear kinematics.
 
     On finer elements than these the beamshell's point reaction at the loaded end turns into
     tension.
     """
     eta, amplitude = strip
-    return jb.library.standard().replace(
-        {
-            "strip.height_ratio": eta,
-            "load.amplitude": amplitude,
-            "load.cycles": CYCLES,
-            "load.steps_per_half_cycle": STEPS,
-            "model.section": rung,
-            "model.kinematics": "linear",
-            "model.nodes": NODES,
-            "model.end_size": 1.0 / 12.0 if rung.startswith("p") else 1.0 / 6.0,
-        }
-        | ({"model.solution": "stepwise"} if rung != "bar" else {})
+    scene = (
+        jb.library.standard()
+        .replace(
+            {
+                "strip.height_ratio": eta,
+                "contact.normal": "held",
+                "load.amplitude": amplitude,
+                "load.cycles": CYCLES,
+                "load.steps_per_half_cycle": STEPS,
+                "model.section": section,
+                "model.kinematics": "linear",
+            }
+        )
+        .on_grid(NODES, 1.0 / 12.0 if section.startswith("p") else 1.0 / 6.0)
     )
+    return scene if section == "bar" else scene.by_load_steps()
 
 
 def ratio(history: jb.History, strip: tuple[float, float]) -> float:
@@ -78,21 +81,21 @@ def ratio(history: jb.History, strip: tuple[float, float]) -> float:
 
 
 def measure_map(quick: bool) -> dict[str, Any]:
-    """Every rung on one grid over all cells."""
-    rungs = QUICK if quick else RUNGS
+    """Every section on one grid over all cells."""
+    sections = QUICK if quick else SECTIONS
     rows: dict[Any, dict[str, float]] = {
         cell: {"eta": cell[0], "A": cell[1], "over_cubic_law": row["ratio"]}
         for cell, row in cells().items()
     }
-    for rung in tqdm(rungs, disable=None, unit="rung", desc="map"):
+    for section in tqdm(sections, disable=None, unit="section", desc="map"):
         for cell, row in rows.items():
-            row[rung] = ratio(jb.solve(modelled(cell, rung)), cell)
+            row[section] = ratio(jb.solve(modelled(cell, section)), cell)
     return {
         "about": about(),
         "kinematics": "linear",
         "nodes": NODES,
         "steps": STEPS,
-        "rungs": list(rungs),
+        "sections": list(sections),
         "cells": list(rows.values()),
     }
 
@@ -138,7 +141,7 @@ def as_text(record: dict[str, Any]) -> str:
 def main() -> None:
     """Measure and write the record."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="a few rungs; writes nothing")
+    parser.add_argument("--quick", action="store_true", help="a few sections; writes nothing")
     options = parser.parse_args()
     text = as_text({"map": measure_map(options.quick)})
     if options.quick:

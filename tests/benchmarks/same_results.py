@@ -20,11 +20,12 @@ jax.config.update("jax_enable_x64", True)
 
 import jbeamshell as jb  # noqa: E402
 
-IN_LOAD_STEPS = {"model.solution": "stepwise", "model.kinematics": "exact"}
+HELD = {"model.kinematics": "exact", "contact.normal": "held"}
+CLOSED_FORM = ("bar", "bar, displaced")  # the other scenes are solved in load steps
 
 SMALL = {"model.nodes": 21, "load.steps_per_half_cycle": 8, "load.cycles": 1}
 LINEAR = SMALL | {"model.kinematics": "linear"}
-LIFT = {"model.section": "squeeze"}
+LIFT = {"contact.normal": "rigid"}
 LAYERS = {"strip.layers": [[0.1, 2e5, 0.3], [0.0752, 1e5, 0.2], [0.05, 4e5, 0.1]]}
 TABLE = {"contact.pressure": [[0.0, 4.0], [0.9, 12.0], [0.9, 6.0], [2.0, 10.0]]}
 DISPLACED = {"load.control": "displacement", "load.amplitude": 2e-5}
@@ -51,7 +52,7 @@ SCENES: dict[str, dict] = {
     "one step": LINEAR | {"load.steps_per_half_cycle": 1},
     "two cycles": LINEAR | {"load.cycles": 2},
     "bar": LINEAR | {"model.section": "bar"},
-    "stepwise bar": LINEAR | {"model.section": "stepwise-bar"},
+    "stepwise bar": LINEAR | {"model.section": "bar"},
     "bar, displaced": LINEAR | {"model.section": "bar"} | DISPLACED,
     "shell": LINEAR | {"model.section": "shell"},
     "shell, exact": SMALL | {"model.section": "shell"} | MILD,
@@ -90,7 +91,7 @@ SCENES: dict[str, dict] = {
     "pressure in steps": LINEAR | {"load.pressure_steps": 3},
     "lift": LINEAR | LIFT,
     "lift, exact": SMALL | LIFT,
-    "lift, shell": LINEAR | {"model.section": "shell"},
+    "lift, shell": LINEAR | LIFT | {"model.section": "shell"},
     "lift, p2": LINEAR | {"model.section": "p2"} | LIFT,
     "compliant": LINEAR | LIFT | {"contact.normal": "compliant"},
     "assumed": LINEAR | LIFT | {"model.section": "assumed"},
@@ -106,28 +107,28 @@ SCENES: dict[str, dict] = {
 }
 
 
+def scene(name: str) -> jb.Scene:
+    """A scene by its name; it is held down unless it says otherwise."""
+    found = jb.library.standard().replace(HELD | SCENES[name])
+    return found if name in CLOSED_FORM else found.by_load_steps()
+
+
 def results() -> dict[str, np.ndarray]:
     """Arrays by name, of every scene, of a gradient and of a sweep."""
     found = {}
-    for name, settings in tqdm(SCENES.items(), disable=None):
-        history = jb.solve(
-            jb.library.standard().replace(IN_LOAD_STEPS).replace(settings), throw=False
-        )
+    for name in tqdm(SCENES, disable=None):
+        history = jb.solve(scene(name), throw=False)
         found |= {f"{name}/{figure}": np.asarray(getattr(history, figure)) for figure in FIGURES}
         if history.cycles:
             found[f"{name}/dissipation"] = np.asarray(history.dissipation)
             found[f"{name}/dissipation_error"] = np.asarray(history.dissipation_error)
     keys = ["contact.friction", "strip.height_ratio", "strip.poisson_ratio"]
     for name in ("linear", "smooth", "lift", "p2"):
-        ask = jb.response(
-            jb.library.standard().replace(IN_LOAD_STEPS).replace(SCENES[name]),
-            keys,
-            ["dissipation"],
-        )
+        ask = jb.response(scene(name), keys, ["dissipation"])
         slopes = jax.jacrev(lambda x, ask=ask: ask(*x)["dissipation"])
         found[f"gradient, {name}/dissipation"] = np.asarray(slopes(np.array([0.12, 0.15, 0.25])))
     over = {"strip.height_ratio": np.geomspace(0.02, 0.4, 8), "load.amplitude": [0.3, 0.8, 1.9]}
-    swept = jb.sweep(jb.library.standard().replace(IN_LOAD_STEPS).replace(LINEAR), over)
+    swept = jb.sweep(scene("linear"), over)
     return found | {f"sweep/{name}": np.asarray(values) for name, values in swept.values.items()}
 
 

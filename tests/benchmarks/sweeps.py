@@ -61,7 +61,7 @@ def swept(scene: jb.Scene, over: dict[str, np.ndarray], paired: bool, check: int
     seen = np.array(errors)[np.array(ratios) > 1e-3]
     return {
         "lanes": works.size,
-        "rung": found.scene.plan.section,
+        "section": found.scene.plan.section,
         "nodes": found.scene.plan.nodes,
         "failed": int(np.sum(found.status != 0)),
         "cold_s": seconds[0],

@@ -13,10 +13,9 @@ import subprocess
 import sys
 import time
 
-IN_LOAD_STEPS = {"model.solution": "stepwise", "model.kinematics": "exact"}
-
 ROUNDS = 15
 FEW = {
+    "contact.normal": "held",
     "model.nodes": 33,
     "load.cycles": 1,
     "load.steps_per_half_cycle": 1,
@@ -36,14 +35,15 @@ def calls():
     jb.configure()
     numbers = (0.1126, 0.7855)
     over = ["strip.height_ratio", "load.amplitude"]
-    scene = jb.library.standard().replace(IN_LOAD_STEPS).replace(FEW)
+    scene = jb.library.standard().replace(FEW).by_load_steps()
     many = scene.replace({"load.steps_per_half_cycle": 20, "model.nodes": 41})
     exact = scene.replace({"model.kinematics": "exact", "load.steps_per_half_cycle": 4})
     ask = jb.response(scene, over, ["dissipation"])
     loop = jb.response(many, over, ["force", "displacement", "dissipation"])
     rotated = jb.response(exact, over, ["dissipation"])
     slope = jax.jit(jax.grad(lambda eta, load: ask(eta, load)["dissipation"], (0, 1)))
-    walked = jb.library.standard().replace({"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 33})
+    line = {"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 33}
+    walked = jb.library.standard().replace(line)
     lanes = {"strip.height_ratio": np.geomspace(0.02, 0.4, 64)}
     lanes["load.amplitude"] = np.linspace(0.3, 1.6, 64)
     return {

@@ -86,7 +86,7 @@ def test_what_is_not_worth_it_is_not_tried():
 
 def test_a_response_is_native(monkeypatch):
     numbers = {"model.nodes": 11, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
-    scene = jb.Scene().replace(numbers | {"load.cycles": 1, "model.solution": "stepwise"})
+    scene = jb.Scene().replace(numbers | {"load.cycles": 1}).by_load_steps()
     made = []
 
     def native(*given, **more):
@@ -104,8 +104,9 @@ def test_a_response_is_native(monkeypatch):
 
 
 def test_a_response_of_a_traced_scene():
-    small = {"model.nodes": 11, "model.fields": ["v"], "model.kinematics": "linear"}
-    scene = jb.Scene().replace(small | {"load.cycles": 1, "load.steps_per_half_cycle": 2})
+    small = {"model.nodes": 11, "model.section": "bar", "model.kinematics": "linear"}
+    small |= {"load.cycles": 1, "load.steps_per_half_cycle": 2}
+    scene = jb.Scene().replace(small).by_load_steps()
 
     def of_height(ratio):
         ask = jb.response(scene.replace({"strip.height_ratio": ratio}), ("load.amplitude",))
@@ -139,8 +140,9 @@ class TestProgram:
             assert function(x, given, 2, native=native) == pytest.approx(expected, rel=1e-14)
 
     def test_the_first_run_has_the_digits_of_the_hundredth(self, optimised):
-        few = {"model.nodes": 5, "model.fields": ["v"], "model.kinematics": "exact"}
-        scene = jb.Scene().replace(few | {"load.cycles": 1, "load.steps_per_half_cycle": 2})
+        few = {"model.nodes": 5, "model.section": "bar", "model.kinematics": "exact"}
+        few |= {"load.cycles": 1, "load.steps_per_half_cycle": 2}
+        scene = jb.Scene().replace(few).by_load_steps()
         first, *rest = (jb.solve(scene, throw=False) for _ in range(100))
         assert first.converged
         for name in ("force", "displacement", "traction", "slip_work"):

@@ -21,7 +21,7 @@ from jbeamshell.quasistatic.system import V
 
 build = eqx.filter_jit(Equations)  # one program instead of hundreds
 jitted = eqx.filter_jit(lambda method, *arguments: method(*arguments))
-LINEAR = {"model.kinematics": "linear", "model.nodes": 21}
+LINEAR = {"model.kinematics": "linear", "model.nodes": 21, "contact.normal": "held"}
 RHO = 2.5
 
 
@@ -48,7 +48,7 @@ def test_a_stuck_strip_vibrates_as_in_closed_form(mass):
     errors = []
     for nodes in (11, 21):
         elastic = {"contact__stick_stiffness": 100.0, "model__nodes": nodes}
-        strip = scene(model__fields=["v", "beta"], **elastic)
+        strip = scene(model__section="shell", **elastic)
         found = dynamics.modes(strip, dynamics.Inertia(RHO, mass=mass)).frequency[0]
         errors.append(abs(found / stuck(strip)[0] - 1.0))
     assert errors[-1] < 5e-3
@@ -88,7 +88,7 @@ def test_a_cantilever_vibrates_as_timoshenkos():
     errors = []
     for nodes in (21, 41):
         strip = scene(
-            model__fields=["v", "w", "beta"],
+            model__section="shell",
             model__nodes=nodes,
             contact__normal="none",
             contact__friction=0.0,
@@ -99,10 +99,20 @@ def test_a_cantilever_vibrates_as_timoshenkos():
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
 
 
+def test_a_strip_on_a_rigid_base_is_held_down_in_motion():
+    held, rigid, soft = (
+        dynamics.modes(scene(contact__normal=base, contact__normal_stiffness=0.1)).frequency[0]
+        for base in ("held", "rigid", "compliant")
+    )
+    assert held == rigid
+    assert soft < 0.99 * held
+
+
 @pytest.mark.slow
 def test_sections_of_higher_order_vibrate_ever_slower_and_the_shell_is_near():
     entry = {"load__entry": "traction", "model__nodes": 41}
-    strips = (scene(model__order=order, **entry) for order in range(4))
+    sections = ("squeeze", "p1", "p2", "p3")
+    strips = (scene(model__section=section, **entry) for section in sections)
     shell, *orders = (dynamics.modes(strip).frequency[0] for strip in strips)
     assert np.all(np.diff(orders) < 0.0)
     assert shell == pytest.approx(orders[-1], rel=0.02)

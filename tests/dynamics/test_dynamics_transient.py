@@ -11,7 +11,7 @@ import jbeamshell as jb
 from jbeamshell import dynamics, identify, plotting
 from jbeamshell.dynamics.release import let_go
 
-LINEAR = {"model.kinematics": "linear", "model.nodes": 21}
+LINEAR = {"model.kinematics": "linear", "model.nodes": 21, "contact.normal": "held"}
 HEAVY = 20.0
 
 
@@ -32,17 +32,18 @@ def left_over(motion):
     return float(jnp.max(jnp.abs(motion.imbalance)))
 
 
-FINE = {"model__nodes": 41, "model__end_size": 0.0278}
+def fine_scene():
+    return scene().on_grid(41, 0.0278)
 
 
 @pytest.fixture(scope="module")
 def study():
-    return let_go(scene(**FINE), 1.0, cycles=20.0, per_cycle=400, whole=True)
+    return let_go(fine_scene(), 1.0, cycles=20.0, per_cycle=400, whole=True)
 
 
 class TestRingDown:
     def test_energy_balances(self):
-        strip = scene(**FINE)
+        strip = fine_scene()
         motion = dynamics.simulate(
             strip,
             20.0 * period(strip),
@@ -135,14 +136,12 @@ def test_fronts_run_at_the_speeds_of_waves(wave):
     strip = STRIP.replace(
         LINEAR
         | {
-            "model.nodes": 401,
-            "model.end_size": 1.0,
-            "model.fields": ["v"] if axial else ["v", "w", "beta"],
+            "model.section": "bar" if axial else "shell",
             "contact.friction": 0.0,
             "contact.normal": "rigid" if axial else "none",
             "strip.height_ratio": 0.2 if axial else 0.4,
         }
-    )
+    ).on_grid(401, 1.0)
     modulus, shear = float(strip.strip.plane_modulus), float(strip.strip.shear_modulus)
     kappa = 10.0 * 1.3 / (12.0 + 11.0 * 0.3)
     speed = np.sqrt(modulus if axial else kappa * shear)
@@ -249,9 +248,7 @@ def test_energy_balances_with_exact_kinematics_damping_and_consistent_mass(mass)
 
 @pytest.mark.slow
 def test_a_shaken_strip_lifts_off_where_the_foundation_falls_away():
-    strip = scene(
-        model__nodes=11, model__fields=["v", "w", "beta", "psi"], contact__normal="compliant"
-    )
+    strip = scene(model__nodes=11, contact__normal="compliant")
     weight = 2.0 * float(strip.strip.half_height)  # per length, of density 1
     for level, lifts in ((0.5, False), (1.6, True)):
         shaker = dynamics.Shaker(level * 10.0 / weight, 20.0, ramp=0.5, direction="across")
@@ -315,11 +312,9 @@ REFUSED = {
         lambda: dynamics.simulate(scene(), 1.0, released=1.0, method="kvaerno3", step=1.0),
         "chooses its own",
     ),
-    "rigid": (
-        lambda: dynamics.simulate(
-            scene(model__fields=["v", "w", "beta", "psi"]), 1.0, released=1.0
-        ),
-        "contact.normal = 'rigid'.*'compliant'",
+    "assumed": (
+        lambda: dynamics.simulate(scene(model__section="assumed"), 1.0, released=1.0),
+        "model.section = 'assumed': has no inertia",
     ),
     "control": (
         lambda: dynamics.simulate(

@@ -7,9 +7,9 @@ from toy import STRIP
 import jbeamshell as jb
 from jbeamshell import dynamics
 from jbeamshell.dynamics.light_strip import LightMotion, ring
-from jbeamshell.dynamics.release import LIGHT, let_go
+from jbeamshell.dynamics.release import LIGHT, let_go, on_contact_line
 
-SCENE = STRIP.replace({"model.section": "plane", "model.nodes": 33, "load.entry": "traction"})
+SCENE = jb.Scene().replace({"model.section": "plane", "model.nodes": 33, "load.entry": "traction"})
 CYCLES = 20.0
 
 
@@ -76,6 +76,14 @@ class TestLetGo:
             let_go(SCENE, 1.0, payload=1.0, cycles=CYCLES)
         assert let_go(SCENE, 1.0, payload=1.0, cycles=CYCLES, whole=False).light
 
+    @pytest.mark.parametrize(
+        ("section", "found"),
+        [("auto", "plane"), ("plane", "plane"), ("squeeze", "squeeze"), ("bar", None)],
+    )
+    def test_the_network_is_that_of_the_named_section_or_of_plane_elasticity(self, section, found):
+        line = on_contact_line(jb.Scene().replace({"model.section": section}))
+        assert found == (None if line is None else line.plan.section)
+
     def test_a_strip_without_a_network_is_refused_where_one_is_asked_for(self):
         smooth = STRIP.replace({"contact.smoothing": 8.0, "model.nodes": 11})
         with pytest.raises(jb.InputError, match=r"whole = False.*has no network"):
@@ -83,8 +91,7 @@ class TestLetGo:
 
     @pytest.mark.slow
     def test_the_strips_inertia_lowers_frequency_and_damping_as_said(self):
-        fine = {"model.kinematics": "linear", "model.nodes": 41, "model.end_size": 0.0278}
-        strip = STRIP.replace(fine)
+        strip = STRIP.replace({"model.kinematics": "linear"}).on_grid(41, 0.0278)
         strip_mass = 2.0 * float(strip.strip.half_height * strip.strip.length)
         curves = {}
         for times in (1000.0, 10.0):

@@ -121,7 +121,7 @@ def test_curves_that_a_scene_cannot_answer():
     scene = library.squeezed()
     with pytest.raises(jb.InputError, match=r"far end: x = 105 lies off the strip.*0 to 100"):
         identify.fit_kappa_s(SqueezeCurve(X + 60.0, STRESS, "far end"), scene)
-    with pytest.raises(jb.InputError, match=r"have no squeeze stress: add psi"):
+    with pytest.raises(jb.InputError, match=r"section = shell has no squeeze stress: take squee"):
         observe(SqueezeCurve(X, STRESS), scene.replace({"model.section": "shell"}))
     observe(SqueezeCurve(X + 45.00001, STRESS), scene)  # rounded by the table it came from
 

@@ -123,7 +123,7 @@ def test_sampled_intervals_are_those_of_profiles():
         u = loop.displacement
         noise = 0.01 * np.ptp(u) * random.standard_normal(u.size)
         loops.append(loop._replace(displacement=u + noise))
-    coarse = {"model.nodes": 21, "model.kinematics": "linear", "model.solution": "stepwise"}
+    coarse = {"model.nodes": 21, "model.kinematics": "linear", "contact.normal": "held"}
     fit = identify.fit(loops, jb.Scene().replace(coarse), [MU, ETA], points=48)
     problem = identify.posterior(fit)
     stride = blackjax.mcmc.random_walk.normal(1.7 * np.linalg.cholesky(problem.covariance))

@@ -23,8 +23,8 @@ MU, COMPLIANCE = "contact.friction", "rig.compliance"
 SCENE = jb.Scene().replace(
     {
         "model.nodes": 7,
-        "model.solution": "stepwise",
         "model.kinematics": "linear",
+        "contact.normal": "held",
         "load.control": "displacement",
         "load.amplitude": 1.0,
     }
@@ -49,7 +49,7 @@ def sliders(scene, path, **_):
 
 @pytest.fixture
 def slid(monkeypatch):
-    monkeypatch.setattr(models, "solve", sliders)
+    monkeypatch.setattr(models, "run", sliders)
 
 
 def cycle(amplitude, points=60):

@@ -240,9 +240,7 @@ def test_the_power_law_has_its_exponent():
 
 @pytest.mark.slow
 def test_a_row_of_sliders_is_the_strip_that_only_stretches():
-    scene = jb.Scene().replace(
-        {"model.fields": ["v"], "model.nodes": 161, "model.solution": "stepwise"}
-    )
+    scene = jb.Scene().replace({"model.section": "bar", "model.nodes": 161}).by_load_steps()
     energy = float(jb.solve(scene.replace({"load.amplitude": 1.234})).dissipation)
     rows = [laws.SeriesIwan.of_bar(3.4e4, 1.0, 2.0, count) for count in (20, 40, 80, 160)]
     found = [float(row.dissipation_at_force(1.234)) for row in rows]

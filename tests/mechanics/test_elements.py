@@ -110,9 +110,9 @@ def test_end_element_follows_the_height_at_the_design_count():
 
 def test_small_elements_grow_fast_up_to_where_others_begin():
     eta, end = 0.1, 2.0**-16 / 48.0
-    model = jb.Model(nodes=97, end_size=end)
-    assert model.small_growth == grid.SMALL_GROWTH > jb.Model(end_size=1e-3).small_growth
-    grading = {"far_size": 1.0 / 15.0, "small_growth": model.small_growth}
+    its, larger = (jb.Scene().on_grid(97, size).plan for size in (end, 1e-3))
+    assert its.small_growth == grid.SMALL_GROWTH > larger.small_growth
+    grading = {"far_size": 1.0 / 15.0, "small_growth": its.small_growth}
     x = np.asarray(grid.vertices(96, 2.0, eta, end, **grading))
     sizes = np.diff(x)
     assert (np.diff(sizes) < 1e-12).all()

@@ -20,7 +20,7 @@ C11 = LAM + 2 * G
 SECTION = Homogeneous(H, PLANE, NU, KAPPA_S)
 STRAINS = Strains(*jnp.array([1.1e-3, -0.7e-3, 2.3e-3, 0.9e-3, -1.7e-3]))
 
-BY_STEPS = {"solution": "stepwise", "kinematics": "linear"}
+BY_STEPS = {"by": "steps", "kinematics": "linear"}
 
 
 def test_forces_are_the_closed_expressions():

@@ -239,10 +239,12 @@ class TestContact:
         assert "test" in [text.get_text() for text in legend.get_texts()]
 
     def test_draws_only_what_is_modelled(self, clamped, history):
-        assert len(plotting.contact(history)) == 5  # the lift is frozen
-        flat = with_scene(history, model_fields=["v", "beta"])
+        assert len(plotting.contact(history)) == 6
+        held = with_scene(history, contact_normal="held")
+        assert len(plotting.contact(held)) == 5  # no lift
+        flat = with_scene(held, model_section="shell")
         assert [p.get_title() for p in plotting.contact(flat)] == ["normal reaction", "rotation"]
-        assumed = with_scene(clamped, model_squeeze="assumed")
+        assumed = with_scene(clamped, model_section="assumed")
         assert len(plotting.contact(assumed)) == 5  # no squeeze couple
 
     def test_without_a_foundation_shows_the_rise_and_no_reaction(self, clamped):

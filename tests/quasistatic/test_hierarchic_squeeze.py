@@ -23,11 +23,8 @@ RMS = {0: 0.74, 1: 2.65, 3: 0.76, 4: 0.34}  # of the mean sigma_y to finite elem
 
 
 def solved(scene, order):
-    change = {
-        "model.section": f"p{order}" if order else "squeeze",
-        "model.nodes": 101,
-        "model.kinematics": "linear",
-    }
+    section = f"p{order}" if order else "squeeze"
+    change = {"model.section": section, "model.nodes": 101, "model.kinematics": "linear"}
     return jb.solve(scene.replace(change))
 
 

@@ -53,7 +53,7 @@ def test_random_strips_converge_and_obey_friction(smoothing):
 
 def test_random_linear_steps_converge_without_recovery():
     random = np.random.default_rng(3)
-    linear = {"model.kinematics": "linear", "model.solution": "stepwise", "load.cycles": 1}
+    linear = {"model.kinematics": "linear", "load.cycles": 1}
     stepped = {"contact.pressure": [[0.0, 8.0], [0.9, 12.0], [0.9, 9.0], [2.0, 11.0]]}
     base = STRIP.replace(SMALL | linear | stepped)
     run = jax.jit(lambda v: jnp.max(jb.solve(base.replace(v), throw=False).status))
@@ -102,11 +102,9 @@ def test_a_contact_that_goes_round_in_circles_is_found_node_by_node():
         "contact.stick_stiffness": 2.3475173273096646,
         "contact.friction": 0.7971740930774074,
         "contact.pressure": [[0, pressure], [patch, pressure], [patch, 0.0], [length, 0.0]],
-        "model.nodes": 41,
         "model.kinematics": "linear",
-        "model.solution": "stepwise",
     }
-    scene = library.receding_rough().replace(clamp)
+    scene = library.receding_rough().replace(clamp).by_load_steps().on_grid(41, 0.02)
     history = jax.jit(lambda load: jb.solve(scene, load[None], throw=False))(7.090942609)
     assert history.converged
     assert int(history.iterations[-1]) > 100
@@ -117,7 +115,7 @@ def test_a_contact_that_goes_round_in_circles_is_found_node_by_node():
 @pytest.mark.slow(minutes=2)
 def test_random_clamps_lift_and_touch_again_and_balance_their_energy():
     random = np.random.default_rng(1)
-    base = library.receding_rough().replace({"model.nodes": 201})
+    base = library.receding_rough().by_load_steps().on_grid(201, 0.02)
     for _ in range(100):
         history = jb.solve(base.replace(random_clamp(random)))
         assert float(jnp.min(history.gap)) > -1e-9

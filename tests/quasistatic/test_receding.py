@@ -135,8 +135,7 @@ def test_the_block_stays_and_the_curved_strip_advances():
 
 
 def test_a_point_load_lifts_the_strip_beyond_three_quarters_of_its_height():
-    # As one with `receding`: a program of its own would be compiled for another end element.
-    history = from_all_nodes(library.point_load().replace({"model.end_size": 0.02}))
+    history = from_all_nodes(library.point_load())
     assert float(history.contact_end[0]) / 2.0 == pytest.approx(0.735, abs=0.01)
 
 
@@ -182,8 +181,8 @@ def test_a_unilateral_end_does_not_mind_how_fine_it_is():
     sizes = {12: 68, 24: 75, 96: 91}  # H over the end element, and nodes with all others alike
     dissipation = []
     for parts, nodes in sizes.items():
-        change = LINEAR | thick | {"model.end_size": 1.0 / parts, "model.nodes": nodes}
-        history = jb.solve(STRIP.replace(change | {"load.cycles": 1}))
+        scene = STRIP.replace(LINEAR | thick | {"load.cycles": 1})
+        history = jb.solve(scene.on_grid(nodes, 1.0 / parts))
         assert float(history.reaction_min) > -1e-6
         dissipation.append(float(history.dissipation))
     assert abs(dissipation[0] / dissipation[1] - 1.0) < 6e-3

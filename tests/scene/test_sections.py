@@ -32,7 +32,7 @@ def test_names_come_back(section, tmp_path):
 
 @pytest.mark.parametrize("section", ["p0", "p13", "p-1", "p", "beam", "condensed-p2", "Bar", ""])
 def test_unknown_names_are_refused(section):
-    told = rf"model\.section = '{section}': choose 'auto' or 'bar' or 'shell' or 'squeeze'"
+    told = rf"model\.section = '{section}': choose 'bar' or 'shell' or 'squeeze'"
     with pytest.raises(jb.InputError, match=told):
         on(section)
 
@@ -142,16 +142,14 @@ def test_what_a_section_cannot_represent(section, more, message):
     ("more", "path"),
     [
         (LAYERS, None),
-        ({"contact.pressure": [[0.0, 10.0], [2.0, 5.0]]}, None),
         ({"load.cycles": 0}, None),
         ({}, [0.1, 0.2]),
     ],
-    ids=["layers", "pressures", "pressing", "path"],
+    ids=["layers", "pressing", "path"],
 )
 @pytest.mark.doubtful("few nodes")
 @pytest.mark.doubtful("the section bar")
 def test_a_bar_without_a_closed_form_takes_load_steps(more, path):
-    """No layer, ramp or path is refused: the same strip goes on by Newton's method."""
     history = jb.solve(on("bar", **more), path)
     assert history.scene.plan.engine == STEPS
     assert history.converged

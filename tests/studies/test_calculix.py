@@ -16,6 +16,7 @@ from calibration.finite_elements import __main__ as command
 from calibration.finite_elements import deck, histories, lap, mesh, program, results, solve
 from jbeamshell.scene import library, load_path
 from jbeamshell.scene.keys import ENTRIES
+from jbeamshell.scene.parts import unit_path
 
 STRIP = toy.STRIP.replace({"load.entry": "traction"})
 RECORDS = Path(deck.__file__).parent
@@ -26,7 +27,7 @@ STEPPED = [[0.0, 10.0], [1.5, 10.0], [1.5, 0.0], [2.0, 0.0]]
 
 def path_of(scene):
     """The scene's own cycles, without the compiled check of gross slip."""
-    target = scene.load.unit_path() * float(scene.load.amplitude)
+    target = unit_path(scene.load.cycles, scene.plan.steps) * float(scene.load.amplitude)
     before = np.arange(1, scene.load.pressure_steps + 1) / scene.load.pressure_steps
     return load_path.LoadPath(
         np.append(0.0 * before, target),
@@ -150,8 +151,7 @@ def test_what_a_scene_is_made_of_shows_in_its_deck():
     assert "TYPE=CPE4, ELSET=STRIP" in plain
     assert "NLGEOM" not in plain
     assert "*EQUATION" not in plain
-    lifted = {"contact.normal": "none", "model.section": "squeeze"}
-    assert "*CONTACT PAIR" not in deck_of(STRIP.replace(lifted))[1]
+    assert "*CONTACT PAIR" not in deck_of(STRIP.replace({"contact.normal": "none"}))[1]
 
 
 def equations(text):
@@ -318,12 +318,7 @@ def test_without_calculix_one_line_says_how_to_get_it(monkeypatch):
     [
         (lambda: library.bimaterial(), "strip.layers"),
         (lambda: library.advancing(), "strip.curvature"),
-        (
-            lambda: STRIP.replace(
-                {"contact.normal": "compliant", "model.section": "squeeze"}
-            ),
-            "contact.normal",
-        ),
+        (lambda: STRIP.replace({"contact.normal": "compliant"}), "contact.normal"),
         (lambda: jb.Scene(energy=lambda e, g, k, psi, dpsi: e**2), "energy"),
         (library.double_shear, "member.support"),
         (lambda: jb.Scene().replace(DRIVEN | {"load.control": "arc-length"}), "load.control"),

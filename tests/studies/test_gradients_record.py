@@ -35,16 +35,16 @@ def test_the_record_holds_all_settings(script):
 
 @pytest.mark.slow
 def test_a_setting_of_the_record(script):
-    name = "condensed, steps of pressure"
+    name = "contact line, steps of pressure"
     found = script.study(script.SETTINGS[name], points=1, seed=[0])
     assert found["counts"]["right"] > 500
     assert "wrong" not in found["counts"]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("setting", ["condensed squeeze", "stepwise sharp", "double shear"])
+@pytest.mark.parametrize("setting", ["contact line, squeeze", "load steps, sharp", "double shear"])
 def test_no_nan_is_kept_for_a_gradient(script, setting):
-    scene = jb.Scene().replace(script.SETTINGS[setting])
+    scene = script.changed(jb.Scene(), script.SETTINGS[setting])
 
     def dissipation(friction):
         return jb.solve(scene.replace({"contact.friction": friction})).dissipation

@@ -72,7 +72,12 @@ def test_condensed_elements_lift_where_nothing_presses():
 # --- the beamshell in NumPy ---------------------------------------------------------------------
 
 
-SMALL = {"model.nodes": 41, "load.steps_per_half_cycle": 8, "model.kinematics": "linear"}
+SMALL = {
+    "contact.normal": "held",
+    "load.steps_per_half_cycle": 8,
+    "model.kinematics": "linear",
+    "model.nodes": 41,
+}
 
 
 @pytest.mark.parametrize(("eta", "amplitude"), [(0.0511, 0.3247), (ETA, A), (0.4, 1.6)])

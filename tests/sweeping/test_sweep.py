@@ -122,7 +122,7 @@ def test_lanes_that_fail_are_solved_alone_and_leave_the_others_alone(result, mon
         return dataclasses.replace(history, status=bad) if scene.load.amplitude == 1.1 else history
 
     monkeypatch.setattr(runner.Runner, "_answers", failing)
-    monkeypatch.setattr(runner, "solve", solve)
+    monkeypatch.setattr(runner, "run", solve)
     over = {"load.amplitude": [0.3, 1.9, 1.1, 0.7], "strip.height_ratio": [0.05] * 31 + [0.4]}
     hurt = jb.sweep(SCENE, over, FIGURES)
     assert len(alone) == 128 // job.LEAST
@@ -151,7 +151,7 @@ def test_a_lane_that_is_solved_alone_has_the_estimate_of_its_run(monkeypatch):
         np.testing.assert_allclose(alone[name], values, rtol=1e-9, err_msg=name)
 
 
-@pytest.mark.doubtful("in the corner", "few nodes", "lock")
+@pytest.mark.doubtful("in the corner", "few nodes", "lock", "the section squeeze")
 def test_a_figure_of_nought_over_nought_is_told_from_a_failure(result, monkeypatch):
     batched = runner.Runner._answers
 
@@ -162,7 +162,7 @@ def test_a_figure_of_nought_over_nought_is_told_from_a_failure(result, monkeypat
 
     monkeypatch.setattr(runner.Runner, "_answers", undefined)
     monkeypatch.setattr(runner, "_figures", lambda *given: np.array([1.0, np.inf, 2.0, 3.0]))
-    monkeypatch.setattr(runner, "solve", lambda scene, **settings: jb.solve(scene))
+    monkeypatch.setattr(runner, "run", lambda scene, **settings: jb.solve(scene))
     odd = jb.sweep(SCENE, {"load.amplitude": [0.3, 1.9], **_eta([0.05])}, FIGURES)
     assert (odd.failed, odd.undefined) == (0, 2)
     assert np.all(np.isnan(odd["dissipation_ratio"]))
@@ -280,7 +280,6 @@ def test_a_sweep_wholly_outside_runs_nothing():
         ({"load.amplitude": [0.1, np.nan]}, "must be finite"),
         ({"load.amplitude": ["a"]}, "give numbers"),
         ({"strip.half_height": [0.1], "strip.height_ratio": [0.1]}, "say the same thing"),
-        ({"strip.curvature": [0.1]}, "needs w"),
         ({"load.amplitude": np.ones(5000), "strip.length": np.ones(5000)}, "25,000,000 lanes"),
     ],
 )
@@ -288,6 +287,11 @@ def test_axes_that_make_no_sweep_are_refused(over, says):
     with pytest.raises(InputError, match=says) as caught:
         jb.sweep(SCENE, over)
     assert "\n" not in str(caught.value)
+
+
+def test_curvatures_of_a_strip_that_is_held_down_are_refused():
+    with pytest.raises(InputError, match="needs a strip that may lift off"):
+        jb.sweep(SCENE.replace({"contact.normal": "held"}), {"strip.curvature": [0.1]})
 
 
 @pytest.mark.parametrize(

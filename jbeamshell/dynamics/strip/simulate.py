@@ -64,7 +64,7 @@ def simulate(
 
     Parameters
     ----------
-    scene : scene of the strip; its load is not used
+    scene : scene of the strip, whose load is not used; on a rigid base the strip is held down
     span : end time
     excitation : force at the end or acceleration of the foundation; None is free vibration
     inertia : density and damping; None is density 1

@@ -16,18 +16,18 @@ from jbeamshell.measured.example import data_folder
 
 ETA, AMPLITUDE = 0.1126, 0.7855
 
-IN_LOAD_STEPS = {"model.solution": "stepwise", "model.kinematics": "exact"}
 OVER = ("strip.height_ratio", "load.amplitude")
 STANDARD = {
     "strip.height_ratio": ETA,
     "load.amplitude": AMPLITUDE,
     "load.cycles": 1,
     "load.steps_per_half_cycle": 1,
+    "contact.normal": "held",
     "model.kinematics": "linear",
     "model.nodes": 41,
-    "model.end_size": 1.0 / 36.0,
 }
-FINE = {"model.nodes": 321, "model.end_size": 1.0 / 3.0, "load.steps_per_half_cycle": 40}
+FINE = {"model.nodes": 321, "load.steps_per_half_cycle": 40}
+END_SIZE, FINE_END_SIZE = 1.0 / 36.0, 1.0 / 3.0  # smallest elements before scaling, over H
 MOST = 200  # calls in a spell
 
 Call = Callable[[], Any]
@@ -69,9 +69,11 @@ QUICK = Plan(
 # --- the strip and its truth ----------------------------------------------------------------------
 
 
-def scene(values: Mapping[str, Any] | None = None) -> jb.Scene:
-    """The standard strip on the grid that is timed, with what differs."""
-    return jb.library.standard().replace(IN_LOAD_STEPS).replace(STANDARD | dict(values or {}))
+def scene(values: Mapping[str, Any] | None = None, end_size: float = END_SIZE) -> jb.Scene:
+    """The standard strip in load steps on the grid that is timed, with what differs."""
+    own = STANDARD | dict(values or {})
+    found = jb.library.standard().replace(own)
+    return found.on_grid(own["model.nodes"], end_size).by_load_steps()
 
 
 @cache

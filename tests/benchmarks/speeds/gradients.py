@@ -8,12 +8,24 @@ from tqdm import tqdm
 
 import jbeamshell as jb
 
-from .common import FINE, OVER, Plan, compiled, interleaved, numbers, scene, seconds_of, summary
+from .common import (
+    END_SIZE,
+    FINE,
+    FINE_END_SIZE,
+    OVER,
+    Plan,
+    compiled,
+    interleaved,
+    numbers,
+    scene,
+    seconds_of,
+    summary,
+)
 
 KEYS = ("contact.friction", "strip.height_ratio", "strip.kappa_s", "strip.axial_stiffness")
 STEPS = "load.steps_per_half_cycle"
 OFF = 1.05  # times the parameters, with which the loop to be met is made
-END_SIZES = {"1/36": 1.0 / 36.0, "1/3": 1.0 / 3.0}
+END_SIZES = {"1/36": END_SIZE, "1/3": FINE_END_SIZE}
 
 
 def gradient(plan: Plan) -> dict[str, Any]:
@@ -78,10 +90,9 @@ def study(plan: Plan) -> dict[str, Any]:
     rows = []
     cases = [(name, count) for name in END_SIZES for count in plan.studied]
     for name, count in tqdm(cases, disable=None, unit="grid", desc="derivative"):
-        change = {STEPS: 4, "model.nodes": count, "model.end_size": END_SIZES[name]}
-        here = scene(change)
+        here = scene({STEPS: 4, "model.nodes": count}, END_SIZES[name])
         rows.append({"end_size": name, "nodes": count} | _derivative(here))
-    best = _derivative(scene(FINE | {STEPS: 4}))
+    best = _derivative(scene(FINE | {STEPS: 4}, FINE_END_SIZE))
     for row in rows:
         row["D_error"] = row["D"] / best["D"] - 1.0
         row["error"] = row["dD_deta"] / best["dD_deta"] - 1.0

@@ -21,6 +21,7 @@ from .common import (
     AMPLITUDE,
     ETA,
     FINE,
+    FINE_END_SIZE,
     OVER,
     Call,
     Plan,
@@ -35,7 +36,7 @@ from .common import (
 
 STEPS = "load.steps_per_half_cycle"
 EXACT = {"model.kinematics": "exact"}
-LIFT = {"model.section": "squeeze"}
+LIFT = {"contact.normal": "rigid"}
 SMOOTH = {"contact.smoothing": 16.0}
 LOOP = ("force", "displacement", "dissipation")
 CALCULIX = machine.ROOT / "calibration" / "finite_elements" / "checked.json"
@@ -80,8 +81,7 @@ def of_call(row: dict[str, Any], call: Call, dissipation: Callable, limit: float
 @functools.cache
 def fine(*change: tuple[str, Any]) -> float:
     """Dissipation on the fine grid, of the standard strip with what differs."""
-    own = {key: list(v) if isinstance(v, tuple) else v for key, v in change}
-    return float(jb.solve(scene(own | FINE)).dissipation)
+    return float(jb.solve(scene(dict(change) | FINE, FINE_END_SIZE)).dissipation)
 
 
 def own_variants() -> list[Variant]:
@@ -97,7 +97,7 @@ def own_variants() -> list[Variant]:
     ]
     found = []
     for name, change, steps, figures in tqdm(cases, disable=None, desc="compile"):
-        limit = fine(*((k, tuple(v) if isinstance(v, list) else v) for k, v in change.items()))
+        limit = fine(*change.items())
         call = dissipation_call(change | {STEPS: steps}, figures)
         row = {"what": name, "by": "jbeamshell", "steps": steps, "returns": ", ".join(figures)}
         found.append(of_call(row, call, lambda answer: answer["dissipation"], limit))

@@ -25,12 +25,10 @@ COMMANDS = {
 RESULTS = {
     "jb.solve(jb.Scene())": "float(jb.solve(jb.Scene()).dissipation)",
     "jb.response, first figure": "jb.response(jb.Scene(), ['load.amplitude'])(.5)",
-    "jb.solve, rung plane": (
-        "float(jb.solve(jb.Scene().replace({'model.rung': 'plane'})).dissipation)"
+    "jb.solve, section plane": (
+        "float(jb.solve(jb.Scene().replace({'model.section': 'plane'})).dissipation)"
     ),
-    "jb.solve in load steps": (
-        "float(jb.solve(jb.Scene().replace({'model.solution': 'stepwise'})).dissipation)"
-    ),
+    "jb.solve in load steps": "float(jb.solve(jb.Scene(), by='steps').dissipation)",
 }
 BEGIN = (
     "import jax; jax.config.update('jax_enable_x64', True); import jbeamshell as jb; "
