@@ -5,8 +5,8 @@
 writes condensed_nodes.json beside this file: for every number of nodes the worst error against the
 converged finite elements of calibration/data/energy.csv, in percent, where D exceeds a tenth of the
 bar's cubic law and down to a ten-thousandth; with the edge of the slip zone followed through the
-elements, as `jb.condensed.dissipation` does, and with the nodes' own thresholds, as a history has
-them.  The numbers of nodes that the package takes unasked come from here.
+elements, as `jb.contact_line.dissipation` does, and with the nodes' own thresholds, as histories
+have them.  The numbers of nodes that the package takes unasked come from here.
 """
 
 import csv
@@ -22,8 +22,8 @@ from provenance import provenance  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.condensed import branches, cycles, strip  # noqa: E402
-from jbeamshell.condensed.body import Body  # noqa: E402
+from jbeamshell.contact_line import branches, cycles, strip  # noqa: E402
+from jbeamshell.contact_line.body import Body  # noqa: E402
 
 HERE = Path(__file__).parent
 COUNTS = (17, 25, 33, 49, 65, 89, 129)

@@ -31,7 +31,7 @@ DOUBLE = {
 }
 SINGLE = DOUBLE | {
     "member.support": "clamped",
-    "strip.loaded_end": "level",
+    "member.loaded_end": "level",
     "strip.overhang": 0.5,
     "member.overhang": 0.4,
 }
@@ -75,16 +75,16 @@ SETTINGS: dict[str, Values] = {
     | SINGLE
     | BOLTS
     | {
-        "contact.bearing_stiffness": 2.0,
-        "contact.clearance": 2e-6,
-        "contact.bolt_stiffness": 1.0,
+        "member.bearing_stiffness": 2.0,
+        "member.clearance": 2e-6,
+        "member.bolt_stiffness": 1.0,
         "load.arm": 0.05,
     },
     "lap with a gap, moment": FEW
     | SINGLE
     | {
         "contact.bottom_pressure": 10.0,
-        "contact.gap": [[0.0, 0.0], [0.9, 2e-6], [2.0, 0.0]],
+        "member.gap": [[0.0, 0.0], [0.9, 2e-6], [2.0, 0.0]],
         "load.kind": "moment",
         "load.amplitude": 0.3,
     },
@@ -94,5 +94,5 @@ SETTINGS: dict[str, Values] = {
 SIZES = {
     "strip.curvature": 1e-4,
     "contact.bottom_pressure": 1.0,
-    "contact.gap": 1e-6,
+    "member.gap": 1e-6,
 }

@@ -38,8 +38,8 @@ from strip import changed  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.quasistatic.response import RESPONSES  # noqa: E402
 from jbeamshell.scene.keys import NUMBERS, TABLE  # noqa: E402
+from jbeamshell.solving.response import RESPONSES  # noqa: E402
 
 RECORD = Path(__file__).parent / "gradients.json"
 SEED = 22
@@ -87,7 +87,7 @@ def numbers_of(scene: jb.Scene, given: Values) -> Walk:
     """Every number that a scene holds, each entry of its tables a direction of its own."""
     keys, values, directions = [], [], []
     for key in NUMBERS:
-        if key == "contact.holes":
+        if key == "member.holes":
             continue
         if TABLE[key].through and key != "contact.bolts":
             continue

@@ -5,7 +5,7 @@ A strip is squeezed on both faces over its middle, and pressed onto a frictionle
 by sections of order p = 1 to 6, on grids of 101 to 801 nodes with linear kinematics, some with
 exact ones, and compared with finite elements and Filon's exact stress. Where the pressure steps by
 [p], the reaction of order p steps by (-1)^p [p]/(p+1), and that of elasticity does not (for the
-reason see tests/quasistatic/test_hierarchic_squeeze.py).
+reason see tests/solving/test_hierarchic_squeeze.py).
 
 Writes ladder_squeeze.json beside this file and draws ladder_squeeze.png from it; takes about a
 quarter of an hour on one core, most of it to compile:

@@ -257,14 +257,14 @@ def lap(random: Random) -> Values:
         "model.section": str(random.choice(["squeeze", "squeeze", "p2", "plane"])),
     }
     if support == "clamped":
-        found["strip.loaded_end"] = "level"
+        found["member.loaded_end"] = "level"
     if random.uniform() < 0.5:
         begin, end = np.sort(random.uniform(0.2, 1.8, 2))
         bolt = [[begin, 0.0], [begin, 20.0], [end, 20.0], [end, 0.0]]
         found["contact.pressure"] = bolt
         if support == "clamped":
             found["contact.bottom_pressure"] = bolt
-            found["contact.assembly"] = str(random.choice(["frictionless", "frictional"]))
+            found["member.assembly"] = str(random.choice(["frictionless", "frictional"]))
         found["load.amplitude"] *= end - begin
     return found
 
@@ -272,7 +272,7 @@ def lap(random: Random) -> Values:
 def bolted(random: Random) -> Values:
     """Lap joints with two bolts: shanks, bearings, holes, gaps, overhangs and moments."""
     found = lap(random)
-    for key in ("contact.pressure", "contact.bottom_pressure", "contact.assembly"):
+    for key in ("contact.pressure", "contact.bottom_pressure", "member.assembly"):
         found.pop(key, None)
     widths, forces = random.uniform(0.2, 0.5, 2), random.uniform(5.0, 20.0, 2)
     bolts = [[x, force, width] for x, force, width in zip((0.6, 1.4), forces, widths, strict=True)]
@@ -280,12 +280,12 @@ def bolted(random: Random) -> Values:
     found |= {"contact.bolts": bolts, "load.amplitude": random.uniform(0.1, 0.9) * gross}
     extra = random.choice(["shanks", "bearings", "holes", "overhang", "arm", "moment"])
     if extra == "shanks":
-        found["contact.bolt_stiffness"] = _log(random, 1e2, 1e4)
+        found["member.bolt_stiffness"] = _log(random, 1e2, 1e4)
     elif extra == "bearings":
-        found["contact.bearing_stiffness"] = _log(random, 1e3, 1e5)
-        found["contact.clearance"] = gross / 3.4e4 * random.uniform(0.05, 1.0)
+        found["member.bearing_stiffness"] = _log(random, 1e3, 1e5)
+        found["member.clearance"] = gross / 3.4e4 * random.uniform(0.05, 1.0)
     elif extra == "holes":
-        found["contact.holes"] = [[row[0], row[2] * random.uniform(0.1, 0.6)] for row in bolts]
+        found["member.holes"] = [[row[0], row[2] * random.uniform(0.1, 0.6)] for row in bolts]
     elif extra == "overhang":
         found |= {
             "strip.overhang": random.uniform(0.1, 1.0),

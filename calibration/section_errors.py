@@ -107,8 +107,8 @@ def single_lap(random: Random) -> tuple[Values, float]:
 
 LAP = {"strip.far_end": "free"}
 DOUBLE = LAP | {"member.support": "rolling"}
-SINGLE = LAP | {"member.support": "clamped", "strip.loaded_end": "level"}
-SINGLE |= {"contact.assembly": "frictional"}
+SINGLE = LAP | {"member.support": "clamped", "member.loaded_end": "level"}
+SINGLE |= {"member.assembly": "frictional"}
 Draw = Callable[[Random], tuple[Values, float]]
 KINDS: dict[str, tuple[Draw, Values, int]] = {  # how one is drawn, words of all, number of scenes
     "even": (even, {}, 40),

@@ -1,5 +1,5 @@
 from . import (
-    condensed as condensed,
+    contact_line as contact_line,
     dynamics as dynamics,
     identify as identify,
     laws as laws,
@@ -14,19 +14,19 @@ from .common.errors import (
     UnconvergedError as UnconvergedError,
 )
 from .common.jax_options import configure as configure
-from .condensed.contact import solve_contact as solve_contact
-from .condensed.contact_file import read_contact as read_contact
-from .condensed.stiffness_model import StiffnessModel as StiffnessModel
-from .condensed.substructure import Substructure as Substructure
+from .contact_line.contact import solve_contact as solve_contact
+from .contact_line.contact_file import read_contact as read_contact
+from .contact_line.stiffness_model import StiffnessModel as StiffnessModel
+from .contact_line.substructure import Substructure as Substructure
 from .explorer import explore as explore
 from .history.contact_history import ContactHistory as ContactHistory
 from .history.history import History as History
-from .quasistatic.advice import Advice as Advice, advise as advise
-from .quasistatic.solving import solve as solve
+from .solving.advice import Advice as Advice, advise as advise
+from .solving.solve import solve as solve
 from .measured.inspection import Inspection as Inspection, inspect as inspect
 from .numerics.newton import Newton as Newton
-from .quasistatic.read_history import read_history as read_history
-from .quasistatic.response import response as response
+from .solving.read_history import read_history as read_history
+from .solving.response import response as response
 from .scene import library as library
 from .scene.parts import (
     Contact as Contact,

@@ -23,7 +23,7 @@ import scipy.io
 import scipy.sparse
 
 import jbeamshell as jb
-from jbeamshell.condensed.matrix_files import read_matrix
+from jbeamshell.contact_line.matrix_files import read_matrix
 from jbeamshell.dynamics.export import table
 from jbeamshell.identify.experiment import Prediction
 from jbeamshell.identify.plan import read_plan

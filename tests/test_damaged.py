@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.condensed.matrix_files import read_matrix
+from jbeamshell.contact_line.matrix_files import read_matrix
 
 FILES = 1_000  # more by hand: python tests/damaged.py SEED COUNT RECORD.json
 RECORD = json.loads(Path(damaged.__file__).with_suffix(".json").read_text(encoding="utf-8"))

@@ -22,9 +22,9 @@ from jbeamshell import identify
 from jbeamshell.cli import arguments, main, terminal
 from jbeamshell.common.errors import LONGEST
 from jbeamshell.identify import plan
+from jbeamshell.load_steps import recovery
 from jbeamshell.measured import array_tables, curve_files, curves, loops, steady
 from jbeamshell.measured.recordings import read_recordings
-from jbeamshell.quasistatic import recovery
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import KEYS, NUMBERS
 from jbeamshell.scene.toml import overridden, scene_from_values

@@ -21,7 +21,7 @@ import jbeamshell as jb
 from calibration.finite_elements.cards import card, node_set
 from calibration.finite_elements.mesh import weights
 from calibration.finite_elements.program import find_program
-from jbeamshell.condensed.strip import stations
+from jbeamshell.contact_line.strip import stations
 
 ROWS = 17  # of nodes over the height
 RISE = 1e3  # of the element height from the contact to the top

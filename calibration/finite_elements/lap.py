@@ -143,7 +143,7 @@ class Member(NamedTuple):
 def joint(entry: str = "traction") -> jb.Scene:
     """Scene of a single lap with two bolts."""
     values = {"contact.bolts": BOLTS, "load.amplitude": 0.6, "load.entry": entry}
-    return library.single_lap().replace(values | {"contact.assembly": "frictionless"} | CYCLE)
+    return library.single_lap().replace(values | {"member.assembly": "frictionless"} | CYCLE)
 
 
 def double_shear(entry: str = "traction") -> jb.Scene:
@@ -239,7 +239,7 @@ def _mounting(scene: jb.Scene, right: np.ndarray, left: np.ndarray) -> Held:
         held += [("PLANE", 2), (left[0], 2)]
     else:
         held += [(n, 2) for n in left]
-    return held + [(n, 2) for n in right if scene.strip.loaded_end == "level"]
+    return held + [(n, 2) for n in right if scene.member.loaded_end == "level"]
 
 
 def _ties(scene: jb.Scene, members: tuple[Member, Member]) -> tuple[str, Held]:

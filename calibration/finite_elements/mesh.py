@@ -17,7 +17,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.checks import POSITIVE, require, require_choice, require_number
-from jbeamshell.condensed.entry import REACH
+from jbeamshell.contact_line.entry import REACH
 from jbeamshell.mechanics import elements
 from jbeamshell.scene.scene import Scene
 

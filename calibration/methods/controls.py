@@ -11,8 +11,8 @@ import numpy as np
 
 import jbeamshell as jb
 from calibration.methods.strips import number, scene_of
-from jbeamshell.quasistatic.path_state import initial_state
-from jbeamshell.quasistatic.stepping import march
+from jbeamshell.load_steps.path_state import initial_state
+from jbeamshell.load_steps.stepping import march
 from jbeamshell.scene.load_path import LoadPath
 
 LARGE = 1.0  # an amplitude for paths of their own, for which it means nothing

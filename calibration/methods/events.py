@@ -21,7 +21,7 @@ from scipy.sparse.linalg import spsolve
 
 import jbeamshell as jb
 from calibration.methods import grids
-from jbeamshell.quasistatic.system import BETA, PSI, System, V, W
+from jbeamshell.load_steps.system import BETA, PSI, System, V, W
 
 FIELDS = [V, BETA, PSI]
 ROUNDING = 1e-11  # of the cap, or of the fastest node

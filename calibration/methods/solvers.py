@@ -19,10 +19,10 @@ from jax import Array, lax
 
 import jbeamshell as jb
 from calibration.strip import in_load_steps
+from jbeamshell.load_steps.system import LoadLevel, Prescribed, System, V
+from jbeamshell.load_steps.tangent import Stiffness, initial_stiffness, matrix
 from jbeamshell.mechanics.bar import cubic_law
 from jbeamshell.numerics import block_tridiagonal
-from jbeamshell.quasistatic.system import LoadLevel, Prescribed, System, V
-from jbeamshell.quasistatic.tangent import Stiffness, initial_stiffness, matrix
 from jbeamshell.scene.parts import unit_path
 from jbeamshell.scene.scene import ALMOST_RIGID
 

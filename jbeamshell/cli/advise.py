@@ -27,7 +27,7 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the advice; returns the exit code."""
     from jbeamshell.common import files
-    from jbeamshell.quasistatic import advice
+    from jbeamshell.solving import advice
 
     advised = advice.advise(scene_of(options), options.tol)
     put(files.as_json(advised.figures()) if options.json else f"{advised}\n")

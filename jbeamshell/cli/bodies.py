@@ -35,8 +35,8 @@ def run(options: argparse.Namespace) -> int:
     """Solve a contact, report and write; returns the exit code."""
     from jbeamshell.common import files
     from jbeamshell.common.checks import require
-    from jbeamshell.condensed.contact import solve_contact
-    from jbeamshell.condensed.contact_file import read_contact
+    from jbeamshell.contact_line.contact import solve_contact
+    from jbeamshell.contact_line.contact_file import read_contact
     from jbeamshell.plotting.folder import check_folder
 
     given = read_contact(options.file)

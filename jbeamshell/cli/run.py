@@ -45,9 +45,9 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run a scene, report and write; returns the exit code."""
     from jbeamshell.common import files
-    from jbeamshell.quasistatic import solving
-    from jbeamshell.quasistatic.advice import within
     from jbeamshell.scene import load_path
+    from jbeamshell.solving import solve as solving
+    from jbeamshell.solving.advice import within
 
     scene = within(scene_of(options), options.tol)
     load_path.check(scene)

@@ -23,8 +23,8 @@ import numpy as np
 from jax import Array, lax
 from jax.typing import ArrayLike
 
-from jbeamshell.condensed.branches import ContactState
-from jbeamshell.condensed.network import Network, Sliders
+from jbeamshell.contact_line.branches import ContactState
+from jbeamshell.contact_line.network import Network, Sliders
 from jbeamshell.dynamics.strip.motion import Ledger
 from jbeamshell.scene.scene import Scene
 

@@ -4,7 +4,7 @@ The mass m feels the strip as a spring of compliance c, whose own mass moves wit
 m_1, the integral of rho |u|^2/u(L)^2 over the stuck strip under an end load.  Rayleigh's quotient
 with this shape gives (omega/omega_1)^2 = m_1/m, where omega = 1/sqrt(m c) and
 omega_1 = 1/sqrt(m_1 c) are the lowest frequencies of the mass on the strip and of the strip alone.
-Where this ratio is small, the strip is its network of sliders (`jbeamshell.condensed.network`)
+Where this ratio is small, the strip is its network of sliders (`jbeamshell.contact_line.network`)
 under the mass.  Compared with the motion of whole strips, eta .1126 and .3, pulled with .25 and .8
 of gross slip, frequencies without the strip's inertia are too high by m_1/2m and damping ratios by
 2 m_1/m, and by up to 10 m_1/m in the first swings from .8 of gross slip.
@@ -23,7 +23,7 @@ from jax import Array, lax
 from jbeamshell.common.checks import POSITIVE, require, require_number
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import Small
-from jbeamshell.condensed.network import Network
+from jbeamshell.contact_line.network import Network
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.over_amplitude import RingDown
 from jbeamshell.dynamics.ringdown import ring_down

@@ -13,10 +13,10 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import is_traced, require, require_number
 from jbeamshell.common.errors import Status
 from jbeamshell.common.failed import nan_unless
-from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
+from jbeamshell.solving.solve import run
 
 CYCLE = np.array([1.0, -1.0, 1.0, -1.0, 1.0])  # the last two branches are the steady cycle
 

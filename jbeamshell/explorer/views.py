@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.explorer.controls import gross_slip
 from jbeamshell.history.history import History
-from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
+from jbeamshell.solving.solve import run
 
 Numbers = NDArray[np.float64]
 

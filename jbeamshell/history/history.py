@@ -146,7 +146,7 @@ class History(Profiles, ContactLine, CycleFigures):
 
         Parameters
         ----------
-        path, options : see `jbeamshell.quasistatic.continuation.PathEnd.continued`
+        path, options : see `jbeamshell.load_steps.continuation.PathEnd.continued`
 
         Raises
         ------

@@ -23,8 +23,8 @@ from jbeamshell.laws import Law, PowerLaw
 from jbeamshell.measured.curves import DissipationCurve, Measurement, StiffnessCurve
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.scene import Scene
+from jbeamshell.solving.solve import run
 
 MODELS = ("iwan4", "bouc-wen", "jenkins", "sliders4")
 LEVELS = np.geomspace(0.1, 1.0, 12)  # amplitudes of a strip's cycles, over its own

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import Small
-from jbeamshell.condensed.shared import Layout, Shared, shared
+from jbeamshell.contact_line.shared import Layout, Shared, shared
 from jbeamshell.identify.models import Model, Prepared, Runnable
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.rig import rigged, with_rig

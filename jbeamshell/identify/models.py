@@ -13,17 +13,17 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import require, require_choice
 from jbeamshell.common.errors import InputError
-from jbeamshell.condensed.strip import Strip
+from jbeamshell.contact_line.strip import Strip
 from jbeamshell.identify.assembly import Assembly
 from jbeamshell.identify.drive import Drive as Drive
 from jbeamshell.laws import Law, MasingLaw, PowerLaw
 from jbeamshell.measured.curves import AmplitudeCurve, DissipationCurve, StiffnessCurve
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.load_path import check
 from jbeamshell.scene.parts import Load
 from jbeamshell.scene.scene import Scene
+from jbeamshell.solving.solve import run
 
 # Figure of a `History` that each curve over amplitude measures.
 FIGURES: dict[type[AmplitudeCurve], str] = {

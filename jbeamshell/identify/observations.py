@@ -42,7 +42,7 @@ from jbeamshell.measured.curves import (
 )
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.solving import run
+from jbeamshell.solving.solve import run
 
 LENGTH_STEP = 32  # runs are filled up to multiples of this, where further points are cheap
 APPROACH = 8  # load steps from zero to the first point of a loop

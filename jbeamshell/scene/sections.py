@@ -7,7 +7,7 @@
 | ``squeeze`` | v, w, beta and psi, the beamshell with its squeeze strain |
 | ``assumed`` | the same, with psi = -(F_N + R)/(2E) (Brink 2015, section 4.2) |
 | ``p1``, ``p2``, ... | displacements of order p, see `jbeamshell.mechanics.hierarchic` |
-| ``plane`` | plane elasticity, see `jbeamshell.condensed` |
+| ``plane`` | plane elasticity, see `jbeamshell.contact_line` |
 
 The bar, and a strip that is held down (``contact.normal = held``), are without the lift w.
 """

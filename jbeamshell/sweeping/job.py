@@ -14,7 +14,7 @@ import jax
 import numpy as np
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.condensed.interpolation import HEIGHT, POISSON
+from jbeamshell.contact_line.interpolation import HEIGHT, POISSON
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.toml import scene_from_values, scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome

@@ -27,8 +27,8 @@ from jbeamshell.common.precision import doubled, is_single
 from jbeamshell.common.progress import counting, in_notebook
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.response import pinned
 from jbeamshell.scene.scene import Scene
+from jbeamshell.solving.response import pinned
 from jbeamshell.sweeping.executors import (
     Blocks,
     Losses,

@@ -17,15 +17,15 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import quick_options
-from jbeamshell.condensed.entry import goes_on
-from jbeamshell.condensed.interpolation import Range
-from jbeamshell.condensed.shared import Layout, shared
+from jbeamshell.contact_line.entry import goes_on
+from jbeamshell.contact_line.interpolation import Range
+from jbeamshell.contact_line.shared import Layout, shared
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.quasistatic.response import Response, figures, response
-from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
+from jbeamshell.solving.response import Response, figures, response
+from jbeamshell.solving.solve import run
 from jbeamshell.sweeping.lanes import Outcome
 
 ABREAST = 32  # most lanes of a chunk on a core, where they share a condensed body

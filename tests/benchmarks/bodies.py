@@ -36,14 +36,14 @@ def main() -> None:
         scene = jb.library.standard().replace(linear | {"model.nodes": options.nodes})
 
         def built(eta, amplitude, scene=scene):
-            kept = jb.condensed.factors(scene.replace({"strip.height_ratio": eta}))
+            kept = jb.contact_line.factors(scene.replace({"strip.height_ratio": eta}))
             return kept.dissipation(amplitude)
 
         def walk(steps, base="rigid", scene=scene):
             values = {"load.steps_per_half_cycle": steps, "contact.normal": base}
             return jb.response(scene.replace(values).by_load_steps(), KEYS)
 
-        kept, whole = jb.condensed.factors(scene), jax.jit(built)
+        kept, whole = jb.contact_line.factors(scene), jax.jit(built)
         few, some, many = (walk(steps) for steps in (1, 30, MANY))
         held, held_some = (walk(steps, "held") for steps in (1, 30))
         history = jb.response(scene.replace({"load.steps_per_half_cycle": 1}), KEYS)

@@ -39,9 +39,9 @@ from ladder import as_text  # noqa: E402
 from speeds import machine  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
-from jbeamshell import condensed  # noqa: E402
+from jbeamshell import contact_line  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.condensed.dissipation import NODES, REFINED  # noqa: E402
+from jbeamshell.contact_line.dissipation import NODES, REFINED  # noqa: E402
 from jbeamshell.measured.example import data_folder  # noqa: E402
 
 ETA, AMPLITUDE = 0.1126, 0.7855
@@ -86,9 +86,9 @@ def scene(eta: Any = ETA) -> jb.Scene:
 
 
 @functools.cache
-def builder(nodes: int) -> Callable[[jax.Array], condensed.SteadyCycles]:
+def builder(nodes: int) -> Callable[[jax.Array], contact_line.SteadyCycles]:
     """Compiled function from a height ratio to factors."""
-    return jax.jit(lambda eta: condensed.factors(scene(eta), nodes=nodes))
+    return jax.jit(lambda eta: contact_line.factors(scene(eta), nodes=nodes))
 
 
 # --- parts ----------------------------------------------------------------------------------------
@@ -118,8 +118,8 @@ def batch(budget: float) -> dict[str, Any]:
     etas, amplitudes = jnp.geomspace(0.03, 0.4, 64), jnp.linspace(0.1, 1.9, 256)
     many = etas.size * amplitudes.size
 
-    def one(eta: jax.Array) -> condensed.SteadyCycles:
-        return condensed.factors(scene(eta))
+    def one(eta: jax.Array) -> contact_line.SteadyCycles:
+        return contact_line.factors(scene(eta))
 
     build = jax.jit(lambda etas: jax.lax.map(one, etas))
     ask = jax.jit(lambda kept: jax.lax.map(lambda own: own.dissipation(amplitudes), kept))

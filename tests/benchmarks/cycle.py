@@ -23,7 +23,7 @@ import jaxlib  # noqa: E402
 import numpy as np  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
-from jbeamshell.quasistatic.solving import compile_for  # noqa: E402
+from jbeamshell.solving.solve import compile_for  # noqa: E402
 
 ROUNDS = 7
 STANDARD = {"load.cycles": 1, "model.kinematics": "exact", "contact.normal": "held"}

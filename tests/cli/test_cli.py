@@ -13,7 +13,8 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.cli import main
-from jbeamshell.quasistatic import recovery, solving
+from jbeamshell.load_steps import recovery
+from jbeamshell.solving import solve as solving
 from tests.command import BASE, options
 
 ROOT = Path(jb.__file__).parent.parent

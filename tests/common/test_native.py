@@ -93,7 +93,7 @@ def test_a_response_is_native(monkeypatch):
         made.append(Native(*given, **more))
         return made[-1]
 
-    module = importlib.import_module("jbeamshell.quasistatic.response")  # jb.response is a function
+    module = importlib.import_module("jbeamshell.solving.response")  # jb.response is a function
     monkeypatch.setattr(module, "Native", native)
     found = jb.response(scene, ("load.amplitude",))(scene.load.amplitude)
     assert made[0].fits is True

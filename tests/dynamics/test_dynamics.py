@@ -15,9 +15,9 @@ from jbeamshell import dynamics
 from jbeamshell.dynamics.strip import rate_friction
 from jbeamshell.dynamics.strip.equations import Equations
 from jbeamshell.dynamics.strip.stepsize import EXPLICIT, stability_limits
+from jbeamshell.load_steps.system import V
 from jbeamshell.mechanics.friction import ElasticSlip
 from jbeamshell.mechanics.homogeneous import shear_coefficient
-from jbeamshell.quasistatic.system import V
 
 build = eqx.filter_jit(Equations)  # one program instead of hundreds
 jitted = eqx.filter_jit(lambda method, *arguments: method(*arguments))

@@ -42,7 +42,7 @@ def test_the_slider_of_a_force_ends_below_gross_slip():
     load = next(c for c in controls_of(jb.Scene()) if c.name == "load.amplitude")
     assert gross_slip(jb.Scene()) == pytest.approx(2.0)
     assert 1.9 < load.high < 2.0
-    held = library.single_lap().replace({"contact.bolt_stiffness": 10.0})
+    held = library.single_lap().replace({"member.bolt_stiffness": 10.0})
     assert math.isinf(gross_slip(held))
     by_length = {"load.control": "displacement", "load.amplitude": 1e-5}
     load = next(c for c in controls_of(jb.Scene().replace(by_length)) if "A" in c.label)

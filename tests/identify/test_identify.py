@@ -416,7 +416,7 @@ def test_a_mixture_of_everything(tmp_path):
 def test_planted_parameters_come_back_where_pairs_of_nodes_are_open():
     """Loops of a lap joint that a gap keeps open beyond X = 1."""
     gap = [[0.0, 0.0], [1.0, 0.0], [2.0, 1e-3]]
-    lap = {"strip.far_end": "free", "member.support": "rolling", "contact.gap": gap}
+    lap = {"strip.far_end": "free", "member.support": "rolling", "member.gap": gap}
     planted = {MU: 0.27, "strip.axial_stiffness": 1.3e5}
     start = jb.Scene().replace(lap | {"model.nodes": 33, "model.section": "squeeze"})
     loops = []

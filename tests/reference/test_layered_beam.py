@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.condensed.body import eliminate
-from jbeamshell.condensed.ends import end_section
-from jbeamshell.condensed.section import section_form
+from jbeamshell.contact_line.body import eliminate
+from jbeamshell.contact_line.ends import end_section
+from jbeamshell.contact_line.section import section_form
 
 LENGTH, STRETCHING, SHEAR = 2.0, 3.4e4, 1.0
 

@@ -95,7 +95,7 @@ def test_overhangs_of_a_joint_are_columns():
     column = weakest_column(lap)
     assert (float(column.begin), float(column.end)) == (2.0, 3.0)
     assert float(column.limit) == pytest.approx(EULER / 4.0, rel=1e-3)
-    level = weakest_column(lap.replace({"strip.loaded_end": "level"}))
+    level = weakest_column(lap.replace({"member.loaded_end": "level"}))
     assert float(level.limit) == pytest.approx(2.0457 * EULER, rel=1e-3)
     assert np.isinf(weakest_column(lap.replace({"strip.overhang": None})).limit)
 

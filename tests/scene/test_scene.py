@@ -34,7 +34,7 @@ LAYERS = [[0.1, 1e4, 0.3], [0.1252, 1e5, 0.2]]  # of the standard strip's height
 
 positive = st.floats(1e-90, 1e90)
 OF_JOINT = {key for key in KEYS if key.startswith("member.")}
-OF_JOINT |= {"strip.overhang", "contact.gap", "contact.bolt_stiffness", "load.kind", "load.arm"}
+OF_JOINT |= {"strip.overhang", "member.gap", "member.bolt_stiffness", "load.kind", "load.arm"}
 OF_JOINT |= {f"contact.{name}" for name in ("bearing_stiffness", "clearance", "holes")}
 OPTIONAL = {"strip.axial_stiffness", "strip.poisson_ratio", "strip.layers", "strip.curvature"}
 OPTIONAL |= OF_JOINT - {"member.support", "load.kind"}
@@ -88,7 +88,7 @@ def values_of_all_keys(draw):
             "strip.height_ratio": ratio,
             "strip.kappa_s": draw(positive),
             "strip.far_end": far_end,
-            "strip.loaded_end": "free",
+            "member.loaded_end": "free",
             "strip.plane": draw(st.sampled_from(["strain", "stress"])),
             "contact.friction": friction,
             "contact.pressure": draw(positive | tables(length)),
@@ -97,7 +97,7 @@ def values_of_all_keys(draw):
             "contact.smoothing": draw(smoothing | st.just("sharp")),
             "contact.law": law,
             "contact.normal": normal,
-            "contact.assembly": "frictionless",
+            "member.assembly": "frictionless",
             "contact.normal_stiffness": draw(positive),
             "member.support": "none",
             "load.control": draw(st.sampled_from(["force", "displacement"])),
@@ -146,9 +146,9 @@ def test_toml_keeps_every_bit(path, values):
 @given(height=positive, stiffness=positive, nu=st.floats(-0.99, 0.49), clamped=st.booleans())
 def test_toml_keeps_a_lap_joint(path, height, stiffness, nu, clamped):
     values = JOINT | {"member.height_ratio": height, "member.axial_stiffness": stiffness}
-    values |= {"member.poisson_ratio": nu, "contact.assembly": "frictional"}
+    values |= {"member.poisson_ratio": nu, "member.assembly": "frictional"}
     if clamped:
-        values |= {"member.support": "clamped", "strip.loaded_end": "level"}
+        values |= {"member.support": "clamped", "member.loaded_end": "level"}
         values |= {"contact.bottom_pressure": 10.0}
     scene = Scene().replace(values)
     write_scene(scene, path)
@@ -588,12 +588,12 @@ FULL = {
 }
 
 
-@pytest.mark.parametrize("key", [key for key in NUMBERS if key != "contact.holes"])
+@pytest.mark.parametrize("key", [key for key in NUMBERS if key != "member.holes"])
 def test_gradients_and_batches_reach_every_number(key):
     layers = {key: LAYERS} if key.endswith(".layers") else {}
     bolts = np.array([[0.5, 8.0, 0.4], [1.5, 6.0, 0.3]])
     beside = {} if layers else {key: bolts if key == "contact.bolts" else 0.2}
-    beside |= {"contact.bearing_stiffness": 1.0} if key == "contact.clearance" else {}
+    beside |= {"member.bearing_stiffness": 1.0} if key == "member.clearance" else {}
     scene = Scene().replace(
         JOINT | layers | beside if key in {*OF_JOINT, "contact.bolts"} else FULL | layers
     )
@@ -614,7 +614,7 @@ def test_gradients_and_batches_reach_every_number(key):
 def test_holes_refuse_derivatives():
     scene = Scene().replace(JOINT)
     with pytest.raises(InputError, match="holes = 'traced': knows no derivatives"):
-        jax.jit(lambda holes: scene.replace({"contact.holes": holes}))(jnp.array([[1.0, 0.2]]))
+        jax.jit(lambda holes: scene.replace({"member.holes": holes}))(jnp.array([[1.0, 0.2]]))
 
 
 def test_gradients_reach_a_pressure_table():
@@ -696,7 +696,7 @@ SPECIMENS = {
         "contact.bolts": [[1.0, 20.0, 0.5]],
         "member.support": "clamped",
         "strip.far_end": "free",
-        "strip.loaded_end": "level",
+        "member.loaded_end": "level",
         "load.entry": "traction",
         "model.section": "plane",
     },

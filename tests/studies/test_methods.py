@@ -15,7 +15,7 @@ import jbeamshell as jb
 from calibration import charts
 from calibration.methods import controls, events, grids, laws, shooting, solvers
 from calibration.methods.strips import scene_of
-from jbeamshell.quasistatic.system import BETA, System, V, W
+from jbeamshell.load_steps.system import BETA, System, V, W
 
 CYCLE = 8  # load steps per half cycle at most; fewer are held, so that all paths compile once
 RECORD = Path(__file__).parents[2] / "calibration" / "methods.json"

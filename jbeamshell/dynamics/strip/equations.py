@@ -1,7 +1,7 @@
 r"""Equations of motion of a scene: forces of equilibrium, inertia, and the rate law of friction.
 
 The state holds the free fields q, their rates p and the friction tractions t of all nodes.  With
-the potential Pi of `jbeamshell.quasistatic.system`, the mass matrix M, the damping matrix C, the
+the potential Pi of `jbeamshell.load_steps.system`, the mass matrix M, the damping matrix C, the
 end force F and the acceleration (a_x, a_y) of the foundation,
 
     M p_t + (M_t p - dT/dq) = F du(L)/dq - dPi/dq - l t - M (e_x a_x + e_y a_y) - C p,
@@ -32,9 +32,9 @@ from jbeamshell.dynamics.strip.chain import chain_energies, chain_response
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.mass_matrix import MassMatrix
+from jbeamshell.load_steps.system import System, V, W
 from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.mechanics.normal_contact import Compliance
-from jbeamshell.quasistatic.system import System, V, W
 from jbeamshell.scene.scene import Scene
 
 LOOSE = 30.0  # tolerance of rates and tractions over that of fields, relative to their scales

@@ -25,10 +25,10 @@ from jax.typing import ArrayLike
 from numpy.polynomial import legendre
 
 from jbeamshell.dynamics.strip.inertia import Inertia
+from jbeamshell.load_steps.system import PSI, System
 from jbeamshell.mechanics import elements
 from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS
 from jbeamshell.numerics import block_tridiagonal
-from jbeamshell.quasistatic.system import PSI, System
 from jbeamshell.scene.scene import Scene
 
 

@@ -32,9 +32,9 @@ from jbeamshell.dynamics.strip.chain import stretches
 from jbeamshell.dynamics.strip.equations import MotionState
 from jbeamshell.dynamics.strip.step_equations import StepEquations, StepForces, StepMatrices
 from jbeamshell.dynamics.strip.time_step import StepMemory, TimeStep
+from jbeamshell.load_steps.system import V
+from jbeamshell.load_steps.tangent import nodal
 from jbeamshell.numerics.newton import Newton, Problem
-from jbeamshell.quasistatic.system import V
-from jbeamshell.quasistatic.tangent import nodal
 
 FILTERING = 0.1
 

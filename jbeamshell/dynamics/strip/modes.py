@@ -16,8 +16,8 @@ from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
 from jbeamshell.dynamics.strip.equations import Equations, movable
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
+from jbeamshell.load_steps.system import V, W
 from jbeamshell.mechanics.normal_contact import Compliance
-from jbeamshell.quasistatic.system import V, W
 from jbeamshell.scene.scene import Scene
 
 

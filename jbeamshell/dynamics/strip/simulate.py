@@ -33,10 +33,10 @@ from jbeamshell.dynamics.strip.motion import (
 )
 from jbeamshell.dynamics.strip.step_equations import StepMatrices
 from jbeamshell.dynamics.strip.stepsize import EXPLICIT, METHODS, STIFF, longest_step
+from jbeamshell.load_steps.system import System
 from jbeamshell.mechanics.friction import ElasticSlip
-from jbeamshell.quasistatic.solving import run
-from jbeamshell.quasistatic.system import System
 from jbeamshell.scene.scene import Scene
+from jbeamshell.solving.solve import run
 
 MOST_STEPS = 10_000_000
 RELEASE_STEPS = 8  # load steps to the force that is released, so that the reaction is followed

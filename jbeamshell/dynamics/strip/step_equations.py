@@ -13,10 +13,8 @@ from jax import Array
 from jbeamshell.dynamics.strip.chain import ChainStep, chain_step
 from jbeamshell.dynamics.strip.equations import Equations, MotionState
 from jbeamshell.dynamics.strip.time_step import StepMemory, TimeStep
-from jbeamshell.numerics import block_tridiagonal
-from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
-from jbeamshell.quasistatic.system import ContactInput, LoadLevel, Prescribed, System, V, W
-from jbeamshell.quasistatic.tangent import (
+from jbeamshell.load_steps.system import ContactInput, LoadLevel, Prescribed, System, V, W
+from jbeamshell.load_steps.tangent import (
     Stiffness,
     block_of_node,
     in_blocks,
@@ -27,6 +25,8 @@ from jbeamshell.quasistatic.tangent import (
     with_v,
     zero_unknowns,
 )
+from jbeamshell.numerics import block_tridiagonal
+from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
 
 
 class StepMatrices(eqx.Module):

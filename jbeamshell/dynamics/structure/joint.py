@@ -6,7 +6,7 @@ u, a spring of stiffness s starts to slip at the force s u; a spring with the la
 A joint is known up to the last point of its backbone.  If that point is gross slip, the force stays
 there, and the joint is known everywhere; beyond any other last point nothing is known.
 A strip becomes one such element by the mean of its pull and its push, whose sliders are the nodes
-of its contact; `jbeamshell.condensed.network` has both, and every branch between them, exactly.
+of its contact; `jbeamshell.contact_line.network` has both, and every branch between them, exactly.
 Scenes that are no network, such as lap joints, become the element nearest to their steady cycles.
 """
 
@@ -35,8 +35,8 @@ from jbeamshell.common.checks import (
 )
 from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.common.summary import Summary, with_unit
-from jbeamshell.condensed.entry import goes_on
-from jbeamshell.condensed.network import Network
+from jbeamshell.contact_line.entry import goes_on
+from jbeamshell.contact_line.network import Network
 from jbeamshell.dynamics.export import table
 from jbeamshell.dynamics.export.element import Element
 from jbeamshell.dynamics.export.targets import write

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.jax_options import ONCE
-from jbeamshell.condensed.network import Network, Response, Sliders
+from jbeamshell.contact_line.network import Network, Response, Sliders
 from jbeamshell.dynamics.steady_cycles import SteadyCycles
-from jbeamshell.quasistatic.solving import run
 from jbeamshell.scene.scene import Scene
+from jbeamshell.solving.solve import run
 
 # Amplitudes of steady cycles, over the largest
 AMPLITUDES = np.append(np.geomspace(0.05, 0.4, 16), np.linspace(0.4, 1.0, 17)[1:])
@@ -177,7 +177,7 @@ def network_forces(network: Network, path: NDArray[np.float64]) -> Array:
     require("force on the path", float(reached), bool(reached < limit), fix)
     first = int(np.argmin(found.valid))
     nested = bool(np.all(np.asarray(found.valid)))
-    fix = "slip zones are not nested from here on: take jbeamshell.condensed.solve"
+    fix = "slip zones are not nested from here on: take jbeamshell.contact_line.solve"
     require(f"path[{first}]", path[first], nested, fix)
     return found.state.force
 

@@ -65,7 +65,7 @@ class Variant(NamedTuple):
 def dissipation_call(
     change: Mapping[str, Any], figures: tuple[str, ...] = ("dissipation",)
 ) -> Callable[[], dict[str, jax.Array]]:
-    """A warm call's worth of `jbeamshell.quasistatic.response` on the standard strip."""
+    """A warm call's worth of `jbeamshell.solving.response` on the standard strip."""
     here = scene(change)
     return functools.partial(jb.response(here, OVER, figures), *numbers(here))
 

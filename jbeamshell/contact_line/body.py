@@ -1,0 +1,316 @@
+"""Body on its contact line: a linear elastic strip with everything but the contact eliminated.
+
+A strip whose section stores a quadratic energy in its fields and their slopes couples each station
+along X to the next one only.  All fields but the contact's (tangential displacement v, lift w) are
+eliminated station by station from the far end, with the contact's fields and the end load as
+right-hand sides.  What is left are dense matrices over the contact nodes.
+
+The unknowns of a station are the steps of its fields from the next station.  A short element is
+stiff against a step over its length, and soft if it moves as a whole.  With the fields themselves
+as unknowns these two would have to cancel, and round-off would grow.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from jbeamshell.common.pytrees import Tree
+from jbeamshell.contact_line.ends import End
+from jbeamshell.mechanics.section_form import SectionForm
+from jbeamshell.numerics.factors import inverse_cholesky
+
+PARTS = 3  # of a strip, eliminated one after the other with as many contact nodes as they know
+FEW = 100  # nodes up to which one part, which compiles in a third of the time, is as fast
+
+
+class Body(Tree):
+    """Matrices of a body over its n contact nodes, numbered from the loaded end.
+
+    With v and w the tangential displacements and lifts since the pressure, F the end load and r the
+    nodal forces of the base on the body,
+
+        r_t = K_tt v + K_tn w - f_t F,    r_n = r_0 + K_tn' v + K_nn w - f_n F,
+        u = c F + f_t.v + f_n.w.
+
+    Attributes
+    ----------
+    x : (n,) positions X
+    tributary : (n,) contact length of each node
+    K_tt, K_tn, K_nn : (n, n) stiffness, force per width and length
+    f_t, f_n : (n,) part of the end load that a clamped contact node carries
+    r_0 : (n,) nodal forces of the base under the pressures alone
+    t_0 : (k,) tangential ones, which are zero if the strip was pressed without friction
+    c : displacement of the loaded end per end load with a clamped contact
+    """
+
+    x: Array
+    tributary: Array
+    K_tt: Array
+    K_tn: Array
+    K_nn: Array
+    f_t: Array
+    f_n: Array
+    r_0: Array
+    t_0: Array
+    c: Array
+
+
+class Elimination(NamedTuple):
+    """Elimination of the fields between the contact's, station by station, to find them again.
+
+    The right-hand sides are v and w of all stations, the end load, and the pressure.  The unknowns
+    are the steps of the fields to a station from the next one, and at both ends the fields.
+
+    Attributes
+    ----------
+    inverse : (n-2, m-2, m-2) inverses of the Cholesky factors
+    known : (n-2, m-2, 2n+2) right-hand sides, reduced
+    onwards : (n-2, m-2, m-2) coupling to the fields of the next station, reduced
+    first : (m-2, 2n+2), (m-2, m-2) fields of the first station from the sides and from its next one
+    last : (m-2, 2n+2) fields of the last station from the sides
+    """
+
+    inverse: Array
+    known: Array
+    onwards: Array
+    first: tuple[Array, Array]
+    last: Array
+
+    @property
+    def forgotten(self) -> Unknown:
+        """Elimination by which the fields are not found again."""
+        return Unknown.of(self.inverse.shape[0] + 2, self.inverse.shape[1] + 2)
+
+    def recovered(self, given: Array) -> Array:
+        """Fields (n, m-2, levels) from the right-hand sides' factors (2n+2, levels)."""
+
+        def back(after: Array, station: tuple[Array, ...]) -> tuple[Array, Array]:
+            inverse, sides, onwards = station
+            here = after - inverse.T @ (sides + onwards @ after)
+            return here, here
+
+        last = self.last @ given
+        stations = (self.inverse, self.known @ given, self.onwards)
+        second, found = lax.scan(back, last, stations, reverse=True)
+        first = self.first[0] @ given + self.first[1] @ second
+        return jnp.concatenate([first[None], found, last[None]])
+
+
+class Unknown(NamedTuple):
+    """Elimination of a body whose inner fields nobody asks for: they are NaN.
+
+    Attributes
+    ----------
+    nothing : (n, m-2) NaN
+    """
+
+    nothing: Array
+
+    @classmethod
+    def of(cls, nodes: int, fields: int) -> Unknown:
+        """Elimination of a body of so many nodes whose form has so many fields."""
+        return cls(jnp.full((nodes, fields - 2), jnp.nan))
+
+    @property
+    def forgotten(self) -> Unknown:
+        """The same."""
+        return self
+
+    def recovered(self, given: Array) -> Array:
+        """Fields (n, m-2, levels), see `Elimination.recovered`."""
+        return jnp.broadcast_to(self.nothing[..., None], (*self.nothing.shape, given.shape[1]))
+
+
+class Line(NamedTuple):
+    """Strip on its contact line.
+
+    Attributes
+    ----------
+    elimination : what finds the eliminated fields again
+    hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
+    """
+
+    elimination: Elimination
+    hessian: Array
+
+
+def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -> tuple[Line, ...]:
+    """Strips of linear elements that differ at their last station alone, on their contact line.
+
+    Parameters
+    ----------
+    form : energy of the section, m fields
+    x : (n,) stations, increasing, the loaded end last; three or more
+    loads : (n,) nodal forces that press on the top face
+    far : conditions at the first station; where v and w of the contact are held is left to the
+        caller
+    last : conditions at the last station of each strip
+    """
+    n, columns = x.size, 2 * x.size + 2
+
+    def go(
+        carry: tuple[Array, Array], station: tuple[Array, ...]
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
+        before, forces = carry
+        i, load, length = station
+        start, _, across = (part[0] for part in form.element(length[None]))
+        stays, follows = form.moved(length)
+        forces = forces + load * _in_last_column(form.press[2:], forces)
+        contacts = jnp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
+        inverse = inverse_cholesky(before + start[2:, 2:])
+        known = inverse @ _add(forces, contacts, 2 * i)
+        onwards = inverse @ (before + stays.T[2:, 2:])
+        contacts = jnp.concatenate([stays[2:, :2], follows[2:, :2]], axis=1)
+        forces = _add(forces - onwards.T @ known, contacts, 2 * i)
+        own = (stays + follows)[2:, 2:]
+        return (before + own - onwards.T @ onwards, forces), (inverse, known, onwards)
+
+    carry, first, left = _begin(form, x, loads[0], far)
+    left, parts = _wider(_wider(left, columns).T, columns), []
+    stations = (jnp.arange(1, n - 1), loads[1:-1], jnp.diff(x)[1:])
+    # No station knows a contact node beyond its next one: the right-hand sides grow part by part.
+    count = PARTS if n > FEW else 1
+    for begin, stop in itertools.pairwise(np.linspace(0, n - 2, count + 1).astype(int)):
+        carry = carry[0], _wider(carry[1], 2 * stop + 6)
+        carry, part = lax.scan(go, carry, tuple(each[begin:stop] for each in stations))
+        parts.append(part)
+        left = left - _products(part[1], columns)
+    inverse, known, onwards = (
+        jnp.concatenate([part[0] for part in parts]),
+        jnp.concatenate([_wider(part[1], columns) for part in parts]),
+        jnp.concatenate([part[2] for part in parts]),
+    )
+    first, left = (_wider(first[0], columns), first[1]), left + _among_contacts(form, x, loads)
+    ends = [_finish(form, loads[-1], carry, end) for end in last]
+    return tuple(
+        Line(Elimination(inverse, known, onwards, first, fields), left + change)
+        for fields, change in ends
+    )
+
+
+def _begin(
+    form: SectionForm, x: Array, load: Array, far: End
+) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
+    """Elimination of the first station; the sides are v and w of two stations, load and pressure.
+
+    Returns
+    -------
+    carry : stiffness (m-2, m-2) of the second station's fields, and their sides (m-2, 6)
+    first : fields of the first station from the sides (m-2, 6) and from the next (m-2, m-2)
+    left : (6, 6) second derivatives of the energy in the sides, of the first station's fields alone
+    """
+    start, end, across = (part[0] for part in form.element(x[1:2] - x[:1]))
+    none = jnp.zeros_like(start[:, :1])
+    forces = [none, none, across[:, :2], none, load * form.press[:, None]]
+    fields, back, left = _of_end(start, jnp.concatenate(forces, axis=1), far, 0)
+    onwards = back.T @ across[:, 2:]
+    sides = across.T @ fields + jnp.pad(end[:, :2], ((0, 0), (2, 2)))
+    carry = end[2:, 2:] - onwards.T @ onwards, sides[2:]
+    return carry, (fields[2:], -(back @ onwards)[2:]), left
+
+
+def _finish(
+    form: SectionForm, load: Array, carry: tuple[Array, Array], loaded: End
+) -> tuple[Array, Array]:
+    """Elimination of the last station.
+
+    Returns
+    -------
+    last : (m-2, 2n+2) its fields from the sides
+    left : (2n+2, 2n+2) second derivatives of the energy in the sides, of its fields alone
+    """
+    before, sides = (jnp.pad(part, ((2, 0), (0, 0))) for part in carry)
+    ends = jnp.stack([-loaded.pull, load * form.press], axis=1)
+    forces = sides + jnp.pad(ends, ((0, 0), (sides.shape[1] - 2, 0)))
+    before = jnp.pad(before, ((0, 0), (2, 0)))
+    fields, _, left = _of_end(before, forces, loaded, sides.shape[1] - 4)
+    return fields[2:], left.at[-2, -2].add(-loaded.softness)
+
+
+def _of_end(stiffness: Array, forces: Array, end: End, place: int) -> tuple[Array, Array, Array]:
+    """Elimination of the fields of a station at an end.
+
+    Parameters
+    ----------
+    stiffness : (m, m) of its fields, without what lies beyond
+    forces : (m, sides) on its fields
+    end : its conditions
+    place : column of its v and w among the sides
+
+    Returns
+    -------
+    fields : (m, sides) its fields
+    back : (m, k) inverse factor of its free fields' stiffness
+    left : (sides, sides) second derivatives of the energy
+    """
+    contact, free = end.span[:, :2], end.span[:, 2:]
+    own = stiffness + end.stiffness
+    moved = jnp.pad(contact, ((0, 0), (place, forces.shape[1] - 2 - place)))
+    back = free @ inverse_cholesky(free.T @ own @ free).T
+    known = back.T @ (forces + own @ moved)
+    left = moved.T @ forces
+    left = left + left.T + moved.T @ own @ moved - known.T @ known
+    return moved - back @ known, back, left
+
+
+def _add(sides: Array, block: Array, column: Array) -> Array:
+    """Sum of sides and a block (rows, 4) at four of their columns."""
+    old = lax.dynamic_slice(sides, (0, column), block.shape)
+    return lax.dynamic_update_slice(sides, old + block, (0, column))
+
+
+def _in_last_column(values: Array, sides: Array) -> Array:
+    """Sides with values in their last column and zeros elsewhere."""
+    return jnp.pad(values[:, None], ((0, 0), (sides.shape[1] - 1, 0)))
+
+
+def _wider(sides: Array, columns: int) -> Array:
+    """Sides with empty columns before the last two, those of the loads."""
+    empty = [(0, 0)] * (sides.ndim - 1) + [(0, columns - sides.shape[-1])]
+    return jnp.concatenate([jnp.pad(sides[..., :-2], empty), sides[..., -2:]], axis=-1)
+
+
+def _among_contacts(form: SectionForm, x: Array, loads: Array) -> Array:
+    """Stiffness (2n + 2, 2n + 2) of the elements among v and w, and the forces of the pressure.
+
+    The parts of the fields of both ends are left out, which have conditions of their own.
+    """
+    n = x.size
+    start, end, across = (part[:, :2, :2] for part in form.element(jnp.diff(x)))
+    inner = (np.arange(n) > 0) & (np.arange(n) < n - 1)
+    start, across = (jnp.where(inner[:-1, None, None], part, 0.0) for part in (start, across))
+    own = jnp.pad(start, ((0, 1), (0, 0), (0, 0))) + jnp.pad(end, ((1, 0), (0, 0), (0, 0)))
+    beside = jnp.pad(across, ((0, 1), (0, 0), (0, 0)))
+    here, following = (np.eye(n, k=k)[..., None, None] for k in (0, 1))
+    blocks = here * own[:, None] + following * beside[:, None]
+    blocks = blocks + np.swapaxes(following, 0, 1) * jnp.swapaxes(beside, 1, 2)
+    stiffness = jnp.moveaxis(blocks, 2, 1).reshape(2 * n, 2 * n)
+    press = (jnp.where(inner, loads, 0.0)[:, None] * form.press[:2]).ravel()
+    sides = jnp.stack([jnp.zeros_like(press), press], axis=1)
+    return jnp.block([[stiffness, sides], [sides.T, jnp.zeros((2, 2), x.dtype)]])
+
+
+def _products(known: Array, columns: int) -> Array:
+    """Sum of known' known over the stations and their fields, (columns, columns)."""
+    known = known.reshape(-1, known.shape[-1])
+    return _wider(_wider(known.T @ known, columns).T, columns).T
+
+
+def local_compliance(stiffness: Array, pull: Array) -> Array:
+    """Compliance of the contact's own fields against the load, which is never zero.
+
+    A load on a contact node, or on a rigid face whose edge is one, has none beside it: c = 0.
+
+    Parameters
+    ----------
+    stiffness : (fields,) diagonal of the stiffness
+    pull : (fields,) part of the load that each clamped contact field carries
+    """
+    square = pull**2
+    whole = jnp.sum(square * stiffness)
+    return jnp.sum(square) / jnp.where(whole > 0.0, whole, 1.0)

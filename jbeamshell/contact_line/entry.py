@@ -1,0 +1,141 @@
+"""How the force enters a scene's members, and how it leaves them: the conditions of their ends.
+
+A member that goes on beyond the contact is continued by `REACH` half heights, from where on its
+length no longer matters.  It stretches there under an even load.  That stretch, l/(E'2H) for a
+force at mid-height, is left out of the displacement u, which stays conjugate to the load: its loop
+holds the energy that friction takes.  So u is the mean displacement of the section X = L, but for
+what the shear there does on an even stretch.  That is less than half a per cent of u, but a fifth
+of the loop where little slips.
+
+Members that go on are pressed first and mounted then: the pressures act on members that end with
+the contact and whose ends are free.  What lies beyond is tied to them without stress.  Else the
+edge of a base would press into a member that goes on, an even pressure would have a singular
+reaction there, and nothing would slip at small loads.
+
+Sections that stay straight (the beamshell, p1) have a rigid face at X = L by nature.  They are
+nearer to a member that goes on as they are than if they were continued.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jbeamshell.contact_line.ends import Condition, End, beyond, compliance, end_section
+from jbeamshell.mechanics import elements
+from jbeamshell.mechanics.section_form import SectionForm, W, without_lift
+from jbeamshell.scene.scene import Scene
+
+REACH = 2.0  # of H, length beyond the contact from which on it no longer matters
+PER_REACH = 1.0 / 6.0  # of the elements of the contact, in that length
+LEAST = 8  # elements there
+GIVEN = 16  # elements of a length that is given
+END_SIZE = 1e-4  # of H, smallest element, beside the contact
+GROWTH = 0.3  # of the element size over the distance from there
+FREE = np.zeros(2, bool)
+
+
+class Held(NamedTuple):
+    """End of a member, and True for v and w (2,) of its contact that a support holds there."""
+
+    end: End
+    fixed: np.ndarray
+
+
+def goes_on(scene: Scene) -> bool:
+    """True if members go on beyond the contact by a length that is not given."""
+    return scene.load.entry == "member" and scene.plan.warps
+
+
+def states(scene: Scene) -> tuple[bool, ...]:
+    """True for members as they are mounted, after False for members that are only pressed.
+
+    One state serves both where the ends are the same.
+    """
+    joint = scene.member.support != "none"
+    apart = joint or scene.strip.overhang is not None or goes_on(scene)
+    return (False, True) if apart and scene.load.entry == "member" else (True,)
+
+
+def loaded_end(scene: Scene, form: SectionForm, mounted: bool) -> Held:
+    """End of the strip at which the force enters.
+
+    Parameters
+    ----------
+    form : energy of the strip's section, whose ``pull`` is that of the load
+    mounted : see `states`
+    """
+    strip, entry = scene.strip, scene.load.entry
+    level = scene.member.loaded_end == "level"
+    along: Condition = entry if entry in ("face", "guided") else "free"  # type: ignore[assignment]
+    if not mounted:
+        return Held(end_section(form), FREE)
+    if strip.overhang is not None:
+        outer = end_section(form, along, level, on_contact=False)
+        lengths = _lengths(strip.overhang, strip.half_height, GIVEN)
+        return Held(beyond(form, lengths, outer, True), FREE)
+    if goes_on(scene):
+        outer, reach = end_section(form, level=level, on_contact=False), REACH * strip.half_height
+        lengths = _lengths(reach, strip.half_height, _count(scene))
+        stretch = reach * compliance(form, form.pull, bends=not level)
+        return Held(beyond(form, lengths, outer, True).shorter(stretch), FREE)
+    return Held(end_section(form, along, level), np.array([False, level]))
+
+
+def far_end(scene: Scene, form: SectionForm) -> End:
+    """End of a strip on a rigid base at X = 0; v of its contact is left to the caller."""
+    return end_section(form, "held" if scene.strip.far_end == "guided" else "free")
+
+
+def leaving_end(
+    scene: Scene, form: SectionForm, pull: Array, flat: bool, mounted: bool
+) -> tuple[Held, Array]:
+    """End of the second member of a lap joint at which the force leaves.
+
+    Parameters
+    ----------
+    form : energy of its section
+    pull : (m,) parts of its fields in the displacement of a rigid extension to the line of the load
+    flat : True if its w is zero everywhere
+    mounted : see `states`; a member that is not mounted keeps its place at X = 0
+
+    Returns
+    -------
+    held : conditions at X = 0
+    stretch : compliance of the length beyond that the joint's displacement leaves out
+    """
+    member, clamped = scene.member, scene.member.support == "clamped"
+    half_height = member.beside(scene.strip).half_height
+    stretch = jnp.zeros_like(half_height)
+    if not mounted:
+        return Held(end_section(form), np.array([True, clamped])), stretch
+    if member.overhang is not None:
+        lengths = _lengths(member.overhang, half_height, GIVEN)
+    elif goes_on(scene):
+        reach, bends = REACH * half_height, clamped and scene.member.loaded_end == "free"
+        lengths = _lengths(reach, half_height, _count(scene))
+        stretch = reach * compliance(form, pull, bends, on_plane=not clamped and not flat)
+    else:
+        return Held(end_section(form, "held", clamped), np.array([True, clamped])), stretch
+    moving = without_lift(form) if flat else form
+    outer = end_section(moving, "held", clamped or flat, on_contact=False)
+    found = beyond(moving, lengths, outer, False)
+    if flat:
+        found = found.among(np.arange(form.pull.size) != W)
+    return Held(found, FREE), stretch
+
+
+def _count(scene: Scene) -> int:
+    """Number of elements of a length beyond that is not given."""
+    return max(LEAST, round(PER_REACH * (scene.plan.nodes - 1)))
+
+
+def _lengths(length: Array, half_height: Array, count: int) -> Array:
+    """Lengths (count,) of the elements beyond the contact, which grow from there on."""
+    near = length * REACH * half_height / (length + REACH * half_height)
+    grading = END_SIZE, None, GROWTH, 1.0, GROWTH
+    graded = elements.vertices(count - 1, near, half_height, *grading)
+    return jnp.append(jnp.diff(graded)[::-1], length - near)

@@ -1,0 +1,134 @@
+"""Pair of members on their common contact line: two condensed bodies take the form of one.
+
+With q = (v, w) of the contact nodes of each member and the relative slip and lift g = q_1 - q_2,
+the contact knows g alone.  The members' own movement is eliminated from the sum of their potentials
+like any other field; without supports at the contact
+
+    K = K_1 - K_1 (K_1 + K_2)^-1 K_1,    f = f_1 - K_1 (K_1 + K_2)^-1 f_1,
+
+so that exact branches, events, slopes and networks of sliders hold for two members as they do for
+one on a rigid base.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jbeamshell.contact_line.body import Elimination, Line, Unknown
+from jbeamshell.mechanics.section_form import SectionForm
+from jbeamshell.numerics.factors import inverse_cholesky
+
+UNITS = np.array([1.0, -1.0])  # v and w of the member below, seen from above
+
+
+class Pair(NamedTuple):
+    """Movement of two members, found again from that of their contact.
+
+    Attributes
+    ----------
+    form : energy of the section of the member below, seen from its contact face
+    elimination : of the fields of the member below
+    upper, lower : (2n, 2n + 2) v and w of each member's stations from the relative v and w, the end
+        load and the pressure; those of the member below in its own frame
+    """
+
+    form: SectionForm
+    elimination: Elimination | Unknown
+    upper: Array
+    lower: Array
+
+    def above(self, given: Array) -> Array:
+        """Movement of the member above and its loads, (steps, 2n + 2), from the pair's."""
+        return jnp.concatenate([given @ self.upper.T, given[:, -2:]], axis=1)
+
+    def below(self, given: Array) -> Array:
+        """Movement of the member below in its own frame and its loads, (steps, 2n + 2)."""
+        loads = given[:, -2:] * np.array([0.0, 1.0])
+        return jnp.concatenate([given @ self.lower.T, loads], axis=1)
+
+
+class Member(NamedTuple):
+    """Member on the stations of the contact.
+
+    Attributes
+    ----------
+    form : energy of its section
+    line : the member on its contact line
+    fixed : (2n,) True for v and w that a support holds
+    """
+
+    form: SectionForm
+    line: Line
+    fixed: np.ndarray
+
+
+def joined(upper: Member, lower: Member) -> tuple[Pair, Array]:
+    """Two members on their contact line.
+
+    Returns
+    -------
+    pair : what finds both members again
+    hessian : (2n + 2, 2n + 2) of the pair's potential in the relative v and w, load and pressure
+    """
+    sign = jnp.append(jnp.tile(jnp.asarray(UNITS), upper.fixed.size // 2), jnp.ones(2))
+    below = lower.line.hessian * sign[:, None] * sign
+    hessian, q_1, q_2 = together(upper.line.hessian, below, upper.fixed, lower.fixed)
+    moves = q_1[:-2], (sign[:, None] * q_2)[:-2]
+    return Pair(lower.form, lower.line.elimination, *moves), hessian
+
+
+def with_shanks(hessian: Array, stiffness: Array, down: Array) -> Array:
+    """Potential of `joined` with the shanks of its bolts, springs between the members along X.
+
+    They are unloaded under the pressures alone, from where v counts.
+
+    Parameters
+    ----------
+    hessian : (2n + 2, 2n + 2)
+    stiffness : of all shanks together, force per width and length
+    down : (n,) nodal forces of the pressure, in proportion to which it is spread
+    """
+    spread = jnp.stack([stiffness * down / jnp.sum(down), jnp.zeros_like(down)], axis=1)
+    return hessian + jnp.diag(jnp.pad(spread.ravel(), (0, 2)))
+
+
+def together(
+    above: Array, below: Array, fixed_above: np.ndarray, fixed_below: np.ndarray
+) -> tuple[Array, Array, Array]:
+    """Potential of two bodies in their relative displacements g = q_1 - q_2.
+
+    Parameters
+    ----------
+    above, below : (2n + 2, 2n + 2) second derivatives in q of each body, end load and pressure
+    fixed_above, fixed_below : (2n,) True for displacements that a support holds
+
+    Returns
+    -------
+    hessian : (2n + 2, 2n + 2) in g, end load and pressure
+    q_1, q_2 : (2n + 2, 2n + 2) displacements of each body and the loads from these
+    """
+    dtype, size = above.dtype, fixed_above.size
+    # Both from the movement z of the body below and g: q_1 = z + g, q_2 = z, unless one is held.
+    moves = jnp.asarray(~(fixed_above | fixed_below), dtype)
+    first = jnp.asarray(~fixed_above, dtype)
+    second = jnp.asarray(np.where(fixed_above & ~fixed_below, -1.0, 0.0), dtype)
+
+    def in_both(scales: Array, both: Array) -> Array:
+        return scales[:, None] * both * scales
+
+    on_z = in_both(moves, (above + below)[:-2, :-2]) + jnp.diag(1.0 - moves)
+    one, other = (jnp.append(part, jnp.ones(2)) for part in (first, second))
+    mixed = moves[:, None] * (above[:-2] * one + below[:-2] * other)
+    inverse = inverse_cholesky(on_z)
+    reduced = inverse @ mixed
+    hessian = in_both(one, above) + in_both(other, below) - reduced.T @ reduced
+    z = -(inverse.T @ reduced) * moves[:, None]
+    given = jnp.eye(size, size + 2, dtype=dtype)
+    loads = jnp.eye(size + 2, dtype=dtype)[-2:]
+    q_1 = jnp.concatenate([z + first[:, None] * given, loads])
+    q_2 = jnp.concatenate([z + second[:, None] * given, loads])
+    return hessian, q_1, q_2

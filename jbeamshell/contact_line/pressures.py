@@ -1,0 +1,106 @@
+"""Load paths along which the pressures change too.
+
+With P the part of the pressures that acts, a body's equations are
+
+    r_t = K_tt v + K_tn w - f_t F - g_t P,    u = c F + f_t.v + f_n.w + h P,
+
+and likewise for r_n.  A straight step in F and P is a load path of its own: one number s drives it,
+with f dF + g dP in place of f.  So a step is walked event by event, and is exact.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import Array, lax
+
+from jbeamshell.contact_line.body import Body
+from jbeamshell.contact_line.branches import ContactState
+from jbeamshell.contact_line.events import walk
+from jbeamshell.contact_line.stretch import Level
+
+
+class Press(NamedTuple):
+    """Share of the pressures in a body's equations.
+
+    Attributes
+    ----------
+    g_t, g_n : (k,) and (n,) part of the pressures that each clamped contact field carries
+    h : displacement of the loaded end per part of the pressures with a clamped contact
+    """
+
+    g_t: Array
+    g_n: Array
+    h: Array
+
+    @classmethod
+    def of(cls, hessian: Array, k: int, bearings: int) -> Press:
+        """Share in the equations of a strip whose potential has this (2n + 2, 2n + 2) hessian.
+
+        Parameters
+        ----------
+        k : number of nodes that may slip
+        bearings : number of further contact nodes
+        """
+        fields = -hessian[:-2, -1].reshape(-1, 2)[::-1]
+        return cls(fields[:k, 0], jnp.pad(fields[:, 1], (0, bearings)), -hessian[-2, -1])
+
+    def driven_by_displacement(self, driven: Body) -> Press:
+        """Share in the equations of a body that was changed by `drives.driven_by_displacement`."""
+        t, n = self.g_t - driven.f_t * self.h, self.g_n - driven.f_n * self.h
+        return Press(t, n, -driven.c * self.h)
+
+
+def walk_with_pressures(
+    body: Body,
+    press: Press,
+    friction: Array,
+    start: ContactState,
+    loads: Array,
+    parts: Array,
+    lift: Array | None = None,
+) -> Level:
+    """Levels of a path of straight steps in the load and the pressures, stacked along the first.
+
+    First derivatives are exact, forward and reverse.
+
+    Parameters
+    ----------
+    body, friction, start, lift : see `contact_line.events.walk`; all the pressures act at
+        the start
+    press : share of the pressures
+    loads, parts : (levels,) end loads, or what drives the body, and parts of the pressures
+    """
+    lift = jnp.zeros_like(start.r_n) if lift is None else lift
+    once = jnp.ones(1, bool)
+
+    def go(
+        now: tuple[ContactState, Array, Array], steps: tuple[Array, Array]
+    ) -> tuple[tuple[ContactState, Array, Array], Level]:
+        state, lift, settled = now
+        size, (load, part) = _direction(*steps)
+        pull_t, pull_n = load * body.f_t + part * press.g_t, load * body.f_n + part * press.g_n
+        along = eqx.tree_at(lambda b: (b.f_t, b.f_n, b.c), body, (pull_t, pull_n, load**2 * body.c))
+        origin = state._replace(force=jnp.zeros_like(size))
+        level = walk(along, friction, origin, size[None], once, lift)
+        level = jax.tree.map(lambda a: a[0], level)
+        level = level._replace(settled=level.settled & settled)
+        return (level.state, level.lift, level.settled), level
+
+    steps = jnp.diff(loads, prepend=start.force), jnp.diff(parts, prepend=jnp.ones_like(parts[0]))
+    found: Level = lax.scan(go, (start, lift, jnp.asarray(True)), steps)[1]
+    slip, risen = found.state.v - start.v, found.lift - lift
+    u = body.c * (loads - start.force) + slip @ body.f_t + risen @ body.f_n
+    u = start.displacement + u + press.h * (parts - 1.0)
+    return found._replace(state=found.state._replace(force=loads, displacement=u))
+
+
+def _direction(load: Array, part: Array) -> tuple[Array, tuple[Array, Array]]:
+    """Size of a step, and the step over it; a rest is a step of no size in the load alone."""
+    size = jnp.maximum(jnp.abs(load), jnp.abs(part))
+    moves = size > 0.0
+    scale = jnp.where(moves, size, 1.0)
+    return size, (jnp.where(moves, load / scale, 1.0), jnp.where(moves, part / scale, 0.0))

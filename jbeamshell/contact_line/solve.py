@@ -1,0 +1,306 @@
+"""Load paths of a strip on its contact line, exact in time: a scene in, a history out."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jbeamshell.common.checks import is_staged, is_traced, require
+from jbeamshell.common.errors import Status
+from jbeamshell.common.failed import nan_unless
+from jbeamshell.common.precision import in_double, is_single
+from jbeamshell.common.small import Small
+from jbeamshell.contact_line.above import Movement, Unread
+from jbeamshell.contact_line.bearings import bearing_energy, with_bearings, with_gaps
+from jbeamshell.contact_line.branches import ContactState, pressed
+from jbeamshell.contact_line.drives import (
+    driven_by_displacement,
+    exchanged,
+    spring_energy,
+    with_springs,
+)
+from jbeamshell.contact_line.entry import goes_on
+from jbeamshell.contact_line.events import walk
+from jbeamshell.contact_line.kept import kept
+from jbeamshell.contact_line.pressures import Press, walk_with_pressures
+from jbeamshell.contact_line.stretch import Level
+from jbeamshell.contact_line.strip import Strip, condensed, spring_stiffness, stays_flat
+from jbeamshell.contact_line.turns import Turns, known_turns, turns_of, turns_of_cycles
+from jbeamshell.history.history import History
+from jbeamshell.scene.load_path import LoadPath
+from jbeamshell.scene.scene import Scene
+
+Cycles = tuple[tuple[int, int, int], ...]
+
+
+def solve(
+    scene: Scene,
+    path: LoadPath,
+    cycles: Cycles,
+    *,
+    own: bool = True,
+    strip: Strip | None = None,
+) -> History:
+    """Press a strip down and walk a load path.
+
+    Between the events at which a node starts to slip, sticks, opens or closes everything is linear
+    in the load, so that load steps only say where the path is looked at.  Friction is Coulomb's,
+    without elastic slip unless contact.stick_stiffness is given; contact is unilateral.
+    Nodes are those of the load steps of the same section; plane elasticity resolves singular
+    stresses at the loaded corner to 1e-4 H.  Fields above the contact are found when they are read
+    first, because that takes twice as long as the walk.
+
+    Parameters
+    ----------
+    scene : scene that is solved on its contact line; may be traced
+    path, cycles : whole path of the scene and its closed cycles, see
+        `jbeamshell.scene.load_path.check`
+    own : True if the loads are the scene's own cycles, whose turns are always known
+    strip : the scene's strip, if it is known
+
+    Returns
+    -------
+    History
+        fields v, w, beta and psi, and those of a section of order p; of plane elasticity beta and
+        psi are means over the height; NaN from the first step on whose events come to no end
+
+    Raises
+    ------
+    InputError
+        if the pressures lift the strip, or change along the path beside elastic sliders, a gap or
+        holes, or if loads act on a strip without a foundation
+    """
+    now = is_traced(scene, path, strip) or is_staged() or is_single(scene)
+    return _solved(scene, path, cycles, own, strip, now)
+
+
+def walks_pressures(scene: Scene) -> bool:
+    """True if pressures that change along a path are walked on the contact line.
+
+    Elastic sliders and what holds two members apart would have to move with them.
+    """
+    joint = scene.member.gap is None and scene.member.holes is None
+    return joint and scene.contact.stick_stiffness is None
+
+
+@in_double
+def _solved(
+    scene: Scene,
+    path: LoadPath,
+    cycles: Cycles,
+    own: bool,
+    strip: Strip | None,
+    now: bool,
+) -> History:
+    """History, whose fields above the contact are found now or when they are read."""
+    before = scene.load.pressure_steps
+    targets, parts = path.target[before:], path.pressure[before:]
+    whole = not is_traced(parts) and bool(np.all(np.asarray(parts) == 1.0))
+    fix = "must act wholly beside elastic sliders, a gap or holes: leave these out, or take load "
+    fix += "steps (by='steps') of another section than plane"
+    require("path", "pressures", whole or walks_pressures(scene), fix)
+    base = scene.contact.normal == "rigid" or not targets.size
+    fix = "leaves plane elasticity nothing but the pressures: set load.cycles = 0, or take another "
+    fix += "model.section"
+    require("contact.normal", scene.contact.normal, base, fix)
+    turns = _turns(scene, targets, own) if whole else ()
+    strip = strip_of(scene) if strip is None else strip
+    if not is_traced(strip.lift):
+        down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
+        fix = f"must press the strip down for model.section = {scene.plan.section}"
+        require("contact.pressure", scene.contact.pressure, down, fix)
+    known = isinstance(turns, tuple)
+    given = (scene, strip, targets, None if whole else parts, () if known else turns)
+    history, movement = _walk(given, turns if known else (), cycles)
+    above = Unread(strip, movement)
+    found: History = history.but(scene=scene, above=above.found if now else above)
+    return found
+
+
+def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
+    """True for each level before which the load has turned; an array if the loads are traced."""
+    if own:
+        return turns_of_cycles(scene.load.cycles, scene.plan.steps)
+    return turns_of(targets) if is_traced(targets) else known_turns(np.asarray(targets))
+
+
+@kept
+@Small
+def strip_of(scene: Scene) -> Strip:
+    """Strip of a scene on its contact line."""
+    strip = condensed(scene, scene.plan.nodes)
+    no_masses = strip.form.masses[:0]  # of no use without inertia, and slow to compile
+    return strip._replace(form=strip.form._replace(masses=no_masses))
+
+
+@Small
+def _walk(
+    given: tuple[Scene, Strip, Array, Array | None, Turns],
+    known: tuple[bool, ...],
+    cycles: Cycles,
+) -> tuple[History, Movement]:
+    """History of a strip pressed down and loaded along targets; see `solve`.
+
+    It is without its scene and the fields above the contact, which follow from the movement.
+
+    Parameters
+    ----------
+    given : scene, its strip, loads after the pressing, parts of the pressures then if they change,
+        else None, and the turns before the loads if traced, else ()
+    known : turns if they are known
+    """
+    scene, strip, targets, parts, traced = given
+    turns = known if isinstance(traced, tuple) else traced
+    found = _levels(scene, strip, targets, parts, turns)
+    history, movement = _history(scene, strip, found, parts, cycles)
+    return history.but(scene=None), movement  # its numbers would be copied
+
+
+def _levels(scene: Scene, strip: Strip, targets: Array, parts: Array | None, turns: Turns) -> Level:
+    """Levels after the pressing; the last contact nodes are bearings, if the scene has any."""
+    body, friction, member = strip.body, scene.contact.friction, scene.member
+    lift, bearing = strip.lift, member.bearing_stiffness
+    if bearing is not None:
+        share = (strip.load / jnp.sum(strip.load))[::-1]
+        body = with_bearings(body, bearing, share)
+        lift = with_gaps(lift, 0.0 if member.clearance is None else member.clearance)
+    soft = scene.contact.stick_stiffness is not None
+    if soft:
+        body, springs = with_springs(body, spring_stiffness(scene, strip))
+    press = Press.of(strip.loaded.hessian, body.f_t.size, body.f_n.size - strip.x.size)
+    if scene.load.control == "displacement":
+        body = driven_by_displacement(body)
+        press = press.driven_by_displacement(body)
+    start = pressed(body)
+    # The pressures squeeze an even strip flat.
+    flat = None if stays_flat(scene) else lift
+    if not targets.size:
+        none = Level(start, lift, start.force, start.v > 0.0, start.force >= 0.0)
+        found = jax.tree.map(lambda a: jnp.zeros((0, *a.shape), a.dtype), none)
+    elif parts is not None:
+        found = walk_with_pressures(body, press, friction, start, targets, parts, flat)
+    else:
+        alike = not goes_on(scene)  # the edge of the contact opens at other events at each load
+        found = walk(body, friction, start, targets, turns, flat, alike=alike)
+    sound = jnp.all(jnp.isfinite(strip.lift))
+    state = found.state
+    if scene.load.control == "displacement":
+        state = jax.vmap(exchanged)(state)
+    if soft:
+        risen = found.lift - lift
+        state = state._replace(v=jax.vmap(springs.slip)(state.v, risen, state.force))
+    return found._replace(state=state, settled=found.settled & sound)
+
+
+def _history(
+    scene: Scene, strip: Strip, levels: Level, parts: Array | None, cycles: Cycles
+) -> tuple[History, Movement]:
+    """History of the levels after the pressing, whose steps come first, and the movement.
+
+    Parameters
+    ----------
+    parts : parts (levels,) of the pressures that act; None is all of them
+    """
+    before, state = scene.load.pressure_steps, levels.state
+    steps = before + state.force.size
+    part = jnp.asarray(np.minimum(np.arange(1, steps + 1) / before, 1.0), state.force.dtype)
+    pressure = part if parts is None else jnp.append(part[:before], parts)
+    sound = jnp.append(jnp.ones(before, bool), levels.settled)
+    movement = _movement(strip, levels, part, pressure, sound)
+    energy, sinking = _energy(scene, strip, movement, state)
+    traction, reaction = _on_base(strip, state, part[:before])
+    moved = part[:, None] * movement.at_rest + movement.change
+    driven = state.displacement if scene.load.control == "displacement" else state.force
+    status = jnp.where(sound, Status.CONVERGED, Status.MAX_ITERATIONS)
+
+    def every(values: Array) -> Array:
+        return jnp.pad(values, (before, 0))
+
+    def masked(values: Array) -> Array:
+        return nan_unless(sound, values)
+
+    history = History(
+        scene=scene,
+        x=strip.x,
+        middles=0.5 * (strip.x[1:] + strip.x[:-1]),
+        tributary=strip.tributary,
+        load=strip.load,
+        force=masked(every(state.force)),
+        displacement=masked(every(state.displacement)),
+        contact_v=masked(moved[:, :-2:2]),
+        above=None,
+        gap=masked(moved[:, 1:-2:2]),
+        traction=masked(traction),
+        reaction=masked(reaction),
+        slipping=_along(levels.slipping, strip.x.size, before),
+        slip_work=masked(every(levels.slip_work)),
+        stored_energy=masked(energy),
+        pressure=pressure,
+        sinking=masked(sinking),
+        iterations=jnp.zeros(part.size, int),
+        error=jnp.zeros(part.size),
+        status=status,
+        cycles=cycles,
+        target=masked(every(driven)),
+    )
+    return history, movement
+
+
+def _along(values: Array, nodes: int, before: int) -> Array:
+    """Values (levels, k) as (before + levels, nodes) from the far end, zero before the levels."""
+    return jnp.pad(values[:, ::-1], ((before, 0), (nodes - values.shape[1], 0)))
+
+
+def _movement(strip: Strip, levels: Level, part: Array, pressure: Array, sound: Array) -> Movement:
+    """Movement of the strip as it is pressed, and what the levels add to it.
+
+    Parameters
+    ----------
+    part : (steps,) part of the pressures that presses the strip down, 1 at the levels
+    pressure : (steps,) part of the pressures that acts
+    sound : (steps,) False from the first step on that has no equilibrium
+    """
+    n, before = strip.x.size, part.size - levels.settled.size
+    settled = _along(strip.settled[None], n, 0)[0]
+    at_rest = jnp.append(jnp.stack([settled, strip.lift[::-1]], axis=1), jnp.array([0.0, 1.0]))
+    slip, risen = (
+        _along(values, n, before) for values in (levels.state.v, levels.lift[:, :n] - strip.lift)
+    )
+    change = jnp.stack([slip, risen], axis=2).reshape(part.size, 2 * n)
+    force = jnp.pad(levels.state.force, (before, 0))
+    change = jnp.column_stack([change, force, pressure - part])
+    return Movement(at_rest, change, part, sound)
+
+
+def _energy(
+    scene: Scene, strip: Strip, movement: Movement, state: ContactState
+) -> tuple[Array, Array]:
+    """Stored energy (steps,) with the potential of the pressures, and their sinking."""
+    at_rest, change, part, _ = movement
+    n, before = strip.x.size, part.size - state.force.size
+    # Conjugate to v and w, minus the end load, and the pressure.
+    resting, added = at_rest @ strip.pressed.hessian, change @ strip.loaded.hessian
+    energy = 0.5 * part**2 * (resting @ at_rest) + change @ resting.at[-2].set(0.0)
+    energy = energy + 0.5 * jnp.sum(added * change, axis=1) - added[:, -2] * change[:, -2]
+    bearing = scene.member.bearing_stiffness
+    if scene.contact.stick_stiffness is not None:
+        springs = spring_energy(spring_stiffness(scene, strip), state.r_t)
+        energy = energy.at[before:].add(springs)
+    if bearing is not None:
+        energy = energy.at[before:].add(bearing_energy(bearing, state.r_n[:, n:]))
+    return energy, part * resting[-1] + added[:, -1]
+
+
+def _on_base(strip: Strip, state: ContactState, pressing: Array) -> tuple[Array, Array]:
+    """Traction on the strip and reaction of the base (steps, n) from the far end.
+
+    Parameters
+    ----------
+    pressing : (before,) part of the pressures while they press the strip down
+    """
+    n, share = strip.x.size, pressing[:, None]
+    r_t = jnp.concatenate([share * strip.body.t_0, state.r_t])
+    r_n = jnp.concatenate([share * strip.body.r_0, state.r_n[:, :n]])
+    return -_along(r_t, n, 0) / strip.tributary, r_n[:, ::-1] / strip.tributary

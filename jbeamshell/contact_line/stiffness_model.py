@@ -1,0 +1,265 @@
+"""Stiffness model: the matrix of an elastic body from any finite-element program.
+
+The matrix is that of a full model, or of one that the program has condensed already.  Each row is a
+degree of freedom, a node in a direction.  Everything but the contact is eliminated here,
+
+    K = K_cc - K_ci K_ii^-1 K_ic,    f = f_c - K_ci K_ii^-1 f_i,    c = f_i' K_ii^-1 f_i,
+
+with c the contact, i the rest, and f the nodal forces of a load (Guyan 1965; exact in statics).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.linalg import SuperLU, splu
+
+from jbeamshell.common.checks import require, require_count, shown, whole_numbers
+from jbeamshell.common.errors import InputError
+from jbeamshell.contact_line.matrix_files import read_matrix
+from jbeamshell.contact_line.substructure import Substructure
+
+SYMMETRIC = 1e-8  # of the largest entry
+SAME_PLACE = 1e-9  # of the contact's length, within which nodes lie at one X
+LOST = 1e-12  # pivot over its diagonal entry, from which on nothing is left of the stiffness
+TABLE = "give rows of node and X"
+FORCES = "give rows of node, direction and force"
+SUPPORTS = "give rows of node and direction"
+DIRECTIONS = 6  # three ways and three turns
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StiffnessModel:
+    """Stiffness matrix of an elastic body, with the node and direction of each row.
+
+    Supports are those degrees of freedom that the matrix does not have.
+
+    Attributes
+    ----------
+    matrix : (N, N) symmetric, dense or scipy sparse
+    dofs : (N, 2) node number and direction (1, 2, 3) of each row
+
+    Raises
+    ------
+    InputError
+        if the matrix is not square or not symmetric, if it has no row for each degree of freedom,
+        or if a node or a direction is no whole number
+
+    Examples
+    --------
+    ::
+
+        model = jb.StiffnessModel.read("upper.sti")  # of CalculiX, with upper.dof beside it
+        upper = model.condensed(contact, pull=pull, press=[bolt])
+        history = jb.solve_contact(upper, friction=0.1, amplitude=0.8)
+    """
+
+    matrix: Any
+    dofs: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        matrix = scipy.sparse.csc_array(self.matrix)
+        square = matrix.shape[0] == matrix.shape[1] > 0
+        require("matrix", matrix.shape, square, "must be square")
+        finite = bool(np.all(np.isfinite(matrix.data)))
+        require("matrix", matrix.shape, finite, "must hold finite numbers only")
+        largest = float(np.max(np.abs(matrix.data), initial=0.0))
+        apart = float(abs(matrix - matrix.T).max()) if matrix.nnz else 0.0
+        fix = "is not symmetric: give the whole matrix, or mirror the half that was written"
+        require("matrix", f"max|K - K'| {apart:.3g}", apart <= SYMMETRIC * largest, fix)
+        dofs = whole_numbers("dofs", self.dofs)
+        fix = f"give the node and direction of each of its {matrix.shape[0]} rows"
+        require("dofs", dofs.shape, dofs.shape == (matrix.shape[0], 2), fix)
+        known = bool(np.all((dofs >= [0, 1]) & (dofs[:, 1:] <= DIRECTIONS)))
+        require("dofs", dofs, known, f"directions are 1 to {DIRECTIONS}, and nodes not negative")
+        unique = len({tuple(row) for row in dofs.tolist()}) == len(dofs)
+        require("dofs", dofs.shape, unique, "must name each node and direction once")
+        object.__setattr__(self, "matrix", 0.5 * (matrix + matrix.T))
+        object.__setattr__(self, "dofs", dofs)
+
+    @classmethod
+    def read(
+        cls, path: str | os.PathLike[str], *, dofs: ArrayLike | None = None, directions: int = 2
+    ) -> StiffnessModel:
+        """Model in a file, see `jbeamshell.contact_line.matrix_files` for the formats.
+
+        Parameters
+        ----------
+        path : file of the matrix
+        dofs : (N, 2) node and direction of each row, where the file does not say them
+        directions : rows of each node where neither does; nodes then count from 1
+
+        Raises
+        ------
+        InputError
+            if the file cannot be read or holds no such matrix
+        """
+        found = read_matrix(path)
+        if dofs is not None:
+            return cls(found.matrix, np.asarray(dofs))
+        if found.dofs is not None:
+            return cls(found.matrix, found.dofs)
+        require_count("directions", directions, 1, DIRECTIONS)
+        node, direction = np.divmod(np.arange(found.matrix.shape[0]), directions)
+        return cls(found.matrix, np.column_stack([node, direction]) + 1)
+
+    def condensed(
+        self,
+        contact: ArrayLike,
+        *,
+        pull: ArrayLike | None = None,
+        press: Sequence[ArrayLike] = (),
+        held: ArrayLike | None = None,
+        tangential: int = 1,
+        normal: int = 2,
+        tributary: ArrayLike | None = None,
+    ) -> Substructure:
+        """Body on its contact line, everything else eliminated.
+
+        Parameters
+        ----------
+        contact : (k, 2) node and X of the contact's nodes; those at one X move together, such as
+            the front and the back of a slice
+        pull : (k, 3) node, direction and force of a unit of the load that is cycled; its
+            displacement is the one conjugate to it.  None for a body that is not pulled
+        press : for each bolt or pressure, (k, 3) node, direction and force
+        held : (k, 2) node and direction of supports that the matrix still has; may be empty
+        tangential, normal : directions along the contact and away from the body below
+        tributary : contact length of each X; None is half the way to its neighbours
+
+        Raises
+        ------
+        InputError
+            for a node or a direction that the model does not have, or that is no whole number; for
+            forces and lengths that are not finite; for a body with a negative or a loose mode
+        """
+        model = self if held is None else self._without(held)
+        for key, side in (("tangential", tangential), ("normal", normal)):
+            require_count(key, side, 1, DIRECTIONS)
+        require("normal", normal, normal != tangential, "must differ from tangential")
+        row = {(int(a), int(b)): i for i, (a, b) in enumerate(model.dofs)}
+        nodes, x, group = _groups(contact)
+        known = set(self.dofs[:, 0].tolist())
+        for node in nodes:
+            fix = "is no node of the model: give nodes that have rows in the matrix"
+            require("contact", node, node in known, fix)
+        for key, side in (("tangential", tangential), ("normal", normal)):
+            fix = "is a direction that no node of the contact has: name another, or free a node"
+            require(key, side, any((node, side) in row for node in nodes), fix)
+        size = model.dofs.shape[0]
+        place = np.full(size, -1)
+        fixed = np.zeros((x.size, 2), bool)
+        for side, direction in enumerate((tangential, normal)):
+            for node, g in zip(nodes, group, strict=True):
+                if (node, direction) not in row:
+                    fixed[g, side] = True
+            for node, g in zip(nodes, group, strict=True):
+                if (node, direction) in row:
+                    place[row[node, direction]] = -2 if fixed[g, side] else 2 * g + side
+        forces = np.column_stack(
+            [_forces("pull", [] if pull is None else pull, row, size)]
+            + [_forces(f"press[{i}]", table, row, size) for i, table in enumerate(press)]
+        )
+        on_line, inside = np.flatnonzero(place >= 0), np.flatnonzero(place == -1)
+        ties = scipy.sparse.csc_array(
+            (np.ones(on_line.size), (np.arange(on_line.size), place[on_line])),
+            shape=(on_line.size, 2 * x.size),
+        )
+        stiffness = (ties.T @ model.matrix[on_line][:, on_line] @ ties).toarray()
+        across = (model.matrix[inside][:, on_line] @ ties).toarray()
+        among, given = ties.T @ forces[on_line], forces[inside]
+        flexibility = np.zeros((forces.shape[1],) * 2)
+        if inside.size:
+            solved = _factors(model.matrix[inside][:, inside]).solve(np.hstack([across, given]))
+            by_contact, by_loads = np.split(solved, [across.shape[1]], axis=1)
+            stiffness = stiffness - across.T @ by_contact
+            among = among - across.T @ by_loads
+            flexibility = given.T @ by_loads
+        return Substructure(
+            x,
+            0.5 * (stiffness + stiffness.T),
+            among,
+            0.5 * (flexibility + flexibility.T),
+            tributary=tributary,
+            fixed=fixed.ravel().tolist(),
+        )
+
+    def _without(self, held: ArrayLike) -> StiffnessModel:
+        """Model without the rows of supports."""
+        rows = _rows("held", held, 2, SUPPORTS)
+        gone = {(a, b) for a, b in whole_numbers("held", rows).tolist()}
+        known = set(map(tuple, self.dofs.tolist()))
+        for node, direction in sorted(gone - known):
+            fix = "is not in the model: leave it out where its matrix has the support already"
+            raise InputError(f"held = node {node}, direction {direction}: {fix}")
+        kept = [i for i, dof in enumerate(self.dofs.tolist()) if tuple(dof) not in gone]
+        require("held", f"{len(gone)} rows", bool(kept), "holds the whole body: leave some free")
+        return StiffnessModel(self.matrix[kept][:, kept], self.dofs[kept])
+
+
+def _groups(contact: ArrayLike) -> tuple[list[int], NDArray[np.float64], NDArray[np.int64]]:
+    """Nodes of the contact, the rising places X, and the place of each node."""
+    table = _rows("contact", contact, 2, TABLE)
+    nodes = whole_numbers("contact", table[:, 0]).tolist()
+    require("contact", len(nodes), len(set(nodes)) == len(nodes), "names a node twice")
+    order = np.argsort(table[:, 1], kind="stable")
+    rising = table[order, 1]
+    begins = np.diff(rising, prepend=-np.inf) > SAME_PLACE * np.ptp(rising)
+    group = np.empty(len(nodes), int)
+    group[order] = np.cumsum(begins) - 1
+    x = rising[begins]
+    require("contact", x.size, x.size > 1, "needs nodes at two or more places X")
+    return nodes, x, group
+
+
+def _forces(
+    key: str, table: ArrayLike, row: dict[tuple[int, int], int], size: int
+) -> NDArray[np.float64]:
+    """Nodal forces (N,) of a table of node, direction and force."""
+    values = _rows(key, table, 3, FORCES)
+    found = np.zeros(size)
+    places = whole_numbers(key, values[:, :2]).tolist()
+    for (node, direction), force in zip(places, values[:, 2], strict=True):
+        where = row.get((node, direction))
+        if where is None:
+            fix = "is not in the model: leave it out where a support holds it"
+            raise InputError(f"{key} = node {node}, direction {direction}: {fix}")
+        found[where] += force
+    return found
+
+
+def _rows(key: str, table: ArrayLike, columns: int, fix: str) -> NDArray[np.float64]:
+    """Rows of finite numbers of a table; none of an empty one."""
+    try:
+        values = np.asarray(table, float)
+    except (TypeError, ValueError):
+        raise InputError(f"{key} = {shown(table)}: is no table of numbers: {fix}") from None
+    values = values if values.size else np.zeros((0, columns))
+    require(key, values.shape, values.ndim == 2 and values.shape[1] == columns, fix)
+    finite = np.all(np.isfinite(values), axis=1)
+    require(key, values[~finite], bool(np.all(finite)), "holds NaN or infinity: " + fix)
+    return values
+
+
+def _factors(matrix: scipy.sparse.csc_array) -> SuperLU:
+    """Factors of what is eliminated, which must be positive definite."""
+    try:
+        factors = splu(
+            scipy.sparse.csc_matrix(matrix),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError:  # exactly singular
+        left = 0.0
+    else:
+        left = float(np.min(factors.U.diagonal()[factors.perm_c] / matrix.diagonal()))
+    fix = "a part moves freely or has a negative mode with the contact clamped: check the supports"
+    require("matrix", f"pivot {left:.3g} of its diagonal", left > LOST, fix)
+    return factors

@@ -1,0 +1,353 @@
+"""Strip of a scene on its contact line: its stations, its pressing, its condensed body."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jbeamshell.contact_line import entry
+from jbeamshell.contact_line.assembly import press_roughly
+from jbeamshell.contact_line.body import Body, Elimination, Unknown, eliminate
+from jbeamshell.contact_line.ends import end_section
+from jbeamshell.contact_line.pair import Member, Pair, joined, with_shanks
+from jbeamshell.contact_line.pressing import press as press_down
+from jbeamshell.contact_line.section import section_form
+from jbeamshell.mechanics import elements
+from jbeamshell.mechanics.section_form import SectionForm, on_symmetry_plane
+from jbeamshell.numerics.factors import solve
+from jbeamshell.scene.keys import FAR_ENDS
+from jbeamshell.scene.parts import Load
+from jbeamshell.scene.scene import Scene
+
+PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
+PLANE_GROWTH = 0.3  # of the element size over the distance from there, also of small elements
+PLANE_FAR_SIZE = 0.15  # of L, elements away from it
+HOLE_DEPTH = 0.1  # of H, a gap that nothing closes
+STEP_SIZE = 0.05  # of H, elements at a step of the pressure
+RULE = elements.element_rule("finite-difference")
+
+
+class Members(NamedTuple):
+    """Strip of a scene, with its second member if there is one, on its contact line.
+
+    Attributes
+    ----------
+    elimination : what finds the fields above the contact again
+    hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
+    pair : second member of a lap joint; v, w and hessian are then relative to it
+    """
+
+    elimination: Elimination | Unknown
+    hessian: Array
+    pair: Pair | None = None
+
+    @property
+    def of_contact(self) -> Members:
+        """Members without what finds the fields above the contact again."""
+        pair = self.pair
+        if pair is not None:
+            pair = pair._replace(elimination=pair.elimination.forgotten)
+        return self._replace(elimination=self.elimination.forgotten, pair=pair)
+
+
+class Strip(NamedTuple):
+    """Strip of a scene, condensed.
+
+    Attributes
+    ----------
+    body : contact line, numbered from the loaded end
+    form : energy of the section
+    pressed : the strip under its pressures
+    loaded : the strip under its load, whose members may go on beyond the contact
+    x, tributary, load : (n,) stations from the far end, contact lengths, forces of the top pressure
+    settled, lift : (k,) tangential displacements and (n,) lifts under the pressures, relative to a
+        second member
+    """
+
+    body: Body
+    form: SectionForm
+    pressed: Members
+    loaded: Members
+    x: Array
+    tributary: Array
+    load: Array
+    settled: Array
+    lift: Array
+
+    @property
+    def of_contact(self) -> Strip:
+        """Strip without what finds the fields above the contact again: they are NaN."""
+        return self._replace(pressed=self.pressed.of_contact, loaded=self.loaded.of_contact)
+
+
+def condensed(scene: Scene, nodes: int) -> Strip:
+    """Strip of a scene as its condensed section, or as plane elasticity, on its contact nodes."""
+    form, x = section_form(scene), stations(scene, nodes)
+    down, up = pressing(scene, x)
+    tributary = elements.tributary_lengths(RULE, x)
+    alone = scene.member.support == "none"
+    under_pressure, under_load = (_alone if alone else _joint)(scene, form, x, down, up)
+    gap = initial_gap(scene, x)
+    last = 2 * x.size - 2
+    v = slice(last, 0 if "v" in FAR_ENDS[scene.strip.far_end] else None, -2)
+    w = slice(last + 1, None, -2)
+    hessian = under_pressure.hessian
+    k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
+    # Without friction the far end keeps its place, even if nothing else holds it.
+    some = x.size - 1
+    press_t, traction = press[v][:some], jnp.zeros_like(press[v])
+    stiffness = k_tt[:some, :some], k_tn[:some], hessian[w, w]
+    away = None if gap is None else gap[::-1]
+    if scene.member.assembly == "frictional":
+        loads = press[v], press[w], scene.contact.friction
+        lift, settled, reaction, traction = press_roughly(k_tt, k_tn, hessian[w, w], *loads, away)
+    elif stays_flat(scene):
+        lift, reaction = jnp.zeros_like(x), (down - up)[::-1]
+        settled = solve(stiffness[0], -press_t)
+    else:
+        based = scene.contact.normal == "rigid"
+        lift, settled, reaction = press_down(*stiffness, press_t, press[w], based, away)
+    if gap is not None:
+        under_pressure, under_load = (over_gap(each, gap) for each in (under_pressure, under_load))
+    settled = jnp.pad(settled, (0, k_tt.shape[0] - settled.size))
+    hessian = under_load.hessian
+    if scene.member.bolt_stiffness is not None:
+        hessian = with_shanks(hessian, scene.member.bolt_stiffness, down)
+    body = Body(
+        x=x[::-1],
+        tributary=tributary[::-1],
+        K_tt=hessian[v, v],
+        K_tn=hessian[v, w],
+        K_nn=hessian[w, w],
+        f_t=-hessian[v, -2],
+        f_n=-hessian[w, -2],
+        r_0=reaction,
+        t_0=traction,
+        c=-hessian[-2, -2],
+    )
+    under_load = under_load._replace(hessian=hessian)
+    return Strip(body, form, under_pressure, under_load, x, tributary, down, settled, lift)
+
+
+def _alone(
+    scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
+) -> tuple[Members, Members]:
+    """Strip on a rigid base, under its pressures and under its load."""
+    lifted = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
+    from_below = lifted[:, None] * np.eye(lifted.size)[-1]
+    ends = [entry.loaded_end(scene, form, mounted).end for mounted in entry.states(scene)]
+    found = [
+        Members(line.elimination, line.hessian - from_below - from_below.T, None)
+        for line in eliminate(form, x, down, entry.far_end(scene, form), *ends)
+    ]
+    return found[0], found[-1]
+
+
+def _joint(
+    scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
+) -> tuple[Members, Members]:
+    """Both members of a lap joint, under the pressures and under the load."""
+    found = []
+    for upper, lower, stretch in lap_members(scene, form, x, down, up):
+        pair, hessian = joined(upper, lower)
+        found.append(Members(upper.line.elimination, hessian.at[-2, -2].add(stretch), pair))
+    return found[0], found[-1]
+
+
+def lap_members(
+    scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
+) -> list[tuple[Member, Member, Array]]:
+    """Members of a lap joint under the pressures, and under the load if they are mounted then.
+
+    Returns
+    -------
+    list
+        upper and lower member, and the compliance of the latter that u leaves out
+    """
+    n, strip, rolls = x.size, scene.strip, scene.member.support == "rolling"
+    upper_form, below = loaded(form, scene.load), section_form(scene.of_member())
+    flat = rolls and below.top == 0  # what cannot be squeezed keeps its height
+    below = on_symmetry_plane(below) if rolls else below
+    arm = strip.half_height + scene.member.beside(strip).half_height
+    arm = arm if scene.load.arm is None else arm + scene.load.arm
+    pull = below.turn if scene.load.kind == "moment" else below.pull + arm * below.turn
+    below = below._replace(pull=jnp.zeros_like(below.pull))  # the load acts above
+    free = np.zeros((n - 1, 2), bool)
+    states = entry.states(scene)
+    entering = [entry.loaded_end(scene, upper_form, mounted) for mounted in states]
+    uppers = eliminate(
+        upper_form, x, down, end_section(upper_form), *(held.end for held in entering)
+    )
+    found = []
+    for mounted, held, upper in zip(states, entering, uppers, strict=True):
+        leaving, stretch = entry.leaving_end(scene, below, pull, flat, mounted)
+        fixed = np.append(leaving.fixed, free).reshape(n, 2) | [False, flat]
+        fixed[-1, 1] |= not mounted and not rolls  # else it would turn
+        (lower,) = eliminate(below, x, up, leaving.end, end_section(below))
+        above = Member(upper_form, upper, np.append(free, held.fixed))
+        found.append((above, Member(below, lower, fixed.ravel()), stretch))
+    return found
+
+
+def over_gap(members: Members, gap: Array) -> Members:
+    """Members in their opening w + g_0 instead of the relative lift w.
+
+    Parameters
+    ----------
+    gap : (n,) distance g_0 of the members before anything presses
+    """
+    shift = jnp.stack([jnp.zeros_like(gap), -gap], axis=1).ravel()
+    change = jnp.eye(shift.size + 2, dtype=gap.dtype).at[:-2, -1].add(shift)
+    pair = members.pair
+    assert pair is not None
+    moved = pair._replace(upper=pair.upper @ change, lower=pair.lower @ change)
+    return members._replace(hessian=change.T @ members.hessian @ change, pair=moved)
+
+
+def initial_gap(scene: Scene, x: Array) -> Array | None:
+    """Distance (n,) of the members at their stations before anything presses; None if they touch.
+
+    A hole is a gap that nothing closes.
+    """
+    given, holes = scene.member.gap, scene.member.holes
+    if given is None and holes is None:
+        return None
+    gap = jnp.zeros_like(x) if given is None else _on_stations(given, x)
+    if holes is None:
+        return gap
+    begin, end = scene.member.hole_edges.T
+    inside = jnp.any((x[:, None] > begin) & (x[:, None] < end), axis=1)
+    return gap + jnp.where(inside, HOLE_DEPTH * scene.strip.half_height, 0.0)
+
+
+def _on_stations(gap: Array, x: Array) -> Array:
+    """Values (n,) of a number or a table at the stations."""
+    return jnp.interp(x, gap[:, 0], gap[:, 1]) if gap.ndim else jnp.broadcast_to(gap, x.shape)
+
+
+def loaded(form: SectionForm, load: Load) -> SectionForm:
+    """Form of a section whose end is loaded by a moment, or by a force away from mid-height."""
+    if load.kind == "moment":
+        return form._replace(pull=form.turn)
+    return form if load.arm is None else form._replace(pull=form.pull - load.arm * form.turn)
+
+
+def pressing(scene: Scene, x: Array) -> tuple[Array, Array]:
+    """Forces (n,) of the pressures on the top face, downwards, and the bottom face, upwards."""
+    down = elements.nodal_loads(RULE, x, scene.contact.pressure)
+    return down, elements.nodal_loads(RULE, x, scene.contact.bottom_pressure)
+
+
+def is_pressed_evenly(scene: Scene) -> bool:
+    """True if neither pressure is a table."""
+    return scene.contact.pressure.ndim == scene.contact.bottom_pressure.ndim == 0
+
+
+def stays_flat(scene: Scene) -> bool:
+    """True if the pressures squeeze the strip evenly onto a foundation, so that it does not bend.
+
+    Layers and a Phi of the user's own may bend.
+    """
+    homogeneous = scene.strip.layers is None and scene.energy is None
+    alone = homogeneous and scene.member.support == "none"
+    return is_pressed_evenly(scene) and alone and scene.contact.normal == "rigid"
+
+
+def stations(scene: Scene, nodes: int) -> Array:
+    """Stations (nodes,) along X: those of load steps, or of plane elasticity.
+
+    The latter are denser at the singular loaded corner and at steps of the pressure.
+    """
+    length, half_height = scene.strip.length, scene.strip.half_height
+    steps, plan = scene.contact.steps(length), scene.plan
+    if scene.member.support != "none":
+        return _joint_stations(scene, nodes)
+    if not plan.elastic:
+        grading = (plan.end_size, steps, elements.GROWTH, plan.far_size, plan.small_growth)
+        return elements.vertices(nodes - 1, length, half_height, *grading)
+    if steps is None:
+        return _plane_vertices(scene, nodes, PLANE_END_SIZE, None, PLANE_GROWTH)
+    inside = jnp.append(steps < length, False)
+    sizes = jnp.where(inside, STEP_SIZE, PLANE_END_SIZE)
+    growths = jnp.where(inside, elements.GROWTH, PLANE_GROWTH)
+    return _plane_vertices(scene, nodes, sizes, steps, growths)
+
+
+def _joint_stations(scene: Scene, nodes: int) -> Array:
+    """Stations of a lap joint, denser at its ends, at steps of the pressure and edges of holes."""
+    length, half_height = scene.strip.length, scene.strip.half_height
+    steps, plan = scene.contact.steps(length), scene.plan
+    if scene.member.holes is not None:
+        edges = scene.member.hole_edges.ravel()
+        steps = jnp.sort(edges if steps is None else jnp.append(steps, edges))
+    if not plan.elastic:
+        start = jnp.zeros_like(length)[None]
+        foci = start if steps is None else jnp.append(start, steps)
+        grading = (plan.end_size, foci, elements.GROWTH, plan.far_size, plan.small_growth)
+        return elements.vertices(nodes - 1, length, half_height, *grading)
+    none = jnp.zeros((0,), length.dtype) if steps is None else steps
+    foci = jnp.append(jnp.zeros_like(length), none)
+    ends = jnp.concatenate([jnp.array([True]), ~(none < length), jnp.array([True])])
+    sizes = jnp.where(ends, PLANE_END_SIZE, STEP_SIZE)
+    growths = jnp.where(ends, PLANE_GROWTH, elements.GROWTH)
+    return _plane_vertices(scene, nodes, sizes, foci, growths)
+
+
+def _plane_vertices(
+    scene: Scene, nodes: int, sizes: Array | float, foci: Array | None, growths: Array | float
+) -> Array:
+    """Stations of plane elasticity: small elements grow slowly too, as stresses are singular."""
+    grading = (sizes, foci, growths, PLANE_FAR_SIZE, PLANE_GROWTH)
+    length, half_height = scene.strip.length, scene.strip.half_height
+    return elements.vertices(nodes - 1, length, half_height, *grading)
+
+
+def spring_stiffness(scene: Scene, strip: Strip) -> Array:
+    """Stiffness (k,) of the elastic slip of each node, k_t times its contact length."""
+    lengths = strip.body.tributary[: strip.body.f_t.size]
+    return scene.slip_stiffness(lengths) * lengths
+
+
+def moving_volume(strip: Strip) -> Array:
+    """Integral of |u|^2/u(L)^2 over each layer, (layers,), under an end load, all nodes stuck.
+
+    A second member's counts with the lowest layer; lengths beyond the contact do not count.
+    """
+    n = strip.x.size
+    given = jnp.zeros((1, 2 * n + 2)).at[0, -2].set(1.0 / strip.body.c)
+    upper, lower = moved_by(strip.loaded, given)
+    volume = _volume(strip, strip.form, upper)
+    if lower is None:
+        return volume
+    assert strip.loaded.pair is not None
+    return volume.at[0].add(jnp.sum(_volume(strip, strip.loaded.pair.form, lower)))
+
+
+def _volume(strip: Strip, form: SectionForm, moved: Array) -> Array:
+    """Moving volume (layers,) of one member along the contact, of its fields (m, n, 1)."""
+    one = moved[..., 0]
+    return jnp.einsum("i,mi,lmk,ki->l", strip.tributary, one, form.masses, one)
+
+
+def moved_by(members: Members, given: Array) -> tuple[Array, Array | None]:
+    """Fields (m, n, steps) of the strip and of its second member, each of its own form.
+
+    Parameters
+    ----------
+    given : (steps, 2n + 2) v and w of the stations, end load and pressure
+    """
+    pair = members.pair
+    if pair is None:
+        return _fields(members.elimination, given), None
+    above = _fields(members.elimination, pair.above(given))
+    return above, _fields(pair.elimination, pair.below(given))
+
+
+def _fields(elimination: Elimination | Unknown, given: Array) -> Array:
+    """Fields (m, n, steps) of a form from v and w of its stations, load and pressure (steps, :)."""
+    contact = given[:, :-2].reshape(len(given), -1, 2)
+    inner = elimination.recovered(given.T)  # (n, m-2, steps)
+    return jnp.concatenate([contact.T, jnp.moveaxis(inner, 1, 0)])

@@ -1,0 +1,1 @@
+"""Load steps: one residual, Newton's method, one scan over the steps."""

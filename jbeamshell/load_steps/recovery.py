@@ -1,0 +1,80 @@
+"""Recovery of failed load steps: each is walked again in pieces."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jbeamshell.load_steps.path_state import PathState, StepResults
+from jbeamshell.load_steps.stepping import compiled_march
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.load_path import LoadPath
+from jbeamshell.scene.scene import Scene
+
+PIECES = (8, 64)  # numbers of pieces of a failed load step, tried in this order
+
+
+def recover(
+    scene: Scene, steps: StepResults, path: LoadPath, solver: Newton, start: PathState
+) -> StepResults:
+    """Walk every failed step of a march in pieces, and go on from there.
+
+    Parameters
+    ----------
+    scene, path, start : what was walked, see `march`
+    steps : results, of which some are not converged
+    solver : settings of Newton's method
+
+    Returns
+    -------
+    StepResults
+        unconverged from the first step on that fails in the smallest pieces too
+    """
+    count = path.target.size
+    while not _converged(steps):
+        first = int(np.argmin(np.asarray(steps.state.converged)))
+        last = jax.tree.map(lambda a: a[first - 1], steps.state) if first else start  # noqa: B023
+        pieces = _walk_in_pieces(scene, last, jax.tree.map(lambda a: a[first], path), solver)  # noqa: B023
+        if pieces is None:
+            return steps
+        joined = jax.tree.map(lambda a: a[-1], pieces)._replace(
+            slip_work=jnp.sum(pieces.slip_work),
+            iterations=steps.iterations[first] + jnp.sum(pieces.iterations),
+            slipping=jnp.any(pieces.slipping, axis=0),
+        )
+        # The path's end is repeated: with the shapes of the first march nothing compiles again.
+        further = jnp.minimum(jnp.arange(count) + first + 1, count - 1)
+        onward = jax.tree.map(lambda a: a[further], path)  # noqa: B023
+        tail = compiled_march(scene, joined.state, onward, solver)
+        steps = jax.tree.map(
+            lambda head, piece, end: jnp.concatenate(
+                [head[:first], piece[None], end[: count - first - 1]]  # noqa: B023
+            ),
+            steps,
+            joined,
+            tail,
+        )
+    return steps
+
+
+def _walk_in_pieces(
+    scene: Scene, start: PathState, to: LoadPath, solver: Newton
+) -> StepResults | None:
+    """Results of a step in equal pieces; None if no number of pieces finds equilibrium."""
+    for count in PIECES:
+        part = jnp.arange(1, count + 1) / count
+        path = LoadPath(
+            start.target + part * (to.target - start.target),
+            start.pressure + part * (to.pressure - start.pressure),
+            jnp.full_like(part, to.rough),
+        )
+        pieces = compiled_march(scene, start, path, solver)
+        if _converged(pieces):
+            return pieces
+    return None
+
+
+def _converged(steps: StepResults) -> bool:
+    """True if all steps found equilibrium."""
+    return bool(steps.state.converged[-1])

@@ -1,1 +1,0 @@
-"""Quasi-static load paths: one residual, Newton's method, one scan over the steps."""

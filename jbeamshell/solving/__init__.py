@@ -1,0 +1,1 @@
+"""Solving of scenes: histories, responses, advice, and histories read from files."""

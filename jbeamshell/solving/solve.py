@@ -1,0 +1,297 @@
+"""Solving a scene, from top to bottom.
+
+1. A scene is planned when it is made, see `jbeamshell.scene.planning`; `_able` plans it anew if the
+   path needs load steps.
+2. `_walked` follows the path on the contact line, exactly in time (`jbeamshell.contact_line`);
+   `_marched` takes load steps by Newton's method, or the closed form of a bar.
+3. `_refined` halves the elements while the estimated error exceeds the tolerance, and plane
+   elasticity takes the place of a section that is further off.
+4. What may still be wrong is a doubt, see `jbeamshell.history.reliability`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+
+from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
+from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, warn_of_doubts
+from jbeamshell.common.native import Program
+from jbeamshell.common.precision import in_double, is_single
+from jbeamshell.common.progress import patience
+from jbeamshell.common.threads import in_one_lapack_thread
+from jbeamshell.contact_line.solve import Cycles, walks_pressures
+from jbeamshell.contact_line.solve import solve as walk
+from jbeamshell.contact_line.strip import Strip
+from jbeamshell.history.history import History
+from jbeamshell.history.reliability import change_of, misses_tolerance
+from jbeamshell.load_steps.closed_bar import bar_cycles
+from jbeamshell.load_steps.continuation import further_path, with_end
+from jbeamshell.load_steps.outcome import ADVICE, check_solver, history_of, raise_if_failed
+from jbeamshell.load_steps.path_state import StepResults, initial_state
+from jbeamshell.load_steps.recovery import recover
+from jbeamshell.load_steps.stepping import fits_native, march
+from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
+from jbeamshell.scene.plan import CLOSED, STEPS
+from jbeamshell.scene.planning import may_be_elastic, refinements
+from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.section_error import section_error
+from jbeamshell.solving.advice import within
+
+NO_END = (
+    "no equilibrium: all of the contact slides, or its events come to no end; take a smaller "
+    "load.amplitude, load.control = displacement, or other model.nodes"
+)
+SINGLE_NODES = 65  # of a section, up to which single precision leaves less than .5 % of D
+SINGLE = (
+    "single precision in a JAX transformation: the dissipation may be off by several per cent; "
+    "write jax.config.update('jax_enable_x64', True) before anything is computed"
+)
+STACK = 4  # frames from a warning to the caller of `solve`
+
+
+def solve(
+    scene: Scene,
+    path: ArrayLike | None = None,
+    *,
+    contact: ArrayLike | None = None,
+    solver: Newton | None = None,
+    throw: bool = True,
+    tolerance: float | None = None,
+    by: str | None = None,
+) -> History:
+    """Press the strip down, follow a load path, and return the history of all load steps.
+
+    Settings that the scene leaves open are planned so that the dissipation, the loop and the secant
+    stiffness are within ``model.tolerance`` of plane elasticity, where that can stand for the
+    scene; `jbeamshell.advise` says what is planned and why.
+
+    Parameters
+    ----------
+    scene : strip, contact, load and model; traced leaves pass, so `jax.grad` and `jax.vmap` work
+    path : loads after the pressing, (steps,): F, u(L) or the arc length, by ``scene.load.control``;
+        or (steps, 2) with the part of the pressures that acts in the second column, both of which
+        change evenly from step to step; None is the scene's own cycles
+    contact : (n,) True at the nodes in contact where the search of load steps for the contact
+        starts; None starts with all of them
+    solver : settings of Newton's method in load steps
+    throw : True raises for a step without equilibrium and warns of doubts; False leaves both to
+        ``history.status`` and ``history.doubts``
+    tolerance : ``model.tolerance``, .0001 to .1; None is the scene's own
+    by : "steps" solves in load steps by Newton's method, to check what the contact line or a closed
+        form says; None leaves it to the plan
+
+    Returns
+    -------
+    History
+        fields, forces and works at every step; steps without equilibrium hold NaN
+
+    Raises
+    ------
+    InputError
+        if the path is invalid or exceeds gross slip under force control
+    UnconvergedError
+        if a step has no equilibrium, even if it is taken in smaller steps
+
+    Warns
+    -----
+    DoubtfulWarning
+        if a converged result may still be wrong, see `jbeamshell.History.doubts`; never in a traced
+        run, which has `jbeamshell.History.dissipation_error`
+
+    Examples
+    --------
+    >>> history = jb.solve(jb.Scene(), tolerance=0.02)
+    >>> float(history.dissipation)
+    >>> print(history.scene.plan)
+    """
+    require("by", by, by in (None, "steps"), "choose None or 'steps'")
+    with patience("solving"):
+        scene = within(scene, tolerance)
+        scene = scene if by is None else scene.by_load_steps()
+        return run(scene, path, contact=contact, solver=solver, throw=throw)
+
+
+@in_one_lapack_thread
+def run(
+    scene: Scene,
+    path: ArrayLike | None = None,
+    *,
+    contact: ArrayLike | None = None,
+    solver: Newton | None = None,
+    throw: bool = True,
+    strip: Strip | None = None,
+) -> History:
+    """Run of a scene as it is planned; see `solve`.
+
+    Parameters
+    ----------
+    scene, path, contact, solver, throw : see `solve`
+    strip : strip of the scene on its contact line, if it is known
+    """
+    check_solver(solver)
+    scene = _able(scene, path, contact)
+    whole, cycles = check(scene, path)
+    if scene.plan.on_contact_line:
+        fix = "is found from the pressures on the contact line: leave it out"
+        require("contact", "given", contact is None, fix)
+        return _walked(scene, whole, cycles, throw, path is None, strip)
+    touching = None if contact is None else check_contact(scene, contact)
+    history = _marched(scene, whole, touching, solver or Newton(), throw).but(cycles=cycles)
+    if throw and not is_traced(history):
+        warn_of_doubts(history.doubts, stacklevel=STACK)
+    return history
+
+
+def _able(scene: Scene, path: ArrayLike | None, contact: ArrayLike | None) -> Scene:
+    """Scene in load steps, if its section was left open or has them, and the path needs them."""
+    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+    pressures = path is not None and as_leaf(path, "path", LOADS).ndim > 1
+    line = contact is None and (walks_pressures(scene) or not pressures)
+    able = line if scene.plan.on_contact_line else path is None or scene.plan.walks_any_path
+    return scene if able or scene.model.section == "plane" else scene.by_load_steps()
+
+
+def _walked(
+    scene: Scene,
+    path: LoadPath,
+    cycles: Cycles,
+    throw: bool,
+    own: bool,
+    strip: Strip | None = None,
+) -> History:
+    """History on the contact line, on a grid and a section that keep the tolerance."""
+    traced = is_traced(scene, path) or is_staged()
+    if traced and not _precise(scene):
+        warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
+
+    def walked(scene: Scene, strip: Strip | None = None) -> History:
+        history = walk(scene, path, cycles, own=own, strip=strip)
+        return history.but(end=WholePath())
+
+    history = walked(scene, strip)
+    if traced:
+        failed = history.status[-1] != Status.CONVERGED
+        return eqx.error_if(history, failed, f"a load step has {NO_END}") if throw else history
+    if cycles and history.converged:
+        history = _refined(history, walked)
+        if _needs_elasticity(history):
+            history = walked(scene.as_elasticity())
+    if throw and not history.converged:
+        step = int(np.argmax(np.asarray(history.status)))
+        load = float(path.target[step])
+        raise UnconvergedError(f"load step {step} (load {load:.6g}) has {NO_END}")
+    if throw:
+        warn_of_doubts(history.doubts, stacklevel=STACK + 1)
+    return history
+
+
+@in_double
+def _marched(
+    scene: Scene, path: LoadPath, touching: np.ndarray | None, solver: Newton, throw: bool
+) -> History:
+    """History in load steps; a failed step is taken again in pieces."""
+    native, enabled = fits_native(scene), np.asarray(True)
+    steps, history = _stepped(scene, touching, path, enabled, solver, native=native)
+    if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
+        converged = steps.state.converged[-1]
+        message = f"a load step found no equilibrium: {ADVICE}"
+        return eqx.error_if(history, ~converged, message) if throw else history
+    if not np.asarray(steps.state.converged)[-1]:  # indexing a JAX array would compile
+        if scene.plan.engine == STEPS:
+            steps = recover(scene, steps, path, solver, initial_state(scene, touching))
+        if throw:
+            raise_if_failed(scene, steps, path)
+        history = with_end(history_of(scene, steps, path.pressure), steps)
+    return history
+
+
+@Program
+def _stepped(
+    scene: Scene,
+    touching: np.ndarray | None,
+    path: LoadPath,
+    enabled: ArrayLike,
+    solver: Newton,
+    native: bool,
+) -> tuple[StepResults, History]:
+    """Results and history of a load path, from the nodes in contact and True to follow it."""
+    start = initial_state(scene, touching)._replace(converged=jnp.asarray(enabled))
+    if scene.plan.engine == CLOSED:
+        steps = bar_cycles(scene, path)
+    else:
+        steps = march(scene, start, path, solver, native)
+    return steps, with_end(history_of(scene, steps, path.pressure), steps)
+
+
+def _refined(history: History, walked: Callable[[Scene], History]) -> History:
+    """History on the first grid whose estimated error keeps the tolerance, or on the finest.
+
+    Parameters
+    ----------
+    history : converged run on the planned grid
+    walked : function that gives the same run of a scene on another grid
+    """
+    for _ in range(refinements(history.scene)):
+        if not misses_tolerance(history):
+            break
+        finer = walked(history.scene.refined())
+        if not finer.converged:
+            break
+        history = finer.but(change=change_of(history, finer))
+    return history
+
+
+def _needs_elasticity(history: History) -> bool:
+    """True if a section that was left open is further off than the tolerance, by its own slip."""
+    scene = history.scene
+    if scene.plan.elastic or not may_be_elastic(scene):
+        return False
+    own = section_error(scene, float(history.slip_length))
+    return own is None or own.largest > scene.model.tolerance
+
+
+def _precise(scene: Scene) -> bool:
+    """True if a transformation's precision is enough for a scene on its contact line."""
+    few = scene.plan.nodes <= SINGLE_NODES and not scene.plan.elastic
+    return few or not is_single(scene)
+
+
+class WholePath(eqx.Module):
+    """End of a path on the contact line: to go on, the whole path is walked anew."""
+
+    def continued(
+        self,
+        history: History,
+        path: ArrayLike | None = None,
+        *,
+        solver: Newton | None = None,
+        throw: bool = True,
+    ) -> History:
+        """History with further loads; see `PathEnd.continued`."""
+        scene, first = history.scene, history.pressed + 1
+        loads, parts = (np.asarray(a)[first:] for a in (history.target, history.pressure))
+        further = further_path(scene, float(loads[-1]) if loads.size else 0.0, path)
+        loads, parts = np.append(loads, further.target), np.append(parts, further.pressure)
+        whole = loads if np.all(parts == 1.0) else np.stack([loads, parts], axis=1)
+        return run(scene, whole, solver=solver, throw=throw)
+
+
+def compile_for(
+    scene: Scene, path: ArrayLike | None = None, *, solver: Newton | None = None
+) -> None:
+    """Compile the programs that `run` needs; only strips on their contact line are solved."""
+    scene = _able(scene, path, None)
+    whole, cycles = whole_path(scene, path)
+    if scene.plan.on_contact_line:
+        _walked(scene, whole, cycles, False, path is None)
+        return
+    given = scene, None, whole, np.asarray(False), solver or Newton()
+    jax.block_until_ready(_stepped(*given, native=fits_native(scene)))

@@ -1,0 +1,286 @@
+"""How the force enters: beside finite elements, limits, energy, derivatives, refusals."""
+
+import csv
+import functools
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.contact_line import entry
+from jbeamshell.contact_line.ends import beyond, compliance, end_section
+from jbeamshell.contact_line.section import section_form
+from jbeamshell.mechanics.layered import Material, layered_form
+from jbeamshell.scene import library
+from jbeamshell.scene.keys import ENTRIES
+
+ELEMENTS = Path(__file__).parents[2] / "calibration/data/entry.csv"
+PLANE = jb.Scene().replace({"model.section": "plane"})
+FIGURES = ("dissipation", "secant_stiffness", "slip_length", "peak_displacement")
+NUMBERS = ("strip.height_ratio", "contact.friction", "load.amplitude")
+H = 0.1126  # half the height of the default strip
+
+
+def elements(name):
+    """Rows of the finite elements of an entry, of a member that goes on by 4 H."""
+    with ELEMENTS.open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row.pop("entry") == name]
+    rows = [{key: float(value or "nan") for key, value in row.items()} for row in rows]
+    return [
+        row for row in rows if row["overhang_over_H"] in (0.0, 4.0) and row["D_over_bar"] > 1e-3
+    ]
+
+
+@functools.cache
+def response(name, nodes):
+    scene = PLANE.replace({"load.entry": name, "model.nodes": nodes})
+    return jb.response(scene, NUMBERS, ("dissipation", "secant_stiffness"))
+
+
+def off(name, row, nodes):
+    """Relative errors of dissipation and stiffness beside the finite elements."""
+    found = response(name, nodes)(row["eta"], row["mu"], row["A"])
+    return (
+        float(found["dissipation"]) / row["D"] - 1.0,
+        float(found["secant_stiffness"]) / row["K_conjugate"] - 1.0,
+    )
+
+
+class TestElements:
+    @pytest.mark.parametrize("name", ENTRIES)
+    def test_a_strip_on_few_nodes(self, name):
+        rows = [r for r in elements(name) if (r["mu"], r["A"]) in {(0.1, 0.4359), (0.3, 3.0)}]
+        errors = np.array([off(name, row, 65) for row in rows])
+        assert len(rows) >= 5
+        assert np.all(np.abs(errors) < [0.02, 0.003])
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("name", ENTRIES)
+    def test_every_strip(self, name):
+        rows = elements(name)
+        errors = np.array([off(name, row, 129) for row in rows])
+        assert len(rows) >= 45
+        assert np.all(np.abs(errors) < [0.005, 0.002])
+
+    def test_the_edge_opens_as_far(self):
+        (row,) = (r for r in elements("member") if (r["eta"], r["mu"], r["A"]) == (H, 0.1, 0.7855))
+        history = jb.solve(PLANE)
+        opened = jnp.sum((history.w[history.pressed + 1 :] > 0.0) * history.tributary, axis=1)
+        assert float(jnp.max(opened)) == pytest.approx(row["open_length"], rel=0.1)
+
+    def test_entries_are_in_order(self):
+        """A stiffer end holds more back: its corner slips more, and it moves less."""
+        scene = PLANE.replace({"load.amplitude": 0.4359, "model.nodes": 65})
+        runs = [jb.solve(scene.replace({"load.entry": name})) for name in ENTRIES[::-1]]
+        loss = {run.scene.load.entry: float(run.dissipation) for run in runs}
+        assert loss["traction"] < loss["member"] < loss["face"] < loss["guided"]
+
+
+class TestBeyond:
+    def test_two_half_heights_are_enough(self):
+        """Dissipation over the length beyond, beside that of the default (see `entry.REACH`)."""
+        scene = PLANE.replace({"load.amplitude": 0.2, "model.nodes": 65})
+        ask = jb.response(scene.replace({"strip.overhang": H}), ("strip.overhang",))
+        whole = float(jb.solve(scene, throw=False).dissipation)
+        parts = [float(ask(length * H)["dissipation"]) / whole for length in (0.5, 1.0, 2.0, 16.0)]
+        assert np.all(np.diff(parts) > 0.0)
+        assert parts[0] < 0.75
+        np.testing.assert_allclose(parts[2:], 1.0, rtol=2e-3)
+
+    def test_a_given_length_adds_its_stretch(self):
+        scene = PLANE.replace({"load.amplitude": 0.4359, "model.nodes": 65})
+        longer = jb.solve(scene.replace({"strip.overhang": 2.0}), throw=False)
+        added = 1.0 / longer.secant_stiffness - 1.0 / jb.solve(scene, throw=False).secant_stiffness
+        assert float(added) == pytest.approx(2.0 / 3.4e4, rel=1e-3)
+
+    def test_a_long_part_of_a_layered_section_stretches_and_bends_as_it_should(self):
+        thickness, stiffness = jnp.array([0.3, 0.7]), jnp.array([2.0, 5.0])
+        form = layered_form(Material(thickness, stiffness, 0.4 * stiffness, 0.3 * stiffness))
+        free = end_section(form, on_contact=False)
+        short, long = (
+            beyond(form, jnp.full(160, length / 160), free, True) for length in (4.0, 6.0)
+        )
+        added = long.softness - short.softness
+        # The end turns, too: what is added is that of the force and of its moment.
+        assert float(added) > 2.0 * float(compliance(form, form.pull, bends=False))
+        np.testing.assert_allclose(added, 2.0 * compliance(form, form.pull), rtol=1e-4)
+
+    def test_both_directions_are_mirror_images(self):
+        form = section_form(PLANE)
+        lengths = jnp.asarray([0.01, 0.05, 0.3])
+        sides = [
+            beyond(form, lengths, end_section(form, on_contact=False), f) for f in (True, False)
+        ]
+        mirror = np.where(form.held, -1.0, 1.0)  # u_x turns round, u_y stays
+        one, other = sides
+        np.testing.assert_allclose(
+            one.stiffness, mirror[:, None] * other.stiffness * mirror, atol=1e-6 * 3.4e4
+        )
+        np.testing.assert_allclose(one.softness, other.softness, rtol=1e-9)
+
+
+class TestSections:
+    def test_a_straight_section_has_a_rigid_face_by_nature(self):
+        scene = jb.Scene().replace(
+            {"model.section": "squeeze", "model.kinematics": "linear", "model.nodes": 33}
+        )
+        runs = [jb.solve(scene.replace({"load.entry": name}), throw=False) for name in ENTRIES]
+        loss = [float(run.dissipation) for run in runs]
+        member, face, guided, traction = loss
+        assert member == face == traction
+        assert guided > 1.02 * face
+
+    @pytest.mark.parametrize("name", ["face", "guided"])
+    def test_load_steps_and_the_contact_line_agree(self, name):
+        """A section of order 3 and the beamshell, whose end is held alike in both."""
+        few = {"load.entry": name, "model.kinematics": "linear"}
+        few |= {"contact.stick_stiffness": 50.0, "load.steps_per_half_cycle": 20}
+        for section in ("squeeze", "p3"):
+            scene = jb.Scene().replace(few | {"model.section": section}).on_grid(17, 1.0 / 6.0)
+            line, steps = (jb.solve(scene, throw=False, by=by) for by in (None, "steps"))
+            assert line.scene.plan.on_contact_line
+            assert not steps.scene.plan.on_contact_line
+            assert float(steps.dissipation) == pytest.approx(float(line.dissipation), rel=0.02)
+            assert float(steps.secant_stiffness) == pytest.approx(
+                float(line.secant_stiffness), rel=5e-3
+            )
+
+    def test_sections_of_rising_order_climb_to_plane_elasticity(self):
+        small = {"load.amplitude": 0.2, "model.nodes": 65, "model.kinematics": "linear"}
+        for name in ("member", "traction"):
+            fine = PLANE.replace(small | {"load.entry": name})
+            plane = float(jb.solve(fine, throw=False).dissipation)
+            orders = [
+                jb.solve(
+                    jb.Scene().replace(small | {"load.entry": name, "model.section": f"p{p}"}),
+                    throw=False,
+                )
+                for p in (2, 4, 8)
+            ]
+            errors = np.abs([float(run.dissipation) / plane - 1.0 for run in orders])
+            assert errors[-1] < 0.5 * errors[0], name
+
+
+class TestJoints:
+    @pytest.mark.parametrize("scene", [library.double_shear(), library.single_lap()])
+    def test_members_that_go_on_are_those_with_overhangs(self, scene):
+        """The default goes on by 2 H; lengths that are given add their stretch alone."""
+        scene = scene.replace({"load.entry": "member", "model.nodes": 65})
+        short = jb.solve(scene, throw=False)
+        given = {"strip.overhang": 2.0 * H, "member.overhang": 2.0 * H}
+        longer = jb.solve(scene.replace(given), throw=False)
+        assert float(longer.dissipation) == pytest.approx(float(short.dissipation), rel=2e-3)
+        added = 1.0 / longer.secant_stiffness - 1.0 / short.secant_stiffness
+        assert float(added) == pytest.approx(4.0 * H / 3.4e4, rel=2e-3)
+
+    def test_members_are_pressed_evenly_before_they_are_mounted(self):
+        """Else the edge of each member presses into the other one, which goes on there."""
+        joint = library.double_shear().replace({"model.nodes": 65, "strip.overhang": 0.5})
+        even, edged = (
+            np.asarray(run.reaction[run.pressed])
+            for run in (
+                jb.solve(joint.replace({"load.entry": name}), throw=False)
+                for name in ("member", "traction")
+            )
+        )
+        np.testing.assert_allclose(even, 10.0, rtol=1e-5)
+        assert np.max(edged) > 20.0
+
+    def test_pressures_that_do_not_balance_are_refused(self):
+        values = {"load.entry": "member", "contact.bottom_pressure": 3.0}
+        with pytest.raises(jb.InputError, match=r"contact.bottom_pressure.*balance"):
+            library.single_lap().replace(values)
+
+
+class TestEnergy:
+    @pytest.mark.parametrize("name", ENTRIES)
+    def test_the_loop_holds_the_work_of_friction(self, name):
+        values = {"load.entry": name, "load.amplitude": 0.4359, "model.nodes": 33}
+        run = jb.solve(PLANE.replace(values | {"load.steps_per_half_cycle": 400}), throw=False)
+        assert float(run.dissipation_loop) == pytest.approx(float(run.dissipation), rel=1e-4)
+        work = float(run.secant_stiffness * run.peak_displacement**2)
+        assert float(jnp.max(jnp.abs(run.energy_imbalance))) < 1e-4 * work
+
+
+class TestDisplacement:
+    @pytest.mark.parametrize("name", ENTRIES)
+    def test_what_the_entry_names_is_driven(self, name):
+        """A displacement that a force has made takes that force."""
+        scene = PLANE.replace({"load.entry": name, "model.nodes": 33, "load.cycles": 1})
+        pulled = jb.solve(scene, throw=False)
+        path = np.asarray(pulled.displacement[pulled.pressed + 1 :])
+        size = {"load.control": "displacement", "load.amplitude": float(np.max(path))}
+        driven = jb.solve(scene.replace(size), path, throw=False)
+        np.testing.assert_allclose(
+            driven.force[-path.size :], pulled.force[-path.size :], atol=1e-6 * 0.7855
+        )
+
+
+class TestDerivatives:
+    @pytest.mark.parametrize("name", ENTRIES)
+    def test_taylor_slope_is_two(self, name):
+        """What a first-order step leaves of all figures falls with the square of the step."""
+        scene = PLANE.replace({"load.entry": name, "model.nodes": 17, "load.amplitude": 0.6})
+        ask = jb.response(scene, NUMBERS, FIGURES)
+        at = jnp.asarray([H, 0.1, 0.6])
+        way = jnp.asarray([0.3 * H, -0.02, 0.1])
+
+        @jax.jit
+        def figures(step):
+            found = ask(*(at + step * way))
+            return jnp.stack([found[figure] for figure in FIGURES])
+
+        value, slope = jax.jvp(figures, (jnp.zeros(()),), (jnp.ones(()),))
+        steps = np.array([1e-3, 1e-4])
+        left = np.array([figures(step) - value - step * slope for step in steps]) / value
+        small = np.abs(left) < 1e-12
+        falls = np.log10(np.abs(left[0]) / np.maximum(np.abs(left[1]), 1e-300))
+        assert np.all(small[1] | (np.abs(falls - 2.0) < 0.2)), (left, falls)
+
+    def test_a_length_beyond_has_a_slope(self):
+        scene = PLANE.replace({"strip.overhang": H, "model.nodes": 17, "load.amplitude": 0.4})
+        ask = jb.response(scene, ("strip.overhang",), FIGURES)
+        slope = jax.jacfwd(lambda length: ask(length)["secant_stiffness"])(H)
+        step = 1e-5 * H
+        ahead, behind = (ask(H + way * step)["secant_stiffness"] for way in (1.0, -1.0))
+        assert float(slope) == pytest.approx(float(ahead - behind) / (2.0 * step), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"load.entry": "glue"}, "choose 'member' or 'face' or 'guided' or 'traction'"),
+        (
+            {"strip.overhang": 0.3, "model.kinematics": "exact"},
+            "strip.overhang = 0.3: needs the contact line of a linear strip",
+        ),
+    ],
+)
+def test_bad_input_is_one_line(values, said):
+    with pytest.raises(jb.InputError, match=said):
+        jb.Scene().replace(values)
+
+
+def test_a_moment_turns_no_guided_face():
+    values = {"load.kind": "moment", "load.amplitude": 0.1, "load.entry": "guided"}
+    with pytest.raises(jb.InputError, match=r"load.entry = 'guided': may not turn"):
+        library.single_lap().replace(values)
+
+
+def test_load_steps_cannot_continue_a_section_that_warps():
+    scene = jb.Scene().replace({"model.section": "p3"})
+    exact = scene.replace({"model.kinematics": "exact"})
+    for solve in (scene.by_load_steps, lambda: jb.solve(exact)):
+        with pytest.raises(jb.InputError, match=r"load.entry = 'member': has no section of order"):
+            solve()
+
+
+def test_one_state_serves_where_the_ends_are_the_same():
+    assert entry.states(PLANE) == (False, True)
+    assert entry.states(PLANE.replace({"load.entry": "face"})) == (True,)
+    assert entry.states(
+        jb.Scene().replace({"model.section": "squeeze", "model.kinematics": "linear"})
+    ) == (True,)

@@ -1,0 +1,216 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from toy import STRIP
+
+import jbeamshell as jb
+from jbeamshell.load_steps.stepping import fits_native
+from jbeamshell.mechanics import bar
+from jbeamshell.solving import solve as solving
+
+SMALL = {
+    "model.nodes": 41,
+    "model.kinematics": "linear",  # compiles in half the time
+    "load.steps_per_half_cycle": 20,
+    "load.cycles": 1,
+}
+EXACT = SMALL | {"model.kinematics": "exact"}  # also with sharp friction by Newton's method
+HELD = EXACT | {"contact.normal": "held"}  # a corner that lifts slips at any load
+SMOOTH = SMALL | {"contact.smoothing": 32.0}
+
+
+def test_bar_limit_gives_backbone_and_cubic_law():
+    thin = {"strip.height_ratio": 0.001, "model.kinematics": "linear", "load.cycles": 1}
+    history = jb.solve(STRIP.replace(thin))
+    start = history.cycles[0][0]
+    loading = history.force[1 : start + 1]
+    backbone = bar.bar_backbone(loading, 3.4e4, 1.0)
+    assert float(history.dissipation_ratio) == pytest.approx(1.0, abs=2e-3)
+    assert float(jnp.max(jnp.abs(history.displacement[1 : start + 1] - backbone))) < 2e-3 * float(
+        backbone[-1]
+    )
+
+
+@pytest.mark.slow
+def test_steps_do_not_matter():
+    base = STRIP.replace({"model.nodes": 81, "model.kinematics": "linear", "load.cycles": 1})
+    dissipation = [
+        float(jb.solve(base.replace({"load.steps_per_half_cycle": n})).dissipation)
+        for n in (20, 40, 160)
+    ]
+    error = np.abs(np.array(dissipation) / dissipation[-1] - 1.0)
+    assert error[0] < 5e-3
+    assert error[1] < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("smoothing", "drift"), [("sharp", 1e-12), pytest.param(16.0, 1e-4, marks=pytest.mark.slow)]
+)
+@pytest.mark.doubtful("in the corner", "few nodes", "nothing slips")
+def test_a_hundred_cycles_inside_the_cone_neither_drift_nor_dissipate(smoothing, drift):
+    scene = STRIP.replace(HELD | {"contact.smoothing": smoothing})
+    path = [*np.linspace(0.01, 0.1, 10), *[-0.1, 0.1] * 100]
+    history = jb.solve(scene.replace({"strip.height_ratio": 0.4}), path)
+    cap = history.scene.contact.friction * history.reaction
+    assert 0.5 < float(jnp.max(jnp.abs(history.traction / cap))) < 0.8
+    peaks = np.asarray(history.displacement[10::2])
+    assert np.ptp(peaks) < drift * peaks[0]
+    assert float(jnp.sum(jnp.abs(history.slip_work))) / 100 < drift * 0.1 * peaks[0]
+
+
+@pytest.mark.parametrize(
+    ("smoothing", "drift"), [("sharp", 1e-13), pytest.param(16.0, 1e-4, marks=pytest.mark.slow)]
+)
+@pytest.mark.doubtful("few nodes", "nothing slips", "single nodes")
+def test_one_sided_cycling_at_the_cap_creeps_only_if_smoothed(smoothing, drift):
+    scene = STRIP.replace(HELD | {"contact.smoothing": smoothing})
+    history = jb.solve(scene, [*np.linspace(0.07, 0.7, 10), *[0.6, 0.7] * 100])
+    peaks = np.asarray(history.displacement[10::2])
+    creep = abs(peaks[-1] - peaks[0]) / peaks[0] / 100
+    assert creep < drift
+    assert (creep > 1e-6) == (smoothing != "sharp")
+    work = float(jnp.sum(jnp.abs(history.slip_work[11:]))) / 100
+    assert work < drift * 0.7 * peaks[0]
+
+
+@pytest.mark.parametrize("smoothing", ["sharp", pytest.param(8.0, marks=pytest.mark.slow), 32.0])
+@pytest.mark.doubtful("few nodes")
+def test_smoothing_does_not_change_the_dissipation(smoothing):
+    scene = STRIP.replace(SMALL | {"contact.smoothing": smoothing})
+    assert float(jb.solve(scene).dissipation_ratio) == pytest.approx(0.7695, abs=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("grid", "order"), [("finite-difference", 2.0), ("collocation", 4.0)])
+def test_order_of_convergence_in_the_grid(grid, order):
+    """A stuck strip on its elastic foundation is smooth: no slip front spoils the order."""
+
+    def end(nodes):
+        scene = STRIP.replace(
+            {
+                "model.grid": grid,
+                "model.nodes": nodes,
+                "model.kinematics": "linear",
+                "contact.friction": 100.0,
+                "contact.stick_stiffness": 3.0,
+            }
+        )
+        return float(jb.solve(scene, np.array([1.0])).displacement[-1])
+
+    values = np.array([end(nodes) for nodes in (41, 81, 161)])
+    rate = np.log2(np.abs(np.diff(values)[:-1] / np.diff(values)[1:]))
+    assert rate[-1] == pytest.approx(order, abs=0.3)
+
+
+# --- failure --------------------------------------------------------------------------------------
+
+
+def test_an_unconverged_step_is_never_silent(monkeypatch):
+    # As many pieces as the path has steps: one shape to compile.
+    monkeypatch.setattr("jbeamshell.load_steps.recovery.PIECES", (50,))
+    lame = jb.Newton(max_iterations=1, tolerance=1e-12)
+    scene = STRIP.replace(SMOOTH)
+    with pytest.raises(jb.UnconvergedError, match=r"load step \d+ of 50 .* found no equilibrium"):
+        jb.solve(scene, solver=lame)
+    history = jb.solve(scene, solver=lame, throw=False)
+    first = int(np.argmax(np.asarray(history.status) > 0))
+    assert not history.converged
+    assert history.status[first] == jb.Status.MAX_ITERATIONS
+    assert set(np.asarray(history.status[first + 1 :]).tolist()) == {jb.Status.NOT_REACHED}
+    assert bool(jnp.all(jnp.isnan(history.force[first:])))
+    assert bool(jnp.all(jnp.isfinite(history.force[:first])))
+    assert bool(jnp.isnan(history.dissipation))
+
+
+def test_inside_a_transformation_the_failure_is_loud_too():
+    lame = jb.Newton(max_iterations=1, tolerance=1e-12)  # as above: traced once
+    run = jax.jit(
+        lambda mu: (
+            jb.solve(STRIP.replace(SMOOTH | {"contact.friction": mu}), solver=lame).dissipation
+        )
+    )
+    with pytest.raises(Exception, match="a load step found no equilibrium"):
+        jax.block_until_ready(run(0.1))
+
+
+@pytest.mark.slow
+def test_a_failed_step_is_walked_in_pieces():
+    """The recovered path ends where a path with small steps ends."""
+    # So smooth that large steps take more iterations than small ones.
+    scene = STRIP.replace(SMALL | {"contact.smoothing": 4.0})
+    path = np.array([0.9, -0.9, *[0.9] * 22])  # held at its end, to be as long as the fine one
+    eager = jb.Newton(max_iterations=100)
+    fine = jb.solve(
+        scene,
+        np.concatenate([np.linspace(a, b, 9)[1:] for a, b in ((0, 0.9), (0.9, -0.9), (-0.9, 0.9))]),
+        solver=eager,
+    )
+    needed = int(jnp.max(fine.iterations))
+    history = jb.solve(scene, path, solver=jb.Newton(max_iterations=needed))
+    plain = jb.solve(scene, path, solver=eager)
+    assert int(jnp.max(plain.iterations)) > needed  # the whole step takes more than is allowed
+    np.testing.assert_allclose(history.force[1:], path)
+    assert float(history.displacement[-1]) == pytest.approx(float(fine.displacement[-1]), rel=1e-6)
+    assert float(jnp.sum(history.slip_work)) == pytest.approx(
+        float(jnp.sum(fine.slip_work)), rel=1e-6
+    )
+
+
+def test_single_precision_says_what_it_cannot_do():
+    with pytest.raises(jb.InputError, match="single precision"):
+        jb.Newton(tolerance=1e-9).tolerance_for(jnp.dtype("float32"))
+
+
+@pytest.mark.parametrize("path", [[], [[0.1]], [0.1, np.nan], [0.1, np.inf]])
+def test_paths_that_are_none(path):
+    with pytest.raises(jb.InputError, match="path"):
+        jb.solve(STRIP, path)
+
+
+def test_beyond_gross_slip_force_control_is_refused():
+    with pytest.raises(jb.InputError, match=r"load.amplitude = 2.5.*'displacement'"):
+        jb.solve(STRIP.replace({"load.amplitude": 2.5}))
+    with pytest.raises(jb.InputError, match="gross slip"):
+        jb.solve(STRIP, [1.0, 2.0])
+
+
+@pytest.mark.doubtful("few nodes")
+def test_compiling_alone_solves_nothing():
+    scene = STRIP.replace(SMALL)
+    solving.compile_for(scene)
+    size = solving._stepped._compiled[True]._cache_size()
+    jb.solve(scene)
+    assert solving._stepped._compiled[True]._cache_size() == size
+
+
+@pytest.mark.doubtful("few nodes")
+def test_plain_numbers_inside_a_callers_jit():
+    scene = STRIP.replace(SMOOTH)
+    inside = jax.jit(lambda: jb.solve(scene).dissipation)()
+    assert float(inside) == pytest.approx(float(jb.solve(scene).dissipation), rel=1e-12)
+    with pytest.raises(jb.InputError, match="gross slip"):
+        jax.jit(lambda: jb.solve(scene, [1.0, 2.0]).displacement)()
+
+
+@pytest.mark.parametrize(
+    ("values", "fits"),
+    [
+        ({"model.kinematics": "exact", "model.nodes": 171}, True),
+        ({"model.kinematics": "exact", "model.nodes": 172}, False),
+        ({"contact.smoothing": 8.0, "model.nodes": 321}, False),
+        ({"model.section": "p2", "model.kinematics": "exact", "model.nodes": 33}, False),
+    ],
+)
+def test_what_the_compiler_makes_one_native_function_of(values, fits):
+    assert fits_native(jb.Scene().replace(values).pinned()) is fits
+
+
+@pytest.mark.doubtful("few nodes")
+@pytest.mark.parametrize("values", [SMALL, EXACT, SMOOTH], ids=["linear", "exact", "smooth"])
+def test_the_compiler_refuses_no_loop_that_fits(values):
+    scene = STRIP.replace(values)
+    assert fits_native(scene)
+    refused = len(solving._stepped._refused)
+    jb.solve(scene)
+    assert len(solving._stepped._refused) == refused
