@@ -118,7 +118,7 @@ def _runs(path):
 
 def _bodies(folder):
     """Matrices of stiffness in all formats, a substructure, and the nodes of a contact."""
-    calculix = TESTS / "condensed" / "calculix"
+    calculix = TESTS / "contact_line" / "calculix"
     shutil.copy(calculix / "strip.sti", folder / "matrix.sti")
     shutil.copy(calculix / "strip.dof", folder / "matrix.dof")
     random = np.random.default_rng(1)

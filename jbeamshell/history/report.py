@@ -47,8 +47,9 @@ def write_run(folder: Path, history: History, figures: Mapping[str, Any]) -> lis
         "sections.csv": section_table(history, steps),
         "result.json": as_json(figures),
     }
+    refined = history.change is not None  # which no file holds
     with contextlib.suppress(InputError):
-        texts["scene.toml"] = scene_to_toml(history.scene.pinned())
+        texts["scene.toml"] = scene_to_toml(history.scene if refined else history.scene.pinned())
     scene, drawn = history.scene, {}
     if history.force.size > history.pressed + 1:
         drawn["loop.png"] = history.plot()

@@ -18,6 +18,7 @@ import numpy as np
 from jbeamshell.common.arrays import write_arrays
 from jbeamshell.common.checks import require
 from jbeamshell.common.files import as_path
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.toml import scene_to_toml
 
 FORMAT = "jbeamshell history 6"
@@ -36,11 +37,11 @@ def write_history(history: Any, path: str | os.PathLike[str]) -> None:
     InputError
         for another suffix, and for a scene with an energy or a law of the user's own
     """
+    scene = history.scene.pinned()
     about = {
         "format": FORMAT,
-        "scene": scene_to_toml(history.scene.pinned()),
-        "by": history.scene.model.by,
-        "end_size": history.scene.plan.end_size,
+        "scene": scene_to_toml(scene.but(model=scene.model.but(end_size=AUTO))),
+        "end_size": scene.plan.end_size,
         "dtype": history.x.dtype.name,
         "cycles": history.cycles,
     }

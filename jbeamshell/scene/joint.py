@@ -13,8 +13,8 @@ from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
 from jbeamshell.scene.plan import Plan
-from jbeamshell.scene.pressure import check_holes, pressure_values
-from jbeamshell.scene.rows import rows
+from jbeamshell.scene.pressure import check_holes_of_bolts, pressure_values
+from jbeamshell.scene.rows import AUTO, rows
 
 
 class Parts(Protocol):
@@ -42,6 +42,10 @@ def check_joint(scene: Parts) -> None:
     require("energy", scene.energy, scene.energy is None, "must be left out in a lap joint")
     fix = "must be 'rigid' in a lap joint, whose second member is elastic"
     require("contact.normal", contact.normal, contact.normal == "rigid", fix)
+    by = scene.model.by
+    fix = "is no engine of a lap joint: its pressures stay beside elastic sliders, a gap or holes; "
+    fix += "for vibrations take jb.dynamics.let_go, or Joint.of(scene) in a structure"
+    require("model.by", by, by == AUTO, fix)
     fix = "must be linear in a lap joint, which is solved on its contact line: leave it out"
     require("model.kinematics", plan.kinematics, plan.kinematics == "linear", fix)
     fix = "is no section of a lap joint: take plane, squeeze, shell or p1 to p12"
@@ -60,8 +64,9 @@ def check_joint(scene: Parts) -> None:
     fix = "needs member.bearing_stiffness"
     bears = member.clearance is None or member.bearing_stiffness is not None
     require("member.clearance", member.clearance, bears, fix)
-    if member.holes is not None:
-        check_holes(member.holes, contact.bolts)
+    bolts = contact.bolts
+    if member.holes is not None and bolts is not None and not is_traced(bolts):
+        check_holes_of_bolts(member.holes, bolts)
     if member.holes is not None and not is_traced(strip.length):
         edges, length = np.asarray(member.hole_edges), float(strip.length)
         fix = f"lies off the overlap, X from 0 to {length:g}: move it or narrow it"

@@ -200,6 +200,7 @@ class ModelKeys(Part):
         "(displacements of that order) or plane (elasticity).",
     )
     kinematics: str = word(AUTO, KINEMATICS, "Rotations: exact or linear.")
+    by: str = word(AUTO, ("steps",), "Engine: steps are load steps, also where others would do.")
     grid: str = word(
         "finite-difference",
         ORDER,
@@ -372,7 +373,7 @@ FORMER = {
     "model.fields": f"{_SECTION}; a strip lifts off unless contact.normal = held",
     "model.rung": _SECTION,
     "model.order": _SECTION,
-    "model.solution": "leave it out; jb.solve(scene, by='steps') takes load steps",
+    "model.solution": "leave it out, or say model.by = steps",
     "model.squeeze": "say model.section = assumed",
     "model.end_size": "elements follow from model.nodes: leave it out",
 }

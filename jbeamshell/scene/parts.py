@@ -33,7 +33,7 @@ from jbeamshell.scene.keys import (
     key_table,
 )
 from jbeamshell.scene.layers import check_layers
-from jbeamshell.scene.pressure import check_gap, check_pressure, pressure_values
+from jbeamshell.scene.pressure import check_gap, check_holes, check_pressure, pressure_values
 from jbeamshell.scene.rows import AUTO, Key
 
 
@@ -108,6 +108,8 @@ class Member(MemberKeys):
     def __check_init__(self) -> None:
         if self.gap is not None and not isinstance(self.gap, jax.core.Tracer):
             check_gap(np.asarray(self.gap))
+        if self.holes is not None:
+            check_holes(self.holes)
         for name in ("axial_stiffness", "poisson_ratio"):
             value = getattr(self, name)
             fix = "member.layers say it already; leave it out"
@@ -260,10 +262,7 @@ def unit_path(cycles: int, steps: int) -> np.ndarray:
     return np.concatenate([first, *[down, -down] * cycles])
 
 
-UNWRITTEN = (  # fields of the model that no file holds
-    Key("by", "word", AUTO, "Engine that is asked for.", choices=(AUTO, "steps")),
-    Key("end_size", "setting", AUTO, "Smallest elements.", unit="H", open=True),
-)
+END_SIZE = Key("end_size", "setting", AUTO, "Smallest elements.", unit="H", open=True)
 
 
 class Model(ModelKeys):
@@ -271,20 +270,16 @@ class Model(ModelKeys):
 
     Attributes
     ----------
-    by : "steps" if the scene is to be solved in load steps, else "auto"
-    end_size : smallest elements in units of H, before the number of nodes scales all; "auto"
-        follows from the plan
+    end_size : smallest elements in units of H, before the number of nodes scales all, see
+        `Scene.on_grid`; "auto" leaves them to the plan.  No file holds it
     """
 
-    by: str = eqx.field(static=True, default=AUTO)
     end_size: float | str = eqx.field(static=True, default=AUTO)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for key in UNWRITTEN:
-            value = key.convert(getattr(self, key.name))
-            key.check(value)
-            setattr(self, key.name, value)
+        self.end_size = END_SIZE.convert(self.end_size)
+        END_SIZE.check(self.end_size)
 
     def __check_init__(self) -> None:
         odd = self.nodes == AUTO or (self.nodes - 1) % ORDER[self.grid] == 0

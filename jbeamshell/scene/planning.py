@@ -232,7 +232,8 @@ def _nodes(grid: Grid, scene: Parts) -> int:
     """Odd number of nodes of a grid for a scene's tolerance."""
     elements = (grid.nodes - 1) * (KNOWN / scene.model.tolerance) ** (1.0 / grid.order)
     if grid in (CONTACT_LINE, SOFT_CONTACT_LINE):
-        elements *= 1.0 + PER_STEP * min(scene.contact.jumps + scene.member.jumps, MOST_JUMPS)
+        jumps = scene.contact.jumps + scene.member.jumps
+        elements *= 1.0 + PER_STEP * min(jumps, MOST_JUMPS)
     elif grid is PLANE and scene.member.support != "none":
         elements *= BOTH_ENDS
     return 2 * int(np.ceil(elements / 2.0)) + 1
@@ -275,13 +276,10 @@ def elasticity(scene: Parts) -> Plan:
 
 
 def in_words(scene: Parts) -> str:
-    """One line that says what a scene has chosen; empty if it left nothing open."""
-    load, model = scene.load, scene.model
-    open_settings = (model.section, model.kinematics, model.nodes, load.steps_per_half_cycle)
-    if AUTO not in open_settings:
+    """One line that says for what a grid is planned; empty if it was given."""
+    if scene.model.nodes != AUTO:
         return ""
-    percent = 100.0 * model.tolerance
-    return f"chosen to be within {percent:g} % of {reference(scene)}: {scene.plan}"
+    return f"planned to be within {100.0 * scene.model.tolerance:g} % of {reference(scene)}"
 
 
 def reference(scene: Parts) -> str:

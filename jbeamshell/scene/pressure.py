@@ -129,14 +129,8 @@ def check_gap(gap: np.ndarray) -> None:
     require("member.gap", gap, rises, "its X must rise from row to row")
 
 
-def check_holes(holes: Array, bolts: Array | None) -> None:
-    """Raise `InputError` unless holes are rows [X, diameter], each within a patch of the bolts.
-
-    Parameters
-    ----------
-    holes : (k, 2)
-    bolts : (m, 3) rows of X, force and width of the patch; None for another pressure
-    """
+def check_holes(holes: Array) -> None:
+    """Raise `InputError` unless holes are rows [X, diameter], side by side."""
     key = "member.holes"
     require(key, "traced", not is_traced(holes), "knows no derivatives: give plain numbers")
     rows = np.asarray(holes)
@@ -146,10 +140,19 @@ def check_holes(holes: Array, bolts: Array | None) -> None:
     begin, end = rows[:, 0] - 0.5 * rows[:, 1], rows[:, 0] + 0.5 * rows[:, 1]
     apart = bool(np.all(begin[1:] >= end[:-1]))
     require(key, rows, apart, "overlap, or X falls: sort the rows and narrow them")
-    if bolts is None or is_traced(bolts):
-        return
-    middle, _, width = np.asarray(bolts).T
+
+
+def check_holes_of_bolts(holes: Array, bolts: Array) -> None:
+    """Raise `InputError` unless each hole lies within a patch of the bolts.
+
+    Parameters
+    ----------
+    holes : (k, 2) rows of X and diameter
+    bolts : (m, 3) rows of X, force and width of the patch
+    """
+    (x, diameter), (middle, _, width) = np.asarray(holes).T, np.asarray(bolts).T
+    begin, end = x - 0.5 * diameter, x + 0.5 * diameter
     inside = (begin[:, None] >= middle - 0.5 * width) & (end[:, None] <= middle + 0.5 * width)
     for hole in np.flatnonzero(~inside.any(axis=1)):
         fix = "lies in no bolt's patch: narrow the hole, or widen the patch"
-        require(f"{key}[{hole}]", rows[hole], False, fix)
+        require(f"member.holes[{hole}]", holes[hole], False, fix)

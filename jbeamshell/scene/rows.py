@@ -110,7 +110,7 @@ class Key:
             return
         if self.kind == "word":
             if self.choices:
-                require_choice(self.name, value, self.choices)
+                require_choice(self.name, value, (*self.choices, *[AUTO] * self.open))
         elif self.whole:
             require_count(self.name, value, int(self.low), int(self.high))
         elif not self.table:

@@ -184,8 +184,8 @@ class Scene(Tree):
         section = f"model.section = {other}"
         fix = f"must be linear for plane elasticity: take {section} for rotations"
         require("model.kinematics", model.kinematics, self.plan.kinematics == "linear", fix)
-        fix = f"is solved on its contact line: take {other} for load steps"
-        require("model.section", "plane", model.by == AUTO, fix)
+        fix = f"is no engine of plane elasticity: leave it out, or take model.section = {other}"
+        require("model.by", model.by, model.by == AUTO, fix)
         for key, value in (("strip.curvature", strip.curvature), ("energy", energy)):
             fix = f"must be left out for plane elasticity: take {section}"
             require(key, value, value is None, fix)
@@ -327,11 +327,12 @@ class Scene(Tree):
             is those of this scene
         """
         its = self.plan if numbers is None else plan(self, numbers)
-        model = self.model.but(
-            section=its.section, kinematics=its.kinematics, nodes=its.nodes, end_size=its.end_size
-        )
+        model = self.model.but(section=its.section, kinematics=its.kinematics, nodes=its.nodes)
         load = self.load.but(steps_per_half_cycle=its.steps)
-        return self.but(load=load, model=model, plan=its)
+        scene = self.but(load=load, model=model, plan=its)
+        if plan(scene, numbers).end_size == its.end_size:
+            return scene
+        return scene.but(model=model.but(end_size=its.end_size))  # of a refined grid
 
     def refined(self) -> Scene:
         """Copy on elements half as large, from which any change goes back to the planned grid."""
@@ -358,12 +359,7 @@ class Scene(Tree):
 
     def by_load_steps(self) -> Scene:
         """Copy that is solved in load steps, of any section but plane elasticity."""
-        support = self.member.support
-        fix = "is for loads at rest, and beside elastic sliders, a gap or holes for pressures that "
-        fix += "stay; for vibrations take jb.dynamics.let_go, or Joint.of(scene) in a structure"
-        require("member.support", support, support == "none", fix)
-        model = dataclasses.replace(self.model, by="steps")
-        scene = dataclasses.replace(self, model=model)
+        scene = self.replace({"model.by": "steps"})
         scene.check_entry()
         return scene
 

@@ -17,6 +17,7 @@ from jbeamshell.common.files import read_toml, write_text
 from jbeamshell.mechanics.friction import law_name
 from jbeamshell.scene.keys import DERIVED, KEYS, LENGTHS, NUMBERS
 from jbeamshell.scene.parts import PARTS, Load
+from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 
 FEW_DIGITS = {4: 6, 8: 12}  # of a number that somebody wrote, by the bytes of its precision
@@ -94,6 +95,8 @@ def scene_to_toml(scene: Scene) -> str:
         raise InputError(
             "energy, law: a function of your own cannot be written to TOML; keep it in code"
         )
+    fix = "is a grid of its own, which no file holds: keep it in code"
+    require("end_size", scene.model.end_size, scene.model.end_size == AUTO, fix)
     tables: dict[str, dict[str, Any]] = {heading: {} for heading in PARTS}
     said = _in_few_digits(scene)
     for key in KEYS:

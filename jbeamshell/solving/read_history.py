@@ -80,8 +80,8 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     tables = tomllib.loads(about["scene"])
     flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
     scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
-    hidden = {name: about[name] for name in ("by", "end_size")}
-    scene = dataclasses.replace(scene, model=dataclasses.replace(scene.model, **hidden))
+    model = dataclasses.replace(scene.model, end_size=about["end_size"])
+    scene = dataclasses.replace(scene, model=model)
     number = functools.partial(jax.ShapeDtypeStruct, dtype=jnp.dtype(about["dtype"]))
     count = functools.partial(jax.ShapeDtypeStruct, dtype=jnp.result_type(int))
     steps, elements = len(arrays["force"]), len(arrays["middles"])

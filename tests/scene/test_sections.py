@@ -43,9 +43,15 @@ OLD = {
     "model.fields": (["v", "w", "beta", "psi"], "model.section"),
     "model.rung": ("condensed-squeeze", "model.section"),
     "model.order": (2, "model.section"),
-    "model.solution": ("stepwise", "by='steps'"),
+    "model.solution": ("stepwise", "model.by = steps"),
     "model.squeeze": ("assumed", "model.section = assumed"),
     "model.end_size": (0.01, "model.nodes"),
+    "strip.loaded_end": ("level", "member.loaded_end"),
+    "contact.assembly": ("frictional", "member.assembly"),
+    **{
+        f"contact.{name}": (0.1, f"member.{name}")
+        for name in ("gap", "bolt_stiffness", "bearing_stiffness", "clearance", "holes")
+    },
 }
 
 
