@@ -112,7 +112,7 @@ class History(Profiles, ContactLine, CycleFigures):
         if not pulled:
             what = f"pressed by {float(np.sum(self.load)):.4g}"
         title = (
-            f"{self.force.size} levels of eta = {float(strip.height_ratio):.4g}, {what}: "
+            f"{self.force.size} levels, eta = {float(strip.height_ratio):.4g}, {what}: "
             f"{self.scene.plan}"
         )
         chosen = planning.in_words(self.scene)

@@ -40,7 +40,7 @@ def test_run_takes_the_tolerance(cli):
     code, out, _ = cli("run", *BASE, "--set", "model.nodes=auto", "--tol", "0.03")
     assert code == 0
     nodes = jb.Scene().replace(COARSE | {"model.nodes": "auto", "model.tolerance": 0.03}).plan.nodes
-    assert "chosen to be within 3 % of its own fine mesh" in out
+    assert "planned to be within 3 % of its own fine mesh" in out
     assert f"linear kinematics, {nodes} nodes" in out
 
 

@@ -48,14 +48,9 @@ def test_run_prints_text_to_read(cli):
     code, out, err = cli("run", *BASE, *options(own))
     assert code == 0
     assert err.startswith("jbeamshell: warning: where slip reaches 1 H the section squeeze")
-    title, chosen, entered, *lines = out.splitlines()
-    assert "v w beta psi on 21 nodes" in title
-    assert (
-        chosen
-        == "chosen to be within 1 % of its own fine mesh: section squeeze on its contact line, "
-        "linear kinematics, 21 nodes"
-    )
-    assert "eta = 0.2, force amplitude 0.5" in title
+    title, entered, *lines = out.splitlines()
+    assert "eta = 0.2, force amplitude 0.5: section squeeze on its contact line" in title
+    assert title.endswith("linear kinematics, 21 nodes")
     assert "load.entry = member); where slip reaches 1 H the section squeeze" in entered
     figures = [line for line in lines if not line.startswith("  doubtful: ")]
     names = {line.split("  ")[1].replace(" ", "_") for line in figures}
