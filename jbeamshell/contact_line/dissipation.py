@@ -29,8 +29,8 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int | None = None
 
     Parameters
     ----------
-    scene : strip and contact; a section that is named and planned on its contact line is that
-        section, else they are plane elasticity; may be traced
+    scene : strip and contact, with linear kinematics; plane elasticity if its section is open; may
+        be traced
     amplitudes : (k,) of the end force
     nodes : contact nodes; None is 49 for plane elasticity, which are within 1 % of it where the
         dissipation exceeds a tenth of the bar's cubic law, and 3 % down to a ten-thousandth (89
@@ -44,7 +44,7 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int | None = None
     Raises
     ------
     InputError
-        if the scene is none of plane elasticity, or an amplitude exceeds gross slip, unless traced
+        if the scene has no contact line, or if an amplitude exceeds gross slip, unless traced
     UnconvergedError
         if the events of a load step come to no end, unless traced
 
@@ -106,12 +106,15 @@ def factors(scene: Scene, *, nodes: int | None = None) -> SteadyCycles:
 
 
 def on_contact_line(scene: Scene, nodes: int | None) -> Scene:
-    """Scene on its contact line, or as plane elasticity, with so many nodes; see `dissipation`."""
+    """Scene on its contact line, as plane elasticity if its section is open; see `dissipation`."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     force = scene.load.control == "force"
     require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
-    if scene.model.section == AUTO or not scene.plan.on_contact_line:
-        scene = scene.replace({"model.section": "plane", "model.kinematics": "linear"})
+    section = "plane" if scene.model.section == AUTO else scene.model.section
+    scene = scene.replace({"model.section": section, "model.kinematics": "linear"})
+    fix = "has no contact line: leave it open, or take another section, the sharp slider, and a "
+    fix += "straight strip on a rigid base"
+    require("model.section", section, scene.plan.on_contact_line, fix)
     if scene.plan.elastic:
         scene = scene.replace({"model.nodes": NODES})
     return scene if nodes is None else scene.replace({"model.nodes": nodes})

@@ -137,3 +137,19 @@ def test_the_slope_in_the_amplitude_is_that_of_differences():
     step = 1e-5
     differences = (kept.dissipation(at + step) - kept.dissipation(at - step)) / (2.0 * step)
     np.testing.assert_allclose(slopes, differences, rtol=1e-6)
+
+
+def test_a_named_section_is_that_section_or_refused():
+    named = scene_of(0.3).replace({"model.section": "shell", "load.entry": "face"})
+    linear, exact, plane = (
+        float(contact_line.dissipation(named.replace(change), [0.5], nodes=33)[0])
+        for change in (
+            {"model.kinematics": "linear"},
+            {"model.kinematics": "exact"},
+            {"model.section": "plane"},
+        )
+    )
+    assert exact == linear
+    assert abs(plane / linear - 1.0) > 0.05
+    with pytest.raises(jb.InputError, match=r"model\.section = 'bar': has no contact line"):
+        contact_line.dissipation(named.replace({"model.section": "bar"}), [0.5])
