@@ -64,7 +64,7 @@ def check_joint(scene: Parts) -> None:
     fix = "needs member.bearing_stiffness"
     bears = member.clearance is None or member.bearing_stiffness is not None
     require("member.clearance", member.clearance, bears, fix)
-    bolts = contact.bolts
+    bolts = None if member.holes is None else contact.bolts
     if member.holes is not None and bolts is not None and not is_traced(bolts):
         check_holes_of_bolts(member.holes, bolts)
     if member.holes is not None and not is_traced(strip.length):

@@ -151,10 +151,15 @@ def run(
 
 
 def _able(scene: Scene, path: ArrayLike | None, contact: ArrayLike | None) -> Scene:
-    """Scene in load steps, if its section was left open or has them, and the path needs them."""
+    """Scene in load steps, if its section was left open or has them, and the path needs them.
+
+    Where no pressure acts all nodes let go at once, which has no order of events.
+    """
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
-    pressures = path is not None and as_leaf(path, "path", LOADS).ndim > 1
-    line = contact is None and (walks_pressures(scene) or not pressures)
+    line = contact is None
+    if path is not None and (loads := as_leaf(path, "path", LOADS)).ndim > 1:
+        vanish = not is_traced(loads) and not np.all(np.asarray(loads)[:, -1])
+        line = line and walks_pressures(scene) and not vanish
     able = line if scene.plan.on_contact_line else path is None or scene.plan.walks_any_path
     return scene if able or scene.model.section == "plane" else scene.by_load_steps()
 

@@ -206,6 +206,18 @@ def test_a_cycle_of_the_load_is_none_where_the_pressures_do_not_close():
     assert whole_path(SCENE, loads)[1] == ()
 
 
+@pytest.mark.parametrize("least", [1e-3, 0.0])
+def test_pressures_that_vanish_take_load_steps(least):
+    moved = {"load.control": "displacement", "load.amplitude": 1.5e-5, "load.entry": "face"}
+    scene = jb.Scene().replace(moved | {"model.section": "squeeze", "model.nodes": 21})
+    time = np.linspace(0.0, 2.0 * np.pi, 21)[1:]
+    path = np.stack([1.5e-5 * np.sin(time), np.maximum(1.0 + np.sin(time), least)], axis=1)
+    path[14, 1] = least
+    history = jb.solve(scene, path, throw=False)
+    assert history.converged
+    assert history.scene.plan.engine == ("load steps" if least == 0.0 else "contact line")
+
+
 @pytest.mark.slow
 def test_load_steps_come_near():
     scene = jb.Scene().replace(

@@ -31,7 +31,8 @@ from jbeamshell.sweeping.runner import Block
 TINY = {
     "model.nodes": 9,
     "model.kinematics": "linear",
-    "contact.normal": "held",  # in load steps
+    "contact.normal": "held",
+    "model.by": "steps",
     "load.steps_per_half_cycle": 2,
     "load.cycles": 1,
 }
