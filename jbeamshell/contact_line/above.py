@@ -52,14 +52,14 @@ class Unread(Tree):
     @functools.cached_property
     def found(self) -> Above:
         """The fields; they are found once."""
-        found: Above = _found((self.strip, self.movement))
-        return found
+        above: Above = _above((self.strip, self.movement))
+        return above
 
 
 @Small
-def _found(given: tuple[Strip, Movement]) -> Above:
+def _above(inputs: tuple[Strip, Movement]) -> Above:
     """Fields above the contact line at every step."""
-    strip, movement = given
+    strip, movement = inputs
     # The pressed strip, and what the load adds to it.
     pressed = moved_by(strip.pressed, movement.at_rest[None])
     loaded = moved_by(strip.loaded, movement.change)
@@ -84,9 +84,9 @@ def _seen_from_above(strip: Strip, moved: Array) -> Array:
     """Fields v, w, beta, psi, ... (steps, n, k) of the member below, as the strip sees them."""
     assert strip.loaded.pair is not None
     further = jnp.tensordot(strip.loaded.pair.form.further, moved, 1)
-    turned = jnp.asarray([1.0, -1.0, -1.0])  # w and beta count the other way from below
-    seen = jnp.concatenate([moved[:2], further])
-    return seen.at[:3].multiply(turned[:, None, None]).T
+    signs = jnp.asarray([1.0, -1.0, -1.0])  # w and beta count the other way from below
+    fields = jnp.concatenate([moved[:2], further])
+    return fields.at[:3].multiply(signs[:, None, None]).T
 
 
 def _sections(strip: Strip, moved: Array) -> tuple[Array, Strains]:
@@ -101,8 +101,8 @@ def _sections(strip: Strip, moved: Array) -> tuple[Array, Strains]:
     on_mean = values @ form.values + slopes @ form.mixed.T
     on_slope = values @ form.mixed + slopes @ form.slopes
     rows = jnp.concatenate([on_mean, on_slope, form.further])
-    found = jnp.moveaxis(jnp.tensordot(rows, moved, 1), 2, 1)  # (rows, steps, n)
-    mean, slope, further = jnp.split(found, [len(on_mean), 2 * len(on_mean)])
+    parts = jnp.moveaxis(jnp.tensordot(rows, moved, 1), 2, 1)  # (rows, steps, n)
+    mean, slope, further = jnp.split(parts, [len(on_mean), 2 * len(on_mean)])
     between = jnp.diff(slope, axis=2) / jnp.diff(strip.x)
     forces = 0.5 * (mean[..., 1:] + mean[..., :-1]) + between
     return jnp.moveaxis(further, 0, 2), Strains(*forces)

@@ -37,7 +37,7 @@ from jbeamshell.contact_line.tableau import System, Tableau, changed, reversed_a
 FEW_LEVELS = 2  # of a branch, up to which loads walk together
 SAME = 1e-12  # of a branch, within which events come at the same load
 CLOSED = 1e-10  # of the largest slip, force or lift, within which a loop is closed
-OWN: Any = Tableau(None, 1, None, None, None, 1, 0, 0, None)  # type: ignore[arg-type]
+LOAD_AXES: Any = Tableau(None, 1, None, None, None, 1, 0, 0, None)  # type: ignore[arg-type]
 """Axes of the loads in a tableau: each has its own value, held slips, tau and work."""
 
 
@@ -46,15 +46,15 @@ class Group(NamedTuple):
 
     Attributes
     ----------
-    at : tableau of those that walk together, of which each load has the parts `OWN`
+    at : tableau of those that walk together, of which each load has the parts `LOAD_AXES`
     walking, waiting : (loads,) True for them, and for all that have not arrived
-    found : levels of those that have, (loads, ...)
+    levels : those of all that have, (loads, ...)
     """
 
     at: Tableau
     walking: Array
     waiting: Array
-    found: Level
+    levels: Level
 
 
 class Branch(NamedTuple):
@@ -62,7 +62,7 @@ class Branch(NamedTuple):
 
     start: Level
     targets: Array
-    found: Level
+    levels: Level
 
     def starts_at(self, start: Level, targets: Array) -> Array:
         """True if another one with this start and these end loads is the same, in a closed loop."""
@@ -71,7 +71,7 @@ class Branch(NamedTuple):
         def close(a: Array, b: Array) -> Array:
             return jnp.max(jnp.abs(a - b)) <= CLOSED * jnp.max(jnp.abs(a))
 
-        parts = [close(*both) for both in zip(*map(jax.tree.leaves, (one, other)), strict=True)]
+        parts = [close(*pair) for pair in zip(*map(jax.tree.leaves, (one, other)), strict=True)]
         return jnp.all(self.targets == targets) & jnp.all(jnp.stack(parts))
 
 
@@ -110,26 +110,26 @@ def walk_abreast(
 
         def anew() -> Level:
             if loads == 1:
-                only = _alone(system, jax.tree.map(lambda a: a[0], origin), targets[0])
-                return jax.tree.map(lambda a: a[None], only._replace(slip_work=_steps(only)))
-            each = jax.tree.map(lambda a: jnp.repeat(a, longest, axis=0), origin)
-            found = _branch(system, each, targets.ravel())
-            found = jax.tree.map(lambda a: a.reshape(loads, longest, *a.shape[1:]), found)
-            return found._replace(slip_work=_steps(found))
+                levels = _alone(system, jax.tree.map(lambda a: a[0], origin), targets[0])
+                return jax.tree.map(lambda a: a[None], levels._replace(slip_work=_steps(levels)))
+            starts = jax.tree.map(lambda a: jnp.repeat(a, longest, axis=0), origin)
+            levels = _branch(system, starts, targets.ravel())
+            levels = jax.tree.map(lambda a: a.reshape(loads, longest, *a.shape[1:]), levels)
+            return levels._replace(slip_work=_steps(levels))
 
-        found = lax.cond(older.starts_at(origin, targets), lambda: older.found, anew)
-        found = found._replace(settled=found.settled & origin.settled[:, None])
-        last = jax.tree.map(lambda a: a[:, -1], found)
-        return (last, Branch(origin, targets, found), before), found
+        levels = lax.cond(older.starts_at(origin, targets), lambda: older.levels, anew)
+        levels = levels._replace(settled=levels.settled & origin.settled[:, None])
+        last = jax.tree.map(lambda a: a[:, -1], levels)
+        return (last, Branch(origin, targets, levels), before), levels
 
-    unlike = jax.tree.map(lambda a: jnp.repeat(a[:, None], longest, axis=1), begin)
-    nowhere = Branch(begin, jnp.full_like(branches[0], jnp.nan), unlike)
-    found = lax.scan(go, (begin, nowhere, nowhere), branches)[1]
+    blank = jax.tree.map(lambda a: jnp.repeat(a[:, None], longest, axis=1), begin)
+    nowhere = Branch(begin, jnp.full_like(branches[0], jnp.nan), blank)
+    levels = lax.scan(go, (begin, nowhere, nowhere), branches)[1]
 
     def in_order(a: Array) -> Array:
         return jnp.concatenate([a[i, :, : part.shape[1]] for i, part in enumerate(parts)], axis=1)
 
-    return jax.tree.map(in_order, found)
+    return jax.tree.map(in_order, levels)
 
 
 def _bounds(turns: tuple[bool, ...]) -> list[int]:
@@ -155,52 +155,52 @@ def _branch(system: System, last: Level, forces: Array) -> Level:
     def leader(among: Array) -> Array:
         return jnp.argmax(jnp.where(among, reach, -1.0))
 
-    def set_out(left: tuple[Array, Level]) -> tuple[Array, Level]:
-        waiting, found = left
+    def set_out(now: tuple[Array, Level]) -> tuple[Array, Level]:
+        waiting, levels = now
         first = leader(waiting)
 
         def begin(state: ContactState, lift: Array) -> Tableau:
             return reversed_at(system, state, lift, opened[first], sense[first])
 
-        at = jax.vmap(begin, out_axes=OWN)(last.state, last.lift)
+        at = jax.vmap(begin, out_axes=LOAD_AXES)(last.state, last.lift)
         alike = (sense == sense[first]) & jnp.all(opened == opened[first], axis=1)
-        group = Group(at, waiting & alike, waiting, found)
+        group = Group(at, waiting & alike, waiting, levels)
         group = lax.while_loop(lambda now: jnp.any(now.walking), on, group)
-        return group.waiting, group.found
+        return group.waiting, group.levels
 
     def on(now: Group) -> Group:
-        at, walking, waiting, found = now
+        at, walking, waiting, levels = now
         waits = waits_of(at, friction)
-        own = jnp.min(functools.reduce(jnp.minimum, waits), axis=0)
-        comes = at.tau + own
+        least = jnp.min(functools.reduce(jnp.minimum, waits), axis=0)
+        arrival = at.tau + least
         first = leader(walking)
-        _, kind, node = first_of([each[:, first] for each in waits])
-        event = Event(comes[first], kind, node)
-        wait = jnp.stack([each[node] for each in waits])[kind]
+        _, kind, node = first_of([values[:, first] for values in waits])
+        event = Event(arrival[first], kind, node)
+        wait = jnp.stack([values[node] for values in waits])[kind]
         # Negations count loads without numbers in: the leader arrives in the end, whatever it is.
-        follows = walking & ~(wait > own + SAME * reach)
-        arrives = walking & (~(comes < reach) | (follows & ~goes_on(at)))
-        found, _ = lax.while_loop(
-            lambda both: jnp.any(both[1]), functools.partial(arrive, at, comes), (found, arrives)
+        follows = walking & ~(wait > least + SAME * reach)
+        arrives = walking & (~(arrival < reach) | (follows & ~goes_on(at)))
+        levels, _ = lax.while_loop(
+            lambda now: jnp.any(now[1]), functools.partial(arrive, at, arrival), (levels, arrives)
         )
         walking = follows & ~arrives
         at = moved(at, friction, at.tau + jnp.where(walking, wait, 0.0))
         at = changed(at, event.kind, event.node, friction)
-        return Group(at, walking, waiting & ~arrives, found)
+        return Group(at, walking, waiting & ~arrives, levels)
 
-    def arrive(at: Tableau, comes: Array, now: tuple[Level, Array]) -> tuple[Level, Array]:
-        found, arrives = now
+    def arrive(at: Tableau, arrival: Array, now: tuple[Level, Array]) -> tuple[Level, Array]:
+        levels, arrives = now
         one = jnp.argmax(arrives)
-        own = at._replace(
+        lone = at._replace(
             value=at.value[:, one], held=at.held[:, one], tau=at.tau[one], work=at.work[one]
         )
         before = jax.tree.map(lambda a: a[one], last)
-        level = ended(system, own, comes[one], before, before.state, forces[one])[1]
-        found = jax.tree.map(lambda old, new: old.at[one].set(new), found, level)
-        return found, arrives.at[one].set(False)
+        level = ended(system, lone, arrival[one], before, before.state, forces[one])[1]
+        levels = jax.tree.map(lambda old, new: old.at[one].set(new), levels, level)
+        return levels, arrives.at[one].set(False)
 
     everyone = jnp.ones_like(sense, bool)
-    return lax.while_loop(lambda left: jnp.any(left[0]), set_out, (everyone, last))[1]
+    return lax.while_loop(lambda now: jnp.any(now[0]), set_out, (everyone, last))[1]
 
 
 def _alone(system: System, last: Level, forces: Array) -> Level:

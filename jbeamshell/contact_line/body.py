@@ -69,14 +69,14 @@ class Elimination(NamedTuple):
     Attributes
     ----------
     inverse : (n-2, m-2, m-2) inverses of the Cholesky factors
-    known : (n-2, m-2, 2n+2) right-hand sides, reduced
+    sides : (n-2, m-2, 2n+2) right-hand sides, reduced
     onwards : (n-2, m-2, m-2) coupling to the fields of the next station, reduced
     first : (m-2, 2n+2), (m-2, m-2) fields of the first station from the sides and from its next one
     last : (m-2, 2n+2) fields of the last station from the sides
     """
 
     inverse: Array
-    known: Array
+    sides: Array
     onwards: Array
     first: tuple[Array, Array]
     last: Array
@@ -86,7 +86,7 @@ class Elimination(NamedTuple):
         """Elimination by which the fields are not found again."""
         return Unknown.of(self.inverse.shape[0] + 2, self.inverse.shape[1] + 2)
 
-    def recovered(self, given: Array) -> Array:
+    def recovered(self, factors: Array) -> Array:
         """Fields (n, m-2, levels) from the right-hand sides' factors (2n+2, levels)."""
 
         def back(after: Array, station: tuple[Array, ...]) -> tuple[Array, Array]:
@@ -94,11 +94,11 @@ class Elimination(NamedTuple):
             here = after - inverse.T @ (sides + onwards @ after)
             return here, here
 
-        last = self.last @ given
-        stations = (self.inverse, self.known @ given, self.onwards)
-        second, found = lax.scan(back, last, stations, reverse=True)
-        first = self.first[0] @ given + self.first[1] @ second
-        return jnp.concatenate([first[None], found, last[None]])
+        last = self.last @ factors
+        stations = (self.inverse, self.sides @ factors, self.onwards)
+        second, inner = lax.scan(back, last, stations, reverse=True)
+        first = self.first[0] @ factors + self.first[1] @ second
+        return jnp.concatenate([first[None], inner, last[None]])
 
 
 class Unknown(NamedTuple):
@@ -121,9 +121,9 @@ class Unknown(NamedTuple):
         """The same."""
         return self
 
-    def recovered(self, given: Array) -> Array:
+    def recovered(self, factors: Array) -> Array:
         """Fields (n, m-2, levels), see `Elimination.recovered`."""
-        return jnp.broadcast_to(self.nothing[..., None], (*self.nothing.shape, given.shape[1]))
+        return jnp.broadcast_to(self.nothing[..., None], (*self.nothing.shape, factors.shape[1]))
 
 
 class Line(NamedTuple):
@@ -163,32 +163,32 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
         forces = forces + load * _in_last_column(form.press[2:], forces)
         contacts = jnp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
         inverse = inverse_cholesky(before + start[2:, 2:])
-        known = inverse @ _add(forces, contacts, 2 * i)
+        sides = inverse @ _add(forces, contacts, 2 * i)
         onwards = inverse @ (before + stays.T[2:, 2:])
         contacts = jnp.concatenate([stays[2:, :2], follows[2:, :2]], axis=1)
-        forces = _add(forces - onwards.T @ known, contacts, 2 * i)
-        own = (stays + follows)[2:, 2:]
-        return (before + own - onwards.T @ onwards, forces), (inverse, known, onwards)
+        forces = _add(forces - onwards.T @ sides, contacts, 2 * i)
+        whole = (stays + follows)[2:, 2:]
+        return (before + whole - onwards.T @ onwards, forces), (inverse, sides, onwards)
 
-    carry, first, left = _begin(form, x, loads[0], far)
-    left, parts = _wider(_wider(left, columns).T, columns), []
+    carry, first, hessian = _begin(form, x, loads[0], far)
+    hessian, parts = _wider(_wider(hessian, columns).T, columns), []
     stations = (jnp.arange(1, n - 1), loads[1:-1], jnp.diff(x)[1:])
     # No station knows a contact node beyond its next one: the right-hand sides grow part by part.
     count = PARTS if n > FEW else 1
     for begin, stop in itertools.pairwise(np.linspace(0, n - 2, count + 1).astype(int)):
         carry = carry[0], _wider(carry[1], 2 * stop + 6)
-        carry, part = lax.scan(go, carry, tuple(each[begin:stop] for each in stations))
+        carry, part = lax.scan(go, carry, tuple(values[begin:stop] for values in stations))
         parts.append(part)
-        left = left - _products(part[1], columns)
-    inverse, known, onwards = (
+        hessian = hessian - _products(part[1], columns)
+    inverse, sides, onwards = (
         jnp.concatenate([part[0] for part in parts]),
         jnp.concatenate([_wider(part[1], columns) for part in parts]),
         jnp.concatenate([part[2] for part in parts]),
     )
-    first, left = (_wider(first[0], columns), first[1]), left + _among_contacts(form, x, loads)
+    first, hessian = (_wider(first[0], columns), first[1]), hessian + _contacts(form, x, loads)
     ends = [_finish(form, loads[-1], carry, end) for end in last]
     return tuple(
-        Line(Elimination(inverse, known, onwards, first, fields), left + change)
+        Line(Elimination(inverse, sides, onwards, first, fields), hessian + change)
         for fields, change in ends
     )
 
@@ -202,16 +202,16 @@ def _begin(
     -------
     carry : stiffness (m-2, m-2) of the second station's fields, and their sides (m-2, 6)
     first : fields of the first station from the sides (m-2, 6) and from the next (m-2, m-2)
-    left : (6, 6) second derivatives of the energy in the sides, of the first station's fields alone
+    hessian : (6, 6) of the energy of the first station's fields in the sides
     """
     start, end, across = (part[0] for part in form.element(x[1:2] - x[:1]))
     none = jnp.zeros_like(start[:, :1])
     forces = [none, none, across[:, :2], none, load * form.press[:, None]]
-    fields, back, left = _of_end(start, jnp.concatenate(forces, axis=1), far, 0)
+    fields, back, hessian = _of_end(start, jnp.concatenate(forces, axis=1), far, 0)
     onwards = back.T @ across[:, 2:]
     sides = across.T @ fields + jnp.pad(end[:, :2], ((0, 0), (2, 2)))
     carry = end[2:, 2:] - onwards.T @ onwards, sides[2:]
-    return carry, (fields[2:], -(back @ onwards)[2:]), left
+    return carry, (fields[2:], -(back @ onwards)[2:]), hessian
 
 
 def _finish(
@@ -222,14 +222,14 @@ def _finish(
     Returns
     -------
     last : (m-2, 2n+2) its fields from the sides
-    left : (2n+2, 2n+2) second derivatives of the energy in the sides, of its fields alone
+    hessian : (2n+2, 2n+2) of the energy of its fields in the sides
     """
     before, sides = (jnp.pad(part, ((2, 0), (0, 0))) for part in carry)
     ends = jnp.stack([-loaded.pull, load * form.press], axis=1)
     forces = sides + jnp.pad(ends, ((0, 0), (sides.shape[1] - 2, 0)))
     before = jnp.pad(before, ((0, 0), (2, 0)))
-    fields, _, left = _of_end(before, forces, loaded, sides.shape[1] - 4)
-    return fields[2:], left.at[-2, -2].add(-loaded.softness)
+    fields, _, hessian = _of_end(before, forces, loaded, sides.shape[1] - 4)
+    return fields[2:], hessian.at[-2, -2].add(-loaded.softness)
 
 
 def _of_end(stiffness: Array, forces: Array, end: End, place: int) -> tuple[Array, Array, Array]:
@@ -246,16 +246,16 @@ def _of_end(stiffness: Array, forces: Array, end: End, place: int) -> tuple[Arra
     -------
     fields : (m, sides) its fields
     back : (m, k) inverse factor of its free fields' stiffness
-    left : (sides, sides) second derivatives of the energy
+    hessian : (sides, sides) of the energy in the sides
     """
     contact, free = end.span[:, :2], end.span[:, 2:]
-    own = stiffness + end.stiffness
-    moved = jnp.pad(contact, ((0, 0), (place, forces.shape[1] - 2 - place)))
-    back = free @ inverse_cholesky(free.T @ own @ free).T
-    known = back.T @ (forces + own @ moved)
-    left = moved.T @ forces
-    left = left + left.T + moved.T @ own @ moved - known.T @ known
-    return moved - back @ known, back, left
+    whole = stiffness + end.stiffness
+    contacts = jnp.pad(contact, ((0, 0), (place, forces.shape[1] - 2 - place)))
+    back = free @ inverse_cholesky(free.T @ whole @ free).T
+    reduced = back.T @ (forces + whole @ contacts)
+    hessian = contacts.T @ forces
+    hessian = hessian + hessian.T + contacts.T @ whole @ contacts - reduced.T @ reduced
+    return contacts - back @ reduced, back, hessian
 
 
 def _add(sides: Array, block: Array, column: Array) -> Array:
@@ -275,7 +275,7 @@ def _wider(sides: Array, columns: int) -> Array:
     return jnp.concatenate([jnp.pad(sides[..., :-2], empty), sides[..., -2:]], axis=-1)
 
 
-def _among_contacts(form: SectionForm, x: Array, loads: Array) -> Array:
+def _contacts(form: SectionForm, x: Array, loads: Array) -> Array:
     """Stiffness (2n + 2, 2n + 2) of the elements among v and w, and the forces of the pressure.
 
     The parts of the fields of both ends are left out, which have conditions of their own.
@@ -284,21 +284,21 @@ def _among_contacts(form: SectionForm, x: Array, loads: Array) -> Array:
     start, end, across = (part[:, :2, :2] for part in form.element(jnp.diff(x)))
     inner = (np.arange(n) > 0) & (np.arange(n) < n - 1)
     start, across = (jnp.where(inner[:-1, None, None], part, 0.0) for part in (start, across))
-    own = jnp.pad(start, ((0, 1), (0, 0), (0, 0))) + jnp.pad(end, ((1, 0), (0, 0), (0, 0)))
-    beside = jnp.pad(across, ((0, 1), (0, 0), (0, 0)))
+    diagonal = jnp.pad(start, ((0, 1), (0, 0), (0, 0))) + jnp.pad(end, ((1, 0), (0, 0), (0, 0)))
+    coupling = jnp.pad(across, ((0, 1), (0, 0), (0, 0)))
     here, following = (np.eye(n, k=k)[..., None, None] for k in (0, 1))
-    blocks = here * own[:, None] + following * beside[:, None]
-    blocks = blocks + np.swapaxes(following, 0, 1) * jnp.swapaxes(beside, 1, 2)
+    blocks = here * diagonal[:, None] + following * coupling[:, None]
+    blocks = blocks + np.swapaxes(following, 0, 1) * jnp.swapaxes(coupling, 1, 2)
     stiffness = jnp.moveaxis(blocks, 2, 1).reshape(2 * n, 2 * n)
     press = (jnp.where(inner, loads, 0.0)[:, None] * form.press[:2]).ravel()
     sides = jnp.stack([jnp.zeros_like(press), press], axis=1)
     return jnp.block([[stiffness, sides], [sides.T, jnp.zeros((2, 2), x.dtype)]])
 
 
-def _products(known: Array, columns: int) -> Array:
-    """Sum of known' known over the stations and their fields, (columns, columns)."""
-    known = known.reshape(-1, known.shape[-1])
-    return _wider(_wider(known.T @ known, columns).T, columns).T
+def _products(sides: Array, columns: int) -> Array:
+    """Sum of sides' sides over the stations and their fields, (columns, columns)."""
+    sides = sides.reshape(-1, sides.shape[-1])
+    return _wider(_wider(sides.T @ sides, columns).T, columns).T
 
 
 def local_compliance(stiffness: Array, pull: Array) -> Array:

@@ -91,7 +91,7 @@ def factorise(body: Body, friction: Array) -> Factors:
     k = body.f_t.size
     k_nt, f_n = body.K_tn.T, body.f_n
 
-    def one(sense: Array) -> Factors:
+    def of_sense(sense: Array) -> Factors:
         matrix = body.K_tt + sense * friction * k_nt[:k]
         g = body.f_t + sense * friction * f_n[:k]
         parts = lower_upper(matrix, g[:, None])
@@ -114,7 +114,7 @@ def factorise(body: Body, friction: Array) -> Factors:
             backs=jnp.tril(2.0 * friction * lifts[:k] - rooms),
         )
 
-    return jax.vmap(one)(jnp.asarray([1.0, -1.0], body.f_t.dtype))
+    return jax.vmap(of_sense)(jnp.asarray([1.0, -1.0], body.f_t.dtype))
 
 
 def pressed(body: Body) -> ContactState:
@@ -140,18 +140,18 @@ def follow(
     rises = jnp.ravel(step)[-1] >= 0.0
     sense = jnp.where(rises, 1.0, -1.0)
     reach = jnp.abs(step)
-    own: Factors = jax.tree.map(lambda a: a[jnp.where(rises, 0, 1)], factors)
-    y_c = own.lower @ -(start.r_t + sense * friction * start.r_n[:k])
-    thresholds = -sense * y_c / own.y_g
+    factors = jax.tree.map(lambda a: a[jnp.where(rises, 0, 1)], factors)
+    y_c = factors.lower @ -(start.r_t + sense * friction * start.r_n[:k])
+    thresholds = -sense * y_c / factors.y_g
     slips = running_sums((thresholds >= reach).astype(step.dtype)) == 0.0
-    slip = jnp.where(slips, y_c + own.y_g * step, 0.0) @ own.upper.T
+    slip = jnp.where(slips, y_c + factors.y_g * step, 0.0) @ factors.upper.T
     beyond = jnp.where(slips, reach - thresholds, 0.0)
-    compliances = own.z * own.y_g
-    pushed = slip @ body.K_tt
+    compliances = factors.z * factors.y_g
+    push = slip @ body.K_tt
     work = 0.5 * jnp.sum(compliances * beyond * (reach + thresholds), axis=-1)
     at = ContactState(
         start.v + slip,
-        start.r_t + pushed - body.f_t * step,
+        start.r_t + push - body.f_t * step,
         start.r_n + slip @ body.K_tn - body.f_n * step,
         forces,
         start.displacement + body.c * step[..., 0] + sense * (beyond @ compliances),
@@ -161,9 +161,9 @@ def follow(
         at=at,
         thresholds=thresholds,
         compliances=compliances,
-        slip_work=work - slip @ start.r_t - 0.5 * jnp.sum(slip * pushed, axis=-1),
+        slip_work=work - slip @ start.r_t - 0.5 * jnp.sum(slip * push, axis=-1),
         slipping=slips,
-        valid=_holds(own, friction, start, thresholds, last[0], sense, last[1]),
+        valid=_holds(factors, friction, start, thresholds, last[0], sense, last[1]),
     )
 
 
@@ -180,7 +180,7 @@ def path(
 
 
 def _holds(
-    own: Factors,
+    factors: Factors,
     friction: Array,
     start: ContactState,
     thresholds: Array,
@@ -198,11 +198,11 @@ def _holds(
     events = jnp.where(slips, thresholds, reach)
     between = jnp.maximum(jnp.diff(events, prepend=0.0, append=reach), 0.0)
     rising = jnp.all(jnp.diff(events, prepend=0.0) >= -tiny * reach)
-    regular = jnp.all(own.regular | ~slips)
-    closed = jnp.all(start.r_n + own.falls @ between > 0.0)  # an open node has none
+    regular = jnp.all(factors.regular | ~slips)
+    closed = jnp.all(start.r_n + factors.falls @ between > 0.0)  # an open node has none
     cap = friction * start.r_n[:k]
-    room = cap + sense * start.r_t + own.draws @ between
+    room = cap + sense * start.r_t + factors.draws @ between
     least = -tiny * jnp.max(cap)
     sticks = jnp.all(slips | (room >= least))
-    behind = cap - sense * start.r_t + running_sums(own.backs * between).T
+    behind = cap - sense * start.r_t + running_sums(factors.backs * between).T
     return rising & regular & closed & sticks & jnp.all(behind >= least)

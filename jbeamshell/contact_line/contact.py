@@ -123,20 +123,20 @@ def solve_contact(
     require_choice("assembly", assembly, ASSEMBLIES)
     require_choice("control", control, CONTROLS)
     require_number("friction", friction, NOT_NEGATIVE, low=-TINY)
-    sizes, away = checked_bolts(upper, lower, bolts), checked_gap(upper, gap)
+    sizes, gaps = checked_bolts(upper, lower, bolts), checked_gap(upper, gap)
     targets = _targets(amplitude, cycles, steps_per_half_cycle, path)
     held = held_nodes(upper, lower)
     hessian, slides = _relative(upper, lower, sizes)
     if assembly == "frictionless" and not is_traced(hessian):
         _check_push(hessian, held, slides)
     contact = hessian, upper.x, upper.tributary, as_leaf(friction), slides
-    flat = not is_traced(away) and not np.any(np.asarray(away))
-    distance = None if flat else jnp.broadcast_to(away, upper.x.shape)
+    flat = not is_traced(gaps) and not np.any(np.asarray(gaps))
+    distance = None if flat else jnp.broadcast_to(gaps, upper.x.shape)
     until_steady = path is None and cycles is None
-    words = control, assembly, steps_per_half_cycle if until_steady else None
-    levels, walked, error = _walked((contact, distance, targets), held, words)
+    settings = control, assembly, steps_per_half_cycle if until_steady else None
+    levels, count, error = _levels((contact, distance, targets), held, settings)
     if until_steady and not is_traced(levels):
-        targets = targets[: unit_path(int(walked), steps_per_half_cycle).size]
+        targets = targets[: unit_path(int(count), steps_per_half_cycle).size]
         levels, error = jax.tree.map(lambda a: a[: targets.size + 1], (levels, error))
     if not is_traced(levels) and throw:
         _demand(levels, targets)
@@ -173,11 +173,11 @@ def _relative(upper: Substructure, lower: Substructure | None, bolts: Array) -> 
 
     True beside it if nothing but friction keeps one of the bodies from moving along X.
     """
-    own = potential(upper, bolts)
+    above = potential(upper, bolts)
     if lower is None:
-        return own, _slides(upper)
+        return above, _slides(upper)
     fixed = np.array(upper.fixed), np.array(lower.fixed)
-    hessian = together(own, potential(lower, bolts), *fixed)[0]
+    hessian = together(above, potential(lower, bolts), *fixed)[0]
     return hessian, _slides(upper) | _slides(lower)
 
 
@@ -200,37 +200,55 @@ def _check_push(hessian: Array, held: tuple[bool, ...], slides: Array) -> None:
 
 
 @Small
-def _walked(
-    given: tuple[tuple[Array, ...], Array | None, Array],
+def _levels(
+    inputs: tuple[tuple[Array, ...], Array | None, Array],
     held: tuple[bool, ...],
-    words: tuple[str, str, int | None],
+    settings: tuple[str, str, int | None],
 ) -> tuple[Level, Array, Array]:
     """Levels of the path, the number of cycles until it is steady, and the `_errors`.
 
-    The pressed contact comes first.  Nodes are as `_order` has them.  The last word is the steps
+    The pressed contact comes first.  Nodes are as `_order` has them.  The last setting is the steps
     per half cycle of a path that goes on until it is steady, see `_until_steady`.
     """
-    ((hessian, x, tributary, friction, slides), gap, targets) = given
-    control, assembly, half = words
+    (contact, gap, targets), (control, assembly, half) = inputs, settings
+    body, lift = _pressed_body(contact, gap, held, assembly)
+    friction, start = contact[3], pressed(body)
+    driven = driven_by_displacement(body) if control == "displacement" else body
+    if half is None:
+        levels, count = walk(driven, friction, start, targets, turns_of(targets), lift), targets
+    else:
+        levels, count = _until_steady(driven, friction, start, targets, lift, half)
+    state = jax.vmap(exchanged)(levels.state) if control == "displacement" else levels.state
+    sound = jnp.all(jnp.isfinite(lift))
+    first = Level(start, lift, jnp.zeros_like(body.c), jnp.zeros_like(start.v, bool), sound)
+    levels = levels._replace(state=state, settled=levels.settled & sound)
+    levels = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), first, levels)
+    return levels, count, _errors(body, friction, levels)
+
+
+def _pressed_body(
+    contact: tuple[Array, ...], gap: Array | None, held: tuple[bool, ...], assembly: str
+) -> tuple[Body, Array]:
+    """Body on its contact line, and its lift (n,) under the pressing."""
+    hessian, x, tributary, friction, slides = contact
     order, free = _order(held)
     v, w = 2 * order[:free], 2 * order + 1
     k_tt, k_tn, k_nn = hessian[np.ix_(v, v)], hessian[np.ix_(v, w)], hessian[np.ix_(w, w)]
-    press_t, press_n, away = hessian[v, -1], hessian[w, -1], None if gap is None else gap[order]
-    traction = jnp.zeros_like(press_t)
+    pressing, gap = (hessian[v, -1], hessian[w, -1]), None if gap is None else gap[order]
+    traction = jnp.zeros_like(pressing[0])
     f_t, f_n, c = -hessian[v, -2], -hessian[w, -2], -hessian[-2, -2]
     # Without a weak spring, the matrix of a body that friction alone holds is singular once all of
     # it slips, even for a moment in which one part slips along and another against v.
     stiffness = jnp.append(jnp.diag(k_tt), jnp.diag(k_nn))
-    gives = c + local_compliance(stiffness, jnp.append(f_t, f_n))
-    k_tt = k_tt + jnp.where(slides, 1.0 / (FREER * SLIDES * free * gives), 0.0) * jnp.eye(free)
+    softness = c + local_compliance(stiffness, jnp.append(f_t, f_n))
+    k_tt = k_tt + jnp.where(slides, 1.0 / (FREER * SLIDES * free * softness), 0.0) * jnp.eye(free)
     if assembly == "frictional":
-        rough = press_roughly(k_tt, k_tn, k_nn, press_t, press_n, friction, away)
-        lift, reaction, traction = rough.lift, rough.reaction, rough.traction
+        lift, _, reaction, traction = press_roughly(k_tt, k_tn, k_nn, *pressing, friction, gap)
     else:
         # Without friction a spring that carries nothing keeps its place.
         spring = jnp.where(slides, jnp.max(stiffness), 0.0)
-        placed = k_tt.at[-1, -1].add(spring)
-        lift, _, reaction = press(placed, k_tn, k_nn, press_t, press_n, gap=away)
+        k_spring = k_tt.at[-1, -1].add(spring)
+        lift, _, reaction = press(k_spring, k_tn, k_nn, *pressing, gap=gap)
     body = Body(
         x=x[order],
         tributary=tributary[order],
@@ -243,18 +261,7 @@ def _walked(
         t_0=traction,
         c=c,
     )
-    start = pressed(body)
-    driven = driven_by_displacement(body) if control == "displacement" else body
-    if half is None:
-        found, walked = walk(driven, friction, start, targets, turns_of(targets), lift), targets
-    else:
-        found, walked = _until_steady(driven, friction, start, targets, lift, half)
-    state = jax.vmap(exchanged)(found.state) if control == "displacement" else found.state
-    sound = jnp.all(jnp.isfinite(lift))
-    first = Level(start, lift, jnp.zeros_like(body.c), jnp.zeros_like(start.v, bool), sound)
-    found = found._replace(state=state, settled=found.settled & sound)
-    found = jax.tree.map(lambda one, more: jnp.concatenate([one[None], more]), first, found)
-    return found, walked, _errors(body, friction, found)
+    return body, lift
 
 
 def _errors(body: Body, friction: Array, levels: Level) -> Array:
@@ -263,10 +270,10 @@ def _errors(body: Body, friction: Array, levels: Level) -> Array:
     It needs nothing that the walk knows but its levels.
     """
     state, lift, k = levels.state, levels.lift, body.f_t.size
-    moved, risen = state.v - state.v[0], lift - lift[0]
-    r_t = body.t_0 + moved @ body.K_tt + risen @ body.K_tn.T - jnp.outer(state.force, body.f_t)
-    r_n = body.r_0 + moved @ body.K_tn + risen @ body.K_nn - jnp.outer(state.force, body.f_n)
-    wrong = [
+    slip, rise = state.v - state.v[0], lift - lift[0]
+    r_t = body.t_0 + slip @ body.K_tt + rise @ body.K_tn.T - jnp.outer(state.force, body.f_t)
+    r_n = body.r_0 + slip @ body.K_tn + rise @ body.K_nn - jnp.outer(state.force, body.f_n)
+    violations = [
         jnp.abs(r_t - state.r_t),
         jnp.abs(r_n - state.r_n),
         jnp.abs(state.r_t) - friction * state.r_n[:, :k],
@@ -274,7 +281,7 @@ def _errors(body: Body, friction: Array, levels: Level) -> Array:
         -lift * jnp.diag(body.K_nn),
         jnp.minimum(jnp.abs(lift * jnp.diag(body.K_nn)), jnp.abs(state.r_n)),
     ]
-    worst = jnp.max(jnp.concatenate(wrong, axis=1), axis=1)
+    worst = jnp.max(jnp.concatenate(violations, axis=1), axis=1)
     return worst / jnp.max(jnp.abs(state.r_n), axis=1)
 
 
@@ -289,34 +296,34 @@ def _until_steady(
     rise = targets.size - 2 * half * MOST_CYCLES
     rest = jnp.full(2 * half - rise, targets[rise - 1])  # the load rests until the first cycle
     loads = jnp.concatenate([targets[:rise], rest, targets[rise:]]).reshape(-1, 2 * half)
-    turned = np.zeros(loads.shape, bool)
-    turned[:, 0] = turned[1:, half] = True
-    paths = loads, jnp.asarray(turned), jnp.arange(MOST_CYCLES + 1) > 0
+    turning = np.zeros(loads.shape, bool)
+    turning[:, 0] = turning[1:, half] = True
+    paths = loads, jnp.asarray(turning), jnp.arange(MOST_CYCLES + 1) > 0
 
     def go(
         carry: tuple[Level, Array, Array], to: tuple[Array, Array, Array]
     ) -> tuple[tuple[Level, Array, Array], tuple[Level, Array]]:
-        before, moved, copied = carry
+        before, last_drift, copied = carry
         loads, turns, closes = to
         state, at = jax.tree.map(lambda a: a[-1], (before.state, before.lift))
-        found = walk(body, friction, state, loads, turns, at, ~copied)
-        found = found._replace(settled=found.settled & before.settled[-1])
-        now = jax.tree.map(lambda old, new: jnp.where(copied, old, new), before, found)
+        levels = walk(body, friction, state, loads, turns, at, ~copied)
+        levels = levels._replace(settled=levels.settled & before.settled[-1])
+        now = jax.tree.map(lambda old, new: jnp.where(copied, old, new), before, levels)
         slip = lax.stop_gradient(jnp.concatenate([state.v[None], now.state.v]))
         none = NOISE * jnp.max(jnp.abs(state.r_t)) / jnp.max(jnp.abs(body.K_tt))
-        onwards = slip[-1] - slip[0]
-        left = jnp.minimum(*(jnp.max(jnp.abs(way)) for way in (onwards, onwards - moved)))
-        repeats = left <= REPEATS * jnp.max(jnp.ptp(slip, axis=0)) + none
+        drift = slip[-1] - slip[0]
+        leftover = jnp.minimum(*(jnp.max(jnp.abs(way)) for way in (drift, drift - last_drift)))
+        repeats = leftover <= REPEATS * jnp.max(jnp.ptp(slip, axis=0)) + none
         steady = copied | (closes & repeats) | ~now.settled[-1]
-        return (now, onwards, steady), (now, copied)
+        return (now, drift, steady), (now, copied)
 
     first = Level(start, lift, body.c, start.v > 0.0, jnp.asarray(True))
     first = jax.tree.map(lambda a: jnp.broadcast_to(a, (2 * half, *a.shape)), first)
     at_start = first, jnp.zeros_like(start.v), jnp.asarray(False)
-    _, (found, copied) = lax.scan(go, at_start, paths)
-    kept = np.arange(loads.size)
-    kept = np.append(kept[:rise], kept[2 * half :])
-    flat = jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[kept], found)
+    _, (levels, copied) = lax.scan(go, at_start, paths)
+    places = np.arange(loads.size)
+    places = np.append(places[:rise], places[2 * half :])
+    flat = jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[places], levels)
     return flat, jnp.maximum(jnp.sum(~copied) - 1, 1)
 
 

@@ -69,11 +69,11 @@ def read_contact(path: str | os.PathLike[str]) -> dict[str, Any]:
         require(str(path), f"key {key}", key in known, f"keys are {', '.join(known)}")
     require(str(path), "without [upper]", "upper" in values, "write the body that is pulled")
     for key in ("amplitude", "cycles", "steps_per_half_cycle"):
-        both = key in values and "path" in values
-        require(key, values.get(key), not both, "is given beside path: leave one of them out")
+        clash = key in values and "path" in values
+        require(key, values.get(key), not clash, "is given beside path: leave one of them out")
     here = Path(path).parent
-    found = {key: values[key] for key in NUMBERS if key in values}
-    return found | {key: _body(key, values[key], here) for key in BODIES if key in values}
+    arguments = {key: values[key] for key in NUMBERS if key in values}
+    return arguments | {key: _body(key, values[key], here) for key in BODIES if key in values}
 
 
 def _body(key: str, table: Any, here: Path) -> Substructure:
@@ -88,15 +88,15 @@ def _body(key: str, table: Any, here: Path) -> Substructure:
         fix = "needs contact = ... beside it: without, the file holds a body that is condensed"
         require(f"{key}.{', '.join(beside)}", "without contact", not beside, fix)
         return Substructure.read(here / str(file))
-    given: dict[str, Any] = {
+    options: dict[str, Any] = {
         name: _table(f"{key}.{name}", table[name], here) for name in TABLES if name in table
     }
-    given |= {name: table[name] for name in ("tangential", "normal") if name in table}
+    options |= {name: table[name] for name in ("tangential", "normal") if name in table}
     press = table.get("press", [])
     press = [press] if isinstance(press, str) else press
-    loads = [_table(f"{key}.press[{i}]", each, here) for i, each in enumerate(press)]
+    loads = [_table(f"{key}.press[{i}]", rows, here) for i, rows in enumerate(press)]
     model = StiffnessModel.read(here / str(file), directions=table.get("directions", 2))
-    return model.condensed(**given, press=loads)
+    return model.condensed(**options, press=loads)
 
 
 def _table(key: str, value: Any, here: Path) -> NDArray[np.float64]:

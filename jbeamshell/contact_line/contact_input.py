@@ -16,8 +16,8 @@ MATCH = 1e-6  # of the contact's length, within which nodes match
 def check_bodies(upper: Substructure, lower: Substructure | None) -> None:
     """Refuse what is no body, bodies that do not match, and those that nothing holds or pulls."""
     for key, body in (("upper", upper), ("lower", lower)):
-        known = isinstance(body, Substructure) or (body is None and key == "lower")
-        require(key, type(body).__name__, known, "give a jbeamshell.Substructure")
+        fits = isinstance(body, Substructure) or (body is None and key == "lower")
+        require(key, type(body).__name__, fits, "give a jbeamshell.Substructure")
     if lower is not None:
         _check_match(upper, lower)
         _check_held(upper, lower)
@@ -29,13 +29,13 @@ def check_bodies(upper: Substructure, lower: Substructure | None) -> None:
 
 def checked_gap(upper: Substructure, gap: ArrayLike) -> Array:
     """Gap of the nodes, () or (n,)."""
-    away = as_leaf(gap, "gap")
+    distance = as_leaf(gap, "gap")
     fix = f"give a number, or one for each of {upper.x.size} nodes"
-    require("gap", gap, away.shape in ((), upper.x.shape), fix)
-    require_finite("gap", away)
+    require("gap", gap, distance.shape in ((), upper.x.shape), fix)
+    require_finite("gap", distance)
     fix = "must not be negative: bodies cannot overlap before anything presses"
-    require("gap", gap, is_traced(away) or bool(np.all(np.asarray(away) >= 0.0)), fix)
-    return away
+    require("gap", gap, is_traced(distance) or bool(np.all(np.asarray(distance) >= 0.0)), fix)
+    return distance
 
 
 def checked_bolts(upper: Substructure, lower: Substructure | None, bolts: ArrayLike) -> Array:
@@ -87,8 +87,8 @@ def _check_held(upper: Substructure, lower: Substructure) -> None:
     if is_traced(upper, lower):
         return
     fixed = np.array(upper.fixed) | np.array(lower.fixed)  # the bodies stuck to each other
-    both = np.asarray(upper.stiffness + lower.stiffness)
-    both = np.where(fixed | fixed[:, None], 0.0, both) + np.diag(fixed * np.max(both))
-    mode = loose_mode(both, np.asarray(upper.x))
+    k = np.asarray(upper.stiffness + lower.stiffness)
+    k = np.where(fixed | fixed[:, None], 0.0, k) + np.diag(fixed * np.max(k))
+    mode = loose_mode(k, np.asarray(upper.x))
     fix = f"{mode} with the other one: hold one of them by a support"
     require("lower", "loose body", not mode, fix)

@@ -72,21 +72,21 @@ class SteadyCycles(NamedTuple):
 
     def _work(self, amplitude: Array) -> Array:
         y_g, z, reach = self.y_g, self.z, 2.0 * amplitude
-        own = jnp.diagonal(self.turned, axis1=1, axis2=2)
+        diagonal = jnp.diagonal(self.turned, axis1=1, axis2=2)
         # Within a node p falls along a straight line, over the part of it that slips.
         part = jnp.clip((amplitude - self.begin[0]) / self.width[0], 0.0, 1.0)
         top = y_g[0] * jnp.maximum(amplitude - self.begin[0], 0.0)
         p_1 = part * (top - 0.5 * part * y_g[0] * self.width[0])
         y = self.turned[0] @ p_1 + y_g[1] * (amplitude - self.threshold[1])
-        top = y + own[0] * (top - p_1) - y_g[1] * (self.begin[1] - self.threshold[1])
-        fall = own[0] * y_g[0] * self.width[0] + y_g[1] * self.width[1]
+        top = y + diagonal[0] * (top - p_1) - y_g[1] * (self.begin[1] - self.threshold[1])
+        fall = diagonal[0] * y_g[0] * self.width[0] + y_g[1] * self.width[1]
         back = jnp.clip(top / fall, 0.0, part)
         low = top - back * fall
         p_2 = 0.5 * back * (top + low)
         square = back * (top**2 + top * low + low**2) / 3.0
         p_3 = self.turned[1] @ p_2
-        rest = p_3 - own[1] * p_2
-        square_3 = part * rest**2 + own[1] * (2.0 * rest * p_2 + own[1] * square)
+        rest = p_3 - diagonal[1] * p_2
+        square_3 = part * rest**2 + diagonal[1] * (2.0 * rest * p_2 + diagonal[1] * square)
         pull = z[1] @ (reach * p_2 - square / y_g[1])
         push = z[0] @ (reach * p_3 - square_3 / y_g[0])
         inside = jnp.all(low <= jnp.where(part < 1.0, LITTLE * reach * y_g[1], jnp.inf))

@@ -54,10 +54,10 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int | None = None
     leaves no nested zones at the corner.
     """
     scene = on_contact_line(scene, nodes)
-    found = _dissipation(scene, jnp.asarray(amplitudes))
-    if is_traced(scene, amplitudes, found):
-        return found
-    sizes, works = np.asarray(amplitudes, dtype=float), np.array(found)
+    by_factors = _dissipation(scene, jnp.asarray(amplitudes))
+    if is_traced(scene, amplitudes, by_factors):
+        return by_factors
+    sizes, works = np.asarray(amplitudes, dtype=float), np.array(by_factors)
     fix = "give (k,) positive amplitudes"
     require("amplitudes", sizes, sizes.ndim == 1 and bool(np.all(sizes > 0.0)), fix)
     check(scene.replace({"load.amplitude": np.max(sizes, initial=0.0)}))
@@ -95,8 +95,8 @@ def factors(scene: Scene, *, nodes: int | None = None) -> SteadyCycles:
 
     Examples
     --------
-    >>> kept = jb.contact_line.factors(jb.library.standard())
-    >>> kept.dissipation(jnp.linspace(0.1, 1.9, 256))
+    >>> factors = jb.contact_line.factors(jb.library.standard())
+    >>> factors.dissipation(jnp.linspace(0.1, 1.9, 256))
     """
     scene = on_contact_line(scene, nodes)
     fix = "opens the edge of the contact, so that no slip zones are nested: take traction, face or "

@@ -125,8 +125,8 @@ def _long(form: SectionForm, length: Array, forwards: bool) -> Three:
     """Stiffness (m, m) of the near, of the far end and from far to near, of many equal elements."""
     start, end, across = (part[0] for part in form.element(length[None] / 2**DOUBLINGS))
 
-    def doubled(of: Three, _: None) -> tuple[Three, None]:
-        start, end, across = of
+    def doubled(element: Three, _: None) -> tuple[Three, None]:
+        start, end, across = element
         inverse = inverse_cholesky(end + start)
         before, after = inverse @ across.T, inverse @ across
         return (start - before.T @ before, end - after.T @ after, -before.T @ after), None

@@ -122,10 +122,10 @@ def leaving_end(
         return Held(end_section(form, "held", clamped), np.array([True, clamped])), stretch
     moving = without_lift(form) if flat else form
     outer = end_section(moving, "held", clamped or flat, on_contact=False)
-    found = beyond(moving, lengths, outer, False)
+    end = beyond(moving, lengths, outer, False)
     if flat:
-        found = found.among(np.arange(form.pull.size) != W)
-    return Held(found, FREE), stretch
+        end = end.among(np.arange(form.pull.size) != W)
+    return Held(end, FREE), stretch
 
 
 def _count(scene: Scene) -> int:

@@ -78,8 +78,8 @@ def walk(
         with the axis of the levels first
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    given = body, jnp.asarray(friction), start, forces, lift
-    return _walk(*given, turns=turns, needed=needed, alike=alike)
+    path = body, jnp.asarray(friction), start, forces, lift
+    return _walk(*path, turns=turns, needed=needed, alike=alike)
 
 
 @eqx.filter_custom_jvp
@@ -94,9 +94,9 @@ def _walk(
     needed: Array | None,
     alike: bool,
 ) -> Level:
-    known = turns if isinstance(turns, tuple) else None
-    given = body, friction, start, forces, lift, jnp.asarray(turns), needed
-    return _one_or_many(known, alike)(*given)
+    known_turns = turns if isinstance(turns, tuple) else None
+    path = body, friction, start, forces, lift, jnp.asarray(turns), needed
+    return _one_or_many(known_turns, alike)(*path)
 
 
 @_walk.def_jvp
@@ -108,14 +108,14 @@ def _walk_jvp(
     needed: Array | None,
     alike: bool,
 ) -> tuple[Level, Level]:
-    changes = tuple(jax.tree.map(_full, *both) for both in zip(primals, tangents, strict=True))
+    changes = tuple(jax.tree.map(_full, *pair) for pair in zip(primals, tangents, strict=True))
     turns = jnp.asarray(turns)
     path = functools.partial(_differentiable, turns=turns, needed=needed)
     return jax.jvp(path, primals, changes)
 
 
 @functools.cache
-def _one_or_many(known: tuple[bool, ...] | None, alike: bool) -> Callable[..., Level]:
+def _one_or_many(known_turns: tuple[bool, ...] | None, alike: bool) -> Callable[..., Level]:
     """Levels of a path.
 
     Loads on one body walk together, if they meet alike events, their turns are known, and that
@@ -123,35 +123,36 @@ def _one_or_many(known: tuple[bool, ...] | None, alike: bool) -> Callable[..., L
     Lanes that need no walk cost nothing.
     """
 
-    def together(*given: PyTree) -> Level:
-        assert known is not None
-        body, friction, start, forces, lift, _, needed = given
+    def together(*inputs: PyTree) -> Level:
+        assert known_turns is not None
+        body, friction, start, forces, lift, _, needed = inputs
         system = _system(body, friction, jnp.zeros(()))
-        return _if_needed(needed, lambda: abreast.walk_abreast(system, start, forces, lift, known))
+        path = functools.partial(abreast.walk_abreast, system, start, forces, lift, known_turns)
+        return _if_needed(needed, path)
 
     @jax.custom_batching.custom_vmap
-    def lane(*given: PyTree) -> Level:
-        if known is None:
-            return _if_needed(given[-1], lambda: _differentiable(*given))
-        body, friction, *at, turns, needed = given
+    def lane(*inputs: PyTree) -> Level:
+        if known_turns is None:
+            return _if_needed(inputs[-1], lambda: _differentiable(*inputs))
+        body, friction, *at, turns, needed = inputs
         one = jax.tree.map(lambda a: a[None], at)
         return jax.tree.map(lambda a: a[0], together(body, friction, *one, turns, needed))
 
     @lane.def_vmap
-    def lanes(size: int, batched: list[PyTree], *given: PyTree) -> tuple[Level, Level]:
-        own_body, own_friction, *_, own_turns, own_need = (_any(each) for each in batched)
-        own = own_body or own_friction or own_turns or own_need
-        if known is None or own or not (alike and abreast.pays(known)):
-            mapped, shared = eqx.partition(list(given), batched)
-            found = lax.map(lambda some: lane(*eqx.combine(some, shared)), mapped)
+    def lanes(size: int, batched: list[PyTree], *inputs: PyTree) -> tuple[Level, Level]:
+        own_body, own_friction, *_, own_turns, own_need = (_any(part) for part in batched)
+        differ = own_body or own_friction or own_turns or own_need
+        if known_turns is None or differ or not (alike and abreast.pays(known_turns)):
+            mapped, shared = eqx.partition(list(inputs), batched)
+            levels = lax.map(lambda some: lane(*eqx.combine(some, shared)), mapped)
         else:
             at = jax.tree.map(
-                lambda a, own: a if own else jnp.broadcast_to(a, (size, *a.shape)),
-                list(given[2:5]),
+                lambda a, batch: a if batch else jnp.broadcast_to(a, (size, *a.shape)),
+                list(inputs[2:5]),
                 batched[2:5],
             )
-            found = together(*given[:2], *at, *given[5:])
-        return found, jax.tree.map(lambda _: True, found)
+            levels = together(*inputs[:2], *at, *inputs[5:])
+        return levels, jax.tree.map(lambda _: True, levels)
 
     return lane
 
@@ -208,10 +209,10 @@ def _differentiable(
         return (lax.stop_gradient(at), origin, level), level
 
     carry = (empty(k, n), lax.stop_gradient(start), first)
-    found = lax.scan(go, carry, (forces, turns))[1]
-    change = jnp.concatenate([found.state.v - start.v, found.lift - lift], axis=1)
+    levels = lax.scan(go, carry, (forces, turns))[1]
+    change = jnp.concatenate([levels.state.v - start.v, levels.lift - lift], axis=1)
     displacement = start.displacement + body.c * (forces - start.force) + change @ system.pull
-    return found._replace(state=found.state._replace(displacement=displacement))
+    return levels._replace(state=levels.state._replace(displacement=displacement))
 
 
 @jax.custom_batching.sequential_vmap
@@ -233,14 +234,13 @@ def _run(
     sense = jnp.where(force >= origin.force, 1.0, -1.0)
     tau = jnp.abs(force - origin.force)
 
-    def turn(both: tuple[Tableau, Array]) -> tuple[Tableau, Array]:
-        wanted = last.lift > 0.0
-        given = last.state, last.lift, wanted, sense
-        return reversed_at(system, *given), jnp.asarray(False)
+    def turn(now: tuple[Tableau, Array]) -> tuple[Tableau, Array]:
+        start = reversed_at(system, last.state, last.lift, last.lift > 0.0, sense)
+        return start, jnp.asarray(False)
 
     # Loops that run once: in a batch they cost nothing where no lane needs them.
-    at, _ = lax.while_loop(lambda both: both[1], turn, (at, turned & needed))
-    done = at.work
+    at, _ = lax.while_loop(lambda now: now[1], turn, (at, turned & needed))
+    work_before = at.work
 
     def full(now: Walk) -> Array:
         # What sticks at once belongs to the event before, and to one trace with it.
@@ -264,12 +264,12 @@ def _run(
     end = lax.while_loop(unfinished, go, Walk(at, next_event(at, system.friction), trace))
     at, event, trace = end
     if trace is not None:
-        before = full(end) & (event.tau < tau)
-        tau = jnp.where(before, at.tau, tau)
-        force = jnp.where(before, origin.force + sense * tau, force)
+        early = full(end) & (event.tau < tau)
+        tau = jnp.where(early, at.tau, tau)
+        force = jnp.where(early, origin.force + sense * tau, force)
         trace = slopes.along(trace, system, at, tau, origin, sense)
     at, level = ended(system, at, event.tau, last, origin, force)
-    return at, level._replace(slip_work=level.slip_work - done), trace
+    return at, level._replace(slip_work=level.slip_work - work_before), trace
 
 
 @eqx.filter_custom_jvp
@@ -309,7 +309,7 @@ def _next_level_jvp(
         )
         assert trace is not None
         whole = level.state.force == force
-        found = slopes.level_slopes(
+        slope = slopes.level_slopes(
             system,
             change,
             before=(now.level.state, now.level.lift),
@@ -320,7 +320,7 @@ def _next_level_jvp(
             trace=trace,
         )
         level = level._replace(slip_work=now.level.slip_work + level.slip_work)
-        return Part(at, level, found._replace(work=now.change.work + found.work))
+        return Part(at, level, slope._replace(work=now.change.work + slope.work))
 
     def parts(now: Part) -> Part:
         def go(carry: tuple[Part, Array], number: Array) -> tuple[tuple[Part, Array], None]:
@@ -336,12 +336,10 @@ def _next_level_jvp(
     state = jax.tree.map(jnp.zeros_like, last.state)._replace(v=slip_change)
     start = Slopes(state, jnp.zeros_like(last.lift), none)
     # A reverse pass walks the parts again in place of keeping their traces.
-    at, level, found = jax.checkpoint(parts)(Part(at, last._replace(slip_work=none), start))
-    nothing, change_of_level = jax.tree.map(lambda _: None, (at, level))
-    change_of_level = change_of_level._replace(
-        state=found.state, lift=found.lift, slip_work=found.work
-    )
-    return (at, level), (nothing, change_of_level)
+    at, level, slope = jax.checkpoint(parts)(Part(at, last._replace(slip_work=none), start))
+    nothing, changes = jax.tree.map(lambda _: None, (at, level))
+    changes = changes._replace(state=slope.state, lift=slope.lift, slip_work=slope.work)
+    return (at, level), (nothing, changes)
 
 
 def _full(like: Array, change: Array | None) -> Array:

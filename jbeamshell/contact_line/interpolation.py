@@ -65,23 +65,23 @@ class Bodies(Tree):
         Fields above the contact and energies are not known: they are NaN.  All is NaN outside the
         ranges.
         """
-        own, nu = scene.strip, scene.strip.poisson_ratio
+        section, nu = scene.strip, scene.strip.poisson_ratio
         assert nu is not None
-        found = self._body(jnp.log(own.height_ratio), -jnp.log1p(-2.0 * nu))
-        modulus, x = own.plane_modulus, own.length * found.x[::-1]
+        unit = self._body(jnp.log(section.height_ratio), -jnp.log1p(-2.0 * nu))
+        modulus, x = section.plane_modulus, section.length * unit.x[::-1]
         down, up = pressing(scene, x)
         tributary = elements.tributary_lengths(RULE, x)
         body = Body(
             x=x[::-1],
             tributary=tributary[::-1],
-            K_tt=modulus * found.K_tt,
-            K_tn=modulus * found.K_tn,
-            K_nn=modulus * found.K_nn,
-            f_t=found.f_t,
-            f_n=found.f_n,
+            K_tt=modulus * unit.K_tt,
+            K_tn=modulus * unit.K_tn,
+            K_nn=modulus * unit.K_nn,
+            f_t=unit.f_t,
+            f_n=unit.f_n,
             r_0=(down - up)[::-1],
-            t_0=jnp.zeros_like(found.f_t),
-            c=found.c / modulus,
+            t_0=jnp.zeros_like(unit.f_t),
+            c=unit.c / modulus,
         )
         flat, form = jnp.zeros_like(x), section_form(scene)
         none = Members(Unknown.of(x.size, form.pull.size), jnp.full((2 * x.size + 2,) * 2, jnp.nan))
@@ -95,7 +95,7 @@ class Bodies(Tree):
         inside = jnp.all((jnp.abs(at) <= 1.0 + EDGE) | (self.high == self.low))
         orders = np.max(self.terms, axis=0)
         heights, ratios = (_polynomials(x, order) for x, order in zip(at, orders, strict=True))
-        ratios = [jnp.where(inside, each, jnp.nan) for each in ratios]
+        ratios = [jnp.where(inside, values, jnp.nan) for values in ratios]
         weights = [heights[first] * ratios[second] for first, second in self.terms]
 
         def summed(values: Array) -> Array:  # term by term, which the compiler makes a quick loop
@@ -135,23 +135,23 @@ def built(scene: Scene, height_ratios: Range, poisson_ratios: Range) -> Bodies |
     rates = np.array([PER_HEIGHT, PER_POISSON])
     counts = np.where(high > low, LEAST + np.ceil(rates * (high - low)), 1).astype(int).tolist()
     for _ in range(MOST):
-        found = Bodies(low, high, *_coefficients(scene, low, high, counts))
-        if _error(scene, found, counts) <= CLOSE:
-            return found
+        bodies = Bodies(low, high, *_coefficients(scene, low, high, counts))
+        if _error(scene, bodies, counts) <= CLOSE:
+            return bodies
         counts = [2 * count if count > 1 else 1 for count in counts]
     return None
 
 
 @Small
-def _built(given: tuple[Scene, Array]) -> Body:
+def _built(inputs: tuple[Scene, Array]) -> Body:
     """Bodies at points (bodies, 2) of ln(height ratio) and -ln(1 - 2 nu), in units of E' and L."""
-    scene, points = given
+    scene, points = inputs
 
     def one(point: Array) -> Body:
-        own = scene.replace({HEIGHT: jnp.exp(point[0]), POISSON: -0.5 * jnp.expm1(-point[1])})
-        body, modulus = condensed(own, own.plan.nodes).body, own.strip.plane_modulus
+        variant = scene.replace({HEIGHT: jnp.exp(point[0]), POISSON: -0.5 * jnp.expm1(-point[1])})
+        body, modulus = condensed(variant, variant.plan.nodes).body, variant.strip.plane_modulus
         stiffness = {name: getattr(body, name) / modulus for name in ("K_tt", "K_tn", "K_nn")}
-        return body.but(**stiffness, c=body.c * modulus, x=body.x / own.strip.length)
+        return body.but(**stiffness, c=body.c * modulus, x=body.x / variant.strip.length)
 
     return lax.map(one, points)
 
@@ -165,28 +165,28 @@ def _coefficients(
     first, second = (_transform(x) for x in at)
 
     def transformed(values: Array) -> np.ndarray:
-        own = np.asarray(values).reshape(*counts, -1)
-        found = np.einsum("pi,qj,ijk->pqk", first, second, own, optimize=True)
-        return found.reshape(-1, *values.shape[1:])
+        table = np.asarray(values).reshape(*counts, -1)
+        coefficients = np.einsum("pi,qj,ijk->pqk", first, second, table, optimize=True)
+        return coefficients.reshape(-1, *values.shape[1:])
 
-    found = jax.tree.map(transformed, bodies)
-    large = functools.reduce(np.logical_or, map(_is_large, jax.tree.leaves(found)))
+    coefficients = jax.tree.map(transformed, bodies)
+    large = functools.reduce(np.logical_or, map(_is_large, jax.tree.leaves(coefficients)))
     terms = [(int(i), int(j)) for i, j in np.argwhere(large.reshape(counts))]
-    return jax.tree.map(lambda values: values[large], found), tuple(terms)
+    return jax.tree.map(lambda values: values[large], coefficients), tuple(terms)
 
 
 def _is_large(values: np.ndarray) -> np.ndarray:
     """True for terms (terms,) that matter in an array of coefficients (terms, ...)."""
     sizes = np.max(np.abs(values.reshape(len(values), -1)), axis=1)
-    found: np.ndarray = sizes > SMALL * np.max(sizes)
-    return found
+    large: np.ndarray = sizes > SMALL * np.max(sizes)
+    return large
 
 
 def _places(at: list[np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Points (points, 2) of the ranges, from those of each in units of -1 to 1."""
     places = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1).reshape(-1, 2)
-    found: np.ndarray = low + 0.5 * (places + 1.0) * (high - low)
-    return found
+    points: np.ndarray = low + 0.5 * (places + 1.0) * (high - low)
+    return points
 
 
 def _transform(points: np.ndarray) -> np.ndarray:
@@ -197,10 +197,10 @@ def _transform(points: np.ndarray) -> np.ndarray:
 
 def _polynomials(x: Array, order: int) -> list[Array]:
     """Chebyshev polynomials up to an order, at x."""
-    found = [jnp.ones_like(x), x]
-    while len(found) <= order:
-        found.append(2.0 * x * found[-1] - found[-2])
-    return found
+    polynomials = [jnp.ones_like(x), x]
+    while len(polynomials) <= order:
+        polynomials.append(2.0 * x * polynomials[-1] - polynomials[-2])
+    return polynomials
 
 
 def _error(scene: Scene, bodies: Bodies, counts: list[int]) -> float:
@@ -208,11 +208,10 @@ def _error(scene: Scene, bodies: Bodies, counts: list[int]) -> float:
     at = [np.cos(np.pi * np.array([1, count // 2]) / count) for count in counts]
     places = _places(at, np.asarray(bodies.low), np.asarray(bodies.high))
     exact = _built((scene, places))
-    found = jax.vmap(lambda place: bodies._body(*place))(places)
+    between = jax.vmap(lambda place: bodies._body(*place))(places)
 
-    def off(exact: Array, found: Array) -> float:
-        one, other = np.asarray(exact), np.asarray(found)
+    def error(name: str) -> float:
+        one, other = (np.asarray(getattr(body, name)) for body in (exact, between))
         return float(np.max(np.abs(one - other)) / max(np.max(np.abs(one)), 1e-300))
 
-    names = ("K_tt", "K_tn", "K_nn", "f_t", "f_n", "c", "x")
-    return max(off(getattr(exact, name), getattr(found, name)) for name in names)
+    return max(map(error, ("K_tt", "K_tn", "K_nn", "f_t", "f_n", "c", "x")))

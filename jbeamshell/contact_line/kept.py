@@ -30,18 +30,18 @@ def kept(build: Build) -> Build:
     """
 
     @functools.lru_cache(MOST)
-    def built(template: Template, numbers: bytes) -> Any:
+    def of_template(template: Template, numbers: bytes) -> Any:
         values = np.frombuffer(numbers, template.dtype)
         return build(template.scene([np.asarray(value) for value in values]))
 
     @functools.wraps(build)
-    def found(scene: Scene) -> Any:
+    def strip_of(scene: Scene) -> Any:
         if not scene.plan.elastic or is_staged() or is_traced(scene):
             return build(scene)
         template, numbers = Template.of(alike(scene))
-        return built(template, np.asarray(numbers, template.dtype).tobytes())
+        return of_template(template, np.asarray(numbers, template.dtype).tobytes())
 
-    return found
+    return strip_of
 
 
 def alike(scene: Scene) -> Scene:

@@ -57,10 +57,10 @@ def read_matrix(path: str | os.PathLike[str]) -> Rows:
         raise InputError(f"{name}: is no file of a matrix: it must end in {', '.join(READERS)}")
     data = read_bytes(path)
     try:
-        found = READERS[suffix](data, Path(path))
-        if not np.all(np.isfinite(found.matrix.data)):
+        rows = READERS[suffix](data, Path(path))
+        if not np.all(np.isfinite(rows.matrix.data)):
             raise InputError("holds numbers that are not finite: write it again")
-        return found
+        return rows
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     except Exception as error:  # a parser may raise anything for a broken file
@@ -74,41 +74,41 @@ def _archive(data: bytes, _: Path) -> Rows:
             matrix = scipy.sparse.load_npz(io.BytesIO(data))
             matrix.check_format(full_check=True)  # places beyond the matrix would end the process
             return Rows(scipy.sparse.csc_array(matrix))
-        named = {name: archive[name] for name in archive.files}
-    dofs = named.pop("dofs", None)
-    return Rows(_the_matrix(named, ARRAYS), None if dofs is None else whole_numbers("dofs", dofs))
+        arrays = {name: archive[name] for name in archive.files}
+    dofs = arrays.pop("dofs", None)
+    return Rows(_the_matrix(arrays, ARRAYS), None if dofs is None else whole_numbers("dofs", dofs))
 
 
 def _matlab(data: bytes, _: Path) -> Rows:
-    named: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
     for name, value in matlab.variables(data, LARGEST, sparse=True):
-        whole, beside, of_sparse = name.rpartition(matlab.SPARSE)
-        if beside:
-            named.setdefault(whole, {})[of_sparse] = value
+        base, mark, part = name.rpartition(matlab.SPARSE)
+        if mark:
+            variables.setdefault(base, {})[part] = value
         else:
-            named[name] = value
-    dofs = named.pop("dofs", None)
-    for name, value in named.items():
+            variables[name] = value
+    dofs = variables.pop("dofs", None)
+    for name, value in variables.items():
         if isinstance(value, dict):
             places = value["row"].ravel(), value["column"].ravel()
-            named[name] = scipy.sparse.csc_array(
+            variables[name] = scipy.sparse.csc_array(
                 (value["value"].ravel(), places), shape=tuple(value["shape"].ravel())
             )
-    found = _the_matrix(named, "give one square matrix, or name it stiffness")
-    return Rows(found, None if dofs is None else whole_numbers("dofs", dofs))
+    matrix = _the_matrix(variables, "give one square matrix, or name it stiffness")
+    return Rows(matrix, None if dofs is None else whole_numbers("dofs", dofs))
 
 
-def _the_matrix(named: dict[str, Any], fix: str) -> scipy.sparse.csc_array:
+def _the_matrix(variables: dict[str, Any], fix: str) -> scipy.sparse.csc_array:
     """Matrix among variables by name: the one of a known name, or the only square one."""
     square = {
         name: value
-        for name, value in named.items()
+        for name, value in variables.items()
         if value.ndim == 2 and value.shape[0] == value.shape[1] > 1
     }
-    known = [square[name] for name in NAMES if name in square]
-    if not known and len(square) != 1:
+    matrices = [square[name] for name in NAMES if name in square]
+    if not matrices and len(square) != 1:
         raise InputError(f"holds {len(square)} square matrices: {fix}")
-    return scipy.sparse.csc_array(known[0] if known else next(iter(square.values())))
+    return scipy.sparse.csc_array(matrices[0] if matrices else next(iter(square.values())))
 
 
 def _text(data: bytes, path: Path) -> Rows:
@@ -121,8 +121,8 @@ def _market(text: str) -> scipy.sparse.csc_array:
     """Real matrix of a Matrix Market file; SciPy's reader may end the process at a damaged one."""
     head, *lines = text.splitlines()
     _, what, form, kind, symmetry = head.split()
-    known = {"matrix", "coordinate", "array", "real", "double", "integer", "general", "symmetric"}
-    if not {what, form, kind, symmetry} <= known:
+    words = {"matrix", "coordinate", "array", "real", "double", "integer", "general", "symmetric"}
+    if not {what, form, kind, symmetry} <= words:
         raise InputError(f"{head}: give a matrix of real numbers, general or symmetric")
     sizes, *rows = (line for line in lines if line.strip() and line[0] != "%")
     size, *others = (int(word) for word in sizes.split())
@@ -134,8 +134,8 @@ def _market(text: str) -> scipy.sparse.csc_array:
     if values.size != (size * (size + 1) // 2 if half else size**2):
         raise InputError(f"holds {values.size} numbers for {size} rows: write it again")
     column, row = np.indices((size, size))
-    kept = row >= column if half else row >= 0
-    return _placed(row[kept], column[kept], values, size, half)
+    part = row >= column if half else row >= 0
+    return _placed(row[part], column[part], values, size, half)
 
 
 def _placed(
@@ -147,12 +147,12 @@ def _placed(
     lost = size > value.size or np.setdiff1d(np.arange(size), places[0, row == column]).size
     if twice or lost or np.any(places != [row, column]):
         raise InputError("lacks entries, or has some twice: copy the whole file again")
-    found = scipy.sparse.coo_array((value, tuple(places)), shape=(size, size))
+    matrix = scipy.sparse.coo_array((value, tuple(places)), shape=(size, size))
     if half:
-        found = found + scipy.sparse.coo_array(
+        matrix = matrix + scipy.sparse.coo_array(
             (np.where(row == column, 0.0, value), tuple(places[::-1])), shape=(size, size)
         )
-    return scipy.sparse.csc_array(found)
+    return scipy.sparse.csc_array(matrix)
 
 
 def _substructure(text: str) -> Rows:
@@ -160,23 +160,23 @@ def _substructure(text: str) -> Rows:
 
     Element node k is the k-th in the comments, and its directions are given from line "k, ..." on.
     """
-    head, found, rest = text.partition("*MATRIX,TYPE=STIFFNESS")
-    if not found:
+    head, marker, rest = text.partition("*MATRIX,TYPE=STIFFNESS")
+    if not marker:
         raise InputError("holds no *MATRIX,TYPE=STIFFNESS: add STIFFNESS=YES to the output")
     _, _, comments = head.partition("ELEMENT NODES")
     nodes: list[int] = []
-    given: list[tuple[int, list[int]]] = []
+    directions: list[tuple[int, list[int]]] = []
     for line in comments.splitlines()[1:]:
         numbers = [int(word) for word in re.findall(r"\d+", line)]
         if line.startswith("**"):
             nodes += numbers
-        elif len(numbers) == 1 and not given:  # direction of the first node
-            given.append((1, numbers))
+        elif len(numbers) == 1 and not directions:  # direction of the first node
+            directions.append((1, numbers))
         elif numbers:
-            given.append((numbers[0], numbers[1:]))
-    if any(not 1 <= place <= len(nodes) for place, _ in given):
+            directions.append((numbers[0], numbers[1:]))
+    if any(not 1 <= place <= len(nodes) for place, _ in directions):
         raise InputError(f"names an element node beyond the {len(nodes)} that it lists")
-    rows = [(nodes[place - 1], direction) for place, found in given for direction in found]
+    rows = [(nodes[place - 1], direction) for place, ways in directions for direction in ways]
     body, _, _ = rest.partition("*")
     values = np.array(body.replace(",", " ").split(), float)
     size = len(rows)
@@ -190,8 +190,8 @@ def _substructure(text: str) -> Rows:
 
 def _stored(data: bytes, path: Path) -> Rows:
     """Rows of CalculiX's matrix storage: triplets of the upper half, and node.direction."""
-    named = path.with_suffix(".dof")
-    words = read_bytes(named).decode("ascii").split()
+    listing = path.with_suffix(".dof")
+    words = read_bytes(listing).decode("ascii").split()
     dofs = np.array([[int(part) for part in word.split(".")] for word in words])
     table = np.array(data.split(), float).reshape(-1, 3)
     if not data.endswith(b"\n"):
@@ -206,13 +206,13 @@ def _nastran(_: bytes, path: Path) -> Rows:
     except ImportError:
         raise InputError("needs pyyeti: pip install 'jbeamshell[nastran]'") from None
     names, matrices, *_ = op4.load(str(path), into="list", sparse=True)
-    named = {
+    variables = {
         name: scipy.sparse.csc_array(matrix) for name, matrix in zip(names, matrices, strict=True)
     }
-    for name, matrix in list(named.items()):
+    for name, matrix in list(variables.items()):
         if name.lower().startswith("k"):
-            named["stiffness"] = matrix
-    return Rows(_the_matrix(named, "give one square matrix, or name it KAA"))
+            variables["stiffness"] = matrix
+    return Rows(_the_matrix(variables, "give one square matrix, or name it KAA"))
 
 
 READERS: dict[str, Callable[[bytes, Path], Rows]] = {

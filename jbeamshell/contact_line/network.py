@@ -115,11 +115,11 @@ class Network(eqx.Module):
         InputError
             for a backbone along which nothing slips
         """
-        moving = jax.jit(lambda scene: moving_volume(condensed(scene, scene.plan.nodes)))
+        volume = jax.jit(lambda scene: moving_volume(condensed(scene, scene.plan.nodes)))
         slopes = jnp.diff(displacement, prepend=0.0) / jnp.diff(force, prepend=0.0)
-        kept = np.append(np.diff(np.asarray(slopes)) > SOFTENS * slopes[0], True)
-        require("force", float(force[-1]), bool(np.sum(kept) > 1), STUCK)
-        return cls.in_series(displacement[kept], force[kept], moving(scene))
+        corners = np.append(np.diff(np.asarray(slopes)) > SOFTENS * slopes[0], True)
+        require("force", float(force[-1]), bool(np.sum(corners) > 1), STUCK)
+        return cls.in_series(displacement[corners], force[corners], volume(scene))
 
     @classmethod
     def in_series(cls, displacement: Array, force: Array, volume: Array) -> Network:
@@ -159,8 +159,8 @@ class Network(eqx.Module):
 
     def branch(self, start: ContactState, force: Array) -> tuple[ContactState, Array, Array]:
         """Contact, work of friction and validity after a branch from a reversal to a force."""
-        found = follow(self.body, self.factors, self.friction, start, force)
-        return found.at, found.slip_work, found.valid
+        branch = follow(self.body, self.factors, self.friction, start, force)
+        return branch.at, branch.slip_work, branch.valid
 
     def sliders(self, start: ContactState, sense: Array) -> Sliders:
         """Sliders of the branch of a sense (1 or -1) that starts with a contact."""
@@ -181,10 +181,10 @@ class Network(eqx.Module):
         Both are NaN where the slip zones are not nested.
         """
         turns = amplitude * jnp.asarray([1.0, *[-1.0, 1.0] * STEADY])
-        found = path(self.body, self.factors, self.friction, self.rest, turns)
-        reach = 0.5 * jnp.abs(found.at.displacement[-1] - found.at.displacement[-2])
-        nested = jnp.all(found.valid)
-        work = jnp.sum(found.slip_work[-2:])
+        branches = path(self.body, self.factors, self.friction, self.rest, turns)
+        reach = 0.5 * jnp.abs(branches.at.displacement[-1] - branches.at.displacement[-2])
+        nested = jnp.all(branches.valid)
+        work = jnp.sum(branches.slip_work[-2:])
         return nan_unless(nested, (reach, work))
 
     def along(self, displacements: Array) -> Response:

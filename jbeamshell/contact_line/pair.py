@@ -41,14 +41,14 @@ class Pair(NamedTuple):
     upper: Array
     lower: Array
 
-    def above(self, given: Array) -> Array:
+    def above(self, movement: Array) -> Array:
         """Movement of the member above and its loads, (steps, 2n + 2), from the pair's."""
-        return jnp.concatenate([given @ self.upper.T, given[:, -2:]], axis=1)
+        return jnp.concatenate([movement @ self.upper.T, movement[:, -2:]], axis=1)
 
-    def below(self, given: Array) -> Array:
+    def below(self, movement: Array) -> Array:
         """Movement of the member below in its own frame and its loads, (steps, 2n + 2)."""
-        loads = given[:, -2:] * np.array([0.0, 1.0])
-        return jnp.concatenate([given @ self.lower.T, loads], axis=1)
+        loads = movement[:, -2:] * np.array([0.0, 1.0])
+        return jnp.concatenate([movement @ self.lower.T, loads], axis=1)
 
 
 class Member(NamedTuple):
@@ -117,8 +117,8 @@ def together(
     first = jnp.asarray(~fixed_above, dtype)
     second = jnp.asarray(np.where(fixed_above & ~fixed_below, -1.0, 0.0), dtype)
 
-    def in_both(scales: Array, both: Array) -> Array:
-        return scales[:, None] * both * scales
+    def in_both(scales: Array, matrix: Array) -> Array:
+        return scales[:, None] * matrix * scales
 
     on_z = in_both(moves, (above + below)[:-2, :-2]) + jnp.diag(1.0 - moves)
     one, other = (jnp.append(part, jnp.ones(2)) for part in (first, second))
@@ -127,8 +127,8 @@ def together(
     reduced = inverse @ mixed
     hessian = in_both(one, above) + in_both(other, below) - reduced.T @ reduced
     z = -(inverse.T @ reduced) * moves[:, None]
-    given = jnp.eye(size, size + 2, dtype=dtype)
+    unit = jnp.eye(size, size + 2, dtype=dtype)
     loads = jnp.eye(size + 2, dtype=dtype)[-2:]
-    q_1 = jnp.concatenate([z + first[:, None] * given, loads])
-    q_2 = jnp.concatenate([z + second[:, None] * given, loads])
+    q_1 = jnp.concatenate([z + first[:, None] * unit, loads])
+    q_2 = jnp.concatenate([z + second[:, None] * unit, loads])
     return hessian, q_1, q_2

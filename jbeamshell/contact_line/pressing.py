@@ -61,20 +61,20 @@ def press(
     gap : (n,) distance of the nodes before anything presses; None is none.  The lift is what is
         left of it
     """
-    known = solve(k_tt, jnp.concatenate([k_tn, press_t[:, None]], axis=1))
-    stiffness = k_nn - k_tn.T @ known[:, :-1]
-    r_0 = press_n - k_tn.T @ known[:, -1]
-    down, away = jnp.sum(r_0), jnp.zeros_like(r_0) if gap is None else gap
-    r_0 = r_0 - stiffness @ away
-    opened, found = jnp.arange(r_0.size) < r_0.size - 1, jnp.asarray(True)
+    solution = solve(k_tt, jnp.concatenate([k_tn, press_t[:, None]], axis=1))
+    stiffness = k_nn - k_tn.T @ solution[:, :-1]
+    r_0 = press_n - k_tn.T @ solution[:, -1]
+    down, distance = jnp.sum(r_0), jnp.zeros_like(r_0) if gap is None else gap
+    r_0 = r_0 - stiffness @ distance
+    opened, ends = jnp.arange(r_0.size) < r_0.size - 1, jnp.asarray(True)
     if foundation:
-        opened, found = lax.stop_gradient(_open_nodes(stiffness, r_0, down))
-    both = opened[:, None] & opened
-    matrix = jnp.where(both, stiffness, jnp.diag(jnp.diag(stiffness)))
+        opened, ends = lax.stop_gradient(_open_nodes(stiffness, r_0, down))
+    block = opened[:, None] & opened
+    matrix = jnp.where(block, stiffness, jnp.diag(jnp.diag(stiffness)))
     lift = jnp.where(opened, solve(matrix, jnp.where(opened, -r_0, 0.0)), 0.0)
-    lift = nan_unless(found, lift)
+    lift = nan_unless(ends, lift)
     reaction = jnp.where(opened | (not foundation), 0.0, r_0 + stiffness @ lift)
-    return Pressing(lift, -known[:, -1] - known[:, :-1] @ (lift - away), reaction)
+    return Pressing(lift, -solution[:, -1] - solution[:, :-1] @ (lift - distance), reaction)
 
 
 def _open_nodes(stiffness: Array, r_0: Array, down: Array) -> tuple[Array, Array]:

@@ -91,11 +91,11 @@ def walk_with_pressures(
         return (level.state, level.lift, level.settled), level
 
     steps = jnp.diff(loads, prepend=start.force), jnp.diff(parts, prepend=jnp.ones_like(parts[0]))
-    found: Level = lax.scan(go, (start, lift, jnp.asarray(True)), steps)[1]
-    slip, risen = found.state.v - start.v, found.lift - lift
-    u = body.c * (loads - start.force) + slip @ body.f_t + risen @ body.f_n
+    levels: Level = lax.scan(go, (start, lift, jnp.asarray(True)), steps)[1]
+    slip, rise = levels.state.v - start.v, levels.lift - lift
+    u = body.c * (loads - start.force) + slip @ body.f_t + rise @ body.f_n
     u = start.displacement + u + press.h * (parts - 1.0)
-    return found._replace(state=found.state._replace(force=loads, displacement=u))
+    return levels._replace(state=levels.state._replace(force=loads, displacement=u))
 
 
 def _direction(load: Array, part: Array) -> tuple[Array, tuple[Array, Array]]:

@@ -49,13 +49,13 @@ class Layout(NamedTuple):
 
     def strip(self, numbers: Array, scene: Scene) -> Strip:
         """Strip of a scene, of numbers that may be traced."""
-        found, begin = [], 0
+        leaves, begin = [], 0
         for shape, dtype in self.leaves:
             end = begin + int(np.prod(shape))
             leaf = numbers[begin:end].reshape(shape)
-            found.append(leaf.astype(dtype) if dtype == "bool" else leaf)
+            leaves.append(leaf.astype(dtype) if dtype == "bool" else leaf)
             begin = end
-        shared = jax.tree.unflatten(self.tree, found)
+        shared = jax.tree.unflatten(self.tree, leaves)
         return shared.strip(scene) if isinstance(shared, Bodies) else shared
 
 
@@ -85,12 +85,12 @@ class Shared(NamedTuple):
         """True if the strips hold for the scene with these values of the numbers that vary."""
         if self.heights is None:
             return True
-        given = {key: float(value) for key, value in zip(over, values, strict=True)}
-        own = given.get(HEIGHT, scene.strip.height_ratio)
-        if "strip.half_height" in given:
-            length = given.get("strip.length", scene.strip.length)
-            own = 2.0 * given["strip.half_height"] / length
-        return self.heights[0] <= float(own) <= self.heights[1]
+        numbers = {key: float(value) for key, value in zip(over, values, strict=True)}
+        height = numbers.get(HEIGHT, scene.strip.height_ratio)
+        if "strip.half_height" in numbers:
+            length = numbers.get("strip.length", scene.strip.length)
+            height = 2.0 * numbers["strip.half_height"] / length
+        return self.heights[0] <= float(height) <= self.heights[1]
 
 
 def shared(
@@ -119,11 +119,11 @@ def shared(
         return None
     if not vary <= LOADS | SCALES | HEIGHTS | {POISSON}:
         return None
-    own, ratio = float(strip.height_ratio), float(nu)
-    usual = min(USUAL_HEIGHTS[0], own / AROUND), max(USUAL_HEIGHTS[1], own * AROUND)
-    given = {HEIGHT: usual if vary & HEIGHTS else (own, own), POISSON: (ratio, ratio)}
-    given |= dict(ranges or {})
-    return _interpolated(*_numbers(scene), given[HEIGHT], given[POISSON])
+    height, ratio = float(strip.height_ratio), float(nu)
+    usual = min(USUAL_HEIGHTS[0], height / AROUND), max(USUAL_HEIGHTS[1], height * AROUND)
+    ends = {HEIGHT: usual if vary & HEIGHTS else (height, height), POISSON: (ratio, ratio)}
+    ends |= dict(ranges or {})
+    return _interpolated(*_numbers(scene), ends[HEIGHT], ends[POISSON])
 
 
 def _numbers(scene: Scene) -> tuple[Template, bytes]:

@@ -210,19 +210,19 @@ def level_slopes(
     )
     slips = jnp.concatenate([slip_change, held_again])
 
-    given = change.matrix @ fields - change.pull * last.force + change.reference
-    pushed = given - system.pull * load_change
+    forces = change.matrix @ fields - change.pull * last.force + change.reference
+    push = forces - system.pull * load_change
     stuck = slips[trace.instance]
-    sum_of_both = pushed[:k] + at.sigma * (
-        change.friction * last.r_n[:k] + system.friction * pushed[k : 2 * k]
+    sum_of_both = push[:k] + at.sigma * (
+        change.friction * last.r_n[:k] + system.friction * push[k : 2 * k]
     )
-    free = jnp.where(at.opened, -pushed[k:], 0.0)
+    free = jnp.where(at.opened, -push[k:], 0.0)
     held = jnp.concatenate([jnp.where(at.sigma == 0.0, stuck, -sum_of_both), free])
     answer = at.matrix[:-1] @ held
     dv = jnp.where(at.sigma == 0.0, stuck, answer[:k])
     dw = jnp.where(at.opened, answer[k:], 0.0)
     dq = jnp.concatenate([dv, dw])
-    dr = pushed + system.matrix @ dq
+    dr = push + system.matrix @ dq
 
     impulse = (
         jnp.vdot(trace.on_matrix, change.matrix)
@@ -249,10 +249,10 @@ def _held_again(change: System, slip_change: Array, trace: Trace) -> Array:
     NaN where there are more events than are recorded.
     """
     k = slip_change.size
-    given = trace.fields @ change.matrix - trace.load[:, None] * change.pull + change.reference
-    known = trace.held.held[:, :k] @ slip_change + trace.held.friction * change.friction
-    known = known + jnp.sum(trace.held.forces * given, axis=1)
+    forces = trace.fields @ change.matrix - trace.load[:, None] * change.pull + change.reference
+    sides = trace.held.held[:, :k] @ slip_change + trace.held.friction * change.friction
+    sides = sides + jnp.sum(trace.held.forces * forces, axis=1)
     # Each depends on those of earlier events only.
     order = jnp.eye(k) - trace.held.held[:, k:]
     recorded = jnp.where(trace.sticks > k, jnp.nan, 1.0)
-    return recorded * (inverse_unit_lower(order) @ known)
+    return recorded * (inverse_unit_lower(order) @ sides)

@@ -111,12 +111,12 @@ def _solved(
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
         fix = f"must press the strip down for model.section = {scene.plan.section}"
         require("contact.pressure", scene.contact.pressure, down, fix)
-    known = isinstance(turns, tuple)
-    given = (scene, strip, targets, None if whole else parts, () if known else turns)
-    history, movement = _walk(given, turns if known else (), cycles)
+    known_turns, traced = (turns, ()) if isinstance(turns, tuple) else ((), turns)
+    inputs = scene, strip, targets, None if whole else parts, traced
+    history, movement = _walk(inputs, known_turns, cycles)
     above = Unread(strip, movement)
-    found: History = history.but(scene=scene, above=above.found if now else above)
-    return found
+    history = history.but(scene=scene, above=above.found if now else above)
+    return history
 
 
 def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
@@ -137,8 +137,8 @@ def strip_of(scene: Scene) -> Strip:
 
 @Small
 def _walk(
-    given: tuple[Scene, Strip, Array, Array | None, Turns],
-    known: tuple[bool, ...],
+    inputs: tuple[Scene, Strip, Array, Array | None, Turns],
+    known_turns: tuple[bool, ...],
     cycles: Cycles,
 ) -> tuple[History, Movement]:
     """History of a strip pressed down and loaded along targets; see `solve`.
@@ -147,14 +147,14 @@ def _walk(
 
     Parameters
     ----------
-    given : scene, its strip, loads after the pressing, parts of the pressures then if they change,
+    inputs : scene, its strip, loads after the pressing, parts of the pressures then if they change,
         else None, and the turns before the loads if traced, else ()
-    known : turns if they are known
+    known_turns : turns if they are known
     """
-    scene, strip, targets, parts, traced = given
-    turns = known if isinstance(traced, tuple) else traced
-    found = _levels(scene, strip, targets, parts, turns)
-    history, movement = _history(scene, strip, found, parts, cycles)
+    scene, strip, targets, parts, traced = inputs
+    turns = known_turns if isinstance(traced, tuple) else traced
+    levels = _levels(scene, strip, targets, parts, turns)
+    history, movement = _history(scene, strip, levels, parts, cycles)
     return history.but(scene=None), movement  # its numbers would be copied
 
 
@@ -178,20 +178,20 @@ def _levels(scene: Scene, strip: Strip, targets: Array, parts: Array | None, tur
     flat = None if stays_flat(scene) else lift
     if not targets.size:
         none = Level(start, lift, start.force, start.v > 0.0, start.force >= 0.0)
-        found = jax.tree.map(lambda a: jnp.zeros((0, *a.shape), a.dtype), none)
+        levels = jax.tree.map(lambda a: jnp.zeros((0, *a.shape), a.dtype), none)
     elif parts is not None:
-        found = walk_with_pressures(body, press, friction, start, targets, parts, flat)
+        levels = walk_with_pressures(body, press, friction, start, targets, parts, flat)
     else:
         alike = not goes_on(scene)  # the edge of the contact opens at other events at each load
-        found = walk(body, friction, start, targets, turns, flat, alike=alike)
+        levels = walk(body, friction, start, targets, turns, flat, alike=alike)
     sound = jnp.all(jnp.isfinite(strip.lift))
-    state = found.state
+    state = levels.state
     if scene.load.control == "displacement":
         state = jax.vmap(exchanged)(state)
     if soft:
-        risen = found.lift - lift
-        state = state._replace(v=jax.vmap(springs.slip)(state.v, risen, state.force))
-    return found._replace(state=state, settled=found.settled & sound)
+        rise = levels.lift - lift
+        state = state._replace(v=jax.vmap(springs.slip)(state.v, rise, state.force))
+    return levels._replace(state=state, settled=levels.settled & sound)
 
 
 def _history(
@@ -265,10 +265,10 @@ def _movement(strip: Strip, levels: Level, part: Array, pressure: Array, sound: 
     n, before = strip.x.size, part.size - levels.settled.size
     settled = _along(strip.settled[None], n, 0)[0]
     at_rest = jnp.append(jnp.stack([settled, strip.lift[::-1]], axis=1), jnp.array([0.0, 1.0]))
-    slip, risen = (
+    slip, rise = (
         _along(values, n, before) for values in (levels.state.v, levels.lift[:, :n] - strip.lift)
     )
-    change = jnp.stack([slip, risen], axis=2).reshape(part.size, 2 * n)
+    change = jnp.stack([slip, rise], axis=2).reshape(part.size, 2 * n)
     force = jnp.pad(levels.state.force, (before, 0))
     change = jnp.column_stack([change, force, pressure - part])
     return Movement(at_rest, change, part, sound)

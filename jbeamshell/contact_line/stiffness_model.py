@@ -76,8 +76,8 @@ class StiffnessModel:
         dofs = whole_numbers("dofs", self.dofs)
         fix = f"give the node and direction of each of its {matrix.shape[0]} rows"
         require("dofs", dofs.shape, dofs.shape == (matrix.shape[0], 2), fix)
-        known = bool(np.all((dofs >= [0, 1]) & (dofs[:, 1:] <= DIRECTIONS)))
-        require("dofs", dofs, known, f"directions are 1 to {DIRECTIONS}, and nodes not negative")
+        valid = bool(np.all((dofs >= [0, 1]) & (dofs[:, 1:] <= DIRECTIONS)))
+        require("dofs", dofs, valid, f"directions are 1 to {DIRECTIONS}, and nodes not negative")
         unique = len({tuple(row) for row in dofs.tolist()}) == len(dofs)
         require("dofs", dofs.shape, unique, "must name each node and direction once")
         object.__setattr__(self, "matrix", 0.5 * (matrix + matrix.T))
@@ -100,14 +100,14 @@ class StiffnessModel:
         InputError
             if the file cannot be read or holds no such matrix
         """
-        found = read_matrix(path)
+        rows = read_matrix(path)
         if dofs is not None:
-            return cls(found.matrix, np.asarray(dofs))
-        if found.dofs is not None:
-            return cls(found.matrix, found.dofs)
+            return cls(rows.matrix, np.asarray(dofs))
+        if rows.dofs is not None:
+            return cls(rows.matrix, rows.dofs)
         require_count("directions", directions, 1, DIRECTIONS)
-        node, direction = np.divmod(np.arange(found.matrix.shape[0]), directions)
-        return cls(found.matrix, np.column_stack([node, direction]) + 1)
+        node, direction = np.divmod(np.arange(rows.matrix.shape[0]), directions)
+        return cls(rows.matrix, np.column_stack([node, direction]) + 1)
 
     def condensed(
         self,
@@ -140,67 +140,39 @@ class StiffnessModel:
             forces and lengths that are not finite; for a body with a negative or a loose mode
         """
         model = self if held is None else self._without(held)
-        for key, side in (("tangential", tangential), ("normal", normal)):
-            require_count(key, side, 1, DIRECTIONS)
+        directions = {"tangential": tangential, "normal": normal}
+        for key, direction in directions.items():
+            require_count(key, direction, 1, DIRECTIONS)
         require("normal", normal, normal != tangential, "must differ from tangential")
         row = {(int(a), int(b)): i for i, (a, b) in enumerate(model.dofs)}
         nodes, x, group = _groups(contact)
-        known = set(self.dofs[:, 0].tolist())
+        model_nodes = set(self.dofs[:, 0].tolist())
         for node in nodes:
             fix = "is no node of the model: give nodes that have rows in the matrix"
-            require("contact", node, node in known, fix)
-        for key, side in (("tangential", tangential), ("normal", normal)):
+            require("contact", node, node in model_nodes, fix)
+        for key, direction in directions.items():
             fix = "is a direction that no node of the contact has: name another, or free a node"
-            require(key, side, any((node, side) in row for node in nodes), fix)
-        size = model.dofs.shape[0]
-        place = np.full(size, -1)
-        fixed = np.zeros((x.size, 2), bool)
-        for side, direction in enumerate((tangential, normal)):
-            for node, g in zip(nodes, group, strict=True):
-                if (node, direction) not in row:
-                    fixed[g, side] = True
-            for node, g in zip(nodes, group, strict=True):
-                if (node, direction) in row:
-                    place[row[node, direction]] = -2 if fixed[g, side] else 2 * g + side
+            require(key, direction, any((node, direction) in row for node in nodes), fix)
+        place, fixed = _places(row, nodes, group, (tangential, normal))
         forces = np.column_stack(
-            [_forces("pull", [] if pull is None else pull, row, size)]
-            + [_forces(f"press[{i}]", table, row, size) for i, table in enumerate(press)]
+            [_forces("pull", [] if pull is None else pull, row)]
+            + [_forces(f"press[{i}]", table, row) for i, table in enumerate(press)]
         )
-        on_line, inside = np.flatnonzero(place >= 0), np.flatnonzero(place == -1)
-        ties = scipy.sparse.csc_array(
-            (np.ones(on_line.size), (np.arange(on_line.size), place[on_line])),
-            shape=(on_line.size, 2 * x.size),
-        )
-        stiffness = (ties.T @ model.matrix[on_line][:, on_line] @ ties).toarray()
-        across = (model.matrix[inside][:, on_line] @ ties).toarray()
-        among, given = ties.T @ forces[on_line], forces[inside]
-        flexibility = np.zeros((forces.shape[1],) * 2)
-        if inside.size:
-            solved = _factors(model.matrix[inside][:, inside]).solve(np.hstack([across, given]))
-            by_contact, by_loads = np.split(solved, [across.shape[1]], axis=1)
-            stiffness = stiffness - across.T @ by_contact
-            among = among - across.T @ by_loads
-            flexibility = given.T @ by_loads
-        return Substructure(
-            x,
-            0.5 * (stiffness + stiffness.T),
-            among,
-            0.5 * (flexibility + flexibility.T),
-            tributary=tributary,
-            fixed=fixed.ravel().tolist(),
-        )
+        matrices = _on_contact(model.matrix, forces, place, 2 * x.size)
+        return Substructure(x, *matrices, tributary=tributary, fixed=fixed.ravel().tolist())
 
     def _without(self, held: ArrayLike) -> StiffnessModel:
         """Model without the rows of supports."""
         rows = _rows("held", held, 2, SUPPORTS)
-        gone = {(a, b) for a, b in whole_numbers("held", rows).tolist()}
-        known = set(map(tuple, self.dofs.tolist()))
-        for node, direction in sorted(gone - known):
+        supports = {(a, b) for a, b in whole_numbers("held", rows).tolist()}
+        dofs = set(map(tuple, self.dofs.tolist()))
+        for node, direction in sorted(supports - dofs):
             fix = "is not in the model: leave it out where its matrix has the support already"
             raise InputError(f"held = node {node}, direction {direction}: {fix}")
-        kept = [i for i, dof in enumerate(self.dofs.tolist()) if tuple(dof) not in gone]
-        require("held", f"{len(gone)} rows", bool(kept), "holds the whole body: leave some free")
-        return StiffnessModel(self.matrix[kept][:, kept], self.dofs[kept])
+        stay = [i for i, dof in enumerate(self.dofs.tolist()) if tuple(dof) not in supports]
+        fix = "holds the whole body: leave some free"
+        require("held", f"{len(supports)} rows", bool(stay), fix)
+        return StiffnessModel(self.matrix[stay][:, stay], self.dofs[stay])
 
 
 def _groups(contact: ArrayLike) -> tuple[list[int], NDArray[np.float64], NDArray[np.int64]]:
@@ -218,20 +190,60 @@ def _groups(contact: ArrayLike) -> tuple[list[int], NDArray[np.float64], NDArray
     return nodes, x, group
 
 
-def _forces(
-    key: str, table: ArrayLike, row: dict[tuple[int, int], int], size: int
-) -> NDArray[np.float64]:
+def _places(
+    row: dict[tuple[int, int], int],
+    nodes: list[int],
+    group: NDArray[np.int64],
+    directions: tuple[int, int],
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Place of each row (N,) on the contact, and True for the contact's fixed displacements (n, 2).
+
+    A place is -1 inside the body, and -2 where a support holds another node at the same X.
+    """
+    place, fixed = np.full(len(row), -1), np.zeros((np.max(group) + 1, 2), bool)
+    for side, direction in enumerate(directions):
+        for node, g in zip(nodes, group, strict=True):
+            fixed[g, side] |= (node, direction) not in row
+        for node, g in zip(nodes, group, strict=True):
+            if (node, direction) in row:
+                place[row[node, direction]] = -2 if fixed[g, side] else 2 * g + side
+    return place, fixed
+
+
+def _on_contact(
+    matrix: scipy.sparse.csc_array, forces: NDArray[Any], place: NDArray[np.int64], size: int
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Stiffness, forces and flexibility of the contact's displacements, ``size`` of them."""
+    on_line, inside = np.flatnonzero(place >= 0), np.flatnonzero(place == -1)
+    ties = scipy.sparse.csc_array(
+        (np.ones(on_line.size), (np.arange(on_line.size), place[on_line])),
+        shape=(on_line.size, size),
+    )
+    stiffness = (ties.T @ matrix[on_line][:, on_line] @ ties).toarray()
+    across = (matrix[inside][:, on_line] @ ties).toarray()
+    loads, forces = forces[inside], ties.T @ forces[on_line]
+    flexibility = np.zeros((forces.shape[1],) * 2)
+    if inside.size:
+        fields = _factors(matrix[inside][:, inside]).solve(np.hstack([across, loads]))
+        by_contact, by_loads = np.split(fields, [across.shape[1]], axis=1)
+        stiffness = stiffness - across.T @ by_contact
+        forces = forces - across.T @ by_loads
+        flexibility = loads.T @ by_loads
+    return 0.5 * (stiffness + stiffness.T), forces, 0.5 * (flexibility + flexibility.T)
+
+
+def _forces(key: str, table: ArrayLike, row: dict[tuple[int, int], int]) -> NDArray[np.float64]:
     """Nodal forces (N,) of a table of node, direction and force."""
     values = _rows(key, table, 3, FORCES)
-    found = np.zeros(size)
+    forces = np.zeros(len(row))
     places = whole_numbers(key, values[:, :2]).tolist()
     for (node, direction), force in zip(places, values[:, 2], strict=True):
         where = row.get((node, direction))
         if where is None:
             fix = "is not in the model: leave it out where a support holds it"
             raise InputError(f"{key} = node {node}, direction {direction}: {fix}")
-        found[where] += force
-    return found
+        forces[where] += force
+    return forces
 
 
 def _rows(key: str, table: ArrayLike, columns: int, fix: str) -> NDArray[np.float64]:
@@ -257,9 +269,9 @@ def _factors(matrix: scipy.sparse.csc_array) -> SuperLU:
             options={"SymmetricMode": True},
         )
     except RuntimeError:  # exactly singular
-        left = 0.0
+        pivot = 0.0
     else:
-        left = float(np.min(factors.U.diagonal()[factors.perm_c] / matrix.diagonal()))
+        pivot = float(np.min(factors.U.diagonal()[factors.perm_c] / matrix.diagonal()))
     fix = "a part moves freely or has a negative mode with the contact clamped: check the supports"
-    require("matrix", f"pivot {left:.3g} of its diagonal", left > LOST, fix)
+    require("matrix", f"pivot {pivot:.3g} of its diagonal", pivot > LOST, fix)
     return factors

@@ -85,8 +85,8 @@ def ended(
     tau = jnp.abs(force - start.force)
     at = moved(at, system.friction, tau)
     state, lift = state_of(at, system.friction, start, force)
-    own = local_compliance(jnp.diag(system.matrix), system.pull)
-    held = jnp.abs(at.rate[-1]) < SLIDES * (jnp.abs(system.c) + own)
+    local = local_compliance(jnp.diag(system.matrix), system.pull)
+    held = jnp.abs(at.rate[-1]) < SLIDES * (jnp.abs(system.c) + local)
     slipping = (at.sigma != 0.0) & ~at.opened[: at.sigma.size]
     return at, Level(state, lift, at.work, slipping, last.settled & (event >= tau) & held)
 

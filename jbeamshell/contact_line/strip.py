@@ -97,21 +97,21 @@ def condensed(scene: Scene, nodes: int) -> Strip:
     hessian = under_pressure.hessian
     k_tt, k_tn, press = hessian[v, v], hessian[v, w], hessian[:-2, -1]
     # Without friction the far end keeps its place, even if nothing else holds it.
-    some = x.size - 1
-    press_t, traction = press[v][:some], jnp.zeros_like(press[v])
-    stiffness = k_tt[:some, :some], k_tn[:some], hessian[w, w]
-    away = None if gap is None else gap[::-1]
+    count = x.size - 1
+    press_t, traction = press[v][:count], jnp.zeros_like(press[v])
+    stiffness = k_tt[:count, :count], k_tn[:count], hessian[w, w]
+    gaps = None if gap is None else gap[::-1]
     if scene.member.assembly == "frictional":
         loads = press[v], press[w], scene.contact.friction
-        lift, settled, reaction, traction = press_roughly(k_tt, k_tn, hessian[w, w], *loads, away)
+        lift, settled, reaction, traction = press_roughly(k_tt, k_tn, hessian[w, w], *loads, gaps)
     elif stays_flat(scene):
         lift, reaction = jnp.zeros_like(x), (down - up)[::-1]
         settled = solve(stiffness[0], -press_t)
     else:
         based = scene.contact.normal == "rigid"
-        lift, settled, reaction = press_down(*stiffness, press_t, press[w], based, away)
+        lift, settled, reaction = press_down(*stiffness, press_t, press[w], based, gaps)
     if gap is not None:
-        under_pressure, under_load = (over_gap(each, gap) for each in (under_pressure, under_load))
+        under_pressure, under_load = (over_gap(part, gap) for part in (under_pressure, under_load))
     settled = jnp.pad(settled, (0, k_tt.shape[0] - settled.size))
     hessian = under_load.hessian
     if scene.member.bolt_stiffness is not None:
@@ -136,25 +136,25 @@ def _alone(
     scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
 ) -> tuple[Members, Members]:
     """Strip on a rigid base, under its pressures and under its load."""
-    lifted = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
-    from_below = lifted[:, None] * np.eye(lifted.size)[-1]
+    lift = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
+    from_below = lift[:, None] * np.eye(lift.size)[-1]
     ends = [entry.loaded_end(scene, form, mounted).end for mounted in entry.states(scene)]
-    found = [
+    members = [
         Members(line.elimination, line.hessian - from_below - from_below.T, None)
         for line in eliminate(form, x, down, entry.far_end(scene, form), *ends)
     ]
-    return found[0], found[-1]
+    return members[0], members[-1]
 
 
 def _joint(
     scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
 ) -> tuple[Members, Members]:
     """Both members of a lap joint, under the pressures and under the load."""
-    found = []
+    members = []
     for upper, lower, stretch in lap_members(scene, form, x, down, up):
         pair, hessian = joined(upper, lower)
-        found.append(Members(upper.line.elimination, hessian.at[-2, -2].add(stretch), pair))
-    return found[0], found[-1]
+        members.append(Members(upper.line.elimination, hessian.at[-2, -2].add(stretch), pair))
+    return members[0], members[-1]
 
 
 def lap_members(
@@ -181,15 +181,15 @@ def lap_members(
     uppers = eliminate(
         upper_form, x, down, end_section(upper_form), *(held.end for held in entering)
     )
-    found = []
+    members = []
     for mounted, held, upper in zip(states, entering, uppers, strict=True):
         leaving, stretch = entry.leaving_end(scene, below, pull, flat, mounted)
         fixed = np.append(leaving.fixed, free).reshape(n, 2) | [False, flat]
         fixed[-1, 1] |= not mounted and not rolls  # else it would turn
         (lower,) = eliminate(below, x, up, leaving.end, end_section(below))
         above = Member(upper_form, upper, np.append(free, held.fixed))
-        found.append((above, Member(below, lower, fixed.ravel()), stretch))
-    return found
+        members.append((above, Member(below, lower, fixed.ravel()), stretch))
+    return members
 
 
 def over_gap(members: Members, gap: Array) -> Members:
@@ -212,10 +212,10 @@ def initial_gap(scene: Scene, x: Array) -> Array | None:
 
     A hole is a gap that nothing closes.
     """
-    given, holes = scene.member.gap, scene.member.holes
-    if given is None and holes is None:
+    table, holes = scene.member.gap, scene.member.holes
+    if table is None and holes is None:
         return None
-    gap = jnp.zeros_like(x) if given is None else _on_stations(given, x)
+    gap = jnp.zeros_like(x) if table is None else _on_stations(table, x)
     if holes is None:
         return gap
     begin, end = scene.member.hole_edges.T
@@ -317,8 +317,8 @@ def moving_volume(strip: Strip) -> Array:
     A second member's counts with the lowest layer; lengths beyond the contact do not count.
     """
     n = strip.x.size
-    given = jnp.zeros((1, 2 * n + 2)).at[0, -2].set(1.0 / strip.body.c)
-    upper, lower = moved_by(strip.loaded, given)
+    movement = jnp.zeros((1, 2 * n + 2)).at[0, -2].set(1.0 / strip.body.c)
+    upper, lower = moved_by(strip.loaded, movement)
     volume = _volume(strip, strip.form, upper)
     if lower is None:
         return volume
@@ -332,22 +332,22 @@ def _volume(strip: Strip, form: SectionForm, moved: Array) -> Array:
     return jnp.einsum("i,mi,lmk,ki->l", strip.tributary, one, form.masses, one)
 
 
-def moved_by(members: Members, given: Array) -> tuple[Array, Array | None]:
+def moved_by(members: Members, movement: Array) -> tuple[Array, Array | None]:
     """Fields (m, n, steps) of the strip and of its second member, each of its own form.
 
     Parameters
     ----------
-    given : (steps, 2n + 2) v and w of the stations, end load and pressure
+    movement : (steps, 2n + 2) v and w of the stations, end load and pressure
     """
     pair = members.pair
     if pair is None:
-        return _fields(members.elimination, given), None
-    above = _fields(members.elimination, pair.above(given))
-    return above, _fields(pair.elimination, pair.below(given))
+        return _fields(members.elimination, movement), None
+    above = _fields(members.elimination, pair.above(movement))
+    return above, _fields(pair.elimination, pair.below(movement))
 
 
-def _fields(elimination: Elimination | Unknown, given: Array) -> Array:
+def _fields(elimination: Elimination | Unknown, movement: Array) -> Array:
     """Fields (m, n, steps) of a form from v and w of its stations, load and pressure (steps, :)."""
-    contact = given[:, :-2].reshape(len(given), -1, 2)
-    inner = elimination.recovered(given.T)  # (n, m-2, steps)
+    contact = movement[:, :-2].reshape(len(movement), -1, 2)
+    inner = elimination.recovered(movement.T)  # (n, m-2, steps)
     return jnp.concatenate([contact.T, jnp.moveaxis(inner, 1, 0)])

@@ -80,8 +80,8 @@ class Substructure(eqx.Module):
         loads, half = self.forces.shape[-1:], 0.5 * jnp.diff(self.x)
         none = jnp.zeros((*loads, *loads))
         self.flexibility = none if flexibility is None else as_leaf(flexibility, "flexibility")
-        beside = jnp.append(half, 0.0) + jnp.append(0.0, half)
-        self.tributary = beside if tributary is None else as_leaf(tributary, "tributary")
+        lengths = jnp.append(half, 0.0) + jnp.append(0.0, half)
+        self.tributary = lengths if tributary is None else as_leaf(tributary, "tributary")
         for i, truth in enumerate(fixed):
             require_choice(f"fixed[{i}]", truth, (False, True))
         self.fixed = tuple(map(bool, fixed)) or (False,) * (2 * self.x.size)
@@ -141,22 +141,22 @@ class Substructure(eqx.Module):
         """
         check_regular(path)
         try:
-            found = read_arrays(as_path(path), signed=False)
+            arrays = read_arrays(as_path(path), signed=False)
         except OSError as error:
             raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
         except Exception as error:  # NumPy may raise anything for a broken file
             reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
             raise InputError(f"{path}: is no .npz file of numbers ({reason})") from None
-        missing = [name for name in ("x", "stiffness", "forces") if name not in found]
+        missing = [name for name in ("x", "stiffness", "forces") if name not in arrays]
         fix = "give numpy.savez x=, stiffness= and forces=, or read a jbeamshell.StiffnessModel"
         require(str(path), f"without {', '.join(missing)}", not missing, fix)
         return cls(
-            found["x"],
-            found["stiffness"],
-            found["forces"],
-            found.get("flexibility"),
-            tributary=found.get("tributary"),
-            fixed=np.ravel(found.get("fixed", ())).tolist(),
+            arrays["x"],
+            arrays["stiffness"],
+            arrays["forces"],
+            arrays.get("flexibility"),
+            tributary=arrays.get("tributary"),
+            fixed=np.ravel(arrays.get("fixed", ())).tolist(),
         )
 
 

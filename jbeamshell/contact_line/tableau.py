@@ -104,9 +104,9 @@ def empty(k: int, n: int) -> Tableau:
 
 
 def reversed_at(
-    system: System, state: ContactState, lift: Array, wanted: Array, sense: Array
+    system: System, state: ContactState, lift: Array, opened: Array, sense: Array
 ) -> Tableau:
-    """Tableau at a reversal: all closed nodes stick, the ``wanted`` ones (n,) stay open."""
+    """Tableau at a reversal: the nodes ``opened`` (n,) stay open, all others stick."""
     k, n = state.v.size, lift.size
     start = empty(k, n)._replace(
         matrix=jnp.concatenate([system.matrix, system.pull[None]]),
@@ -115,13 +115,13 @@ def reversed_at(
     )
 
     def open_next(at: Tableau) -> Tableau:
-        i = jnp.argmax(wanted & ~at.opened)
+        i = jnp.argmax(opened & ~at.opened)
         sticks = (i < k) & (at.sigma[jnp.minimum(i, k - 1)] == 0.0)  # it slips before it opens
         return changed(at, jnp.where(sticks, ALONG, OPEN), i, system.friction)
 
-    found = lax.while_loop(lambda at: jnp.any(wanted & ~at.opened), open_next, start)
-    value = found.value.at[k : k + n].add(jnp.where(wanted, lift, 0.0))
-    return found._replace(value=value, events=jnp.asarray(0))
+    end = lax.while_loop(lambda at: jnp.any(opened & ~at.opened), open_next, start)
+    value = end.value.at[k : k + n].add(jnp.where(opened, lift, 0.0))
+    return end._replace(value=value, events=jnp.asarray(0))
 
 
 def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tableau:

@@ -80,29 +80,29 @@ def _lower_upper(matrix: Array, sides: Array) -> LowerUpper:
     n = matrix.shape[0]
     # Rows that shrink by powers of two keep LAPACK from exchanging them, and cost no digits.
     scale = 2.0 ** (-min(SHRINK, 900 // n) * np.arange(n))
-    both, _, order = lax.linalg.lu(jnp.concatenate([matrix, sides], axis=1) * scale[:, None])
+    block, _, order = lax.linalg.lu(jnp.concatenate([matrix, sides], axis=1) * scale[:, None])
     exchanged = jnp.where(jnp.all(order == np.arange(n)), 0.0, jnp.nan)
     one = jnp.eye(n, dtype=matrix.dtype)
-    lower = jnp.tril(both[:, :n] * (scale / scale[:, None]), -1) + one + exchanged
-    both = both / scale[:, None] + exchanged
-    upper, reduced = jnp.triu(both[:, :n]), both[:, n:]
+    lower = jnp.tril(block[:, :n] * (scale / scale[:, None]), -1) + one + exchanged
+    block = block / scale[:, None] + exchanged
+    upper, reduced = jnp.triu(block[:, :n]), block[:, n:]
     inverse_upper = lax.linalg.triangular_solve(upper, one, left_side=False)
     return LowerUpper(lower, upper, reduced, _inverse_lower(lower, True), inverse_upper)
 
 
 @lower_upper.defjvp
 def _lower_upper_slope(
-    given: tuple[Array, Array], change: tuple[Array, Array]
+    inputs: tuple[Array, Array], change: tuple[Array, Array]
 ) -> tuple[LowerUpper, LowerUpper]:
-    found = lower_upper(*given)
-    between = found.inverse_lower @ change[0] @ found.inverse_upper
+    factors = lower_upper(*inputs)
+    between = factors.inverse_lower @ change[0] @ factors.inverse_upper
     below, above = jnp.tril(between, -1), jnp.triu(between)
-    return found, LowerUpper(
-        found.lower @ below,
-        above @ found.upper,
-        found.inverse_lower @ change[1] - below @ found.reduced,
-        -below @ found.inverse_lower,
-        -found.inverse_upper @ above,
+    return factors, LowerUpper(
+        factors.lower @ below,
+        above @ factors.upper,
+        factors.inverse_lower @ change[1] - below @ factors.reduced,
+        -below @ factors.inverse_lower,
+        -factors.inverse_upper @ above,
     )
 
 

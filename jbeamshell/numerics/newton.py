@@ -164,8 +164,8 @@ class _Search(NamedTuple):
         """Iterate from unknowns ``start``."""
         refresh = self.problem.refresh
         one, none = jnp.ones((), start.dtype), jnp.asarray(0)
-        evaluated = self.problem.evaluate(start)
-        first = _Iterate(start, *evaluated, one, jnp.asarray(False), none)
+        values = self.problem.evaluate(start)
+        first = _Iterate(start, *values, one, jnp.asarray(False), none)
         if refresh is None:
             return self._chords(first, stiffness, self.settings.max_iterations)
 
@@ -187,9 +187,9 @@ class _Search(NamedTuple):
     def _improved(self, at: _Iterate, stiffness: Any) -> _Iterate:
         """Iterate after a Newton step, or the same with half the scale if the step is rejected."""
         problem = self.problem
-        left, tangent_input, whole_step = self._linearised(at)
+        defect, tangent_input, whole_step = self._linearised(at)
         matrix = problem.tangent(tangent_input, stiffness)
-        step = block_tridiagonal.solve(matrix, -left)
+        step = block_tridiagonal.solve(matrix, -defect)
         x = problem.limit(at.x, at.x + jnp.where(whole_step, 1.0, at.scale) * step)
         residual, tangent_input = problem.evaluate(x)
         # Friction's kinks raise the residual, but by no more than the friction force itself.  A
@@ -203,8 +203,8 @@ class _Search(NamedTuple):
         accepted = jnp.where(close, _largest(residual) <= _largest(at.residual), accepted)
         new = _Iterate(x, residual, tangent_input, whole, close, at.tried)
         old = at._replace(scale=0.5 * at.scale, was_close=close)
-        kept: _Iterate = jax.tree.map(lambda a, b: jnp.where(accepted, a, b), new, old)
-        return kept._replace(tried=at.tried + 1)
+        iterate: _Iterate = jax.tree.map(lambda a, b: jnp.where(accepted, a, b), new, old)
+        return iterate._replace(tried=at.tried + 1)
 
     def _linearised(self, at: _Iterate) -> tuple[Array, Any, Array]:
         """Residual and tangent's input of the next step, and True if it must be taken whole."""
