@@ -23,7 +23,7 @@ from jbeamshell.scene.scene import Scene
 
 
 def bar_cycles(scene: Scene, path: LoadPath) -> StepResults:
-    """Results of the scene's own cycles; of those after the pressing, NaN beyond gross slip."""
+    """Results of the scene's own cycles; beyond gross slip only the pressing converges."""
     system, strip, load, contact = System(scene), scene.strip, scene.load, scene.contact
     half, stiffness = scene.plan.steps, strip.stretching_stiffness
     resistance = contact.friction * (contact.pressure - contact.bottom_pressure)
@@ -35,48 +35,48 @@ def bar_cycles(scene: Scene, path: LoadPath) -> StepResults:
         displacement = load.amplitude * part
         # The root of the part is taken alone, because its slope at zero is infinite.
         force = bar_force(load.amplitude, stiffness, resistance) * jnp.sqrt(part)
-    reach = bar_slip_length(force, resistance)
-    slid = jax.vmap(lambda f: bar_slip_profile(system.x, f, strip.length, stiffness, resistance))(
+    slip_length = bar_slip_length(force, resistance)
+    slip = jax.vmap(lambda f: bar_slip_profile(system.x, f, strip.length, stiffness, resistance))(
         force
     )
-    traction = resistance * (system.x > strip.length - reach[:, None])
+    traction = resistance * (system.x > strip.length - slip_length[:, None])
     work = jnp.diff(force**3 / (6.0 * stiffness * resistance))  # of q along the slip
-    pressed = jnp.zeros(load.pressure_steps)
+    zeros = jnp.zeros(load.pressure_steps)  # of the pressing
 
     def along_path(pull: Array) -> Array:
         """Values (steps, ...) along the whole path from those of a first pull (half+1, ...)."""
         up = 2.0 * pull[1:] - pull[-1]
-        before = jnp.zeros((pressed.size, *pull.shape[1:]), pull.dtype)
-        return jnp.concatenate([before, pull[2::2], *[-up, up] * load.cycles])
+        pressing = jnp.zeros((zeros.size, *pull.shape[1:]), pull.dtype)
+        return jnp.concatenate([pressing, pull[2::2], *[-up, up] * load.cycles])
 
-    def each_step(before: Array, first: Array, branch: Array) -> Array:
+    def per_step(pressing: Array, first: Array, branch: Array) -> Array:
         """Values of the steps of the pressing, the first pull and every branch, one by one."""
-        return jnp.concatenate([before, first, *[branch] * (2 * load.cycles)])
+        return jnp.concatenate([pressing, first, *[branch] * (2 * load.cycles)])
 
     reaction = path.pressure[:, None] * ((system.load - system.bottom_load) / system.tributary)
     level = LoadLevel(
-        q=along_path(jnp.zeros((*slid.shape, scene.plan.width)).at[..., V].set(slid)),
+        q=along_path(jnp.zeros((*slip.shape, scene.plan.width)).at[..., V].set(slip)),
         traction=along_path(traction),
         cap=coulomb_cap(contact.friction, reaction),
         reaction=reaction,
         force=along_path(force),
     )
-    converged = (path.rough == 0.0) | (reach[-1] < strip.length)  # the other end does not slip
-    start, slips = initial_state(scene), traction > 0.0
+    sticks = slip_length[-1] < strip.length  # at the other end
+    converged = (path.rough == 0.0) | sticks
     state: PathState = jax.tree.map(
-        lambda a: jnp.broadcast_to(a, (converged.size, *a.shape)), start
+        lambda a: jnp.broadcast_to(a, (converged.size, *a.shape)), initial_state(scene)
     )
-    nothing = jnp.zeros_like(level.force)
+    slips, zero = traction > 0.0, jnp.zeros_like(level.force)
     return StepResults(
         state=state._replace(
             level=level, target=path.target, pressure=path.pressure, converged=converged
         ),
         displacement=along_path(displacement),
-        slipping=each_step(jnp.zeros((pressed.size, system.x.size), bool), slips[2::2], slips[1:]),
-        slip_work=each_step(pressed, work[::2] + work[1::2], 2.0 * work),
+        slipping=per_step(jnp.zeros((zeros.size, system.x.size), bool), slips[2::2], slips[1:]),
+        slip_work=per_step(zeros, work[::2] + work[1::2], 2.0 * work),
         stored_energy=jax.vmap(system.stored_energy)(level, path.pressure),
-        sinking=nothing,
-        iterations=nothing.astype(int),
-        error=nothing,
+        sinking=zero,
+        iterations=zero.astype(int),
+        error=zero,
         status=jnp.where(converged, Status.CONVERGED, Status.NOT_REACHED),
     )

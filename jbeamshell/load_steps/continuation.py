@@ -16,7 +16,7 @@ from jbeamshell.common.errors import InputError, warn_of_doubts
 from jbeamshell.history.history import History
 from jbeamshell.load_steps.outcome import check_solver, history_of, raise_if_failed
 from jbeamshell.load_steps.path_state import PathState, StepResults
-from jbeamshell.load_steps.recovery import recover
+from jbeamshell.load_steps.recovery import recover, rows
 from jbeamshell.load_steps.stepping import compiled_march
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.numerics.newton import Newton
@@ -68,27 +68,23 @@ class PathEnd(eqx.Module):
         pressing = scene.load.pressure_steps
         further = further_path(scene, float(self.state.target), path)
         # A single step would be compiled without a loop and rounded differently.
-        count, least = further.target.size, max(further.target.size, 2)
-        walked: LoadPath = jax.tree.map(
-            lambda a: np.pad(a, (0, least - count), mode="edge"), further
-        )
-        steps = compiled_march(scene, self.state, walked, solver)
+        count = further.target.size
+        padding = 0, max(2 - count, 0)
+        padded: LoadPath = jax.tree.map(lambda a: np.pad(a, padding, mode="edge"), further)
+        steps = compiled_march(scene, self.state, padded, solver)
         if not np.asarray(steps.state.converged)[count - 1]:
-            steps = recover(scene, steps, walked, solver, self.state)
+            steps = recover(scene, steps, padded, solver, self.state)
             if throw:
-                part = jax.tree.map(lambda a: a[:count], steps)
-                raise_if_failed(scene, part, further, history.force.size)
-        added = jax.tree.map(
-            lambda a: a[:count], _steps_of(history_of(scene, steps, walked.pressure))
-        )
-        joined = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), _steps_of(history), added)
-        end = jax.tree.map(lambda a: a[count - 1], steps.state)
-        known = np.append(0.0, np.asarray(joined["target"])[pressing:])
+                raise_if_failed(scene, rows(steps, np.s_[:count]), further, history.force.size)
+        tail = rows(_steps_of(history_of(scene, steps, padded.pressure)), np.s_[:count])
+        columns = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), _steps_of(history), tail)
+        targets = np.append(0.0, np.asarray(columns["target"])[pressing:])
         cycles = tuple(
             (a + pressing - 1, b + pressing - 1, c + pressing - 1)
-            for a, b, c in closed_cycles(known)
+            for a, b, c in closed_cycles(targets)
         )
-        result = dataclasses.replace(history, **joined, end=PathEnd(end), cycles=cycles)
+        end = PathEnd(rows(steps.state, count - 1))
+        result = dataclasses.replace(history, **columns, end=end, cycles=cycles)
         if throw:
             warn_of_doubts(result.doubts, stacklevel=3)
         return result
@@ -97,14 +93,14 @@ class PathEnd(eqx.Module):
 def further_path(scene: Scene, last: float, path: ArrayLike | None) -> LoadPath:
     """Loads that follow the last one; None is the scene's own cycles once more."""
     whole, _ = check(scene, path)
-    begun, half = scene.load.pressure_steps, scene.plan.steps
+    first = scene.load.pressure_steps
     if path is None:
         amplitude = float(scene.load.amplitude)
         require("path", None, scene.load.cycles > 0, "the scene has no cycles: give the loads")
         fix = f"the last load is {last:.6g}, not load.amplitude = {amplitude:.6g}: give the loads"
         require("path", None, last == amplitude, fix)
-        begun += max(half // 2, 1)
-    further: LoadPath = jax.tree.map(lambda column: np.asarray(column)[begun:], whole)
+        first += max(scene.plan.steps // 2, 1)
+    further: LoadPath = jax.tree.map(lambda column: np.asarray(column)[first:], whole)
     return further
 
 
@@ -112,8 +108,7 @@ def with_end(history: History, steps: StepResults) -> History:
     """History with the end of its path, if that was walked step by step."""
     if history.scene.plan.engine != STEPS:
         return history
-    last = jax.tree.map(lambda a: a[-1], steps.state)
-    return dataclasses.replace(history, end=PathEnd(last))
+    return dataclasses.replace(history, end=PathEnd(rows(steps.state, -1)))
 
 
 def _steps_of(history: History) -> dict[str, Any]:

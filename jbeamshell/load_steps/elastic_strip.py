@@ -180,17 +180,17 @@ class ElasticStrip(eqx.Module):
         return jax.grad(self.potential)(q, pressure)
 
     def section_forces(self, q: Array) -> Strains:
-        """Mean N, Q, M, chi and xi of every element, (elements,) each."""
+        """Mean N, Q, M, chi and xi of every element, (elements,) local."""
         strains = self._strains(q)
         if self.section is None:
-            each = jax.vmap(jax.vmap(lambda s: forces(self.energy, s)))(strains)
+            local = jax.vmap(jax.vmap(lambda s: forces(self.energy, s)))(strains)
         else:
-            each = jax.vmap(jax.vmap(self.section.forces))(*self._fields_and_slopes(q))
+            local = jax.vmap(jax.vmap(self.section.forces))(*self._fields_and_slopes(q))
         if self.plan.section == "assumed":
             stretch = 2.0 * self.half_height * jnp.asarray(self.youngs_modulus)
-            each = each._replace(psi=stretch * strains.psi)
+            local = local._replace(psi=stretch * strains.psi)
         weights = self.element_rule.weights
-        return jax.tree.map(lambda f: jnp.sum(weights[:, None] * f, axis=0), each)
+        return jax.tree.map(lambda f: jnp.sum(weights[:, None] * f, axis=0), local)
 
     def _fields_and_slopes(self, q: Array) -> tuple[list[Array], list[Array]]:
         """Fields and their slopes at all points of all elements, (points, elements) each."""
@@ -207,17 +207,17 @@ class ElasticStrip(eqx.Module):
         section = [at(shape, values) for shape, values in zip(shapes, nodal, strict=True)]
         slope = [at(rule.slopes, values) / self.lengths for values in nodal]
         if self.curvature is not None:
-            inside = rule.values @ rule.nodes
-            angle = self._initial_angle(self._element_starts + inside[:, None] * self.lengths)
+            points = rule.values @ rule.nodes
+            angle = self._initial_angle(self._element_starts + points[:, None] * self.lengths)
             slope[V], slope[W] = rotated(slope[V], slope[W], angle)
         return section, slope
 
     def _strains(self, q: Array) -> Strains:
         """Strains of the beamshell at all points of all elements, (points, elements) each."""
         section, slope = self._fields_and_slopes(q)
-        straight = slice(len(FIELDS))
+        shell = slice(len(FIELDS))
         strains = self._kinematics.strains(
-            section[straight], slope[straight], self.half_height, self.curvature
+            section[shell], slope[shell], self.half_height, self.curvature
         )
         if self.section is not None or self.element_order > 1:
             return strains

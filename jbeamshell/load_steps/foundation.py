@@ -13,7 +13,7 @@ from jbeamshell.mechanics.normal_contact import Absent, Compliance, NormalLaw, R
 from jbeamshell.scene.scene import Scene
 
 CAP_FLOOR = 1e-6  # smallest cap over mu F_N: gradients need a cap that is not zero
-# Range over which a compliant contact closes, over its approach under the mean pressure.
+# Range in which a compliant contact closes, a part of its approach under the mean pressure.
 CLOSING_RANGE = 0.05
 
 
@@ -100,10 +100,10 @@ class Foundation(eqx.Module):
         old, new : (n,) increments of slip of the last and of the next iterate
         traction_before, cap : (n,) traction and cap at the start of the step
         """
-        limited = jax.vmap(self.friction_law.limit)(
+        slip = jax.vmap(self.friction_law.limit)(
             old, new, traction_before, cap, self.slip_stiffness
         )
-        return jnp.where(self.has_friction(cap), limited, new)
+        return jnp.where(self.has_friction(cap), slip, new)
 
     def slip_work(
         self, slip: Array, tractions: tuple[Array, Array], caps: tuple[Array, Array]

@@ -94,12 +94,10 @@ class StepEquations(NamedTuple):
 
     def limit(self, old: Array, new: Array) -> Array:
         """Next iterate with its slips limited by the friction law."""
-        before, slips = self.before, (nodal(self.system, unknown)[:, V] for unknown in (old, new))
-        slip_before, slip = slips
-        limited = self.system.foundation.limited_slip(
-            slip_before, slip, before.traction, before.cap
-        )
-        return with_v(self.system, new, jnp.where(self.prescribed.rough > 0.0, limited, slip))
+        system, before = self.system, self.before
+        old_slip, new_slip = (nodal(system, unknown)[:, V] for unknown in (old, new))
+        slip = system.foundation.limited_slip(old_slip, new_slip, before.traction, before.cap)
+        return with_v(system, new, jnp.where(self.prescribed.rough > 0.0, slip, new_slip))
 
     def _advance(self, system: System, unknown: Array) -> tuple[LoadLevel, Array, ContactInput]:
         return system.advance(nodal(system, unknown), self.before, self.prescribed)
@@ -129,9 +127,9 @@ def newton_step(
     )
     after, *_ = system.advance(nodal(system, change), before, prescribed)
     converged = state.converged & (error <= solver.tolerance_for(system.x.dtype))
-    end = system.end_displacement(after.q)
-    origin = jnp.where(to.rough > 0.0, state.origin, end)
-    new = PathState(
+    u = system.end_displacement(after.q)
+    origin = jnp.where(to.rough > 0.0, state.origin, u)
+    end = PathState(
         level=jax.tree.map(lambda new, old: jnp.where(converged, new, old), after, before),
         origin=origin,
         target=to.target,
@@ -141,9 +139,9 @@ def newton_step(
         direction=_direction(system, state, before, after, origin),
         converged=converged,
     )
-    return new, StepResults(
-        state=new,
-        displacement=end - origin,
+    return end, StepResults(
+        state=end,
+        displacement=u - origin,
         slipping=slipping_nodes(system, before, after, to.rough),
         slip_work=to.rough * system.slip_work(before, after),
         stored_energy=system.stored_energy(after, to.pressure),
@@ -160,9 +158,9 @@ def guess_from_bar(
     """Guess that takes those nodes to their caps which would slip in a bar."""
     level = state.level
     reversal = last_reversal(system, state, to)
-    slips = first_to_slip(system, reversal, to.target)
-    beyond = (2.0 * level.cap - slips * level.traction) / system.foundation.slip_stiffness
-    slip = slips * jnp.maximum(beyond, 0.0)
+    direction = first_to_slip(system, reversal, to.target)
+    size = (2.0 * level.cap - direction * level.traction) / system.foundation.slip_stiffness
+    slip = direction * jnp.maximum(size, 0.0)
     fields = jnp.zeros_like(level.q).at[:, V].set(slip)[:, list(system.plan.active)]
     bar = in_blocks(fields, state.change)
     change = lax.stop_gradient(jnp.where(to.rough > 0.0, bar, state.change))
@@ -181,8 +179,8 @@ def _prescribed(system: System, state: PathState, to: LoadPath, reversal: Revers
     travel = to.target - state.target
     diagonal = jnp.where(travel >= 0.0, EQUAL, -EQUAL)
     direction = jnp.where(reversal.target == state.target, diagonal, state.direction)
-    reached = jnp.sum(direction * _path_point(system, state.level, state.origin))
-    controlled = jnp.where(to.rough > 0.0, reached + jnp.abs(travel), 0.0)
+    arc = jnp.sum(direction * _path_point(system, state.level, state.origin))
+    controlled = jnp.where(to.rough > 0.0, arc + jnp.abs(travel), 0.0)
     return prescribed._replace(controlled=controlled, weights=direction)
 
 

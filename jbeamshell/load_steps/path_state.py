@@ -69,9 +69,9 @@ def initial_state(scene: Scene, touching: ArrayLike | None = None) -> PathState:
     system, fields = System(scene), scene.plan.fields
     change, zero = zero_unknowns(system), jnp.zeros_like(system.x)
     if touching is not None:
-        raised = jnp.where(jnp.asarray(touching), 0.0, scene.strip.half_height)
-        lifted = jnp.zeros((zero.size, len(system.plan.active)), zero.dtype)
-        change = in_blocks(lifted.at[:, fields.index("w")].set(raised), change)
+        lift = jnp.where(jnp.asarray(touching), 0.0, scene.strip.half_height)
+        active = jnp.zeros((zero.size, len(system.plan.active)), zero.dtype)
+        change = in_blocks(active.at[:, fields.index("w")].set(lift), change)
     return PathState(
         level=system.unloaded(),
         origin=zero[0],

@@ -42,7 +42,7 @@ def last_reversal(system: System, state: Any, to: Any) -> Reversal:
     to : target, pressure and roughness of the step
     """
     before, travel, rough = state.level, to.target - state.target, to.rough > 0.0
-    along = jnp.where(travel >= 0.0, 1.0, -1.0)
+    direction = jnp.where(travel >= 0.0, 1.0, -1.0)
     # The end load's part of the cap changes sign with the load.
     mean = (
         system.foundation.friction
@@ -50,14 +50,14 @@ def last_reversal(system: System, state: Any, to: Any) -> Reversal:
         * (system.load - system.bottom_load)
         / system.tributary
     )
-    left = jnp.maximum(2.0 * mean - before.cap - along * before.traction, 0.0)
-    share = left * system.tributary
-    used = jnp.cumsum(share[::-1], axis=0)[::-1] - 0.5 * share
-    away = (system.x[-1] - system.x) / (REACH * system.half_height)
-    corner = CORNER * system.half_height * (1.0 - jnp.exp(-away))
-    now = Reversal(state.target, used + corner * left, left[-1])
-    back = rough & (travel * (state.target - state.reversal.target) <= 0.0)
-    return jax.tree.map(lambda new, old: jnp.where(back, new, old), now, state.reversal)
+    room = jnp.maximum(2.0 * mean - before.cap - direction * before.traction, 0.0)
+    share = room * system.tributary
+    depth = jnp.cumsum(share[::-1], axis=0)[::-1] - 0.5 * share
+    distance = (system.x[-1] - system.x) / (REACH * system.half_height)
+    corner = CORNER * system.half_height * (1.0 - jnp.exp(-distance))
+    reversal = Reversal(state.target, depth + corner * room, room[-1])
+    turns = rough & (travel * (state.target - state.reversal.target) <= 0.0)
+    return jax.tree.map(lambda new, old: jnp.where(turns, new, old), reversal, state.reversal)
 
 
 def first_to_slip(system: System, reversal: Reversal, target: Array) -> Array:
@@ -67,7 +67,7 @@ def first_to_slip(system: System, reversal: Reversal, target: Array) -> Array:
     the friction that was left.
     """
     rise = target - reversal.target
-    along, load = jnp.where(rise >= 0.0, 1.0, -1.0), jnp.abs(rise)
+    direction, load = jnp.where(rise >= 0.0, 1.0, -1.0), jnp.abs(rise)
     if system.control != "force":  # by the bar's u = F^2/(2 E' 2H q)
         stretch = system.stiffness_scale * jnp.sum(system.tributary, axis=0)
         square = 2.0 * stretch * reversal.left
@@ -76,4 +76,4 @@ def first_to_slip(system: System, reversal: Reversal, target: Array) -> Array:
             soft = (square / system.stiffness_scale) ** 2 / 2.0
             load = load**2 / (soft + jnp.hypot(soft, load) + jnp.finfo(load.dtype).tiny)
         load = jnp.sqrt(load)
-    return along * (reversal.depth < load)
+    return direction * (reversal.depth < load)

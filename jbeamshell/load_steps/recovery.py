@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -34,28 +36,26 @@ def recover(
     count = path.target.size
     while not _converged(steps):
         first = int(np.argmin(np.asarray(steps.state.converged)))
-        last = jax.tree.map(lambda a: a[first - 1], steps.state) if first else start  # noqa: B023
-        pieces = _walk_in_pieces(scene, last, jax.tree.map(lambda a: a[first], path), solver)  # noqa: B023
+        before = rows(steps.state, first - 1) if first else start
+        pieces = _walk_in_pieces(scene, before, rows(path, first), solver)
         if pieces is None:
             return steps
-        joined = jax.tree.map(lambda a: a[-1], pieces)._replace(
+        step = rows(pieces, -1)._replace(
             slip_work=jnp.sum(pieces.slip_work),
             iterations=steps.iterations[first] + jnp.sum(pieces.iterations),
             slipping=jnp.any(pieces.slipping, axis=0),
         )
         # The path's end is repeated: with the shapes of the first march nothing compiles again.
-        further = jnp.minimum(jnp.arange(count) + first + 1, count - 1)
-        onward = jax.tree.map(lambda a: a[further], path)  # noqa: B023
-        tail = compiled_march(scene, joined.state, onward, solver)
-        steps = jax.tree.map(
-            lambda head, piece, end: jnp.concatenate(
-                [head[:first], piece[None], end[: count - first - 1]]  # noqa: B023
-            ),
-            steps,
-            joined,
-            tail,
-        )
+        further = rows(path, jnp.minimum(jnp.arange(count) + first + 1, count - 1))
+        tail = rows(compiled_march(scene, step.state, further, solver), np.s_[: count - first - 1])
+        parts = rows(steps, np.s_[:first]), rows(step, None), tail
+        steps = jax.tree.map(lambda *columns: jnp.concatenate(columns), *parts)
     return steps
+
+
+def rows(tree: Any, index: Any) -> Any:
+    """Rows of a pytree's arrays (steps, ...), by an index of NumPy."""
+    return jax.tree.map(lambda a: a[index], tree)
 
 
 def _walk_in_pieces(

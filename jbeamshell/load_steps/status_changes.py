@@ -32,7 +32,7 @@ def applies(system: System) -> bool:
 
 
 def one_change(
-    system: System, residual: Array, contact: ContactInput, tolerance: float, tried: Array
+    system: System, residual: Array, contact: ContactInput, tolerance: float, iterations: Array
 ) -> tuple[Array, ContactInput, Array]:
     """Residual and tangent's input by which a Newton step changes the status of one node.
 
@@ -42,7 +42,7 @@ def one_change(
     residual : (blocks, size) out-of-balance forces
     contact : input of the foundation
     tolerance : residual up to which a node need not change
-    tried : number of iterations so far
+    iterations : number of iterations so far
 
     Returns
     -------
@@ -56,14 +56,15 @@ def one_change(
     changing = jax.vmap(law.changes_status)(pressed, gap)
     must = changing & (-forces[:, column] > tolerance)
     node = jnp.arange(must.size)
-    forwards = lax.rem(lax.div(tried, TURN), 2) == 0  # `//` and `%` would care for negative ones
+    # `//` and `%` would care for negative numbers.
+    forwards = lax.rem(lax.div(iterations, TURN), 2) == 0
     order = jnp.where(forwards, node, -node)
-    kept = changing & (order != jnp.max(order, where=must, initial=-must.size))
-    force, far, other = jax.vmap(law.kept_status)(pressed, gap)
-    other = other * system.tributary * system.residual_scale(W)
-    forces = forces.at[:, column].set(jnp.where(kept, other, forces[:, column]))
-    held = contact._replace(
-        lift_force=jnp.where(kept, force * system.tributary, contact.lift_force),
-        w=jnp.where(kept, contact.w + far - gap, contact.w),
+    keeps = changing & (order != jnp.max(order, where=must, initial=-must.size))
+    old_force, old_gap, old_residual = jax.vmap(law.kept_status)(pressed, gap)
+    old_residual = old_residual * system.tributary * system.residual_scale(W)
+    forces = forces.at[:, column].set(jnp.where(keeps, old_residual, forces[:, column]))
+    contact = contact._replace(
+        lift_force=jnp.where(keeps, old_force * system.tributary, contact.lift_force),
+        w=jnp.where(keeps, contact.w + old_gap - gap, contact.w),
     )
-    return in_blocks(forces, residual), held, jnp.any(must)
+    return in_blocks(forces, residual), contact, jnp.any(must)

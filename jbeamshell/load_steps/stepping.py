@@ -37,8 +37,8 @@ def march(
     solver : settings of Newton's method
     native : True compiles the loop over the steps to one native function, see `one_call`
     """
-    called = one_call if native else _call
-    steps: StepResults = called(_steps, System(scene), start, path, solver)
+    call = one_call if native else _call
+    steps: StepResults = call(_steps, System(scene), start, path, solver)
     return steps
 
 
@@ -62,8 +62,8 @@ def fits_native(scene: Scene) -> bool:
     return size <= block_tridiagonal.SMALL and probes <= LARGEST_SUM
 
 
-def _call(function: Callable[..., Any], *given: Any) -> Any:
-    return function(*given)
+def _call(function: Callable[..., Any], *arguments: Any) -> Any:
+    return function(*arguments)
 
 
 def _steps(system: System, start: PathState, path: LoadPath, solver: Newton) -> StepResults:

@@ -231,10 +231,10 @@ class System(ElasticStrip):
         """Replace the balance of the fields held at both ends by their support conditions."""
 
         def held(supports: dict[tuple[int, int], Array]) -> Array:
-            found = forces
+            balance = forces
             for place, scale in supports.items():
-                found = found.at[place].set(scale * q[place])
-            return found
+                balance = balance.at[place].set(scale * q[place])
+            return balance
 
         with_friction, without = self.supports(True), self.supports(False)
         if with_friction.keys() == without.keys():
@@ -247,25 +247,25 @@ class System(ElasticStrip):
         Without friction something must hold v at X = 0: a free end is held too until friction acts.
         """
         names = FAR_ENDS[self.far_end]
-        held = {}
+        scales = {}
         if not self.foundation.present:
-            held[0, W] = self.stiffness_scale
+            scales[0, W] = self.stiffness_scale
         if "v" in names or not rough:
-            held[0, V] = self.stiffness_scale
+            scales[0, V] = self.stiffness_scale
         turning = self.stiffness_scale * self.half_height**2
         ends = [0] if "beta" in names else []
         if self.entry == "guided":
             ends.append(LAST)
-        held |= {(node, BETA): turning for node in ends}
+        scales |= {(node, BETA): turning for node in ends}
         # A section of order p also has displacements along X beyond its rotation.
-        further = range(len(FIELDS), self.plan.width, 2)
+        higher = range(len(FIELDS), self.plan.width, 2)
         ends += [LAST] if self.entry == "face" else []
-        return held | {(node, field): self.stiffness_scale for node in ends for field in further}
+        return scales | {(node, field): self.stiffness_scale for node in ends for field in higher}
 
     def end_displacement(self, q: Array) -> Array:
         """Displacement u(L) of the loaded end, the conjugate of F; see `ElasticStrip`."""
-        held = [field for node, field in self.supports(True) if node == LAST]
-        return super().end_displacement(q.at[LAST, held].set(0.0) if held else q)
+        fields = [field for node, field in self.supports(True) if node == LAST]
+        return super().end_displacement(q.at[LAST, fields].set(0.0) if fields else q)
 
     def residual_scale(self, field: int) -> Array:
         """Residual per force, or per moment, in a field's balance."""

@@ -95,10 +95,10 @@ def stiffness_at(
 ) -> Stiffness:
     """Stiffness at fields q (n, m) under the foundation's response."""
     like, block = zero_unknowns(system), block_of_node(system)
-    padded = like.shape[0] * system.element_order - system.x.size
+    missing = like.shape[0] * system.element_order - system.x.size
 
     def blocked(active: Array) -> Array:  # (..., n, active) to (..., size, blocks)
-        padding = [(0, 0)] * (active.ndim - 2) + [(padded, 0), (0, 0)]
+        padding = [(0, 0)] * (active.ndim - 2) + [(missing, 0), (0, 0)]
         rows = jnp.pad(active, padding).reshape(*active.shape[:-2], *like.shape)
         return jnp.swapaxes(rows, -1, -2)
 
@@ -117,22 +117,24 @@ def stiffness_at(
     filling = np.arange(like.size - system.x.size * len(system.plan.active))
     if filling.size:
         entries = entries.at[1, filling, filling, 0].set(1.0)
-    one = jnp.ones_like(system.x)
+    ones = jnp.ones_like(system.x)
     per_response = {
-        name: blocked(residual(zero, zero, no_response._replace(**{name: one})))
+        name: blocked(residual(zero, zero, no_response._replace(**{name: ones})))
         for name in ContactResponse._fields
         if system.enters_residual(name)
     }
-    # There is no block before the first one, and none after the last one.
-    first, last = block == 0, block == block[-1]
-
-    def inside(part: Array, first: Any = first, last: Any = last) -> Array:
-        return part.at[0, ..., first].set(0.0).at[2, ..., last].set(0.0)
-
     contact = ContactInput(along[..., W], fields[..., V], fields[..., W])
+    end_nodes = block == 0, block == block[-1]
     return Stiffness(
-        inside(entries, 0, -1), ContactInput(*(inside(part) for part in contact)), per_response
+        _inside(entries, 0, -1),
+        ContactInput(*(_inside(a, *end_nodes) for a in contact)),
+        per_response,
     )
+
+
+def _inside(part: Array, first: Any, last: Any) -> Array:
+    """Part of a `Stiffness` without the blocks before the first one and after the last one."""
+    return part.at[0, ..., first].set(0.0).at[2, ..., last].set(0.0)
 
 
 def _probes(system: System, like: Array) -> np.ndarray:
@@ -175,6 +177,7 @@ def _in_rows(system: System, response: Array) -> Array:
     order, active = system.element_order, len(system.plan.active)
     if order == 1:
         return response[..., None, :, :]
-    filled = jnp.pad(response, [(0, 0)] * (response.ndim - 1) + [(-response.shape[-1] % order, 0)])
-    nodes = jnp.moveaxis(filled.reshape(*response.shape[:-1], -1, order), -1, -3)
+    padding = [(0, 0)] * (response.ndim - 1) + [(-response.shape[-1] % order, 0)]
+    response = jnp.pad(response, padding)
+    nodes = jnp.moveaxis(response.reshape(*response.shape[:-1], -1, order), -1, -3)
     return jnp.repeat(nodes, active, axis=-3)
