@@ -7,7 +7,7 @@ a lap joint, and a whole single lap, whose eccentric load bends it.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -71,25 +71,23 @@ def weakest_column(scene: Parts, numbers: Numbers | None = None) -> Column:
         return none
     bending, shear = _stiffnesses(scene, numbers)
     amplitude = pull(load, numbers("load.amplitude"))
-    held = "clamped" if "beta" in FAR_ENDS[scene.strip.far_end] else scene.strip.far_end
+    support = "clamped" if "beta" in FAR_ENDS[scene.strip.far_end] else scene.strip.far_end
     for start, stop in parts:
         begin, end = np.clip(start, 0.0, length), np.clip(stop, 0.0, length)
         overhangs = end == length
-        if start == -np.inf and held == "free":
+        if start == -np.inf and support == "free":
             continue  # nothing takes a compression
-        far = HINGED if start == -np.inf and held != "clamped" else CLAMPED
-        run = np.where(end > begin, end - begin, np.nan)
-        euler = np.where(overhangs, OVERHANG, far) * np.pi**2 * bending / run**2
-        limit = np.where(end > begin, 1.0 / (1.0 / euler + 1.0 / shear), np.inf)
-        held_back = numbers("contact.friction") * _pressed_beyond(scene.contact, stop, length)
-        force = np.maximum(amplitude - held_back, 0.0)
+        far = HINGED if start == -np.inf and support != "clamped" else CLAMPED
+        limit = _euler_load(np.where(overhangs, OVERHANG, far), begin, end, bending, shear)
+        friction = numbers("contact.friction") * _pressed_beyond(scene.contact, stop, length)
+        force = np.maximum(amplitude - friction, 0.0)
         if load.control != "force":
             force = amplitude * stretching(scene.strip, numbers) / (length - begin)
         columns.append(Column(*np.broadcast_arrays(begin, end, force, limit)))
     weakest = none
-    for found in columns:
-        nearer = found.force / found.limit > weakest.force / weakest.limit
-        weakest = Column(*(np.where(nearer, a, b) for a, b in zip(found, weakest, strict=True)))
+    for column in columns:
+        nearer = column.force / column.limit > weakest.force / weakest.limit
+        weakest = Column(*(np.where(nearer, a, b) for a, b in zip(column, weakest, strict=True)))
     return weakest
 
 
@@ -115,28 +113,35 @@ def _columns_of_joint(scene: Parts, numbers: Numbers) -> list[Column]:
     if member.support == "none" and strip.overhang is None:
         return []
     length = numbers("strip.length")
-    none = np.zeros(())
-    far = none if member.overhang is None else numbers("member.overhang")
-    beyond = none if strip.overhang is None else numbers("strip.overhang")
+    zero = np.zeros(())
+    far_overhang = zero if member.overhang is None else numbers("member.overhang")
+    overhang = zero if strip.overhang is None else numbers("strip.overhang")
     factor = OVERHANG if member.loaded_end == "free" else HINGED
     upper, lower = (_stiffnesses(scene, numbers, second) for second in (False, True))
     along = stretching(strip, numbers)
     Span = tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]
-    spans: list[Span] = [(length, length + beyond, upper)]
+    spans: list[Span] = [(length, length + overhang, upper)]
     if member.support == "clamped":
-        spans += [(-far, 0.0 * length, lower)]
+        spans += [(-far_overhang, 0.0 * length, lower)]
         weaker = np.minimum(upper[0], lower[0]), np.minimum(upper[1], lower[1])
-        spans += [(-far, length + beyond, weaker)]
-    found = []
+        spans += [(-far_overhang, length + overhang, weaker)]
+    columns = []
     for begin, end, (bending, shear) in spans:
-        run = np.where(end > begin, end - begin, np.nan)
-        euler = factor * np.pi**2 * bending / run**2
-        limit = np.where(end > begin, 1.0 / (1.0 / euler + 1.0 / shear), np.inf)
+        limit = _euler_load(factor, begin, end, bending, shear)
         force = pull(load, numbers("load.amplitude"))
         if load.control != "force":
             force = force * along / length
-        found.append(Column(*np.broadcast_arrays(begin, end, force, limit)))
-    return found
+        columns.append(Column(*np.broadcast_arrays(begin, end, force, limit)))
+    return columns
+
+
+def _euler_load(
+    factor: Any, begin: np.ndarray, end: np.ndarray, bending: np.ndarray, shear: np.ndarray
+) -> np.ndarray:
+    """Load of Euler and Engesser of a part from begin to end; infinite where there is none."""
+    run = np.where(end > begin, end - begin, np.nan)
+    euler = factor * np.pi**2 * bending / run**2
+    return np.where(end > begin, 1.0 / (1.0 / euler + 1.0 / shear), np.inf)
 
 
 def unpressed_parts(contact: Contact) -> list[tuple[float, float]]:
@@ -149,10 +154,10 @@ def unpressed_parts(contact: Contact) -> list[tuple[float, float]]:
         return []
     edges = np.unique(np.concatenate(rows))
     reach = max(float(edges[-1] - edges[0]), 1.0)
-    inner = np.concatenate([[edges[0] - reach], edges, [edges[-1] + reach]])
-    at = [inner[:-1] + part * np.diff(inner) for part in (0.25, 0.75)]
+    knots = np.concatenate([[edges[0] - reach], edges, [edges[-1] + reach]])
+    points = [knots[:-1] + part * np.diff(knots) for part in (0.25, 0.75)]
     down, up = (
-        [np.interp(x, *f.T) if is_table(f) else np.full(x.size, np.max(f)) for x in at]
+        [np.interp(x, *f.T) if is_table(f) else np.full(x.size, np.max(f)) for x in points]
         for f in faces
     )
     free = (down[0] <= up[0]) & (down[1] <= up[1])

@@ -62,12 +62,12 @@ class Dimensions(NamedTuple):
     notes: tuple[str, ...]
 
 
-def dimensions_of(given: Mapping[str, Any]) -> Dimensions:
+def dimensions_of(texts: Mapping[str, Any]) -> Dimensions:
     """Dimensions from texts with units; what is left out is not known.
 
     Parameters
     ----------
-    given : texts by name, one of `DIMENSIONS`: length, thickness, width, modulus, poisson (a
+    texts : texts by name, one of `DIMENSIONS`: length, thickness, width, modulus, poisson (a
         number), pressure or bolts, head
 
     Raises
@@ -78,22 +78,22 @@ def dimensions_of(given: Mapping[str, Any]) -> Dimensions:
 
     Examples
     --------
-    >>> known = dimensions_of({"length": "120 mm", "thickness": "12 mm", "modulus": "210 GPa"})
-    >>> known.values["strip.half_height"], known.values["strip.youngs_modulus"]
+    >>> steel = dimensions_of({"length": "120 mm", "thickness": "12 mm", "modulus": "210 GPa"})
+    >>> steel.values["strip.half_height"], steel.values["strip.youngs_modulus"]
     (0.006, 210000000000.0)
     """
-    for name in given:
+    for name in texts:
         if name not in DIMENSIONS:
             raise InputError(f"{name!r}: is no dimension; known are {', '.join(DIMENSIONS)}")
-    sizes = {name: _size(name, text) for name, text in given.items() if name != "bolts"}
+    sizes = {name: _size(name, text) for name, text in texts.items() if name != "bolts"}
     values: dict[str, Any] = {KEYS[name]: sizes[name] for name in KEYS if name in sizes}
     if "thickness" in sizes:
         values["strip.half_height"] = 0.5 * sizes["thickness"]
     notes: tuple[str, ...] = ()
-    if "bolts" in given:
-        values["contact.pressure"], notes = _bolted(given["bolts"], sizes)
-    elif "head" in given:
-        raise InputError(f"head = {given['head']!r}: belongs to bolts: give bolts, or leave it out")
+    if "bolts" in texts:
+        values["contact.pressure"], notes = _bolted(texts["bolts"], sizes)
+    elif "head" in texts:
+        raise InputError(f"head = {texts['head']!r}: belongs to bolts: give bolts, or leave it out")
     return Dimensions(values, sizes.get("width"), notes)
 
 
@@ -112,16 +112,16 @@ def quantity(name: str, text: Any, unit: str, example: str) -> float:
     InputError
         if it is no positive number, or if its unit is missing or of another kind
     """
-    found = QUANTITY.fullmatch(text) if isinstance(text, str) else None
-    if found is None or found[2] is None:
-        number = found is not None or (isinstance(text, int | float) and not isinstance(text, bool))
+    match = QUANTITY.fullmatch(text) if isinstance(text, str) else None
+    if match is None or match[2] is None:
+        number = match is not None or (isinstance(text, int | float) and not isinstance(text, bool))
         fix = "names no unit" if number else "is no number with a unit"
         raise InputError(f"{name} = {shown(text)}: {fix}: write one, such as {example}")
-    factor = factor_of(found[2], (unit,))
+    factor = factor_of(match[2], (unit,))
     if factor is None:
-        fix = f"{found[2][:20]!r} is no unit that {unit} measures: write {example}"
+        fix = f"{match[2][:20]!r} is no unit that {unit} measures: write {example}"
         raise InputError(f"{name} = {text!r}: {fix}")
-    value = float(found[1]) * factor
+    value = float(match[1]) * factor
     require(name, text, 0.0 < value < math.inf, "must be positive")
     return value
 
@@ -164,14 +164,14 @@ def _bolted(text: Any, sizes: Mapping[str, float]) -> tuple[list[list[float]], t
 def _bolts(text: Any) -> tuple[float, list[float]]:
     """Preload [N] and positions [m] of some bolts alike."""
     example = DIMENSIONS["bolts"].example
-    found = KIND.fullmatch(text) if isinstance(text, str) else None
-    if found is None:
+    match = KIND.fullmatch(text) if isinstance(text, str) else None
+    if match is None:
         raise InputError(f"bolts = {shown(text)}: write number, preload and positions: {example}")
-    force = quantity("bolts: preload", found[2].strip(), "N", "8kN")
+    force = quantity("bolts: preload", match[2].strip(), "N", "8kN")
     places = [
-        quantity("bolts: position", place.strip(), "m", "30mm") for place in found[3].split(",")
+        quantity("bolts: position", place.strip(), "m", "30mm") for place in match[3].split(",")
     ]
-    count = len(places) if found[1] is None else int(found[1])
+    count = len(places) if match[1] is None else int(match[1])
     fix = f"{count} bolts have {len(places)} positions: give one position for each"
     require("bolts", text, count == len(places), fix)
     return force, places
@@ -187,13 +187,13 @@ def _usual_head(kind: str, force: float) -> float:
 def _table(patches: list[tuple[float, float, float]], length: float) -> list[list[float]]:
     """Rows [X, p] of the sum of even pressures p between low and high."""
     ends = sorted({0.0, length, *(end for low, high, _ in patches for end in (low, high))})
-    kept = [0.0]
+    edges = [0.0]
     for end in ends[1:]:
-        if end - kept[-1] > ROUNDING * length:
-            kept.append(end)
-    kept[-1] = length
+        if end - edges[-1] > ROUNDING * length:
+            edges.append(end)
+    edges[-1] = length
     rows = []
-    for start, stop in itertools.pairwise(kept):
+    for start, stop in itertools.pairwise(edges):
         middle = 0.5 * (start + stop)
         pressure = float(np.sum([p for low, high, p in patches if low < middle < high]))
         rows += [[start, pressure], [stop, pressure]]

@@ -61,10 +61,10 @@ def support_rules(
     """
     length, friction = numbers("strip.length"), numbers("contact.friction")
     top, bottom = numbers("contact.pressure"), numbers("contact.bottom_pressure")
-    held = FAR_ENDS[strip.far_end]
-    down, _ = face_resultant(top, length)
+    held_fields = FAR_ENDS[strip.far_end]
+    top_force, _ = face_resultant(top, length)
     force, moment = resultant(top, bottom, length, member.support)
-    rough = (friction > 0.0) | ("v" in held)
+    rough = (friction > 0.0) | ("v" in held_fields)
     fix = "nothing holds the strip along X (rigid-body motion): give strip.far_end or friction"
     rules = [Rule("contact.friction", friction, rough, fix)]
     if plan.engine == CLOSED:
@@ -73,19 +73,21 @@ def support_rules(
     for key, pressure in (("contact.pressure", top), ("contact.bottom_pressure", bottom)):
         if is_table(pressure):
             rules.append(_on_strip(key, pressure[:, 0], length))
-    rules.append(Rule("contact.pressure", top, down > 0.0, "must press somewhere"))
+    rules.append(Rule("contact.pressure", top, top_force > 0.0, "must press somewhere"))
     fix = "overflows together with contact.pressure: take other units"
     rules.append(Rule("strip.length", length, np.isfinite(moment), fix))
     if member.support == "clamped" and load.entry == "member":
-        up, lifting = face_resultant(bottom, length)
-        off = np.maximum(np.abs(down - up), np.abs(moment - lifting) / length)
+        bottom_force, bottom_moment = face_resultant(bottom, length)
+        excess = np.maximum(
+            np.abs(top_force - bottom_force), np.abs(moment - bottom_moment) / length
+        )
         fix = "must balance contact.pressure in a single lap that is pressed before it is mounted: "
         fix += "give both the same, or another load.entry, whose clamp carries the rest"
-        rules.append(Rule("contact.bottom_pressure", bottom, off <= BALANCED * down, fix))
+        rules.append(Rule("contact.bottom_pressure", bottom, excess <= BALANCED * top_force, fix))
     if contact.normal != "none":
         fix = "nothing holds the strip down (rigid-body motion): press more on top"
         rules.append(Rule("contact.bottom_pressure", bottom, force > 0.0, fix))
-        if "beta" not in held and plan.lifts:
+        if "beta" not in held_fields and plan.lifts:
             inside = (moment >= 0.0) & (moment <= force * length)
             fix = "the strip tips over (rigid-body motion): the pressures' resultant misses it"
             rules.append(Rule("contact.bottom_pressure", bottom, inside, fix))
@@ -142,11 +144,11 @@ def bar_rule(load: Load, plan: Plan, numbers: Numbers) -> Rule:
     key, amplitude = "load.amplitude", numbers("load.amplitude")
     if plan.engine != CLOSED or load.control == "force":
         return Rule(key, amplitude, True, "")
-    net = numbers("contact.pressure") - numbers("contact.bottom_pressure")
-    per_length = numbers("contact.friction") * net
+    pressure = numbers("contact.pressure") - numbers("contact.bottom_pressure")
+    per_length = numbers("contact.friction") * pressure
     with jax.ensure_compile_time_eval():
-        slipping = per_length * numbers("strip.length")
-        limit = np.asarray(bar_backbone(slipping, numbers("strip.axial_stiffness"), per_length))
+        gross_slip = per_length * numbers("strip.length")
+        limit = np.asarray(bar_backbone(gross_slip, numbers("strip.axial_stiffness"), per_length))
     fix = f"must stay below the bar's gross slip, {np.max(limit):.6g}; take model.section = shell"
     return Rule(key, amplitude, amplitude < limit, f"{fix} beyond, or jb.solve(..., by='steps')")
 
@@ -154,6 +156,6 @@ def bar_rule(load: Load, plan: Plan, numbers: Numbers) -> Rule:
 def _on_strip(key: str, x: np.ndarray, length: np.ndarray) -> Rule:
     """Rule that the X of a table lie on the strip."""
     end = length * (1.0 + EDGE)
-    off = x[(x < 0.0) | (x > np.max(end))]
+    outliers = x[(x < 0.0) | (x > np.max(end))]
     fix = f"lies off the strip, whose X runs from 0 to {np.max(length):.6g}"
-    return Rule(key, off, (x.min() >= 0.0) & (x.max() <= end), fix)
+    return Rule(key, outliers, (x.min() >= 0.0) & (x.max() <= end), fix)

@@ -83,10 +83,10 @@ def check_joint(scene: Parts) -> None:
     require("model.section", plan.section, plan.order == 0 or plain, fix)
     if member.support != "rolling":
         return
-    below = contact.bottom_pressure
-    none = is_traced(below) or not np.any(pressure_values(np.asarray(below)))
+    bottom = contact.bottom_pressure
+    none = is_traced(bottom) or not np.any(pressure_values(np.asarray(bottom)))
     fix = "must be 0 on a symmetry plane: take member.support = clamped"
-    require("contact.bottom_pressure", below, none, fix)
+    require("contact.bottom_pressure", bottom, none, fix)
     squeezed = plan.section != "shell" or member.loaded_end == "free"
     fix = "leaves no lift to a shell on a symmetry plane: take model.section = squeeze or plane"
     require("member.loaded_end", member.loaded_end, squeezed, fix)
@@ -97,9 +97,9 @@ def _check_section(strip: Strip, member: Member) -> None:
     if member.layers is not None:
         ratio = strip.height_ratio if member.height_ratio is None else member.height_ratio
         check_layers(member.layers, ratio * strip.length, strip.plane, "member.layers")
-    own = [member.axial_stiffness is not None, member.poisson_ratio is not None]
+    numbers = [member.axial_stiffness is not None, member.poisson_ratio is not None]
     fix = "needs member.axial_stiffness and member.poisson_ratio both on a strip with layers"
-    whole = strip.layers is None or member.layers is not None or all(own) or not any(own)
+    whole = strip.layers is None or member.layers is not None or all(numbers) or not any(numbers)
     require("member", "homogeneous", whole, fix)
 
 

@@ -359,8 +359,8 @@ INDIRECT = (
 
 TABLE: dict[str, Key] = {}
 for _part in (StripKeys, ContactKeys, LoadKeys, ModelKeys, MemberKeys):
-    _others = (row for row in INDIRECT if row.name.startswith(f"{_part.heading}."))
-    TABLE |= {row.name: row for row in (*rows(_part).values(), *_others)}
+    _indirect = (row for row in INDIRECT if row.name.startswith(f"{_part.heading}."))
+    TABLE |= {row.name: row for row in (*rows(_part).values(), *_indirect)}
 # Keys that set a field through another number, in the order in which they apply.
 DERIVED = {row.name: row.through for row in INDIRECT if row.through}
 KEYS = tuple(TABLE)
@@ -383,12 +383,12 @@ FORMER |= {f"contact.{name}": f"say member.{name}" for name in _OF_JOINT}
 
 def key_table(section: str = "") -> str:
     """Table as text with key, default, unit and meaning; of one section, or of all."""
-    shown = [key for key in TABLE.values() if key.name.startswith(section)]
+    keys = [key for key in TABLE.values() if key.name.startswith(section)]
     heads = [("key", "default", "unit")]
-    cells = heads + [(key.name, key.shown_default, key.shown_unit) for key in shown]
+    cells = heads + [(key.name, key.shown_default, key.shown_unit) for key in keys]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = []
-    for row, text in zip(cells, ["meaning", *(key.sentence for key in shown)], strict=True):
+    for row, text in zip(cells, ["meaning", *(key.sentence for key in keys)], strict=True):
         begin = "".join(cell.ljust(width + 2) for cell, width in zip(row, widths, strict=True))
         margin = " " * len(begin)
         wrap = textwrap.TextWrapper(WIDTH, begin, margin, break_on_hyphens=False)
@@ -403,8 +403,8 @@ def check_key(key: str) -> None:
     if key in FORMER:
         raise InputError(f"{key}: is no key any more; {FORMER[key]}")
     if key not in TABLE:
-        near = difflib.get_close_matches(key, KEYS, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"keys are {', '.join(KEYS)}"
+        matches = difflib.get_close_matches(key, KEYS, 1)
+        hint = f"did you mean {matches[0]!r}?" if matches else f"keys are {', '.join(KEYS)}"
         raise InputError(f"unknown key {key!r}: {hint}")
 
 

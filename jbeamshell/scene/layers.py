@@ -50,11 +50,11 @@ def check_layers(layers: Any, height: ArrayLike, plane: str, key: str = "strip.l
             raise InputError(f"{key} = {row} (row {place} from the bottom): {fix}")
     if is_traced(height):
         return
-    total, whole = float(table[:, 0].sum()), float(np.asarray(height))
+    total, height = float(table[:, 0].sum()), float(np.asarray(height))
     fix = (
-        f"the thicknesses add up to {total:.9g}, but the height 2H is {whole:.9g}; make them equal"
+        f"the thicknesses add up to {total:.9g}, but the height 2H is {height:.9g}; make them equal"
     )
-    require(key, table, bool(fill_height(total, whole)), fix)
+    require(key, table, bool(fill_height(total, height)), fix)
 
 
 def _rows(layers: Any, key: str) -> np.ndarray:

@@ -187,8 +187,8 @@ def summary(name: str) -> str:
 def _file(name: str) -> Path:
     require("scene", name, isinstance(name, str), "give a name")
     if name not in NAMES:
-        near = difflib.get_close_matches(name, NAMES, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"scenes are {', '.join(NAMES)}"
+        matches = difflib.get_close_matches(name, NAMES, 1)
+        hint = f"did you mean {matches[0]!r}?" if matches else f"scenes are {', '.join(NAMES)}"
         raise InputError(
             f"unknown scene {name!r}: {hint} (`jbeamshell scenes` lists them; a file of your own "
             "ends in .toml)"

@@ -110,9 +110,9 @@ def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> 
         softness = np.asarray(strip.plane_modulus / (2.0 * strip.shear_modulus))
     else:
         softness = 0.5 / shear_modulus(1.0, numbers("strip.poisson_ratio"), strip.plane)
-    pressed = 2.0 * height * pressure / stiffness
+    strain = 2.0 * height * pressure / stiffness
     constants = SECTIONS if elastic else BEAMSHELL
-    return bound(pressed, slip / height, limit / pressure, softness, constants)
+    return bound(strain, slip / height, limit / pressure, softness, constants)
 
 
 def pull(load: Load, amplitude: np.ndarray) -> np.ndarray:

@@ -27,54 +27,54 @@ def check(
     scene: Scene, path: ArrayLike | None = None
 ) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
     """Whole path and its closed cycles (start, turn, end); see `solve` for its `InputError`."""
-    whole, cycles = whole_path(scene, path)
-    if not is_traced(scene, whole):
-        _check_size(scene, whole)
+    loads, cycles = whole_path(scene, path)
+    if not is_traced(scene, loads):
+        _check_size(scene, loads)
         parts = scene.load, scene.member, scene.number
-        gross_slip_rule(*parts, whole.target, whole.pressure).demand()
+        gross_slip_rule(*parts, loads.target, loads.pressure).demand()
         bar_rule(scene.load, scene.plan, scene.number).demand()
-    return whole, cycles
+    return loads, cycles
 
 
 def whole_path(
     scene: Scene, path: ArrayLike | None
 ) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
-    """Path of the pressing and of the given loads or the scene's own, and its closed cycles."""
+    """Path of the pressing and of some loads, None for the scene's, and its closed cycles."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     if path is not None or scene.load.cycles > 0:
         scene.check_entry()
-    pressing, whole_cycles = scene.load.pressure_steps, (scene.load.cycles, scene.plan.steps)
-    known, closed = unit_path(*whole_cycles), functools.partial(_own_cycles, *whole_cycles)
     numbers: Any = jnp if is_traced(scene.load.amplitude, path) else np  # NumPy is faster
     amplitude = numbers.asarray(scene.load.amplitude)
     if path is None:
-        targets = amplitude * known.astype(amplitude.dtype)
+        counts = scene.load.cycles, scene.plan.steps
+        targets = amplitude * unit_path(*counts).astype(amplitude.dtype)
         pressures = np.ones(targets.shape, targets.dtype)
+        cycles = _unit_cycles(*counts)
     else:
         loads = numbers.asarray(as_leaf(path, "path", LOADS), amplitude.dtype)
         shaped = loads.size > 0 and (loads.ndim == 1 or (loads.ndim == 2 and loads.shape[1] == 2))
         require("path", np.shape(path), shaped, LOADS)
         constant = np.ones(loads.shape, loads.dtype)
         targets, pressures = (loads, constant) if loads.ndim == 1 else loads.T
+        cycles = ()
         if not is_traced(loads):
-            known, parts, finite = np.asarray(targets), np.asarray(pressures), np.isfinite(loads)
+            finite = np.isfinite(loads)
             require("path", loads[~finite], bool(np.all(finite)), "must hold finite loads only")
             pulling = pressures < 0.0
             fix = "the part of the pressures that acts must not be negative"
             require("path", np.asarray(pressures)[pulling], not np.any(pulling), fix)
-        else:
-            known = parts = np.zeros(0)
-        closed = functools.partial(_cycles_of, known, parts)
+            cycles = _cycles_of(np.asarray(targets), np.asarray(pressures))
     if is_traced(scene, targets) and scene.load.control == "force":
         targets, numbers = _below_gross_slip(scene, targets, pressures), jnp
-    before = (np.arange(1, pressing + 1) / pressing).astype(amplitude.dtype)
-    whole = LoadPath(
-        numbers.append(np.zeros_like(before), targets),
-        (jnp if is_traced(pressures) else np).append(before, pressures),
-        numbers.append(np.zeros_like(before), numbers.ones_like(targets)),
+    steps = scene.load.pressure_steps
+    pressing = (np.arange(1, steps + 1) / steps).astype(amplitude.dtype)
+    loads = LoadPath(
+        numbers.append(np.zeros_like(pressing), targets),
+        (jnp if is_traced(pressures) else np).append(pressing, pressures),
+        numbers.append(np.zeros_like(pressing), numbers.ones_like(targets)),
     )
-    last = pressing - 1
-    return whole, tuple((a + last, b + last, c + last) for a, b, c in closed())
+    last = steps - 1
+    return loads, tuple((a + last, b + last, c + last) for a, b, c in cycles)
 
 
 def _cycles_of(loads: np.ndarray, parts: np.ndarray) -> tuple[tuple[int, int, int], ...]:
@@ -85,7 +85,7 @@ def _cycles_of(loads: np.ndarray, parts: np.ndarray) -> tuple[tuple[int, int, in
 
 
 @functools.cache
-def _own_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
+def _unit_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
     """Closed cycles of a scene's own path."""
     loads = unit_path(cycles, steps)
     return _cycles_of(loads, np.ones_like(loads))
@@ -94,8 +94,8 @@ def _own_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
 def _below_gross_slip(scene: Scene, targets: Array, pressures: Array | np.ndarray) -> Array:
     """Forces of a traced path, NaN from gross slip on, where no step finds an equilibrium."""
     contact, member = scene.contact, scene.member
-    given = contact.pressure, contact.bottom_pressure, scene.strip.length
-    force, _ = resultant(*given, member.support)
+    faces = contact.pressure, contact.bottom_pressure
+    force, _ = resultant(*faces, scene.strip.length, member.support)
     if member.bolt_stiffness is not None or scene.load.kind == "moment":  # nothing slides off
         return targets
     below = stays_below(jnp.abs(targets), contact.friction * force, pressures)

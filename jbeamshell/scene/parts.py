@@ -52,8 +52,12 @@ class Strip(StripKeys):
             elif value is None:
                 setattr(self, name, key.default)
         super().__post_init__()
-        bend = self.curvature
-        if bend is not None and not isinstance(bend, jax.core.Tracer) and not np.any(bend):
+        curvature = self.curvature
+        if (
+            curvature is not None
+            and not isinstance(curvature, jax.core.Tracer)
+            and not np.any(curvature)
+        ):
             self.curvature = None  # straight
 
     def __check_init__(self) -> None:
@@ -129,10 +133,10 @@ class Member(MemberKeys):
 
     def beside(self, strip: Strip) -> Strip:
         """Member as a strip whose contact is its bottom face; what it leaves out is the strip's."""
-        own = self.layers is not None
+        layered = self.layers is not None
         ratio = strip.height_ratio if self.height_ratio is None else self.height_ratio
         stiffness, nu = self.axial_stiffness, self.poisson_ratio
-        layers = self.layers if own or stiffness is not None or nu is not None else strip.layers
+        layers = self.layers if layered or stiffness is not None or nu is not None else strip.layers
         if layers is None:
             height = ratio * strip.length
             stiffness = strip.plane_modulus * height if stiffness is None else stiffness
@@ -162,8 +166,8 @@ class Contact(ContactKeys):
     law: FrictionLaw = eqx.field(default_factory=SharpSlip)
 
     def __check_init__(self) -> None:
-        law = isinstance(self.law, FrictionLaw)
-        require("contact.law", self.law, law, "give a jbeamshell.mechanics.friction.FrictionLaw")
+        is_law = isinstance(self.law, FrictionLaw)
+        require("contact.law", self.law, is_law, "give a jbeamshell.mechanics.friction.FrictionLaw")
         if takes_smoothing(self.law):
             TABLE["contact.smoothing"].check(self.smoothing)
         for key in ("pressure", "bottom_pressure"):
@@ -191,9 +195,13 @@ class Contact(ContactKeys):
         rows = table.reshape(-1, 4, 2)
         begin, end = rows[:, 0, 0], rows[:, 3, 0]
         if not is_traced(table):
-            even = np.asarray(rows)
-            steps = np.all(even[:, ::2, 0] == even[:, 1::2, 0])
-            if not (steps and np.all(even[:, 1, 1] == even[:, 2, 1]) and not even[:, ::3, 1].any()):
+            numbers = np.asarray(rows)
+            steps = np.all(numbers[:, ::2, 0] == numbers[:, 1::2, 0])
+            if not (
+                steps
+                and np.all(numbers[:, 1, 1] == numbers[:, 2, 1])
+                and not numbers[:, ::3, 1].any()
+            ):
                 return None
         width = end - begin
         return jnp.stack([0.5 * (begin + end), rows[:, 1, 1] * width, width], axis=1)
@@ -215,8 +223,8 @@ class Contact(ContactKeys):
         Rows of a table between which it does not jump give L.
         """
         tables = [p for p in (self.pressure, self.bottom_pressure) if p.ndim == 2]
-        found = [table_steps(table, length) for table in tables]
-        return jnp.sort(jnp.concatenate(found)) if found else None
+        steps = [table_steps(table, length) for table in tables]
+        return jnp.sort(jnp.concatenate(steps)) if steps else None
 
 
 class Load(LoadKeys):
@@ -234,17 +242,17 @@ class Load(LoadKeys):
         if self.amplitude is None:
             turns = " of a moment" if self.kind == "moment" else ""
             fix = f"give the amplitude{turns} under {self.control} control"
-            known = (self.control, self.kind) == ("force", "force") or self.cycles == 0
-            require("load.amplitude", None, known, fix)
+            has_default = (self.control, self.kind) == ("force", "force") or self.cycles == 0
+            require("load.amplitude", None, has_default, fix)
             self.amplitude = TABLE["load.amplitude"].default
         super().__post_init__()
 
     def __check_init__(self) -> None:
-        half = self.steps_per_half_cycle
-        if half == AUTO:
+        steps = self.steps_per_half_cycle
+        if steps == AUTO:
             return  # the plan's
         fix = "must be 1, or even, so that the path passes through zero"
-        require("load.steps_per_half_cycle", half, half == 1 or half % 2 == 0, fix)
+        require("load.steps_per_half_cycle", steps, steps == 1 or steps % 2 == 0, fix)
 
 
 def unit_path(cycles: int, steps: int) -> np.ndarray:

@@ -81,7 +81,7 @@ ARC_STEPS = 120  # load steps per half cycle, whose chords are shorter than a be
 
 
 def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
-    """Plan of a scene: what is given stays, what is open is decided.
+    """Plan of a scene: settings that are given stay, and those that are open are decided.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
     lifts = section != "bar" and contact.normal != "held"
     opens = lifts and scene.strip.curvature is None
     grid = _grid(section, engine, opens, _is_soft(scene, numbers))
-    many = ARC_STEPS if load.control == ARC_LENGTH else grid.steps
+    steps = ARC_STEPS if load.control == ARC_LENGTH else grid.steps
     return Plan(
         section,
         kinematics,
@@ -110,7 +110,7 @@ def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
         lifts,
         nodes=_nodes(grid, scene) if model.nodes == AUTO else model.nodes,
         end_size=grid.end_size if model.end_size == AUTO else float(model.end_size),
-        steps=many if load.steps_per_half_cycle == AUTO else load.steps_per_half_cycle,
+        steps=steps if load.steps_per_half_cycle == AUTO else load.steps_per_half_cycle,
     )
 
 
@@ -161,7 +161,7 @@ def may_be_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
     """True if a scene leaves its section open, and plane elasticity can stand for it.
 
     A squeeze-shear factor of the user's own is a number that elasticity does not have.  A traced
-    one may be any number where a scene is made; in a scene that was made before it is as it was.
+    one may be any number in a new scene; in a scene that was made before it has kept its value.
 
     Parameters
     ----------
@@ -183,8 +183,8 @@ def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:
     if is_traced(scene.strip, scene.contact, scene.load):
         return float(np.inf)
     with jax.ensure_compile_time_eval():
-        known = known_beforehand(scene, "squeeze", numbers or scene.number)
-    return float(np.inf) if known is None else known.largest
+        error = known_beforehand(scene, "squeeze", numbers or scene.number)
+    return float(np.inf) if error is None else error.largest
 
 
 def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
@@ -200,15 +200,15 @@ def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     may_be = may_be_elastic(scene, numbers)
     # Numbers stay numbers within a caller's jit; the largest there are may overflow.
     with jax.ensure_compile_time_eval(), np.errstate(all="ignore"):
-        error = linear_errors(
+        errors = linear_errors(
             strip, load, model.section in ORDERS or may_be, numbers or scene.number
         )
         column = weakest_column(scene, numbers)
-    known = error[np.isfinite(error)]  # lanes of a sweep outside the domain have none
-    allowed = LINEAR_PART * model.tolerance
+    errors = errors[np.isfinite(errors)]  # lanes of a sweep outside the domain have none
+    allowance = LINEAR_PART * model.tolerance
     if may_be:  # better linear than a section that is further off
-        allowed = max(allowed, _squeeze_error(scene, numbers))
-    small = known.size > 0 and np.max(known) <= allowed
+        allowance = max(allowance, _squeeze_error(scene, numbers))
+    small = errors.size > 0 and np.max(errors) <= allowance
     return "linear" if small and not column.near else "exact"
 
 
@@ -247,31 +247,30 @@ def refinements(scene: Parts) -> int:
     """
     if scene.model.nodes != AUTO:
         return 0
-    its = scene.plan
-    opens = its.lifts and scene.strip.curvature is None
-    grid = _grid(its.section, its.engine, opens, _is_soft(scene, None))
+    plan = scene.plan
+    opens = plan.lifts and scene.strip.curvature is None
+    grid = _grid(plan.section, plan.engine, opens, _is_soft(scene, None))
     halvings = range(1, grid.halvings + 1)
-    return sum(2**times * (its.nodes - 1) < MOST_REFINED for times in halvings)
+    return sum(2**times * (plan.nodes - 1) < MOST_REFINED for times in halvings)
 
 
 def finer(scene: Parts) -> Plan:
     """Plan of a scene on elements half as large."""
-    its, given = scene.plan, scene.model.end_size != AUTO
-    return its._replace(
-        nodes=2 * its.nodes - 1, end_size=its.end_size if given else 0.5 * its.end_size
-    )
+    plan = scene.plan
+    end_size = 0.5 * plan.end_size if scene.model.end_size == AUTO else plan.end_size
+    return plan._replace(nodes=2 * plan.nodes - 1, end_size=end_size)
 
 
 def elasticity(scene: Parts) -> Plan:
     """Plan of a scene as plane elasticity, on a grid of its own."""
-    its, model = scene.plan, scene.model
-    return its._replace(
+    plan, model = scene.plan, scene.model
+    return plan._replace(
         section="plane",
         kinematics="linear",
         engine=LINE,
         lifts=True,
-        nodes=_nodes(PLANE, scene) if model.nodes == AUTO else its.nodes,
-        end_size=PLANE.end_size if model.end_size == AUTO else its.end_size,
+        nodes=_nodes(PLANE, scene) if model.nodes == AUTO else plan.nodes,
+        end_size=PLANE.end_size if model.end_size == AUTO else plan.end_size,
     )
 
 

@@ -40,11 +40,11 @@ def face_resultant(pressure: ArrayLike, length: ArrayLike) -> tuple[Any, Any]:
         stress times length, and stress times length squared; in double precision unless traced
     """
     numbers: Any = jnp if is_traced(pressure, length) else np
-    load, along = numbers.asarray(pressure, float), numbers.asarray(length, float)
+    load, span = numbers.asarray(pressure, float), numbers.asarray(length, float)
     if not is_table(load):
-        return load * along, 0.5 * load * along**2
-    end = along[..., None]
-    x, p = (numbers.broadcast_to(column, (*along.shape, column.size)) for column in load.T)
+        return load * span, 0.5 * load * span**2
+    end = span[..., None]
+    x, p = (numbers.broadcast_to(column, (*span.shape, column.size)) for column in load.T)
     x = numbers.concatenate([numbers.zeros_like(end), x, end], axis=-1)
     p = numbers.concatenate([p[..., :1], p, p[..., -1:]], axis=-1)
     run, begin, stop = numbers.diff(x), p[..., :-1], p[..., 1:]
@@ -62,11 +62,11 @@ def resultant(
     The bottom pressure acts on the second member of a lap joint, if ``support`` names one.  Other
     parameters and units are those of `face_resultant`.
     """
-    down, turning = face_resultant(top, length)
+    top_force, top_moment = face_resultant(top, length)
     if support != "none":
-        return down, turning
-    up, lifting = face_resultant(bottom, length)
-    return down - up, turning - lifting
+        return top_force, top_moment
+    bottom_force, bottom_moment = face_resultant(bottom, length)
+    return top_force - bottom_force, top_moment - bottom_moment
 
 
 def pressure_values(pressure: np.ndarray) -> np.ndarray:

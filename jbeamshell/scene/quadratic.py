@@ -25,11 +25,11 @@ def is_quadratic(energy: Energy, half_height: Array, squeeze: bool) -> bool:
     squeeze : True if psi is a field; psi' may have no stiffness
     """
     with jax.ensure_compile_time_eval():
-        stiffness, at, found = map(np.asarray, _probed(energy, half_height))
-    if not (np.all(np.isfinite(stiffness)) and np.all(np.isfinite(found))):
+        stiffness, strains, stresses = map(np.asarray, _probe(energy, half_height))
+    if not (np.all(np.isfinite(stiffness)) and np.all(np.isfinite(stresses))):
         return False
-    close = np.sqrt(np.finfo(found.dtype).eps) * np.abs(at) @ np.abs(stiffness)
-    quadratic = bool(np.all(np.abs(found - at @ stiffness) <= close))
+    tolerance = np.sqrt(np.finfo(stresses.dtype).eps) * np.abs(strains) @ np.abs(stiffness)
+    quadratic = bool(np.all(np.abs(stresses - strains @ stiffness) <= tolerance))
     fields = stiffness[:4, :4] if squeeze else stiffness[:3, :3]
     least, most = np.linalg.eigvalsh(fields)[[0, -1]]
     strong = bool(least > WEAKEST * most)
@@ -39,7 +39,7 @@ def is_quadratic(energy: Energy, half_height: Array, squeeze: bool) -> bool:
 
 
 @eqx.filter_jit
-def _probed(energy: Energy, half_height: Array) -> tuple[Array, Array, Array]:
+def _probe(energy: Energy, half_height: Array) -> tuple[Array, Array, Array]:
     """Stiffness (5, 5) at zero, strains (n, 5) and forces (n, 5) there; k and psi' times H."""
     unit = jnp.ones((), half_height.dtype)
     scale = jnp.stack([unit, unit, 1.0 / half_height, unit, 1.0 / half_height])
@@ -48,5 +48,5 @@ def _probed(energy: Energy, half_height: Array) -> tuple[Array, Array, Array]:
         return scale * jnp.stack(forces(energy, Strains(*(scale * strains))))
 
     pattern = np.cos(np.arange(1, 5 * len(SIZES) + 1) ** 2).reshape(-1, 5)
-    at = jnp.asarray(pattern * np.array(SIZES)[:, None], half_height.dtype)
-    return jax.jacfwd(scaled)(jnp.zeros_like(scale)), at, jax.vmap(scaled)(at)
+    probes = jnp.asarray(pattern * np.array(SIZES)[:, None], half_height.dtype)
+    return jax.jacfwd(scaled)(jnp.zeros_like(scale)), probes, jax.vmap(scaled)(probes)

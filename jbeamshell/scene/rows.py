@@ -116,8 +116,8 @@ class Key:
         elif not self.table:
             number = as_leaf(value, self.name, self.words)
             if not isinstance(number, jax.core.Tracer):
-                one = f"give one number, not an array of shape {number.shape}"
-                require(self.name, number, number.ndim == 0, one)
+                fix = f"give one number, not an array of shape {number.shape}"
+                require(self.name, number, number.ndim == 0, fix)
                 require(self.name, number, bool(self.holds(np.asarray(number))), self.words)
 
     @property

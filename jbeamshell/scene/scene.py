@@ -50,14 +50,14 @@ def _standard(part: type[Part]) -> Any:
     """Field whose default is a part of the standard strip, which all scenes share."""
 
     @functools.cache
-    def made(precision: Any, device: Any) -> Part:
+    def part_for(precision: Any, device: Any) -> Part:
         return part()
 
-    def shared() -> Part:
+    def standard_part() -> Part:
         config: Any = jax.config
-        return made(jnp.result_type(float), config.jax_default_device)
+        return part_for(jnp.result_type(float), config.jax_default_device)
 
-    return eqx.field(default_factory=shared)
+    return eqx.field(default_factory=standard_part)
 
 
 class Scene(Tree):
@@ -180,11 +180,11 @@ class Scene(Tree):
     def _check_elasticity(self) -> None:
         """Refuse what is not plane elasticity."""
         strip, contact, model, energy = self.strip, self.contact, self.model, self.energy
-        other = "squeeze, or p6 of a homogeneous strip"
-        section = f"model.section = {other}"
+        others = "squeeze, or p6 of a homogeneous strip"
+        section = f"model.section = {others}"
         fix = f"must be linear for plane elasticity: take {section} for rotations"
         require("model.kinematics", model.kinematics, self.plan.kinematics == "linear", fix)
-        fix = f"is no engine of plane elasticity: leave it out, or take model.section = {other}"
+        fix = f"is no engine of plane elasticity: leave it out, or take model.section = {others}"
         require("model.by", model.by, model.by == AUTO, fix)
         for key, value in (("strip.curvature", strip.curvature), ("energy", energy)):
             fix = f"must be left out for plane elasticity: take {section}"
@@ -193,8 +193,8 @@ class Scene(Tree):
         fix = f"must be the sharp slider for plane elasticity: take it, or {section}"
         require("contact.law", law_name(contact.law), sharp, fix)
         fix = f"must be rigid for plane elasticity, which may lift off: take {section}"
-        based = contact.normal in ("rigid", "none")
-        require("contact.normal", contact.normal, based, fix)
+        on_base = contact.normal in ("rigid", "none")
+        require("contact.normal", contact.normal, on_base, fix)
         control = self.load.control
         fix = f"must be force or displacement for plane elasticity: take {section}"
         require("load.control", control, control in CONTROLS, fix)
@@ -222,8 +222,8 @@ class Scene(Tree):
     def of_member(self) -> Scene:
         """Scene with the second member in the strip's place, for its section alone."""
         strip = self.member.beside(self.strip)
-        of_member: Scene = eqx.tree_at(lambda scene: scene.strip, self, strip)
-        return of_member
+        scene: Scene = eqx.tree_at(lambda scene: scene.strip, self, strip)
+        return scene
 
     def slip_stiffness(self, tributary: ArrayLike) -> Array:
         """Elastic stiffness k_t of the sliders at nodes, traction per slip.
@@ -240,13 +240,13 @@ class Scene(Tree):
         strip, alpha = self.strip, self.contact.stick_stiffness
         numbers: Any = jnp if is_traced(strip, alpha, tributary) else np  # much faster
         if alpha is not None:
-            each = numbers.full_like(tributary, alpha * strip.shear_modulus / strip.half_height)
+            k_t = numbers.full_like(tributary, alpha * strip.shear_modulus / strip.half_height)
         elif self.plan.on_contact_line:
-            each = numbers.full_like(tributary, np.inf)
+            k_t = numbers.full_like(tributary, np.inf)
         else:
             length = numbers.minimum(tributary, strip.half_height)
-            each = ALMOST_RIGID * strip.shear_modulus / length
-        return cast(Array, each)
+            k_t = ALMOST_RIGID * strip.shear_modulus / length
+        return cast(Array, k_t)
 
     def get(self, key: str) -> Any:
         """Value of a dotted key, such as ``scene.get("strip.height_ratio")``."""
@@ -273,8 +273,8 @@ class Scene(Tree):
         InputError
             if a key does not exist, or a value is no good
         """
-        known = isinstance(values, Mapping)
-        require("values", values, known, "give a dictionary, such as {'contact.friction': 0.2}")
+        mapping = isinstance(values, Mapping)
+        require("values", values, mapping, "give a dictionary, such as {'contact.friction': 0.2}")
         for key, value in values.items():
             check_key(key)
             check_word(key, value)
@@ -300,19 +300,19 @@ class Scene(Tree):
             rows = _number("contact.bolts", values["contact.bolts"])
             length = as_leaf(parts["strip"].get("length", self.strip.length), "strip.length")
             contact["pressure"] = bolt_pressure(rows, length)
-            both = parts["member"].get("support", self.member.support) == "clamped"
-            contact.setdefault("bottom_pressure", contact["pressure"] if both else 0.0)
+            clamped = parts["member"].get("support", self.member.support) == "clamped"
+            contact.setdefault("bottom_pressure", contact["pressure"] if clamped else 0.0)
         if "law" in contact or "smoothing" in contact:
             contact["law"] = _make_law(self.contact.law, contact)
         # An amplitude of another control or kind has another unit: it must be given anew.
         for word in ("control", "kind"):
             if parts["load"].get(word, getattr(self.load, word)) != getattr(self.load, word):
                 parts["load"].setdefault("amplitude", None)
-        fresh = {
+        new_parts = {
             heading: dataclasses.replace(getattr(self, heading), **changes) if changes else None
             for heading, changes in parts.items()
         }
-        scene = dataclasses.replace(self, **{k: v for k, v in fresh.items() if v is not None})
+        scene = dataclasses.replace(self, **{k: v for k, v in new_parts.items() if v is not None})
         if "strip.youngs_modulus" in values:
             strip = _with_youngs_modulus(scene.strip, values["strip.youngs_modulus"])
             scene = dataclasses.replace(scene, strip=strip)
@@ -326,13 +326,15 @@ class Scene(Tree):
         numbers : values by dotted key of many scenes, all of which the settings are to serve; None
             is those of this scene
         """
-        its = self.plan if numbers is None else plan(self, numbers)
-        model = self.model.but(section=its.section, kinematics=its.kinematics, nodes=its.nodes)
-        load = self.load.but(steps_per_half_cycle=its.steps)
-        scene = self.but(load=load, model=model, plan=its)
-        if plan(scene, numbers).end_size == its.end_size:
+        settings = self.plan if numbers is None else plan(self, numbers)
+        model = self.model.but(
+            section=settings.section, kinematics=settings.kinematics, nodes=settings.nodes
+        )
+        load = self.load.but(steps_per_half_cycle=settings.steps)
+        scene = self.but(load=load, model=model, plan=settings)
+        if plan(scene, numbers).end_size == settings.end_size:
             return scene
-        return scene.but(model=model.but(end_size=its.end_size))  # of a refined grid
+        return scene.but(model=model.but(end_size=settings.end_size))  # of a refined grid
 
     def refined(self) -> Scene:
         """Copy on elements half as large, from which any change goes back to the planned grid."""
@@ -401,27 +403,27 @@ def _with_youngs_modulus(strip: Strip, value: Any) -> Strip:
 
 def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:
     law = contact.pop("law", law_name(current))
-    given = contact.pop("smoothing", None)
-    smoothing = getattr(current, "smoothing", "sharp") if given is None else given
-    m = np.inf if isinstance(smoothing, str) else smoothing
+    smoothing = contact.pop("smoothing", None)
+    m = getattr(current, "smoothing", "sharp") if smoothing is None else smoothing
+    m = np.inf if isinstance(m, str) else m
     key = TABLE["contact.smoothing"]
     exponent = key.convert(m)
     sharp = not isinstance(exponent, jax.core.Tracer) and bool(np.all(np.isposinf(exponent)))
     require("contact.smoothing", m, exponent.ndim == 0, key.words)
-    own = isinstance(law, FrictionLaw)
-    if not own and takes_smoothing(LAWS[law]):
+    custom = isinstance(law, FrictionLaw)
+    if not custom and takes_smoothing(LAWS[law]):
         return law_named(law, None if sharp else exponent)
-    unused = given is None or sharp
-    require("contact.smoothing", given, unused, f"contact.law {law!r} has none; leave it out")
-    return law if own else law_named(law, None)
+    unused = smoothing is None or sharp
+    require("contact.smoothing", smoothing, unused, f"contact.law {law!r} has none; leave it out")
+    return law if custom else law_named(law, None)
 
 
 def check_word(name: str, value: Any) -> None:
     """Raise `InputError` for a value of the wrong type, before it is put into a part."""
     key = TABLE[name]
     if name == "contact.law":
-        known = isinstance(value, FrictionLaw) or (isinstance(value, str) and value in LAWS)
-        require(name, value, known, f"choose {' or '.join(map(repr, LAWS))}")
+        is_law = isinstance(value, FrictionLaw) or (isinstance(value, str) and value in LAWS)
+        require(name, value, is_law, f"choose {' or '.join(map(repr, LAWS))}")
     elif name == "contact.smoothing" and isinstance(value, str):
         require(name, value, value == "sharp", key.words)
     elif key.kind == "word":

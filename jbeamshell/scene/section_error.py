@@ -85,7 +85,7 @@ def section_of(scene: Parts) -> str:
     """Section of a scene for which curves are recorded; empty if there are none for it."""
     section, order = scene.plan.section, scene.plan.order
     if order > 0:
-        return next((f"p{known}" for known in KNOWN_ORDERS if known <= order), "")
+        return next((f"p{p}" for p in KNOWN_ORDERS if p <= order), "")
     return section if section in ("bar", "shell", "squeeze") else ""
 
 
@@ -103,8 +103,8 @@ def section_error(scene: Parts, slip_length: float) -> SectionError | None:
         the curve's first point where slip is shorter than that.  None where nothing slips, for
         plane elasticity, and for scenes unlike those that were recorded
     """
-    at = slip_length / float(scene.strip.half_height)
-    return _on_curve(scene, section_of(scene), at) if at > 0.0 else None
+    reach = slip_length / float(scene.strip.half_height)
+    return _on_curve(scene, section_of(scene), reach) if reach > 0.0 else None
 
 
 def known_beforehand(scene: Parts, section: str, numbers: Numbers) -> SectionError | None:
@@ -138,9 +138,9 @@ def slip_of_bar(scene: Parts, numbers: Numbers) -> np.ndarray:
         if scene.load.control == "displacement":
             return np.full(np.shape(length), np.nan)
         x = np.linspace(0.0, float(np.max(length)), POINTS)[::-1]
-        here = np.interp(x, pressure[:, 0], pressure[:, 1], left=0.0, right=0.0)
-        carried = np.append(0.0, np.cumsum(-0.5 * (here[1:] + here[:-1]) * np.diff(x)))
-        return np.interp(force / friction, carried, x[0] - x)
+        pressures = np.interp(x, pressure[:, 0], pressure[:, 1], left=0.0, right=0.0)
+        forces = np.append(0.0, np.cumsum(-0.5 * (pressures[1:] + pressures[:-1]) * np.diff(x)))
+        return np.interp(force / friction, forces, x[0] - x)
     limit = friction * pressure
     if scene.load.control == "displacement":
         force = bar_force(force, stretching(scene.strip, numbers), limit)
@@ -149,12 +149,12 @@ def slip_of_bar(scene: Parts, numbers: Numbers) -> np.ndarray:
 
 def _on_curve(scene: Parts, section: str, reach: float) -> SectionError | None:
     """Error of a section whose slip reaches so many H, by its curve; None if there is none."""
-    known = curves().get(kind_of(scene), {}).get(scene.load.entry, {}).get(section)
-    if known is None:
+    curve = curves().get(kind_of(scene), {}).get(scene.load.entry, {}).get(section)
+    if curve is None:
         return None
-    place = np.log(reach), np.log(known["slip_over_H"])
-    sizes = (np.exp(np.interp(*place, np.log(known[name]))) for name in ("usual", "largest"))
-    return SectionError(float(np.interp(*place, known["typical"])), *map(float, sizes))
+    place = np.log(reach), np.log(curve["slip_over_H"])
+    sizes = (np.exp(np.interp(*place, np.log(curve[name]))) for name in ("usual", "largest"))
+    return SectionError(float(np.interp(*place, curve["typical"])), *map(float, sizes))
 
 
 def in_words(scene: Parts, slip_length: float | None) -> str:
@@ -168,12 +168,12 @@ def in_words(scene: Parts, slip_length: float | None) -> str:
     load = scene.load
     what = "moment" if load.kind == "moment" else "force"
     line = f"the {what} {ENTERS[load.entry]} (load.entry = {load.entry})"
-    found = None if slip_length is None else section_error(scene, slip_length)
-    if slip_length is None or found is None:
+    error = None if slip_length is None else section_error(scene, slip_length)
+    if slip_length is None or error is None:
         return line
     reach = slip_length / float(scene.strip.half_height)
     about = f"where slip reaches {reach:.2g} H the section {section_of(scene)}"
-    return f"{line}; {about} typically loses {_compared(found.typical)} plane elasticity"
+    return f"{line}; {about} typically loses {_compared(error.typical)} plane elasticity"
 
 
 def doubt_of_section(scene: Parts, slip_length: float, allowed: float) -> str:
@@ -185,11 +185,11 @@ def doubt_of_section(scene: Parts, slip_length: float, allowed: float) -> str:
     slip_length : see `section_error`
     allowed : relative error of the dissipation that is no doubt
     """
-    found = section_error(scene, slip_length)
-    if found is None or found.usual <= allowed:
+    error = section_error(scene, slip_length)
+    if error is None or error.usual <= allowed:
         return ""
     reach = slip_length / float(scene.strip.half_height)
-    off = f"more than {100.0 * min(found.usual, 1.0):.3g} %"
+    off = f"more than {100.0 * min(error.usual, 1.0):.3g} %"
     fix = "leave model.section open, or take model.section = plane"
     if scene.model.by == "steps":
         fix = "do without load steps, with model.section open or plane"
@@ -197,7 +197,7 @@ def doubt_of_section(scene: Parts, slip_length: float, allowed: float) -> str:
         fix = "let it lift off (contact.normal = rigid), with model.section = plane"
     return (
         f"where slip reaches {reach:.2g} H the section {section_of(scene)} typically loses "
-        f"{_compared(found.typical)} plane elasticity, and one strip in ten is off by {off}; {fix}"
+        f"{_compared(error.typical)} plane elasticity, and one strip in ten is off by {off}; {fix}"
     )
 
 

@@ -39,8 +39,8 @@ def summary(scene: Parts, own_energy: bool) -> Summary:
             continue
         unit = unit_of(name, scene.load) if key.kind == "number" else ""
         rows.append((name, _shown(value) + (f"  [{unit}]" if unit not in ("", "1") else "")))
-    own = " with a strain energy of its own" * own_energy
-    title = f"Strip{own}: {scene.plan}"
+    energy = " with a strain energy of its own" * own_energy
+    title = f"Strip{energy}: {scene.plan}"
     return Summary(title, rows, tuple(filter(None, [in_words(scene)])))
 
 

@@ -33,8 +33,8 @@ def scene_from_values(values: Mapping[str, Any]) -> Scene:
 
 def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Dotted keys with others on top, in which ``half_height`` replaces ``height_ratio``, etc."""
-    same = DERIVED | {primary: derived for derived, primary in DERIVED.items()}
-    displaced = {same[key] for key in overrides if key in same}
+    twins = DERIVED | {primary: derived for derived, primary in DERIVED.items()}
+    displaced = {twins[key] for key in overrides if key in twins}
     return {k: v for k, v in values.items() if k not in displaced} | dict(overrides)
 
 
@@ -98,12 +98,12 @@ def scene_to_toml(scene: Scene) -> str:
     fix = "is a grid of its own, which no file holds: keep it in code"
     require("end_size", scene.model.end_size, scene.model.end_size == AUTO, fix)
     tables: dict[str, dict[str, Any]] = {heading: {} for heading in PARTS}
-    said = _in_few_digits(scene)
+    short = _in_few_digits(scene)
     for key in KEYS:
-        if key in DERIVED and key not in said:
+        if key in DERIVED and key not in short:
             continue
         heading, name = key.split(".")
-        value = said.get(key, scene.get(key))
+        value = short.get(key, scene.get(key))
         if value is None:  # such as no layers
             continue
         if key in NUMBERS:
@@ -116,23 +116,23 @@ def scene_to_toml(scene: Scene) -> str:
 
 def _in_few_digits(scene: Scene) -> dict[str, Any]:
     """Values of derived keys that take fewer digits than their fields, which are None then."""
-    said: dict[str, Any] = {}
+    short: dict[str, Any] = {}
     for key in ("strip.youngs_modulus", "strip.half_height", "contact.bolts"):
         field, value = DERIVED[key], scene.get(key)
         if value is None:
             continue
-        own, few = np.asarray(scene.get(field)), _rounded(value)
-        again = scene.replace({key: few})
+        number, digits = np.asarray(scene.get(field)), _rounded(value)
+        copy = scene.replace({key: digits})
         # Beside a modulus stands the half height; bolts are fewer rows always.
-        told = bool(said) or key == "contact.bolts" or _digits(few) < _digits(own)
-        if not (told and np.array_equal(again.get(field), own)):
+        shorter = bool(short) or key == "contact.bolts" or _digits(digits) < _digits(number)
+        if not (shorter and np.array_equal(copy.get(field), number)):
             continue
-        said |= {key: few, field: None}
+        short |= {key: digits, field: None}
         if key == "contact.bolts" and np.array_equal(
-            again.contact.bottom_pressure, scene.contact.bottom_pressure
+            copy.contact.bottom_pressure, scene.contact.bottom_pressure
         ):
-            said["contact.bottom_pressure"] = None  # follows from the bolts
-    return said
+            short["contact.bottom_pressure"] = None  # follows from the bolts
+    return short
 
 
 def _rounded(value: Any) -> NDArray[Any]:
@@ -145,8 +145,8 @@ def _rounded(value: Any) -> NDArray[Any]:
 
 def _digits(array: NDArray[Any]) -> int:
     """Most significant digits that one of some numbers takes."""
-    shown = (np.format_float_scientific(number) for number in array.ravel())
-    return max(len(text.partition("e")[0].strip("-0.").replace(".", "")) for text in shown)
+    texts = (np.format_float_scientific(number) for number in array.ravel())
+    return max(len(text.partition("e")[0].strip("-0.").replace(".", "")) for text in texts)
 
 
 def _shortest(value: Any) -> Any:
