@@ -127,11 +127,11 @@ def test_set_overrides_the_file_and_an_alias_its_twin(cli, tmp_path):
     scene.write_text(sections + "steps_per_half_cycle = 8\n")
     model = options({k: v for k, v in COARSE.items() if k.startswith("model")})
     _, out, _ = cli("run", scene, *model)
-    assert "eta = 0.1, force amplitude 0.5\n" in out
+    assert "eta = 0.1, force amplitude 0.5: " in out
     _, out, _ = cli("run", scene, *model, *options({"load.amplitude": 0.625}))
-    assert "eta = 0.1, force amplitude 0.625\n" in out
+    assert "eta = 0.1, force amplitude 0.625: " in out
     _, out, _ = cli("run", scene, *model, *options({"strip.half_height": 0.3}))
-    assert "eta = 0.15, force amplitude 0.5\n" in out
+    assert "eta = 0.15, force amplitude 0.5: " in out
 
 
 def test_words_numbers_and_lists_of_the_command_line():
