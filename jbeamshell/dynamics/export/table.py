@@ -82,14 +82,19 @@ def read(
         table.units(places)
         return table.numbers(places).T
 
-    u, f = columns(wanted)
-    whole = bool(np.all(np.isfinite([u, f])))
-    require(str(path), "a number is missing", whole, "export the joint again")
+    u, f = _whole(path, columns(wanted))
     about: dict[str, Any] = {}
     for name in ABOUT:
         if name in table.titles:
             value = float(columns([name])[0, 0])
             about |= {name: value} if np.isfinite(value) else {}
     if all(name in table.titles for name in SIDES):
-        about["sides"] = columns(SIDES)
+        about["sides"] = _whole(path, columns(SIDES))
     return u, f, about
+
+
+def _whole(path: str | os.PathLike[str], columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns of a table, all of whose numbers must be finite."""
+    finite = bool(np.all(np.isfinite(columns)))
+    require(str(path), "a number is missing", finite, "export the joint again")
+    return columns
