@@ -41,7 +41,7 @@ def write_history(history: Any, path: str | os.PathLike[str]) -> None:
     about = {
         "format": FORMAT,
         "scene": scene_to_toml(scene.but(model=scene.model.but(end_size=AUTO))),
-        "end_size": scene.plan.end_size,
+        "end_size": scene.model.end_size,
         "dtype": history.x.dtype.name,
         "cycles": history.cycles,
     }
