@@ -125,8 +125,8 @@ def bar_slip_profile(
     Goodman 1959; Brink 2015, eq. 3.11 with the slip length of eq. 3.12.
     """
     slip_length = bar_slip_length(force, friction_per_length)
-    slipped = jnp.maximum(jnp.asarray(x) - length + slip_length, 0)
-    return jnp.sign(force) * friction_per_length * slipped**2 / axial_stiffness / 2
+    depth = jnp.maximum(jnp.asarray(x) - length + slip_length, 0)
+    return jnp.sign(force) * friction_per_length * depth**2 / axial_stiffness / 2
 
 
 def cubic_law(
@@ -190,8 +190,8 @@ def lap_backbone(
     The lap joint of Metherell, A. F. and Diller, S. V. (1968). Instantaneous energy dissipation
     rate in a lap joint: uniform clamping pressure. Journal of Applied Mechanics 35, 123-128.
     """
-    stuck = jnp.asarray(force) * length / (upper + lower)
-    return stuck + bar_backbone(force, _in_series(upper, lower), friction_per_length)
+    stretch = jnp.asarray(force) * length / (upper + lower)
+    return stretch + bar_backbone(force, _in_series(upper, lower), friction_per_length)
 
 
 def lap_cubic_law(
@@ -222,5 +222,5 @@ def lap_cubic_law(
 
 def _in_series(upper: ArrayLike, lower: ArrayLike) -> Array:
     """Stiffness of one bar that slips as much as two that lap."""
-    one, other = jnp.asarray(upper), jnp.asarray(lower)
-    return one * other * (one + other) ** 2 / (one**3 + other**3)
+    k_1, k_2 = jnp.asarray(upper), jnp.asarray(lower)
+    return k_1 * k_2 * (k_1 + k_2) ** 2 / (k_1**3 + k_2**3)

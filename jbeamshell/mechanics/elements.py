@@ -134,8 +134,8 @@ def vertices(
     # flatter one to far, and stays so.  The number of elements within d, int dd/h(d), is a
     # logarithm along each of the two, and then a straight line.
     first, second = (small - end) / small_growth, (far - small) / rate
-    in_first = jnp.log1p(small_growth * first / end) / small_growth
-    in_second = jnp.log1p(rate * second / small) / rate
+    first_count = jnp.log1p(small_growth * first / end) / small_growth
+    second_count = jnp.log1p(rate * second / small) / rate
 
     def at(values: Array, i: ArrayLike) -> Array:
         # Where all foci are alike nothing is gathered: programs then agree on x to the last bit.
@@ -149,8 +149,8 @@ def vertices(
         return elements + (distance - near - middle) / far
 
     def reach(elements: Array, i: ArrayLike) -> Array:
-        slope, near = at(rate, i), jnp.minimum(elements, at(in_first, i))
-        middle = jnp.minimum(elements - near, at(in_second, i))
+        slope, near = at(rate, i), jnp.minimum(elements, at(first_count, i))
+        middle = jnp.minimum(elements - near, at(second_count, i))
         distance = at(end, i) * jnp.expm1(small_growth * near) / small_growth
         distance = distance + at(small, i) * jnp.expm1(slope * middle) / slope
         return distance + far * (elements - near - middle)
@@ -202,11 +202,11 @@ def nodal_loads(rule: Rule, ends: Array, load: Array) -> Array:
     cut = jnp.where((high >= low) & (low < end), high - low, 0.0)  # (elements, rows + 1)
     total = jnp.zeros((ends.size - 1, rule.nodes.size), ends.dtype)
     for point, weight in zip(*_gauss(2), strict=True):  # exact for linear times quadratic
-        at = low + point * cut
-        along = jnp.clip((at - x[:-1]) / run, 0.0, 1.0)
+        points = low + point * cut
+        along = jnp.clip((points - x[:-1]) / run, 0.0, 1.0)
         part = weight * cut * (value[:-1] + along * jnp.diff(value))
-        inside = (at - begin) / size
-        shapes = jnp.stack([jnp.polyval(s.coef[::-1], inside) for s in _shapes(rule.nodes)], -1)
+        local = (points - begin) / size
+        shapes = jnp.stack([jnp.polyval(s.coef[::-1], local) for s in _shapes(rule.nodes)], -1)
         total = total + jnp.sum(part[..., None] * shapes, axis=1)
     return scatter(total)
 

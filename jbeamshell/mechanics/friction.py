@@ -118,10 +118,10 @@ def _beta_series(x: Array, a: Array, b: Array) -> Array:
 def _mean_cap(slip: Array, dv: Array, t_n: Array, cap_n: Array, cap: Array, k_t: Array) -> Array:
     """Mean cap while the point slips, if slip and cap go linearly through the step."""
     along = jnp.where(slip >= 0.0, 1.0, -1.0)
-    gap, closing = cap_n - along * t_n, along * k_t * dv + cap_n - cap
-    ratio = gap / jnp.where(closing > 0.0, closing, 1.0)
-    meeting = jnp.where(closing > 0.0, jnp.clip(ratio, 0.0, 1.0), 1.0)
-    return cap + 0.5 * (1.0 - meeting) * (cap_n - cap)
+    gap, approach = cap_n - along * t_n, along * k_t * dv + cap_n - cap
+    ratio = gap / jnp.where(approach > 0.0, approach, 1.0)
+    onset = jnp.where(approach > 0.0, jnp.clip(ratio, 0.0, 1.0), 1.0)
+    return cap + 0.5 * (1.0 - onset) * (cap_n - cap)
 
 
 class SharpSlip(FrictionLaw):
@@ -175,26 +175,26 @@ class ElasticSlip(FrictionLaw):
         start, rise = self._loading(trial, direction * t_n, cap)
         slip_a, work_a = self._slip_and_work(start)
         slip_b, work_b = self._slip_and_work(start + rise)
-        moved = slip_b - slip_a
+        change = slip_b - slip_a
         tiny = 1e-12 * (1.0 + slip_b)
-        relative = jnp.where(
-            moved > tiny, (work_b - work_a) / jnp.maximum(moved, tiny), jnp.abs(t) / cap
+        ratio = jnp.where(
+            change > tiny, (work_b - work_a) / jnp.maximum(change, tiny), jnp.abs(t) / cap
         )
         slip = plastic_slip(dv, t_n, t, k_t)
-        return relative * _mean_cap(slip, dv, t_n, cap_n, cap, k_t) * jnp.abs(slip)
+        return ratio * _mean_cap(slip, dv, t_n, cap_n, cap, k_t) * jnp.abs(slip)
 
     @classmethod
     def sharp(cls) -> FrictionLaw:
         """Sharp slider, the limit of large m."""
         return SharpSlip()
 
-    def _loading(self, trial: Array, along: Array, cap: Array) -> tuple[Array, Array]:
+    def _loading(self, trial: Array, t_n: Array, cap: Array) -> tuple[Array, Array]:
         """Start of the step on the virgin curve and its way along it, in units of cap/k_t."""
-        held = jnp.where(along > 0.0, along, 0.0)
+        t = jnp.where(t_n > 0.0, t_n, 0.0)
         almost_one = 1.0 - 4.0 * jnp.finfo(jnp.result_type(cap)).eps
-        ratio = jnp.clip(held / cap, 0.0, almost_one)
+        ratio = jnp.clip(t / cap, 0.0, almost_one)
         start = ratio / (1.0 - ratio**self.smoothing) ** (1.0 / self.smoothing)
-        return start, (jnp.maximum(trial, 0.0) - held) / cap
+        return start, (jnp.maximum(trial, 0.0) - t) / cap
 
     def _slip_and_work(self, z: Array) -> tuple[Array, Array]:
         """Plastic slip s = z - S and dissipated work int S ds = S s - int s dS up to z."""
@@ -205,12 +205,12 @@ class ElasticSlip(FrictionLaw):
         x, y = below / (1.0 + below), above / (1.0 + above)
         y = jnp.maximum(y, jnp.finfo(jnp.result_type(y)).tiny)  # y**b is steep at zero
         a, b = 2.0 / m, 1.0 - 1.0 / m
-        rising = jnp.minimum(r, 0.5 ** (1.0 / m)) ** 2 * _beta_series(x, a, b)
+        lower = jnp.minimum(r, 0.5 ** (1.0 / m)) ** 2 * _beta_series(x, a, b)
         half = jnp.full_like(y, 0.5)
-        capped = half**b * _beta_series(half, b, a) - y**b * _beta_series(y, b, a)
-        stored = (rising + capped) / m - 0.5 * r**2
+        upper = half**b * _beta_series(half, b, a) - y**b * _beta_series(y, b, a)
+        integral = (lower + upper) / m - 0.5 * r**2
         slip = z - r
-        return slip, r * slip - stored
+        return slip, r * slip - integral
 
 
 class CappedTrial(FrictionLaw):

@@ -80,12 +80,12 @@ class Hierarchic(eqx.Module):
         They are exact for small rotations.  The parameters are those of `energy`.
         """
         of_section, of_slope = jax.grad(self.energy, argnums=(0, 1))(section, slope)
-        normal, shear, about_base, squeeze = (of_slope[field] for field in range(len(FIELDS)))
+        normal, shear, base_moment, squeeze = (of_slope[field] for field in range(len(FIELDS)))
         # From e = v' - H beta', k = beta' and g = w' - beta + H psi' by the chain rule.
         return Strains(
             normal,
             shear,
-            about_base + self.half_height * normal,
+            base_moment + self.half_height * normal,
             of_section[FIELDS.index("psi")],
             squeeze - self.half_height * shear,
         )
@@ -97,8 +97,8 @@ class Hierarchic(eqx.Module):
         if self.order == 1:
             return x, y
         shapes = [jnp.polyval(c, height / self.half_height) for c in _bubbles(self.order)]
-        along = sum(shape * own for shape, own in zip(shapes, bubbles[::2], strict=True))
-        across = sum(shape * own for shape, own in zip(shapes, bubbles[1::2], strict=True))
+        along = sum(shape * a for shape, a in zip(shapes, bubbles[::2], strict=True))
+        across = sum(shape * b for shape, b in zip(shapes, bubbles[1::2], strict=True))
         if self.kinematics == "linear":
             return x + along, y + across
         sin, cos = jnp.sin(straight[2]), jnp.cos(straight[2])
@@ -107,19 +107,19 @@ class Hierarchic(eqx.Module):
     def mean_displacement(self, section: Section) -> Array:
         """Mean displacement along X over the height, conjugate to a uniform traction."""
         points, weights = np.polynomial.legendre.leggauss(self.order + 1)
-        moved = jax.vmap(lambda t: self.displacement(section, t * self.half_height)[0])
-        return 0.5 * jnp.sum(weights * moved(jnp.asarray(points)))
+        displacements = jax.vmap(lambda t: self.displacement(section, t * self.half_height)[0])
+        return 0.5 * jnp.sum(weights * displacements(jnp.asarray(points)))
 
     def _density(self, section: Section, slope: Section, t: Array) -> Array:
         """Strain energy per area at t = s/H."""
         height = t * self.half_height
 
-        def moved(section: Section, height: Array) -> Array:
+        def displacement(section: Section, height: Array) -> Array:
             return jnp.stack(self.displacement(section, height))
 
-        still = jax.tree.map(jnp.zeros_like, section)
-        along = jax.jvp(moved, (section, height), (slope, jnp.zeros_like(height)))[1]
-        across = jax.jvp(moved, (section, height), (still, jnp.ones_like(height)))[1]
+        zero = jax.tree.map(jnp.zeros_like, section)
+        along = jax.jvp(displacement, (section, height), (slope, jnp.zeros_like(height)))[1]
+        across = jax.jvp(displacement, (section, height), (zero, jnp.ones_like(height)))[1]
         (ux_x, uy_x), (ux_y, uy_y) = along, across
         exx, eyy, shear = ux_x, uy_y, ux_y + uy_x
         if self.kinematics == "exact":
@@ -135,9 +135,9 @@ class Hierarchic(eqx.Module):
 
 def _bubbles(order: int) -> list[np.ndarray]:
     """Coefficients of N_2 ... N_p, the highest power of t first."""
-    found = []
+    bubbles = []
     for j in range(2, order + 1):
         series = np.zeros(j + 1)
         series[[j, j - 2]] = 1.0, -1.0
-        found.append(np.polynomial.legendre.leg2poly(series)[::-1] / np.sqrt(2 * (2 * j - 1)))
-    return found
+        bubbles.append(np.polynomial.legendre.leg2poly(series)[::-1] / np.sqrt(2 * (2 * j - 1)))
+    return bubbles

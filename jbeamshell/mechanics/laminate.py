@@ -117,12 +117,12 @@ class Laminate(eqx.Module):
         if self.constants == "printed":
             c11 = modulus / (1.0 - contraction**2)
             p0, p1, _ = self._integrals(c11 * contraction)
-            uncoupled = self._bending(c11, e, k) + 0.5 * self._integrals(c11)[0] * psi**2
-            return uncoupled + (p0 * e - p1 * k) * psi + self._shear(g, dpsi)
+            energy = self._bending(c11, e, k) + 0.5 * self._integrals(c11)[0] * psi**2
+            return energy + (p0 * e - p1 * k) * psi + self._shear(g, dpsi)
         p0, p1, _ = self._integrals(contraction)
-        closing = self.height * psi + p0 * e - p1 * k
-        squeezed = 0.5 * closing**2 / self._compliance
-        return self._bending(modulus, e, k) + squeezed + self._shear(g, dpsi)
+        closure = self.height * psi + p0 * e - p1 * k
+        squeeze = 0.5 * closure**2 / self._compliance
+        return self._bending(modulus, e, k) + squeeze + self._shear(g, dpsi)
 
     def uniform_squeeze(self, pressure: ArrayLike) -> Strains:
         """Strains under the same pressure on both faces, without end force and moment.

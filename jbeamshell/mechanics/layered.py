@@ -64,18 +64,18 @@ def layered_form(material: Material) -> SectionForm:
         return jnp.tensordot(weight, jnp.asarray(template), 1)
 
     size = layers + 1 + sum(order - 1 for order in orders)
-    none = jnp.zeros((size, size), h.dtype)
-    turned = np.swapaxes(mixed, 1, 2)
-    values = jnp.block([[summed(g / h, slope), none], [none, summed(c / h, slope)]])
-    mixed_form = jnp.block([[none, summed(g, turned)], [summed(lam, turned), none]])
-    slopes = jnp.block([[summed(c * h, mass), none], [none, summed(g * h, mass)]])
+    zero = jnp.zeros((size, size), h.dtype)
+    transpose = np.swapaxes(mixed, 1, 2)
+    values = jnp.block([[summed(g / h, slope), zero], [zero, summed(c / h, slope)]])
+    mixed_form = jnp.block([[zero, summed(g, transpose)], [summed(lam, transpose), zero]])
+    slopes = jnp.block([[summed(c * h, mass), zero], [zero, summed(g * h, mass)]])
     edges = jnp.append(0.0, jnp.cumsum(h))
     middle = 0.5 * edges[-1]
     even = jnp.pad(jnp.ones(layers + 1), (0, size - layers - 1))
-    from_middle = jnp.pad(edges - middle, (0, size - layers - 1))
+    heights = jnp.pad(edges - middle, (0, size - layers - 1))
     mean = summed(h, integral[0]) / edges[-1]
     moment = summed(h**2, integral[1]) + summed(h * (edges[:-1] - middle), integral[0])
-    turning = -moment / (2.0 * middle**3 / 3.0)
+    rotation = -moment / (2.0 * middle**3 / 3.0)
     top = np.zeros(size)
     top[layers] = 1.0
     squeeze = np.zeros(size)
@@ -91,29 +91,29 @@ def layered_form(material: Material) -> SectionForm:
         return jnp.append(jnp.zeros(size), part)[place]
 
     def squares(layer: int) -> Array:
-        one = summed(jnp.where(kind == layer, h, 0.0), mass)
-        return jnp.block([[one, none], [none, one]])[pick]
+        block = summed(jnp.where(kind == layer, h, 0.0), mass)
+        return jnp.block([[block, zero], [zero, block]])[pick]
 
-    still = jnp.zeros(2 * size)
+    rest = jnp.zeros(2 * size)
     modes = [
-        (still, along(even)),
-        (still, across(even)),
-        (still, along(-from_middle)),
-        (across(from_middle), still),
-        (still, across(from_middle)),
+        (rest, along(even)),
+        (rest, across(even)),
+        (rest, along(-heights)),
+        (across(heights), rest),
+        (rest, across(heights)),
     ]
     # What differs between an element's ends bends it: as if bubbles along X relieved the strains
     # that linear fields cannot (Wilson's incompatible modes; Taylor, Beresford & Wilson 1976).
-    spread = jnp.block([[none, none], [none, summed((c - lam**2 / c) / h, slope)]]) / 12.0
+    spread = jnp.block([[zero, zero], [zero, summed((c - lam**2 / c) / h, slope)]]) / 12.0
     return SectionForm(
         values=values[pick],
         mixed=mixed_form[pick],
         slopes=slopes[pick],
         pull=along(mean),
-        turn=along(turning),
+        turn=along(rotation),
         press=across(top),
         held=np.append(np.ones(size, bool), np.zeros(size, bool))[place],
-        further=jnp.stack([along(turning), across(squeeze) / edges[-1]]),
+        further=jnp.stack([along(rotation), across(squeeze) / edges[-1]]),
         modes=jnp.asarray([jnp.stack(mode) for mode in modes]),
         spread=spread[pick],
         masses=jnp.stack([squares(i) for i in range(count)]),
@@ -144,9 +144,9 @@ def _templates(orders: tuple[int, ...]) -> tuple[np.ndarray, ...]:
             phi.append(scale * basis.integ(lbnd=-1)(points))
             dphi.append(2.0 * scale * basis(points))
         values, slopes, w = np.array(phi), np.array(dphi), 0.5 * weights
-        here = np.ix_(places, places)
-        mass[layer][here] = (values * w) @ values.T
-        mixed[layer][here] = (values * w) @ slopes.T
-        slope[layer][here] = (slopes * w) @ slopes.T
+        block = np.ix_(places, places)
+        mass[layer][block] = (values * w) @ values.T
+        mixed[layer][block] = (values * w) @ slopes.T
+        slope[layer][block] = (slopes * w) @ slopes.T
         integral[:, layer, places] = values @ w, (values * 0.5 * (1.0 + points)) @ w
     return mass, mixed, slope, integral

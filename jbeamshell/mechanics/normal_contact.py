@@ -65,8 +65,8 @@ class Rigid(NormalLaw):
 
     def residual(self, balance: Array, gap: Array) -> Array:
         """Residual; see `NormalLaw.residual`."""
-        closing = self.stiffness * gap
-        return jnp.where(balance < closing, balance, closing)
+        penalty = self.stiffness * gap
+        return jnp.where(balance < penalty, balance, penalty)
 
     def changes_status(self, balance: Array, gap: Array) -> Array:
         """True if a point is not as a step of Newton's method took it to be, open or closed.
@@ -81,11 +81,11 @@ class Rigid(NormalLaw):
 
         The point is one that `changes_status`.
         """
-        far = jnp.abs(gap) + jnp.abs(balance) / self.stiffness
+        distance = jnp.abs(gap) + jnp.abs(balance) / self.stiffness
         was_open = self.stiffness * gap < balance
         return (
             jnp.zeros_like(balance),
-            jnp.where(was_open, far, -far),
+            jnp.where(was_open, distance, -distance),
             -self.residual(-balance, -gap),
         )
 
@@ -108,8 +108,8 @@ class Compliance(NormalLaw):
     def reaction(self, balance: Array, gap: Array) -> Array:
         """Reaction R; see `NormalLaw.reaction`."""
         touch = jnp.clip(self.rounding - gap, 0.0, 2.0 * self.rounding)
-        deep = jnp.maximum(-gap - self.rounding, 0.0)
-        return self.stiffness * (touch**2 / (4.0 * self.rounding) + deep)
+        depth = jnp.maximum(-gap - self.rounding, 0.0)
+        return self.stiffness * (touch**2 / (4.0 * self.rounding) + depth)
 
     def residual(self, balance: Array, gap: Array) -> Array:
         """Residual; see `NormalLaw.residual`."""
@@ -118,8 +118,8 @@ class Compliance(NormalLaw):
     def energy(self, gap: Array) -> Array:
         """Energy stored in the contact, the integral of R over the approach."""
         touch = jnp.clip(self.rounding - gap, 0.0, 2.0 * self.rounding)
-        deep = jnp.maximum(-gap - self.rounding, 0.0)
-        layer = touch**3 / (12.0 * self.rounding) + self.rounding * deep + 0.5 * deep**2
+        depth = jnp.maximum(-gap - self.rounding, 0.0)
+        layer = touch**3 / (12.0 * self.rounding) + self.rounding * depth + 0.5 * depth**2
         return self.stiffness * layer
 
 

@@ -60,8 +60,8 @@ class SectionForm(NamedTuple):
         slope, spread = self.slopes / h, h * self.spread
         mean = 0.25 * h * self.values
         even, odd = 0.5 * (self.mixed + self.mixed.T), 0.5 * (self.mixed - self.mixed.T)
-        own = mean + slope + spread
-        return own - even, own + even, mean - slope - spread + odd
+        diagonal = mean + slope + spread
+        return diagonal - even, diagonal + even, mean - slope - spread + odd
 
     def moved(self, length: Array) -> tuple[Array, Array]:
         """Forces (m, m) from fields at an element's start and end to both ends together.
@@ -80,7 +80,7 @@ def section_stiffness(energy: Callable[[Section, Section], Array], like: Array) 
     energy : strain energy per length and width from the fields (m,) and their slopes (m,)
     like : (m,) fields, for their number and precision
     """
-    return jax.hessian(lambda both: energy(both[0], both[1]))(
+    return jax.hessian(lambda fields: energy(fields[0], fields[1]))(
         jnp.zeros((2, *like.shape), like.dtype)
     )
 
@@ -106,20 +106,20 @@ def on_symmetry_plane(form: SectionForm) -> SectionForm:
     """
     if form.top == 0:
         return form
-    kept = np.delete(np.arange(form.pull.size), form.top)
-    others = -form.press[kept] / form.press[form.top]
-    fields = jnp.eye(form.pull.size, dtype=form.pull.dtype)[:, kept].at[form.top].set(others)
-    return _within(form, fields, kept)._replace(press=jnp.zeros_like(others), top=0)
+    places = np.delete(np.arange(form.pull.size), form.top)
+    relation = -form.press[places] / form.press[form.top]
+    fields = jnp.eye(form.pull.size, dtype=form.pull.dtype)[:, places].at[form.top].set(relation)
+    return _within(form, fields, places)._replace(press=jnp.zeros_like(relation), top=0)
 
 
 def without_lift(form: SectionForm) -> SectionForm:
     """Form of a section whose w is zero, and is left out."""
-    kept = np.delete(np.arange(form.pull.size), W)
-    return _within(form, jnp.eye(form.pull.size, dtype=form.pull.dtype)[:, kept], kept)
+    places = np.delete(np.arange(form.pull.size), W)
+    return _within(form, jnp.eye(form.pull.size, dtype=form.pull.dtype)[:, places], places)
 
 
-def _within(form: SectionForm, fields: Array, kept: np.ndarray) -> SectionForm:
-    """Form in those fields that are kept, from which all others follow as ``fields`` (m, k)."""
+def _within(form: SectionForm, fields: Array, places: np.ndarray) -> SectionForm:
+    """Form in the fields at some places, from which all others follow as ``fields`` (m, k)."""
 
     def within(matrix: Array) -> Array:
         return fields.T @ matrix @ fields
@@ -131,9 +131,9 @@ def _within(form: SectionForm, fields: Array, kept: np.ndarray) -> SectionForm:
         pull=fields.T @ form.pull,
         turn=fields.T @ form.turn,
         press=fields.T @ form.press,
-        held=form.held[kept],
+        held=form.held[places],
         further=form.further @ fields,
-        modes=form.modes[..., kept],
+        modes=form.modes[..., places],
         spread=within(form.spread),
         masses=jax.vmap(within)(form.masses),
     )
