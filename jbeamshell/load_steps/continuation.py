@@ -18,9 +18,8 @@ from jbeamshell.load_steps.outcome import check_solver, history_of, raise_if_fai
 from jbeamshell.load_steps.path_state import PathState, StepResults
 from jbeamshell.load_steps.recovery import recover, rows
 from jbeamshell.load_steps.stepping import compiled_march
-from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.scene.load_path import LoadPath, check
+from jbeamshell.scene.load_path import LoadPath, check, closed_cycles_of
 from jbeamshell.scene.plan import STEPS
 from jbeamshell.scene.scene import Scene
 
@@ -78,11 +77,10 @@ class PathEnd(eqx.Module):
                 raise_if_failed(scene, rows(steps, np.s_[:count]), further, history.force.size)
         tail = rows(_steps_of(history_of(scene, steps, padded.pressure)), np.s_[:count])
         columns = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), _steps_of(history), tail)
-        targets = np.append(0.0, np.asarray(columns["target"])[pressing:])
-        cycles = tuple(
-            (a + pressing - 1, b + pressing - 1, c + pressing - 1)
-            for a, b, c in closed_cycles(targets)
-        )
+        loads, parts = (np.asarray(columns[name])[pressing:] for name in ("target", "pressure"))
+        last = pressing - 1
+        closed = closed_cycles_of(loads, parts)
+        cycles = tuple((a + last, b + last, c + last) for a, b, c in closed)
         end = PathEnd(rows(steps.state, count - 1))
         result = dataclasses.replace(history, **columns, end=end, cycles=cycles)
         if throw:

@@ -248,3 +248,10 @@ def test_double_precision_is_not_halved_quietly(saved):
             jb.read_history(saved)
     finally:
         jax.config.update("jax_enable_x64", True)
+
+
+def test_a_cycle_that_goes_on_is_none_where_the_pressures_do_not_close():
+    path = [[0.2, 1.0], [-0.2, 1.0]]
+    begun = jb.solve(OWN, path, by="steps", throw=False)
+    assert len(begun.continued([[0.2, 1.0]], throw=False).cycles) == 1
+    assert begun.continued([[0.2, 0.9]], throw=False).cycles == ()
