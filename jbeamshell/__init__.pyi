@@ -14,12 +14,15 @@ from .common.errors import (
     UnconvergedError as UnconvergedError,
 )
 from .common.jax_options import configure as configure
+from .contact_face.body import FaceBody as FaceBody
+from .contact_face.solve import solve_faces as solve_faces
 from .contact_line.contact import solve_contact as solve_contact
 from .contact_line.contact_file import read_contact as read_contact
 from .contact_line.stiffness_model import StiffnessModel as StiffnessModel
 from .contact_line.substructure import Substructure as Substructure
 from .explorer import explore as explore
 from .history.contact_history import ContactHistory as ContactHistory
+from .history.face_history import FaceHistory as FaceHistory
 from .history.history import History as History
 from .solving.advice import Advice as Advice, advise as advise
 from .solving.solve import solve as solve

@@ -24,6 +24,7 @@ ORDER = [
     "plotting",
     "history",
     "contact_line",
+    "contact_face",
     "load_steps",
     "solving",
     "sweeping",

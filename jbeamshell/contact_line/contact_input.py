@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -38,7 +40,15 @@ def checked_gap(upper: Substructure, gap: ArrayLike) -> Array:
     return distance
 
 
-def checked_bolts(upper: Substructure, lower: Substructure | None, bolts: ArrayLike) -> Array:
+class Pressed(Protocol):
+    """Condensed body, on a line or on a face."""
+
+    @property
+    def bolts(self) -> int:
+        """Number of loads that press."""
+
+
+def checked_bolts(upper: Pressed, lower: Pressed | None, bolts: ArrayLike) -> Array:
     """Size of each pressing load, (m - 1,)."""
     count = upper.bolts if lower is None else max(upper.bolts, lower.bolts)
     require("bolts", 0, count > 0, "nothing presses the bodies together: condense one with press=")

@@ -103,15 +103,16 @@ def together(
 
     Parameters
     ----------
-    above, below : (2n + 2, 2n + 2) second derivatives in q of each body, end load and pressure
-    fixed_above, fixed_below : (2n,) True for displacements that a support holds
+    above, below : (k + m, k + m) second derivatives in q of each body and in the loads of both
+    fixed_above, fixed_below : (k,) True for displacements that a support holds
 
     Returns
     -------
-    hessian : (2n + 2, 2n + 2) in g, end load and pressure
-    q_1, q_2 : (2n + 2, 2n + 2) displacements of each body and the loads from these
+    hessian : (k + m, k + m) in g and the loads
+    q_1, q_2 : (k + m, k + m) displacements of each body and the loads from these
     """
     dtype, size = above.dtype, fixed_above.size
+    count = above.shape[0] - size
     # Both from the movement z of the body below and g: q_1 = z + g, q_2 = z, unless one is held.
     moves = jnp.asarray(~(fixed_above | fixed_below), dtype)
     first = jnp.asarray(~fixed_above, dtype)
@@ -120,15 +121,15 @@ def together(
     def in_both(scales: Array, matrix: Array) -> Array:
         return scales[:, None] * matrix * scales
 
-    on_z = in_both(moves, (above + below)[:-2, :-2]) + jnp.diag(1.0 - moves)
-    one, other = (jnp.append(part, jnp.ones(2)) for part in (first, second))
-    mixed = moves[:, None] * (above[:-2] * one + below[:-2] * other)
+    on_z = in_both(moves, (above + below)[:size, :size]) + jnp.diag(1.0 - moves)
+    one, other = (jnp.append(part, jnp.ones(count)) for part in (first, second))
+    mixed = moves[:, None] * (above[:size] * one + below[:size] * other)
     inverse = inverse_cholesky(on_z)
     reduced = inverse @ mixed
     hessian = in_both(one, above) + in_both(other, below) - reduced.T @ reduced
     z = -(inverse.T @ reduced) * moves[:, None]
-    unit = jnp.eye(size, size + 2, dtype=dtype)
-    loads = jnp.eye(size + 2, dtype=dtype)[-2:]
+    unit = jnp.eye(size, size + count, dtype=dtype)
+    loads = jnp.eye(size + count, dtype=dtype)[size:]
     q_1 = jnp.concatenate([z + first[:, None] * unit, loads])
     q_2 = jnp.concatenate([z + second[:, None] * unit, loads])
     return hessian, q_1, q_2

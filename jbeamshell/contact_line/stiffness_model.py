@@ -139,7 +139,7 @@ class StiffnessModel:
             for a node or a direction that the model does not have, or that is no whole number; for
             forces and lengths that are not finite; for a body with a negative or a loose mode
         """
-        model = self if held is None else self._without(held)
+        model = self if held is None else self.without(held)
         directions = {"tangential": tangential, "normal": normal}
         for key, direction in directions.items():
             require_count(key, direction, 1, DIRECTIONS)
@@ -155,15 +155,15 @@ class StiffnessModel:
             require(key, direction, any((node, direction) in row for node in nodes), fix)
         place, fixed = _places(row, nodes, group, (tangential, normal))
         forces = np.column_stack(
-            [_forces("pull", [] if pull is None else pull, row)]
-            + [_forces(f"press[{i}]", table, row) for i, table in enumerate(press)]
+            [nodal_forces("pull", [] if pull is None else pull, row)]
+            + [nodal_forces(f"press[{i}]", table, row) for i, table in enumerate(press)]
         )
-        matrices = _on_contact(model.matrix, forces, place, 2 * x.size)
+        matrices = condensed_on(model.matrix, forces, place, 2 * x.size)
         return Substructure(x, *matrices, tributary=tributary, fixed=fixed.ravel().tolist())
 
-    def _without(self, held: ArrayLike) -> StiffnessModel:
+    def without(self, held: ArrayLike) -> StiffnessModel:
         """Model without the rows of supports."""
-        rows = _rows("held", held, 2, SUPPORTS)
+        rows = table_of("held", held, 2, SUPPORTS)
         supports = {(a, b) for a, b in whole_numbers("held", rows).tolist()}
         dofs = set(map(tuple, self.dofs.tolist()))
         for node, direction in sorted(supports - dofs):
@@ -177,7 +177,7 @@ class StiffnessModel:
 
 def _groups(contact: ArrayLike) -> tuple[list[int], NDArray[np.float64], NDArray[np.int64]]:
     """Nodes of the contact, the rising places X, and the place of each node."""
-    table = _rows("contact", contact, 2, TABLE)
+    table = table_of("contact", contact, 2, TABLE)
     nodes = whole_numbers("contact", table[:, 0]).tolist()
     require("contact", len(nodes), len(set(nodes)) == len(nodes), "names a node twice")
     order = np.argsort(table[:, 1], kind="stable")
@@ -210,7 +210,7 @@ def _places(
     return place, fixed
 
 
-def _on_contact(
+def condensed_on(
     matrix: scipy.sparse.csc_array, forces: NDArray[Any], place: NDArray[np.int64], size: int
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Stiffness, forces and flexibility of the contact's displacements, ``size`` of them."""
@@ -232,9 +232,11 @@ def _on_contact(
     return 0.5 * (stiffness + stiffness.T), forces, 0.5 * (flexibility + flexibility.T)
 
 
-def _forces(key: str, table: ArrayLike, row: dict[tuple[int, int], int]) -> NDArray[np.float64]:
+def nodal_forces(
+    key: str, table: ArrayLike, row: dict[tuple[int, int], int]
+) -> NDArray[np.float64]:
     """Nodal forces (N,) of a table of node, direction and force."""
-    values = _rows(key, table, 3, FORCES)
+    values = table_of(key, table, 3, FORCES)
     forces = np.zeros(len(row))
     places = whole_numbers(key, values[:, :2]).tolist()
     for (node, direction), force in zip(places, values[:, 2], strict=True):
@@ -246,7 +248,7 @@ def _forces(key: str, table: ArrayLike, row: dict[tuple[int, int], int]) -> NDAr
     return forces
 
 
-def _rows(key: str, table: ArrayLike, columns: int, fix: str) -> NDArray[np.float64]:
+def table_of(key: str, table: ArrayLike, columns: int, fix: str) -> NDArray[np.float64]:
     """Rows of finite numbers of a table; none of an empty one."""
     try:
         values = np.asarray(table, float)

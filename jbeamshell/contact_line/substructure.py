@@ -110,10 +110,10 @@ class Substructure(eqx.Module):
         require("tributary", tributary, bool(np.all(tributary > 0.0)), fix)
         free = ~np.array(self.fixed)
         fix = "has a negative mode: check the supports and the sign of the matrix"
-        _check_energy("stiffness", np.asarray(self.stiffness), free, LOOSE, fix)
+        check_energy("stiffness", np.asarray(self.stiffness), free, LOOSE, fix)
         fix = "has a negative mode: give displacements per load, positive along each load"
         loads = np.full(self.flexibility.shape[:1], True)
-        _check_energy("flexibility", np.asarray(self.flexibility), loads, 1e-8, fix)
+        check_energy("flexibility", np.asarray(self.flexibility), loads, 1e-8, fix)
 
     @property
     def bolts(self) -> int:
@@ -122,10 +122,8 @@ class Substructure(eqx.Module):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write to an .npz file; see `read`."""
-        target = as_path(path)
-        require("path", str(path), target.suffix == ".npz", "end the name in .npz")
         names = ("x", "tributary", "stiffness", "forces", "flexibility", "fixed")
-        write_arrays(target, {name: np.asarray(getattr(self, name)) for name in names})
+        write_body(path, {name: np.asarray(getattr(self, name)) for name in names})
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Substructure:
@@ -139,17 +137,7 @@ class Substructure(eqx.Module):
         InputError
             if the file cannot be read, or holds no substructure
         """
-        check_regular(path)
-        try:
-            arrays = read_arrays(as_path(path), signed=False)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-        except Exception as error:  # NumPy may raise anything for a broken file
-            reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-            raise InputError(f"{path}: is no .npz file of numbers ({reason})") from None
-        missing = [name for name in ("x", "stiffness", "forces") if name not in arrays]
-        fix = "give numpy.savez x=, stiffness= and forces=, or read a jbeamshell.StiffnessModel"
-        require(str(path), f"without {', '.join(missing)}", not missing, fix)
+        arrays = read_body(path, ("x", "stiffness", "forces"))
         return cls(
             arrays["x"],
             arrays["stiffness"],
@@ -160,7 +148,36 @@ class Substructure(eqx.Module):
         )
 
 
-def _check_energy(key: str, matrix: np.ndarray, free: np.ndarray, least: float, fix: str) -> None:
+def write_body(path: str | os.PathLike[str], arrays: dict[str, np.ndarray]) -> None:
+    """Write arrays of a condensed body to an .npz file with a check sum."""
+    target = as_path(path)
+    require("path", str(path), target.suffix == ".npz", "end the name in .npz")
+    write_arrays(target, arrays)
+
+
+def read_body(path: str | os.PathLike[str], needed: Sequence[str]) -> dict[str, np.ndarray]:
+    """Arrays of a condensed body in an .npz file.
+
+    Raises
+    ------
+    InputError
+        if the file cannot be read, or lacks an array that is needed
+    """
+    check_regular(path)
+    try:
+        arrays = read_arrays(as_path(path), signed=False)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except Exception as error:  # NumPy may raise anything for a broken file
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:120]
+        raise InputError(f"{path}: is no .npz file of numbers ({reason})") from None
+    missing = [name for name in needed if name not in arrays]
+    fix = f"give numpy.savez {'=, '.join(needed)}=, or read a jbeamshell.StiffnessModel"
+    require(str(path), f"without {', '.join(missing)}", not missing, fix)
+    return arrays
+
+
+def check_energy(key: str, matrix: np.ndarray, free: np.ndarray, least: float, fix: str) -> None:
     """Refuse a matrix that is not symmetric, or whose free part has a negative eigenvalue."""
     apart, size = (float(np.max(np.abs(part))) for part in (matrix - matrix.T, matrix))
     same = apart <= 1e-8 * size
