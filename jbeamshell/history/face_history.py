@@ -12,7 +12,6 @@ from jax import Array
 from jbeamshell.common.errors import Status
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.loop_figures import LoopFigures
-from jbeamshell.history.reliability import CLOSES
 
 FIGURES = (
     "dissipation",
@@ -22,6 +21,7 @@ FIGURES = (
     "peak_displacement",
 )
 SLIDES = 1e-9  # of friction times reaction, within which a pair is at its limit
+STEADY = 5e-3  # slip left over by a cycle, over its range, up to which D has settled
 COARSE = 0.02  # error of the dissipation, from which on it is doubted
 
 
@@ -139,7 +139,7 @@ class FaceHistory(LoopFigures, eqx.Module):
             return ()
         doubts = []
         apart = float(self.closure)
-        if apart > CLOSES:
+        if apart > STEADY:
             doubts.append(
                 f"the last cycle is not steady: its ends are {apart:.2g} of its width apart; take "
                 f"more than {len(self.cycles)} cycles"
@@ -167,3 +167,15 @@ class FaceHistory(LoopFigures, eqx.Module):
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
         rows = [(name.replace("_", " "), in_words(value)) for name, value in figures.items()]
         return Summary(title, rows, doubts).as_text()
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw force over displacement; returns the axes."""
+        from jbeamshell import plotting
+
+        return plotting.loop(self, axes)
+
+    def plot_face(self, step: int = -1) -> Any:
+        """Draw where the face sticks, slips and opens, its pressure, slip and gap, at a step."""
+        from jbeamshell import plotting
+
+        return plotting.face_map(self, step)

@@ -12,6 +12,7 @@ which attributes they read.
 from jbeamshell.plotting.comparisons import comparison as comparison
 from jbeamshell.plotting.contacts import contact as contact
 from jbeamshell.plotting.contacts import contact_map as contact_map
+from jbeamshell.plotting.faces import face_map as face_map
 from jbeamshell.plotting.films import Film as Film
 from jbeamshell.plotting.films import animate as animate
 from jbeamshell.plotting.fits import likelihoods as likelihoods

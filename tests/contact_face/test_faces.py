@@ -11,6 +11,7 @@ import jbeamshell as jb
 from calibration.finite_elements import body as calculix
 from calibration.finite_elements.block import LOAD, SOFTNESS, area
 from jbeamshell.contact_face.body import frames_of
+from jbeamshell.measured.example import data_folder
 
 DATA = Path(__file__).parent
 STRIP = DATA.parent / "contact_line" / "calculix" / "strip.sti"  # by CalculiX 2.20
@@ -26,7 +27,7 @@ def point(normal=0.0):
 
 def block():
     """Block of 6 x 4 x 2 bricks of CalculiX on its 35 nodes."""
-    return jb.FaceBody.read(DATA / "block.npz")
+    return jb.FaceBody.read(data_folder() / "calculix_block.npz")
 
 
 class TestPoint:
