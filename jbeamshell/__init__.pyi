@@ -15,6 +15,11 @@ from .common.errors import (
 )
 from .common.jax_options import configure as configure
 from .contact_face.body import FaceBody as FaceBody
+from .contact_face.modes import (
+    FacePart as FacePart,
+    ModalBodies as ModalBodies,
+    modal_bodies as modal_bodies,
+)
 from .contact_face.solve import solve_faces as solve_faces
 from .contact_line.contact import solve_contact as solve_contact
 from .contact_line.contact_file import read_contact as read_contact

@@ -5,7 +5,7 @@
 | ``.npz`` | of `scipy.sparse.save_npz`, or of `numpy.savez` with ``stiffness`` and ``dofs`` |
 | ``.mat`` | a square matrix, dense or sparse; ``stiffness`` or ``K`` if there are several |
 | ``.mtx`` | Matrix Market, or what CalculiX and Abaqus write for ``*SUBSTRUCTURE GENERATE`` |
-| ``.sti`` | CalculiX's ``*FREQUENCY, SOLVER=MATRIXSTORAGE``, with the ``.dof`` beside it |
+| ``.sti``, ``.mas`` | CalculiX's ``*FREQUENCY, SOLVER=MATRIXSTORAGE``, with the ``.dof`` beside |
 | ``.op4`` | Nastran's OUTPUT4, read by pyyeti |
 """
 
@@ -220,5 +220,6 @@ READERS: dict[str, Callable[[bytes, Path], Rows]] = {
     ".mat": _matlab,
     ".mtx": _text,
     ".sti": _stored,
+    ".mas": _stored,
     ".op4": _nastran,
 }

@@ -44,11 +44,12 @@ class StiffnessModel:
     ----------
     matrix : (N, N) symmetric, dense or scipy sparse
     dofs : (N, 2) node number and direction (1, 2, 3) of each row
+    mass : (N, N) symmetric, or None; only modes need it
 
     Raises
     ------
     InputError
-        if the matrix is not square or not symmetric, if it has no row for each degree of freedom,
+        if a matrix is not square or not symmetric, if it has no row for each degree of freedom,
         or if a node or a direction is no whole number
 
     Examples
@@ -62,17 +63,10 @@ class StiffnessModel:
 
     matrix: Any
     dofs: NDArray[np.int64]
+    mass: Any = None
 
     def __post_init__(self) -> None:
-        matrix = scipy.sparse.csc_array(self.matrix)
-        square = matrix.shape[0] == matrix.shape[1] > 0
-        require("matrix", matrix.shape, square, "must be square")
-        finite = bool(np.all(np.isfinite(matrix.data)))
-        require("matrix", matrix.shape, finite, "must hold finite numbers only")
-        largest = float(np.max(np.abs(matrix.data), initial=0.0))
-        apart = float(abs(matrix - matrix.T).max()) if matrix.nnz else 0.0
-        fix = "is not symmetric: give the whole matrix, or mirror the half that was written"
-        require("matrix", f"max|K - K'| {apart:.3g}", apart <= SYMMETRIC * largest, fix)
+        matrix = _symmetric("matrix", self.matrix)
         dofs = whole_numbers("dofs", self.dofs)
         fix = f"give the node and direction of each of its {matrix.shape[0]} rows"
         require("dofs", dofs.shape, dofs.shape == (matrix.shape[0], 2), fix)
@@ -80,12 +74,23 @@ class StiffnessModel:
         require("dofs", dofs, valid, f"directions are 1 to {DIRECTIONS}, and nodes not negative")
         unique = len({tuple(row) for row in dofs.tolist()}) == len(dofs)
         require("dofs", dofs.shape, unique, "must name each node and direction once")
-        object.__setattr__(self, "matrix", 0.5 * (matrix + matrix.T))
+        object.__setattr__(self, "matrix", matrix)
         object.__setattr__(self, "dofs", dofs)
+        if self.mass is not None:
+            mass = _symmetric("mass", self.mass)
+            require("mass", mass.shape, mass.shape == matrix.shape, f"must be {matrix.shape}")
+            fix = "must be positive on its diagonal: each row needs its mass"
+            require("mass", mass.shape, bool(np.all(mass.diagonal() > 0.0)), fix)
+            object.__setattr__(self, "mass", mass)
 
     @classmethod
     def read(
-        cls, path: str | os.PathLike[str], *, dofs: ArrayLike | None = None, directions: int = 2
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        dofs: ArrayLike | None = None,
+        directions: int = 2,
+        mass: str | os.PathLike[str] | None = None,
     ) -> StiffnessModel:
         """Model in a file, see `jbeamshell.contact_line.matrix_files` for the formats.
 
@@ -94,6 +99,7 @@ class StiffnessModel:
         path : file of the matrix
         dofs : (N, 2) node and direction of each row, where the file does not say them
         directions : rows of each node where neither does; nodes then count from 1
+        mass : file of the mass matrix, its rows in the same order
 
         Raises
         ------
@@ -101,13 +107,18 @@ class StiffnessModel:
             if the file cannot be read or holds no such matrix
         """
         rows = read_matrix(path)
+        masses = None if mass is None else read_matrix(mass)
+        if masses is not None and rows.dofs is not None and masses.dofs is not None:
+            same = np.array_equal(rows.dofs, masses.dofs)
+            require("mass", str(mass), same, "must name the rows of the stiffness, in their order")
+        matrices = rows.matrix, None if masses is None else masses.matrix
         if dofs is not None:
-            return cls(rows.matrix, np.asarray(dofs))
+            return cls(matrices[0], np.asarray(dofs), matrices[1])
         if rows.dofs is not None:
-            return cls(rows.matrix, rows.dofs)
+            return cls(matrices[0], rows.dofs, matrices[1])
         require_count("directions", directions, 1, DIRECTIONS)
         node, direction = np.divmod(np.arange(rows.matrix.shape[0]), directions)
-        return cls(rows.matrix, np.column_stack([node, direction]) + 1)
+        return cls(matrices[0], np.column_stack([node, direction]) + 1, matrices[1])
 
     def condensed(
         self,
@@ -172,7 +183,22 @@ class StiffnessModel:
         stay = [i for i, dof in enumerate(self.dofs.tolist()) if tuple(dof) not in supports]
         fix = "holds the whole body: leave some free"
         require("held", f"{len(supports)} rows", bool(stay), fix)
-        return StiffnessModel(self.matrix[stay][:, stay], self.dofs[stay])
+        mass = None if self.mass is None else self.mass[stay][:, stay]
+        return StiffnessModel(self.matrix[stay][:, stay], self.dofs[stay], mass)
+
+
+def _symmetric(key: str, given: Any) -> scipy.sparse.csc_array:
+    """Sparse matrix, refused unless it is square, finite and symmetric."""
+    matrix = scipy.sparse.csc_array(given)
+    square = matrix.shape[0] == matrix.shape[1] > 0
+    require(key, matrix.shape, square, "must be square")
+    finite = bool(np.all(np.isfinite(matrix.data)))
+    require(key, matrix.shape, finite, "must hold finite numbers only")
+    largest = float(np.max(np.abs(matrix.data), initial=0.0))
+    apart = float(abs(matrix - matrix.T).max()) if matrix.nnz else 0.0
+    fix = "is not symmetric: give the whole matrix, or mirror the half that was written"
+    require(key, f"max|K - K'| {apart:.3g}", apart <= SYMMETRIC * largest, fix)
+    return 0.5 * (matrix + matrix.T)
 
 
 def _groups(contact: ArrayLike) -> tuple[list[int], NDArray[np.float64], NDArray[np.int64]]:
