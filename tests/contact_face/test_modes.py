@@ -87,10 +87,7 @@ class TestModes:
         bodies = jb.modal_bodies(*pressed, friction=0.2)
         assert bodies.touching.all()
         k, m = whole.matrix.toarray(), whole.mass.toarray()
-        values = np.linalg.eigvalsh(
-            np.linalg.solve(np.linalg.cholesky(m), k) @ np.linalg.inv(np.linalg.cholesky(m)).T
-        )
-        assert bodies.omega == pytest.approx(np.sqrt(values[0]), rel=1e-8)
+        assert bodies.omega**2 == pytest.approx(scipy.linalg.eigvalsh(k, m)[0], rel=1e-8)
 
     def test_slip_makes_a_mode_softer_and_its_damping_has_a_peak(self):
         *_, bodies = leaves()
