@@ -38,6 +38,8 @@ from jbeamshell.contact_line.stiffness_model import (
 from jbeamshell.contact_line.substructure import check_energy, read_body, write_body
 
 RIGID = 1e-6  # energy of a rigid motion over that of the nodes alone, from which on it is held
+LOOSE = 1e-9  # of the largest eigenvalue, below which a motion costs no energy
+BENT = 1e-3  # part of a motion without energy that may be no rigid one
 LEVEL = 1e-9  # of a normal, within which it lies along an axis
 NAMES = ("places", "normals", "areas", "stiffness", "forces", "flexibility", "fixed")
 
@@ -62,7 +64,7 @@ class FaceBody(eqx.Module):
     ------
     InputError
         for shapes that do not go together, numbers that are not finite, a matrix that is not
-        symmetric, a negative mode, or rigid motions that some energy resists and others do not
+        symmetric, a negative mode, or a motion without energy that is not rigid
     """
 
     places: Array
@@ -87,7 +89,10 @@ class FaceBody(eqx.Module):
         self.places, self.stiffness = as_leaf(places, "places"), as_leaf(stiffness, "stiffness")
         self.forces = as_leaf(forces, "forces")
         n, loads = self.places.shape[0], self.forces.shape[-1:]
-        self.normals = jnp.broadcast_to(as_leaf(normals, "normals"), (n, 3))
+        normal = as_leaf(normals, "normals")
+        fix = f"give one normal, or one for each of {n} nodes"
+        require("normals", normal.shape, normal.shape in ((3,), (n, 3)), fix)
+        self.normals = jnp.broadcast_to(normal, (n, 3))
         none = jnp.zeros((*loads, *loads))
         self.flexibility = none if flexibility is None else as_leaf(flexibility, "flexibility")
         self.areas = jnp.ones(n) if areas is None else as_leaf(areas, "areas")
@@ -99,6 +104,7 @@ class FaceBody(eqx.Module):
         n, m = self.places.shape[0], self.forces.shape[-1] if self.forces.ndim == 2 else 0
         shapes = {
             "places": (self.places, (n, 3)),
+            "normals": (self.normals, (n, 3)),
             "areas": (self.areas, (n,)),
             "stiffness": (self.stiffness, (3 * n, 3 * n)),
             "forces": (self.forces, (3 * n, m)),
@@ -109,7 +115,7 @@ class FaceBody(eqx.Module):
         require("fixed", len(self.fixed), len(self.fixed) == 3 * n, f"must be {3 * n} truths")
         fix = "need double precision: write jax.config.update('jax_enable_x64', True)"
         require("stiffness", "numbers of 32 bits", self.stiffness.dtype == jnp.float64, fix)
-        if is_traced(*(value for value, _ in shapes.values()), self.normals):
+        if is_traced(*(value for value, _ in shapes.values())):
             return
         for key, (value, _) in shapes.items():
             require_finite(key, value)
@@ -124,18 +130,17 @@ class FaceBody(eqx.Module):
         loads = np.full(self.flexibility.shape[:1], True)
         fix = "has a negative mode: give displacements per load, positive along each load"
         check_energy("flexibility", np.asarray(self.flexibility), loads, 1e-8, fix)
-        if not any(self.fixed):
-            self._check_rigid()
+        self._check_loose(free)
 
-    def _check_rigid(self) -> None:
-        """Refuse a body that moves freely along all axes and resists a turn."""
-        motions = self.rigid_motions()
-        energy = np.einsum("ki,ij,kj->k", motions, np.asarray(self.stiffness), motions)
-        alone = np.einsum("ki,i,ki->k", motions, np.diag(self.stiffness), motions)
-        resisted = energy > RIGID * alone
-        turns = bool(np.any(resisted[3:])) and not np.any(resisted[:3])
-        fix = "moves freely along X, Y and Z and resists a turn: check places, normals and units"
-        require("stiffness", "of a free body", not turns, fix)
+    def _check_loose(self, free: NDArray[np.bool_]) -> None:
+        """Refuse a body that moves without energy and not as a rigid body does."""
+        values, vectors = np.linalg.eigh(np.asarray(self.stiffness)[np.ix_(free, free)])
+        loose = vectors[:, values < LOOSE * values[-1]]
+        rigid = np.linalg.qr(self.rigid_motions()[:, free].T)[0]
+        bent = loose - rigid @ (rigid.T @ loose)
+        most = float(np.max(np.linalg.norm(bent, axis=0), initial=0.0))
+        fix = "its rows do not go with these places and normals, or the bolts hold a loose part"
+        require("stiffness", f"a motion without energy, {most:.2g} not rigid", most < BENT, fix)
 
     @classmethod
     def of(

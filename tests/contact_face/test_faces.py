@@ -235,12 +235,59 @@ class TestRefusals:
         with pytest.raises(jb.UnconvergedError, match="step"):
             jb.solve_faces(block(), friction=0.3, amplitude=2000.0, bolts=10.0, cycles=1)
 
-    def test_a_free_body_with_places_in_other_units_is_refused(self):
-        body = block()
-        with pytest.raises(jb.InputError, match="resists a turn"):
-            jb.FaceBody(
-                np.asarray(body.places) * [1.0, 1e-3, 1.0],
-                body.stiffness,
-                body.forces,
-                body.flexibility,
-            )
+    def test_no_damaged_body_is_taken(self):
+        whole = {name: np.array(getattr(block(), name)) for name in DAMAGED}
+        for seed in range(300):
+            draw = np.random.default_rng(seed)
+            arrays = {name: array.copy() for name, array in whole.items()}
+            DAMAGES[draw.choice(list(DAMAGES))](draw, arrays)
+            with pytest.raises(jb.InputError, match=" = "):
+                jb.FaceBody(**arrays)
+
+
+DAMAGED = ("places", "normals", "areas", "stiffness", "forces", "flexibility")
+
+
+def entry(draw, arrays, value, names=DAMAGED):
+    array = arrays[draw.choice(list(names))]
+    array[tuple(draw.integers(size) for size in array.shape)] = value
+
+
+def unsymmetric(draw, arrays):
+    arrays["stiffness"][3, 7] *= 1.0 + draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-3.0, 1.0)
+
+
+def negative(draw, arrays):
+    way = draw.normal(size=arrays["stiffness"].shape[0])
+    way /= np.linalg.norm(way)
+    size = 10.0 ** draw.uniform(-2.0, 1.0) * np.max(np.diag(arrays["stiffness"]))
+    arrays["stiffness"] -= size * np.outer(way, way)
+
+
+def permuted(draw, arrays):
+    order = draw.permutation(arrays["stiffness"].shape[0])
+    arrays["stiffness"] = arrays["stiffness"][np.ix_(order, order)]
+
+
+def mixed_units(draw, arrays):
+    arrays["places"][:, draw.integers(2)] *= 10.0 ** draw.choice([-3, -1, 1, 3])
+
+
+def short(draw, arrays):
+    name = draw.choice(list(DAMAGED))
+    arrays[name] = arrays[name][:-1]
+
+
+DAMAGES = {
+    "not a number": lambda draw, arrays: entry(draw, arrays, draw.choice([np.nan, np.inf])),
+    "unsymmetric": unsymmetric,
+    "negative": negative,
+    "permuted": permuted,
+    "mixed units": mixed_units,
+    "short": short,
+    "area": lambda draw, arrays: entry(draw, arrays, -draw.random(), ["areas"]),
+    "normal": lambda draw, arrays: entry(draw, arrays, draw.uniform(0.1, 0.9), ["normals"]),
+    "single": lambda _, arrays: arrays.update(
+        stiffness=jnp.asarray(arrays["stiffness"], "float32")
+    ),
+}
