@@ -152,6 +152,19 @@ def test_examples_of_docstrings_run(path, tmp_path, monkeypatch):
     assert not runner.failures, said.getvalue()
 
 
+def faces():
+    """Module that knows the public names of each face of the package."""
+    sys.path.insert(0, str(SITE))
+    try:
+        return importlib.import_module("generate.names")
+    finally:
+        sys.path.remove(str(SITE))
+
+
+def test_every_face_has_public_names():
+    assert all(faces().public(face) for face in faces().FACES)
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """Folder of the built site."""
@@ -172,12 +185,8 @@ class TestSite:
     def test_every_public_name_is_described(self, site):
         from sphinx.util.inventory import InventoryFile
 
-        sys.path.insert(0, str(SITE))
-        try:
-            from generate import names
-        finally:
-            sys.path.remove(str(SITE))
         known = InventoryFile.loads((site / "objects.inv").read_bytes(), uri="")
+        names = faces()
         described = {name for kind in known.data for name in known.data[kind] if kind[:3] == "py:"}
         expected = {
             f"{names.home(face, name)}.{name}"
