@@ -16,8 +16,10 @@ from .common.errors import (
 from .common.jax_options import configure as configure
 from .contact_face.body import FaceBody as FaceBody
 from .contact_face.modes import (
+    FaceCurve as FaceCurve,
     FacePart as FacePart,
     ModalBodies as ModalBodies,
+    face_curve as face_curve,
     modal_bodies as modal_bodies,
 )
 from .contact_face.solve import solve_faces as solve_faces

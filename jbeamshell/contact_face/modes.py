@@ -8,8 +8,9 @@ factor (quasi-static modal analysis: Festjens, Chevallier and Dion 2013; Allen, 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
@@ -17,6 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.linalg import eigsh
 
 from jbeamshell.common.checks import require, require_count
+from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
+from jbeamshell.common.summary import Summary, ranged
 from jbeamshell.contact_face.body import FaceBody
 from jbeamshell.contact_face.solve import solve_faces
 from jbeamshell.contact_line.stiffness_model import StiffnessModel
@@ -99,6 +102,90 @@ def modal_bodies(
     omega, forces = _stuck_mode(parts, touching, mode)
     bodies = [_body(part, pull, normals, areas) for part, pull in zip(parts, forces, strict=True)]
     return ModalBodies(bodies[0], bodies[1] if lower is not None else None, omega, touching)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FaceCurve:
+    """Frequency and damping of a mode over its amplitude, (k,) each.
+
+    Attributes
+    ----------
+    amplitude : modal displacement q
+    frequency : cycles per time
+    damping : damping ratio zeta of the friction on the face
+    dissipation : energy lost per cycle
+    doubts : reasons to doubt a point, the amplitude first
+    """
+
+    amplitude: NDArray[np.float64]
+    frequency: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    dissipation: NDArray[np.float64]
+    doubts: tuple[str, ...]
+
+    def __str__(self) -> str:
+        columns = {
+            "modal displacement": self.amplitude,
+            "frequency": self.frequency,
+            "damping ratio": self.damping,
+            "lost per cycle": self.dissipation,
+        }
+        rows = [(name, ranged(np.asarray(column))) for name, column in columns.items()]
+        notes = [f"doubtful: {doubt}" for doubt in self.doubts]
+        return Summary(f"mode of a face, {len(self.amplitude)} points", rows, notes).as_text()
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw frequency and damping over the amplitude; returns the axes."""
+        from jbeamshell import plotting
+
+        return plotting.modal_curve(self, axes=axes)
+
+
+def face_curve(
+    bodies: ModalBodies, amplitudes: ArrayLike, *, throw: bool = True, **options: Any
+) -> FaceCurve:
+    """Frequency and damping of a mode over its amplitude, from the loops of its contact.
+
+    Parameters
+    ----------
+    bodies : of `modal_bodies`
+    amplitudes : (k,) modal displacements, positive
+    throw : as in `jbeamshell.solve_faces`
+    options : friction, bolts, gap and the like, as `jbeamshell.solve_faces` takes them
+
+    Raises
+    ------
+    InputError
+        for amplitudes that are not positive, or options that make no sense
+    UnconvergedError
+        if a loop has no equilibrium
+    """
+    sizes = np.atleast_1d(np.asarray(amplitudes, float))
+    fix = "give positive modal displacements"
+    require("amplitudes", sizes, bool(np.all(sizes > 0.0) and sizes.ndim == 1), fix)
+    options |= {"control": "displacement", "throw": False}
+    loops = []
+    for size in sizes:
+        loop = solve_faces(bodies.upper, bodies.lower, amplitude=size, **options)
+        if throw and not loop.converged:
+            raise UnconvergedError(
+                f"amplitude {size:.6g}: a step has no equilibrium; take more steps"
+            )
+        loops.append(loop)
+    curve = FaceCurve(
+        amplitude=sizes,
+        frequency=np.sqrt([float(loop.secant_stiffness) for loop in loops]) / (2.0 * np.pi),
+        damping=np.array([0.5 * float(loop.loss_factor) for loop in loops]),
+        dissipation=np.array([float(loop.dissipation) for loop in loops]),
+        doubts=tuple(
+            f"at {size:.4g}: {doubt}"
+            for size, loop in zip(sizes, loops, strict=True)
+            for doubt in loop.doubts
+        ),
+    )
+    if throw:
+        warn_of_doubts(curve.doubts, stacklevel=2)
+    return curve
 
 
 def _body(

@@ -116,20 +116,27 @@ def solve_faces(
     loads = _loads(amplitude, cycles, steps_per_half_cycle, path, sizes)
     driven = _driven(face, rest) if control == "displacement" else face
     half = steps_per_half_cycle if path is None and cycles is None else None
-    levels, count = _walk(driven, loads, assembly == "frictional", half)
+    frictional, most = assembly == "frictional", jnp.asarray(MOST_CYCLES)
+    levels, count = _walk(driven, loads, frictional, half, most)
+    last = loads.shape[0] if half is None else 1 + unit_path(MOST_CYCLES, half).size
     if half is not None and not is_traced(levels):
         last = 1 + unit_path(int(count), half).size
-        levels, loads = jax.tree.map(lambda a: a[:last], (levels, loads))
-    history = _history(upper, face, rest, levels, control, assembly)
+    history = _history(upper, face, rest, _first(levels, last), control, assembly)
     if path is None and not is_traced(history) and history.converged:
-        coarse, _ = _walk(driven, loads[::2], assembly == "frictional", None)
-        coarse_history = _history(upper, face, rest, coarse, control, assembly)
-        apart = history.dissipation - coarse_history.dissipation
+        every_second = None if half is None else half // 2
+        levels, _ = _walk(driven, loads[::2], frictional, every_second, count)
+        coarse = _history(upper, face, rest, _first(levels, last // 2 + 1), control, assembly)
+        apart = history.dissipation - coarse.dissipation
         history = eqx.tree_at(lambda h: h.change, history, apart)
     if not is_traced(history) and throw:
         _demand(history)
         warn_of_doubts(history.doubts, stacklevel=2)
     return history
+
+
+def _first(levels: Levels, count: int) -> Levels:
+    """First levels of a path."""
+    return jax.tree.map(lambda a: a[:count], levels)
 
 
 def _check_bodies(upper: FaceBody, lower: FaceBody | None) -> None:
@@ -294,7 +301,9 @@ def _driven(face: Face, rest: Array) -> Face:
 
 
 @eqx.filter_jit
-def _walk(face: Face, loads: Array, frictional: bool, half: int | None) -> tuple[Levels, Array]:
+def _walk(
+    face: Face, loads: Array, frictional: bool, half: int | None, most: Array
+) -> tuple[Levels, Array]:
     """Levels of the path, and the number of cycles until it is steady, see `_until_steady`.
 
     The pressing, its first level (m,), is taken in steps.
@@ -316,23 +325,24 @@ def _walk(face: Face, loads: Array, frictional: bool, half: int | None) -> tuple
     if half is None:
         rest, count = _steps(face, begin, loads[1:]), jnp.asarray(0)
     else:
-        rest, count = _until_steady(face, begin, loads[1:], half)
+        rest, count = _until_steady(face, begin, loads[1:], half, most)
     return jax.tree.map(lambda a, b: jnp.concatenate([a, b]), pressed, rest), count
 
 
 def _until_steady(
-    face: Face, begin: tuple[Array, Array], loads: Array, half: int
+    face: Face, begin: tuple[Array, Array], loads: Array, half: int, most: Array
 ) -> tuple[Levels, Array]:
     """Levels of the first loading and of all cycles, and the number of those that were taken.
 
-    A cycle is steady if its slip ends where it began.  The cycles after it are copies.
+    A cycle is steady if its slip ends where it began.  The cycles after it are copies, and so are
+    those after as many as are wanted at most.
     """
     rise = loads.shape[0] - 2 * half * MOST_CYCLES
     first = _steps(face, begin, loads[:rise])
     cycle = loads[rise : rise + 2 * half]
 
     def go(
-        carry: tuple[Levels, Array], _: None
+        carry: tuple[Levels, Array], number: Array
     ) -> tuple[tuple[Levels, Array], tuple[Levels, Array]]:
         before, steady = carry
 
@@ -344,10 +354,11 @@ def _until_steady(
         apart = jnp.max(jnp.abs(ends[-1] - lax.stop_gradient(before.slip[-1])))
         repeats = apart <= REPEATS * jnp.max(jnp.ptp(ends, axis=0))
         lost = ~(now.error[-1] <= TOLERANCE)
-        return (now, steady | repeats | lost), (now, steady)
+        ends_here = repeats | lost | (number + 1 >= most)
+        return (now, steady | ends_here), (now, steady)
 
     start = jax.tree.map(lambda a: jnp.broadcast_to(a[-1], (2 * half, *a.shape[1:])), first)
-    _, (cycles, copied) = lax.scan(go, (start, jnp.asarray(False)), length=MOST_CYCLES)
+    _, (cycles, copied) = lax.scan(go, (start, jnp.asarray(False)), jnp.arange(MOST_CYCLES))
     flat = jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:]), cycles)
     levels = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), first, flat)
     return levels, jnp.sum(~copied)

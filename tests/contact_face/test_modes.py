@@ -40,19 +40,7 @@ def leaves():
     return upper, lower, jb.modal_bodies(upper, lower, friction=0.2, bolts=2e3)
 
 
-def loop_of(amplitude, **options):
-    *_, bodies = leaves()
-    return jb.solve_faces(
-        bodies.upper,
-        bodies.lower,
-        friction=0.2,
-        bolts=2e3,
-        amplitude=amplitude,
-        cycles=1,
-        steps_per_half_cycle=16,
-        throw=False,
-        **options,
-    )
+OPTIONS = {"friction": 0.2, "bolts": 2e3, "steps_per_half_cycle": 16}
 
 
 class TestBricks:
@@ -68,9 +56,8 @@ class TestBricks:
 class TestModes:
     def test_bodies_without_slip_have_the_frequency_of_their_mode(self):
         *_, bodies = leaves()
-        omega = bodies.omega
-        small = loop_of(1e-9 * omega**2)
-        assert float(small.secant_stiffness) == pytest.approx(omega**2, rel=1e-3)
+        curve = jb.face_curve(bodies, [1e-9], **OPTIONS, throw=False)
+        assert float(curve.frequency[0]) == pytest.approx(bodies.omega / (2 * np.pi), rel=1e-3)
 
     def test_all_pairs_tied_are_one_body(self):
         whole, _ = box(
@@ -91,18 +78,15 @@ class TestModes:
 
     def test_slip_makes_a_mode_softer_and_its_damping_has_a_peak(self):
         *_, bodies = leaves()
-        loops = [loop_of(size * bodies.omega**2) for size in AMPLITUDES]
-        stiffness = [float(loop.secant_stiffness) for loop in loops]
-        damping = [0.5 * float(loop.loss_factor) for loop in loops]
-        assert np.all(np.diff(stiffness) < 0.0)
-        assert 0.0 < damping[0] < 0.1 * damping[1]
-        assert damping[2] < damping[1]  # once all of it slides, only the elastic energy grows
+        curve = jb.face_curve(bodies, [2e-5, 1e-4, 3e-4], **OPTIONS, throw=False)
+        assert np.all(np.diff(curve.frequency) < 0.0)
+        low, peak, high = map(float, curve.damping)
+        assert 0.0 < low < 0.2 * peak
+        assert high < peak  # once all of it slides, only the elastic energy grows
+        assert "modal displacement" in str(curve)
 
     def test_a_model_without_mass_is_refused(self):
         upper, lower, _ = leaves()
         model = jb.StiffnessModel(upper.model.matrix, upper.model.dofs)
         with pytest.raises(jb.InputError, match="mass="):
             jb.modal_bodies(upper._replace(model=model), lower)
-
-
-AMPLITUDES = (2e-5, 1e-4, 3e-4)
