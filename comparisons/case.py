@@ -27,12 +27,12 @@ class Source:
     ----------
     citation : author, year, title and place, or an address
     licence : of the numbers; "formula" if a formula was taken, which has none
-    opened : the text or the file that was read: "itself", or through which other text
+    opened : sentence on what was read, if it is not the source itself
     """
 
     citation: str
     licence: str = "formula"
-    opened: str = "itself"
+    opened: str = ""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ from comparisons.case import Case, Floats, Source
 from comparisons.finite_elements import frictionless
 from jbeamshell import reference
 
-THROUGH = "through Brink 2015"
+THROUGH = "Read through Brink 2015."
+AGAIN = "Not opened: derived again."
 BRINK = Source(
     "A. R. Brink, Modeling complex contact phenomena with nonlinear beamshells, dissertation, "
     "The University of Akron, 2015",
@@ -27,12 +28,12 @@ GOODMAN = Source(
 METHERELL = Source(
     "A. F. Metherell and S. V. Diller, Instantaneous energy dissipation rate in a lap joint: "
     "uniform clamping pressure, J. Appl. Mech. 35 (1968) 123-128",
-    opened="not: derived again",
+    opened=AGAIN,
 )
 KLUMPP = Source(
     "L. E. Goodman and J. H. Klumpp, Analysis of slip damping with reference to turbine-blade "
     "vibration, J. Appl. Mech. 23 (1956) 421-429",
-    opened="not: derived again",
+    opened=AGAIN,
 )
 MINDLIN = Source(
     "R. D. Mindlin and H. Deresiewicz, Elastic spheres in contact under varying oblique forces, "
@@ -43,17 +44,17 @@ CATTANEO = Source(
     "C. Cattaneo, Sul contatto di due corpi elastici, Rend. Accad. Naz. Lincei 27 (1938) 342-348; "
     "M. Ciavarella, The generalized Cattaneo partial slip plane contact problem, Int. J. Solids "
     "Structures 35 (1998) 2349-2378",
-    opened="not: derived again",
+    opened=AGAIN,
 )
 FILON = Source(
     "L. N. G. Filon, On an approximate solution for the bending of a beam of rectangular "
     "cross-section under any system of load, Phil. Trans. R. Soc. A 201 (1903) 63-155",
-    opened="not: derived again",
+    opened=AGAIN,
 )
 BARBER = Source(
     "J. R. Barber, Contact Mechanics, Springer 2018, chapter 11 (its summary), on Filon 1903",
     "figure quoted",
-    "in the publisher's summary",
+    "Read in the publisher's summary.",
 )
 COKER = Source(
     "E. G. Coker and L. N. G. Filon, A Treatise on Photo-Elasticity, Cambridge 1931",
@@ -73,7 +74,7 @@ LAYER = Source(
 )
 TIMOSHENKO = Source(
     "S. Timoshenko, Analysis of bi-metal thermostats, J. Opt. Soc. Am. 11 (1925) 233-255",
-    opened="not: derived again",
+    opened=AGAIN,
 )
 HEIGHTS = np.array([0.0305, 0.0716, 0.1126, 0.1537, 0.1947, 0.2358, 0.2768, 0.3179, 0.3589, 0.4])
 LENGTH = 20.0  # half of a pressed strip, mm

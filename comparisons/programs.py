@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 import jbeamshell as jb
 from comparisons.case import Case, Floats, Source
 from comparisons.closed_forms import cylinder, stuck_parts
+from comparisons.measured import recorded
 from jbeamshell import laws, reference
 
 CONTACT = Source(
@@ -21,12 +24,17 @@ FRONTISTR = Source(
     "FrontISTR, NAFEMS contact patch test CGS-4, "
     "https://gitlab.com/FrontISTR-Commons/FrontISTR/-/merge_requests/599",
     "MIT, figures quoted",
-    "in the text of the merge request; its input files were not run",
+    "Read in the text of the merge request; its input files were not run.",
 )
 TMDSIMPY = Source(
     "J. H. Porter, tmdsimpy, https://github.com/tmd-lab/tmdsimpy at 17d5fc3; its VectorIwan4 with "
     "1000 sliders was run over 4096 points of a cosine",
     "MIT, figures of own runs",
+)
+EPMC = Source(
+    "J. H. Porter, tmdsimpy, https://github.com/tmd-lab/tmdsimpy at 17d5fc3, "
+    "examples/structures/results/brb_epmc_flat.yaml and brb_epmc_meso.yaml",
+    "MIT; derived figures only",
 )
 OPENSEES = Source(
     "OpenSees 3.7.1 (openseespy 3.7.1.2), uniaxialMaterial BoucWen in 4000 steps for each branch",
@@ -70,6 +78,33 @@ def bouc_wen() -> Floats:
         for bend in (0.5, 0.8)
     ]
     return np.concatenate([np.asarray(force) for force in forces])
+
+
+def beam(kind: str, what: str) -> tuple[Callable[[], Floats], Callable[[], Floats]]:
+    """One, and the recorded ratio of ours to theirs, at the amplitudes that were not fitted."""
+
+    def ratio() -> Floats:
+        return np.array(recorded("backbones")[kind][f"{what}_over_theirs"])
+
+    return lambda: np.ones_like(ratio()), ratio
+
+
+def backbone(kind: str, what: str, bound: float, explained: str = "") -> Case:
+    """Case of one computed curve of the bolted beam."""
+    surface = {"flat": "flat", "meso": "measured, wavy"}[kind]
+    return Case(
+        f"beam of tmdsimpy, {kind}, {what}",
+        "other program",
+        EPMC,
+        f"{what} over theirs at every other of the amplitudes, over three decades",
+        f"first mode of the Brake-Reuss beam, {surface} interface of rough contact; one mode with "
+        "an Iwan element",
+        *beam(kind, what),
+        bound,
+        explained=explained,
+        fitted="the other half of the amplitudes, frequency and damping together",
+        held_out=0.5,
+    )
 
 
 CASES = (
@@ -133,6 +168,16 @@ CASES = (
         ],
         iwan,
         0.001,
+    ),
+    backbone("flat", "frequency", 0.005),
+    backbone("flat", "damping", 0.25, "theirs grows faster than any law of sliders with chi <= 0"),
+    backbone("meso", "frequency", 0.01),
+    backbone(
+        "meso",
+        "damping",
+        0.75,
+        "patches of a wavy interface let go one by one; damping grows nearly with the square of "
+        "the amplitude, and no law of sliders with chi <= 0 does",
     ),
     Case(
         "Bouc-Wen of OpenSees",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from comparisons.case import Floats, Result
+from comparisons.case import Floats, Result, Source
 
 KINDS = {
     "closed form": "Closed forms",
@@ -84,10 +84,9 @@ def _row(result: Result, number: int) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def _source(number: int, source: object) -> str:
-    citation, licence, opened = (getattr(source, k) for k in ("citation", "licence", "opened"))
-    through = "" if opened == "itself" else f" Read {opened}."
-    return f"{number}. {citation}. {licence[0].upper() + licence[1:]}.{through}"
+def _source(number: int, source: Source) -> str:
+    licence = source.licence[0].upper() + source.licence[1:]
+    return f"{number}. {source.citation}. {licence}. {source.opened}".rstrip()
 
 
 def _numbers(values: Floats) -> str:
