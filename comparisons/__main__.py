@@ -14,7 +14,7 @@ jax.config.update("jax_enable_x64", True)
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
-from comparisons import all_cases, table  # noqa: E402
+from comparisons import all_cases, measurements, table  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 
 HERE = Path(__file__).parent
@@ -26,15 +26,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("name", nargs="*", help="words of the names of the cases (default: all)")
     parser.add_argument("--data", type=Path, help="folder of measurements, to take them again")
     options = parser.parse_args(arguments)
-    jb.configure()
-    if options.data is not None:
-        from comparisons import measurements
-
-        measurements.record(options.data)
     cases = all_cases()
     chosen = [c for c in cases if not options.name or any(word in c.name for word in options.name)]
     if not chosen:
         parser.error("no such case: choose among " + ", ".join(case.name for case in cases))
+    jb.configure()
+    if options.data is not None:
+        measurements.record(options.data)
     results = [case.run() for case in tqdm(chosen, disable=None, unit="case")]
     print(table.as_text(results))
     if len(chosen) == len(cases):

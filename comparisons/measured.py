@@ -202,7 +202,7 @@ CASES = (
         (0.06, 0.25),
         (
             "backlash loses length, not force; the bar's rounded shoulder stands for it",
-            "stick-slip peaks of one sign, which a law without them leaves out",
+            "one direction sticks and slips with peaks, which the law averages",
         ),
     ),
     *pair(
@@ -213,7 +213,7 @@ CASES = (
         "the mean of the first half of 8 cycles, by five laws; the criterion chose Bouc-Wen",
         0.5,
         (0.02, 0.05),
-        ("", "the measured force peaks at the shoulder"),
+        ("", "the measured friction changes along the stroke and with the direction"),
     ),
     Case(
         "bending of a stranded conductor",
@@ -225,7 +225,7 @@ CASES = (
         moment,
         0.06,
         each=False,
-        explained="the points are scattered about any smooth curve",
+        explained="the moment goes on rising by the wires' own bending, which a law of slip has not",
         fitted="every other point, by four laws",
         held_out=0.5,
     ),

@@ -69,12 +69,12 @@ def _row(result: Result, number: int) -> str:
     case = result.case
     difference = percent(result.difference) + ("" if result.within else ", outside")
     notes = [case.compared]
-    notes += [f"Fitted: {case.fitted}."] if case.fitted else []
-    notes += [f"Set: {case.settings}."] if case.settings else []
+    notes += [f"Fitted: {case.fitted}"] if case.fitted else []
+    notes += [f"Set: {case.settings}"] if case.settings else []
     why = f": {case.explained}" if case.explained else ""
     cells = (
         case.name,
-        " ".join(notes),
+        ". ".join(notes),
         case.condition,
         _numbers(result.theirs),
         _numbers(result.ours),
