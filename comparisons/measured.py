@@ -225,7 +225,7 @@ CASES = (
         moment,
         0.06,
         each=False,
-        explained="the moment goes on rising by the wires' own bending, which a law of slip has not",
+        explained="the moment goes on rising, by the bending of the wires, which laws of slip lack",
         fitted="every other point, by four laws",
         held_out=0.5,
     ),

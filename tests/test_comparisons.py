@@ -79,7 +79,7 @@ def test_a_page_has_a_row_for_each_case_and_its_source():
     assert "1. nobody. Formula." in page
 
 
-@pytest.mark.slow(minutes=6)
+@pytest.mark.slow
 @pytest.mark.parametrize("one", CASES, ids=lambda one: one.name)
 def test_each_case_is_within_its_bound(one):
     result = one.run()
