@@ -11,7 +11,7 @@ PACKAGE = Path(jbeamshell.__file__).parent
 FACES = {  # heading of the page of each face
     "jbeamshell": "jbeamshell: scenes, runs, sweeps",
     "jbeamshell.scene.library": "jb.library: scenes that ship",
-    "jbeamshell.condensed": "jb.condensed: exact cycles on the contact line",
+    "jbeamshell.contact_line": "jb.contact_line: exact cycles on the contact line",
     "jbeamshell.measured": "jb.measured: recordings, loops, curves",
     "jbeamshell.identify": "jb.identify: fits and their uncertainty",
     "jbeamshell.dynamics": "jb.dynamics: ring-down, structures, export",
