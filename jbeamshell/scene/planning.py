@@ -7,6 +7,8 @@ rules were measured (calibration/campaign.py, calibration/default_settings.py).
   see `jbeamshell.scene.linearisation`.
 * The section is the beamshell's with its squeeze strain, or plane elasticity where that is known to
   be needed, see `jbeamshell.scene.section_error`.
+* A strip that is only pressed, and unevenly, is plane elasticity on small elements: with one
+  squeeze strain through its height it lifts off too near to the edge of a pressure.
 * A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
   in time; its strain energy may be a quadratic one of the user's own.  So are plane elasticity and
   lap joints.  A bar under an even pressure has a closed form.  Any other strip is solved in load
@@ -72,6 +74,7 @@ CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20, halvings=2)
 SOFT_CONTACT_LINE = Grid(97, 2.0**-16 / 48.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
 MOST_REFINED = 513  # nodes of a grid that was refined
 PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
+PRESSED_SIZE = 0.125  # largest elements over H of a strip that is only pressed
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
 BOTH_ENDS = 1.75  # of the elements, for corners at both ends of a lap joint
@@ -96,8 +99,8 @@ def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
         kinematics = _kinematics(scene, numbers)
     if section == AUTO:
         elastic = kinematics == "linear" and may_be_elastic(scene, numbers)
-        elastic = elastic and _squeeze_error(scene, numbers) > SECTION_PART * model.tolerance
-        section = "plane" if elastic else "squeeze"
+        off = only_pressed(scene) or _squeeze_error(scene, numbers) > SECTION_PART * model.tolerance
+        section = "plane" if elastic and off else "squeeze"
     engine = _engine(scene, section, kinematics)
     lifts = section != "bar" and contact.normal != "held"
     opens = lifts and scene.strip.curvature is None
@@ -108,7 +111,7 @@ def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
         kinematics,
         engine,
         lifts,
-        nodes=_nodes(grid, scene) if model.nodes == AUTO else model.nodes,
+        nodes=_nodes(grid, scene, numbers) if model.nodes == AUTO else model.nodes,
         end_size=grid.end_size if model.end_size == AUTO else float(model.end_size),
         steps=steps if load.steps_per_half_cycle == AUTO else load.steps_per_half_cycle,
     )
@@ -148,13 +151,21 @@ def _has_closed_form(scene: Parts) -> bool:
 
 def has_contact_line(scene: Parts) -> bool:
     """True if a strip with linear kinematics can be solved on its contact line."""
-    contact, load = scene.contact, scene.load
     if scene.member.support != "none":
         return True
-    base = contact.normal == "rigid" and isinstance(contact.law, SharpSlip)
-    straight = scene.strip.curvature is None and scene.model.grid == "finite-difference"
-    cycling = load.control in CONTROLS and load.cycles > 0
-    return base and straight and cycling
+    return _is_straight(scene) and scene.load.control in CONTROLS and scene.load.cycles > 0
+
+
+def only_pressed(scene: Parts) -> bool:
+    """True if a single strip on its base has no load but a pressure that may leave gaps."""
+    pressed = scene.load.cycles == 0 and scene.contact.pressure.ndim > 0
+    return pressed and scene.member.support == "none" and _is_straight(scene)
+
+
+def _is_straight(scene: Parts) -> bool:
+    """True for a straight strip on a rigid base with sharp friction."""
+    base = scene.contact.normal == "rigid" and isinstance(scene.contact.law, SharpSlip)
+    return base and scene.strip.curvature is None and scene.model.grid == "finite-difference"
 
 
 def may_be_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
@@ -175,7 +186,8 @@ def may_be_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
     if is_traced(kappa_s):
         return scene.plan is not None and has_contact_line(scene)
     factors = (numbers or scene.number)(KAPPA_S)
-    return bool(np.all(factors == TABLE[KAPPA_S].default)) and has_contact_line(scene)
+    solvable = has_contact_line(scene) or only_pressed(scene)
+    return bool(np.all(factors == TABLE[KAPPA_S].default)) and solvable
 
 
 def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:
@@ -228,14 +240,20 @@ def _is_soft(scene: Parts, numbers: Numbers | None) -> bool:
     return not np.all(np.isnan(numbers("contact.stick_stiffness")))
 
 
-def _nodes(grid: Grid, scene: Parts) -> int:
+def _nodes(grid: Grid, scene: Parts, numbers: Numbers | None = None) -> int:
     """Odd number of nodes of a grid for a scene's tolerance."""
+    if grid is PLANE and only_pressed(scene) and is_traced(scene.strip) and scene.plan is not None:
+        return scene.plan.nodes
     elements = (grid.nodes - 1) * (KNOWN / scene.model.tolerance) ** (1.0 / grid.order)
     if grid in (CONTACT_LINE, SOFT_CONTACT_LINE):
         jumps = scene.contact.jumps + scene.member.jumps
         elements *= 1.0 + PER_STEP * min(jumps, MOST_JUMPS)
     elif grid is PLANE and scene.member.support != "none":
         elements *= BOTH_ENDS
+    elif grid is PLANE and only_pressed(scene) and not is_traced(scene.strip):
+        length, height = map(numbers or scene.number, ("strip.length", "strip.half_height"))
+        even = float(np.max(length / height)) / PRESSED_SIZE
+        elements = min(elements + even, max(elements, MOST_REFINED - 1))
     return 2 * int(np.ceil(elements / 2.0)) + 1
 
 

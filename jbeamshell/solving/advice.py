@@ -11,7 +11,7 @@ from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.friction import SharpSlip
 from jbeamshell.scene.keys import CONTROLS, KAPPA_S, TABLE
 from jbeamshell.scene.load_path import check
-from jbeamshell.scene.planning import has_contact_line, may_be_elastic, reference
+from jbeamshell.scene.planning import has_contact_line, may_be_elastic, only_pressed, reference
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import SectionError, known_beforehand
@@ -85,7 +85,9 @@ def advise(scene: Scene, tolerance: float | None = None) -> Advice:
         return Advice(scene, reference(scene), _why_not(scene), None)
     at = "for slip as long as a bar's"
     if scene.plan.elastic:
-        if known is None:
+        if only_pressed(scene):
+            text = "a squeeze section lifts off too near to the edge of a pressure"
+        elif known is None:
             text = "no curve says how far a squeeze section is off for such a scene"
         else:
             text = f"a squeeze section may be off by {_percent(known)} {at}"

@@ -113,6 +113,22 @@ def test_a_bar_has_a_closed_form_where_it_is_goodmans(values, engine):
     assert bar.by_load_steps().plan.engine == STEPS
 
 
+def test_a_strip_that_is_pressed_unevenly_alone_is_plane_elasticity():
+    pressed = {"load.cycles": 0, "contact.pressure": [[0.0, 10.0], [1.0, 10.0], [1.0, 0.0]]}
+    scene = jb.Scene().replace(pressed | {"strip.half_height": 0.02})
+    assert (scene.plan.section, scene.plan.nodes) == ("plane", 513)  # 50 times as long as high
+    thick = scene.replace({"strip.half_height": 0.2})
+    assert thick.plan.nodes == jb.Scene().replace({"model.section": "plane"}).plan.nodes + 80
+    for more in (
+        {"contact.pressure": 10.0},
+        {"strip.kappa_s": 1.0},
+        {"contact.normal": "held"},
+        {"model.section": "squeeze"},
+    ):
+        assert scene.replace(more).plan.section == "squeeze"
+    assert "too near to the edge of a pressure" in jb.advise(scene).reason
+
+
 def test_load_steps_stick_through_changes():
     steps = jb.Scene().by_load_steps()
     assert steps.plan.engine == STEPS

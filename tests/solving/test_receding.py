@@ -140,6 +140,16 @@ def test_a_point_load_lifts_the_strip_beyond_three_quarters_of_its_height():
 
 
 @pytest.mark.slow
+def test_a_plain_call_lifts_off_where_elasticity_does():
+    """Contact under a point load, of the singular integral equation of strip and base."""
+    pressed = [[0.0, 100.0], [0.05, 100.0], [0.05, 0.0], [20.0, 0.0]]
+    values = {"strip.length": 20.0, "strip.half_height": 1.0, "contact.pressure": pressed}
+    history = jb.solve(jb.Scene().replace(values | {"load.cycles": 0, "contact.friction": 0.0}))
+    length = jb.reference.strip_contact_length(2.0, "rigid")
+    assert float(history.contact_end[0]) == pytest.approx(float(length), rel=0.005)
+
+
+@pytest.mark.slow
 def test_the_assumed_squeeze_strain_is_what_it_says():
     history = jb.solve(library.receding_421())
     pressed = np.interp(history.x, [0, 2.405, 2.5], [1000, 1000, 0])

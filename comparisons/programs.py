@@ -1,0 +1,203 @@
+"""Other programs: what their makers publish of them, and what was run for this project."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+import jbeamshell as jb
+from comparisons.case import Case, Floats, Source
+from comparisons.closed_forms import cylinder, stuck_parts
+from comparisons.measured import recorded
+from jbeamshell import laws, reference
+
+CONTACT = Source(
+    "E. Vollebregt, CONTACT, case cattaneo, https://github.com/eve70a/CONTACT at d431cdb",
+    "Apache-2.0, one figure quoted",
+)
+LEVEL_SET = Source(
+    "LevelSetWear, cylinder on flat, https://github.com/illavori/LevelSetWear at f5a3cad",
+    "BSD-3-Clause, figures quoted",
+)
+FRONTISTR = Source(
+    "FrontISTR, NAFEMS contact patch test CGS-4, "
+    "https://gitlab.com/FrontISTR-Commons/FrontISTR/-/merge_requests/599",
+    "MIT, figures quoted",
+    "Read in the text of the merge request; its input files were not run.",
+)
+TMDSIMPY = Source(
+    "J. H. Porter, tmdsimpy, https://github.com/tmd-lab/tmdsimpy at 17d5fc3; its VectorIwan4 with "
+    "1000 sliders was run over 4096 points of a cosine",
+    "MIT, figures of own runs",
+)
+EPMC = Source(
+    "J. H. Porter, tmdsimpy, https://github.com/tmd-lab/tmdsimpy at 17d5fc3, "
+    "examples/structures/results/brb_epmc_flat.yaml and brb_epmc_meso.yaml",
+    "MIT; derived figures only",
+)
+OPENSEES = Source(
+    "OpenSees 3.7.1 (openseespy 3.7.1.2), uniaxialMaterial BoucWen in 4000 steps for each branch",
+    "figures of own runs",
+)
+SLOPE, FRICTION = 0.1, 0.3  # of the patch test
+IWAN = (1000.0, 2e6, -0.5, 0.3)  # F_S, K_T, chi, beta
+AMPLITUDES = np.array([1e-4, 3e-4, 6e-4, 9e-4, 2e-3])
+TURNS = np.array([0.05, -0.03, 0.04, -0.05, 0.05])  # nested reversals
+
+
+def patch_test() -> float:
+    """Force over weight that moves a block up a slope, from our friction over normal force."""
+    pressed = 10.0
+    values = {"contact.friction": FRICTION, "contact.pressure": pressed, "load.entry": "traction"}
+    driven = {"load.control": "displacement", "load.amplitude": 2e-3, "strip.far_end": "free"}
+    history = jb.solve(jb.Scene().replace(values | driven))
+    ratio = float(np.max(history.force)) / (pressed * float(history.scene.strip.length))
+    return (SLOPE + ratio) / (1.0 - ratio * SLOPE)
+
+
+def sphere() -> float:
+    """Shift of a sphere, mm, at .875 of gross slip."""
+    slip = 0.4 * 9.195
+    law = reference.sphere_law(slip, 1.0, reference.pair_compliance(200.0, 0.42))
+    return float(law.displacement(0.875 * slip))
+
+
+def iwan() -> Floats:
+    """Energy of a cycle, and largest force, of five amplitudes."""
+    law = laws.Iwan4(*IWAN)
+    return np.append(law.dissipation(AMPLITUDES), law.backbone(AMPLITUDES))
+
+
+def bouc_wen() -> Floats:
+    """Forces at the turns, for straight and for bent unloading."""
+    forces = [
+        laws.BoucWen(
+            slip_force=1.2, stiffness=50.0, exponent=2.0, unloading=bend, hardening=0.1
+        ).path_forces(TURNS)
+        for bend in (0.5, 0.8)
+    ]
+    return np.concatenate([np.asarray(force) for force in forces])
+
+
+def beam(kind: str, what: str) -> tuple[Callable[[], Floats], Callable[[], Floats]]:
+    """One, and the recorded ratio of ours to theirs, at the amplitudes that were not fitted."""
+
+    def ratio() -> Floats:
+        return np.array(recorded("backbones")[kind][f"{what}_over_theirs"])
+
+    return lambda: np.ones_like(ratio()), ratio
+
+
+def backbone(kind: str, what: str, bound: float, explained: str = "") -> Case:
+    """Case of one computed curve of the bolted beam."""
+    surface = {"flat": "flat", "meso": "measured, wavy"}[kind]
+    return Case(
+        f"beam of tmdsimpy, {kind}, {what}",
+        "other program",
+        EPMC,
+        f"{what} over theirs at every other of the amplitudes, over three decades",
+        f"first mode of the Brake-Reuss beam, {surface} interface of rough contact; one mode with "
+        "an Iwan element",
+        *beam(kind, what),
+        bound,
+        explained=explained,
+        fitted="the other half of the amplitudes, frequency and damping together",
+        held_out=0.5,
+    )
+
+
+CASES = (
+    Case(
+        "contact patch test of FrontISTR",
+        "other program",
+        FRONTISTR,
+        "force over weight at which a block slides up a slope of .1, mu = .3",
+        "equilibrium of the block; our friction force of gross slip, driven by displacement",
+        [0.412168, 0.412371],  # FrontISTR, closed form
+        lambda: [patch_test()] * 2,
+        0.002,
+    ),
+    Case(
+        "shift of a sphere by CONTACT",
+        "other program",
+        CONTACT,
+        "tangential shift at .875 of gross slip",
+        "half-spaces, G = 200 MPa, nu = .42; their grid of elements, our closed form",
+        8.155e-3,
+        sphere,
+        0.005,
+    ),
+    Case(
+        "cylinder of LevelSetWear",
+        "other program",
+        LEVEL_SET,
+        "part that sticks at half of gross slip, part without counter-slip back at no force",
+        "their finite elements of a cylinder, our half-planes of equal material on 161 nodes",
+        [0.70711, 0.86603],
+        stuck_parts,
+        0.005,
+    ),
+    Case(
+        "largest pressure of LevelSetWear",
+        "other program",
+        LEVEL_SET,
+        "largest pressure under a cylinder over that of the mean over its width",
+        "their finite elements, 120 N/mm on a half width of .091336 mm; our half-planes",
+        836.41 / (120.0 / (2.0 * 0.091336)),
+        lambda: 2.0 * float(np.max(np.asarray(cylinder().reaction[0]))),
+        0.01,
+    ),
+    Case(
+        "four-parameter Iwan of tmdsimpy",
+        "other program",
+        TMDSIMPY,
+        "energy of a cycle, and largest force, five amplitudes from micro-slip to gross slip",
+        "F_S = 1 kN, K_T = 2 kN/mm, chi = -.5, beta = .3; their sliders, our closed form",
+        [
+            0.0025617594539495553,
+            0.03992707991827644,
+            0.22585498419751968,
+            0.6223789142194102,
+            4.759013301897151,
+            167.9865552786903,
+            433.6461874382949,
+            729.4775909195557,
+            935.593769244408,
+            1000.0015036544809,
+        ],
+        iwan,
+        0.001,
+    ),
+    backbone("flat", "frequency", 0.005),
+    backbone("flat", "damping", 0.25, "theirs grows faster than any law of sliders with chi <= 0"),
+    backbone("meso", "frequency", 0.01),
+    backbone(
+        "meso",
+        "damping",
+        0.75,
+        "patches of a wavy interface let go one by one; damping grows nearly with the square of "
+        "the amplitude, and no law of sliders with chi <= 0 does",
+    ),
+    Case(
+        "Bouc-Wen of OpenSees",
+        "other program",
+        OPENSEES,
+        "force at the turns of nested reversals, straight and bent unloading",
+        "n = 2, a tenth of the stiffness remains; their steps, our exact path",
+        [
+            1.2969753958166144,
+            -1.211008236611767,
+            1.2357220506443574,
+            -1.3218661804219585,
+            1.3262080651866832,
+            1.2969753958166144,
+            -1.2155470994975608,
+            1.2463481915429575,
+            -1.3236920843161306,
+            1.3271607780458827,
+        ],
+        bouc_wen,
+        0.001,
+    ),
+)

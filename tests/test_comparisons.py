@@ -1,0 +1,86 @@
+"""The comparisons: each is whole, its record is of today's cases, and it keeps its bound."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import comparisons
+from comparisons import measurements, table
+from comparisons.__main__ import main
+from comparisons.case import Case, Source
+
+HERE = Path(comparisons.__file__).parent
+CASES = comparisons.all_cases()
+SOURCE = Source("nobody")
+
+
+def case(theirs, ours, bound=0.1, **more):
+    return Case("a", "closed form", SOURCE, "b", "c", theirs, lambda: ours, bound, **more)
+
+
+def test_the_largest_difference_counts():
+    assert case([1.0, 2.0], [1.0, 2.1]).run().difference == pytest.approx(0.05)
+    assert case([0.1, 2.0], [0.2, 2.0]).run().difference == pytest.approx(1.0)
+    assert case([0.1, 2.0], [0.2, 2.0], each=False).run().difference == pytest.approx(0.05)
+    assert case([1.0], [1.2]).run().within is False
+    assert case([1.0], [np.nan]).run().within is False
+    with pytest.raises(ValueError, match="a: "):
+        case([1.0, 2.0], 1.0).run()
+
+
+def test_every_case_says_what_it_is():
+    names = [one.name for one in CASES]
+    assert len(set(names)) == len(names)
+    for one in CASES:
+        assert one.kind in table.KINDS, one.name
+        assert one.source.citation
+        assert one.compared
+        assert one.condition
+        assert (one.held_out > 0.0) <= bool(one.fitted), one.name
+    assert not [one.name for one in CASES if one.settings]  # each runs without one
+
+
+def test_the_record_is_of_these_cases_and_explains_its_differences():
+    rows = json.loads((HERE / "results.json").read_text("utf-8"))
+    assert [row["name"] for row in rows] == [one.name for one in CASES]
+    for row in rows:
+        assert row["within"], row["name"]
+        assert row["difference"] <= table.EXPLAINED or row["explained"], row["name"]
+
+
+def test_cases_without_a_solver_are_within_their_bounds():
+    """Laws and records take no time."""
+    words = ("M12 bolt", "damper", "reciprocating", "conductor", "screwed", "Orion", "Bouc-Wen")
+    quick = [one for one in CASES if any(word in one.name for word in words)]
+    assert len(quick) >= 9
+    for one in quick:
+        result = one.run()
+        assert result.within, (one.name, result.difference)
+
+
+def test_the_command_names_the_cases_that_there_are(capsys):
+    with pytest.raises(SystemExit):
+        main(["nothing of that kind"])
+    assert "preloaded M12 bolt, energy" in capsys.readouterr().err
+
+
+def test_a_folder_without_the_files_leaves_the_record(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(measurements, "RECORD", tmp_path / "measured.json")
+    measurements.record(tmp_path, ["bolt", "cable", "backbones"])
+    assert not measurements.RECORD.exists()
+    assert capsys.readouterr().out.count(":") >= 3
+
+
+def test_a_page_has_a_row_for_each_case_and_its_source():
+    page = table.as_page([case([1.0], [1.3], explained="why").run()])
+    assert "| a | b | c | 1 | 1.3 | 30 %, outside: why | 1 |" in page
+    assert "1. nobody. Formula." in page
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("one", CASES, ids=lambda one: one.name)
+def test_each_case_is_within_its_bound(one):
+    result = one.run()
+    assert result.within, (result.theirs, result.ours)
