@@ -15,10 +15,12 @@ from jbeamshell import laws, reference
 CONTACT = Source(
     "E. Vollebregt, CONTACT, case cattaneo, https://github.com/eve70a/CONTACT at d431cdb",
     "Apache-2.0, one figure quoted",
+    "Not opened again here: the figure is quoted from notes of this project on it.",
 )
 LEVEL_SET = Source(
     "LevelSetWear, cylinder on flat, https://github.com/illavori/LevelSetWear at f5a3cad",
     "BSD-3-Clause, figures quoted",
+    "Not opened again here: the figure is quoted from notes of this project on it.",
 )
 FRONTISTR = Source(
     "FrontISTR, NAFEMS contact patch test CGS-4, "
