@@ -26,7 +26,7 @@ import jbeamshell as jb
 from jbeamshell.contact_line.matrix_files import read_matrix
 from jbeamshell.dynamics.export import table
 from jbeamshell.identify.experiment import Prediction
-from jbeamshell.identify.plan import read_plan
+from jbeamshell.identify.plan_file import read_plan
 from jbeamshell.identify.saved_runs import SavedRuns
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.recordings import read_recordings

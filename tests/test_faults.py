@@ -21,7 +21,7 @@ import jbeamshell as jb
 from jbeamshell import identify
 from jbeamshell.cli import arguments, main, terminal
 from jbeamshell.common.errors import LONGEST
-from jbeamshell.identify import plan
+from jbeamshell.identify import plan_file as plan
 from jbeamshell.load_steps import recovery
 from jbeamshell.measured import array_tables, curve_files, curves, loops, steady
 from jbeamshell.measured.recordings import read_recordings

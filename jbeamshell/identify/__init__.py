@@ -15,16 +15,12 @@ from jbeamshell.identify.comparison import compare as compare
 from jbeamshell.identify.each import Fits as Fits
 from jbeamshell.identify.each import bootstrap as bootstrap
 from jbeamshell.identify.each import fit_each as fit_each
-from jbeamshell.identify.fitting import MAX_ITERATIONS as MAX_ITERATIONS
-from jbeamshell.identify.fitting import METHODS as METHODS
-from jbeamshell.identify.fitting import FitProgress as FitProgress
 from jbeamshell.identify.fitting import fit as fit
-from jbeamshell.identify.fitting import fit_kappa_s as fit_kappa_s
 from jbeamshell.identify.models import Drive as Drive
 from jbeamshell.identify.models import Driven as Driven
 from jbeamshell.identify.parameters import Parameter as Parameter
 from jbeamshell.identify.plan import Plan as Plan
-from jbeamshell.identify.plan import read_plan as read_plan
+from jbeamshell.identify.plan_file import read_plan as read_plan
 from jbeamshell.identify.posterior import Posterior as Posterior
 from jbeamshell.identify.posterior import posterior as posterior
 from jbeamshell.identify.profile_likelihood import Profile as Profile

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -13,10 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, UnconvergedError
-from jbeamshell.identify.driving import as_model
-from jbeamshell.identify.fitting import fit
-from jbeamshell.identify.models import Driven, Model
+from jbeamshell.identify.models import Model
 from jbeamshell.identify.observations import Observation, observe
+from jbeamshell.identify.plan import Options, planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import Law, PowerLaw
@@ -182,7 +182,7 @@ def compare(
     if isinstance(target, Scene):
         return _with_strip(target, models, amplitudes, options)
     require("amplitudes", amplitudes, amplitudes is None, "are the target's own: leave them out")
-    data = Specimen(Driven(PowerLaw()), target).measurements
+    data = [item for item, _ in Specimen(None, target).read(Path())]
     amplitude, energy, drive = _energies(data)
     rows = [_fitted(model, data, amplitude, drive, options) for model in models]
     return Comparison(amplitude, energy, drive, tuple(rows))
@@ -253,9 +253,9 @@ def _fitted(
     name = model if isinstance(model, str) else model.heading
     nothing = np.full(amplitude.shape, np.nan)
     try:
-        driven = as_model(model, data, drive)
         own = [i for i in data if not (_is_power(model) and isinstance(i, StiffnessCurve))]
-        found = fit(own, driven, **({"throw": False} | options))
+        specimen = Specimen(model, own, set={"load.control": drive})
+        found = planned(specimen, options=Options(**{"throw": False, **options})).run()
     except (InputError, UnconvergedError) as error:
         return Compared(name, None, nothing, np.nan, np.nan, str(error))
     law = found.law

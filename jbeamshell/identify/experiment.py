@@ -99,7 +99,6 @@ class Experiment:
         self.measurements: list[Any] = []
         self.owners: list[int] = []
         for owner, specimen in enumerate(specimens):
-            specimen.check()
             control = specimen.scene.load.control
             for given in specimen.measurements:
                 thinned = given.thinned(points, control) if isinstance(given, Loop) else given

@@ -49,6 +49,7 @@ class Fit(NamedTuple):
     scenes : scene of every specimen by its label, with the fitted values
     intervals : 95 % confidence interval by key
     warnings : sentences on what to know before using the values
+    notes : sentences on what was done to the data, and what was estimated and chosen by default
     describes : False if the model leaves too much of a measurement, or misses the energy per cycle
         or the secant stiffness of a loop, see `jbeamshell.identify.verdict`; its values then mean
         little
@@ -76,6 +77,7 @@ class Fit(NamedTuple):
     minima: Sequence[tuple[dict[str, float], float]] = ()
     uncertainty: Uncertainty | None = None
     problem: Problem | None = None
+    notes: Sequence[str] = ()
 
     @property
     def law(self) -> Law:
@@ -89,7 +91,7 @@ class Fit(NamedTuple):
         rows = [(k, f"{value:.6g} +- {self.errors[k]:.2g}") for k, value in self.values.items()]
         misfit = f"misfit {100 * self.misfit:.3g} % of the range"
         end = f"{self.status} after {self.model_runs} model runs"
-        return Summary("", rows, [misfit, end, *self.warnings])
+        return Summary("", rows, [misfit, end, *self.warnings, *self.notes])
 
     def __str__(self) -> str:
         return self._summary.as_text(28)
@@ -118,6 +120,7 @@ class Fit(NamedTuple):
             "status": self.status,
             "model_runs": self.model_runs,
             "warnings": list(self.warnings),
+            "notes": list(self.notes),
         }
         if self.uncertainty is not None:
             u = self.uncertainty

@@ -22,12 +22,11 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.models import Model, Runnable, response_along
 from jbeamshell.identify.observations import LoopObservation, Observation
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.rig_keys import PREFIX, RIG, check_rig_key
+from jbeamshell.identify.rig_keys import PREFIX, RIG, check_rig
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, Measurement
 from jbeamshell.measured.loops import Loop
@@ -71,14 +70,9 @@ def rig_of(values: Mapping[str, Any]) -> Rig:
 
     Raises `InputError` for unknown keys and for values that are no number in their domain.
     """
+    check_rig(values)
     fields = dict.fromkeys((name.removeprefix(PREFIX) for name in RIG), 0.0)
-    for key, value in values.items():
-        check_rig_key(key)
-        low = RIG[key].low
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        fix = "give a number" + (", 0 or more" if low == 0.0 else "")
-        require(key, value, number and bool(np.isfinite(value)) and value >= low, fix)
-        fields[key.removeprefix(PREFIX)] = float(value)
+    fields |= {key.removeprefix(PREFIX): float(value) for key, value in values.items()}
     return Rig(**{name: jnp.asarray(value) for name, value in fields.items()})
 
 

@@ -219,3 +219,5 @@ def adam(
 
 
 SEARCHES = {"levenberg-marquardt": levenberg_marquardt, "l-bfgs-b": l_bfgs_b, "adam": adam}
+
+METHODS = tuple(SEARCHES)

@@ -223,7 +223,6 @@ def test_a_state_that_can_no_longer_be_written(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"free": ()}, "name at least one"),
         ({"free": (MU, "contact.stick_stiffness")}, "no value for it; give a start"),
         ({"free": (MU, "contact.normal_stiffness")}, "'contact.normal_stiffness'.*do not depend"),
         (
@@ -239,7 +238,6 @@ def test_a_state_that_can_no_longer_be_written(tmp_path):
         ({"noise": -0.01}, "noise = -0.01: give a positive part"),
         ({"weights": (1.0, 2.0)}, r"weights = \[1.0, 2.0\]: give one positive number for each"),
         ({"weights": (0.0,)}, r"weights = \[0.0\]: give one positive"),
-        ({"scene": None}, "scene: give one"),
         ({"data": []}, "no measurement given"),
         ({"data": [Specimen(STRIP, [], "a")], "scene": None}, "data of specimen 'a': no meas"),
         ({"data": np.arange(9.0)}, "a ndarray is no measurement: give a Loop, a Squeeze"),

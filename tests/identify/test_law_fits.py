@@ -109,9 +109,9 @@ def test_a_law_is_driven_by_force_where_it_has_masings_memory():
 
 def test_bad_input_is_one_clear_line():
     data = loops(PLANTED["jenkins"])
-    with pytest.raises(InputError, match=r"^model = 'iwan5': choose jenkins, iwan4"):
+    with pytest.raises(InputError, match=r"^scene = 'iwan5': choose a law .jenkins, iwan4"):
         identify.fit(data, "iwan5")
-    with pytest.raises(InputError, match=r"^scene = 3: give a jbeamshell.Scene, a law such as"):
+    with pytest.raises(InputError, match=r"^scene = 3: give a jbeamshell.Scene, values by"):
         identify.fit(data, 3)
     with pytest.raises(InputError, match=r"^unknown key 'contact.friction': the numbers of this l"):
         identify.fit(data, "iwan4", ["contact.friction"])

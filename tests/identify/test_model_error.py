@@ -6,7 +6,6 @@ from toy import KEYS, TRUTH, Readings, formula, scene
 
 from jbeamshell import identify
 from jbeamshell.identify.model_error import independent_points, model_misfit
-from jbeamshell.identify.plan import plan_for
 from jbeamshell.identify.starts import estimate
 from jbeamshell.measured.loops import make_loop
 from tests import rig
@@ -142,13 +141,12 @@ def test_friction_of_another_law_lies_inside_its_interval():
         "model.kinematics": "linear",
         "contact.normal": "held",
     }
-    free = {MU: {}, "contact.stick_stiffness": {}, "strip.axial_stiffness": {}}
+    free = [MU, "contact.stick_stiffness", "strip.axial_stiffness"]
     inside = []
     for seed in range(100, 150):
         loop = another_law(seed)
         start = {} if estimate([loop]).soft else {"contact.stick_stiffness": 1000.0}
-        plan = plan_for({"set": known | start, "free": free}, [loop])
-        fit = identify.fit(plan.specimens, free=plan.free, points=64, throw=False)
+        fit = identify.fit(loop, known | start, free, points=64, throw=False)
         low, high = fit.intervals[MU]
         inside.append(low < 0.5 < high)
     assert 0.9 <= np.mean(inside) <= 0.99

@@ -11,7 +11,7 @@ import jbeamshell as jb
 from jbeamshell import identify
 from jbeamshell.identify import models, rig
 from jbeamshell.identify.observations import observe
-from jbeamshell.identify.plan import plan_for
+from jbeamshell.identify.plan import planned
 from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, DissipationCurve
@@ -141,7 +141,7 @@ def test_a_planted_rig_is_found(slid):
 
 def test_a_plan_holds_and_frees_values_of_the_rig(slid):
     loop, _ = behind(1.0, compliance=1.0)
-    plan = plan_for({"set": {"model.nodes": 7, COMPLIANCE: 1.0}, "free": {"rig.drift": {}}}, [loop])
+    plan = planned(Specimen({"model.nodes": 7}, [loop], set={COMPLIANCE: 1.0}), free=["rig.drift"])
     assert plan.specimens[0].rig == {COMPLIANCE: 1.0}
     (drift,) = rig.with_starts(plan.free, plan.specimens)
     assert (drift.start, drift.high) == (0.0, np.ptp(loop.force))

@@ -10,7 +10,7 @@ from jbeamshell import dynamics
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.identify import Assembly, Parameter, fit, jointed
-from jbeamshell.identify.plan import plan_from_values
+from jbeamshell.identify.plan_file import plan_from_values
 from jbeamshell.measured import DampingCurve, ForcedCurve, FrequencyCurve, SqueezeCurve
 
 SIZE = np.geomspace(0.02, 1.0, 16)
