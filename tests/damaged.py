@@ -25,7 +25,7 @@ import scipy.sparse
 import jbeamshell as jb
 from jbeamshell.contact_line.matrix_files import read_matrix
 from jbeamshell.dynamics.export import table
-from jbeamshell.identify.experiment import Prediction
+from jbeamshell.identify.experiment import Evaluation
 from jbeamshell.identify.plan_file import read_plan
 from jbeamshell.identify.saved_runs import SavedRuns
 from jbeamshell.measured.curve_files import read_curves
@@ -107,7 +107,7 @@ def _stores(folder):
     runs.read()
     for _ in range(4):
         numbers = random.random(4), random.random((4, 2)), random.random(4)
-        runs.append([(random.random(2), Prediction(*numbers, True))])
+        runs.append([(random.random(2), Evaluation(*numbers, True))])
 
 
 def _runs(path):

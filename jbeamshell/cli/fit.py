@@ -37,7 +37,6 @@ WORDS = {
     "drift": "drift of a recording: keep (default), linear (remove a straight line) or cycle "
     "(remove the mean of each cycle)",
     "reverse": "column whose sign is turned: force or displacement",
-    "method": "search: levenberg-marquardt (default), l-bfgs-b or adam",
 }
 NUMBERS = {
     "noise": (float, "standard deviation of the data, as a fraction of their range"),
@@ -108,7 +107,6 @@ def add_to(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit, report and write; returns the exit code, `NOT_DESCRIBED` if the model is not theirs."""
-    from jbeamshell import identify
     from jbeamshell.common import files
     from jbeamshell.identify import report
     from jbeamshell.plotting.folder import check_folder
@@ -124,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
     begin = time.perf_counter()
     result = plan.run(save=options.save)
     names = [name for name in result.values if name.partition("[")[0] in options.profile]
-    profiles = [identify.profile(result, name) for name in names]
+    profiles = [result.profile(name) for name in names]
     wall = time.perf_counter() - begin
     figures = result.figures() | {"wall_s": wall}
     if profiles:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.models import Drive, Driven, Model
+from jbeamshell.identify.models import LawModel, Model
 from jbeamshell.laws import Law, MasingLaw
 from jbeamshell.measured.curves import (
     AmplitudeCurve,
@@ -47,22 +47,20 @@ class Figures(NamedTuple):
     stiffness: float
 
 
-def as_driven(
-    law: Law | type[Law] | Driven, measurements: Sequence[Any], control: str | None = None
-) -> Driven:
-    """Driven law of a fit from a law, or from the class of one that starts from the data.
+def driven(
+    law: Law | type[Law], measurements: Sequence[Any], control: str | None = None
+) -> LawModel:
+    """Model of a law, or of the class of one that starts from the data.
 
     A law is driven by the displacement, as it has a force for each; by the force where curves over
     amplitude are all there is, or where loops know the noise of their displacement alone.
 
     Parameters
     ----------
-    law : law, its class, or a driven one
+    law : law, or its class
     measurements : what was measured
     control : column that drives it; None chooses as above
     """
-    if isinstance(law, Driven):
-        return law if control is None else Driven(law.law, Drive(control))
     if not isinstance(law, Law):
         law = law.started(*figures_of(measurements, control or "force"))
     pulls = [item for item in measurements if isinstance(item, Loop | Backbone)]
@@ -70,7 +68,7 @@ def as_driven(
     noisy = [noise_of(pull) is not None for pull in pulls]
     backward = any(a and b for a, b in zip(by_force, noisy, strict=True))
     force = not pulls or (backward and isinstance(law, MasingLaw))
-    return Driven(law, Drive(control or ("force" if force else "displacement")))
+    return LawModel(law, control or ("force" if force else "displacement"))
 
 
 def figures_of(measurements: Sequence[Any], control: str = "force") -> Figures:
@@ -103,7 +101,7 @@ def figures_of(measurements: Sequence[Any], control: str = "force") -> Figures:
 
 def feature_doubts(model: Model, loops: Sequence[Loop]) -> list[str]:
     """Sentences on what loops show and a law cannot follow; none for other models."""
-    if not isinstance(model, Driven):
+    if not isinstance(model, LawModel):
         return []
     name, doubts = model.law.heading, []
     for loop in loops:

@@ -11,7 +11,7 @@ import dataclasses
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from jbeamshell.common.progress import counting
 from jbeamshell.common.summary import Summary
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.plan import POINTS, Options, Plan, planned
+from jbeamshell.identify.plan import Options, Plan, planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.rig import RiggedObservation
 from jbeamshell.identify.specimens import Specimen
@@ -30,7 +30,8 @@ from jbeamshell.identify.specimens import Specimen
 LEVEL = 0.95  # part of the values between the ends that a summary names
 
 
-class Fits(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Fits:
     """Results of many fits of the same numbers.
 
     Attributes
@@ -38,12 +39,14 @@ class Fits(NamedTuple):
     values, errors : (fits,) fitted values and standard errors by key
     misfit : (fits,) root mean square of the residual over the range of the response
     converged : (fits,) False where a search did not converge; its values mean little
+    doubts : sentences on what to know before using the values, of each fit
     """
 
     values: dict[str, NDArray[np.float64]]
     errors: dict[str, NDArray[np.float64]]
     misfit: NDArray[np.float64]
     converged: NDArray[np.bool_]
+    doubts: Sequence[Sequence[str]] = ()
 
     def intervals(self, level: float = LEVEL) -> dict[str, tuple[float, float]]:
         """Ends between which this part of the converged values lies, by key.
@@ -78,7 +81,7 @@ class Fits(NamedTuple):
         ]
         return Summary(title, rows, [f"median misfit {100.0 * np.median(self.misfit):.3g} %"])
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self._summary.as_text(28)
 
     def _repr_html_(self) -> str:
@@ -91,12 +94,8 @@ def fit_each(
     scene: Any = None,
     free: Sequence[str | Parameter] = (),
     *,
-    starts: int | None = None,
-    noise: float | None = None,
-    points: int = POINTS,
-    max_iterations: int | None = None,
-    tolerance: float = 1e-7,
     progress: Callable[[int, int], None] | None = None,
+    **options: Any,
 ) -> Fits:
     """Fit the same numbers to each of many measurements on its own, as `fit` does.
 
@@ -104,13 +103,14 @@ def fit_each(
     ----------
     data : what to fit, or a list of measurements for each fit
     scene, free : see `fit`; what the first of the data tell is fitted to all
-    starts, noise, points, max_iterations, tolerance : see `fit`
     progress : called with the fits done and to do; None shows a bar where a person watches
+    options : further arguments of `fit`, such as ``noise``
 
     Returns
     -------
     Fits
-        values and errors of all fits, in the order of the data
+        ``values`` and ``errors`` (fits,) by key, ``misfit``, ``converged`` and ``doubts`` of each,
+        in the order of the data, and ``intervals()``
 
     Raises
     ------
@@ -128,18 +128,11 @@ def fit_each(
     """
     several = isinstance(data, Sequence) and len(data) > 0
     require("data", data if not several else "given", several, "give a list of measurements")
-    options = Options(
-        starts=starts,
-        noise=noise,
-        points=points,
-        max_iterations=max_iterations,
-        tolerance=tolerance,
-        throw=False,
-    )
+    given = Options(**{"throw": False, **options})
 
     def one(place: int, free: Sequence[str | Parameter]) -> Plan:
         with _naming(place, len(data)):
-            return planned(data[place], scene, free, options=options)
+            return planned(data[place], scene, free, options=given)
 
     first = one(0, free)
     plans = [first, *(one(place, first.free) for place in range(1, len(data)))]
@@ -168,6 +161,7 @@ def _found(
         {key: np.array([fit.errors[key] for fit in found]) for key in found[0].values},
         np.array([fit.misfit for fit in found]),
         np.array([fit.status == "converged" for fit in found]),
+        [fit.doubts for fit in found],
     )
 
 
@@ -219,7 +213,7 @@ def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
     experiment, space = problem.experiment, uncertainty.space
     rigged = any(isinstance(each, RiggedObservation) for each in experiment.observations)
     require("result", "a rig", not rigged, "has a rig, whose numbers copies do not know")
-    best = problem(space, uncertainty.point)
+    best = problem(uncertainty.point)
     rows = experiment.weight.size
     residual = best.residual[:rows] / experiment.emphasis / experiment.weight
     residual = residual * np.sqrt(

@@ -7,11 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from jbeamshell.identify.assembly import Assembly
-from jbeamshell.identify.models import Driven
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.plan import POINTS, Options, planned
 from jbeamshell.identify.results import Fit
-from jbeamshell.identify.search import METHODS
 from jbeamshell.identify.searching import FitProgress
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import Law
@@ -25,11 +23,10 @@ Datum = Measurement | Recording | Specimen | str | os.PathLike[str]
 
 def fit(
     data: Datum | Sequence[Datum],
-    scene: Scene | Mapping[str, Any] | Law | Driven | Assembly | str | None = None,
+    scene: Scene | Mapping[str, Any] | Law | Assembly | str | None = None,
     free: Sequence[str | Parameter] = (),
     *,
     weights: Sequence[float] = (),
-    method: str = METHODS[0],
     starts: int | None = None,
     noise: float | None = None,
     save: str | os.PathLike[str] | None = None,
@@ -65,17 +62,15 @@ def fit(
         with bounds, scale, prior, and whether every specimen has a value of its own; if empty,
         the numbers that the data tell, with the reasons in ``notes``
     weights : factors of the measurements' residuals, besides the curves' own; all 1 if empty
-    method : "levenberg-marquardt"; "l-bfgs-b", which may end on a bound; or "adam", which starts
-        from all points at once and finishes the best by Levenberg-Marquardt
-    starts : number of starts: the given one, and others spread between the bounds (a factor e to
-        either side of a missing bound).  "adam" uses all of them, the other methods the best of
-        four times as many.  None means 8 for "adam"; else 6 for a law, 3 if all parameters of a
-        strip have two bounds, or 1
+    starts : number of searches: from the given start, and from the best of four times as many
+        points between the bounds (a factor e to either side of a missing bound).  None is 6 for a
+        law; for a strip 3 if all parameters have two bounds, else 1
     noise : standard deviation of measurements without noise, over their range
     save : file that keeps every model run; if it exists, the fit continues from it
     solver : settings of Newton's method; None takes the defaults
     points : number of points to which each loop is thinned, approximately
-    max_iterations : largest number of iterations of each search; None is 40, for laws 200
+    max_iterations : largest number of iterations of each search; None is 40, for laws 200, after
+        which many starts are tried together
     tolerance : relative change of the parameters at which a search stops; a flat cost stops it too
     progress : called after every step with a `FitProgress`; None shows a bar where a person watches
     throw : True to raise if the fit did not converge; if False, read ``status``
@@ -111,7 +106,5 @@ def fit(
         law = jb.fit(loops, "iwan4").law  # four parameters in place of the strip
         law.dissipation_at_force(0.5)
     """
-    options = Options(
-        method, starts, noise, points, max_iterations, tolerance, unchecked, throw, solver
-    )
+    options = Options(starts, noise, points, max_iterations, tolerance, unchecked, throw, solver)
     return planned(data, scene, free, weights, options).run(save=save, progress=progress)

@@ -18,18 +18,16 @@ import numpy as np
 from jbeamshell.common.checks import require, require_choice, require_count
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.threads import in_one_lapack_thread
-from jbeamshell.identify.assembly import Assembly
 from jbeamshell.identify.choose_free import chosen_free
 from jbeamshell.identify.copies import counted_once
-from jbeamshell.identify.driving import as_driven
+from jbeamshell.identify.driving import driven
 from jbeamshell.identify.experiment import Experiment
-from jbeamshell.identify.models import Driven, Model
+from jbeamshell.identify.models import LawModel, Model, StripModel
 from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.rig import with_starts
 from jbeamshell.identify.rig_keys import RIG
-from jbeamshell.identify.search import METHODS
 from jbeamshell.identify.search_space import search_space
 from jbeamshell.identify.searching import FitProgress, found_by
 from jbeamshell.identify.specimens import Specimen, inspected
@@ -65,7 +63,6 @@ class Options:
         for a value that makes no sense
     """
 
-    method: str = METHODS[0]
     starts: int | None = None
     noise: float | None = None
     points: int = POINTS
@@ -76,7 +73,6 @@ class Options:
     solver: Newton | None = None
 
     def __post_init__(self) -> None:
-        require_choice("method", self.method, METHODS)
         require_count("starts", 1 if self.starts is None else self.starts, 1)
         require_count("points", self.points, FEWEST_POINTS)
         most, noise = self.max_iterations, self.noise
@@ -130,14 +126,14 @@ class Plan:
         if not unseen:
             doubts = [*doubts, *inspected(specimens, keys, self.options.unchecked)]
         parameters = with_starts(self.free, specimens)
-        space, models = search_space(parameters, {one.label: one.scene for one in specimens})
+        space, models = search_space(parameters, {one.label: one.model for one in specimens})
         specimens = [dataclasses.replace(one, scene=models[one.label]) for one in specimens]
         check_starts(specimens, parameters)
         given = self.options
         experiment = Experiment(specimens, points=given.points, noise=given.noise, free=space.keys)
         problem = Problem(experiment, space, given.solver or Newton(), save)
-        fit = found_by(problem, space, given, list(models), doubts, progress)
-        return fit._replace(warnings=[*fit.warnings, *doubts], notes=self.notes)
+        fit = found_by(problem, given, list(models), doubts, progress)
+        return dataclasses.replace(fit, doubts=[*fit.doubts, *doubts], notes=self.notes)
 
 
 def planned(
@@ -162,12 +158,11 @@ def planned(
         if specimens are mixed with measurements or given a scene or weights besides their own, if
         two have one label, or if a model, a parameter or data are wrong
     """
-    given = _labelled(_specimens(data, scene, weights))
     chosen = not isinstance(free, list | tuple) or len(free) > 0
     parameters = as_parameters(free) if chosen else ()
     whole: list[Specimen] = []
     notes: list[str] = []
-    for one in given:
+    for one in _specimens(data, scene, weights):
         done, parameters, said = _completed(one, parameters, folder, options.unchecked)
         whole.append(done)
         notes += said
@@ -175,32 +170,24 @@ def planned(
 
 
 def _specimens(data: Any, scene: Any, weights: Sequence[float]) -> list[Specimen]:
-    """Specimens from what `fit` was given."""
-    given = [data] if isinstance(data, Specimen) else data
-    several = isinstance(given, list | tuple) and not isinstance(given, Loop)
-    if not (several and any(isinstance(item, Specimen) for item in given)):
+    """Specimens from what `fit` was given, with labels if there are several."""
+    given = list(data) if isinstance(data, list | tuple) and not isinstance(data, Loop) else [data]
+    of_specimens = [isinstance(item, Specimen) for item in given]
+    if not any(of_specimens):
         return [Specimen(scene, data, weights=weights)]
-    if not all(isinstance(item, Specimen) for item in given):
+    if not all(of_specimens):
         raise InputError("data: mixes specimens with measurements: make each a Specimen")
     for name, present in {"scene": scene is not None, "weights": len(weights) > 0}.items():
         if present:
             raise InputError(f"{name}: the specimens bring their own; leave it out")
-    return list(given)
-
-
-def _labelled(specimens: Sequence[Specimen]) -> list[Specimen]:
-    """Specimens with labels, no two alike; a single one needs none."""
-    if len(specimens) == 1:
-        return list(specimens)
-    labelled = [
-        dataclasses.replace(one, label=one.label or f"{number}")
-        for number, one in enumerate(specimens, 1)
-    ]
-    labels = [one.label for one in labelled]
+    if len(given) == 1:
+        return given
+    labels = [one.label or f"{number}" for number, one in enumerate(given, 1)]
     repeated = [label for label in labels if labels.count(label) > 1]
     if repeated:
         raise InputError(f"specimens: two have the label {repeated[0]!r}: give each its own")
-    return labelled
+    pairs = zip(given, labels, strict=True)
+    return [dataclasses.replace(one, label=label) for one, label in pairs]
 
 
 Free = tuple[Parameter, ...]
@@ -215,9 +202,10 @@ def _completed(
     if isinstance(meant, Mapping):
         meant = overridden(overridden(meant, known.values), of_model)
         control = meant.get("load.control")
-    elif isinstance(meant, Scene | Assembly):
-        meant = meant.replace(of_model)
-        control = meant.load.control
+    elif isinstance(meant, Model):
+        of_strip = known.values if isinstance(meant, StripModel) else {}
+        meant = meant.replace(overridden(of_strip, of_model))
+        control = meant.control
     else:
         control = of_model.pop("load.control", None)
     driver = control if control in CONTROLS else None
@@ -226,30 +214,31 @@ def _completed(
     notes = [f"{item.label}: {note}" for item, said in read for note in said]
     notes += known.notes
     model: Model
+    said: list[str]
     if isinstance(meant, Mapping):
         model, free, said = _strip(meant, data, free)
-    elif isinstance(meant, Scene):
+    elif isinstance(meant, Model):
         model, said = meant, []
-        if not free:
-            free, note = _chosen(meant, {}, data, estimate(data))
+        if isinstance(meant, StripModel) and not free:
+            free, note = _chosen(meant.scene, {}, data, estimate(data))
             said = [note]
-    elif isinstance(meant, Assembly):
-        require("free", "none", bool(free), "name what to fit of the structure")
-        model, said = meant, []
+        if not free:
+            raise InputError("free: name what to fit of the structure, by its keys")
     else:
         model, free, said = _law(meant, of_model, control, data, free)
     require(
         "load.control",
-        model.load.control,
-        model.load.control in CONTROLS,
+        model.control,
+        model.control in CONTROLS,
         "does not drive a measurement: take " + " or ".join(map(repr, CONTROLS)),
     )
     notes += [f"{one.label}: {note}" if one.label else note for note in said]
-    return dataclasses.replace(one, scene=model, data=data, set=one.rig), free, notes
+    whole = model.own if isinstance(model, StripModel) else model
+    return dataclasses.replace(one, scene=whole, data=data, set=one.rig), free, notes
 
 
 def _meant(scene: Any, folder: Path) -> Any:
-    """Scene, structure, law or its class, or values of a strip, that a user means."""
+    """Model, law or its class, or known values of a strip, that a user means."""
     if scene is None:
         return {}
     if isinstance(scene, str):
@@ -259,15 +248,14 @@ def _meant(scene: Any, folder: Path) -> Any:
         fix = f"choose a law ({', '.join(LAWS)}), a scene ({', '.join(library.NAMES)}), or a file"
         require("scene", scene, of_file or scene in library.NAMES, fix)
         return library.values_from(scene, folder)
-    known = isinstance(scene, Scene | Assembly | Driven | Law | Mapping)
-    require("scene", repr(scene) if not known else "", known, KINDS)
-    return scene
+    require("scene", scene, isinstance(scene, Scene | Model | Law | Mapping), KINDS)
+    return StripModel(scene) if isinstance(scene, Scene) else scene
 
 
 def _strip(
     known: Mapping[str, Any], data: Sequence[Measurement], free: Free
-) -> tuple[Scene, Free, list[str]]:
-    """Scene of known values, of which the data tell the rest; see `chosen_free` and `started`."""
+) -> tuple[StripModel, Free, list[str]]:
+    """Strip of known values, of which the data tell the rest; see `chosen_free` and `started`."""
     own, notes = dict(known), []
     loops = [item for item in data if isinstance(item, Loop)]
     if "load.control" not in own and loops:
@@ -294,7 +282,7 @@ def _strip(
         largest = [float(np.max(np.abs(drive))) for drive in drives if drive is not None]
         if largest:
             own["load.amplitude"] = max(largest)
-    return scene_from_values(own), free, notes
+    return StripModel(scene_from_values(own)), free, notes
 
 
 def _chosen(
@@ -316,11 +304,11 @@ def _law(
     control: str | None,
     data: Sequence[Measurement],
     free: Free,
-) -> tuple[Driven, Free, list[str]]:
+) -> tuple[LawModel, Free, list[str]]:
     """Law of a joint with known numbers, which starts from the data where it was only named."""
-    driven = as_driven(meant, data, control)
+    model = driven(meant, data, control)
     given = {p.key: p.start for p in free if p.start is not None and p.key not in RIG}
-    driven = driven.replace({**known, **given})
-    name, by = driven.law.heading, driven.load.control
-    free = free or as_parameters([key for key in driven.law.free() if key not in known])
-    return driven, free, [f"{name} in place of a strip, driven by the {by}"]
+    model = model.replace({**known, **given})
+    free = free or as_parameters([key for key in model.law.free() if key not in known])
+    note = f"{model.law.heading} in place of a strip, driven by the {model.control}"
+    return model, free, [note]

@@ -52,7 +52,7 @@ from jbeamshell.scene.toml import overridden, scene_from_values
 
 OF_STRUCTURE = tuple(inspect.signature(jointed).parameters)[1:]
 TABLES = ("set", "free", "specimen")
-OPTIONS = ("method", "starts", "noise", "points", "max_iterations", "tolerance", "unchecked")
+OPTIONS = ("starts", "noise", "points", "max_iterations", "tolerance", "unchecked")
 ENTRIES = [field.name for field in dataclasses.fields(Specimen) if field.name != "scene"]
 
 
@@ -100,6 +100,8 @@ def plan_from_values(
         if an entry is unknown or of the wrong kind, or if a file cannot be read
     """
     _check_table("plan", values)
+    if "method" in values:
+        raise InputError("entry: 'method' is no choice any more: one search serves; leave it out")
     _check_names("entry", values, ("scene", "model", "structure", *TABLES, *OPTIONS))
     given = values.get("specimen", []) if data is None else [{"data": data}]
     if not (isinstance(given, list) and given and all(isinstance(s, dict) for s in given)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -11,10 +12,16 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.progress import bar
-from jbeamshell.identify.models import Driven
+from jbeamshell.identify.models import LawModel
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit, fit_at
-from jbeamshell.identify.search import ADAM_STEPS, SEARCHES, SearchResult, StoppingRule
+from jbeamshell.identify.search import (
+    SearchResult,
+    StoppingRule,
+    minimise,
+    together,
+    within_bounds,
+)
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.settling import Settled, settle
 
@@ -22,7 +29,7 @@ MAX_ITERATIONS = 40
 OF_LAWS = 5  # times as many for laws, which cost little and creep to their limits
 LAW_STARTS = 6
 STARTS = 3  # default number of searches if all parameters have two bounds
-ADAM_STARTS = 8
+TOGETHER = 8  # starts that move together where no search has converged
 SCREENED = 4  # random points tried for each start besides the given one
 NO_INFLUENCE = 1e-9  # change of a residual for a unit step below which it is rounding
 
@@ -58,7 +65,6 @@ class FitProgress(NamedTuple):
 
 def found_by(
     problem: Problem,
-    space: SearchSpace,
     options: Any,
     labels: Sequence[str],
     doubts: Sequence[str] = (),
@@ -69,33 +75,31 @@ def found_by(
     Parameters
     ----------
     problem : least-squares problem
-    space : search space, n axes
     options : settings, see `jbeamshell.identify.plan.Options`
     labels : labels of the specimens
     doubts : sentences on the data; where a fit fails, they may say why
     progress : called after every step; None shows a bar where a person watches
     """
-    of_law = isinstance(problem.experiment.scenes[0], Driven)
+    space = problem.space
+    of_law = isinstance(problem.experiment.models[0], LawModel)
     most = options.max_iterations or (OF_LAWS * MAX_ITERATIONS if of_law else MAX_ITERATIONS)
     starts = options.starts
     if starts is None:
         bounded = all(parameter.bounded for parameter in space.parameters)
-        few = LAW_STARTS if of_law else STARTS if bounded else 1
-        starts = ADAM_STARTS if options.method == "adam" else few
+        starts = LAW_STARTS if of_law else STARTS if bounded else 1
+    rescue = options.max_iterations is None
     noise_cost = problem.experiment.weight.size if problem.experiment.noisy else 0
     stopping = StoppingRule(most, options.tolerance, noise_cost)
     told = "".join(f"; {doubt}" for doubt in doubts)
     try:
-        if progress is None:
-            with bar("fit") as shown:
+        watched: Any = bar("fit") if progress is None else contextlib.nullcontext()
+        with watched as shown:
 
-                def show(now: FitProgress) -> None:
-                    shown.set_postfix_str(str(now))
-                    shown.update()
+            def show(now: FitProgress) -> None:
+                shown.set_postfix_str(str(now))
+                shown.update()
 
-                end, ends = _search(problem, space, options.method, starts, stopping, show)
-        else:
-            end, ends = _search(problem, space, options.method, starts, stopping, progress)
+            end, ends = _search(problem, starts, stopping, rescue, progress or show)
     except KeyboardInterrupt:
         kept = (
             "nothing was saved: give save= (--save on the command line), a file, to continue later"
@@ -105,7 +109,7 @@ def found_by(
         raise KeyboardInterrupt(f"interrupted after {problem.runs} model runs; {kept}") from None
     except UnconvergedError as error:
         raise UnconvergedError(f"{error}{told}") from None
-    minima = [(space.values(own.point), problem(space, own.point).cost) for own in ends]
+    minima = [(space.values(own.point), problem(own.point).cost) for own in ends]
     status = ends[0].status
     if options.throw and status != "converged":
         values, cost = minima[0]
@@ -114,7 +118,7 @@ def found_by(
             f"the fit has not converged after {most} iterations, at {named}, cost "
             f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations{told}"
         )
-    return fit_at(problem, space, end, labels, status, minima)
+    return fit_at(problem, end, labels, status, minima)
 
 
 class _Monitor:
@@ -140,6 +144,10 @@ class _Monitor:
         named = self._space.named(values)
         self._progress(FitProgress(search, self._searches, step, cost, named, elapsed, left))
 
+    def of_search(self, number: int) -> Callable[[int, Vector, float], None]:
+        """Function that counts and reports a step of one search at a point (n,)."""
+        return lambda step, point, cost: self(number, step, self._space.values(point), cost)
+
     def settling(self, point: Vector, cost: float) -> None:
         """Count a step after the last search and report it."""
         search, step = self._last
@@ -148,37 +156,53 @@ class _Monitor:
 
 def _search(
     problem: Problem,
-    space: SearchSpace,
-    method: str,
     starts: int,
     stopping: StoppingRule,
+    rescue: bool,
     progress: Callable[[FitProgress], None],
 ) -> tuple[Settled, list[SearchResult]]:
     """Ends of the searches from all starts, the best first, and where that settles."""
-    check_start(problem, space)
+    check_start(problem)
+    space = problem.space
+    tried = SCREENED * (starts - 1)
+    monitor = _Monitor(space, starts, tried + starts * stopping.max_iterations, progress)
+
+    def cost(end: SearchResult) -> float:
+        return problem(end.point).cost
+
+    def search(number: int, start: Vector) -> SearchResult:
+        return minimise(problem, start, stopping, monitor.of_search(number))
+
+    costs, points = [], _spread(space, tried)
+    for number, point in enumerate(points, 1):
+        costs.append(problem(point).cost)
+        monitor.of_search(0)(number, point, costs[-1])
+    best = [points[i] for i in np.argsort(costs, kind="stable")[: starts - 1]]
     first = np.zeros(len(space.names))
-    if method == "adam":
-        report = _Monitor(space, 1, stopping.max_iterations + ADAM_STEPS, progress)
-        points = _spread(space, starts - 1)
-    else:
-        tried = SCREENED * (starts - 1)
-        most = tried + starts * stopping.max_iterations
-        report = _Monitor(space, starts, most, progress)
-        costs, points = [], _spread(space, tried)
-        for number, point in enumerate(points, 1):
-            costs.append(problem(space, point).cost)
-            report(0, number, space.values(point), costs[-1])
-        points = [points[i] for i in np.argsort(costs, kind="stable")[: starts - 1]]
-    ends = SEARCHES[method](problem, space, [first, *points], stopping, report)
-    ends = sorted(ends, key=lambda end: problem(space, end.point).cost)
-    best = settle(problem, space, ends[0].point, report.settling)
-    status = ends[0].status if best.settled else "max_iterations"
-    return best, [SearchResult(best.point, status), *ends[1:]]
+    ends = [search(number, start) for number, start in enumerate([first, *best], 1)]
+    ends = sorted(ends, key=cost)
+    if rescue and ends[0].status != "converged":
+        many = [ends[0].point, first, *_spread(space, TOGETHER - 2)]
+        moved = together(problem, many, monitor.of_search(starts + 1))
+        ends = sorted([*ends, search(starts + 2, moved)], key=cost)
+    if _at_bound(space, ends[0].point):
+        end = within_bounds(problem, ends[0].point, stopping)
+        ends[0] = SearchResult(min(ends[0], end, key=cost).point, ends[0].status)
+    settled = settle(problem, ends[0].point, monitor.settling)
+    status = ends[0].status if settled.settled else "max_iterations"
+    return settled, [SearchResult(settled.point, status), *ends[1:]]
 
 
-def check_start(problem: Problem, space: SearchSpace) -> None:
+def _at_bound(space: SearchSpace, point: Vector) -> bool:
+    """True if a value ended at a bound of its parameter."""
+    pairs = zip(space.bijections, space.values(point).tolist(), strict=True)
+    return any(bijection.bound_at(value) is not None for bijection, value in pairs)
+
+
+def check_start(problem: Problem) -> None:
     """Raise unless the model has an equilibrium at the start, and every parameter an influence."""
-    start = problem(space, np.zeros(len(space.names)))
+    space = problem.space
+    start = problem(np.zeros(len(space.names)))
     if not start.converged:
         raise UnconvergedError(
             "the model finds no equilibrium at the start values: start closer, or take "

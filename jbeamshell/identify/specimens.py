@@ -15,7 +15,7 @@ from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml
 from jbeamshell.identify.driving import feature_doubts
-from jbeamshell.identify.models import Model
+from jbeamshell.identify.models import Model, StripModel, as_model
 from jbeamshell.identify.parameters import is_number
 from jbeamshell.identify.rig_keys import PREFIX, check_rig
 from jbeamshell.measured.columns import QUANTITIES
@@ -30,7 +30,6 @@ from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
 from jbeamshell.scene.dimensions import Dimensions, dimensions_of
 from jbeamshell.scene.keys import CONTROLS, FAR_ENDS
-from jbeamshell.scene.scene import Scene
 
 KINDS = ("loop", "backbone", *CURVES)
 CYCLES = ("auto", "steady", "recorded")
@@ -65,7 +64,8 @@ class Specimen:
     centre : True to take the zeros of the sensors from the loops, see `Loop.centred`; None to do so
         where they can only be offsets
     reverse : "force" or "displacement" to turn the sign of that column
-    width : width of the specimen, by which forces of files are divided
+    width : width of the specimen, by which forces of recordings are divided; those of loops are per
+        width already
     columns, units, decimal : arguments of `read_recordings`
     dimensions : dimensions of the specimen with units, see `jbeamshell.scene.dimension_table`; or
         the name of a TOML file that holds them
@@ -106,6 +106,11 @@ class Specimen:
         if not (is_number(self.width) and self.width > 0.0):
             raise InputError(f"width = {shown(self.width)}: give a positive number")
         check_rig(self.rig)
+
+    @property
+    def model(self) -> Model:
+        """Model of a scene, a law or a structure that is whole."""
+        return as_model(self.scene)
 
     @property
     def rig(self) -> dict[str, Any]:
@@ -177,22 +182,30 @@ class Specimen:
         where = f" of specimen {self.label!r}" if self.label else ""
         if not items:
             raise InputError(f"data{where}: no measurement given: give loops, or files")
-        files = [isinstance(item, str | os.PathLike) for item in items]
-        if any(files):
-            require(
-                "data",
-                shown(items[files.index(False)]) if not all(files) else "",
-                all(files),
-                "files do not mix with other data: make each a Specimen",
-            )
-            items = list(self._of_files(folder))
+        known = self.known(folder)
+        width = self.width if known.width is None else known.width
+        named = [item for item in items if isinstance(item, str | os.PathLike)]
+        if named:
+            fix = "files do not mix with other data: make each a Specimen"
+            require("data", str(named[0]), len(named) == len(items), fix)
+            files = [folder / name for name in named]
+            if self.kind not in ("loop", "backbone"):
+                fix = f"a {self.kind} curve is per unit width; leave width out"
+                require("width", width, width == 1.0, fix)
+                return list(read_curves(files, self.kind, **self._reading))
+            items = list(read_recordings(files, **self._reading))
         asked = self.driver or driver
         keeps_zero = bool(ZEROS & {*free, *self.set})
         found: list[tuple[Measurement, Sequence[str]]] = []
         for item in items:
-            if isinstance(item, tuple) and not isinstance(item, Loop | Recording):
-                found.append(item)  # a curve of a file, with its notes
-            elif isinstance(item, Recording) or (isinstance(item, Loop) and _as_recorded(item)):
+            if isinstance(item, Recording):
+                if known.values and item.units is None:
+                    raise InputError(
+                        f"{item.label}: its columns name no units, but the specimen's dimensions "
+                        "do: give --unit force=N --unit displacement=mm, or what they are"
+                    )
+                item = item.per_width(width)
+            if isinstance(item, Recording) or (isinstance(item, Loop) and _as_recorded(item)):
                 found += self._of_recording(item, asked, keeps_zero, unchecked)
             elif isinstance(item, Loop):
                 found.append(self._centred(item, keeps_zero))
@@ -200,27 +213,10 @@ class Specimen:
                 found.append((item, ()))
         return found
 
-    def _of_files(self, folder: Path) -> Iterator[Any]:
-        """Recordings, per unit width, or curves with their notes, in the files of a folder."""
-        files, known = [folder / name for name in self.measurements], self.known(folder)
-        width = self.width if known.width is None else known.width
-        how: dict[str, Any] = {
-            "columns": self.columns,
-            "units": self.units,
-            "decimal": self.decimal,
-        }
-        if self.kind not in ("loop", "backbone"):
-            fix = f"a {self.kind} curve is per unit width; leave width out"
-            require("width", width, width == 1.0, fix)
-            yield from read_curves(files, self.kind, **how)
-            return
-        for recording in read_recordings(files, **how):
-            if known.values and recording.units is None:
-                raise InputError(
-                    f"{recording.label}: its columns name no units, but the specimen's dimensions "
-                    "do: give --unit force=N --unit displacement=mm, or what they are"
-                )
-            yield recording.per_width(width)
+    @property
+    def _reading(self) -> dict[str, Any]:
+        """Arguments of the readers of files."""
+        return {"columns": self.columns, "units": self.units, "decimal": self.decimal}
 
     def _of_recording(
         self, item: Recording | Loop, driver: str | None, keeps_zero: bool, unchecked: bool
@@ -320,18 +316,18 @@ def inspected(
     for specimen in specimens:
         loops = [item for item in specimen.measurements if isinstance(item, Loop)]
         seen = (
-            inspect(loops, stiffness=plausible_stiffness(specimen.scene, [*free, *specimen.rig]))
+            inspect(loops, stiffness=plausible_stiffness(specimen.model, [*free, *specimen.rig]))
             if loops
             else None
         )
         if seen is not None and not unchecked:
             seen.check()
         doubts += [] if seen is None else seen.doubts()
-        doubts += feature_doubts(specimen.scene, loops)
+        doubts += feature_doubts(specimen.model, loops)
     return doubts
 
 
-def plausible_stiffness(scene: Model, free: Sequence[str]) -> tuple[float, float] | None:
+def plausible_stiffness(model: Model, free: Sequence[str]) -> tuple[float, float] | None:
     """Least and largest force per width over displacement that a strip can have.
 
     A strip that is held at its far end is at least as stiff as without friction, E'2H/L; a third of
@@ -339,13 +335,13 @@ def plausible_stiffness(scene: Model, free: Sequence[str]) -> tuple[float, float
 
     Parameters
     ----------
-    scene : strip with known dimensions
+    model : strip with known dimensions; None is returned for others
     free : keys to fit; None is returned if they are of the strip's stiffness or dimensions, or of
         the rig
     """
-    if not isinstance(scene, Scene):
+    if not isinstance(model, StripModel):
         return None
-    strip = scene.strip
+    strip = model.scene.strip
     unknown = any(key.startswith(("strip.", PREFIX)) and key not in OF_SHEAR for key in free)
     if strip.axial_stiffness is None or unknown:
         return None

@@ -1,10 +1,13 @@
 """Many fits, each on its own: planted values, bootstrap copies beside intervals, bad input."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import jbeamshell as jb
 from jbeamshell import identify
+from jbeamshell.identify.each import Fits
 from jbeamshell.measured.loops import make_loop
 
 MU, ETA = "contact.friction", "strip.height_ratio"
@@ -72,11 +75,11 @@ def test_bad_input_names_the_fit(noisy):
     beyond = make_loop(*(3.0 * np.asarray(column) for column in (loop.force, loop.displacement)))
     with pytest.raises(jb.InputError, match=r"fit 2 of 2: .*gross slip"):
         identify.fit_each([loop, beyond], START, [MU], points=POINTS)
-    none = identify.Fits({MU: np.ones(2)}, {MU: np.ones(2)}, np.ones(2), np.zeros(2, bool))
+    none = Fits({MU: np.ones(2)}, {MU: np.ones(2)}, np.ones(2), np.zeros(2, bool))
     with pytest.raises(jb.InputError, match="start closer"):
         none.intervals()
     assert str(none) == "2 fits, 0 converged"
     with pytest.raises(jb.InputError, match="copies"):
         identify.bootstrap(noisy, 1)
     with pytest.raises(jb.InputError, match="was not made by fit"):
-        identify.bootstrap(noisy._replace(problem=None), 5)
+        identify.bootstrap(dataclasses.replace(noisy, problem=None), 5)

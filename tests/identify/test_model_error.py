@@ -87,10 +87,10 @@ def test_profiles_include_what_the_model_leaves():
     fit = identify.fit(Readings(FINE, bent, noise=1e-4), TWO, [MU, ETA])
     assert fit.uncertainty.scatter > 5.0
     assert fit.uncertainty.sigma > 2.0 * fit.uncertainty.scatter
-    text = " ".join(fit.warnings)
+    text = " ".join(fit.doubts)
     assert "times the measured noise unexplained" in text
     assert "the errors count 200 points as " in text
-    low, high = identify.profile(fit, MU).interval
+    low, high = fit.profile(MU).interval
     np.testing.assert_allclose((low, high), fit.intervals[MU], rtol=0.02)
     assert low < TRUTH[MU] < high
 
@@ -100,7 +100,7 @@ def test_a_model_of_other_data_says_so():
     wrong = y + 0.12 * np.ptp(y) * np.sin(12.0 * FINE)
     fit = identify.fit(Readings(FINE, wrong), TWO, [MU, ETA])
     assert not fit.describes
-    assert fit.warnings[0].startswith("this model does not describe these data: it leaves ")
+    assert fit.doubts[0].startswith("this model does not describe these data: it leaves ")
     assert fit.figures()["describes"] is False
     # Noise alone is no fault of the model, however large.
     loud = y + 0.13 * np.ptp(y) * np.random.default_rng(4).standard_normal(FINE.size)

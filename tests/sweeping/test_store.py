@@ -12,7 +12,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.common import files
-from jbeamshell.identify.experiment import Prediction
+from jbeamshell.identify.experiment import Evaluation
 from jbeamshell.identify.saved_runs import SavedRuns
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.sweeping.runner import Block
@@ -102,7 +102,7 @@ def test_a_run_of_a_fit_that_was_changed_is_made_again(tmp_path):
     runs = SavedRuns(path, experiment, space, Newton())
     assert runs.read() == []
     made = [
-        (random.random(2), Prediction(random.random(4), random.random((4, 2)), random.random(4), c))
+        (random.random(2), Evaluation(random.random(4), random.random((4, 2)), random.random(4), c))
         for c in (True, False, True)
     ]
     runs.append(made)
