@@ -151,7 +151,7 @@ def test_names_of_no_data(folder, fault):
 
 GOOD = np.cos(RUN_IN), np.sin(RUN_IN)
 UP = np.arange(1.0, 12.0)
-OPTIONS = ("method", "starts", "noise", "points", "max_iterations", "tolerance", "solver", "save")
+OPTIONS = ("starts", "noise", "points", "max_iterations", "tolerance", "solver", "save")
 ENTRIES = {
     "solve": lambda x: jb.solve(x),
     "path": lambda x: jb.solve(SCENE, x),

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from jbeamshell.common.checks import require, require_choice, require_count
+from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.identify.choose_free import chosen_free
@@ -23,68 +23,28 @@ from jbeamshell.identify.copies import counted_once
 from jbeamshell.identify.driving import driven
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.models import LawModel, Model, StripModel
-from jbeamshell.identify.parameters import Parameter, as_parameters, is_number
+from jbeamshell.identify.parameters import Parameter, as_parameters
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.rig import with_starts
 from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.search_space import search_space
-from jbeamshell.identify.searching import FitProgress, found_by
+from jbeamshell.identify.searching import DEFAULTS, FitProgress, Options, found_by
 from jbeamshell.identify.specimens import Specimen, inspected
 from jbeamshell.identify.starts import Estimate, check_starts, estimate, started
 from jbeamshell.laws import LAWS, Law, law_named
 from jbeamshell.measured.curves import AmplitudeCurve, Measurement
 from jbeamshell.measured.loops import Loop, driver_of
-from jbeamshell.measured.recordings import FEWEST_POINTS
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import overridden, scene_from_values
 
-POINTS = 96  # points of a loop at which the model is run
 KINDS = (
     "give a jbeamshell.Scene, values by dotted key, the name of a scene, a law such as "
     "jbeamshell.laws.Iwan4(), or its name, such as 'iwan4', or a jbeamshell.identify.Assembly"
 )
-
-
-def _require_positive(name: str, value: Any, what: str) -> None:
-    require(name, value, is_number(value) and value > 0.0, f"give a positive {what}")
-
-
-@dataclasses.dataclass(frozen=True)
-class Options:
-    """Settings of a fit; see `jbeamshell.identify.fit` for what they mean.
-
-    Raises
-    ------
-    InputError
-        for a value that makes no sense
-    """
-
-    starts: int | None = None
-    noise: float | None = None
-    points: int = POINTS
-    max_iterations: int | None = None
-    tolerance: float = 1e-7
-    unchecked: bool = False
-    throw: bool = True
-    solver: Newton | None = None
-
-    def __post_init__(self) -> None:
-        require_count("starts", 1 if self.starts is None else self.starts, 1)
-        require_count("points", self.points, FEWEST_POINTS)
-        most, noise = self.max_iterations, self.noise
-        require_count("max_iterations", 1 if most is None else most, 1)
-        _require_positive(
-            "noise", 1.0 if noise is None else noise, "part of the range, such as 0.01"
-        )
-        _require_positive("tolerance", self.tolerance, "number, such as 1e-7")
-        valid = self.solver is None or isinstance(self.solver, Newton)
-        require("solver", self.solver, valid, "give a jbeamshell.Newton")
-        for name in ("unchecked", "throw"):
-            require_choice(name, getattr(self, name), (False, True))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,7 +62,7 @@ class Plan:
     specimens: Sequence[Specimen]
     free: Sequence[Parameter]
     notes: Sequence[str] = ()
-    options: Options = Options()
+    options: Options = DEFAULTS
 
     @in_one_lapack_thread
     def run(
@@ -141,7 +101,7 @@ def planned(
     scene: Any = None,
     free: Sequence[str | Parameter] = (),
     weights: Sequence[float] = (),
-    options: Options = Options(),
+    options: Options = DEFAULTS,
     folder: Path = Path(),
 ) -> Plan:
     """Plan of a fit.

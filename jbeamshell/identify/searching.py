@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -10,9 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jbeamshell.common.checks import require, require_choice, require_count
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.progress import bar
 from jbeamshell.identify.models import LawModel
+from jbeamshell.identify.parameters import is_number
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit, fit_at
 from jbeamshell.identify.search import (
@@ -24,7 +27,10 @@ from jbeamshell.identify.search import (
 )
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.settling import Settled, settle
+from jbeamshell.measured.recordings import FEWEST_POINTS
+from jbeamshell.numerics.newton import Newton
 
+POINTS = 96  # points of a loop at which the model is run
 MAX_ITERATIONS = 40
 OF_LAWS = 5  # times as many for laws, which cost little and creep to their limits
 LAW_STARTS = 6
@@ -34,6 +40,47 @@ SCREENED = 4  # random points tried for each start besides the given one
 NO_INFLUENCE = 1e-9  # change of a residual for a unit step below which it is rounding
 
 Vector = NDArray[np.float64]
+
+
+def _require_positive(name: str, value: Any, what: str) -> None:
+    require(name, value, is_number(value) and value > 0.0, f"give a positive {what}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """Settings of a fit; see `jbeamshell.identify.fit` for what they mean.
+
+    Raises
+    ------
+    InputError
+        for a value that makes no sense
+    """
+
+    starts: int | None = None
+    noise: float | None = None
+    points: int = POINTS
+    max_iterations: int | None = None
+    tolerance: float = 1e-7
+    unchecked: bool = False
+    throw: bool = True
+    solver: Newton | None = None
+
+    def __post_init__(self) -> None:
+        require_count("starts", 1 if self.starts is None else self.starts, 1)
+        require_count("points", self.points, FEWEST_POINTS)
+        most, noise = self.max_iterations, self.noise
+        require_count("max_iterations", 1 if most is None else most, 1)
+        _require_positive(
+            "noise", 1.0 if noise is None else noise, "part of the range, such as 0.01"
+        )
+        _require_positive("tolerance", self.tolerance, "number, such as 1e-7")
+        valid = self.solver is None or isinstance(self.solver, Newton)
+        require("solver", self.solver, valid, "give a jbeamshell.Newton")
+        for name in ("unchecked", "throw"):
+            require_choice(name, getattr(self, name), (False, True))
+
+
+DEFAULTS = Options()
 
 
 class FitProgress(NamedTuple):
@@ -65,7 +112,7 @@ class FitProgress(NamedTuple):
 
 def found_by(
     problem: Problem,
-    options: Any,
+    options: Options,
     labels: Sequence[str],
     doubts: Sequence[str] = (),
     progress: Callable[[FitProgress], None] | None = None,
@@ -75,7 +122,7 @@ def found_by(
     Parameters
     ----------
     problem : least-squares problem
-    options : settings, see `jbeamshell.identify.plan.Options`
+    options : settings
     labels : labels of the specimens
     doubts : sentences on the data; where a fit fails, they may say why
     progress : called after every step; None shows a bar where a person watches

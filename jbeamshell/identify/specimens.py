@@ -105,6 +105,7 @@ class Specimen:
             raise InputError(f"centre = {self.centre!r}: give true or false")
         if not (is_number(self.width) and self.width > 0.0):
             raise InputError(f"width = {shown(self.width)}: give a positive number")
+        require("set", self.set, isinstance(self.set, Mapping), "give values by dotted key")
         check_rig(self.rig)
 
     @property

@@ -63,6 +63,15 @@ def test_what_is_given_is_not_fitted():
     assert chosen([in_si()], known=friction | {ETA: 0.1}) == [MU, ETA]  # what is given starts there
 
 
+def test_the_numbers_of_a_whole_scene_are_starts():
+    assert chosen([in_si()], known=jb.Scene()) == [MU, ETA]
+    assert chosen([root()], known=jb.Scene()) == [MU, STIFF]
+    sticky = jb.Scene().replace({SLIDERS: 1e-3})
+    assert chosen([sliding(0.3)], known=sticky) == [MU, SLIDERS]
+    x = np.linspace(0.0, 2.0, 9)
+    assert chosen([SqueezeCurve(x, -np.exp(-x))], known=jb.Scene()) == ["strip.kappa_s"]
+
+
 def test_a_line_tells_a_stiffness_and_no_friction():
     u = 1e-6 * np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
     line = make_loop(2e9 * u, u)._replace(units=SI)

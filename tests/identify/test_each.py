@@ -4,9 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from identify.test_law_fits import loops as law_loops
 
 import jbeamshell as jb
-from jbeamshell import identify
+from jbeamshell import identify, laws
 from jbeamshell.identify.each import Fits
 from jbeamshell.measured.loops import make_loop
 
@@ -52,6 +53,16 @@ def test_planted_values_come_back_one_by_one():
     assert fits.values[MU][1] == pytest.approx(alone.values[MU], rel=1e-9)
     assert fits.errors[MU][1] == pytest.approx(alone.errors[MU], rel=1e-6)
     assert "3 fits, 3 converged" in str(fits)
+
+
+def test_each_fit_has_the_defaults_of_a_fit():
+    """Starts, iterations and doubts of a law, which is only named."""
+    data = [law_loops(laws.Jenkins(slip, 100.0), sizes=(0.03,))[0] for slip in (1.0, 1.3)]
+    fits = identify.fit_each(data, "jenkins")
+    for place, loop in enumerate(data):
+        alone = jb.fit(loop, "jenkins")
+        assert {key: values[place] for key, values in fits.values.items()} == alone.values
+        assert fits.doubts[place] == alone.doubts
 
 
 def test_bootstrap_copies_spread_as_the_standard_error_says(noisy):

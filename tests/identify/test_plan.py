@@ -9,6 +9,7 @@ from jbeamshell.identify.plan_file import plan_from_values, read_plan
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.recordings import read_recordings
 from tests import rig
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 101)
@@ -94,6 +95,16 @@ def test_specimens_share_what_the_plan_says_and_keep_their_own(folder):
 def test_cycles_are_averaged_unless_told_otherwise(folder, cycles, points):
     ((loop, _),) = Specimen(data=["cycles.csv"], cycles=cycles).read(folder)
     assert loop.force.size == points if points else loop.cycles == 6
+
+
+def test_recordings_at_hand_are_read_as_files_are(folder):
+    (recording,) = read_recordings(folder / "cycles.csv")
+    ((loop, notes),) = Specimen(data=recording, width=2.0).read(folder)
+    ((other, others),) = Specimen(data="cycles.csv", width=2.0).read(folder)
+    np.testing.assert_array_equal(loop.force, other.force)
+    assert notes == others
+    with pytest.raises(InputError, match="files do not mix with other data"):
+        Specimen(data=["cycles.csv", recording]).read(folder)
 
 
 def test_a_clean_cycle_and_a_pull_stay_as_they_are(folder):
