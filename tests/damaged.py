@@ -111,7 +111,7 @@ def _stores(folder):
 
 
 def _runs(path):
-    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), scenes=(), observations=())
+    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), models=(), observations=())
     space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
     return SavedRuns(path, experiment, space, Newton())
 

@@ -97,7 +97,7 @@ def test_a_lock_ends_with_the_process_that_holds_it(tmp_path):
 
 def test_a_run_of_a_fit_that_was_changed_is_made_again(tmp_path):
     random, path = np.random.default_rng(23), tmp_path / "state"
-    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), scenes=(), observations=())
+    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), models=(), observations=())
     space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
     runs = SavedRuns(path, experiment, space, Newton())
     assert runs.read() == []
