@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.identify.models import LawModel, Model, as_model
+from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.plan import planned
 from jbeamshell.identify.results import Fit
-from jbeamshell.identify.searching import Options
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import Law, PowerLaw, law_named
 from jbeamshell.measured.curves import DissipationCurve, Measurement, StiffnessCurve

@@ -21,11 +21,11 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import counting
 from jbeamshell.common.summary import Summary
 from jbeamshell.common.threads import in_one_lapack_thread
+from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.plan import Plan, planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.rig import RiggedObservation
-from jbeamshell.identify.searching import Options
 from jbeamshell.identify.specimens import Specimen
 
 LEVEL = 0.95  # part of the values between the ends that a summary names

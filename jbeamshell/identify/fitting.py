@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from jbeamshell.identify.assembly import Assembly
+from jbeamshell.identify.multistart import POINTS, FitProgress, Options
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.plan import planned
 from jbeamshell.identify.results import Fit
-from jbeamshell.identify.searching import POINTS, FitProgress, Options
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import Law
 from jbeamshell.measured.curves import Measurement

@@ -23,13 +23,13 @@ from jbeamshell.identify.copies import counted_once
 from jbeamshell.identify.driving import driven
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.models import LawModel, Model, StripModel
+from jbeamshell.identify.multistart import DEFAULTS, FitProgress, Options, found_by
 from jbeamshell.identify.parameters import Parameter, as_parameters
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.rig import with_starts
 from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.search_space import search_space
-from jbeamshell.identify.searching import DEFAULTS, FitProgress, Options, found_by
 from jbeamshell.identify.specimens import Specimen, inspected
 from jbeamshell.identify.starts import Estimate, check_starts, estimate, started
 from jbeamshell.laws import LAWS, Law, law_named

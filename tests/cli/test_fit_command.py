@@ -12,7 +12,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell import laws
 from jbeamshell.cli import main
-from jbeamshell.identify import searching
+from jbeamshell.identify import multistart
 from jbeamshell.identify.plan import Plan
 from jbeamshell.measured.loops import read_loops
 from jbeamshell.measured.recordings import read_recordings
@@ -144,7 +144,7 @@ def test_data_of_another_law_end_with_code_3(cli, planted, monkeypatch):
 
 
 def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
-    monkeypatch.setattr(searching, "MAX_ITERATIONS", 1)
+    monkeypatch.setattr(multistart, "MAX_ITERATIONS", 1)
     line = refused("fit", planted, *FIT, "--json", code=3)
     assert line.startswith("the fit has not converged after 1 iterations, at contact.friction = ")
 

@@ -12,7 +12,7 @@ from toy import KEYS, START, STRIP, Formula, X, formula, readings, scene
 
 import jbeamshell as jb
 from jbeamshell import identify
-from jbeamshell.identify import searching
+from jbeamshell.identify import multistart
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.parameters import Parameter, as_parameters
 from jbeamshell.identify.problem import Problem
@@ -118,11 +118,11 @@ def test_a_value_that_runs_into_its_bound_ends_on_it(monkeypatch):
 def test_starts_that_move_together_save_a_search_that_does_not_converge(monkeypatch):
     """Only where nobody limited the iterations, and only then."""
     moved = []
-    whole = searching.together
-    monkeypatch.setattr(searching, "together", lambda *a: moved.append(whole(*a)) or moved[-1])
+    whole = multistart.together
+    monkeypatch.setattr(multistart, "together", lambda *a: moved.append(whole(*a)) or moved[-1])
     assert identify.fit(readings(1e-3), scene(), KEYS).status == "converged"
     assert not moved
-    monkeypatch.setattr(searching, "MAX_ITERATIONS", 6)
+    monkeypatch.setattr(multistart, "MAX_ITERATIONS", 6)
     far = scene(**{MU: 0.011, ETA: 0.03, KAPPA: 0.02})
     hasty = identify.fit(readings(1e-3), far, KEYS, max_iterations=6, throw=False)
     assert hasty.status == "max_iterations"
