@@ -202,7 +202,7 @@ def figures(record: Mapping[str, Any]) -> tuple[dict[str, Any], Fit]:
     return {
         "values": fit.values,
         "errors": fit.errors,
-        "warnings": list(fit.warnings),
+        "warnings": list(fit.doubts),
         "worst_damping": float(np.max(np.abs(damping))),
         "worst_frequency": float(np.max(np.abs(frequency))),
         "fitted": {model.form.y: rounded(getattr(model, model.form.y)) for model in fit.model},

@@ -329,7 +329,7 @@ def ended(code: int, out: str, err: str, case: Case, folder: Path) -> Ending:
         fix = re.search(r"--\w|give|record|write|keep|name|remove|leave", line)
         return Ending("refused" if fix and line.startswith("jbeamshell: ") else "silent", line)
     figures = json.loads(out)
-    said = " ".join([*figures["warnings"], *figures["notes"]])
+    said = " ".join([*figures["doubts"], *figures["notes"]])
     values = {key: one["value"] for key, one in figures["values"].items()}
     scene = jb.read_scene(folder / "out" / "scene.toml")
     normal, _ = resultant(scene.contact.pressure, scene.contact.bottom_pressure, scene.strip.length)

@@ -25,8 +25,8 @@ import scipy.sparse
 import jbeamshell as jb
 from jbeamshell.contact_line.matrix_files import read_matrix
 from jbeamshell.dynamics.export import table
-from jbeamshell.identify.experiment import Prediction
-from jbeamshell.identify.plan import read_plan
+from jbeamshell.identify.experiment import Evaluation
+from jbeamshell.identify.plan_file import read_plan
 from jbeamshell.identify.saved_runs import SavedRuns
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.recordings import read_recordings
@@ -107,11 +107,11 @@ def _stores(folder):
     runs.read()
     for _ in range(4):
         numbers = random.random(4), random.random((4, 2)), random.random(4)
-        runs.append([(random.random(2), Prediction(*numbers, True))])
+        runs.append([(random.random(2), Evaluation(*numbers, True))])
 
 
 def _runs(path):
-    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), scenes=(), observations=())
+    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), models=(), observations=())
     space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
     return SavedRuns(path, experiment, space, Newton())
 

@@ -199,7 +199,7 @@ PLANS = {
 # Of a fit's own options in a plan with good data.
 OPTIONS = [
     "starts = 'a'", "starts = 0", "starts = 0x" + "f" * 5000, "noise = [1]", "noise = -1",
-    "method = 1", "method = ['adam']", "max_iterations = 1e9", "max_iterations = 10000000000",
+    "method = 'adam'", "max_iterations = 1e9", "max_iterations = 10000000000",
     "points = true", "points = 2", "tolerance = inf", "tolerance = 'a'",
 ]  # fmt: skip
 

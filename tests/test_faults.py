@@ -21,7 +21,7 @@ import jbeamshell as jb
 from jbeamshell import identify
 from jbeamshell.cli import arguments, main, terminal
 from jbeamshell.common.errors import LONGEST
-from jbeamshell.identify import plan
+from jbeamshell.identify import plan_file as plan
 from jbeamshell.load_steps import recovery
 from jbeamshell.measured import array_tables, curve_files, curves, loops, steady
 from jbeamshell.measured.recordings import read_recordings
@@ -151,7 +151,7 @@ def test_names_of_no_data(folder, fault):
 
 GOOD = np.cos(RUN_IN), np.sin(RUN_IN)
 UP = np.arange(1.0, 12.0)
-OPTIONS = ("method", "starts", "noise", "points", "max_iterations", "tolerance", "solver", "save")
+OPTIONS = ("starts", "noise", "points", "max_iterations", "tolerance", "solver", "save")
 ENTRIES = {
     "solve": lambda x: jb.solve(x),
     "path": lambda x: jb.solve(SCENE, x),

@@ -5,7 +5,7 @@ import numpy as np
 from jax import Array
 
 import jbeamshell as jb
-from jbeamshell.identify.observations import Observation, observe
+from jbeamshell.identify.observations import Observation, run_of
 from jbeamshell.measured.curves import Curve
 from jbeamshell.measured.form import Column, Form
 
@@ -35,12 +35,13 @@ class Readings(Curve):
 class Formula(Observation):
     x: Array
 
-    def predict(self, scene, solver):
-        return formula(self.x, *(scene.get(key) for key in KEYS)), scene.contact.friction < 50.0
+    def predict(self, model, solver):
+        answer = formula(self.x, *(model.get(key) for key in KEYS))
+        return answer, model.get(KEYS[0]) < 50.0
 
 
-@observe.register
-def _(measurement: Readings, scene):
+@run_of.register
+def _(measurement: Readings, model):
     weight = 1.0 / np.ptp(measurement.y) if measurement.noise is None else 1.0 / measurement.noise
     weight = np.broadcast_to(weight, measurement.x.shape)
     return Formula(*map(jnp.asarray, (measurement.y, weight, measurement.x)))

@@ -37,7 +37,6 @@ WORDS = {
     "drift": "drift of a recording: keep (default), linear (remove a straight line) or cycle "
     "(remove the mean of each cycle)",
     "reverse": "column whose sign is turned: force or displacement",
-    "method": "search: levenberg-marquardt (default), l-bfgs-b or adam",
 }
 NUMBERS = {
     "noise": (float, "standard deviation of the data, as a fraction of their range"),
@@ -108,7 +107,6 @@ def add_to(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit, report and write; returns the exit code, `NOT_DESCRIBED` if the model is not theirs."""
-    from jbeamshell import identify
     from jbeamshell.common import files
     from jbeamshell.identify import report
     from jbeamshell.plotting.folder import check_folder
@@ -122,15 +120,15 @@ def run(options: argparse.Namespace) -> int:
         say(note)
     folder = None if options.out is None else check_folder(options.out)
     begin = time.perf_counter()
-    result = identify.fit(plan.specimens, free=plan.free, save=options.save, **plan.options)
+    result = plan.run(save=options.save)
     names = [name for name in result.values if name.partition("[")[0] in options.profile]
-    profiles = [identify.profile(result, name) for name in names]
+    profiles = [result.profile(name) for name in names]
     wall = time.perf_counter() - begin
-    figures = result.figures() | {"notes": plan.notes, "wall_s": wall}
+    figures = result.figures() | {"wall_s": wall}
     if profiles:
         figures["profiles"] = {profile.name: profile.figures() for profile in profiles}
-    parts = (result, *profiles, *(f"  {note}" for note in plan.notes))
-    put(files.as_json(figures) if options.json else "".join(f"{part}\n" for part in parts))
+    lines = "".join(f"{part}\n" for part in (result, *profiles))
+    put(files.as_json(figures) if options.json else lines)
     if folder is not None:
         say_written(report.write_fit(folder, result, figures, profiles))
     return 0 if result.describes else NOT_DESCRIBED
@@ -138,17 +136,15 @@ def run(options: argparse.Namespace) -> int:
 
 def _plan(options: argparse.Namespace) -> Any:
     """Plan of a file, or of the options."""
-    from jbeamshell.identify import plan
+    from jbeamshell.identify import plan_file
 
+    changed = {name: getattr(options, name) for name in plan_file.OPTIONS if _given(options, name)}
     if any(name.endswith(".toml") for name in options.data):
-        return _plan_of_file(options)
-    values = {name: getattr(options, name) for name in plan.OPTIONS if _given(options, name)}
-    if options.scene is not None:
-        values["scene"] = options.scene
-    if options.model is not None:
-        values["model"] = options.model
-    values["set"] = assignments(options.set)
-    values["free"] = _free(options)
+        return _plan_of_file(options, changed)
+    values = changed | {"set": assignments(options.set), "free": _free(options)}
+    for name in ("scene", "model"):
+        if _given(options, name):
+            values[name] = getattr(options, name)
     if not options.data:
         return _example(values)
     specimen: dict[str, Any] = {"data": options.data}
@@ -158,37 +154,36 @@ def _plan(options: argparse.Namespace) -> Any:
             specimen[name] = getattr(options, name)
     specimen["columns"] = pairs(options.column, "force=FT")
     specimen["units"] = pairs(options.unit, "force=kN")
-    return plan.plan_from_values(values | {"specimen": [specimen]}, Path())
+    return plan_file.plan_from_values(values | {"specimen": [specimen]}, Path())
 
 
-def _plan_of_file(options: argparse.Namespace) -> Any:
+def _plan_of_file(options: argparse.Namespace, changed: dict[str, Any]) -> Any:
     """Plan of a file; options may change the search, not the data or the parameters."""
-    from jbeamshell.identify import plan
+    from jbeamshell.identify import plan_file
 
     if len(options.data) > 1:
         raise InputError(f"{' '.join(options.data)}: give one plan, or files of data alone")
-    ours = ("data", "json", "out", "save", "profile", "run", *plan.OPTIONS)
+    ours = ("data", "json", "out", "save", "profile", "run", *plan_file.OPTIONS)
     for name in sorted(set(vars(options)) - set(ours)):
         if _given(options, name):
             raise InputError(f"--{name}: {options.data[0]} is a plan; write this into the plan")
-    read = plan.read_plan(options.data[0], bool(options.unchecked))
-    changed = {name: getattr(options, name) for name in plan.OPTIONS if _given(options, name)}
-    return read._replace(options=read.options | changed)
+    return plan_file.read_plan(options.data[0], **changed)
 
 
 def _example(values: dict[str, Any]) -> Any:
     """Plan of the finite-element loops that ship."""
-    from jbeamshell.identify import plan
+    from jbeamshell.identify.plan_file import plan_from_values
     from jbeamshell.measured.example import example_loops
     from jbeamshell.scene import library
     from jbeamshell.scene.toml import overridden
 
-    if "model" in values:
-        return plan.plan_for(values, example_loops())
-    start = {key: value for key, value in EXAMPLE_START.items() if key in values["free"]}
-    scene = values.pop("scene", None)
-    below = overridden(EXAMPLE_ENTRY | start, {} if scene is None else library.values_from(scene))
-    return plan.plan_for(values | {"set": overridden(below, values["set"])}, example_loops())
+    if "model" not in values:
+        start = {key: value for key, value in EXAMPLE_START.items() if key in values["free"]}
+        scene = values.pop("scene", None)
+        below = EXAMPLE_ENTRY | start
+        below = overridden(below, {} if scene is None else library.values_from(scene))
+        values["set"] = overridden(below, values["set"])
+    return plan_from_values(values, Path(), example_loops())
 
 
 def _given(options: argparse.Namespace, name: str) -> bool:

@@ -16,9 +16,10 @@ from jbeamshell.dynamics.steady_cycles import gross_slip
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.dynamics.structure.modal import ModalCurve, by_statics
-from jbeamshell.identify.drive import Drive
+from jbeamshell.identify.models import Model
 from jbeamshell.identify.rig_keys import OF_STRUCTURE
 from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.toml import scene_to_toml
 
 REACH = 0.9  # force up to which a joint is computed, over its gross slip
 NUMBERS = "give numbers by name, such as {'damping_ratio': 0.001}"
@@ -26,7 +27,7 @@ NUMBERS = "give numbers by name, such as {'damping_ratio': 0.001}"
 Build = Callable[[Scene | None, Mapping[str, Array]], Structure]
 
 
-class Assembly(eqx.Module):
+class Assembly(Model):
     """Structure with joints, built from a scene and a few numbers, in place of a strip.
 
     Attributes
@@ -62,7 +63,7 @@ class Assembly(eqx.Module):
     build: Build
     scene: Scene | None
     numbers: dict[str, Array]
-    load: ClassVar[Drive] = Drive("displacement")
+    kind: ClassVar[str] = "a structure"
     mode: int = eqx.field(static=True)
     point: int | None = eqx.field(static=True)
     driven: int | None = eqx.field(static=True)
@@ -88,6 +89,10 @@ class Assembly(eqx.Module):
         self.build, self.scene = build, scene
         self.numbers = {name: as_leaf(value, name, NUMBERS) for name, value in given.items()}
         self.mode, self.point, self.driven = mode, point, driven
+
+    @property
+    def control(self) -> str:
+        return "displacement"
 
     def get(self, key: str) -> Any:
         """Number of the structure, or of its scene, by dotted key."""
@@ -116,6 +121,9 @@ class Assembly(eqx.Module):
             point=self.point,
             driven=self.driven,
         )
+
+    def as_toml(self) -> str:
+        return "" if self.scene is None else scene_to_toml(self.scene)
 
     def structure(self) -> Structure:
         """Structure with these numbers."""

@@ -12,34 +12,46 @@ from typing import Any
 
 from jbeamshell.identify.starts import HEIGHT, STIFFNESS, Estimate, suits
 from jbeamshell.measured.curves import SqueezeCurve
+from jbeamshell.scene.scene import Scene
 
 FRICTION, SLIDERS = "contact.friction", "contact.stick_stiffness"
 TALL, STIFF, SQUEEZE = "strip.height_ratio", "strip.axial_stiffness", "strip.kappa_s"
-USUAL = (FRICTION, TALL)
 
 
 def chosen_free(
-    known: Mapping[str, Any], data: Sequence[Any], found: Estimate | None
+    scene: Scene | None, known: Mapping[str, Any], data: Sequence[Any], found: Estimate | None
 ) -> dict[str, str]:
     """Keys to fit, each with the reason why these data tell it.
 
     Parameters
     ----------
-    known : values by dotted key that were given
+    scene : whole scene, whose numbers are starts; None where only some values are known
+    known : values by dotted key that were given, and that stay fixed if others are left to fit
     data : measurements of a specimen
     found : figures of its loops; None without loops
     """
-    reasons = _told(known, data, found)
+    stiff = scene is not None or any(key in known for key in STIFFNESS)
+    suited = scene is None and found is not None and suits(known, found)
     other_names = dict.fromkeys(STIFFNESS, STIFF) | dict.fromkeys(HEIGHT, TALL)
     given = {other_names.get(key, key) for key in known}
-    if "strip.layers" in known:
-        given |= {STIFF, TALL}
-    free = {key: reason for key, reason in reasons if key not in given}
-    return free or dict.fromkeys(USUAL, "the usual ones, as all that the data tell is given")
+    layers = "strip.layers" in known if scene is None else scene.strip.layers is not None
+    reasons = {
+        key: reason
+        for key, reason in _told(data, found, stiff, suited)
+        if not (layers and key in (STIFF, TALL))
+        and not (scene is not None and scene.get(key) is None)
+    }
+    free = {key: reason for key, reason in reasons.items() if key not in given}
+    if free:
+        return free
+    # All that the data tell is given: these values are starts.
+    return {key: f"{reason}; it is given and starts there" for key, reason in reasons.items()} or {
+        FRICTION: "the data tell nothing that the layers leave open"
+    }
 
 
 def _told(
-    known: Mapping[str, Any], data: Sequence[Any], found: Estimate | None
+    data: Sequence[Any], found: Estimate | None, stiff: bool, suited: bool
 ) -> list[tuple[str, str]]:
     """Parameters that data tell, with reasons; the last of several stiffnesses if it is unknown."""
     if all(isinstance(item, SqueezeCurve) for item in data):
@@ -53,11 +65,11 @@ def _told(
             else (STIFF, "the way to the plateau is bent, as of a strip that slides from its end")
         )
         return [(FRICTION, "the plateau is mu F_N L"), way]
-    if suits(known, found):
+    if suited:
         return [(FRICTION, "of the standard strip, which suits the loops"), (TALL, "likewise")]
     if found.work is None:
         return [(STIFF, "the loops are lines: they tell a stiffness, and no friction")]
     by_work = (FRICTION, "the work of a cycle tells mu F_N L over the height")
-    if any(key in known for key in STIFFNESS):
+    if stiff:
         return [by_work, (TALL, "the stiffness is given, so the displacement tells the height")]
     return [by_work, (STIFF, "the displacement tells it")]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -13,13 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, UnconvergedError
-from jbeamshell.identify.driving import as_model
-from jbeamshell.identify.fitting import fit
-from jbeamshell.identify.models import Driven, Model
+from jbeamshell.identify.models import LawModel, Model, as_model
+from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.observations import Observation, observe
+from jbeamshell.identify.plan import planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.specimens import Specimen
-from jbeamshell.laws import Law, PowerLaw
+from jbeamshell.laws import Law, PowerLaw, law_named
 from jbeamshell.measured.curves import DissipationCurve, Measurement, StiffnessCurve
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
@@ -33,7 +35,8 @@ REPEATS = 5  # runs of which the fastest counts
 Floats = NDArray[np.float64]
 
 
-class Compared(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Compared:
     """One model of a comparison.
 
     Attributes
@@ -64,7 +67,8 @@ class Compared(NamedTuple):
         return sum(rows.size for rows in self.fit.residuals) if self.fit is not None else 0
 
 
-class Comparison(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Comparison:
     """Models fitted to one target; print it, or draw it by `plot`.
 
     Attributes
@@ -96,7 +100,7 @@ class Comparison(NamedTuple):
         """Relative error (n,) of a model's energies."""
         return np.asarray(row.energy / self.energy - 1.0)
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         head = f"  {'model':12s} numbers  misfit  error of D: median  worst     time"
         lines = [head]
         for row in self.rows:
@@ -182,7 +186,7 @@ def compare(
     if isinstance(target, Scene):
         return _with_strip(target, models, amplitudes, options)
     require("amplitudes", amplitudes, amplitudes is None, "are the target's own: leave them out")
-    data = Specimen(Driven(PowerLaw()), target).measurements
+    data = [item for item, _ in Specimen(None, target).read(Path())]
     amplitude, energy, drive = _energies(data)
     rows = [_fitted(model, data, amplitude, drive, options) for model in models]
     return Comparison(amplitude, energy, drive, tuple(rows))
@@ -253,9 +257,11 @@ def _fitted(
     name = model if isinstance(model, str) else model.heading
     nothing = np.full(amplitude.shape, np.nan)
     try:
-        driven = as_model(model, data, drive)
+        if isinstance(model, str):
+            law_named(model)  # raises for the name of anything else
         own = [i for i in data if not (_is_power(model) and isinstance(i, StiffnessCurve))]
-        found = fit(own, driven, **({"throw": False} | options))
+        specimen = Specimen(model, own, set={"load.control": drive})
+        found = planned(specimen, options=Options(**{"throw": False, **options})).run()
     except (InputError, UnconvergedError) as error:
         return Compared(name, None, nothing, np.nan, np.nan, str(error))
     law = found.law
@@ -264,7 +270,7 @@ def _fitted(
     told = "" if found.status == "converged" else "the search has not converged"
     if not found.describes:
         told = "; ".join(filter(None, (told, "does not describe these data")))
-    return Compared(name, found, energy, found.misfit, _seconds(own, found.scene), told)
+    return Compared(name, found, energy, found.misfit, _seconds(own, LawModel(law, drive)), told)
 
 
 def _is_power(model: str | Law) -> bool:
@@ -273,8 +279,9 @@ def _is_power(model: str | Law) -> bool:
     return heading == PowerLaw.heading
 
 
-def _seconds(data: Sequence[Measurement], model: Model) -> float:
+def _seconds(data: Sequence[Measurement], model: Any) -> float:
     """Time of one response of a model to all data, compiled, the fastest of some."""
+    model = as_model(model)
     observations = [observe(item, model) for item in data]
     jax.block_until_ready(_respond(observations, model))
     times = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -56,7 +57,9 @@ def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[st
         others += own
         chosen = sorted(places)
         kept.append(
-            specimen._replace(data=[own[i] for i in chosen], weights=weights[chosen].tolist())
+            dataclasses.replace(
+                specimen, data=[own[i] for i in chosen], weights=weights[chosen].tolist()
+            )
         )
     return kept, said
 

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.assembly import Assembly
-from jbeamshell.identify.models import Drive, Driven, Model
-from jbeamshell.laws import Law, MasingLaw, law_named
+from jbeamshell.identify.models import LawModel, Model
+from jbeamshell.laws import Law, MasingLaw
 from jbeamshell.measured.curves import (
     AmplitudeCurve,
     Backbone,
@@ -25,7 +24,6 @@ from jbeamshell.measured.curves import (
 )
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.reversals import find_turns
-from jbeamshell.scene.scene import Scene
 
 AFTER_TURN = 0.15  # part of the range of the displacement in which the first slope is taken
 STIFFEST = 50.0  # largest start of the stiffness over the secant
@@ -49,38 +47,28 @@ class Figures(NamedTuple):
     stiffness: float
 
 
-def as_model(model: Any, measurements: Sequence[Any], control: str | None = None) -> Model:
-    """Model of a fit from a scene, a structure, a law, or a law's name.
+def driven(
+    law: Law | type[Law], measurements: Sequence[Any], control: str | None = None
+) -> LawModel:
+    """Model of a law, or of the class of one that starts from the data.
 
     A law is driven by the displacement, as it has a force for each; by the force where curves over
     amplitude are all there is, or where loops know the noise of their displacement alone.
 
     Parameters
     ----------
-    model : scene, structure, law, or name of a law
+    law : law, or its class
     measurements : what was measured
-    control : column that drives a law; None chooses as above
-
-    Raises
-    ------
-    InputError
-        for anything else, or an unknown name
+    control : column that drives it; None chooses as above
     """
-    if isinstance(model, Scene | Driven | Assembly):
-        return model
-    if isinstance(model, str):
-        model = law_named(model).started(*figures_of(measurements, control or "force"))
-    if not isinstance(model, Law):
-        raise InputError(
-            f"scene = {model!r}: give a jbeamshell.Scene, a law such as jbeamshell.laws.Iwan4(), "
-            "or its name, such as 'iwan4', or a jbeamshell.identify.Assembly"
-        )
+    if not isinstance(law, Law):
+        law = law.started(*figures_of(measurements, control or "force"))
     pulls = [item for item in measurements if isinstance(item, Loop | Backbone)]
     by_force = [getattr(pull, "driver", None) == "force" for pull in pulls]
     noisy = [noise_of(pull) is not None for pull in pulls]
     backward = any(a and b for a, b in zip(by_force, noisy, strict=True))
-    force = not pulls or (backward and isinstance(model, MasingLaw))
-    return Driven(model, Drive(control or ("force" if force else "displacement")))
+    force = not pulls or (backward and isinstance(law, MasingLaw))
+    return LawModel(law, control or ("force" if force else "displacement"))
 
 
 def figures_of(measurements: Sequence[Any], control: str = "force") -> Figures:
@@ -113,7 +101,7 @@ def figures_of(measurements: Sequence[Any], control: str = "force") -> Figures:
 
 def feature_doubts(model: Model, loops: Sequence[Loop]) -> list[str]:
     """Sentences on what loops show and a law cannot follow; none for other models."""
-    if not isinstance(model, Driven):
+    if not isinstance(model, LawModel):
         return []
     name, doubts = model.law.heading, []
     for loop in loops:

@@ -6,11 +6,12 @@ cores.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,27 +21,18 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import counting
 from jbeamshell.common.summary import Summary
 from jbeamshell.common.threads import in_one_lapack_thread
-from jbeamshell.identify.copies import counted_once
-from jbeamshell.identify.experiment import Experiment
-from jbeamshell.identify.fitting import MAX_ITERATIONS, POINTS, check_start
-from jbeamshell.identify.models import Model
-from jbeamshell.identify.parameters import Parameter, as_parameters
-from jbeamshell.identify.problem import Problem
-from jbeamshell.identify.results import Fit, fit_at
+from jbeamshell.identify.multistart import Options
+from jbeamshell.identify.parameters import Parameter
+from jbeamshell.identify.plan import Plan, planned
+from jbeamshell.identify.results import Fit
 from jbeamshell.identify.rig import RiggedObservation
-from jbeamshell.identify.search import StoppingRule, minimise
-from jbeamshell.identify.search_space import SearchSpace, search_space
-from jbeamshell.identify.settling import settle
-from jbeamshell.identify.specimens import Specimen, as_specimens
-from jbeamshell.identify.starts import check_starts
-from jbeamshell.measured.curves import Measurement
-from jbeamshell.measured.recordings import FEWEST_POINTS
-from jbeamshell.numerics.newton import Newton
+from jbeamshell.identify.specimens import Specimen
 
 LEVEL = 0.95  # part of the values between the ends that a summary names
 
 
-class Fits(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Fits:
     """Results of many fits of the same numbers.
 
     Attributes
@@ -48,12 +40,14 @@ class Fits(NamedTuple):
     values, errors : (fits,) fitted values and standard errors by key
     misfit : (fits,) root mean square of the residual over the range of the response
     converged : (fits,) False where a search did not converge; its values mean little
+    doubts : sentences on what to know before using the values, of each fit
     """
 
     values: dict[str, NDArray[np.float64]]
     errors: dict[str, NDArray[np.float64]]
     misfit: NDArray[np.float64]
     converged: NDArray[np.bool_]
+    doubts: Sequence[Sequence[str]] = ()
 
     def intervals(self, level: float = LEVEL) -> dict[str, tuple[float, float]]:
         """Ends between which this part of the converged values lies, by key.
@@ -88,7 +82,7 @@ class Fits(NamedTuple):
         ]
         return Summary(title, rows, [f"median misfit {100.0 * np.median(self.misfit):.3g} %"])
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self._summary.as_text(28)
 
     def _repr_html_(self) -> str:
@@ -97,31 +91,27 @@ class Fits(NamedTuple):
 
 @in_one_lapack_thread
 def fit_each(
-    data: Sequence[Measurement | Sequence[Measurement]],
-    scene: Model,
-    free: Sequence[str | Parameter],
+    data: Sequence[Any],
+    scene: Any = None,
+    free: Sequence[str | Parameter] = (),
     *,
-    noise: float | None = None,
-    points: int = POINTS,
-    max_iterations: int = MAX_ITERATIONS,
-    tolerance: float = 1e-7,
     progress: Callable[[int, int], None] | None = None,
+    **options: Any,
 ) -> Fits:
-    """Fit the same numbers to each of many measurements on its own.
+    """Fit the same numbers to each of many measurements on its own, as `fit` does.
 
     Parameters
     ----------
-    data : measurements of one kind, or a list of measurements for each fit; loops are not
-        inspected, see `jbeamshell.inspect`
-    scene : start values of every fit, and all values that stay fixed
-    free : what to fit, see `fit`
-    noise, points, max_iterations, tolerance : see `fit`
+    data : what to fit, or a list of measurements for each fit
+    scene, free : see `fit`; what the first of the data tell is fitted to all
     progress : called with the fits done and to do; None shows a bar where a person watches
+    options : further arguments of `fit`, such as ``noise``
 
     Returns
     -------
     Fits
-        values and errors of all fits, in the order of the data
+        ``values`` and ``errors`` (fits,) by key, ``misfit``, ``converged`` and ``doubts`` of each,
+        in the order of the data, and ``intervals()``
 
     Raises
     ------
@@ -139,45 +129,53 @@ def fit_each(
     """
     several = isinstance(data, Sequence) and len(data) > 0
     require("data", data if not several else "given", several, "give a list of measurements")
-    require_count("points", points, FEWEST_POINTS)
-    require_count("max_iterations", max_iterations, 1)
-    (first,) = as_specimens(data[0], scene, ())
-    space, scenes = search_space(as_parameters(free), {first.label: first.scene})
-    start = scenes[first.label]
-    stopping = StoppingRule(max_iterations, tolerance)
+    given = Options(**{"throw": False, **options})
+
+    def one(place: int, free: Sequence[str | Parameter]) -> Plan:
+        with _naming(place, len(data)):
+            return planned(data[place], scene, free, options=given)
+
+    first = one(0, free)
+    plans = [first, *(one(place, first.free) for place in range(1, len(data)))]
+    return _found(plans, progress)
+
+
+def _found(
+    plans: Sequence[Plan],
+    progress: Callable[[int, int], None] | None = None,
+    unseen: bool = False,
+) -> Fits:
+    """Fits of plans, on all cores."""
 
     def one(place: int) -> Fit:
-        try:
-            specimens, _ = counted_once([Specimen(start, data[place])])
-            check_starts(specimens, space.parameters)
-            experiment = Experiment(specimens, points=points, noise=noise, free=space.keys)
-            return _searched(Problem(experiment, space, Newton()), space, stopping)
-        except InputError as error:
-            raise InputError(f"fit {place + 1} of {len(data)}: {error}") from None
+        with _naming(place, len(plans)):
+            return plans[place].found(progress=lambda _: None, unseen=unseen)
 
     with counting(progress, "fits", "fit") as told, ThreadPoolExecutor(os.cpu_count()) as pool:
         found = [one(0)]  # threads that miss the same compiled code would all compile it
-        told(1, len(data))
-        for fit in pool.map(one, range(1, len(data))):
+        told(1, len(plans))
+        for fit in pool.map(one, range(1, len(plans))):
             found.append(fit)
-            told(len(found), len(data))
+            told(len(found), len(plans))
     return Fits(
-        {key: np.array([fit.values[key] for fit in found]) for key in space.names},
-        {key: np.array([fit.errors[key] for fit in found]) for key in space.names},
+        {key: np.array([fit.values[key] for fit in found]) for key in found[0].values},
+        {key: np.array([fit.errors[key] for fit in found]) for key in found[0].values},
         np.array([fit.misfit for fit in found]),
         np.array([fit.status == "converged" for fit in found]),
+        [fit.doubts for fit in found],
     )
 
 
-def _searched(problem: Problem, space: SearchSpace, stopping: StoppingRule) -> Fit:
-    """Fit of one search from the start."""
-    check_start(problem, space)
-    at_noise = problem.experiment.weight.size if problem.experiment.noisy else 0
-    rule = stopping._replace(noise_cost=at_noise)
-    end = minimise(lambda point: problem(space, point), np.zeros(len(space.names)), rule)
-    return fit_at(problem, space, settle(problem, space, end.point), [""], end.status, [])
+@contextlib.contextmanager
+def _naming(place: int, count: int) -> Iterator[None]:
+    """Put the number of a fit before what is wrong with its input."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"fit {place + 1} of {count}: {error}") from None
 
 
+@in_one_lapack_thread
 def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
     """Fit copies of a fit's data, whose residuals are drawn anew.
 
@@ -216,20 +214,24 @@ def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
     experiment, space = problem.experiment, uncertainty.space
     rigged = any(isinstance(each, RiggedObservation) for each in experiment.observations)
     require("result", "a rig", not rigged, "has a rig, whose numbers copies do not know")
-    best = problem(space, uncertainty.point)
+    best = problem(uncertainty.point)
     rows = experiment.weight.size
     residual = best.residual[:rows] / experiment.emphasis / experiment.weight
     residual = residual * np.sqrt(
         rows / max(rows - len(space.names), 1)
     )  # of which a fit took part
     random = np.random.default_rng(seed)
-    data = []
+    free = [
+        dataclasses.replace(own, start=result.values[name])
+        for own, name in zip(space.parameters, space.names, strict=True)
+    ]
+    options = Options(starts=1, throw=False)
+    plans = []
     for _ in range(copies):
         drawn = np.concatenate([_blocks(residual[own], random) for own in experiment.slices])
-        data.append(experiment.as_measurements(best.prediction - drawn))
-    starts = zip(space.parameters, space.names, strict=True)
-    free = [dataclasses.replace(own, start=result.values[name]) for own, name in starts]
-    return fit_each(data, result.scene, free)
+        data = experiment.as_measurements(best.prediction - drawn)
+        plans.append(Plan([Specimen(result.scene, data)], free, options=options))
+    return _found(plans, unseen=True)
 
 
 def _blocks(values: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import Small
-from jbeamshell.contact_line.shared import Layout, Shared, shared
-from jbeamshell.identify.models import Model, Prepared, Runnable
+from jbeamshell.contact_line.shared import Layout, Shared
+from jbeamshell.identify.models import FINER, Model
 from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.rig import rigged, with_rig
 from jbeamshell.identify.rig_keys import RIG
@@ -30,20 +30,18 @@ from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Measurement, noise_of, weight_of
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.scene.planning import may_be_elastic
-from jbeamshell.scene.scene import Scene
 
-FINER = 0.5  # part of the tolerance that plane elasticity keeps: fitted numbers amplify its error
 GRIDS = float(np.hypot(1.0, 1.0 / FINER))  # errors of both grids over that of the finer one
 
 
-class Prediction(NamedTuple):
+class Evaluation(NamedTuple):
     """Model's response to all measurements, their compared points one after the other.
 
     Attributes
     ----------
     residual : (rows,) weighted differences
-    jacobian : (rows, k) derivatives with respect to the values of the measurement's own specimen
+    jacobian : (rows, k) derivatives with respect to the values of the measurement's own specimen;
+        of a problem (rows + priors, n) with respect to the point of the search space
     prediction : (rows,) response on the scale that is compared
     converged : True if every load step found equilibrium
     """
@@ -52,6 +50,11 @@ class Prediction(NamedTuple):
     jacobian: NDArray[np.float64]
     prediction: NDArray[np.float64]
     converged: bool
+
+    @property
+    def cost(self) -> float:
+        """Sum of the squared residuals."""
+        return float(self.residual @ self.residual)
 
 
 class Experiment:
@@ -62,7 +65,7 @@ class Experiment:
     measurements : all measurements, specimen by specimen
     labels : labels of the measurements, no two alike
     owners : specimen of each measurement
-    scenes : scene of each specimen
+    models : model of each specimen
     observations : run of each measurement
     noisy : True if residuals are in units of measured noise; False if relative to the range
     weight : (rows,) factors from differences to residuals
@@ -95,12 +98,11 @@ class Experiment:
             the weights are not positive or not as many as the measurements
         """
         weights = [specimen.checked_weights() for specimen in specimens]
-        self.scenes = [specimen.scene for specimen in specimens]
+        self.models = [specimen.model for specimen in specimens]
         self.measurements: list[Any] = []
         self.owners: list[int] = []
         for owner, specimen in enumerate(specimens):
-            specimen.check()
-            control = specimen.scene.load.control
+            control = specimen.model.control
             for given in specimen.measurements:
                 thinned = given.thinned(points, control) if isinstance(given, Loop) else given
                 self.measurements.append(thinned)
@@ -119,7 +121,7 @@ class Experiment:
         self.observations = self._with_noise(observations, noise)
         self._compared = [np.flatnonzero(np.asarray(o.weight)) for o in self.observations]
         self._set_rows(np.concatenate(weights), noise)
-        served = [_served(scene, free) for scene in self.scenes]
+        served = [model.serving(free) for model in self.models]
         self._runs = [
             (_filled(observation), served[owner])
             for observation, owner in zip(self.observations, self.owners, strict=True)
@@ -151,15 +153,14 @@ class Experiment:
         It counts that of data computed at the scene's own tolerance, which is coarser, as well.
         """
         left = np.zeros(self.weight.size)
-        for rows, (observation, scene) in zip(self.slices, self._runs, strict=True):
-            if isinstance(scene, Scene) and scene.plan.elastic:
-                left[rows] = observation.own_error * GRIDS * scene.model.tolerance
+        for rows, (observation, model) in zip(self.slices, self._runs, strict=True):
+            left[rows] = observation.own_error * GRIDS * model.tolerance
         return float(np.sqrt(np.mean((left / self.relative) ** 2)))
 
     def __call__(
         self, keys: tuple[str, ...], table: NDArray[np.float64], solver: Newton
-    ) -> Prediction:
-        """Prediction of all measurements.
+    ) -> Evaluation:
+        """Evaluation of all measurements.
 
         Parameters
         ----------
@@ -189,23 +190,12 @@ class Experiment:
             slopes = slopes.at[owner].add(2.0 * emphasis * residual @ jacobian)
         return cost, slopes
 
-    def batch(
-        self, keys: tuple[str, ...], tables: NDArray[np.float64], solver: Newton
-    ) -> list[Prediction]:
-        """Predictions for several tables, (tables, specimens, k); each measurement is one batch."""
-        responses = self._run(_respond_batch, np.swapaxes(tables, 0, 1), keys, solver)
-        return [
-            self._joined([tuple(array[entry] for array in arrays) for arrays in responses])
-            for entry in range(len(tables))
-        ]
-
     def _strips(self, keys: tuple[str, ...]) -> list[Shared | None]:
         """Strip of each run that its values share; None where each must be condensed."""
         if keys not in self._shared:
             vary = [key for key in keys if key not in RIG]
             self._shared[keys] = [
-                shared(scene, vary, observation.figures) if isinstance(scene, Scene) else None
-                for observation, scene in self._runs
+                model.shared(vary, observation.figures) for observation, model in self._runs
             ]
         return self._shared[keys]
 
@@ -213,10 +203,9 @@ class Experiment:
         self, place: int, keys: tuple[str, ...], values: NDArray[np.float64]
     ) -> Shared | None:
         """Strip of a run if it holds for all values (tables, k) of its specimen."""
-        scene, strip = self._runs[place][1], self._strips(keys)[place]
-        if strip is None or not isinstance(scene, Scene):
-            return None
-        return strip if all(strip.holds(scene, keys, own) for own in values) else None
+        own, strip = self._runs[place][1].own, self._strips(keys)[place]
+        held = strip is not None and all(strip.holds(own, keys, each) for each in values)
+        return strip if held else None
 
     def _run(
         self,
@@ -246,7 +235,7 @@ class Experiment:
             pool.shutdown(cancel_futures=True)
         return [done[place] for place in range(len(self._runs))]
 
-    def _joined(self, responses: Sequence[tuple[NDArray[Any], ...]]) -> Prediction:
+    def _joined(self, responses: Sequence[tuple[NDArray[Any], ...]]) -> Evaluation:
         """One prediction from the responses of the runs."""
         converged = all(bool(response[-1]) for response in responses)
         columns = [
@@ -254,7 +243,7 @@ class Experiment:
             for response, compared in zip(responses, self._compared, strict=True)
         ]
         residual, jacobian, prediction = map(np.concatenate, zip(*columns, strict=True))
-        return Prediction(residual, jacobian, prediction, converged)
+        return Evaluation(residual, jacobian, prediction, converged)
 
     def as_measurements(self, prediction: NDArray[np.float64]) -> list[Any]:
         """Measurements as the model predicts them, from compared points (rows,)."""
@@ -262,7 +251,7 @@ class Experiment:
         for measurement, observation, owner, rows in zip(
             self.measurements, self.observations, self.owners, self.slices, strict=True
         ):
-            column = measurement.form.response(self.scenes[owner].load.control)
+            column = measurement.form.response(self.models[owner].control)
             values = observation.response_from(prediction[rows])
             predicted.append(_with_column(measurement, column, values))
         return predicted
@@ -289,24 +278,16 @@ class Experiment:
 
 def _observed(measurement: Measurement, specimen: Specimen, rig: Sequence[str]) -> Observation:
     """Run that reproduces a measurement, through the specimen's rig if there is one."""
-    plain = observe(measurement, specimen.scene)
+    plain = observe(measurement, specimen.model)
     if not (specimen.rig or rig):
         return plain
-    return rigged(measurement, plain, specimen.scene, specimen.rig, rig)
-
-
-def _served(scene: Model, free: Sequence[str]) -> Model:
-    """Model with settings that serve all values that a fit may try."""
-    if not isinstance(scene, Scene):
-        return scene
-    finer = {"model.tolerance": FINER * scene.model.tolerance}
-    return scene.replace(finer if may_be_elastic(scene) else {}).serving(free).pinned()
+    return rigged(measurement, plain, specimen.model, specimen.rig, rig)
 
 
 def _response(
     values: Array,
     observation: Observation,
-    scene: Model,
+    model: Model,
     numbers: Any,
     solver: Newton,
     keys: tuple[str, ...],
@@ -316,11 +297,11 @@ def _response(
 
     def residual(own: Array) -> tuple[Array, tuple[Array, Array, Array]]:
         given = dict(zip(keys, own, strict=True))
-        at: Runnable = scene.replace({key: v for key, v in given.items() if key not in RIG})
+        at = model.replace({key: v for key, v in given.items() if key not in RIG})
         of_rig = {key: value for key, value in given.items() if key in RIG}
         through = with_rig(observation, of_rig) if of_rig else observation
-        if layout is not None and isinstance(at, Scene):
-            at = Prepared(at, layout.strip(numbers, at))
+        if layout is not None:
+            at = at.prepared(layout.strip(numbers, at.own))
         rows, prediction, converged = through.residual(at, solver)
         return rows, (rows, prediction, converged)
 
@@ -339,36 +320,18 @@ _respond_whole = eqx.filter_jit(_response)
 def _respond(
     values: Array,
     observation: Observation,
-    scene: Model,
+    model: Model,
     strip: Shared | None,
     keys: tuple[str, ...],
     solver: Newton,
 ) -> tuple[Array, Array, Array, Array]:
     """Compiled response; that of a strip on its contact line is a small program."""
     numbers, layout = (None, None) if strip is None else (strip.numbers, strip.layout)
-    given = values, observation, scene, numbers, solver
-    if isinstance(scene, Scene) and scene.plan.on_contact_line:
+    given = values, observation, model, numbers, solver
+    if model.small:
         found: tuple[Array, Array, Array, Array] = _respond_small(given, keys, layout)
         return found
     return _respond_whole(*given, keys, None)
-
-
-def _respond_batch(
-    values: Array,
-    observation: Observation,
-    scene: Model,
-    strip: Shared | None,
-    keys: tuple[str, ...],
-    solver: Newton,
-) -> tuple[Array, ...]:
-    """Compiled responses to several values (tables, k)."""
-    numbers, layout = (None, None) if strip is None else (strip.numbers, strip.layout)
-    given = values, observation, scene, numbers, solver
-    found: tuple[Array, ...] = _batch(*given, keys, layout)
-    return found
-
-
-_batch = eqx.filter_jit(eqx.filter_vmap(_response, in_axes=(0, *[None] * 6)))
 
 
 def _shape(run: tuple[Observation, Model]) -> Any:

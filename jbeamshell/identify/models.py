@@ -1,9 +1,14 @@
-"""Models that a fit runs: a strip, a law of a joint, or a structure with joints."""
+"""Models that a fit changes: a strip, a law of a joint, or a structure with joints.
+
+Each has numbers by dotted key, a column that drives it, and answers for the kinds of measurement
+that it knows.  A structure is in `jbeamshell.identify.assembly`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Self
+import abc
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NoReturn, Self
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,16 +18,16 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import require, require_choice
 from jbeamshell.common.errors import InputError
+from jbeamshell.contact_line.shared import Shared, shared
 from jbeamshell.contact_line.strip import Strip
-from jbeamshell.identify.assembly import Assembly
-from jbeamshell.identify.drive import Drive as Drive
 from jbeamshell.laws import Law, MasingLaw, PowerLaw
 from jbeamshell.measured.curves import AmplitudeCurve, DissipationCurve, StiffnessCurve
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.load_path import check
-from jbeamshell.scene.parts import Load
+from jbeamshell.scene.planning import may_be_elastic
 from jbeamshell.scene.scene import Scene
+from jbeamshell.scene.toml import scene_to_toml
 from jbeamshell.solving.solve import run
 
 # Figure of a `History` that each curve over amplitude measures.
@@ -30,170 +35,243 @@ FIGURES: dict[type[AmplitudeCurve], str] = {
     DissipationCurve: "dissipation",
     StiffnessCurve: "secant_stiffness",
 }
+FINER = 0.5  # part of the tolerance that plane elasticity keeps: fitted numbers amplify its error
 
 
-class Driven(eqx.Module):
+class Model(eqx.Module):
+    """Numbers by dotted key, and the answers to measurements that follow from them."""
+
+    kind: ClassVar[str]  # in words
+
+    @property
+    @abc.abstractmethod
+    def control(self) -> str:
+        """Column that drives it, "force" or "displacement"."""
+
+    @property
+    def own(self) -> Any:
+        """Object that a user knows: the scene, the law, or the structure itself."""
+        return self
+
+    @abc.abstractmethod
+    def get(self, key: str) -> Any:
+        """Number by its dotted key."""
+
+    @abc.abstractmethod
+    def replace(self, values: Mapping[str, Any]) -> Self:
+        """Copy with other numbers, by dotted key; they may be traced."""
+
+    @property
+    def tolerance(self) -> float:
+        """Error of an answer, over its range, that the model's grid may leave; 0 without a grid."""
+        return 0.0
+
+    @property
+    def small(self) -> bool:
+        """True if its answers are small programs."""
+        return False
+
+    def serving(self, free: Sequence[str]) -> Model:
+        """Model with settings that serve all values of free numbers."""
+        return self
+
+    def shared(self, vary: Sequence[str], figures: Sequence[str]) -> Shared | None:
+        """Strip that its copies share while some numbers vary; None if each needs its own."""
+        return None
+
+    def prepared(self, strip: Strip) -> Model:
+        """Model whose strip is known, so that a run need not condense it."""
+        return self
+
+    def as_toml(self) -> str:
+        """TOML of its numbers; empty if there is none."""
+        return ""
+
+    def check_path(self, path: ArrayLike) -> None:
+        """Raise `InputError` unless it follows a path of its driving column."""
+        self.lacks("loop or backbone", "a Scene or a law")
+
+    def check_amplitudes(self, amplitude: ArrayLike) -> None:
+        """Raise `InputError` unless it has a steady cycle of all amplitudes."""
+        self.lacks("work or stiffness of a cycle", "a Scene or a law")
+
+    def along(self, path: Array, solver: Newton) -> tuple[Array, Array]:
+        """Answering column (T,) on a path (T,) of the driving one, and if all of it converged."""
+        self.lacks("loop", "a Scene or a law")
+
+    def cycles(self, amplitude: Array, figure: Array, solver: Newton) -> tuple[Array, Array]:
+        """Figures (n,) of the steady cycles of some amplitudes (n,), and if each converged.
+
+        Parameters
+        ----------
+        amplitude : (n,) amplitudes of the driving column
+        figure : (n,) index of the figure in `FIGURES`
+        solver : settings of Newton's method
+        """
+        self.lacks("cycle", "a Scene or a law")
+
+    def squeeze(self, x: Array, solver: Newton) -> tuple[Array, Array]:
+        """Squeeze stress (n,) at positions (n,) under the pressures alone, and if it converged."""
+        self.lacks("squeeze stress", "a Scene")
+
+    def lacks(self, what: str, better: str) -> NoReturn:
+        """Raise `InputError` that says what the model has not."""
+        raise InputError(f"{what}: {self.kind} has none; give {better}")
+
+
+class StripModel(Model):
+    """Strip with its load.
+
+    Attributes
+    ----------
+    scene : the scene
+    strip : its strip on the contact line, if that is known
+    """
+
+    scene: Scene
+    strip: Strip | None = None
+    kind: ClassVar[str] = "a strip"
+
+    @property
+    def control(self) -> str:
+        return self.scene.load.control
+
+    @property
+    def own(self) -> Scene:
+        """The scene."""
+        return self.scene
+
+    def get(self, key: str) -> Any:
+        return self.scene.get(key)
+
+    def replace(self, values: Mapping[str, Any]) -> Self:
+        return type(self)(self.scene.replace(values))
+
+    @property
+    def tolerance(self) -> float:
+        """Tolerance of plane elasticity; 0 for other sections."""
+        return float(self.scene.model.tolerance) if self.scene.plan.elastic else 0.0
+
+    @property
+    def small(self) -> bool:
+        return self.scene.plan.on_contact_line
+
+    def serving(self, free: Sequence[str]) -> Model:
+        finer = {"model.tolerance": FINER * self.scene.model.tolerance}
+        scene = self.scene.replace(finer if may_be_elastic(self.scene) else {})
+        return type(self)(scene.serving(free).pinned())
+
+    def shared(self, vary: Sequence[str], figures: Sequence[str]) -> Shared | None:
+        return shared(self.scene, vary, figures)
+
+    def prepared(self, strip: Strip) -> Model:
+        return type(self)(self.scene, strip)
+
+    def as_toml(self) -> str:
+        return scene_to_toml(self.scene)
+
+    def check_path(self, path: ArrayLike) -> None:
+        """Raise `InputError` if a force exceeds gross slip."""
+        check(self.scene, path)
+
+    def check_amplitudes(self, amplitude: ArrayLike) -> None:
+        """Raise `InputError` if a force exceeds gross slip."""
+        check(self.scene, np.sort(np.asarray(amplitude)))
+
+    def along(self, path: Array, solver: Newton) -> tuple[Array, Array]:
+        history = run(self.scene, path, solver=solver, throw=False, strip=self.strip)
+        response = history.displacement if self.control == "force" else history.force
+        return response[history.pressed + 1 :], jnp.all(history.status == 0)
+
+    def cycles(self, amplitude: Array, figure: Array, solver: Newton) -> tuple[Array, Array]:
+        cycles = max(self.scene.load.cycles, 1)
+
+        def one(point: tuple[Array, Array]) -> tuple[Array, Array]:
+            at = self.scene.replace({"load.amplitude": point[0], "load.cycles": cycles})
+            history = run(at, solver=solver, throw=False, strip=self.strip)
+            figures = (getattr(history, name) for name in FIGURES.values())
+            return lax.select_n(point[1], *figures), jnp.all(history.status == 0)
+
+        return lax.map(one, (amplitude, figure))
+
+    def squeeze(self, x: Array, solver: Newton) -> tuple[Array, Array]:
+        history = run(self.scene.replace({"load.cycles": 0}), solver=solver, throw=False)
+        stress = jnp.interp(x, history.middles, history.squeeze_stress[-1])
+        return stress, jnp.all(history.status == 0)
+
+
+class LawModel(Model):
     """Law of a joint in place of a strip.
 
     Attributes
     ----------
     law : the law
-    load : what drives it; a force on a path only where the law follows Masing's rule
-
-    Examples
-    --------
-    >>> model = Driven(jb.laws.Iwan4(slip_force=2.0), Drive("force"))
-    >>> model.get("iwan4.chi")
+    by : column that drives it; a force on a path only where the law follows Masing's rule
     """
 
     law: Law
-    load: Drive = eqx.field(static=True, default=Drive())
+    by: str = eqx.field(static=True, default="displacement")
+    kind: ClassVar[str] = "a law of a joint"
 
     def __check_init__(self) -> None:
-        require("law", self.law, isinstance(self.law, Law), "give a jbeamshell.laws.Law")
-        require_choice("load.control", self.load.control, CONTROLS)
+        require_choice("load.control", self.by, CONTROLS)
+
+    @property
+    def control(self) -> str:
+        return self.by
+
+    @property
+    def own(self) -> Law:
+        """The law."""
+        return self.law
 
     def get(self, key: str) -> Any:
-        """Number of the law by its dotted key."""
         return self.law.get(key)
 
     def replace(self, values: Mapping[str, Any]) -> Self:
-        """Copy with other numbers of the law, by dotted key; they may be traced."""
-        return type(self)(self.law.replace(values), self.load)
+        return type(self)(self.law.replace(values), self.control)
+
+    def as_toml(self) -> str:
+        return self.law.as_toml()
+
+    def check_path(self, path: ArrayLike) -> None:
+        """Raise `InputError` for a law without loops, and forces that it cannot follow."""
+        _ = self.law.stiffness  # raises for a law without loops
+        if self.control == "force":
+            fix = f"{self.law.heading} is driven by the displacement alone: take 'displacement'"
+            require("load.control", "force", isinstance(self.law, MasingLaw), fix)
+            self._check_forces(path)
+
+    def check_amplitudes(self, amplitude: ArrayLike) -> None:
+        """Raise `InputError` if a force reaches gross slip."""
+        if self.control == "force":
+            self._check_forces(amplitude)
+
+    def along(self, path: Array, solver: Newton) -> tuple[Array, Array]:
+        if self.control == "force" and isinstance(self.law, MasingLaw):
+            response = self.law.path_displacements(path)
+        else:
+            response = self.law.path_forces(path)
+        return response, jnp.all(jnp.isfinite(response))
+
+    def cycles(self, amplitude: Array, figure: Array, solver: Newton) -> tuple[Array, Array]:
+        law = self.law
+        if isinstance(law, PowerLaw):
+            values = jnp.where(figure == 0, law.dissipation_at_force(amplitude), jnp.nan)
+        else:
+            size = law.displacement(amplitude) if self.control == "force" else amplitude
+            values = lax.select_n(figure, law.dissipation(size), law.secant_stiffness(size))
+        return values, jnp.isfinite(values)
+
+    def _check_forces(self, force: ArrayLike) -> None:
+        """Raise `InputError` if forces reach gross slip at the start values."""
+        law, largest = self.law, float(np.max(np.abs(np.asarray(force))))
+        fix = f"reaches gross slip of {law.heading} at the start, {float(law.capacity):.6g}"
+        require("force", largest, largest < float(law.capacity), f"{fix}: start from a larger one")
 
 
-class Prepared(eqx.Module):
-    """Scene whose strip on its contact line is known, so that a run need not condense it.
-
-    Attributes
-    ----------
-    scene : the scene
-    strip : its strip, which answers figures of the contact alone
-    """
-
-    scene: Scene
-    strip: Strip
-
-    @property
-    def load(self) -> Load:
-        """Load of the scene."""
-        return self.scene.load
-
-
-Model = Scene | Driven | Assembly
-Runnable = Model | Prepared
-
-
-def check_path(model: Model, path: ArrayLike) -> None:
-    """Raise `InputError` if a model cannot follow a path of its driving column."""
-    if isinstance(model, Scene):
-        check(model, path)
-        return
-    driven = of_law("loop or backbone", model)
-    law = driven.law
-    _ = law.stiffness  # raises for a law without loops
-    if driven.load.control == "force":
-        fix = f"{law.heading} is driven by the displacement alone: take 'displacement'"
-        require("load.control", "force", isinstance(law, MasingLaw), fix)
-        check_forces(driven, path)
-
-
-def check_amplitudes(model: Model, amplitude: ArrayLike) -> None:
-    """Raise `InputError` if a model has no steady cycle of one of the amplitudes."""
-    if isinstance(model, Scene):
-        check(model, np.sort(np.asarray(amplitude)))
-        return
-    driven = of_law("work or stiffness of a cycle", model)
-    if driven.load.control == "force":
-        check_forces(driven, amplitude)
-
-
-def check_forces(model: Driven, force: ArrayLike) -> None:
-    """Raise `InputError` if forces reach a law's gross slip at its start values."""
-    law, largest = model.law, float(np.max(np.abs(np.asarray(force))))
-    fix = f"reaches gross slip of {law.heading} at the start, {float(law.capacity):.6g}: start from"
-    require("force", largest, largest < float(law.capacity), f"{fix} a larger one")
-
-
-def response_along(model: Runnable, path: Array, solver: Newton) -> tuple[Array, Array]:
-    """Answering column (T,) on a path (T,) of the driving one, and whether all of it converged."""
-    by_force = model.load.control == "force"
-    scene, strip = _parts(model)
-    if scene is not None:
-        history = run(scene, path, solver=solver, throw=False, strip=strip)
-        response = history.displacement if by_force else history.force
-        return response[history.pressed + 1 :], jnp.all(history.status == 0)
-    law = of_law("loop", model).law
-    if by_force and isinstance(law, MasingLaw):
-        response = law.path_displacements(path)
-    else:
-        response = law.path_forces(path)
-    return response, jnp.all(jnp.isfinite(response))
-
-
-def cycle_figures(
-    model: Runnable, amplitude: Array, figure: Array, solver: Newton
-) -> tuple[Array, Array]:
-    """Figures (n,) of the steady cycles of some amplitudes (n,), and whether each converged.
-
-    Parameters
-    ----------
-    model : strip, or law
-    amplitude : (n,) amplitudes of the driving column
-    figure : (n,) index of the figure in `FIGURES`
-    solver : settings of Newton's method
-    """
-    scene, strip = _parts(model)
-    if scene is not None:
-        cycles = max(scene.load.cycles, 1)
-
-        def one(point: tuple[Array, Array]) -> tuple[Array, Array]:
-            to = {"load.amplitude": point[0], "load.cycles": cycles}
-            history = run(scene.replace(to), solver=solver, throw=False, strip=strip)
-            figures = (getattr(history, name) for name in FIGURES.values())
-            return lax.select_n(point[1], *figures), jnp.all(history.status == 0)
-
-        return lax.map(one, (amplitude, figure))
-    law = of_law("cycle", model).law
-    if isinstance(law, PowerLaw):
-        values = jnp.where(figure == 0, law.dissipation_at_force(amplitude), jnp.nan)
-    else:
-        size = law.displacement(amplitude) if model.load.control == "force" else amplitude
-        values = lax.select_n(figure, law.dissipation(size), law.secant_stiffness(size))
-    return values, jnp.isfinite(values)
-
-
-def _parts(model: Runnable) -> tuple[Scene | None, Strip | None]:
-    """Scene of a model, and its strip if that is known; None for laws and structures."""
-    if isinstance(model, Prepared):
-        return model.scene, model.strip
-    return (model if isinstance(model, Scene) else None), None
-
-
-def of_strips_alone(what: str, model: Runnable) -> Scene:
-    """Scene of a model; raises `InputError` for others, which have nothing of the kind."""
-    if isinstance(model, Scene):
-        return model
-    other = "a law of a joint" if isinstance(model, Driven) else "a structure"
-    raise InputError(f"{what}: {other} has none; give a Scene")
-
-
-def of_law(what: str, model: Runnable) -> Driven:
-    """Driven law of a model that is no scene; raises `InputError` for a structure."""
-    if isinstance(model, Driven):
-        return model
-    raise InputError(f"{what}: a structure has none; give a Scene or a law")
-
-
-def of_structures_alone(what: str, model: Runnable) -> Assembly:
-    """Structure of a model; raises `InputError` for a strip or a law."""
-    if isinstance(model, Assembly):
-        return model
-    raise InputError(f"{what}: is that of a structure; give a jbeamshell.identify.Assembly")
-
-
-def require_point(label: str, model: Assembly) -> None:
-    """Raise `InputError` unless a structure knows where a force drives it."""
-    place = model.point if model.driven is None else model.driven
-    fix = "is driven nowhere: give the assembly driven=, a degree of freedom"
-    require(label, "force", place is not None, fix)
+def as_model(given: Any) -> Model:
+    """Model of a scene, of a law under a displacement, or a model as it is."""
+    if isinstance(given, Scene):
+        return StripModel(given)
+    return LawModel(given) if isinstance(given, Law) else given

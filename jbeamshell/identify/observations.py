@@ -17,20 +17,11 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
+from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.dynamics.structure.modal import ModalCurve
-from jbeamshell.identify.models import (
-    FIGURES,
-    Model,
-    Runnable,
-    check_amplitudes,
-    check_path,
-    cycle_figures,
-    of_strips_alone,
-    of_structures_alone,
-    require_point,
-    response_along,
-)
+from jbeamshell.identify.assembly import Assembly
+from jbeamshell.identify.models import FIGURES, Model, StripModel, as_model
 from jbeamshell.measured.curves import (
     AmplitudeCurve,
     Backbone,
@@ -42,7 +33,6 @@ from jbeamshell.measured.curves import (
 )
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
-from jbeamshell.solving.solve import run
 
 LENGTH_STEP = 32  # runs are filled up to multiples of this, where further points are cheap
 APPROACH = 8  # load steps from zero to the first point of a loop
@@ -81,12 +71,12 @@ class Observation(eqx.Module):
         return prediction
 
     @abc.abstractmethod
-    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         """Run the model.
 
         Parameters
         ----------
-        scene : strip with its load, law or structure; may hold traced leaves
+        model : strip, law or structure; may hold traced leaves
         solver : settings of Newton's method
 
         Returns
@@ -95,9 +85,9 @@ class Observation(eqx.Module):
         converged : True if every load step found equilibrium
         """
 
-    def residual(self, scene: Runnable, solver: Newton) -> tuple[Array, Array, Array]:
+    def residual(self, model: Model, solver: Newton) -> tuple[Array, Array, Array]:
         """Weighted difference (n,), prediction (n,), and whether every load step converged."""
-        prediction, converged = self.predict(scene, solver)
+        prediction, converged = self.predict(model, solver)
         difference = (prediction - self.measured) * self.weight
         # With weights of 1 over the noise, a difference of one range is a large residual itself.
         ranges = jnp.maximum(1.0, self.weight * jnp.ptp(self.measured))
@@ -106,7 +96,7 @@ class Observation(eqx.Module):
 
 
 class LoopObservation(Observation):
-    """Response to the column of a loop or backbone that ``scene.load.control`` names.
+    """Response to the column of a loop or backbone that ``load.control`` names.
 
     A closed loop is run through twice, first in larger steps, so that its second pass is steady.
     Anything else is run once, from the unloaded strip.
@@ -125,45 +115,45 @@ class LoopObservation(Observation):
     own_error: ClassVar[float] = 0.1  # measured on loops of finite elements: .02 to .06
 
     @classmethod
-    def of(cls, loop: Loop, scene: Model) -> LoopObservation:
+    def of(cls, loop: Loop, model: Model) -> LoopObservation:
         """Run of a loop; raises `InputError` if a force exceeds gross slip."""
-        control = scene.load.control
+        control = model.control
         run_in = getattr(loop.thinned(RUN_IN, control), control) if loop.closed else np.zeros(0)
-        return cls._through(loop, scene, run_in)
+        return cls._through(loop, model, run_in)
 
     @classmethod
-    def of_backbone(cls, backbone: Backbone, scene: Model) -> LoopObservation:
+    def of_backbone(cls, backbone: Backbone, model: Model) -> LoopObservation:
         """Run of a first loading; raises `InputError` if it turns back or exceeds gross slip."""
-        drive = getattr(backbone, scene.load.control)
+        drive = getattr(backbone, model.control)
         steps = np.diff(drive, prepend=0.0) * np.sign(drive[-1])
         back = np.flatnonzero(steps[1:] <= 0.0)
         if back.size or steps[0] < 0.0:
             at = back[0] + 2 if back.size else 1
             raise InputError(
-                f"{backbone.label}: {scene.load.control} = {drive[at - 1]:g} turns back at point "
+                f"{backbone.label}: {model.control} = {drive[at - 1]:g} turns back at point "
                 f"{at}, but a backbone only rises from zero; give a Loop instead"
             )
-        return cls._through(backbone, scene, np.zeros(0))
+        return cls._through(backbone, model, np.zeros(0))
 
     @classmethod
     def _through(
-        cls, measurement: Loop | Backbone, scene: Model, run_in: NDArray[np.float64]
+        cls, measurement: Loop | Backbone, model: Model, run_in: NDArray[np.float64]
     ) -> LoopObservation:
-        drive = getattr(measurement, scene.load.control)
-        responding = measurement.form.response(scene.load.control)
+        drive = getattr(measurement, model.control)
+        responding = measurement.form.response(model.control)
         response = getattr(measurement, responding)
         approach = np.linspace(0.0, drive[0], APPROACH + 1)[1:]
         path = np.concatenate([approach, run_in, drive])
-        check_path(scene, path)
+        model.check_path(path)
         uncompared = np.zeros(path.size - drive.size)
         noise = noise_of(measurement)
-        driver = getattr(measurement, "driver", None) or scene.load.control
-        if noise is not None and driver != scene.load.control:
+        driver = getattr(measurement, "driver", None) or model.control
+        if noise is not None and driver != model.control:
             raise InputError(
                 f"{measurement.label}: its {driver} drives, so its noise is not that of the "
-                f"{driver}, which is the response under load.control = {scene.load.control!r}: "
+                f"{driver}, which is the response under load.control = {model.control!r}: "
                 f"set load.control to {driver!r}, or average its cycles by "
-                f"steady_loops(recording, {scene.load.control!r})"
+                f"steady_loops(recording, {model.control!r})"
             )
         if noise is not None and np.min(noise) >= np.ptp(response):
             raise InputError(
@@ -178,9 +168,9 @@ class LoopObservation(Observation):
             getattr(measurement, "free_zero", False),
         )
 
-    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         """Responding column (n,), and whether every load step converged."""
-        response, converged = response_along(scene, self.path, solver)
+        response, converged = model.along(self.path, solver)
         return self.shifted(response), converged
 
     def shifted(self, response: Array) -> Array:
@@ -207,9 +197,11 @@ class SqueezeObservation(Observation):
     figures: ClassVar[tuple[str, ...]] = ("squeeze_stress",)
 
     @classmethod
-    def of(cls, curve: SqueezeCurve, scene: Model) -> SqueezeObservation:
+    def of(cls, curve: SqueezeCurve, model: Model) -> SqueezeObservation:
         """Run of a curve; raises `InputError` if the scene cannot reproduce it."""
-        scene = of_strips_alone(f"{curve.label}: squeeze stress", scene)
+        if not isinstance(model, StripModel):
+            model.lacks(f"{curve.label}: squeeze stress", "a Scene")
+        scene = model.scene
         if "psi" not in scene.plan.fields:
             raise InputError(
                 f"{curve.label}: model.section = {scene.plan.section} has no squeeze stress: "
@@ -228,12 +220,9 @@ class SqueezeObservation(Observation):
         weight = weight if curve.noise is None else 1.0 / curve.noise
         return cls(*map(jnp.asarray, (curve.stress, weight, curve.x)))
 
-    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         """Squeeze stress (n,), linear between element midpoints, and whether it converged."""
-        strip = of_strips_alone("squeeze stress", scene)
-        history = run(strip.replace({"load.cycles": 0}), solver=solver, throw=False)
-        stress = jnp.interp(self.x, history.middles, history.squeeze_stress[-1])
-        return stress, jnp.all(history.status == 0)
+        return model.squeeze(self.x, solver)
 
 
 class LogObservation(Observation):
@@ -262,7 +251,7 @@ class AmplitudeObservation(LogObservation):
 
     Attributes
     ----------
-    amplitude : (n,) amplitudes of the column that ``scene.load.control`` names
+    amplitude : (n,) amplitudes of the column that ``load.control`` names
     figure : (n,) index of the figure in `FIGURES`, so that all kinds share one compiled program
     """
 
@@ -272,15 +261,15 @@ class AmplitudeObservation(LogObservation):
     own_error: ClassVar[float] = 0.5
 
     @classmethod
-    def of(cls, curve: AmplitudeCurve, scene: Model) -> AmplitudeObservation:
+    def of(cls, curve: AmplitudeCurve, model: Model) -> AmplitudeObservation:
         """Runs of a curve; raises `InputError` if a force exceeds gross slip."""
-        check_amplitudes(scene, curve.amplitude)
+        model.check_amplitudes(curve.amplitude)
         figure = np.full(curve.amplitude.size, list(FIGURES).index(type(curve)), dtype=np.int32)
         return cls(*cls.columns(curve), *map(jnp.asarray, (curve.amplitude, figure)))
 
-    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         """Logarithms (n,) of the figure, and whether every load step converged."""
-        values, converged = cycle_figures(scene, self.amplitude, self.figure, solver)
+        values, converged = model.cycles(self.amplitude, self.figure, solver)
         return _logarithm(values, self.measured)[0], jnp.all(converged)
 
 
@@ -304,26 +293,28 @@ class ModalObservation(LogObservation):
     omega: Array
 
     @classmethod
-    def of(cls, curve: AmplitudeCurve, scene: Model) -> ModalObservation:
+    def of(cls, curve: AmplitudeCurve, model: Model) -> ModalObservation:
         """Run of a curve; raises `InputError` if the model is no structure that vibrates so."""
-        model = of_structures_alone(curve.label, scene)
+        structure = _structure(curve.label, model)
         omega = np.zeros(curve.amplitude.size)
         if isinstance(curve, ForcedCurve):
-            require_point(curve.label, model)
+            driven = structure.point if structure.driven is None else structure.driven
+            fix = "is driven nowhere: give the assembly driven=, a degree of freedom"
+            require(curve.label, "force", driven is not None, fix)
             omega = 2.0 * np.pi * curve.frequency
         level, place = np.unique(curve.amplitude, return_inverse=True)
-        model.response(level)  # raises for wrong input
+        structure.response(level)  # raises for wrong input
         figure = MODAL.index(type(curve))
         return cls(*cls.columns(curve), *map(jnp.asarray, (level, place, figure, omega)))
 
-    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         """Logarithms (n,) of the figure, and whether all static equilibria were found."""
-        values = self._figures(*of_structures_alone("modal curve", scene).response(self.level))
+        values = self._figures(*_structure("modal curve", model).response(self.level))
         return _logarithm(values, self.measured)
 
-    def without_errors(self, scene: Model) -> tuple[ModalCurve, NDArray[np.float64]]:
+    def without_errors(self, model: Model) -> tuple[ModalCurve, NDArray[np.float64]]:
         """Curve, and change (n,) of the logarithms if it were without the errors that it states."""
-        curve, mobility = of_structures_alone("modal curve", scene).response(self.level)
+        curve, mobility = _structure("modal curve", model).response(self.level)
         parts = (1.0 - np.asarray([curve.frequency_error, curve.damping_error])).clip(LEAST_PART)
         exact = curve._replace(
             frequency=parts[0] * curve.frequency, damping=parts[1] * curve.damping
@@ -347,31 +338,43 @@ def _logarithm(values: Array, measured: Array) -> tuple[Array, Array]:
     return jnp.log(jnp.maximum(values, least)), jnp.all(jnp.isfinite(values))
 
 
-@functools.singledispatch
-def observe(measurement: Any, scene: Model) -> Observation:
-    """Run of a scene that reproduces a measurement.
+def _structure(what: str, model: Model) -> Assembly:
+    """Structure; raises `InputError` for a strip or a law."""
+    if not isinstance(model, Assembly):
+        model.lacks(what, "a jbeamshell.identify.Assembly")
+    return model
+
+
+def observe(measurement: Any, model: Any) -> Observation:
+    """Run of a model that reproduces a measurement.
 
     Parameters
     ----------
     measurement : a `Loop`, or a curve of `jbeamshell.measured.curves`
-    scene : strip and load that were measured, or law, or structure
+    model : strip and load that were measured, or law, or structure
 
     Raises
     ------
     InputError
-        if the scene cannot reproduce the measurement, or if it is of an unknown kind
+        if the model cannot reproduce the measurement, or if it is of an unknown kind
     """
+    return run_of(measurement, as_model(model))
+
+
+@functools.singledispatch
+def run_of(measurement: Any, model: Model) -> Observation:
+    """Run of a model for a kind of measurement, registered by the measurement's class."""
     kind = type(measurement).__name__
-    *known, last = (known.__name__ for known in observe.registry if known is not object)
+    *known, last = (known.__name__ for known in run_of.registry if known is not object)
     raise InputError(
         f"data: a {kind} is no measurement: give a {', a '.join(known)}, a {last}, or a list"
     )
 
 
-observe.register(Loop, LoopObservation.of)
-observe.register(SqueezeCurve, SqueezeObservation.of)
-observe.register(Backbone, LoopObservation.of_backbone)
+run_of.register(Loop, LoopObservation.of)
+run_of.register(SqueezeCurve, SqueezeObservation.of)
+run_of.register(Backbone, LoopObservation.of_backbone)
 for _curve in FIGURES:
-    observe.register(_curve, AmplitudeObservation.of)
+    run_of.register(_curve, AmplitudeObservation.of)
 for _curve in MODAL:
-    observe.register(_curve, ModalObservation.of)
+    run_of.register(_curve, ModalObservation.of)

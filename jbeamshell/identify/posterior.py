@@ -11,7 +11,7 @@ leaves.  The prior of a parameter is its own normal one, or flat on its scale: i
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import dataclasses
 
 import jax
 import jax.numpy as jnp
@@ -23,13 +23,13 @@ from scipy import stats
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.problem import Problem
-from jbeamshell.identify.results import Fit
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.uncertainty import Uncertainty
 
 
-class Posterior(NamedTuple):
-    """Posterior density of n parameters; made by `posterior`.
+@dataclasses.dataclass(frozen=True, eq=False)
+class Posterior:
+    """Posterior density of n parameters; made by `Fit.posterior`.
 
     Attributes
     ----------
@@ -131,36 +131,15 @@ class Posterior(NamedTuple):
         return jnp.stack(values), jnp.stack(scales)
 
 
-def posterior(result: Fit) -> Posterior:
-    """Posterior density of the parameters of a fit.
-
-    Parameters
-    ----------
-    result : result of `fit`
-
-    Raises
-    ------
-    InputError
-        if the result was not made by `fit`, or if a value ended at its bound
-
-    Examples
-    --------
-    ::
-
-        problem = jb.identify.posterior(jb.identify.fit(loops, scene, ["contact.friction"]))
-        sampler = blackjax.nuts(problem.logdensity, 0.5, problem.covariance)
-        state = sampler.init(problem.start)
-    """
-    problem, uncertainty = result.problem, result.uncertainty
-    if problem is None or uncertainty is None:
-        raise InputError("posterior: this result was not made by fit")
+def posterior(problem: Problem, uncertainty: Uncertainty) -> Posterior:
+    """Posterior density at the minimum of a problem; see `Fit.posterior`."""
     for name, at_bound in zip(uncertainty.space.names, uncertainty.at_bound, strict=True):
         if at_bound:
             raise InputError(
                 f"posterior: {name} ended at its bound; widen its bounds, or leave it out"
             )
     rows = problem.experiment.weight.size
-    best = problem(uncertainty.space, uncertainty.point).residual[:rows]
+    best = problem(uncertainty.point).residual[:rows]
     return Posterior(problem, uncertainty, float(best @ best))
 
 

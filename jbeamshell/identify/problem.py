@@ -7,40 +7,16 @@ where it stopped by reading its first steps from the runs that were saved.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.experiment import Experiment, Prediction
+from jbeamshell.identify.experiment import Evaluation, Experiment
 from jbeamshell.identify.saved_runs import SavedRuns
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.numerics.newton import Newton
-
-
-class Evaluation(NamedTuple):
-    """Residual and Jacobian of the problem at a point of the search space.
-
-    Attributes
-    ----------
-    residual : (rows + priors,) entries whose squares are summed
-    jacobian : (rows + priors, n) derivatives with respect to the point
-    prediction : (rows,) the model's response on the scale that is compared
-    converged : True if every load step found equilibrium
-    """
-
-    residual: NDArray[np.float64]
-    jacobian: NDArray[np.float64]
-    prediction: NDArray[np.float64]
-    converged: bool
-
-    @property
-    def cost(self) -> float:
-        """Sum of the squared residuals."""
-        return float(self.residual @ self.residual)
 
 
 class Problem:
@@ -49,6 +25,7 @@ class Problem:
     Attributes
     ----------
     experiment : measurements and the runs that reproduce them
+    space : search space, n axes
     priors : (axis, mean, standard deviation) of every prior
     solver : settings of Newton's method
     """
@@ -74,7 +51,7 @@ class Problem:
         InputError
             if the file belongs to another problem, or if there are priors but no known noise
         """
-        self.experiment, self.solver = experiment, solver
+        self.experiment, self.space, self.solver = experiment, space, solver
         self.priors = [(i, *p.prior) for i, p in enumerate(space.parameters) if p.prior is not None]
         if self.priors and not experiment.noisy:
             name, (_, mean, deviation) = space.names[self.priors[0][0]], self.priors[0]
@@ -82,7 +59,7 @@ class Problem:
                 f"free {name!r}: prior = {(mean, deviation)}: cannot be weighed against data of "
                 "unknown noise; give noise (--noise on the command line), such as 0.01"
             )
-        self._known: dict[bytes, Prediction] = {}
+        self._known: dict[bytes, Evaluation] = {}
         self._saved = None
         if save is not None:
             self._saved = SavedRuns(save, experiment, space, solver)
@@ -98,27 +75,13 @@ class Problem:
         """File of the model runs; None if they are not saved."""
         return None if self._saved is None else str(self._saved.path)
 
-    def __call__(self, space: SearchSpace, point: ArrayLike) -> Evaluation:
-        """Residual and Jacobian at a point (n,) of the search space."""
+    def __call__(self, point: ArrayLike, space: SearchSpace | None = None) -> Evaluation:
+        """Residual and Jacobian at a point (n,) of the search space, or of another one."""
+        space = space or self.space
         values = space.values(point)
         if values.tobytes() not in self._known:
             prediction = self.experiment(space.keys, values[space.table], self.solver)
-            self._remember([(values, prediction)])
-        return self._evaluation(space, point, values)
-
-    def batch(self, space: SearchSpace, points: Sequence[ArrayLike]) -> list[Evaluation]:
-        """Residuals and Jacobians at several points, whose models run in one batch."""
-        several = [space.values(point) for point in points]
-        if any(values.tobytes() not in self._known for values in several):
-            tables = np.stack([values[space.table] for values in several])
-            predictions = self.experiment.batch(space.keys, tables, self.solver)
-            self._remember(list(zip(several, predictions, strict=True)))
-        pairs = zip(points, several, strict=True)
-        return [self._evaluation(space, point, values) for point, values in pairs]
-
-    def _evaluation(
-        self, space: SearchSpace, point: ArrayLike, values: NDArray[np.float64]
-    ) -> Evaluation:
+            self._remember(values, prediction)
         run, experiment = self._known[values.tobytes()], self.experiment
         rows = run.residual.size
         jacobian = np.zeros((rows + len(self.priors), values.size))
@@ -133,7 +96,7 @@ class Problem:
         slopes = space.slopes(point)
         return Evaluation(residual, jacobian * slopes, run.prediction, run.converged)
 
-    def _remember(self, runs: Sequence[tuple[NDArray[np.float64], Prediction]]) -> None:
-        self._known |= {values.tobytes(): run for values, run in runs}
+    def _remember(self, values: NDArray[np.float64], run: Evaluation) -> None:
+        self._known[values.tobytes()] = run
         if self._saved is not None:
-            self._saved.append(runs)
+            self._saved.append([(values, run)])

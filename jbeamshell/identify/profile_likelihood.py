@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +12,20 @@ from numpy.typing import NDArray
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import bar
 from jbeamshell.identify.bijection import FARTHEST
-from jbeamshell.identify.problem import Evaluation
-from jbeamshell.identify.results import Fit
+from jbeamshell.identify.experiment import Evaluation
+from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search import StoppingRule, minimise
-from jbeamshell.identify.uncertainty import check_level
+from jbeamshell.identify.uncertainty import Uncertainty, check_level
 
 MOST_POINTS = 8  # evaluations to either side
 ACCURACY = 0.02  # relative error allowed in the square root of the rise at an interval's end
 NUDGE = 0.5  # largest move of the others, in the search space, before they are fitted
+MAX_ITERATIONS, TOLERANCE = 40, 1e-4  # of the fits of the other parameters
 LONGEST_FIRST_STEP = 2.0  # in the search space
 
 
-class Profile(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Profile:
     """Profile likelihood of one parameter.
 
     Attributes
@@ -44,7 +47,7 @@ class Profile(NamedTuple):
     level: float
     settled: bool = True
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         low, high = self.interval
         line = f"  {self.name}: {100.0 * self.level:g} % profile interval {low:.6g} to {high:.6g}"
         doubt = "; the other parameters did not converge everywhere, so it may be too short"
@@ -62,47 +65,15 @@ class Profile(NamedTuple):
 
 
 def profile(
-    result: Fit,
+    problem: Problem,
+    uncertainty: Uncertainty,
     name: str,
-    *,
     level: float = 0.95,
-    max_iterations: int = 40,
-    tolerance: float = 1e-4,
+    max_iterations: int = MAX_ITERATIONS,
+    tolerance: float = TOLERANCE,
 ) -> Profile:
-    """Profile likelihood of a fitted parameter, and its confidence interval.
-
-    The intervals of `Fit` linearise the model, which is right for little noise only.  This function
-    runs the model: it holds the parameter at other values and fits all others again (Raue et al.,
-    Bioinformatics 25, 2009).  It costs up to 16 fits.
-
-    Parameters
-    ----------
-    result : result of `fit`
-    name : one of ``result.values``
-    level : confidence level, between 0 and 1
-    max_iterations, tolerance : settings of the fits of the other parameters
-
-    Returns
-    -------
-    Profile
-        values of the parameter, rises of the cost, and the interval
-
-    Raises
-    ------
-    InputError
-        if the name was not fitted, or if its value ended at a bound
-
-    Examples
-    --------
-    ::
-
-        fit = jb.identify.fit(loops, scene, ["contact.friction", "strip.height_ratio"])
-        low, high = jb.identify.profile(fit, "contact.friction").interval
-    """
+    """Profile likelihood of a parameter at the minimum of a problem; see `Fit.profile`."""
     check_level(level)
-    if name not in result.values or result.problem is None or result.uncertainty is None:
-        raise InputError(f"profile {name!r}: was not fitted; names are {', '.join(result.values)}")
-    problem, uncertainty = result.problem, result.uncertainty
     space, best = uncertainty.space, uncertainty.point
     axis = space.names.index(name)
     bijection = space.bijections[axis]
@@ -110,7 +81,7 @@ def profile(
         raise InputError(f"profile {name!r}: it ended at its bound; widen its bounds and fit again")
     others = np.delete(np.arange(best.size), axis)
     along = uncertainty.inverse[:, axis] / uncertainty.inverse[axis, axis]
-    least, wanted = problem(space, best).cost, uncertainty.quantile(level)
+    least, wanted = problem(best).cost, uncertainty.quantile(level)
     stopping = StoppingRule(max_iterations, tolerance, uncertainty.sigma**2)
     points, roots, settled = {0.0: best}, {0.0: 0.0}, True
 
@@ -123,7 +94,7 @@ def profile(
         whole[axis] = best[axis] + step
 
         def evaluate(part: NDArray[np.float64]) -> Evaluation:
-            evaluation = problem(space, np.insert(part, axis, whole[axis]))
+            evaluation = problem(np.insert(part, axis, whole[axis]))
             return evaluation._replace(jacobian=evaluation.jacobian[:, others])
 
         if others.size:

@@ -12,21 +12,20 @@ import numpy as np
 from jbeamshell import plotting
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_json, csv_text
-from jbeamshell.identify.models import Driven, Model
+from jbeamshell.identify.models import as_model
+from jbeamshell.laws import Law
 from jbeamshell.measured.form import by_form
 from jbeamshell.plotting.folder import write_folder
 from jbeamshell.plotting.protocols import LikelihoodProfile, ModelOverData
-from jbeamshell.scene.scene import Scene
-from jbeamshell.scene.toml import scene_to_toml
 
 
 class Fitted(ModelOverData, Protocol):
     """Model over its data, with the fitted scenes: the first, and all by the specimens' labels."""
 
     @property
-    def scene(self) -> Model: ...
+    def scene(self) -> Any: ...
     @property
-    def scenes(self) -> Mapping[str, Model]: ...
+    def scenes(self) -> Mapping[str, Any]: ...
 
 
 def write_fit(
@@ -62,10 +61,10 @@ def write_fit(
     texts = {f"{name}.csv": text for name, text in tables(result).items()}
     scenes = list(result.scenes.values()) or [result.scene]
     for number, scene in enumerate(scenes, 1):
-        kind = "law" if isinstance(scene, Driven) else "scene"
+        kind = "law" if isinstance(scene, Law) else "scene"
         name = f"{kind}.toml" if len(scenes) == 1 else f"{kind}_{number}.toml"
         with contextlib.suppress(InputError):
-            if text := _text_of(scene):
+            if text := as_model(scene).as_toml():
                 texts[name] = text
     if profiles:
         rows = [
@@ -83,14 +82,6 @@ def write_fit(
         drawn["profiles.png"] = plotting.likelihoods(profiles)
     pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
     return write_folder(folder, texts, pictures)
-
-
-def _text_of(model: Model) -> str:
-    """TOML of a scene, a law, or the scene of a structure's joints; empty if there is none."""
-    if isinstance(model, Driven):
-        return model.law.as_toml()
-    scene = model if isinstance(model, Scene) else model.scene
-    return "" if scene is None else scene_to_toml(scene)
 
 
 def tables(result: ModelOverData) -> dict[str, str]:

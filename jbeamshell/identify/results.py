@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require
+from jbeamshell.common.errors import InputError
 from jbeamshell.common.summary import Summary
 from jbeamshell.identify.contradictions import contradiction
 from jbeamshell.identify.model_error import model_misfit
-from jbeamshell.identify.models import Driven, Model
+from jbeamshell.identify.posterior import Posterior, posterior
 from jbeamshell.identify.problem import Problem
-from jbeamshell.identify.search_space import SearchSpace
+from jbeamshell.identify.profile_likelihood import MAX_ITERATIONS, TOLERANCE, Profile, profile
 from jbeamshell.identify.settling import Settled
 from jbeamshell.identify.statics import doubt_of_statics
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_at
@@ -28,13 +30,14 @@ WRONG_MODEL = 2.0  # misfit over noise above which the model must be wrong
 WORTH_SAYING = 1e-3  # of the range, left by the model
 
 
-class Fit(NamedTuple):
-    """Result of a fit.
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Fit:
+    """Result of a fit; print it, or draw it by `plot`.
 
     Attributes
     ----------
-    scene : scene with the fitted values, ready to run; of several specimens the first.  For a law
-        a `Driven`, see `law`; for a structure an `Assembly`
+    scene : scene with the fitted values, ready to run, or the law, or the `Assembly`; of several
+        specimens the first
     values, errors : fitted value and standard error (one sigma) by key, or by "key[specimen]" where
         every specimen has its own.  They count what the model leaves as so many independent points
         as its correlation along the curves allows
@@ -48,16 +51,18 @@ class Fit(NamedTuple):
     labels : labels of the measurements, no two alike
     scenes : scene of every specimen by its label, with the fitted values
     intervals : 95 % confidence interval by key
-    warnings : sentences on what to know before using the values
+    doubts : sentences on what to know before using the values
+    controls : column that drives the model, for every measurement
+    notes : sentences on what was done to the data, and what was estimated and chosen by default
     describes : False if the model leaves too much of a measurement, or misses the energy per cycle
         or the secant stiffness of a loop, see `jbeamshell.identify.verdict`; its values then mean
         little
     minima : values and cost at the end of each search, the best first
     uncertainty : what the data do not determine, for other levels and noise
-    problem : least-squares problem, for `bands` and `identify.profile`
+    problem : least-squares problem
     """
 
-    scene: Model
+    scene: Any
     values: dict[str, float]
     errors: dict[str, float]
     correlation: NDArray[np.float64]
@@ -68,30 +73,32 @@ class Fit(NamedTuple):
     status: str
     model_runs: int
     labels: Sequence[str] = ()
-    scenes: dict[str, Model] = {}  # noqa: RUF012 - never changed
-    intervals: dict[str, tuple[float, float]] = {}  # noqa: RUF012
-    warnings: Sequence[str] = ()
+    scenes: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    intervals: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    doubts: Sequence[str] = ()
     left: Sequence[float] = ()
     describes: bool = True
     minima: Sequence[tuple[dict[str, float], float]] = ()
     uncertainty: Uncertainty | None = None
     problem: Problem | None = None
+    notes: Sequence[str] = ()
+    controls: Sequence[str] = ()
 
     @property
     def law(self) -> Law:
         """Fitted law of a joint, of several specimens the first; raises for others."""
-        require("law", "none", isinstance(self.scene, Driven), "read scene instead")
-        assert isinstance(self.scene, Driven)
-        return self.scene.law
+        require("law", "none", isinstance(self.scene, Law), "read scene instead")
+        law: Law = self.scene
+        return law
 
     @property
     def _summary(self) -> Summary:
         rows = [(k, f"{value:.6g} +- {self.errors[k]:.2g}") for k, value in self.values.items()]
         misfit = f"misfit {100 * self.misfit:.3g} % of the range"
         end = f"{self.status} after {self.model_runs} model runs"
-        return Summary("", rows, [misfit, end, *self.warnings])
+        return Summary("", rows, [misfit, end, *self.doubts, *self.notes])
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self._summary.as_text(28)
 
     def _repr_html_(self) -> str:
@@ -117,7 +124,8 @@ class Fit(NamedTuple):
             "describes": self.describes,
             "status": self.status,
             "model_runs": self.model_runs,
-            "warnings": list(self.warnings),
+            "doubts": list(self.doubts),
+            "notes": list(self.notes),
         }
         if self.uncertainty is not None:
             u = self.uncertainty
@@ -152,7 +160,7 @@ class Fit(NamedTuple):
         Lower and upper end for every measurement, each a measurement of the same kind
         """
         problem, uncertainty = self._problem, self._uncertainty
-        best, experiment = problem(uncertainty.space, uncertainty.point), problem.experiment
+        best, experiment = problem(uncertainty.point), problem.experiment
         per_noise = 1.0 / experiment.weight
         rows = experiment.weight.size
         plain = best.jacobian[:rows] * (per_noise / experiment.emphasis)[:, None]
@@ -161,13 +169,75 @@ class Fit(NamedTuple):
         sides = (best.prediction + side * width for side in (-1.0, 1.0))
         return list(zip(*map(experiment.as_measurements, sides), strict=True))
 
+    def profile(
+        self,
+        name: str,
+        *,
+        level: float = 0.95,
+        max_iterations: int = MAX_ITERATIONS,
+        tolerance: float = TOLERANCE,
+    ) -> Profile:
+        """Profile likelihood of a fitted parameter, and its confidence interval.
+
+        ``intervals`` linearise the model, which is right for little noise only.  This function runs
+        the model: it holds the parameter at other values and fits all others again (Raue et al.,
+        Bioinformatics 25, 2009).  It costs up to 16 fits.
+
+        Parameters
+        ----------
+        name : one of ``values``
+        level : confidence level, between 0 and 1
+        max_iterations, tolerance : settings of the fits of the other parameters
+
+        Returns
+        -------
+        Profile
+            ``interval``, the ``values`` of the parameter with the ``rises`` of the cost over the
+            squared noise, and ``settled``, which is False if other fits did not converge
+
+        Raises
+        ------
+        InputError
+            if the name was not fitted, or if its value ended at a bound
+
+        Examples
+        --------
+        ::
+
+            low, high = jb.fit(loops, scene, free).profile("contact.friction").interval
+        """
+        fix = f"was not fitted; names are {', '.join(self.values)}"
+        require("profile", name, name in self.values, fix)
+        return profile(self._problem, self._uncertainty, name, level, max_iterations, tolerance)
+
+    def posterior(self) -> Posterior:
+        """Posterior density of the parameters, for samplers of other libraries.
+
+        Returns
+        -------
+        Posterior
+            ``logdensity`` of points of the search space, ``start`` and ``covariance`` there,
+            ``constrain`` and ``unconstrain``, ``loglikelihood`` of values, ``prior_transform``
+
+        Raises
+        ------
+        InputError
+            if a value ended at its bound
+
+        Examples
+        --------
+        ::
+
+            problem = jb.fit(loops, scene, ["contact.friction"]).posterior()
+            sampler = blackjax.nuts(problem.logdensity, 0.5, problem.covariance)
+            state = sampler.init(problem.start)
+        """
+        return posterior(self._problem, self._uncertainty)
+
     @property
     def columns(self) -> list[str]:
         """Name of the responding column of every measurement."""
-        owners = [0] * len(self.data) if self.problem is None else self.problem.experiment.owners
-        scenes = list(self.scenes.values()) or [self.scene]
-        controls = (scenes[owner].load.control for owner in owners)
-        return [d.form.response(control) for d, control in zip(self.data, controls, strict=True)]
+        return [d.form.response(by) for d, by in zip(self.data, self.controls, strict=True)]
 
     @property
     def residuals(self) -> list[NDArray[np.float64]]:
@@ -202,19 +272,18 @@ class Fit(NamedTuple):
     @property
     def _uncertainty(self) -> Uncertainty:
         if self.uncertainty is None:
-            raise ValueError("uncertainty: this result was not made by fit and has none")
+            raise InputError("uncertainty: this result was not made by fit and has none")
         return self.uncertainty
 
     @property
     def _problem(self) -> Problem:
         if self.problem is None:
-            raise ValueError("problem: this result was not made by fit and has none")
+            raise InputError("problem: this result was not made by fit and has none")
         return self.problem
 
 
 def fit_at(
     problem: Problem,
-    space: SearchSpace,
     end: Settled,
     labels: Sequence[str],
     status: str,
@@ -225,27 +294,27 @@ def fit_at(
     Parameters
     ----------
     problem : least-squares problem
-    space : search space, n axes
     end : end of the best search
     labels : labels of the specimens
     status : status of the best search
     minima : values and cost at the end of each search
     """
-    experiment, point = problem.experiment, end.point
-    best, values = problem(space, point), space.values(point)
-    uncertainty = uncertainty_at(problem, space, point, end.jacobian)
+    space, experiment, point = problem.space, problem.experiment, end.point
+    best, values = problem(point), space.values(point)
+    uncertainty = uncertainty_at(problem, point, end.jacobian)
     plain = best.residual[: experiment.weight.size] / experiment.emphasis
     relative = plain * experiment.relative
     left = [model_misfit(relative[own]) for own in experiment.slices]
     unlike = undescribed(experiment, left, best.prediction)
-    scenes = {
-        label: scene.replace(space.of(values, specimen))
-        for specimen, (label, scene) in enumerate(zip(labels, experiment.scenes, strict=True))
+    models = {
+        label: model.replace(space.of(values, specimen))
+        for specimen, (label, model) in enumerate(zip(labels, experiment.models, strict=True))
     }
+    scenes = {label: model.own for label, model in models.items()}
     ends = uncertainty.intervals().tolist()
     statics: list[str] = []
     if best.converged:
-        statics = doubt_of_statics(experiment, list(scenes.values()), uncertainty, end.jacobian)
+        statics = doubt_of_statics(experiment, list(models.values()), uncertainty, end.jacobian)
     return Fit(
         scene=next(iter(scenes.values())),
         values=space.named(values),
@@ -260,24 +329,25 @@ def fit_at(
         labels=experiment.labels,
         scenes=scenes,
         intervals={k: (low, high) for k, (low, high) in zip(space.names, ends, strict=True)},
-        warnings=[
+        doubts=[
             *unlike,
-            *_contradiction(problem, space, point),
+            *_contradiction(problem, point),
             *doubt_of_units(space, values.tolist()),
             *statics,
-            *_warnings(problem, uncertainty, values, left, minima),
+            *_doubts(problem, uncertainty, values, left, minima),
         ],
         left=left,
         describes=not unlike,
         minima=[(space.named(own), cost) for own, cost in minima],
         uncertainty=uncertainty,
         problem=problem,
+        controls=[experiment.models[owner].control for owner in experiment.owners],
     )
 
 
-def _contradiction(problem: Problem, space: SearchSpace, point: NDArray[np.float64]) -> list[str]:
+def _contradiction(problem: Problem, point: NDArray[np.float64]) -> list[str]:
     """Sentence on two measurements that contradict each other; none if they agree."""
-    experiment, best = problem.experiment, problem(space, point)
+    experiment, best = problem.experiment, problem(point)
     found = contradiction(best.residual, best.jacobian, experiment.slices)
     if found is None:
         return []
@@ -285,48 +355,48 @@ def _contradiction(problem: Problem, space: SearchSpace, point: NDArray[np.float
     said = []
     for place, step in zip(places, found[3:], strict=True):
         moved = np.where(np.arange(point.size) == axis, point + step, point)
-        said.append(f"{experiment.labels[place]} about {space.values(moved)[axis]:.3g}")
+        said.append(f"{experiment.labels[place]} about {problem.space.values(moved)[axis]:.3g}")
     return [
         f"the measurements contradict each other: alone, {' and '.join(said)} would have for "
-        f"{space.names[axis]}, and each would be described at least twice as well: the values lie "
-        "between them and describe none; fit them apart"
+        f"{problem.space.names[axis]}, and each would be described at least twice as well: the "
+        "values lie between them and describe none; fit them apart"
     ]
 
 
-def _warnings(
+def _doubts(
     problem: Problem,
     uncertainty: Uncertainty,
     values: NDArray[np.float64],
     left: Sequence[float],
     minima: Sequence[tuple[NDArray[np.float64], float]],
 ) -> list[str]:
-    space, warnings = uncertainty.space, []
+    space, doubts = uncertainty.space, []
     for name, bijection, value in zip(space.names, space.bijections, values, strict=True):
         bound = bijection.bound_at(float(value))
         if bound is not None:
-            warnings.append(
+            doubts.append(
                 f"{name} = {value:.6g} ends at its bound {bound:g}: it has no error, and the "
                 "errors of the others take it as fixed"
             )
     rows = problem.experiment.weight.size
     if problem.experiment.noisy and uncertainty.scatter > WRONG_MODEL:
-        warnings.append(
+        doubts.append(
             f"the model leaves {uncertainty.scatter:.2g} times the measured noise "
             "unexplained: it is wrong in some way, and the errors include what it leaves"
         )
     if uncertainty.independent < rows and max(left) > WORTH_SAYING:
-        warnings.append(
+        doubts.append(
             f"what the model leaves is correlated along the curve: the errors count {rows} points "
             f"as {uncertainty.independent:.2g} independent ones"
         )
     costs = [cost for _, cost in minima]
     others = [cost for cost in costs if cost > 1.01 * costs[0]]
     if others:
-        warnings.append(
+        doubts.append(
             f"{len(others)} of {len(costs)} starts ended in worse minima (cost {others[0]:.4g} or "
             f"more, against {costs[0]:.4g}): the problem has several minima"
         )
-    return warnings + uncertainty.limitations()
+    return doubts + uncertainty.limitations()
 
 
 def _finite(value: float) -> float | None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -22,12 +23,11 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.models import Model, Runnable, response_along
+from jbeamshell.identify.models import Model
 from jbeamshell.identify.observations import LoopObservation, Observation
 from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.rig_keys import PREFIX, RIG, check_rig_key
+from jbeamshell.identify.rig_keys import PREFIX, RIG, check_rig
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, Measurement
 from jbeamshell.measured.loops import Loop
@@ -71,14 +71,9 @@ def rig_of(values: Mapping[str, Any]) -> Rig:
 
     Raises `InputError` for unknown keys and for values that are no number in their domain.
     """
+    check_rig(values)
     fields = dict.fromkeys((name.removeprefix(PREFIX) for name in RIG), 0.0)
-    for key, value in values.items():
-        check_rig_key(key)
-        low = RIG[key].low
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        fix = "give a number" + (", 0 or more" if low == 0.0 else "")
-        require(key, value, number and bool(np.isfinite(value)) and value >= low, fix)
-        fields[key.removeprefix(PREFIX)] = float(value)
+    fields |= {key.removeprefix(PREFIX): float(value) for key, value in values.items()}
     return Rig(**{name: jnp.asarray(value) for name, value in fields.items()})
 
 
@@ -89,7 +84,7 @@ def with_starts(free: Sequence[Parameter], specimens: Sequence[Specimen]) -> tup
         return tuple(free)
     held = {key: value for one in specimens for key, value in one.rig.items()}
     loops = [
-        (item, one.scene.load.control)
+        (item, one.model.control)
         for one in specimens
         for item in one.measurements
         if isinstance(item, Loop | Backbone)
@@ -152,22 +147,22 @@ class RiggedObservation(LoopObservation):
     near: Array
     series: bool = eqx.field(static=True)
 
-    def predict(self, scene: Runnable, solver: Newton) -> tuple[Array, Array]:
+    def predict(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         """Responding column (n,), and whether every load step converged."""
-        if scene.load.control == "force":
+        if model.control == "force":
             path = self.path - self.rig.force_zero
-            response, converged = response_along(scene, path, solver)
+            response, converged = model.along(path, solver)
             _, response = self.rig.seen(path, response, self.phase)
         else:
             path = self.path - self.rig.displacement_zero
-            run = self._behind_spring if self.series else response_along
-            force, converged = run(scene, path, solver)
+            run = partial(self._behind_spring, model) if self.series else model.along
+            force, converged = run(path, solver)
             strip = path - self.rig.compliance * force
             response, _ = self.rig.seen(force, strip, self.phase)
         response = response + self.rig.drift * self.time
         return self.shifted(response), converged
 
-    def _behind_spring(self, scene: Runnable, path: Array, solver: Newton) -> tuple[Array, Array]:
+    def _behind_spring(self, model: Model, path: Array, solver: Newton) -> tuple[Array, Array]:
         """Force of the strip (n,) where spring and strip together follow a path."""
         begin, end, compliance = self.begin, self.end, self.rig.compliance
         zero = jnp.zeros(1)
@@ -175,7 +170,7 @@ class RiggedObservation(LoopObservation):
         def run(turns: Array, _: None) -> tuple[Array, tuple[Array, Array, Array]]:
             known = jnp.append(zero, turns)
             strip = known[begin] + (known[end] - known[begin]) * self.part
-            force, converged = response_along(scene, strip, solver)
+            force, converged = model.along(strip, solver)
             together = strip + compliance * force
             moved, rise = (jnp.diff(jnp.append(zero, a)) for a in (strip, together))
             slope = jnp.where(moved == 0.0, 1.0, rise) / jnp.where(moved == 0.0, 1.0, moved)
@@ -195,7 +190,7 @@ class RiggedObservation(LoopObservation):
 def rigged(
     measurement: Measurement,
     observation: Observation,
-    scene: Model,
+    model: Model,
     values: Mapping[str, Any],
     free: Sequence[str],
 ) -> RiggedObservation:
@@ -205,7 +200,7 @@ def rigged(
     ----------
     measurement : loop or backbone
     observation : its run without a rig
-    scene : strip with its load, or law
+    model : strip, or law
     values : values of the rig that are not 0, by dotted key
     free : keys of the rig that a fit may change
 
@@ -220,7 +215,7 @@ def rigged(
         raise InputError(f"{measurement.label}: {given[0]} changes loops and backbones only")
     rig = rig_of(values)
     parallel = [key for key in ("rig.stiffness", "rig.loss") if key in given]
-    if parallel and scene.load.control == "force":
+    if parallel and model.control == "force":
         raise InputError(
             f"{parallel[0]}: carries a part of a prescribed force that is not known beforehand: "
             "set load.control to 'displacement', so that forces are compared"

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
+from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.laws import LAWS, Law, law_named
 from jbeamshell.scene.keys import TABLE, check_key
@@ -63,3 +66,13 @@ def check_rig_key(key: str) -> None:
     """Raise `InputError` for a key of the rig that does not exist."""
     if key not in RIG:
         raise InputError(f"unknown key {key!r}: keys of the rig are {', '.join(RIG)}")
+
+
+def check_rig(values: Mapping[str, Any]) -> None:
+    """Raise `InputError` for unknown keys of a rig, and values out of their domain."""
+    for key, value in values.items():
+        check_rig_key(key)
+        low = RIG[key].low
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        fix = "give a number" + (", 0 or more" if low == 0.0 else "")
+        require(key, value, number and math.isfinite(value) and value >= low, fix)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, write_text
-from jbeamshell.identify.experiment import Experiment, Prediction
+from jbeamshell.identify.experiment import Evaluation, Experiment
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.numerics.newton import Newton
 
@@ -28,7 +28,7 @@ FORMAT = "jbeamshell fit 3"
 LONGEST_HEADER = 1000  # characters
 FIX = "delete it, or save to another file"
 
-Run = tuple[NDArray[np.float64], Prediction]
+Run = tuple[NDArray[np.float64], Evaluation]
 
 
 class SavedRuns:
@@ -93,8 +93,8 @@ class SavedRuns:
             reason = error.strerror or error
             raise InputError(f"save {self.path}: cannot be written ({reason})") from None
 
-    def _line(self, values: NDArray[np.float64], run: Prediction) -> str:
-        arrays = {"values": values} | {name: getattr(run, name) for name in Prediction._fields[:3]}
+    def _line(self, values: NDArray[np.float64], run: Evaluation) -> str:
+        arrays = {"values": values} | {name: getattr(run, name) for name in Evaluation._fields[:3]}
         packed: dict[str, Any] = {name: _packed(array) for name, array in arrays.items()}
         packed["converged"] = bool(run.converged)
         return json.dumps(packed | {"check_sum": self._check_sum(packed)}) + "\n"
@@ -113,7 +113,7 @@ class SavedRuns:
             jacobian = _unpacked(packed["jacobian"]).reshape(rows, keys)
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return None
-        return values, Prediction(residual, jacobian, prediction, packed["converged"])
+        return values, Evaluation(residual, jacobian, prediction, packed["converged"])
 
     def _check_sum(self, packed: dict[str, Any]) -> str:
         return hashlib.sha256((self._header + json.dumps(packed)).encode()).hexdigest()
@@ -130,7 +130,7 @@ def _unpacked(text: str) -> NDArray[np.float64]:
 def _fingerprint(experiment: Experiment, keys: tuple[str, ...], solver: Newton) -> str:
     """Hash of everything that determines the predictions, except the parameters' values."""
     digest = hashlib.sha256(repr((keys, solver, experiment.owners)).encode())
-    for part in (experiment.scenes, experiment.observations):
+    for part in (experiment.models, experiment.observations):
         digest.update(re.sub(r"0x[0-9a-f]+", "", str(jax.tree.structure(part))).encode())
         for leaf in jax.tree.leaves(part):
             if isinstance(leaf, jax.Array | np.ndarray):

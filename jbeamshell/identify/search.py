@@ -1,6 +1,8 @@
-"""Searches for the minimum of a sum of squares.
+"""Searches for the minimum of a sum of squares: three, each with one job.
 
-The only file that imports jaxopt and optax.
+Levenberg-Marquardt is the search of every fit.  It cannot end on a bound, so jaxopt's gradient
+search in a box goes on where it ran into one.  Where it does not converge, optax moves many starts
+together, and it searches again from the best.  The only file that imports jaxopt and optax.
 """
 
 from __future__ import annotations
@@ -15,8 +17,8 @@ import optax
 from jax import Array
 from numpy.typing import NDArray
 
-from jbeamshell.identify.problem import Evaluation, Problem
-from jbeamshell.identify.search_space import SearchSpace
+from jbeamshell.identify.experiment import Evaluation
+from jbeamshell.identify.problem import Problem
 
 DAMPING = 1e-4  # first damping of a Gauss-Newton step, in parameters of equal influence
 MAX_STEP = 1.0  # longest step along an axis of the search space, for most parameters a factor e
@@ -28,7 +30,6 @@ ADAM_RATE = 0.15  # step in the search space, where most parameters are logarith
 
 Vector = NDArray[np.float64]
 Evaluate = Callable[[Vector], Evaluation]
-Report = Callable[[int, int, Vector, float], None]
 
 
 class StoppingRule(NamedTuple):
@@ -58,34 +59,6 @@ class SearchResult(NamedTuple):
 
     point: Vector
     status: str
-
-
-def levenberg_marquardt(
-    problem: Problem,
-    space: SearchSpace,
-    starts: Sequence[Vector],
-    stopping: StoppingRule,
-    report: Report,
-) -> list[SearchResult]:
-    """Search by Levenberg-Marquardt from every start, one after the other.
-
-    Parameters
-    ----------
-    problem : residuals and their derivatives
-    space : unbounded search space, n axes
-    starts : points (n,) to start from
-    stopping : conditions that end each search
-    report : called after every step with the number of the search, the number of the step, the
-        parameters (n,) and the cost
-    """
-
-    def search(number: int, start: Vector) -> SearchResult:
-        def report_step(step: int, point: Vector, cost: float) -> None:
-            report(number, step, space.values(point), cost)
-
-        return minimise(lambda point: problem(space, point), start, stopping, report_step)
-
-    return [search(number, start) for number, start in enumerate(starts, 1)]
 
 
 def minimise(
@@ -140,82 +113,61 @@ def minimise(
     return SearchResult(current, "max_iterations")
 
 
-def l_bfgs_b(
-    problem: Problem,
-    space: SearchSpace,
-    starts: Sequence[Vector],
-    stopping: StoppingRule,
-    report: Report,
-) -> list[SearchResult]:
-    """Search by L-BFGS-B from every start, in a box whose sides may be reached.
+def within_bounds(problem: Problem, start: Vector, stopping: StoppingRule) -> SearchResult:
+    """Search on by L-BFGS-B in a box whose sides may be reached.
 
-    Parameters and result as for `levenberg_marquardt`.
+    Parameters
+    ----------
+    problem : residuals and their derivatives
+    start : (n,) point to start from
+    stopping : conditions that end the search
     """
+    space = problem.space
     boxed, box = space.boxed()
-    sides = tuple(map(jnp.asarray, box.T))
+    first = np.clip(boxed.point(space.values(start)), *box.T)
+    scale = 1.0 / max(problem(first, boxed).cost, np.finfo(float).tiny)
 
-    def search(number: int, start: Vector) -> SearchResult:
-        first = np.clip(boxed.point(space.values(start)), *box.T)
-        scale = 1.0 / max(problem(boxed, first).cost, np.finfo(float).tiny)
-        step = 0
+    def value_and_gradient(params: Array) -> tuple[float, Vector]:
+        at = problem(np.asarray(params), boxed)
+        return scale * at.cost, 2.0 * scale * at.residual @ at.jacobian
 
-        def value_and_gradient(params: Array) -> tuple[float, Vector]:
-            at = problem(boxed, np.asarray(params))
-            return scale * at.cost, 2.0 * scale * at.residual @ at.jacobian
-
-        def report_step(params: Array) -> None:
-            nonlocal step
-            step, point = step + 1, np.asarray(params)
-            report(number, step, boxed.values(point), problem(boxed, point).cost)
-
-        method = jaxopt.ScipyBoundedMinimize(
-            fun=value_and_gradient,
-            value_and_grad=True,
-            method="L-BFGS-B",
-            maxiter=stopping.max_iterations,
-            options={"ftol": stopping.tolerance**2, "gtol": stopping.tolerance},
-            callback=report_step,
-            jit=False,
-        )
-        params, state = method.run(jnp.asarray(first), bounds=sides)
-        end = space.point(boxed.values(np.asarray(params)))
-        return SearchResult(end, "converged" if bool(state.success) else "max_iterations")
-
-    return [search(number, start) for number, start in enumerate(starts, 1)]
+    method = jaxopt.ScipyBoundedMinimize(
+        fun=value_and_gradient,
+        value_and_grad=True,
+        method="L-BFGS-B",
+        maxiter=stopping.max_iterations,
+        options={"ftol": stopping.tolerance**2, "gtol": stopping.tolerance},
+        jit=False,
+    )
+    params, state = method.run(jnp.asarray(first), bounds=tuple(map(jnp.asarray, box.T)))
+    end = space.point(boxed.values(np.asarray(params)))
+    return SearchResult(end, "converged" if bool(state.success) else "max_iterations")
 
 
-def adam(
+def together(
     problem: Problem,
-    space: SearchSpace,
     starts: Sequence[Vector],
-    stopping: StoppingRule,
-    report: Report,
-) -> list[SearchResult]:
-    """Search by Adam from all starts in one batch, then by Levenberg-Marquardt from the best point.
+    report: Callable[[int, Vector, float], None],
+) -> Vector:
+    """Point (n,) of least cost that many starts meet as Adam moves them in one batch.
 
-    Parameters as for `levenberg_marquardt`; the list holds one result.
+    Parameters
+    ----------
+    problem : residuals and their derivatives
+    starts : points (n,) to start from
+    report : called after every step with its number, the best point and its cost
     """
     optimiser = optax.adam(optax.cosine_decay_schedule(ADAM_RATE, ADAM_STEPS))
     points: Any = np.stack(starts)
     state = optimiser.init(points)
     seen = []
     for step in range(1, ADAM_STEPS + 1):
-        evaluations = problem.batch(space, points)
+        evaluations = [problem(point) for point in points]
         costs = [evaluation.cost for evaluation in evaluations]
         best = int(np.argmin(costs))
         seen.append((costs[best], points[best]))
-        report(1, step, space.values(points[best]), costs[best])
+        report(step, points[best], costs[best])
         gradients = np.stack([at.residual @ at.jacobian for at in evaluations])
-        updates, state = optimiser.update(gradients, state)
+        updates, state = optimiser.update(np.nan_to_num(gradients), state)
         points = np.asarray(optax.apply_updates(points, updates))
-    _, start = min(seen, key=lambda pair: pair[0])
-    return levenberg_marquardt(
-        problem,
-        space,
-        [start],
-        stopping,
-        lambda _, step, *rest: report(1, ADAM_STEPS + step, *rest),
-    )
-
-
-SEARCHES = {"levenberg-marquardt": levenberg_marquardt, "l-bfgs-b": l_bfgs_b, "adam": adam}
+    return min(seen, key=lambda pair: pair[0])[1]

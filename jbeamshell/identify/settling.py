@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.identify.problem import Evaluation, Problem
-from jbeamshell.identify.search_space import SearchSpace
+from jbeamshell.identify.experiment import Evaluation
+from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.uncertainty import Uncertainty, uncertainty_at
 
 ROUNDS = 8  # most moves along weakest directions
@@ -46,7 +46,6 @@ class Settled(NamedTuple):
 
 def settle(
     problem: Problem,
-    space: SearchSpace,
     point: Vector,
     report: Callable[[Vector, float], None] | None = None,
 ) -> Settled:
@@ -55,38 +54,37 @@ def settle(
     Parameters
     ----------
     problem : least-squares problem
-    space : search space, n axes
     point : (n,) end of the search
     report : called after every move with the point and the cost
     """
-    here = problem(space, point)
+    here = problem(point)
     jacobian, rounding = here.jacobian, ROUNDING**2 * here.residual.size
     for _ in range(ROUNDS):
-        found = uncertainty_at(problem, space, point, jacobian)
+        found = uncertainty_at(problem, point, jacobian)
         width = _width(found)
         jacobian, tried = _over_interval(problem, found, here, width)
         trial = point + _step(jacobian, here, ~found.at_bound)
-        best = _cheapest(problem, space, [*tried, trial])
+        best = _cheapest(problem, [*tried, trial])
         least = here.cost - max(GAIN * here.cost, rounding)
-        if jacobian is not here.jacobian and not problem(space, best).cost < least:
+        if jacobian is not here.jacobian and not problem(best).cost < least:
             # The kinks that the width bridges may hide a minimum nearer by.
             _, nearer = _over_interval(problem, found, here, NEARER * width)
-            best = _cheapest(problem, space, [best, *nearer])
-        there = problem(space, best)
+            best = _cheapest(problem, [best, *nearer])
+        there = problem(best)
         if there.cost < least and np.all(np.isfinite(there.jacobian)):
             point, here, jacobian = best, there, there.jacobian
             if report:
                 report(point, here.cost)
-        elif _width(uncertainty_at(problem, space, point, jacobian)) <= WIDER * width:
+        elif _width(uncertainty_at(problem, point, jacobian)) <= WIDER * width:
             return Settled(point, jacobian, True)
     return Settled(point, jacobian, False)
 
 
-def _cheapest(problem: Problem, space: SearchSpace, points: list[Vector]) -> Vector:
+def _cheapest(problem: Problem, points: list[Vector]) -> Vector:
     """Point (n,) of least cost among those where the response has a derivative, if any has."""
 
     def cost(point: Vector) -> float:
-        at = problem(space, point)
+        at = problem(point)
         return at.cost if bool(np.all(np.isfinite(at.jacobian))) else np.inf
 
     return min(points, key=cost)
@@ -111,15 +109,15 @@ def _over_interval(
         return here.jacobian, []
     others = np.array(directions[1:]).reshape(-1, found.point.size).T
     ends = [
-        _relaxed(problem, found.space, found.point + side * width * directions[0], here, others)
+        _relaxed(problem, found.point + side * width * directions[0], here, others)
         for side in (-1.0, 1.0)
     ]
-    ways = [end for end in ends if problem(found.space, end).converged]
+    ways = [end for end in ends if problem(end).converged]
     if not ways:
         return here.jacobian, []
     first = ways[0] if len(ways) > 1 else found.point
     way = ways[-1] - first
-    residuals = [problem(found.space, at).residual for at in (first, ways[-1])]
+    residuals = [problem(at).residual for at in (first, ways[-1])]
     foreseen, change = here.jacobian @ way, residuals[1] - residuals[0]
     missed = change - foreseen
     if np.linalg.norm(missed) <= STRAIGHT * np.linalg.norm(foreseen):
@@ -127,11 +125,9 @@ def _over_interval(
     return here.jacobian + np.outer(missed, way) / (way @ way), ways
 
 
-def _relaxed(
-    problem: Problem, space: SearchSpace, end: Vector, here: Evaluation, others: Vector
-) -> Vector:
+def _relaxed(problem: Problem, end: Vector, here: Evaluation, others: Vector) -> Vector:
     """End of an interval after a Gauss-Newton step along the other directions (n, others)."""
-    there = problem(space, end)
+    there = problem(end)
     if not (there.converged and others.size):
         return end
     slopes = here.jacobian @ others
@@ -140,7 +136,7 @@ def _relaxed(
     if there.cost - rest @ rest < WORTH * abs(there.cost - here.cost):
         return end
     relaxed = end + others @ np.clip(step, -LONGEST, LONGEST)
-    return min(end, relaxed, key=lambda at: problem(space, at).cost)
+    return min(end, relaxed, key=lambda at: problem(at).cost)
 
 
 def _step(jacobian: Vector, here: Evaluation, inside: NDArray[np.bool_]) -> Vector:

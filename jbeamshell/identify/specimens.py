@@ -1,52 +1,134 @@
-"""Specimens of a fit: a strip, and what was measured on it."""
+"""Specimens of a fit: a strip, a joint or a structure, and what was measured on it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+import dataclasses
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import require
+from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.driving import as_model, feature_doubts
-from jbeamshell.identify.models import Driven, Model
-from jbeamshell.identify.rig_keys import PREFIX
-from jbeamshell.measured.curves import Measurement
+from jbeamshell.common.files import read_toml
+from jbeamshell.identify.driving import feature_doubts
+from jbeamshell.identify.models import Model, StripModel, as_model
+from jbeamshell.identify.parameters import is_number
+from jbeamshell.identify.rig_keys import PREFIX, check_rig
+from jbeamshell.measured.columns import QUANTITIES
+from jbeamshell.measured.curve_files import CURVES, read_curves
+from jbeamshell.measured.curves import Backbone, Measurement
+from jbeamshell.measured.drift import DRIFTS
+from jbeamshell.measured.findings import DRIFT, OFF_CENTRE, OFF_ZERO
 from jbeamshell.measured.inspection import inspect
-from jbeamshell.measured.loops import Loop
-from jbeamshell.measured.recordings import as_column
+from jbeamshell.measured.loops import Loop, loop_of
+from jbeamshell.measured.recordings import Recording, as_column, read_recordings
+from jbeamshell.measured.splitting import split_cycles
+from jbeamshell.measured.steady import steady_loops
+from jbeamshell.scene.dimensions import Dimensions, dimensions_of
 from jbeamshell.scene.keys import CONTROLS, FAR_ENDS
-from jbeamshell.scene.scene import Scene
 
+KINDS = ("loop", "backbone", *CURVES)
+CYCLES = ("auto", "steady", "recorded")
+WRONG_DRIVE = (
+    "the displacement goes from turn to turn as a machine drives it, the force does not: if it "
+    "drives, give --set load.control=displacement"
+)
+QUIET = 1e-3  # noise of the driving column, over its range, above which cycles are averaged
 OF_SHEAR = ("strip.kappa_s", "strip.poisson_ratio", "strip.curvature")
+ZEROS = {"rig.force_zero", "rig.displacement_zero"}
 
 
-class Specimen(NamedTuple):
-    """One strip and what was measured on it.
+@dataclasses.dataclass(frozen=True)
+class Specimen:
+    """One strip, joint or structure, and what was measured on it.
 
     Attributes
     ----------
-    scene : start values, and all values that stay fixed; or a law of a joint, or a structure
-    data : one measurement or several
+    scene : scene, with start values and all values that stay fixed; values of a scene by dotted
+        key, or its name or file, of which those that are not given are estimated; a law of a joint
+        or its name; or a structure.  None is a strip of which nothing is known
+    data : a measurement or a recording, a file, or a list of them
     label : name in messages and in the names of the specimen's own values
     weights : factors of the measurements' residuals, besides the curves' own; all 1 if empty
-    rig : values of the rig that are not 0, by dotted key, see `jbeamshell.identify.rig`
+    set : values by dotted key, of the scene or the rig (see `jbeamshell.identify.rig`)
+    kind : kind of measurement in files, one of `KINDS`
+    cycles : treatment of loops as recorded: "steady" averages the steady cycles of every amplitude;
+        "recorded" takes the recording as one loop; "auto" averages if cycles repeat or if the
+        driving column is noisy
+    driver, drift : arguments of `steady_loops`; the driver is the column that the scene names, if
+        it names one
+    centre : True to take the zeros of the sensors from the loops, see `Loop.centred`; None to do so
+        where they can only be offsets
+    reverse : "force" or "displacement" to turn the sign of that column
+    width : width of the specimen, by which forces of recordings are divided; those of loops are per
+        width already
+    columns, units, decimal : arguments of `read_recordings`
+    dimensions : dimensions of the specimen with units, see `jbeamshell.scene.dimension_table`; or
+        the name of a TOML file that holds them
+
+    Raises
+    ------
+    InputError
+        if an entry is of the wrong kind, naming the entry, the value and the fix
     """
 
-    scene: Model
-    data: Measurement | Sequence[Measurement]
+    scene: Any = None
+    data: Any = ()
     label: str = ""
     weights: Sequence[float] = ()
-    rig: Mapping[str, Any] = {}
+    set: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    kind: str = "loop"
+    cycles: str = "auto"
+    driver: str | None = None
+    drift: str = "keep"
+    centre: bool | None = None
+    reverse: str | None = None
+    width: float = 1.0
+    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    decimal: str | None = None
+    dimensions: Mapping[str, Any] | str = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        words = {"kind": KINDS, "cycles": CYCLES, "drift": DRIFTS, "driver": (None, *CONTROLS)}
+        words["reverse"] = (None, *QUANTITIES)
+        for name, known in words.items():
+            value = getattr(self, name)
+            if not (value is None or isinstance(value, str)) or value not in known:
+                names = ", ".join(repr(word) for word in known if word)
+                raise InputError(f"{name} = {shown(value)}: choose among {names}")
+        if self.centre not in (None, True, False):
+            raise InputError(f"centre = {self.centre!r}: give true or false")
+        if not (is_number(self.width) and self.width > 0.0):
+            raise InputError(f"width = {shown(self.width)}: give a positive number")
+        require("set", self.set, isinstance(self.set, Mapping), "give values by dotted key")
+        check_rig(self.rig)
 
     @property
-    def measurements(self) -> list[Measurement]:
-        """Measurements as a list."""
+    def model(self) -> Model:
+        """Model of a scene, a law or a structure that is whole."""
+        return as_model(self.scene)
+
+    @property
+    def rig(self) -> dict[str, Any]:
+        """Values of the rig by dotted key; those that are not named are 0."""
+        return {key: value for key, value in self.set.items() if key.startswith(PREFIX)}
+
+    @property
+    def of_model(self) -> dict[str, Any]:
+        """Values of the model by dotted key, such as those of a scene."""
+        return {key: value for key, value in self.set.items() if not key.startswith(PREFIX)}
+
+    @property
+    def measurements(self) -> list[Any]:
+        """Data as a list."""
         # A Loop is a tuple itself.
-        one = isinstance(self.data, Loop) or not isinstance(self.data, Sequence)
-        return [self.data] if one else list(self.data)  # type: ignore[list-item, arg-type]
+        one = isinstance(self.data, Loop | Recording | str) or not isinstance(self.data, Sequence)
+        return [self.data] if one else list(self.data)
 
     def checked_weights(self) -> NDArray[np.float64]:
         """Weights (measurements,); raises `InputError` unless there are none or one for each."""
@@ -60,57 +142,159 @@ class Specimen(NamedTuple):
             raise InputError(f"weights{where} = {given.tolist()}: {fix}")
         return weights
 
-    def check(self) -> None:
-        """Raise `InputError` if there is no measurement, or if the load drives no column of one."""
-        driver = self.scene.load.control
-        fix = "does not drive a measurement: take " + " or ".join(map(repr, CONTROLS))
-        require("load.control", driver, driver in CONTROLS, fix)
-        if not self.measurements:
-            where = f" of specimen {self.label!r}" if self.label else ""
-            raise InputError(f"data{where}: no measurement given; read loops with read_loops")
-
-
-def as_specimens(data: Any, scene: Any, weights: Sequence[float]) -> list[Specimen]:
-    """Specimens with labels, no two alike, from what `fit` was given.
-
-    Raises
-    ------
-    InputError
-        if specimens are mixed with measurements or given a scene or weights besides their own, if
-        measurements come without a scene, or if two specimens have one label
-    """
-    given = [data] if isinstance(data, Specimen) else data
-    several = isinstance(given, Sequence) and not isinstance(given, Loop)
-    if not (several and any(isinstance(item, Specimen) for item in given)):
-        if scene is None:
+    def known(self, folder: Path) -> Dimensions:
+        """Dimensions of the specimen in SI; a file is looked for in a folder."""
+        given = self.dimensions
+        read = read_toml(folder / given) if isinstance(given, str) else given
+        try:
+            known = dimensions_of(read)
+        except InputError as error:
             raise InputError(
-                "scene: give one, or a Specimen (a scene with its data) in place of data"
-            )
-        one = Specimen(scene, data, weights=weights)
-        return [one._replace(scene=as_model(scene, one.measurements))]
-    if not all(isinstance(item, Specimen) for item in given):
-        raise InputError("data: mixes specimens with measurements: make each a Specimen")
-    for name, present in {"scene": scene is not None, "weights": len(weights) > 0}.items():
-        if present:
-            raise InputError(f"{name}: the specimens bring their own; leave it out")
-    labelled = [
-        specimen._replace(
-            scene=as_model(specimen.scene, specimen.measurements),
-            label=specimen.label or f"specimen {number}",
-        )
-        for number, specimen in enumerate(given, 1)
-    ]
-    labels = [specimen.label for specimen in labelled]
-    repeated = [label for label in labels if labels.count(label) > 1]
-    if repeated:
-        raise InputError(f"specimens: two have the label {repeated[0]!r}: give each its own")
-    return labelled
+                f"{given}: {error}" if isinstance(given, str) else str(error)
+            ) from None
+        fix = "is given twice, as one of the dimensions too: leave it out here"
+        require("width", self.width, known.width is None or self.width == 1.0, fix)
+        return known
+
+    def read(
+        self,
+        folder: Path,
+        driver: str | None = None,
+        free: Sequence[str] = (),
+        unchecked: bool = False,
+    ) -> list[tuple[Measurement, Sequence[str]]]:
+        """Measurements as they are fitted, each with notes on what was done to it.
+
+        Recordings, and loops as they were recorded, are averaged over their cycles and centred.
+
+        Parameters
+        ----------
+        folder : folder in which files are looked for
+        driver : column that drives; None finds it
+        free : keys to fit
+        unchecked : True to take a recording that an inspection refuses
+
+        Raises
+        ------
+        InputError
+            for a file that cannot be read, or a recording that an inspection refuses
+        """
+        items = self.measurements
+        where = f" of specimen {self.label!r}" if self.label else ""
+        if not items:
+            raise InputError(f"data{where}: no measurement given: give loops, or files")
+        known = self.known(folder)
+        width = self.width if known.width is None else known.width
+        named = [item for item in items if isinstance(item, str | os.PathLike)]
+        if named:
+            fix = "files do not mix with other data: make each a Specimen"
+            require("data", str(named[0]), len(named) == len(items), fix)
+            files = [folder / name for name in named]
+            if self.kind not in ("loop", "backbone"):
+                fix = f"a {self.kind} curve is per unit width; leave width out"
+                require("width", width, width == 1.0, fix)
+                return list(read_curves(files, self.kind, **self._reading))
+            items = list(read_recordings(files, **self._reading))
+        asked = self.driver or driver
+        keeps_zero = bool(ZEROS & {*free, *self.set})
+        found: list[tuple[Measurement, Sequence[str]]] = []
+        for item in items:
+            if isinstance(item, Recording):
+                if known.values and item.units is None:
+                    raise InputError(
+                        f"{item.label}: its columns name no units, but the specimen's dimensions "
+                        "do: give --unit force=N --unit displacement=mm, or what they are"
+                    )
+                item = item.per_width(width)
+            if isinstance(item, Recording) or (isinstance(item, Loop) and _as_recorded(item)):
+                found += self._of_recording(item, asked, keeps_zero, unchecked)
+            elif isinstance(item, Loop):
+                found.append(self._centred(item, keeps_zero))
+            else:
+                found.append((item, ()))
+        return found
+
+    @property
+    def _reading(self) -> dict[str, Any]:
+        """Arguments of the readers of files."""
+        return {"columns": self.columns, "units": self.units, "decimal": self.decimal}
+
+    def _of_recording(
+        self, item: Recording | Loop, driver: str | None, keeps_zero: bool, unchecked: bool
+    ) -> Iterator[tuple[Measurement, Sequence[str]]]:
+        """Measurements of one recording, or of a loop as it was recorded."""
+        item = self._turned(item)
+        seen = inspect(item)
+        if not unchecked:
+            seen.check()
+        if self.drift == "keep":  # which the mean loops do not show
+            drifts = [f.text for view in seen.views for f in view.findings if f.name == DRIFT]
+            item = item._replace(notes=(*item.notes, *drifts))
+        if driver == "force" and any(v.driver == "displacement" for v in seen.views):
+            item = item._replace(notes=(*item.notes, WRONG_DRIVE))
+        if self.kind == "backbone":
+            yield Backbone(item.force, item.displacement, item.label), item.notes
+        else:
+            for loop in self._loops(item, driver):
+                yield self._centred(loop, keeps_zero)
+
+    def _centred(self, loop: Loop, keeps_zero: bool) -> tuple[Loop, Sequence[str]]:
+        """Loop without its sensors' offsets, if that was asked for or must be, and its notes."""
+        wanted = self.centre
+        if wanted is None:
+            wanted = not (loop.free_zero or keeps_zero) and _forgets_zero(loop)
+        taken = loop.centred() if wanted else loop
+        return taken, taken.notes
+
+    def _turned(self, recording: Any) -> Any:
+        """Recording with the sign of one column turned, if that was asked for."""
+        if self.reverse is None:
+            return recording
+        note = f"the sign of the {self.reverse} is turned"
+        column = {self.reverse: -getattr(recording, self.reverse)}
+        return recording._replace(**column, notes=(*recording.notes, note))
+
+    def _loops(self, recording: Recording | Loop, driver: str | None) -> list[Loop]:
+        whole = recording if isinstance(recording, Loop) else loop_of(recording)
+        if self.cycles == "recorded" and self.drift == "keep":
+            return [whole]
+        if self.cycles == "auto" and self.drift == "keep":
+            try:
+                found = split_cycles(recording, driver)
+            except InputError:  # a first loading, or an unsteady path
+                return [whole]
+            noise = found.noise / np.ptp(found.path)
+            if len(found.cycles) == 1 and noise < QUIET:
+                return [whole]
+        return steady_loops(recording, driver, self.drift)
 
 
-def free_of(specimens: Sequence[Specimen]) -> tuple[str, ...]:
-    """Keys of the numbers that loops tell of the first specimen's law; none of other models."""
-    first = specimens[0].scene
-    return first.law.free() if isinstance(first, Driven) else ()
+def _as_recorded(loop: Loop) -> bool:
+    """True for a loop that nobody has averaged, centred or named a drive of."""
+    untouched = loop.noise is None and loop.scatter is None and loop.cycles == 1
+    return untouched and loop.driver is None and not loop.free_zero
+
+
+def _forgets_zero(loop: Loop) -> bool:
+    """True for a loop whose response has an offset that no joint makes.
+
+    A joint that is driven to and fro alike answers about zero.  A contact that slides as a whole
+    has no place of its own, so the zero of its displacement was never that of the strip.  A path
+    that is not closed starts unloaded, unless its driving column has an offset too.
+    """
+    zeros = loop.zeros()
+    off = {n: abs(zero) > OFF_CENTRE * np.ptp(getattr(loop, n)) for n, zero in zeros.items()}
+    driver, answer = zeros
+    if not loop.closed:
+        return off[answer] and abs(zeros[driver]) < OFF_ZERO * np.ptp(getattr(loop, driver))
+    if not any(off.values()):
+        return False
+    levels = inspect(loop).views[0].levels
+    if not levels:
+        return False
+    shape = levels[-1].shape
+    slides = off["displacement"] and shape.kind == "gross slip"
+    return slides or (off[answer] and not off[driver] and not shape.asymmetric)
 
 
 def inspected(
@@ -133,18 +317,18 @@ def inspected(
     for specimen in specimens:
         loops = [item for item in specimen.measurements if isinstance(item, Loop)]
         seen = (
-            inspect(loops, stiffness=plausible_stiffness(specimen.scene, [*free, *specimen.rig]))
+            inspect(loops, stiffness=plausible_stiffness(specimen.model, [*free, *specimen.rig]))
             if loops
             else None
         )
         if seen is not None and not unchecked:
             seen.check()
         doubts += [] if seen is None else seen.doubts()
-        doubts += feature_doubts(specimen.scene, loops)
+        doubts += feature_doubts(specimen.model, loops)
     return doubts
 
 
-def plausible_stiffness(scene: Model, free: Sequence[str]) -> tuple[float, float] | None:
+def plausible_stiffness(model: Model, free: Sequence[str]) -> tuple[float, float] | None:
     """Least and largest force per width over displacement that a strip can have.
 
     A strip that is held at its far end is at least as stiff as without friction, E'2H/L; a third of
@@ -152,13 +336,13 @@ def plausible_stiffness(scene: Model, free: Sequence[str]) -> tuple[float, float
 
     Parameters
     ----------
-    scene : strip with known dimensions
+    model : strip with known dimensions; None is returned for others
     free : keys to fit; None is returned if they are of the strip's stiffness or dimensions, or of
         the rig
     """
-    if not isinstance(scene, Scene):
+    if not isinstance(model, StripModel):
         return None
-    strip = scene.strip
+    strip = model.scene.strip
     unknown = any(key.startswith(("strip.", PREFIX)) and key not in OF_SHEAR for key in free)
     if strip.axial_stiffness is None or unknown:
         return None

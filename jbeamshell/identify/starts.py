@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.identify.models import StripModel
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.specimens import Specimen, plausible_stiffness
 from jbeamshell.measured.curves import Backbone, DissipationCurve, StiffnessCurve
@@ -200,7 +201,7 @@ def _check_friction(
     units = TOO_SMALL if needed < low else TOO_LARGE
     if any(key in values for key in STIFFNESS):  # which tells the wrong one of two units
         stiffness = found.force / found.displacement
-        soft, stiff = plausible_stiffness(scene, ()) or (0.0, np.inf)
+        soft, stiff = plausible_stiffness(StripModel(scene), ()) or (0.0, np.inf)
         units = TOO_SOFT if stiffness * UNIT_ERROR < soft else units
         units = TOO_STIFF if stiffness > UNIT_ERROR * stiff else units
     raise InputError(
@@ -231,7 +232,8 @@ def check_starts(specimens: Sequence[Specimen], parameters: Sequence[Parameter])
     parameters : free numbers
     """
     free = {parameter.key for parameter in parameters}
-    for scene, found in ((one.scene, _peak(one.measurements)) for one in specimens):
+    for one in specimens:
+        scene, found = one.model.own, _peak(one.measurements)
         if not isinstance(scene, Scene):
             continue
         rule = gross_slip_rule(scene.load, scene.member, scene.number, found)
@@ -270,7 +272,7 @@ def suits(known: Mapping[str, Any], found: Estimate) -> bool:
     scene, forced = _scene_of(known)
     gross = float(scene.contact.friction) * _pressing(scene)
     most = BELOW if forced else SIMILAR
-    low, high = plausible_stiffness(scene, ()) or (0.0, np.inf)
+    low, high = plausible_stiffness(StripModel(scene), ()) or (0.0, np.inf)
     stiffness = found.force / found.displacement
     return not found.si and found.peak < most * gross and low <= stiffness <= high
 

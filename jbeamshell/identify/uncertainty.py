@@ -10,7 +10,6 @@ model's own grid may leave adds to it.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -203,49 +202,21 @@ class Uncertainty(NamedTuple):
 
 
 def uncertainty_at(
-    problem: Problem, space: SearchSpace, point: NDArray[np.float64], jacobian: NDArray[np.float64]
+    problem: Problem, point: NDArray[np.float64], jacobian: NDArray[np.float64]
 ) -> Uncertainty:
-    """Uncertainty at a minimum (n,) of a problem with derivatives (rows, n) there."""
-    experiment = problem.experiment
-    return uncertainty_of(
-        space,
-        point,
-        problem(space, point).residual,
-        jacobian,
-        emphasis=experiment.emphasis,
-        relative=experiment.relative,
-        slices=experiment.slices,
-        noisy=experiment.noisy,
-        model_error=experiment.model_error,
-    )
+    """Uncertainty at the minimum of a problem.
 
-
-def uncertainty_of(
-    space: SearchSpace,
-    point: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
-    *,
-    emphasis: NDArray[np.float64],
-    relative: NDArray[np.float64],
-    slices: Sequence[slice],
-    noisy: bool,
-    model_error: float = 0.0,
-) -> Uncertainty:
-    """Uncertainty from the residuals at a minimum.
+    What the model's own grid may leave in a residual is smooth and alike in all curves, so that all
+    together are worth `FEWEST` independent points of it.
 
     Parameters
     ----------
-    space : search space, n axes
+    problem : least-squares problem
     point : (n,) minimum
-    residual, jacobian : (rows,) and (rows, n), priors in the last rows
-    emphasis : factors that the user gave to the rows without priors, whatever their noise
-    relative : factors of the same rows from residuals to parts of the range
-    slices : rows of each measurement
-    noisy : True if the residuals are in units of measured noise
-    model_error : size of what the model's own grid may leave in a residual.  It is smooth and alike
-        in all curves, so that all together are worth `FEWEST` independent points of it
+    jacobian : (rows, n) derivatives there, priors in the last rows
     """
+    space, experiment, residual = problem.space, problem.experiment, problem(point).residual
+    emphasis, relative = experiment.emphasis, experiment.relative
     values = space.values(point)
     pairs = zip(space.bijections, values.tolist(), strict=True)
     at_bound = np.array([bijection.bound_at(value) is not None for bijection, value in pairs])
@@ -259,19 +230,19 @@ def uncertainty_of(
     priors = np.ones(residual.size - emphasis.size)
     factors = np.append(emphasis, priors)
     left = (residual / factors)[: relative.size]
-    independent = independent_points([left[own] for own in slices])
+    independent = independent_points([left[own] for own in experiment.slices])
     total = float(np.sum((residual / factors) ** 2))
     rows = max(residual.size - point.size, 1)
     scatter = float(np.sqrt(total / rows))
     freedom: float | None = max(rows - (left.size - independent), min(rows, FEWEST))
     sigma = scatter * float(np.sqrt(left.size / independent))
-    if noisy:
+    if experiment.noisy:
         explained = scatter**2 <= stats.chi2.ppf(ALARM, rows) / rows
         scatter = 1.0 if explained else scatter
         sigma = max(sigma, 1.0)
         if explained and independent == left.size:
             sigma, freedom = 1.0, None
-    sigma = float(np.hypot(sigma, model_error * np.sqrt(left.size / FEWEST)))
+    sigma = float(np.hypot(sigma, experiment.model_error * np.sqrt(left.size / FEWEST)))
     factors = np.append(emphasis, priors / sigma)
     if np.any(factors != 1.0):
         # Sandwich estimator: the factors change the minimum, not the noise; priors keep theirs.

@@ -44,7 +44,7 @@ def undescribed(
     models = experiment.as_measurements(prediction)
     for name, limit in (("energy per cycle", ENERGY), ("secant stiffness", STIFFNESS)):
         errors = [
-            _errors(data, model, experiment.scenes[owner].load.control)[name]
+            _errors(data, model, experiment.models[owner].control)[name]
             for data, model, owner in zip(
                 experiment.measurements, models, experiment.owners, strict=True
             )

@@ -139,7 +139,7 @@ def likelihoods(profiles: Sequence[LikelihoodProfile], axes: Any = None) -> list
 
     Parameters
     ----------
-    profiles : profiles of fitted parameters, as `jbeamshell.identify.profile` gives them
+    profiles : profiles of fitted parameters, as `Fit.profile` of `jbeamshell.identify` gives them
     axes : axes, one for each profile; new ones when not given
 
     Returns

@@ -305,7 +305,7 @@ class InspectedData(Protocol):
 
 
 class LikelihoodProfile(Protocol):
-    """Profile likelihood of one parameter, such as `jbeamshell.identify.profile` gives.
+    """Profile likelihood of one parameter, such as `Fit.profile` of `jbeamshell.identify` gives.
 
     Attributes
     ----------
@@ -353,7 +353,7 @@ class ComparedModel(Protocol):
 
 
 class ComparedModels(Protocol):
-    """Models fitted to one target, such as a `jbeamshell.identify.Comparison`.
+    """Models fitted to one target, such as `jbeamshell.identify.compare` gives.
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ EXTENSIONS = (  # what one's own laws, energies and readers build on, and format
     "jbeamshell.scene.keys",
     "jbeamshell.scene.rows",
     "jbeamshell.scene.dimensions",
-    "jbeamshell.identify.plan",
+    "jbeamshell.identify.plan_file",
     "jbeamshell.identify.rig",
     "jbeamshell.identify.rig_keys",
     "jbeamshell.history.record",

@@ -1,7 +1,7 @@
 """`jbeamshell fit`: what it finds, what it is asked, and the data and words that it refuses."""
 
 import csv
-import functools
+import dataclasses
 import json
 import re
 import tomllib
@@ -9,9 +9,13 @@ import tomllib
 import numpy as np
 import pytest
 
-from jbeamshell import identify, laws
+import jbeamshell as jb
+from jbeamshell import laws
 from jbeamshell.cli import main
+from jbeamshell.identify import multistart
+from jbeamshell.identify.plan import Plan
 from jbeamshell.measured.loops import read_loops
+from jbeamshell.measured.recordings import read_recordings
 from tests import rig
 from tests.command import BASE, COARSE, is_png, names, options
 
@@ -45,6 +49,16 @@ def closed(planted):
 
 
 FIT = (*BASE, *options(OFF, "--start"))
+
+
+DOOR = {"model.section": "squeeze", "model.nodes": 21}
+
+
+def rig_file(random):
+    """Three noisy cycles of many plays with an offset of the displacement."""
+    force = rig.path(3, 100)
+    u = 1e-6 * (rig.iwan_by_force(force) + 0.2 + 2e-3 * random.standard_normal(force.size))
+    return 1e5 * force, u
 
 
 def test_fit_finds_what_was_planted(cli, planted, tmp_path):
@@ -98,17 +112,39 @@ def test_fit_prints_text_to_read(cli, planted):
     ]
 
 
+def test_python_and_the_command_line_are_one_door(cli, tmp_path):
+    """A file and its loops: the same starts, numbers, doubts and notes, with nothing given."""
+    rows = np.column_stack(rig_file(np.random.default_rng(3)))
+    path = tmp_path / "rig.csv"
+    np.savetxt(path, rows, delimiter=",", header="force [N/m],displacement [m]", comments="")
+    code, out, _ = cli("fit", path, *options(DOOR), "--json")
+    loops = [loop._replace(label="rig.csv") for loop in read_loops(path)]
+    fits = [jb.fit(given, DOOR) for given in (str(path), loops, read_recordings(path))]
+    fits.append(jb.fit([jb.identify.Specimen(DOOR, [path])]))
+    told = json.loads(out)
+    told.pop("wall_s")
+    assert told["notes"]
+    assert told["doubts"]
+    for fit in fits:
+        assert fit.describes == (code == 0)
+        assert json.loads(json.dumps(fit.figures())) == told
+    assert cli("fit", path, *options(DOOR))[1] == f"{fits[0]}\n"
+
+
 def test_data_of_another_law_end_with_code_3(cli, planted, monkeypatch):
-    whole = identify.fit
-    monkeypatch.setattr(identify, "fit", lambda *a, **b: whole(*a, **b)._replace(describes=False))
+    whole = Plan.run
+
+    def run(*given, **options):
+        return dataclasses.replace(whole(*given, **options), describes=False)
+
+    monkeypatch.setattr(Plan, "run", run)
     code, out, _ = cli("fit", planted, *FIT, "--json")
     assert code == 3
     assert json.loads(out)["describes"] is False
 
 
 def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
-    hasty = functools.partial(identify.fit, max_iterations=1)
-    monkeypatch.setattr(identify, "fit", hasty)
+    monkeypatch.setattr(multistart, "MAX_ITERATIONS", 1)
     line = refused("fit", planted, *FIT, "--json", code=3)
     assert line.startswith("the fit has not converged after 1 iterations, at contact.friction = ")
 
@@ -169,17 +205,17 @@ def test_a_plan_of_two_strips_is_fitted_profiled_saved_and_resumed(cli, closed, 
 
 
 class Asked(Exception):
-    """Carries what `identify.fit` was called with."""
+    """Carries the plan that was to be run."""
 
 
 @pytest.fixture
 def asked(monkeypatch):
-    def fit(specimens, *, free, **_):
-        (one,) = specimens
-        start = {p.key: p.start for p in free if p.start is not None}
-        raise Asked(one.data, one.scene.replace(start), [p.key for p in free])
+    def run(plan, **_):
+        (one,) = plan.specimens
+        start = {p.key: p.start for p in plan.free if p.start is not None}
+        raise Asked(one.data, one.scene.replace(start), [p.key for p in plan.free])
 
-    monkeypatch.setattr(identify, "fit", fit)
+    monkeypatch.setattr(Plan, "run", run)
 
     def asked(*words):
         with pytest.raises(Asked) as caught:
@@ -288,7 +324,6 @@ def test_the_control_that_is_set_decides_how_cycles_are_averaged(asked, tmp_path
         (["--profile", "strip.kappa_s"], "--profile strip.kappa_s: is not among the free keys"),
         (["--noise", "-1"], "noise = -1.0: give a positive part of the range"),
         (["--starts", "0"], "starts = 0: must be a whole number, 1 to"),
-        (["--method", "simplex"], "method = 'simplex': choose"),
         (["plan.toml"], "plan.toml: cannot be read (No such file"),
         (["plan.toml", "a.csv"], "plan.toml a.csv: give one plan, or files of data"),
         (["plan.toml", "--kind", "loop"], "--kind: plan.toml is a plan; write this into the plan"),

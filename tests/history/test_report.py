@@ -59,9 +59,8 @@ def result():
     )
     scene = STRIP.replace({"contact.friction": 1.0 / 3.0})
     values = {"contact.friction": 1.0 / 3.0}
-    return Fit(
-        scene, values, values, np.eye(1), 0.1, [0.1, 0.2], data, model, "converged", model_runs=5
-    )
+    told = np.eye(1), 0.1, [0.1, 0.2], data, model, "converged", 5
+    return Fit(scene, values, values, *told, controls=["force"] * 2)
 
 
 def rows_of(text):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.identify.plan import plan_for, plan_from_values
+from jbeamshell.identify.plan import planned
+from jbeamshell.identify.plan_file import plan_from_values
 from jbeamshell.measured.curves import DissipationCurve, SqueezeCurve
 from jbeamshell.measured.example import example_loops
 from jbeamshell.measured.loops import make_loop
@@ -16,7 +17,7 @@ SLIDERS, PRESSURE, LENGTH = "contact.stick_stiffness", "contact.pressure", "stri
 
 
 def chosen(data, known=None):
-    plan = plan_for({"set": known or {}}, data)
+    plan = planned(data, known or {})
     (note,) = [note for note in plan.notes if note.startswith("free is not given")]
     assert all(p.key in note for p in plan.free)
     return [p.key for p in plan.free]
@@ -59,7 +60,16 @@ def test_what_is_given_is_not_fitted():
     assert chosen([in_si()], known=dimensions) == [MU]
     friction = {MU: 0.1, PRESSURE: 1e6, LENGTH: 2.0, STIFF: 3.4e8}
     assert chosen([in_si()], known=friction) == [ETA]
-    assert chosen([in_si()], known=friction | {ETA: 0.1}) == [MU, ETA]  # nothing is left
+    assert chosen([in_si()], known=friction | {ETA: 0.1}) == [MU, ETA]  # what is given starts there
+
+
+def test_the_numbers_of_a_whole_scene_are_starts():
+    assert chosen([in_si()], known=jb.Scene()) == [MU, ETA]
+    assert chosen([root()], known=jb.Scene()) == [MU, STIFF]
+    sticky = jb.Scene().replace({SLIDERS: 1e-3})
+    assert chosen([sliding(0.3)], known=sticky) == [MU, SLIDERS]
+    x = np.linspace(0.0, 2.0, 9)
+    assert chosen([SqueezeCurve(x, -np.exp(-x))], known=jb.Scene()) == ["strip.kappa_s"]
 
 
 def test_a_line_tells_a_stiffness_and_no_friction():
@@ -90,8 +100,7 @@ def test_a_contact_that_slides_forgets_its_zero(tmp_path, centre, middle):
 
 @pytest.mark.slow
 def test_a_planted_slider_is_found_from_the_file_alone():
-    plan = plan_for({}, [sliding(0.3)])
-    fit = jb.identify.fit(plan.specimens, free=plan.free, **plan.options)
+    fit = jb.fit(sliding(0.3))
     scene = fit.scene
     gross = float(scene.contact.friction * scene.contact.pressure * scene.strip.length)
     assert gross == pytest.approx(7.0, rel=0.005)

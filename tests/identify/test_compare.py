@@ -1,5 +1,6 @@
 """Comparison of laws: the right one loses nothing, the others what they must."""
 
+import dataclasses
 import json
 from types import SimpleNamespace
 
@@ -49,10 +50,10 @@ def test_the_planted_law_loses_nothing_and_a_power_law_does():
 
 def test_a_comparison_is_printed_and_recorded(made):
     rows = (made.rows[0], made.rows[2])
-    lines = str(made._replace(rows=rows)).splitlines()
+    lines = str(dataclasses.replace(made, rows=rows)).splitlines()
     assert lines[1].split() == ["right", "0", "2", "%", "10", "%", "10", "%", "30", "us"]
     assert lines[2].split() == ["wrong", "has", "no", "loop"]
-    figures = made._replace(rows=rows).figures()["models"]
+    figures = dataclasses.replace(made, rows=rows).figures()["models"]
     assert figures["wrong"]["misfit"] is None
     assert figures["wrong"]["energy"] == [None] * 7
     assert json.dumps(figures, allow_nan=False)
@@ -61,8 +62,10 @@ def test_a_comparison_is_printed_and_recorded(made):
 def test_no_comparison_prints_nan(made):
     """A law whose energy is not known at some amplitudes, or at none, says so instead."""
     right, _, wrong = made.rows
-    some = right._replace(energy=np.append(np.nan, right.energy[1:]), told="not converged")
-    text = str(made._replace(rows=(some, wrong._replace(told=""))))
+    some = dataclasses.replace(
+        right, energy=np.append(np.nan, right.energy[1:]), told="not converged"
+    )
+    text = str(dataclasses.replace(made, rows=(some, dataclasses.replace(wrong, told=""))))
     assert "nan" not in text
     lines = text.splitlines()
     assert lines[1].endswith("(not converged; no energy at 1 of 7 amplitudes)")
@@ -71,8 +74,8 @@ def test_no_comparison_prints_nan(made):
 
 
 def test_a_comparison_is_drawn(made):
-    fitted = made.rows[1]._replace(fit=SimpleNamespace(values={"a": 1.0}))
-    energies, errors = made._replace(rows=(made.rows[0], fitted, made.rows[2])).plot()
+    fitted = dataclasses.replace(made.rows[1], fit=SimpleNamespace(values={"a": 1.0}))
+    energies, errors = dataclasses.replace(made, rows=(made.rows[0], fitted, made.rows[2])).plot()
     texts = [text.get_text() for text in energies.get_legend().get_texts()]
     assert texts == ["right: 1 numbers, 30 us", "target"]
     np.testing.assert_allclose(errors.lines[0].get_ydata(), 10.0)

@@ -26,10 +26,10 @@ def test_the_same_data_twice_have_the_errors_of_once():
     data = readings(2e-3, 1)
     once, twice = (identify.fit(given, scene(), KEYS) for given in ([data], [data, data]))
     assert twice.errors == once.errors
-    assert "toy is toy once more: it counts once" in twice.warnings
-    assert "once more" not in " ".join(once.warnings)
+    assert "toy is toy once more: it counts once" in twice.doubts
+    assert "once more" not in " ".join(once.doubts)
     both = identify.fit([data, readings(2e-3, 2)], scene(), KEYS)
-    assert "once more" not in " ".join(both.warnings)
+    assert "once more" not in " ".join(both.doubts)
 
 
 def test_copies_with_fewer_points_or_in_other_units_count_once(noisy):

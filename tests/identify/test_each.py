@@ -1,10 +1,14 @@
 """Many fits, each on its own: planted values, bootstrap copies beside intervals, bad input."""
 
+import dataclasses
+
 import numpy as np
 import pytest
+from identify.test_law_fits import loops as law_loops
 
 import jbeamshell as jb
-from jbeamshell import identify
+from jbeamshell import identify, laws
+from jbeamshell.identify.each import Fits
 from jbeamshell.measured.loops import make_loop
 
 MU, ETA = "contact.friction", "strip.height_ratio"
@@ -51,6 +55,16 @@ def test_planted_values_come_back_one_by_one():
     assert "3 fits, 3 converged" in str(fits)
 
 
+def test_each_fit_has_the_defaults_of_a_fit():
+    """Starts, iterations and doubts of a law, which is only named."""
+    data = [law_loops(laws.Jenkins(slip, 100.0), sizes=(0.03,))[0] for slip in (1.0, 1.3)]
+    fits = identify.fit_each(data, "jenkins")
+    for place, loop in enumerate(data):
+        alone = jb.fit(loop, "jenkins")
+        assert {key: values[place] for key, values in fits.values.items()} == alone.values
+        assert fits.doubts[place] == alone.doubts
+
+
 def test_bootstrap_copies_spread_as_the_standard_error_says(noisy):
     """Under white noise and a model that is right, both tell the same spread and the truth."""
     copies = identify.bootstrap(noisy, 40)
@@ -72,11 +86,11 @@ def test_bad_input_names_the_fit(noisy):
     beyond = make_loop(*(3.0 * np.asarray(column) for column in (loop.force, loop.displacement)))
     with pytest.raises(jb.InputError, match=r"fit 2 of 2: .*gross slip"):
         identify.fit_each([loop, beyond], START, [MU], points=POINTS)
-    none = identify.Fits({MU: np.ones(2)}, {MU: np.ones(2)}, np.ones(2), np.zeros(2, bool))
+    none = Fits({MU: np.ones(2)}, {MU: np.ones(2)}, np.ones(2), np.zeros(2, bool))
     with pytest.raises(jb.InputError, match="start closer"):
         none.intervals()
     assert str(none) == "2 fits, 0 converged"
     with pytest.raises(jb.InputError, match="copies"):
         identify.bootstrap(noisy, 1)
     with pytest.raises(jb.InputError, match="was not made by fit"):
-        identify.bootstrap(noisy._replace(problem=None), 5)
+        identify.bootstrap(dataclasses.replace(noisy, problem=None), 5)

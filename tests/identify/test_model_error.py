@@ -6,7 +6,6 @@ from toy import KEYS, TRUTH, Readings, formula, scene
 
 from jbeamshell import identify
 from jbeamshell.identify.model_error import independent_points, model_misfit
-from jbeamshell.identify.plan import plan_for
 from jbeamshell.identify.starts import estimate
 from jbeamshell.measured.loops import make_loop
 from tests import rig
@@ -88,10 +87,10 @@ def test_profiles_include_what_the_model_leaves():
     fit = identify.fit(Readings(FINE, bent, noise=1e-4), TWO, [MU, ETA])
     assert fit.uncertainty.scatter > 5.0
     assert fit.uncertainty.sigma > 2.0 * fit.uncertainty.scatter
-    text = " ".join(fit.warnings)
+    text = " ".join(fit.doubts)
     assert "times the measured noise unexplained" in text
     assert "the errors count 200 points as " in text
-    low, high = identify.profile(fit, MU).interval
+    low, high = fit.profile(MU).interval
     np.testing.assert_allclose((low, high), fit.intervals[MU], rtol=0.02)
     assert low < TRUTH[MU] < high
 
@@ -101,7 +100,7 @@ def test_a_model_of_other_data_says_so():
     wrong = y + 0.12 * np.ptp(y) * np.sin(12.0 * FINE)
     fit = identify.fit(Readings(FINE, wrong), TWO, [MU, ETA])
     assert not fit.describes
-    assert fit.warnings[0].startswith("this model does not describe these data: it leaves ")
+    assert fit.doubts[0].startswith("this model does not describe these data: it leaves ")
     assert fit.figures()["describes"] is False
     # Noise alone is no fault of the model, however large.
     loud = y + 0.13 * np.ptp(y) * np.random.default_rng(4).standard_normal(FINE.size)
@@ -142,13 +141,12 @@ def test_friction_of_another_law_lies_inside_its_interval():
         "model.kinematics": "linear",
         "contact.normal": "held",
     }
-    free = {MU: {}, "contact.stick_stiffness": {}, "strip.axial_stiffness": {}}
+    free = [MU, "contact.stick_stiffness", "strip.axial_stiffness"]
     inside = []
     for seed in range(100, 150):
         loop = another_law(seed)
         start = {} if estimate([loop]).soft else {"contact.stick_stiffness": 1000.0}
-        plan = plan_for({"set": known | start, "free": free}, [loop])
-        fit = identify.fit(plan.specimens, free=plan.free, points=64, throw=False)
+        fit = identify.fit(loop, known | start, free, points=64, throw=False)
         low, high = fit.intervals[MU]
         inside.append(low < 0.5 < high)
     assert 0.9 <= np.mean(inside) <= 0.99

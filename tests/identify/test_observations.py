@@ -8,6 +8,7 @@ from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import identify
+from jbeamshell.identify.models import as_model
 from jbeamshell.identify.observations import UNSOLVED_RESIDUAL, observe
 from jbeamshell.measured.curves import (
     Backbone,
@@ -36,7 +37,7 @@ def measured():
 
 @pytest.fixture(scope="module")
 def fitted(measured):
-    return identify.fit_kappa_s(measured, library.squeezed().replace(FAST | {"strip.kappa_s": 1.0}))
+    return identify.fit(measured, library.squeezed().replace(FAST | {"strip.kappa_s": 1.0}))
 
 
 def test_kappa_s_of_the_finite_elements(measured, fitted):
@@ -51,7 +52,7 @@ def test_kappa_s_of_the_finite_elements(measured, fitted):
 @pytest.mark.slow
 def test_printed_constants_hide_a_factor_of_24(measured, fitted):
     printed = FAST | {"model.constants": "printed", "strip.kappa_s": 0.05}
-    fit = identify.fit_kappa_s(measured, library.squeezed().replace(printed))
+    fit = identify.fit(measured, library.squeezed().replace(printed))
     assert fit.values["strip.kappa_s"] == pytest.approx(0.0184, abs=0.0005)
     assert fit.misfit == pytest.approx(fitted.misfit, rel=1e-6)
     consistent = fitted.values["strip.kappa_s"]
@@ -59,9 +60,7 @@ def test_printed_constants_hide_a_factor_of_24(measured, fitted):
 
 
 def test_a_planted_kappa_s_comes_back(fitted):
-    fit = identify.fit_kappa_s(
-        fitted.model[0], library.squeezed().replace(FAST | {"strip.kappa_s": 0.2})
-    )
+    fit = identify.fit(fitted.model[0], library.squeezed().replace(FAST | {"strip.kappa_s": 0.2}))
     assert fit.values["strip.kappa_s"] == pytest.approx(fitted.values["strip.kappa_s"], rel=1e-6)
     assert fit.misfit < 1e-7
 
@@ -70,7 +69,7 @@ def test_the_closed_form_gives_its_kappa_s_back(measured):
     """An answer that owes nothing to the model's grid or solver."""
     decay = squeeze_decay_length(1.0, 0.44, 0.3)
     closed = SqueezeCurve(measured.x, -100.0 * squeeze_step(measured.x - 50.0, decay))
-    fit = identify.fit_kappa_s(closed, library.squeezed().replace(FAST))
+    fit = identify.fit(closed, library.squeezed().replace(FAST))
     assert fit.values["strip.kappa_s"] == pytest.approx(0.44, rel=0.005)
     assert fit.misfit < 1e-3
 
@@ -82,7 +81,7 @@ def test_noise_is_covered_by_the_standard_error(fitted):
     for seed in range(8):
         noise = np.random.default_rng(seed).standard_normal(clean.x.size) / np.sqrt(even)
         curve = SqueezeCurve(clean.x, clean.stress + noise)  # 1 MPa per mean length
-        fit = identify.fit_kappa_s(curve, library.squeezed().replace(FAST | {"strip.kappa_s": 0.8}))
+        fit = identify.fit(curve, library.squeezed().replace(FAST | {"strip.kappa_s": 0.8}))
         scores.append((fit.values["strip.kappa_s"] - truth) / fit.errors["strip.kappa_s"])
     assert np.max(np.abs(scores)) < 3.0
     assert np.abs(np.mean(scores)) < 3.0 / np.sqrt(8)
@@ -120,7 +119,7 @@ def test_curves_that_are_refused(x, stress, message):
 def test_curves_that_a_scene_cannot_answer():
     scene = library.squeezed()
     with pytest.raises(jb.InputError, match=r"far end: x = 105 lies off the strip.*0 to 100"):
-        identify.fit_kappa_s(SqueezeCurve(X + 60.0, STRESS, "far end"), scene)
+        identify.fit(SqueezeCurve(X + 60.0, STRESS, "far end"), scene)
     with pytest.raises(jb.InputError, match=r"section = shell has no squeeze stress: take squee"):
         observe(SqueezeCurve(X, STRESS), scene.replace({"model.section": "shell"}))
     observe(SqueezeCurve(X + 45.00001, STRESS), scene)  # rounded by the table it came from
@@ -200,7 +199,7 @@ def test_a_free_zero_is_put_where_it_fits():
     misfits = []
     for free_zero in (False, True):
         one = observe(shifted._replace(free_zero=free_zero), scene)
-        rows, answer, _ = one.residual(scene, jb.Newton())
+        rows, answer, _ = one.residual(as_model(scene), jb.Newton())
         misfits.append(float(jnp.max(jnp.abs(rows))))
         compared = np.asarray(one.weight) > 0.0
         off = np.mean(np.asarray(answer)[compared] - shifted.displacement)
@@ -222,10 +221,13 @@ def test_a_backbone_only_goes_on():
 
 
 def test_a_trial_without_equilibrium_is_hopeless_where_it_is_compared():
-    formula = observe(toy.readings(), toy.scene(**{"contact.friction": 60.0}))
-    rows, _, sound = formula.residual(toy.scene(**{"contact.friction": 60.0}), jb.Newton())
+    far = as_model(toy.scene(**{"contact.friction": 60.0}))
+    formula = observe(toy.readings(), far)
+    rows, _, sound = formula.residual(
+        as_model(toy.scene(**{"contact.friction": 60.0})), jb.Newton()
+    )
     np.testing.assert_array_equal(rows, UNSOLVED_RESIDUAL)
     assert not bool(sound)
     noisy = observe(toy.readings(1e-3, known=True), toy.scene())
-    rows, _, _ = noisy.residual(toy.scene(**{"contact.friction": 60.0}), jb.Newton())
+    rows, _, _ = noisy.residual(far, jb.Newton())
     np.testing.assert_allclose(rows, UNSOLVED_RESIDUAL * np.ptp(noisy.measured) / 1e-3)

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.plan import plan_from_values, read_plan
-from jbeamshell.identify.sources import Source
+from jbeamshell.identify import Specimen
+from jbeamshell.identify.plan_file import plan_from_values, read_plan
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.recordings import read_recordings
 from tests import rig
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 101)
@@ -77,7 +78,7 @@ def test_specimens_share_what_the_plan_says_and_keep_their_own(folder):
     assert [p.key for p in plan.free] == ["contact.friction", "strip.height_ratio"]
     assert plan.free[0].prior == (0.2, 0.05)
     assert plan.free[1].each
-    assert plan.options == {"noise": 0.01, "starts": 2}
+    assert (plan.options.noise, plan.options.starts) == (0.01, 2)
     assert [loop.label for loop in thin.measurements] == ["loop.csv", "pull.csv"]
     (loop,) = other.measurements  # six cycles are one, in N and m, per width
     assert loop.cycles == 6
@@ -92,16 +93,26 @@ def test_specimens_share_what_the_plan_says_and_keep_their_own(folder):
     ("cycles", "points"), [("recorded", 600), ("steady", None), ("auto", None)]
 )
 def test_cycles_are_averaged_unless_told_otherwise(folder, cycles, points):
-    ((loop, _),) = Source(["cycles.csv"], cycles=cycles).measurements(folder)
+    ((loop, _),) = Specimen(data=["cycles.csv"], cycles=cycles).read(folder)
     assert loop.force.size == points if points else loop.cycles == 6
+
+
+def test_recordings_at_hand_are_read_as_files_are(folder):
+    (recording,) = read_recordings(folder / "cycles.csv")
+    ((loop, notes),) = Specimen(data=recording, width=2.0).read(folder)
+    ((other, others),) = Specimen(data="cycles.csv", width=2.0).read(folder)
+    np.testing.assert_array_equal(loop.force, other.force)
+    assert notes == others
+    with pytest.raises(InputError, match="files do not mix with other data"):
+        Specimen(data=["cycles.csv", recording]).read(folder)
 
 
 def test_a_clean_cycle_and_a_pull_stay_as_they_are(folder):
     for name, points in (("loop.csv", 101), ("pull.csv", 12)):
-        ((loop, _),) = Source([name]).measurements(folder)
+        ((loop, _),) = Specimen(data=[name]).read(folder)
         assert loop.force.size == points
     with pytest.raises(InputError, match=r"pull\.csv.*never turns back"):
-        list(Source(["pull.csv"], cycles="steady").measurements(folder))
+        Specimen(data=["pull.csv"], cycles="steady").read(folder)
 
 
 @pytest.mark.parametrize(
@@ -115,7 +126,7 @@ def test_a_clean_cycle_and_a_pull_stay_as_they_are(folder):
     ],
 )
 def test_every_kind_is_read(folder, kind, name, made):
-    ((item, _),) = Source([f"{name}.csv"], kind=kind).measurements(folder)
+    ((item, _),) = Specimen(data=[f"{name}.csv"], kind=kind).read(folder)
     assert type(item) is made
 
 
@@ -157,7 +168,7 @@ def test_curves_that_cannot_be_read_say_why(tmp_path, text, message):
     [
         ({"specimens": []}, "'specimens' is unknown"),
         ({"specimen": []}, r"write a table \[\[specimen\]\]"),
-        ({"specimen": [{"label": "thin"}]}, "'thin': data: list its files"),
+        ({"specimen": [{"label": "thin"}]}, "'thin': data = None: list its files"),
         ({"specimen": [{"data": "loop.csv"}]}, "data = 'loop.csv': list its files"),
         ({"specimen": [{"data": ["loop.csv"], "kind": "lop"}]}, "kind = 'lop': choose among"),
         ({"specimen": [{"data": ["loop.csv"], "width": 0}]}, "width = 0: give a positive number"),
@@ -205,7 +216,7 @@ def test_an_offset_of_the_responding_sensor_is_removed_and_said(tmp_path, cycles
         rows = np.column_stack(list(table.values()))
         head = "force,displacement"
         np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header=head, comments="")
-    read = {name: list(Source([f"{name}.csv"]).measurements(tmp_path)) for name in ("right", "off")}
+    read = {name: Specimen(data=f"{name}.csv").read(tmp_path) for name in ("right", "off")}
     for (loop, _), (moved, notes) in zip(read["right"], read["off"], strict=True):
         assert any("zeros of the sensors" in note for note in notes)
         assert moved.free_zero
@@ -213,7 +224,7 @@ def test_an_offset_of_the_responding_sensor_is_removed_and_said(tmp_path, cycles
         shift = getattr(moved, answer) - getattr(loop, answer)
         assert np.ptp(shift) < 1e-9 * np.ptp(columns[answer])
         assert np.max(np.abs(shift)) < 0.05 * np.ptp(columns[answer])
-    (kept, _), *_ = Source(["off.csv"], centre=False).measurements(tmp_path)
+    (kept, _), *_ = Specimen(data="off.csv", centre=False).read(tmp_path)
     assert not kept.free_zero
 
 
@@ -223,5 +234,5 @@ def test_a_drive_that_the_data_contradict_is_said(tmp_path):
     head = "force,displacement"
     np.savetxt(tmp_path / "rig.csv", rows, delimiter=",", header=head, comments="")
     for driver, said in ((None, False), ("displacement", False), ("force", True)):
-        for _, notes in Source(["rig.csv"], driver=driver).measurements(tmp_path):
+        for _, notes in Specimen(data="rig.csv", driver=driver).read(tmp_path):
             assert any("load.control=displacement" in note for note in notes) == said

@@ -10,8 +10,9 @@ import pytest
 import jbeamshell as jb
 from jbeamshell import identify
 from jbeamshell.identify import models, rig
+from jbeamshell.identify.models import as_model
 from jbeamshell.identify.observations import observe
-from jbeamshell.identify.plan import plan_for
+from jbeamshell.identify.plan import planned
 from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, DissipationCurve
@@ -77,14 +78,14 @@ def behind(amplitude, **values):
 
 def seen_by(loop, scene=SCENE, **values):
     given = {f"rig.{name}": value for name, value in values.items()}
-    return rig.rigged(loop, observe(loop, scene), scene, given, [])
+    return rig.rigged(loop, observe(loop, scene), as_model(scene), given, [])
 
 
 @pytest.mark.parametrize("compliance", [0.1, 1.0, 30.0])
 @pytest.mark.parametrize("amplitude", [0.3, 1.0, 2.0])  # the widest slider slides at 1.2
 def test_behind_a_spring_the_strip_follows_its_own_path(slid, compliance, amplitude):
     loop, _ = behind(amplitude, compliance=compliance)
-    found, converged = seen_by(loop, compliance=compliance).predict(SCENE, Newton())
+    found, converged = seen_by(loop, compliance=compliance).predict(as_model(SCENE), Newton())
     assert converged
     assert np.max(np.abs(found[-121:] - loop.force)) < 0.01 * np.ptp(loop.force)
 
@@ -95,7 +96,7 @@ def test_slopes_pass_through_the_spring(slid):
 
     def response(compliance):
         changed = rig.with_rig(observation, {COMPLIANCE: compliance})
-        return changed.predict(SCENE, Newton())[0]
+        return changed.predict(as_model(SCENE), Newton())[0]
 
     at, tangent = (jnp.asarray(value) for value in (1.0, 1.0))
     _, slope = jax.jvp(response, (at,), (tangent,))
@@ -111,7 +112,7 @@ def test_springs_zeros_and_damping_are_seen_in_closed_form(slid):
         force=plain.force + 0.4 * plain.displacement + 0.05 * phase + 0.2,
         displacement=plain.displacement - 0.3,
     )
-    found, _ = seen_by(loop, **values, drift=0.1).predict(SCENE, Newton())
+    found, _ = seen_by(loop, **values, drift=0.1).predict(as_model(SCENE), Newton())
     expected = loop.force + 0.1 * np.linspace(0.0, 1.0, 121)
     np.testing.assert_allclose(found[-121:], expected, atol=1e-12)
     # An ellipse dissipates pi times its half axes, a spring nothing.
@@ -123,7 +124,7 @@ def test_under_a_force_the_spring_adds_its_stretch(slid):
     force = np.linspace(0.05, 0.9, 12)
     pull = Backbone(force, (force - 0.02) + 0.2 * (force - 0.02) ** 3 + 0.5 * (force - 0.02) + 0.1)
     values = {"compliance": 0.5, "force_zero": 0.02, "displacement_zero": 0.1}
-    found, _ = seen_by(pull, scene, **values).predict(scene, Newton())
+    found, _ = seen_by(pull, scene, **values).predict(as_model(scene), Newton())
     np.testing.assert_allclose(found[-12:], pull.displacement, rtol=1e-12)
 
 
@@ -141,7 +142,7 @@ def test_a_planted_rig_is_found(slid):
 
 def test_a_plan_holds_and_frees_values_of_the_rig(slid):
     loop, _ = behind(1.0, compliance=1.0)
-    plan = plan_for({"set": {"model.nodes": 7, COMPLIANCE: 1.0}, "free": {"rig.drift": {}}}, [loop])
+    plan = planned(Specimen({"model.nodes": 7}, [loop], set={COMPLIANCE: 1.0}), free=["rig.drift"])
     assert plan.specimens[0].rig == {COMPLIANCE: 1.0}
     (drift,) = rig.with_starts(plan.free, plan.specimens)
     assert (drift.start, drift.high) == (0.0, np.ptp(loop.force))

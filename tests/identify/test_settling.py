@@ -75,7 +75,7 @@ def test_two_numbers_of_a_thin_strip_are_a_product(thin):
         assert high < 1.6 * low
     product = fit.values[MU] * fit.values[STIFF]
     assert product == pytest.approx(float(truth.get(MU) * truth.get(STIFF)), rel=1e-2)
-    said = " ".join(fit.warnings)
+    said = " ".join(fit.doubts)
     assert f"only the product of {MU} and {STIFF} is known well" in said
 
 

@@ -6,7 +6,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.observations import observe
-from jbeamshell.identify.plan import plan_for
+from jbeamshell.identify.plan import planned
 from jbeamshell.identify.starts import _beyond_bar, _x, estimate, started
 from jbeamshell.measured.example import HEIGHT_RATIOS, example_loops
 from jbeamshell.measured.loops import make_loop
@@ -68,7 +68,7 @@ def test_work_and_displacement_of_finite_elements_lie_on_one_curve():
 @pytest.mark.parametrize("seed", range(24))
 def test_no_start_is_beyond_gross_slip_whatever_is_known(seed):
     loops, known, truth = random_specimen(seed, 0.01)
-    plan = plan_for({"set": known, "free": {MU: {}}}, loops)
+    plan = planned(loops, known, [MU])
     scene = plan.specimens[0].scene
     for loop in loops:
         observe(loop, scene)  # raises beyond gross slip
@@ -93,7 +93,7 @@ def test_a_plateau_tells_gross_slip_and_a_straight_way_to_it_soft_sliders():
     made = made._replace(units=SI, normal_force=np.full(u.size, 20.0))
     loops = steady_loops(made)
     assert loops[0].normal_force == pytest.approx(20.0)
-    plan = plan_for({"free": {MU: {}}}, loops)
+    plan = planned(loops, None, [MU])
     scene = plan.specimens[0].scene
     length = float(scene.strip.length)
     assert scene.load.control == "displacement"
@@ -106,7 +106,7 @@ def test_a_plateau_tells_gross_slip_and_a_straight_way_to_it_soft_sliders():
     way = np.clip((1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, 201))) / 0.4, 0.0, None)
     down = 7.0 - 14.0 * np.sqrt(np.minimum(way[0] - way[:101], 1.0))
     bar = make_loop(np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0))._replace(units=SI)
-    root = plan_for({"free": {MU: {}}}, [bar]).specimens[0].scene
+    root = planned([bar], None, [MU]).specimens[0].scene
     gross = float(root.contact.friction) * float(root.contact.pressure) * float(root.strip.length)
     assert gross == pytest.approx(7.0, rel=0.02)
     stretched = gross * float(root.strip.length) / float(root.strip.axial_stiffness)
@@ -117,14 +117,14 @@ def test_a_plateau_tells_gross_slip_and_a_straight_way_to_it_soft_sliders():
 def test_a_line_starts_where_hardly_anything_slips():
     u = rig.path(4)
     loops = steady_loops(rig.recorded(7.0 * u, 1e-4 * u, 0.002)._replace(units=SI))
-    scene = plan_for({"free": {STIFF: {}}}, loops).specimens[0].scene
+    scene = planned(loops, None, [STIFF]).specimens[0].scene
     gross = float(scene.contact.friction * scene.contact.pressure * scene.strip.length)
     assert gross == pytest.approx(70.0, rel=0.02)
 
 
 def test_the_standard_strip_stays_where_its_loops_are_fitted():
     for ratio in HEIGHT_RATIOS:
-        plan = plan_for({"free": {MU: {}}}, example_loops(ratio))
+        plan = planned(example_loops(ratio), None, [MU])
         scene, standard = plan.specimens[0].scene, jb.Scene()
         for key in (MU, ETA, STIFF, P, L):
             assert float(scene.get(key)) == float(standard.get(key))
@@ -134,9 +134,9 @@ def test_friction_and_pressure_that_cannot_resist_are_refused_by_their_names():
     (loop,) = example_loops(0.1126, (1.9,))
     known = {MU: 0.05, P: 10.0}
     with pytest.raises(InputError, match=r"contact.friction = 0.05: slides at mu F_N L = 1, but"):
-        plan_for({"set": known, "free": {ETA: {}}}, [loop])
+        planned([loop], known, [ETA])
     with pytest.raises(InputError, match=r"start it above 0.095"):
-        plan_for({"set": {P: 10.0}, "free": {MU: {"start": 0.05}}}, [loop])
+        planned([loop], {P: 10.0}, [jb.identify.Parameter(MU, start=0.05)])
     found = estimate([loop])
     values, _ = started({P: 10.0}, found._replace(si=True))
     assert values[MU] * 20.0 > 1.9
@@ -145,9 +145,7 @@ def test_friction_and_pressure_that_cannot_resist_are_refused_by_their_names():
 def test_a_first_loading_has_a_start_too():
     force = np.linspace(0.0, 4e3, 40)
     pull = recording_from_arrays(force, 1e-13 * force**2, "pull")
-    scene = (
-        plan_for({"free": {MU: {}}}, [make_loop(pull.force, pull.displacement)]).specimens[0].scene
-    )
+    scene = planned([make_loop(pull.force, pull.displacement)], None, [MU]).specimens[0].scene
     gross = (
         float(scene.contact.friction) * float(scene.contact.pressure) * float(scene.strip.length)
     )
@@ -158,10 +156,9 @@ def test_a_first_loading_has_a_start_too():
 @pytest.mark.parametrize("seed", range(12))
 def test_fits_of_random_specimens_converge_from_the_file_alone(seed):
     loops, known, _ = random_specimen(seed, 0.01)
-    free = {MU: {}} if STIFF in known else {ETA: {}, STIFF: {}}
+    free = [MU] if STIFF in known else [ETA, STIFF]
     coarse = {"model.nodes": 41, "model.kinematics": "linear"}
-    plan = plan_for({"set": known | coarse, "free": free}, loops)
-    fit = jb.identify.fit(plan.specimens, free=plan.free, points=48)
+    fit = jb.fit(loops, known | coarse, free, points=48)
     assert fit.status == "converged"
     assert fit.misfit < 0.02
 
@@ -188,6 +185,6 @@ def test_a_wrong_unit_is_named_where_no_surface_or_material_explains_it(factors,
         )
         for f, d in ((1.0, 1.0), factors)
     )
-    plan_for({"set": known, "free": {MU: {}}}, right)
+    planned(right, known, [MU])
     with pytest.raises(InputError, match=told):
-        plan_for({"set": known, "free": {MU: {}}}, wrong)
+        planned(wrong, known, [MU])

@@ -10,7 +10,7 @@ from jbeamshell import dynamics
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.identify import Assembly, Parameter, fit, jointed
-from jbeamshell.identify.plan import plan_from_values
+from jbeamshell.identify.plan_file import plan_from_values
 from jbeamshell.measured import DampingCurve, ForcedCurve, FrequencyCurve, SqueezeCurve
 
 SIZE = np.geomspace(0.02, 1.0, 16)
@@ -122,7 +122,7 @@ def test_a_fit_by_statics_says_how_far_it_may_be_off():
 
     own = found(size, curve.frequency, curve.damping)
     assert own.values["structure.limit"] == pytest.approx(1.2, rel=1e-4)
-    (doubt,) = (warning for warning in own.warnings if "statics" in warning)
+    (doubt,) = (warning for warning in own.doubts if "statics" in warning)
     told = re.search(r"amplitude (.*) on, .*to (.*)% and .*by (.*)%, .*limit by (.*): ", doubt)
     first, damping, frequency, moved = map(float, told.groups())
     off = np.abs([curve.frequency_error, curve.damping_error])
@@ -137,7 +137,7 @@ def test_a_fit_by_statics_says_how_far_it_may_be_off():
     assert abs(other - 1.2) == pytest.approx(moved, rel=0.3)
     small = size < first  # the fix
     well = found(size[small], curve.frequency[small], curve.damping[small])
-    assert not [warning for warning in well.warnings if "statics" in warning]
+    assert not [warning for warning in well.doubts if "statics" in warning]
 
 
 @pytest.mark.slow

@@ -106,14 +106,14 @@ def test_directions_are_those_of_the_information(quiet):
     assert np.all(np.diff(eigenvalues) >= 0.0)
     vectors = np.array([direction.vector for direction in directions])
     information = vectors.T @ np.diag(eigenvalues) @ vectors
-    residual = quiet.problem(quiet.uncertainty.space, quiet.uncertainty.point)
+    residual = quiet.problem(quiet.uncertainty.point)
     expected = residual.jacobian.T @ residual.jacobian
     np.testing.assert_allclose(information, expected, rtol=1e-6, atol=1e-8 * expected.max())
 
 
 def test_profiles_of_little_noise_are_parabolas(quiet):
     for key in KEYS:
-        profile = identify.profile(quiet, key)
+        profile = quiet.profile(key)
         np.testing.assert_allclose(
             np.array(profile.interval) - quiet.values[key],
             np.array(quiet.intervals[key]) - quiet.values[key],
@@ -127,36 +127,36 @@ def test_profiles_of_little_noise_are_parabolas(quiet):
 def test_a_profile_ends_where_the_others_can_no_longer_follow():
     """Parameters under much noise, whose distribution is skewed like the model."""
     fit = identify.fit(readings(0.01, 3, known=True), TWO, KEYS[:2])
-    profile = identify.profile(fit, ETA)
-    least = fit.problem(fit.uncertainty.space, fit.uncertainty.point).cost
+    profile = fit.profile(ETA)
+    least = fit.problem(fit.uncertainty.point).cost
     for end in profile.interval:
         other = scene(**{KAPPA: 0.44, ETA: end})
         best = identify.fit(readings(0.01, 3, known=True), other, MU)
-        cost = best.problem(best.uncertainty.space, best.uncertainty.point).cost
+        cost = best.problem(best.uncertainty.point).cost
         assert cost - least == pytest.approx(1.959964**2, rel=0.06)
 
 
 def test_profiles_of_what_was_not_fitted(quiet):
     with pytest.raises(jb.InputError, match=r"'strip.length': was not fitted; names are contact"):
-        identify.profile(quiet, "strip.length")
+        quiet.profile("strip.length")
     with pytest.raises(jb.InputError, match="level = 95: give a number between"):
-        identify.profile(quiet, MU, level=95)
+        quiet.profile(MU, level=95)
 
 
 def test_what_the_data_leave_open_is_said_in_words():
     clear = identify.fit(readings(NOISE, known=True), scene(), KEYS)
-    assert not clear.warnings
+    assert not clear.doubts
     # Short of the knee only mu / eta + 0.2 kappa_s shows.
     short = Readings(X, formula(X, 0.5, 5.0, 0.44), noise=1e-3)
     begin = scene(**{MU: 0.5, ETA: 5.0})
     near = identify.fit(short, begin, KEYS)
-    text = " ".join(near.warnings)
+    text = " ".join(near.doubts)
     assert "strip.kappa_s is not identifiable from these data: " in text
     assert "% noise leaves it anywhere between" in text
     assert "trade off" in text
     # Exact data hide it until one asks what noise would do.
     exact = identify.fit(Readings(X, short.y), begin, KEYS, max_iterations=100)
-    assert not exact.warnings
+    assert not exact.doubts
     (sentence, *_) = exact.uncertainty.at_noise(0.01).limitations()
     assert "is not identifiable from these data: 1 % noise leaves it anywhere" in sentence
     with pytest.raises(jb.InputError, match="noise = 0: give a positive part"):
@@ -167,7 +167,7 @@ def test_a_model_that_is_wrong_is_named():
     data = readings(known=True, noise=1e-5)
     bent = type(data)(X, np.asarray(data.y) + 0.01 * np.sin(9.0 * X), noise=1e-5)
     fit = identify.fit(bent, scene(), KEYS)
-    assert any("times the measured noise unexplained" in warning for warning in fit.warnings)
+    assert any("times the measured noise unexplained" in warning for warning in fit.doubts)
 
 
 def test_a_value_at_its_bound_has_no_error():
@@ -175,13 +175,12 @@ def test_a_value_at_its_bound_has_no_error():
         readings(NOISE, known=True),
         TWO,
         [Parameter(MU, low=0.12, high=0.5), ETA],
-        method="l-bfgs-b",
         starts=1,
     )
     assert fit.values[MU] == pytest.approx(0.12, rel=1e-3)
     assert np.isnan(fit.errors[MU])
     assert np.isfinite(fit.errors[ETA])
     assert fit.figures()["values"][MU]["error"] is None
-    assert any("ends at its bound 0.12" in warning for warning in fit.warnings)
+    assert any("ends at its bound 0.12" in warning for warning in fit.doubts)
     with pytest.raises(jb.InputError, match="ended at its bound"):
-        identify.profile(fit, MU)
+        fit.profile(MU)

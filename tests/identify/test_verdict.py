@@ -12,7 +12,7 @@ def test_a_law_without_loss_does_not_describe_loops():
     fit = identify.fit(pair, "jenkins", starts=1, throw=False)
     assert fit.misfit < 0.05
     assert not fit.describes
-    assert "its energy per cycle is" in fit.warnings[0]
+    assert "its energy per cycle is" in fit.doubts[0]
 
 
 @pytest.mark.parametrize("noise", [NOISE, 0.03])
@@ -25,7 +25,7 @@ def test_noise_alone_is_no_fault_of_energy_or_stiffness(noise):
             for loop in loops(PLANTED["iwan4"], sizes=(0.003, 0.012))
         ]
         fit = identify.fit(data, "iwan4", starts=1, throw=False)
-        assert fit.describes, fit.warnings
+        assert fit.describes, fit.doubts
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import pytest
 from toy import Formula, Readings, X, scene
 
 from jbeamshell import identify
-from jbeamshell.identify.observations import observe
+from jbeamshell.identify.observations import run_of
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.search_space import search_space
 from jbeamshell.identify.wrong_units import doubt_of_units
@@ -22,12 +22,12 @@ class Pull(Readings):
 
 
 class Bar(Formula):
-    def predict(self, scene, solver):
-        return self.x**2 / scene.get(STIFF), jnp.asarray(True)
+    def predict(self, model, solver):
+        return self.x**2 / model.get(STIFF), jnp.asarray(True)
 
 
-@observe.register
-def _(measurement: Pull, scene):
+@run_of.register
+def _(measurement: Pull, model):
     weight = np.broadcast_to(1.0 / np.ptp(measurement.y), measurement.x.shape)
     return Bar(*map(jnp.asarray, (measurement.y, weight, measurement.x)))
 
@@ -46,18 +46,18 @@ def test_a_free_stiffness_takes_a_wrong_unit_and_says_so(factor, told):
     found = fitted(factor)
     assert found.values[STIFF] == pytest.approx(TRUE / factor, rel=1e-3)
     assert found.misfit < 1e-6
-    (doubt,) = [warning for warning in found.warnings if "--unit" in warning]
+    (doubt,) = [warning for warning in found.doubts if "--unit" in warning]
     assert re.search(told, doubt)
 
 
 def test_a_start_that_is_only_far_off_says_nothing():
     for start in (TRUE / 5.0, 5.0 * TRUE):
-        assert not [warning for warning in fitted(1.0, start).warnings if "--unit" in warning]
+        assert not [warning for warning in fitted(1.0, start).doubts if "--unit" in warning]
 
 
 def test_a_bound_that_a_wrong_unit_meets_says_so():
     found = fitted(1e3, low=5e3, high=1e5)
-    assert any("at its bound: are kilonewtons taken" in warning for warning in found.warnings)
+    assert any("at its bound: are kilonewtons taken" in warning for warning in found.doubts)
 
 
 def test_friction_that_no_surface_has_is_said_unless_the_stiffness_tells_more():

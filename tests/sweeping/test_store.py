@@ -12,7 +12,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.common import files
-from jbeamshell.identify.experiment import Prediction
+from jbeamshell.identify.experiment import Evaluation
 from jbeamshell.identify.saved_runs import SavedRuns
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.sweeping.runner import Block
@@ -97,12 +97,12 @@ def test_a_lock_ends_with_the_process_that_holds_it(tmp_path):
 
 def test_a_run_of_a_fit_that_was_changed_is_made_again(tmp_path):
     random, path = np.random.default_rng(23), tmp_path / "state"
-    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), scenes=(), observations=())
+    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), models=(), observations=())
     space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
     runs = SavedRuns(path, experiment, space, Newton())
     assert runs.read() == []
     made = [
-        (random.random(2), Prediction(random.random(4), random.random((4, 2)), random.random(4), c))
+        (random.random(2), Evaluation(random.random(4), random.random((4, 2)), random.random(4), c))
         for c in (True, False, True)
     ]
     runs.append(made)

@@ -1,0 +1,279 @@
+"""Search of a fit: from several starts, then along the direction that the data know least."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jbeamshell.common.checks import require, require_choice, require_count
+from jbeamshell.common.errors import InputError, UnconvergedError
+from jbeamshell.common.progress import bar
+from jbeamshell.identify.models import LawModel
+from jbeamshell.identify.parameters import is_number
+from jbeamshell.identify.problem import Problem
+from jbeamshell.identify.results import Fit, fit_at
+from jbeamshell.identify.search import (
+    SearchResult,
+    StoppingRule,
+    minimise,
+    together,
+    within_bounds,
+)
+from jbeamshell.identify.search_space import SearchSpace
+from jbeamshell.identify.settling import Settled, settle
+from jbeamshell.measured.recordings import FEWEST_POINTS
+from jbeamshell.numerics.newton import Newton
+
+POINTS = 96  # points of a loop at which the model is run
+MAX_ITERATIONS = 40
+OF_LAWS = 5  # times as many for laws, which cost little and creep to their limits
+LAW_STARTS = 6
+STARTS = 3  # default number of searches if all parameters have two bounds
+TOGETHER = 8  # starts that move together where no search has converged
+SCREENED = 4  # random points tried for each start besides the given one
+NO_INFLUENCE = 1e-9  # change of a residual for a unit step below which it is rounding
+
+Vector = NDArray[np.float64]
+
+
+def _require_positive(name: str, value: Any, what: str) -> None:
+    require(name, value, is_number(value) and value > 0.0, f"give a positive {what}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """Settings of a fit; see `jbeamshell.identify.fit` for what they mean.
+
+    Raises
+    ------
+    InputError
+        for a value that makes no sense
+    """
+
+    starts: int | None = None
+    noise: float | None = None
+    points: int = POINTS
+    max_iterations: int | None = None
+    tolerance: float = 1e-7
+    unchecked: bool = False
+    throw: bool = True
+    solver: Newton | None = None
+
+    def __post_init__(self) -> None:
+        require_count("starts", 1 if self.starts is None else self.starts, 1)
+        require_count("points", self.points, FEWEST_POINTS)
+        most, noise = self.max_iterations, self.noise
+        require_count("max_iterations", 1 if most is None else most, 1)
+        _require_positive(
+            "noise", 1.0 if noise is None else noise, "part of the range, such as 0.01"
+        )
+        _require_positive("tolerance", self.tolerance, "number, such as 1e-7")
+        valid = self.solver is None or isinstance(self.solver, Newton)
+        require("solver", self.solver, valid, "give a jbeamshell.Newton")
+        for name in ("unchecked", "throw"):
+            require_choice(name, getattr(self, name), (False, True))
+
+
+DEFAULTS = Options()
+
+
+class FitProgress(NamedTuple):
+    """Progress of a fit; as text, it is one line.
+
+    Attributes
+    ----------
+    search, searches : number of the search, 0 while starts are tried, and how many there are
+    step : number of the step in the search, or of the start that is tried
+    cost : sum of the squared residuals
+    values : parameters by name
+    elapsed : seconds since the fit began
+    left : seconds it may still take if every search uses all its iterations
+    """
+
+    search: int
+    searches: int
+    step: int
+    cost: float
+    values: dict[str, float]
+    elapsed: float
+    left: float
+
+    def __str__(self) -> str:
+        at = f"search {self.search} of {self.searches}, step" if self.search else "start"
+        values = ", ".join(f"{name} = {value:.6g}" for name, value in self.values.items())
+        return f"{at} {self.step}, cost {self.cost:.4g}, at most {self.left:.0f} s left: {values}"
+
+
+def found_by(
+    problem: Problem,
+    options: Options,
+    labels: Sequence[str],
+    doubts: Sequence[str] = (),
+    progress: Callable[[FitProgress], None] | None = None,
+) -> Fit:
+    """Fit of a problem.
+
+    Parameters
+    ----------
+    problem : least-squares problem
+    options : settings
+    labels : labels of the specimens
+    doubts : sentences on the data; where a fit fails, they may say why
+    progress : called after every step; None shows a bar where a person watches
+    """
+    space = problem.space
+    of_law = isinstance(problem.experiment.models[0], LawModel)
+    most = options.max_iterations or (OF_LAWS * MAX_ITERATIONS if of_law else MAX_ITERATIONS)
+    starts = options.starts
+    if starts is None:
+        bounded = all(parameter.bounded for parameter in space.parameters)
+        starts = LAW_STARTS if of_law else STARTS if bounded else 1
+    rescue = options.max_iterations is None
+    noise_cost = problem.experiment.weight.size if problem.experiment.noisy else 0
+    stopping = StoppingRule(most, options.tolerance, noise_cost)
+    told = "".join(f"; {doubt}" for doubt in doubts)
+    try:
+        watched: Any = bar("fit") if progress is None else contextlib.nullcontext()
+        with watched as shown:
+
+            def show(now: FitProgress) -> None:
+                shown.set_postfix_str(str(now))
+                shown.update()
+
+            end, ends = _search(problem, starts, stopping, rescue, progress or show)
+    except KeyboardInterrupt:
+        kept = (
+            "nothing was saved: give save= (--save on the command line), a file, to continue later"
+        )
+        if problem.saved_in:
+            kept = f"all are in {problem.saved_in}: fit again with the same arguments to continue"
+        raise KeyboardInterrupt(f"interrupted after {problem.runs} model runs; {kept}") from None
+    except UnconvergedError as error:
+        raise UnconvergedError(f"{error}{told}") from None
+    minima = [(space.values(own.point), problem(own.point).cost) for own in ends]
+    status = ends[0].status
+    if options.throw and status != "converged":
+        values, cost = minima[0]
+        named = ", ".join(f"{name} = {value:.6g}" for name, value in space.named(values).items())
+        raise UnconvergedError(
+            f"the fit has not converged after {most} iterations, at {named}, cost "
+            f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations{told}"
+        )
+    return fit_at(problem, end, labels, status, minima)
+
+
+class _Monitor:
+    """Counter of the steps of a fit, which reports each with the time left."""
+
+    def __init__(
+        self,
+        space: SearchSpace,
+        searches: int,
+        most_steps: int,
+        progress: Callable[[FitProgress], None],
+    ) -> None:
+        self._space, self._searches, self._most = space, searches, most_steps
+        self._progress, self._steps, self._begin = progress, 0, time.perf_counter()
+        self._last = (0, 0)
+
+    def __call__(self, search: int, step: int, values: Vector, cost: float) -> None:
+        """Count one step and report it."""
+        self._steps += 1
+        self._last = (search, step)
+        elapsed = time.perf_counter() - self._begin
+        left = elapsed / self._steps * max(self._most - self._steps, 0)
+        named = self._space.named(values)
+        self._progress(FitProgress(search, self._searches, step, cost, named, elapsed, left))
+
+    def of_search(self, number: int) -> Callable[[int, Vector, float], None]:
+        """Function that counts and reports a step of one search at a point (n,)."""
+        return lambda step, point, cost: self(number, step, self._space.values(point), cost)
+
+    def settling(self, point: Vector, cost: float) -> None:
+        """Count a step after the last search and report it."""
+        search, step = self._last
+        self(search, step + 1, self._space.values(point), cost)
+
+
+def _search(
+    problem: Problem,
+    starts: int,
+    stopping: StoppingRule,
+    rescue: bool,
+    progress: Callable[[FitProgress], None],
+) -> tuple[Settled, list[SearchResult]]:
+    """Ends of the searches from all starts, the best first, and where that settles."""
+    check_start(problem)
+    space = problem.space
+    tried = SCREENED * (starts - 1)
+    monitor = _Monitor(space, starts, tried + starts * stopping.max_iterations, progress)
+
+    def cost(end: SearchResult) -> float:
+        return problem(end.point).cost
+
+    def search(number: int, start: Vector) -> SearchResult:
+        return minimise(problem, start, stopping, monitor.of_search(number))
+
+    costs, points = [], _spread(space, tried)
+    for number, point in enumerate(points, 1):
+        costs.append(problem(point).cost)
+        monitor.of_search(0)(number, point, costs[-1])
+    best = [points[i] for i in np.argsort(costs, kind="stable")[: starts - 1]]
+    first = np.zeros(len(space.names))
+    ends = [search(number, start) for number, start in enumerate([first, *best], 1)]
+    ends = sorted(ends, key=cost)
+    if rescue and ends[0].status != "converged":
+        many = [ends[0].point, first, *_spread(space, TOGETHER - 2)]
+        moved = together(problem, many, monitor.of_search(starts + 1))
+        ends = sorted([*ends, search(starts + 2, moved)], key=cost)
+    if _at_bound(space, ends[0].point):
+        end = within_bounds(problem, ends[0].point, stopping)
+        ends[0] = SearchResult(min(ends[0], end, key=cost).point, ends[0].status)
+    settled = settle(problem, ends[0].point, monitor.settling)
+    status = ends[0].status if settled.settled else "max_iterations"
+    return settled, [SearchResult(settled.point, status), *ends[1:]]
+
+
+def _at_bound(space: SearchSpace, point: Vector) -> bool:
+    """True if a value ended at a bound of its parameter."""
+    pairs = zip(space.bijections, space.values(point).tolist(), strict=True)
+    return any(bijection.bound_at(value) is not None for bijection, value in pairs)
+
+
+def check_start(problem: Problem) -> None:
+    """Raise unless the model has an equilibrium at the start, and every parameter an influence."""
+    space = problem.space
+    start = problem(np.zeros(len(space.names)))
+    if not start.converged:
+        raise UnconvergedError(
+            "the model finds no equilibrium at the start values: start closer, or take "
+            "softer sliders (contact.stick_stiffness = 100 or less)"
+        )
+    data = start.jacobian[: start.prediction.size]
+    for name, column in zip(space.names, data.T, strict=True):
+        if not np.all(np.isfinite(column)):
+            raise UnconvergedError(
+                f"free {name!r}: the response has no derivative at its start: start elsewhere"
+            )
+        if not np.any(np.abs(column) > NO_INFLUENCE):
+            raise InputError(
+                f"free {name!r}: the data do not depend on it at its start; leave it out"
+            )
+
+
+def _spread(space: SearchSpace, count: int) -> list[Vector]:
+    """Points of a Latin hypercube between the bounds."""
+    random = np.random.default_rng(0)
+    cells = np.stack([random.permutation(count) for _ in space.names], axis=1)
+    parts = (cells + random.uniform(size=cells.shape)) / max(count, 1)
+    boxed, box = space.boxed()
+    near = np.clip(box, -1.0, 1.0)
+    bounded = np.all(np.isfinite(box), axis=1)  # a bound of 0 is none on a logarithmic scale
+    low, high = np.where(bounded[:, None], box, near).T
+    return [space.point(boxed.values(low + part * (high - low))) for part in parts]
