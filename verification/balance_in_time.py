@@ -1,35 +1,21 @@
 """Harmonic balance beside time integration, on structures that random strips join.
 
-    python calibration/balance_in_time.py [--scenes 25]
-
 Two masses hang on a spring; the first is held by the sliders of a random scene of
-calibration/campaign.py (`jbeamshell.dynamics.Joint.of`).  A harmonic force acts on the second one
+verification/campaign.py (`jbeamshell.dynamics.Joint.of`).  A harmonic force acts on the second one
 below, at and above the resonance.  Central differences begin on the motion that the balance finds,
 take the exact law of the sliders, and after many periods end on their own steady motion.
-balance_in_time.json beside this file gets the amplitudes of both, and that of the joint over its
-largest displacement.
+The record has the amplitudes of both, and that of the joint over its largest displacement.
 """
 
-import argparse
-import json
-import warnings
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import jax
+import numpy as np
+from numpy.typing import NDArray
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from jbeamshell.dynamics import Attachment, Joint, Structure, steady_response
+from verification.campaign import SEED, drawn
 
-import numpy as np  # noqa: E402
-from campaign import SEED, drawn  # noqa: E402
-from numpy.typing import NDArray  # noqa: E402
-from provenance import provenance  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.dynamics import Attachment, Joint, Structure, steady_response  # noqa: E402
-
-RECORD = Path(__file__).parent / "balance_in_time.json"
 KINDS = ("plain", "ramps", "pinned and free", "elastic sliders", "layers that lift")
 BESIDE = (0.7, 1.0, 1.4)  # frequencies over the first natural one
 STEPS, PERIODS, HARMONICS = 600, 120, 21  # steps of a period
@@ -119,15 +105,10 @@ def _sliders(joint: Joint) -> tuple[Floats, Floats]:
     return np.asarray(joint.springs)[:-1], np.asarray(joint.limits)
 
 
-def main() -> None:
-    """Compare all structures, and write the record."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--scenes", type=int, default=25)
-    count = parser.parse_args().scenes
-    names = [(KINDS[i % len(KINDS)], i // len(KINDS)) for i in range(count)]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", jb.DoubtfulWarning)
-        cases = [case(*name) for name in names]
+def measure(scenes: int = 25) -> dict[str, Any]:
+    """Compare all structures."""
+    names = [(KINDS[i % len(KINDS)], i // len(KINDS)) for i in range(scenes)]
+    cases = [case(*name) for name in names]
     ends = integrated(cases)
     rows: list[dict[str, Any]] = []
     for (kind, number), one, end in zip(names, cases, ends, strict=True):
@@ -137,9 +118,4 @@ def main() -> None:
         joint = abs(one.shapes[:, 0, 0]) / float(one.joint.displacement[-1])
         row |= {"joint": joint.tolist(), "in_time": abs(end).tolist(), "error": errors.tolist()}
         rows.append(row)
-    record = {"about": provenance(), "seed": SEED, "beside": BESIDE, "rows": rows}
-    write_text(RECORD, json.dumps(record, indent=1))
-
-
-if __name__ == "__main__":
-    main()
+    return {"seed": SEED, "beside": BESIDE, "rows": rows}

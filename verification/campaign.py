@@ -1,52 +1,52 @@
 """Campaign of random scenes of all kinds: true errors, doubts, and whether failures are silent.
 
-    python calibration/campaign.py [--only KIND ...] [--share 1.0] [--seed 22] [--again]
-
-solves every scene of calibration/random_scenes.py as it is and against two references: the same
+Solves every scene of verification/random_scenes.py as it is and against two references: the same
 model on a fine mesh with twice as many load steps, and another solver where one applies (load steps
 against events on the contact line).  A reference by another solver that disagrees and doubts itself
 is refined, and left out if it still does.
 
 Where a kind of scene leaves the section open it is the beamshell, and the tolerance is .5 % to its
-own fine mesh; calibration/plain_call.py has plain calls beside elements and plane elasticity.
+own fine mesh; verification/plain_call.py has plain calls beside elements and plane elasticity.
 
 A run is wrong if its dissipation is off by more than 2 % from a reference; its failure is silent if
 it neither raised nor doubted itself.  campaign.jsonl beside this file gets a row after each scene,
-and a second run goes on where the first was cut.  --again solves the scenes of the record once
-more, and keeps the errors of those whose result is the same.
+and a second run goes on where the first was cut.  again=true solves the scenes of the record once
+more, and keeps the errors of those whose result is the same; kind, share and seed choose scenes.
 """
 
-import argparse
 import json
 import time
-import warnings
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import jax
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from tqdm import tqdm
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from calibration.charts import OFF
+from calibration.provenance import provenance
+from calibration.running import short
+from calibration.strip import changed
+from jbeamshell.common.files import write_text
+from jbeamshell.history.reliability import TOLERANCE
+from jbeamshell.plotting.style import style
+from verification.outcomes import OUTCOMES
+from verification.random_scenes import KINDS, Kind, Values
 
-import numpy as np  # noqa: E402
-from provenance import provenance  # noqa: E402
-from random_scenes import KINDS, Kind, Values  # noqa: E402
-from strip import changed  # noqa: E402
-from tqdm import tqdm  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.history.reliability import TOLERANCE  # noqa: E402
-
-RECORD = Path(__file__).parent / "campaign.jsonl"
+RECORD = Path(__file__).with_suffix(".jsonl")
 SEED = 22
 MANY_NODES = 129  # from which on a fine mesh has half as many more elements, else twice as many
 SAME = 1e-7  # relative change of a result that is the same
-DIGITS = 8  # of the numbers of the record
 BEAMSHELL: Values = {"model.section": "squeeze"}
 TO_ITSELF: Values = {"model.tolerance": 0.005}
+HATCHES = dict(zip(OUTCOMES, ("", "", "..", "//", "xx", "**", ""), strict=True))
+MARKERS = {"right": "o", "right, but doubted": "s", "wrong, and says so": "^"}
+SMALLEST, LARGEST = 1e-5, 10.0  # errors and estimates that are drawn
 Row = dict[str, Any]
 
 
@@ -173,20 +173,11 @@ def compared(values: Values, other: Values | None, before: Row | None = None) ->
     return {"outcome": outcome(row)} | row
 
 
-def rounded(value: Any) -> Any:
-    """Value with its numbers rounded, as the record has them."""
-    if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}")
-    if isinstance(value, dict):
-        return {key: rounded(each) for key, each in value.items()}
-    return value
-
-
-def read(path: Path = RECORD) -> list[Row]:
-    """Rows of a record, the first of which tells its provenance."""
-    if not path.exists():
-        return [{"about": provenance(), "tolerance": TOLERANCE}]
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+def read() -> list[Row]:
+    """Rows of the record; the line before them tells its provenance."""
+    if not RECORD.exists():
+        return []
+    return [json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines()][1:]
 
 
 def places(kinds: dict[str, Kind], share: float) -> Iterator[tuple[str, int]]:
@@ -200,40 +191,121 @@ def places(kinds: dict[str, Kind], share: float) -> Iterator[tuple[str, int]]:
         yield name, number
 
 
-def main() -> None:
-    """Solve the scenes asked for, and add a row to the record after each."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", nargs="*", default=list(KINDS), choices=list(KINDS))
-    parser.add_argument("--share", type=float, default=1.0, help="part of each kind's scenes")
-    parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--again", action="store_true", help="solve recorded scenes once more")
-    parser.add_argument("--record", type=Path, default=RECORD)
-    asked = parser.parse_args()
-    jb.configure()
-    about, *rows = read(asked.record)
-    known = {(row["seed"], row["kind"], row["number"]): row for row in rows}
+def measure(kind: str = "", share: float = 1.0, seed: int = SEED, again: bool = False) -> None:
+    """Solve the scenes asked for, and add a row to the record after each.
+
+    Parameters
+    ----------
+    kind : name of one kind of scenes; empty for all
+    share : part of each kind's scenes
+    again : True to solve recorded scenes once more
+    """
+    known = {(row["seed"], row["kind"], row["number"]): row for row in read()}
 
     def line(row: Row) -> str:
-        return json.dumps(rounded(row)) + "\n"
+        return json.dumps(short(row)) + "\n"
 
     def write() -> None:
-        write_text(asked.record, "".join(map(line, (about, *known.values()))))
+        about = {"about": provenance(), "tolerance": TOLERANCE}
+        write_text(RECORD, "".join(map(line, (about, *known.values()))))
 
     write()
-    warnings.simplefilter("ignore", jb.DoubtfulWarning)
-    kinds = {name: KINDS[name] for name in asked.only}
-    for name, number in tqdm(list(places(kinds, asked.share)), disable=None):
-        key = asked.seed, name, number
+    kinds = {name: KINDS[name] for name in ([kind] if kind else KINDS)}
+    for name, number in tqdm(list(places(kinds, share)), disable=None):
+        key = seed, name, number
         before = known.get(key)
-        if before is not None and not asked.again:
+        if before is not None and not again:
             continue
-        found = compared(drawn(name, asked.seed, number), KINDS[name].other, before)
+        found = compared(drawn(name, seed, number), KINDS[name].other, before)
         known[key] = dict(zip(("seed", "kind", "number"), key, strict=True)) | found
-        with asked.record.open("a", encoding="utf-8") as record:
+        with RECORD.open("a", encoding="utf-8") as record:
             record.write(line(known[key]))
     write()
-    print(Counter(row["outcome"] for row in known.values()))
 
 
-if __name__ == "__main__":
-    main()
+def tell(record: Row) -> str:
+    """Number of scenes of each outcome."""
+    return str(counts(read()))
+
+
+# --- charts ---------------------------------------------------------------------------------------
+
+
+def counts(rows: Iterable[Row]) -> Counter[str]:
+    """Number of scenes of each outcome."""
+    return Counter(row["outcome"] for row in rows)
+
+
+class Choice(NamedTuple):
+    """Run whose grid and load steps were chosen.
+
+    Attributes
+    ----------
+    kind : kind of its scene
+    error : that of the dissipation or of the loop to a fine mesh, whichever is larger
+    doubted : True if it doubts itself
+    """
+
+    kind: str
+    error: float
+    doubted: bool
+
+
+def chosen(rows: Iterable[Row]) -> list[Choice]:
+    """Runs whose grid and load steps were chosen, and that have a fine mesh beside them."""
+    return [
+        Choice(
+            row["kind"], max(row["errors"]["refined"], row["errors"]["loop"]), any(row["doubts"])
+        )
+        for row in rows
+        if row.get("chosen") and "refined" in row["errors"]
+    ]
+
+
+def draw_outcomes(rows: list[Row], axes: Axes) -> Axes:
+    """Draw the part of each outcome, by kind of scene."""
+    kinds = {
+        kind: [r for r in rows if r["kind"] == kind] for kind in sorted({r["kind"] for r in rows})
+    }
+    names = [f"{kind} ({len(found)})" for kind, found in kinds.items()]
+    left = np.zeros(len(kinds))
+    for outcome, colour in OUTCOMES.items():
+        parts = np.array([counts(found)[outcome] / len(found) for found in kinds.values()])
+        if parts.any():
+            look = {"color": colour, "edgecolor": "0.3", "hatch": HATCHES[outcome]}
+            axes.barh(names, parts, left=left, label=outcome, linewidth=0.4, **look)
+            left += parts
+    axes.invert_yaxis()
+    axes.set(xlabel="part of the scenes", xlim=(0.0, 1.0))
+    axes.tick_params(axis="y", labelsize=7)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=7)
+    return axes
+
+
+def draw_estimates(rows: list[Row], axes: Axes) -> Axes:
+    """Draw the error of the dissipation against the run's own estimate."""
+    for outcome, marker in MARKERS.items():
+        found = [r for r in rows if r["outcome"] == outcome and "refined" in r["errors"]]
+        x, y = (
+            np.clip(values, SMALLEST, LARGEST)
+            for values in zip(
+                *((r["estimate"], r["errors"]["refined"]) for r in found), strict=True
+            )
+        )
+        look = {"color": OUTCOMES[outcome], "edgecolor": "0.3", "linewidth": 0.2}
+        axes.scatter(x, y, 9.0, marker=marker, label=outcome, **look)
+    for line in (axes.axhline, axes.axvline):
+        line(TOLERANCE, color="0.5", linestyle="--", linewidth=0.8)
+    axes.set(xscale="log", yscale="log", xlabel="estimate of the run  [1]", ylabel=OFF)
+    axes.legend(fontsize=7)
+    return axes
+
+
+def draw(record: Row) -> plt.Figure:
+    """Outcomes by kind, and errors against estimates."""
+    rows = read()
+    with style():
+        figure, panels = plt.subplots(1, 2, figsize=(10.0, 4.6), layout="constrained")
+        draw_outcomes(rows, panels[0])
+        draw_estimates(rows, panels[1])
+    return figure

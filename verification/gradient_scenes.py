@@ -1,4 +1,4 @@
-"""Scenes of all kinds, for calibration/gradients.py; values are as `strip.changed` reads them."""
+"""Scenes of all kinds, for verification/gradients.py; values are as `strip.changed` reads them."""
 
 from typing import Any
 

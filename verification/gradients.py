@@ -1,47 +1,33 @@
 """Gradients of every number of a scene, by every figure, against differences.
 
-    python calibration/gradients.py [--points 2] [--only SETTING ...]
-
-solves scenes of all kinds of models, laws, kinematics, supports and loads at random points.  Each
+Solves scenes of all kinds of models, laws, kinematics, supports and loads at random points.  Each
 number that a scene holds, each entry of its tables included, is changed alone; rows of a table that
 make a step are moved together.  The derivative of each figure by JAX, in reverse, stands
 beside central differences at two distances, extrapolated (Richardson).  Where they differ, the
 distances are made smaller, and the slopes from both sides are compared: a figure with a kink there
 has no derivative, and JAX must give one that lies between the two.
 
-It writes gradients.json beside this file after every setting: counts of right and wrong ones, and
-each kink by its name.
+The record has counts of right and wrong ones by setting, and each kink by its name.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
+import functools
 import time
-import warnings
 from collections import Counter
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
+import numpy as np
 
-jax.config.update("jax_enable_x64", True)
-jax.config.update("jax_disable_most_optimizations", True)  # few runs of many programs
+import jbeamshell as jb
+from calibration.strip import changed
+from jbeamshell.scene.keys import NUMBERS, TABLE
+from jbeamshell.solving.response import RESPONSES
+from verification.gradient_scenes import SETTINGS, SIZES, Values
 
-import jax.numpy as jnp  # noqa: E402
-import numpy as np  # noqa: E402
-from gradient_scenes import SETTINGS, SIZES, Values  # noqa: E402
-from provenance import provenance  # noqa: E402
-from strip import changed  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.scene.keys import NUMBERS, TABLE  # noqa: E402
-from jbeamshell.solving.response import RESPONSES  # noqa: E402
-
-RECORD = Path(__file__).parent / "gradients.json"
 SEED = 22
 STEP = 1e-4  # relative distance of the differences
 DISTANCES = (10.0, 1.0, 0.1, 0.01)  # times that, until they agree; round-off asks for the largest
@@ -287,8 +273,10 @@ def min_over(found: list[Differences]) -> np.ndarray:
     return np.min([np.abs(at.up - at.down) for at in found], axis=0)
 
 
-def study(given: Values, points: int, seed: list[int]) -> Values:
+def study(name: str, points: int = 1) -> Values:
     """Counts of verdicts of one setting at random points, and all that are not right."""
+    jax.config.update("jax_disable_most_optimizations", True)  # few runs of many programs
+    given, seed = SETTINGS[name], [SEED, list(SETTINGS).index(name)]
     random, begun = np.random.default_rng(seed), time.process_time()
     setting = setting_of(given)
     walk, rows = setting.walk, []
@@ -312,26 +300,4 @@ def study(given: Values, points: int, seed: list[int]) -> Values:
     }
 
 
-def main() -> None:
-    """Go over the settings asked for, and write the record after each."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--points", type=int, default=1)
-    parser.add_argument("--only", nargs="*", default=list(SETTINGS), choices=list(SETTINGS))
-    parser.add_argument("--record", type=Path, default=RECORD)
-    given = parser.parse_args()
-    record: Values = {"about": provenance(), "settings": {}}
-    if given.record.exists():
-        record = json.loads(given.record.read_text(encoding="utf-8"))
-    for name in given.only:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", jb.DoubtfulWarning)
-            seed = [SEED, list(SETTINGS).index(name)]
-            found = study(SETTINGS[name], given.points, seed)
-        record["settings"][name] = found
-        write_text(given.record, json.dumps(record, indent=1))
-        print(name, found["counts"], found["cpu_s"], file=sys.stderr, flush=True)
-        jax.clear_caches()
-
-
-if __name__ == "__main__":
-    main()
+PARTS = {name: functools.partial(study, name) for name in SETTINGS}

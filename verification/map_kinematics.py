@@ -14,46 +14,32 @@ Held down, a thin strip cannot buckle under a push.  Cells fail where Newton's m
 equilibrium in the plain load steps (a batch does not retry in smaller ones), or where a section is
 pressed through itself, psi <= -1.
 
-Writes map_kinematics.json beside this file, draws map_kinematics.png from it, and fits the
-constants of `jbeamshell.scene.linearisation`; a quarter of an hour on one core:
-
-    python calibration/map_kinematics.py           # --draw: only the picture, from the record
+The constants of `jbeamshell.scene.linearisation` are fitted to it.  A quarter of an hour on one
+core.
 """
 
-import argparse
 import itertools
-import json
-from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.optimize import minimize
+from scipy.stats import qmc
+from tqdm import tqdm
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from calibration.strip import changed, in_load_steps
+from jbeamshell import plotting
+from jbeamshell.scene.linearisation import BEAMSHELL, SECTIONS, bound
 
-import equinox as eqx  # noqa: E402
-import jax.numpy as jnp  # noqa: E402
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-from matplotlib.colors import LogNorm  # noqa: E402
-from provenance import provenance  # noqa: E402
-from scipy.optimize import minimize  # noqa: E402
-from scipy.stats import qmc  # noqa: E402
-from strip import changed, in_load_steps  # noqa: E402
-from tqdm import tqdm  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell import plotting  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.scene.linearisation import BEAMSHELL, SECTIONS, bound  # noqa: E402
-
-HERE = Path(__file__).parent
-RECORD = HERE / "map_kinematics.json"
 STRAINS = np.logspace(-6.0, -0.5, 12)
 HEIGHTS = np.geomspace(0.005, 0.4, 12)
 GROSS = (0.1, 0.5, 0.9)
 FRICTIONS = (0.05, 0.1, 0.5)
 NU = 0.3
-SHOWN = (0.5, 0.1)  # load over gross slip and mu of the map
 # Of the scattered strips: strain and eta even in their logarithms, load, mu (log) and nu.
 LOWEST = (1e-6, 0.005, 0.05, 0.03, 0.0)
 HIGHEST = (1e-1, 0.4, 0.95, 0.6, 0.47)
@@ -73,8 +59,6 @@ NAMES = {
     "p3": "p3, scattered",
     "lift": "squeeze with lift, scattered",
 }
-LEVELS = (0.1, 1.0, 5.0)  # per cent
-LABELS = ((6e-3, 0.09), (2.7e-2, 0.11), (6e-2, 0.13))  # where their labels stand
 COVERED = 0.99  # aimed at by the fit
 LEAST = 1e-4  # a smaller difference is none
 
@@ -152,24 +136,12 @@ def measure() -> dict[str, Any]:
     """Record of the map and of the random strips."""
     strips = scattered()
     return {
-        "provenance": provenance(),
         "meaning": "dissipation, stiffness: exact over linear, less 1; rotation: max |beta|, rad",
         "columns": COLUMNS,
         "grid": compared(grid(), "squeeze"),
         "scattered": compared(strips, "squeeze"),
         **{name: compared(strips[: SCATTERED[name]], name) for name in ("p3", "lift")},
     }
-
-
-def as_text(record: dict[str, Any]) -> str:
-    """Record as JSON text, every cell on one line."""
-    parts = []
-    for key, value in record.items():
-        text = json.dumps(value, allow_nan=False)
-        if key in SETS:
-            text = "[\n" + ",\n".join(json.dumps(cell, allow_nan=False) for cell in value) + "\n]"
-        parts.append(f"{json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
 # --- the bound ------------------------------------------------------------------------------------
@@ -216,7 +188,7 @@ def fitted(cells: list[list[Any]], start: tuple[float, ...]) -> np.ndarray:
     return start * np.exp(minimize(loss, guess, method="Nelder-Mead", options=options).x)
 
 
-def report(record: dict[str, Any]) -> str:
+def tell(record: dict[str, Any]) -> str:
     """Text on how the bound holds on every set of cells, with the constants that fit best."""
     lines = ["set        cells  failed  covered  over (median)  of D alone: covered  over (median)"]
     for name in SETS:
@@ -238,77 +210,25 @@ def report(record: dict[str, Any]) -> str:
 # --- picture --------------------------------------------------------------------------------------
 
 
-def picture(record: dict[str, Any]) -> plt.Figure:
-    """Picture of the map, and of the bound over the measured differences."""
+def draw(record: dict[str, Any]) -> plt.Figure:
+    """Picture of the bound over the larger of the two differences."""
     with plotting.style():
-        figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.8))
-        draw_map(record["grid"], left)
-        draw_bound(record, right)
+        figure, axes = plt.subplots(figsize=(5.6, 4.8))
+        for name, colour in zip(SETS, plotting.colours(len(SETS)), strict=True):
+            c = columns(record[name])
+            size = 8.0 if name == "grid" else 16.0
+            axes.scatter(larger(c), limit(name, c), size, color=colour, label=NAMES[name], lw=0)
+        ends = np.array([1e-9, 10.0])
+        axes.plot(ends, ends, color=plotting.DATA, linewidth=1.0)
+        axes.plot(ends, 5.0 * ends, "--", color=plotting.FAINT, linewidth=1.0)
+        axes.set(
+            xscale="log",
+            yscale="log",
+            xlim=ends,
+            ylim=ends,
+            xlabel="measured difference, the larger of $D$ and secant stiffness  [1]",
+            ylabel="bound  [1]",
+            title="the closed-form bound: equal (line), fivefold (dashes)",
+        )
+        axes.legend(loc="lower right")
     return figure
-
-
-def draw_map(cells: list[list[Any]], axes: plt.Axes) -> None:
-    """Draw the difference of the dissipation over strain and height ratio, in per cent."""
-    gross, mu = SHOWN
-    c = columns([cell for cell in cells if cell[2:4] == [gross, mu]])
-    strain, eta = np.unique(c["strain"]), np.unique(c["eta"])
-    shape = strain.size, eta.size  # cells run over eta within strain
-    percent = 100.0 * np.abs(c["dissipation"].reshape(shape).T)
-    axes.set(xscale="log", yscale="log")  # before the labels of the contours turn with them
-    shades = axes.pcolormesh(
-        strain, eta, percent, norm=LogNorm(1e-5, 1e2), cmap="Blues", shading="nearest"
-    )
-    label = r"$|D_\mathrm{exact}/D_\mathrm{linear} - 1|$  [%]"
-    axes.figure.colorbar(shades, ax=axes, extend="both", label=label)
-    # Logarithms, in which the difference is nearly a plane.
-    levels, look = np.log10(LEVELS), {"colors": "k", "linewidths": 1.1, "linestyles": "solid"}
-    lines = axes.contour(strain, eta, np.log10(percent), levels, **look)
-    axes.clabel(lines, fmt=lambda level: f"{10.0**level:g} %", fontsize=9, manual=LABELS)
-    failed = np.ma.masked_equal((c["state"] != "ok").reshape(shape).T, False)
-    axes.pcolor(strain, eta, failed, hatch="////", facecolor="none", shading="nearest")
-    standard = in_load_steps()
-    load = standard.load.amplitude / standard.strip.stretching_stiffness
-    place = float(load), float(standard.strip.height_ratio)
-    axes.plot(*place, "*", color="w", markeredgecolor="k", markersize=14.0)
-    axes.annotate("standard strip", place, (8, 6), textcoords="offset points")
-    axes.set(
-        xlabel="strain of the load  $A\\,/\\,(E'\\,2H)$  [1]",
-        ylabel=r"$\eta = H\,/\,(L/2)$  [1]",
-        title=rf"(a) $A = {gross:g}\,\mu F_N L$, $\mu = {mu:g}$, $\nu = {NU:g}$",
-    )
-
-
-def draw_bound(record: dict[str, Any], axes: plt.Axes) -> None:
-    """Draw the bound over the larger of the two differences."""
-    for name, colour in zip(SETS, plotting.colours(len(SETS)), strict=True):
-        c = columns(record[name])
-        size = 8.0 if name == "grid" else 16.0
-        axes.scatter(larger(c), limit(name, c), size, color=colour, label=NAMES[name], lw=0)
-    ends = np.array([1e-9, 10.0])
-    axes.plot(ends, ends, color=plotting.DATA, linewidth=1.0)
-    axes.plot(ends, 5.0 * ends, "--", color=plotting.FAINT, linewidth=1.0)
-    axes.set(
-        xscale="log",
-        yscale="log",
-        xlim=ends,
-        ylim=ends,
-        xlabel="measured difference, the larger of $D$ and secant stiffness  [1]",
-        ylabel="bound  [1]",
-        title="(b) the closed-form bound: equal (line), fivefold (dashes)",
-    )
-    axes.legend(loc="lower right")
-
-
-def main() -> None:
-    """Measure, write the record, print a summary, draw the picture."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--draw", action="store_true", help="draw the record that is there")
-    if not parser.parse_args().draw:
-        write_text(RECORD, as_text(measure()))
-    record = json.loads(RECORD.read_text(encoding="utf-8"))
-    print(report(record))
-    plotting.save(picture(record), HERE / "map_kinematics.png")
-
-
-if __name__ == "__main__":
-    main()

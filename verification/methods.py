@@ -1,73 +1,53 @@
-"""Compute the comparisons, section by section, and draw them."""
+"""Methods that could solve the same scenes, compared by numbers that decide.
+
+Friction laws, iterations, grids, load steps against events, shooting.  What the library has is
+called; what it lacks is written in `compared`, each in a small file, to be measured and to fail
+where all can see it.  Half an hour on one core.
+"""
 
 from __future__ import annotations
 
-import argparse
-import json
-from collections.abc import Callable
-from pathlib import Path
+import functools
+from collections.abc import Iterator
 from typing import Any
 
 import jax
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from tqdm import tqdm
 
 import jbeamshell as jb
+from calibration import charts
+from calibration.charts import OFF, Chart, Curve, column
+from jbeamshell.plotting.style import FAINT, PALETTE
+from verification.compared import events, grids, laws, shooting, solvers, strips
 
-jb.configure(cache=False)
-jax.config.update("jax_enable_x64", True)
-
-from calibration import charts  # noqa: E402
-from calibration.methods import (  # noqa: E402
-    contacts,
-    controls,
-    events,
-    grids,
-    laws,
-    shooting,
-    solvers,
-    strips,
-)
-from calibration.provenance import provenance  # noqa: E402
-from jbeamshell import plotting  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-
-HERE = Path(__file__).parent.parent
-RECORD, PICTURE = HERE / "methods.json", HERE / "methods.png"
 STEPS = [2, 10, 40, 320]
 FEWER_STEPS = [10, 40]  # of all scenes but the first
 LAW_STRIPS, NODES = ("standard", "thick", "near gross slip"), 41  # on which laws are compared
 STRIPS = 200
+GROWTH = 60.0  # digits, the end of the axis
+SMALLEST = 1e-17  # of the errors of shooting
+EPS = float(np.finfo(float).eps)
 Section = dict[str, Any]
 
 
-def compared_laws(quick: bool) -> Section:
+def compared_laws() -> Section:
     """Dissipation over steps per half cycle, and drift, of every law on every scene."""
     rows = []
-    names = LAW_STRIPS[:1] if quick else LAW_STRIPS
-    pairs = [(name, law) for name in names for law in laws.LAWS]
+    pairs = [(name, law) for name in LAW_STRIPS for law in laws.LAWS]
     for name, law in tqdm(pairs, desc="laws", disable=None):
-        steps = STEPS if name == LAW_STRIPS[0] and not quick else FEWER_STEPS
+        steps = STEPS if name == LAW_STRIPS[0] else FEWER_STEPS
         work, area = zip(*laws.dissipations(name, law, steps, NODES), strict=True)
         row = {"scene": name, "law": law, "steps": steps, "dissipation": work, "area": area}
         rows.append(row | {"drift": laws.drift(name, law, nodes=NODES)})
     return {"rows": rows}
 
 
-def compared_controls(quick: bool) -> Section:
-    """Control of force, displacement and arc length, on the same loop and up to gross slip."""
-    parts = [0.9, 1.1] if quick else [0.5, 0.9, 0.99, 0.999, 1.0, 1.1, 1.5, 2.0]
-    pulls = [
-        {"control": control, "far_end": end, "rows": controls.to_gross_slip(control, parts, end)}
-        for end in ("guided", "free")
-        for control in ("force", "displacement", "arc-length")
-    ]
-    return {"loop": controls.same_loop(), "pulls": pulls, "refusal": controls.refusal(1.1)}
-
-
-def compared_solvers(quick: bool) -> Section:
+def compared_solvers() -> Section:
     """Success, wrong answers and iterations over random strips."""
-    values = solvers.random_strips(20 if quick else STRIPS)
+    values = solvers.random_strips(STRIPS)
     names = [solvers.LIBRARY, *solvers.METHODS]
     nothing = solvers.NEGLIGIBLE * np.array([solvers.bar_dissipation(one) for one in values])
     right, rows = None, []
@@ -87,47 +67,25 @@ def compared_solvers(quick: bool) -> Section:
     }
 
 
-def compared_grids(quick: bool) -> Section:
-    """Locking, oscillation, and convergence of the dissipation."""
-    heights = [float(eta) for eta in np.geomspace(0.005, 0.4, 4 if quick else 12)]
+def compared_grids() -> Section:
+    """Locking and oscillation."""
+    heights = [float(eta) for eta in np.geomspace(0.005, 0.4, 12)]
     sizes = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0]
-    counts, finest = ([41, 81], 161) if quick else ([21, 41, 81, 161, 321], 1281)
     locking = {name: [grids.cantilever(eta, name) for eta in heights] for name in grids.RULES}
     oscillation = {name: [grids.squeezed(size, name) for size in sizes] for name in grids.RULES}
-    rows = []
-    kinds = [
-        (name, grid)
-        for name in ("standard", "thick")
-        for grid in ("finite-difference", "collocation")
-    ]
-    for name, grid in tqdm(kinds, desc="grids", disable=None):
-        scene = strips.scene_of(name, steps_per_half_cycle=10)
-        found = [grids.convergence(grid, nodes, scene) for nodes in (*counts, finest)]
-        work, stiffness = np.array(found).T
-        rows.append(
-            {
-                "scene": name,
-                "grid": grid,
-                "dissipation_off": (work[:-1] / work[-1] - 1.0).tolist(),
-                "stiffness_off": (stiffness[:-1] / stiffness[-1] - 1.0).tolist(),
-            }
-        )
     return {
         "heights": heights,
         "locking": locking,
         "elements_per_height": sizes,
         "oscillation": oscillation,
-        "nodes": counts,
-        "finest": finest,
-        "rows": rows,
     }
 
 
-def compared_steps(quick: bool) -> Section:
+def compared_steps() -> Section:
     """Load steps against the exact path from event to event."""
-    counts = [1, 4] if quick else [1, 2, 4, 10, 40, 160]
+    counts = [1, 2, 4, 10, 40, 160]
     rows = []
-    for name in tqdm(list(strips.STRIPS)[: 1 if quick else None], desc="events", disable=None):
+    for name in tqdm(strips.STRIPS, desc="events", disable=None):
         scene = strips.scene_of(name, 41)
         exact, stiffness, changes = events.dissipation(scene)
         found = [
@@ -148,13 +106,13 @@ def compared_steps(quick: bool) -> Section:
     return {"steps": counts, "rows": rows}
 
 
-def compared_shooting(quick: bool) -> Section:
+def compared_shooting() -> Section:
     """Errors of shooting over the growth of its solutions."""
-    lengths = [float(x) for x in np.geomspace(1.0, 100.0, 8 if quick else 25)]
+    lengths = [float(x) for x in np.geomspace(1.0, 100.0, 25)]
     squeeze = [shooting.shoot_squeeze(x)._asdict() for x in lengths]
     stuck = []
     for alpha in (6.0, 1000.0):
-        for eta in np.geomspace(0.02, 4.0, 8 if quick else 24):
+        for eta in np.geomspace(0.02, 4.0, 24):
             scene = strips.scene_of("standard").replace({"strip.height_ratio": float(eta)})
             unit = float(scene.strip.shear_modulus / scene.strip.half_height)
             shot = shooting.shoot(scene, alpha * unit)._asdict()
@@ -163,41 +121,115 @@ def compared_shooting(quick: bool) -> Section:
     return {"squeeze": squeeze, "stuck": stuck}
 
 
-def compared_contacts(quick: bool) -> Section:
-    """The active set against compliances."""
-    stiffnesses = [None, *(float(k) for k in np.geomspace(1.0, 1e6, 3 if quick else 13))]
-    return {
-        "receding": [contacts.figures(k) for k in tqdm(stiffnesses, desc="contact", disable=None)],
-        "clamp": [contacts.clamp(k) for k in tqdm(stiffnesses[::2], desc="clamp", disable=None)],
-    }
-
-
-SECTIONS: dict[str, Callable[[bool], Section]] = {
+PARTS = {
     "shooting": compared_shooting,
     "steps": compared_steps,
     "grids": compared_grids,
-    "contacts": compared_contacts,
-    "controls": compared_controls,
     "solvers": compared_solvers,
     "laws": compared_laws,
 }
 
 
-def main() -> None:
-    """Compute what is missing, write it section by section, and draw it."""
-    parser = argparse.ArgumentParser(prog="python -m calibration.methods", description=__doc__)
-    parser.add_argument("--only", nargs="+", choices=SECTIONS, metavar="SECTION")
-    parser.add_argument("--quick", action="store_true", help="few values of each")
-    parser.add_argument("--draw", action="store_true", help="draw the record that is there")
-    options = parser.parse_args()
-    record = json.loads(RECORD.read_text()) if RECORD.exists() else {}
-    if not options.draw:
-        for name in options.only or [name for name in SECTIONS if name not in record]:
-            record[name] = SECTIONS[name](options.quick)
-            write_text(RECORD, json.dumps({"provenance": provenance()} | record) + "\n")
-            jax.clear_caches()
-    plotting.save(charts.methods.sheet(record), PICTURE)
+# --- charts ---------------------------------------------------------------------------------------
 
 
-if __name__ == "__main__":
-    main()
+def _laws(section: Any) -> Iterator[Curve]:
+    """Friction laws against the sharp slider in its finest steps; drift per one-sided cycle."""
+    rows = [row for row in section["rows"] if row["scene"] == LAW_STRIPS[0]]
+    exact = next(row for row in rows if row["law"] == "sharp")["dissipation"][-1]
+    for row in rows:
+        drift = "fails" if row["drift"] is None else f"drift {row['drift']:.0e}"
+        off = np.array(row["dissipation"], float) / exact - 1.0
+        yield Curve(f"{row['law']}: {drift}", row["steps"], off)
+
+
+def _steps(section: Any) -> Iterator[Curve]:
+    """Load steps against the exact path from event to event, by slip work and by loop area."""
+    for row in section["rows"]:
+        yield Curve(row["scene"], section["steps"], row["off"], row["area_off"])
+
+
+def _solvers(axes: Axes, section: Any) -> None:
+    """Bars of how often each solver finds every step, and is wrong if nobody reads its flag."""
+    rows = section["rows"][::-1]
+    place = np.arange(len(rows))
+    for shift, name, colour, label in (
+        (0.2, "found", PALETTE[2], "every step found"),
+        (-0.2, "wrong", PALETTE[1], "wrong, if nobody reads the flag"),
+    ):
+        share = 100.0 * column(rows, name)
+        axes.barh(place + shift, share, height=0.38, color=colour, label=label)
+    for y, row in zip(place, rows, strict=True):
+        effort = row["iterations"]
+        text = "none" if effort is None else f"{effort:.1f} iterations"
+        axes.text(102.0, float(y), text, va="center", fontsize=7)
+    axes.set_xlim(0.0, 130.0)
+    axes.set_yticks(place, [row["method"] for row in rows], fontsize=7)
+    axes.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2)
+
+
+def _shooting(section: Any) -> Iterator[Curve]:
+    """Errors of shooting over the digits by which the fastest solution grows."""
+    families = {"squeezed": ("o", section["squeeze"], "error")}
+    for alpha in sorted({row["alpha"] for row in section["stuck"]}):
+        rows = [r for r in section["stuck"] if r["alpha"] == alpha and r["path_error"] is not None]
+        families[rf"stuck, $\alpha = {alpha:g}$"] = ("s", rows, "path_error")
+    for label, (marker, rows, name) in families.items():
+        error = np.maximum(column(rows, name), SMALLEST)
+        yield Curve(label, column(rows, "growth"), error, look={"marker": marker, "linestyle": ""})
+
+
+def _rounding(axes: Axes, section: Any) -> None:
+    """Rounding error times the growth, over all of the axis."""
+    axes.set(xlim=(0.0, GROWTH), ylim=(SMALLEST, 1e6))
+    digits = np.array([0.0, GROWTH])
+    axes.plot(digits, EPS * 10.0**digits, color=FAINT, label="rounding times growth")
+
+
+def _families(x: str, name: str, section: Any) -> Iterator[Curve]:
+    """Families of a figure by quadrature, over one column of the section."""
+    for label, values in section[name].items():
+        yield Curve(label, section[x], values)
+
+
+CHARTS = {
+    "laws": Chart("laws", STEPS, OFF, f"friction laws, {LAW_STRIPS[0]}", _laws, "xy"),
+    "steps": Chart(
+        "steps", STEPS, OFF, "load steps against events (dashed: loop area)", _steps, "xy"
+    ),
+    "solvers": Chart(
+        "solvers", lambda section: f"of {section['strips']} random strips  [%]", "", extra=_solvers
+    ),
+    "locking": Chart(
+        "grids",
+        r"$\eta = H/(L/2)$  [1]",
+        "deflection over exact  [1]",
+        "locking of 20 elements",
+        functools.partial(_families, "heights", "locking"),
+        "x",
+    ),
+    "oscillation": Chart(
+        "grids",
+        "elements per $H$  [1]",
+        "overshoot over the load  [1]",
+        "oscillation of the squeeze",
+        functools.partial(_families, "elements_per_height", "oscillation"),
+        "x",
+        ticks=lambda section: section["elements_per_height"],
+    ),
+    "shooting": Chart(
+        "shooting",
+        "growth of the fastest solution  [digits]",
+        "error of the fields  [1]",
+        "shooting in double precision",
+        _shooting,
+        "y",
+        extra=_rounding,
+    ),
+}
+chart = functools.partial(charts.draw, CHARTS)
+
+
+def draw(record: Section) -> plt.Figure:
+    """Sheet of all charts."""
+    return charts.sheet(CHARTS, record)

@@ -1,4 +1,4 @@
-"""Random scenes of all kinds, for calibration/campaign.py.
+"""Random scenes of all kinds, for verification/campaign.py.
 
 A kind is a function that draws the values of one scene, what the other solver sets, and how many
 scenes of it the campaign holds.  Values are as `strip.changed` reads them.

@@ -1,39 +1,31 @@
 """Errors of every section beside plane elasticity, for each way in which the force enters.
 
-    python calibration/section_errors.py [--only KIND ...]
-
-solves random strips and lap joints as plane elasticity and on the contact line of each section,
-with the same entry of the force.  It writes section_errors.json beside this file after every entry:
-of each run the slip length over the half height, as the section itself has it, and how far its
-dissipation and its secant stiffness are off, in per cent.  Strips of all heights, frictions and
+Solves random strips and lap joints as plane elasticity and on the contact line of each section,
+with the same entry of the force.  Of each run the record has the slip length over the half height,
+as the section itself has it, and how far its dissipation and its secant stiffness are off, in per
+cent.  Strips of all heights, frictions and
 Poisson's ratios fall near one curve of the slip length over the half height.  These curves go to
 jbeamshell.scene.section_errors.json, from where every run tells the error of its section.
 """
 
 from __future__ import annotations
 
-import argparse
+import functools
 import itertools
 import json
-import sys
-import time
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import jax
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from jbeamshell.common.files import write_text
+from jbeamshell.plotting.style import PALETTE, style
+from jbeamshell.scene.keys import ENTRIES
 
-import numpy as np  # noqa: E402
-from provenance import provenance  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.scene.keys import ENTRIES  # noqa: E402
-
-RECORD = Path(__file__).with_suffix(".json")
 SHIPPED = Path(jb.__file__).parent / "scene" / "section_errors.json"
 SEED = 46
 FIGURES = ("dissipation", "secant_stiffness", "slip_length", "dissipation_ratio")
@@ -43,6 +35,8 @@ BINS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 
 BINS += (8.0, 10.0, 14.0, 20.0, 60.0)  # of the slip length over H
 ENOUGH = 3  # rows that make a point of a curve
 LITTLE = 1e-4  # of the bar's dissipation, below which rows count for no curve
+SHOWN = ("shell", "squeeze", "p2", "p4", "p6")  # sections that are drawn
+EDGES, LEAST = np.geomspace(0.1, 60.0, 15), 0.02  # bins, and lower end in per cent, of the charts
 WARPING = ("shell", "squeeze", "p2", "p3", "p4", "p6")
 Values = dict[str, Any]
 Random = np.random.Generator
@@ -207,40 +201,63 @@ def curve(rows: Values) -> Values:
     return {key: [float(f"{value:.3g}") for value in values] for key, values in named.items()}
 
 
-def ship(errors: Values) -> None:
+def ship(record: Values) -> None:
     """Write the curves that the package reads."""
     curves = {
         kind: {
             entry: {name: curve(rows) for name, rows in sections.items() if name != "plane"}
             for entry, sections in entries.items()
         }
-        for kind, entries in errors.items()
+        for kind, entries in record.items()
+        if kind != "about"
     }
     write_text(SHIPPED, json.dumps(curves, separators=(",", ":")) + "\n")
 
 
-def main() -> None:
-    """Solve the kinds asked for, and write the record after each entry."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", nargs="*", default=list(KINDS), choices=list(KINDS))
-    given = parser.parse_args()
-    jb.configure()
-    record: Values = {"errors": {}}
-    if RECORD.exists():
-        record = json.loads(RECORD.read_text(encoding="utf-8"))
-    ship(record["errors"])
-    record["about"] = provenance() | {"plane_nodes": FINE, "section_nodes": NODES}
-    for kind in given.only:
-        for entry in ENTRIES:
-            begin = time.perf_counter()
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", jb.DoubtfulWarning)
-                record["errors"].setdefault(kind, {})[entry] = beside_elasticity(kind, entry)
-            write_text(RECORD, json.dumps(record, separators=(",", ":")) + "\n")
-            ship(record["errors"])
-            print(kind, entry, f"{time.perf_counter() - begin:.0f} s", file=sys.stderr, flush=True)
-        jax.clear_caches()
+def of_kind(kind: str) -> Values:
+    """Rows of a kind by entry."""
+    return {entry: beside_elasticity(kind, entry) for entry in ENTRIES}
 
 
-if __name__ == "__main__":
-    main()
+PARTS = {kind: functools.partial(of_kind, kind) for kind in KINDS}
+
+
+# --- chart ----------------------------------------------------------------------------------------
+
+
+def draw(record: Values) -> plt.Figure:
+    """Sections under an even pressure above, the section squeeze of other kinds below."""
+    entries = record["even"]
+    with style():
+        figure, panels = plt.subplots(
+            2, len(entries), figsize=(10.2, 5.4), sharex=True, sharey=True, layout="constrained"
+        )
+        for entry, above, below in zip(entries, *panels, strict=True):
+            for section, colour in zip(SHOWN, PALETTE, strict=False):
+                rows = entries[entry][section]
+                _draw(above, rows, colour, section, dots=section == "squeeze")
+            for kind, colour in zip([k for k in KINDS if k != "even"], PALETTE, strict=False):
+                _draw(below, record[kind][entry]["squeeze"], colour, kind, dots=False)
+            above.set(title=entry, xscale="log", yscale="log", xlim=(0.1, 60.0), ylim=(LEAST, 1e3))
+            below.set_xlabel("slip length over $H$")
+        panels[0, 0].set_ylabel("error of $D$, even pressure  [%]")
+        panels[1, 0].set_ylabel("error of $D$, squeeze  [%]")
+        for row in panels:
+            row[-1].legend(fontsize=7)
+    return figure
+
+
+def _draw(axes: Axes, rows: Values, colour: str, label: str, dots: bool) -> None:
+    """Draw the median size of the error of D [%] in bins of the slip length, and its rows."""
+    slip, off, share = (np.array(rows[key]) for key in ("slip_over_H", "D_percent", "D_over_bar"))
+    kept = share > LITTLE
+    slip, off = slip[kept], np.maximum(np.abs(off[kept]), LEAST)
+    if dots:
+        axes.plot(slip, off, ".", color=colour, markersize=2, alpha=0.4)
+    bins = np.digitize(slip, EDGES)
+    points = [
+        (np.exp(np.mean(np.log(slip[bins == i]))), np.median(off[bins == i]))
+        for i in range(1, EDGES.size)
+        if np.sum(bins == i) >= ENOUGH
+    ]
+    axes.plot(*np.reshape(points, (-1, 2)).T, color=colour, label=label)

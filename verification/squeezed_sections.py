@@ -7,52 +7,33 @@ exact ones, and compared with finite elements and Filon's exact stress. Where th
 [p], the reaction of order p steps by (-1)^p [p]/(p+1), and that of elasticity does not (for the
 reason see tests/solving/test_hierarchic_squeeze.py).
 
-Writes ladder_squeeze.json beside this file and draws ladder_squeeze.png from it; takes about a
-quarter of an hour on one core, most of it to compile:
-
-    python calibration/ladder_squeeze.py           # --draw: only the picture, from the record
+Takes about a quarter of an hour on one core, most of it to compile.
 """
 
-import argparse
-import json
-import re
-import statistics
-import time
-from pathlib import Path
 from typing import Any
 
 import jax
+import matplotlib.pyplot as plt
+import numpy as np
+from tqdm import tqdm
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from jbeamshell import plotting
+from jbeamshell.measured.example import data_folder
+from jbeamshell.mechanics.homogeneous import shear_coefficient
+from jbeamshell.reference import filon_average_step, reaction_jump
+from jbeamshell.scene import library
 
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-from matplotlib.ticker import ScalarFormatter  # noqa: E402
-from provenance import provenance  # noqa: E402
-from tqdm import tqdm  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell import plotting  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.measured.example import data_folder  # noqa: E402
-from jbeamshell.mechanics.homogeneous import shear_coefficient  # noqa: E402
-from jbeamshell.reference import filon_average_step, reaction_jump  # noqa: E402
-from jbeamshell.scene import library  # noqa: E402
-
-HERE = Path(__file__).parent
-RECORD = HERE / "ladder_squeeze.json"
 ORDERS = (0, 1, 2, 3, 4, 6)
 NODES = (101, 201, 401, 801)
 SHOWN = 401  # nodes of the profiles
 END_SIZE = 0.02  # smallest elements over H, before the number of nodes scales all
 EXACT = [(order, 201) for order in (0, 3)]  # once more with exact kinematics
-ROUNDS = 5
 EDGE, PRESSURE = 50.0, 100.0  # mm, MPa
 WINDOW = (45.0, 55.0)  # mm, of the rms error
 PROFILE = (EDGE - 1.0, EDGE + 2.5)  # mm
 # Finite elements, finest mesh: between the end of contact by pressure, 50.777, and by gap, 50.782.
 TRUTH = {"contact_end_mm": 0.779, "reaction_max_MPa": 103.12, "lift_slope": 1.9858e-4}
-UNSURE = 0.0025  # mm, of the end of contact
 
 
 # --- measuring ------------------------------------------------------------------------------------
@@ -61,16 +42,6 @@ UNSURE = 0.0025  # mm, of the end of contact
 def finite_elements(name: str) -> np.ndarray:
     """Table of the finite elements, by column."""
     return np.genfromtxt(data_folder() / "squeeze" / name, delimiter=",", names=True)
-
-
-def timed(scene: jb.Scene) -> tuple[jb.History, dict[str, float]]:
-    """Result of a run, seconds of its first time with compilation, median of the next ones."""
-    seconds = []
-    for _ in range(1 + ROUNDS):
-        begin = time.perf_counter()
-        history = jax.block_until_ready(jb.solve(scene))
-        seconds.append(time.perf_counter() - begin)
-    return history, {"first_s": seconds[0], "run_ms": 1e3 * statistics.median(seconds[1:])}
 
 
 def peak(x: np.ndarray, values: np.ndarray) -> tuple[float, float]:
@@ -148,21 +119,19 @@ def profile(x: Any, values: Any) -> list[list[float]]:
     return [[float(f"{value:.5g}") for value in row] for row in rows]
 
 
-def climb(order: int, nodes: int, kinematics: str) -> tuple[dict[str, Any], dict[str, Any]]:
+def solved(order: int, nodes: int, kinematics: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Figures and profiles of both problems on one grid."""
     section = f"p{order}" if order else "squeeze"
     change = {"model.section": section, "model.kinematics": kinematics}
-    squeezed, squeeze_time = timed(library.squeezed().replace(change).on_grid(nodes, END_SIZE))
-    receding, contact_time = timed(library.receding().replace(change).on_grid(nodes, END_SIZE))
+    squeezed = jb.solve(library.squeezed().replace(change).on_grid(nodes, END_SIZE))
+    receding = jb.solve(library.receding().replace(change).on_grid(nodes, END_SIZE))
     jax.clear_caches()  # every case compiles programs of its own
     figures = {
         "order": order,
         "nodes": nodes,
         "kinematics": kinematics,
-        "squeezed": squeeze_figures(squeezed) | squeeze_time,
-        "receding": contact_figures(receding)
-        | {"closed_step_MPa": closed_step(order)}
-        | contact_time,
+        "squeezed": squeeze_figures(squeezed),
+        "receding": contact_figures(receding) | {"closed_step_MPa": closed_step(order)},
     }
     return figures, {
         "stress": profile(squeezed.middles, squeezed.squeeze_stress[-1]),
@@ -177,8 +146,6 @@ def measure() -> dict[str, Any]:
     b2, b3 = finite_elements("b2.csv"), finite_elements("b3.csv")
     tension, place = peak(b2["x_mm"], b2["sy_avg"])
     record: dict[str, Any] = {
-        "provenance": provenance(),
-        "timing": f"run_ms: median of {ROUNDS} warm runs; first_s: with compilation",
         "finite_elements": {"tension_MPa": tension, "tension_at_mm": place - EDGE} | TRUTH,
         "sections": [],
         "profiles": {
@@ -190,24 +157,18 @@ def measure() -> dict[str, Any]:
         },
     }
     for case in tqdm(cases, disable=None, unit="case"):
-        figures, profiles = climb(*case)
+        figures, profiles = solved(*case)
         record["sections"].append(figures)
         if case[1] == SHOWN:
             record["profiles"][str(case[0])] = profiles
     return record
 
 
-def as_text(record: dict[str, Any]) -> str:
-    """Record as JSON text, every row of a profile on one line."""
-    text = json.dumps(record, indent=1, allow_nan=False)
-    return re.sub(r"\[[^][{}]*\]", lambda row: " ".join(row[0].split()), text) + "\n"
-
-
-def report(record: dict[str, Any]) -> str:
+def tell(record: dict[str, Any]) -> str:
     """Table of the sections, as text."""
     lines = [
         "p  nodes  kinematics  tension MPa at mm   rms MPa  x_c - a mm  R max MPa at mm     "
-        "R across the step  lift slope  run ms"
+        "R across the step  lift slope"
     ]
     for row in record["sections"]:
         s, r = row["squeezed"], row["receding"]
@@ -217,7 +178,7 @@ def report(record: dict[str, Any]) -> str:
             f"{s['tension_MPa']:11.4f} {at:>5s}   {s['rms_MPa']:7.4f}  {r['contact_end_mm']:10.4f}"
             f"  {r['reaction_max_MPa']:9.3f} {r['reaction_max_at_mm']:.3f}    "
             f"{r['reaction_before_step_MPa']:6.2f} -> {r['reaction_after_step_MPa']:6.2f}  "
-            f"  {r['lift_slope']:.4e}  {s['run_ms']:.0f} + {r['run_ms']:.0f}"
+            f"  {r['lift_slope']:.4e}"
         )
     return "\n".join(lines)
 
@@ -225,30 +186,12 @@ def report(record: dict[str, Any]) -> str:
 # --- picture --------------------------------------------------------------------------------------
 
 
-def picture(record: dict[str, Any]) -> plt.Figure:
-    """Picture with profiles above, errors over run time below."""
+def draw(record: dict[str, Any]) -> plt.Figure:
+    """Picture of the stress and of the reaction beside the edge of the load."""
     with plotting.style():
-        figure, ((stress, reaction), (squeeze, contact)) = plt.subplots(2, 2, figsize=(11.0, 8.0))
+        figure, (stress, reaction) = plt.subplots(1, 2, figsize=(11.0, 4.0))
         draw_stress(record["profiles"], stress)
         draw_reaction(record["profiles"], reaction)
-        draw_grids(record["sections"], "squeezed", "rms_MPa", squeeze)
-        squeeze.set(
-            yscale="log",
-            ylabel="rms error of the mean $\\sigma_y$  [MPa]",
-            title="(c) squeezed: 101, 201, 401 and 801 nodes",
-        )
-        squeeze.yaxis.set_major_formatter(ScalarFormatter())
-        draw_grids(record["sections"], "receding", "contact_end_mm", contact)
-        end = record["finite_elements"]["contact_end_mm"]
-        label = "finite elements"
-        contact.axhspan(
-            end - UNSURE, end + UNSURE, color=plotting.DATA, alpha=0.4, lw=0, label=label
-        )
-        contact.set(
-            ylabel="end of contact $x_c - a$  [mm]",
-            title="(d) receding: 101, 201, 401 and 801 nodes",
-        )
-        contact.legend(handles=contact.get_legend_handles_labels()[0][-1:], loc="lower right")
     return figure
 
 
@@ -292,28 +235,3 @@ def draw_reaction(profiles: dict[str, Any], axes: plt.Axes) -> None:
         title="(b) on a base, pressed up to $X = a$",
     )
     axes.legend(loc="lower left")
-
-
-def draw_grids(sections: list[dict], problem: str, key: str, axes: plt.Axes) -> None:
-    """Draw a figure over run time, a line for every section and a dot for every grid."""
-    for order, colour in zip(ORDERS, plotting.colours(len(ORDERS)), strict=True):
-        own = [r[problem] for r in sections if r["order"] == order and r["kinematics"] == "linear"]
-        milliseconds, values = [r["run_ms"] for r in own], [r[key] for r in own]
-        axes.plot(milliseconds, values, "o-", color=colour, label=name(order), markersize=4.0)
-    axes.set(xscale="log", xlabel="warm run, one core  [ms]")
-    axes.xaxis.set_major_formatter(ScalarFormatter())
-
-
-def main() -> None:
-    """Measure, write the record, print a table, draw the picture."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--draw", action="store_true", help="draw the record that is there")
-    if not parser.parse_args().draw:
-        write_text(RECORD, as_text(measure()))
-    record = json.loads(RECORD.read_text(encoding="utf-8"))
-    print(report(record))
-    plotting.save(picture(record), HERE / "ladder_squeeze.png")
-
-
-if __name__ == "__main__":
-    main()

@@ -2,14 +2,12 @@
 
 The measurements are public: https://github.com/mattiacenedese/BRBtesting, of a bolted lap joint in
 the middle of a free beam (Chen et al., Mech. Syst. Signal Process. 166:108401, 2022; Jin et al.,
-108402). They are not part of this repository, as they have another licence:
-
-    python calibration/brake_reuss.py [FOLDER with HammerImpact.mat, ForcedFrequencyResponses.mat]
-
-With the folder, frequency and damping over amplitude of the first mode are taken from the decay
-after an impact, by the analytic signal of the third accelerometer in a band about the mode, and the
-frequency, amplitude and force at phase resonance from each sweep of the shaker. They are written to
-brake_reuss.json. Without it, those of the file are used.
+108402). They are not part of this repository, as they have another licence. With
+folder=FOLDER, which holds HammerImpact.mat and ForcedFrequencyResponses.mat, frequency and damping
+over amplitude of the first mode are taken from the decay after an impact, by the analytic signal of
+the third accelerometer in a band about the mode, and the frequency, amplitude and force at phase
+resonance from each sweep of the shaker. They are kept in the record, and those of the record are
+used without a folder.
 
 The model is one mode: its mass, a spring in series with a strip between bolts, and a damping ratio.
 The strip stands for the joint as this mode feels it: its width has the lever of the beam in it. The
@@ -24,31 +22,22 @@ resonance are 3 to 18 % off, frequencies .07 to .19 Hz too high: with the shaker
 from the smallest amplitude on. Above .5 N, 2.6 times the amplitudes of the decay, the model slides.
 """
 
-import json
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jax
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+from jax import Array
+from scipy.io import loadmat
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from calibration.running import read
+from jbeamshell import dynamics, identify, plotting
+from jbeamshell.identify import Assembly, Fit, Parameter
+from jbeamshell.measured import DampingCurve, FrequencyCurve
 
-import jax.numpy as jnp  # noqa: E402
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-from jax import Array  # noqa: E402
-from provenance import provenance  # noqa: E402
-from scipy.io import loadmat  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell import dynamics, identify, plotting  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.identify import Assembly, Fit, Parameter  # noqa: E402
-from jbeamshell.measured import DampingCurve, FrequencyCurve  # noqa: E402
-
-HERE = Path(__file__).parent
-RECORD = HERE / "brake_reuss.json"
 SOURCE = "https://github.com/mattiacenedese/BRBtesting, commit 2d42d3a, articles of 2022"
 BAND = (55.0, 120.0)  # [Hz] about the first mode
 SPAN = (0.12, 4.2)  # [s] after the impact: other modes have gone, noise has not come
@@ -211,8 +200,18 @@ def figures(record: Mapping[str, Any]) -> tuple[dict[str, Any], Fit]:
     }, fit
 
 
-def told(found: Mapping[str, Any]) -> str:
+def measure(folder: str = "") -> dict[str, Any]:
+    """Fit, with the measurements if their folder is given."""
+    record = extracted(Path(folder)) if folder else read(Path(__file__).with_suffix(".json"))
+    found, fit = figures(record)
+    print(fit)
+    kept = {name: record[name] for name in ("source", "ring_down", "resonances", "modal_mass")}
+    return kept | {"found": found}
+
+
+def tell(record: Mapping[str, Any]) -> str:
     """Figures in lines."""
+    found = record["found"]
     lines = [
         f"damping of the fit within {100.0 * found['worst_damping']:.2g} % of the ring-down, "
         f"frequency within {100.0 * found['worst_frequency']:.2g} %",
@@ -233,9 +232,10 @@ def told(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def draw(record: Mapping[str, Any], found: Mapping[str, Any], path: Path) -> None:
+def draw(record: Mapping[str, Any]) -> plt.Figure:
     """Picture of the fit, and of what it predicts of the sweeps."""
-    ring, rows = record["ring_down"], found["predictions"]
+    found, ring = record["found"], record["ring_down"]
+    rows = found["predictions"]
     size, labels = 1e6 * np.array(ring["amplitude"]), ("frequency  [Hz]", "damping ratio")
     known = [row for row in rows if "predicted_amplitude" in row]
     known.sort(key=lambda row: row["force"])
@@ -258,20 +258,4 @@ def draw(record: Mapping[str, Any], found: Mapping[str, Any], path: Path) -> Non
         for panel in axes:
             panel.minorticks_off()
             panel.legend()
-        figure.savefig(path)
-        plt.close(figure)
-
-
-def main(arguments: list[str]) -> None:
-    """Run the study, with the measurements if their folder is given."""
-    own = not arguments
-    record = json.loads(RECORD.read_text("utf-8")) if own else extracted(Path(arguments[0]))
-    found, fit = figures(record)
-    print(fit, told(found), sep="\n")
-    draw(record, found, HERE / "brake_reuss.png")
-    kept = {name: record[name] for name in ("source", "ring_down", "resonances", "modal_mass")}
-    write_text(RECORD, json.dumps(kept | {"found": found} | provenance(), indent=1) + "\n")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
+    return figure

@@ -3,34 +3,22 @@
 The friction is known.  The logarithm of the dissipation of five strips by finite elements, at
 amplitudes of 0.3 and more, is fitted with one squeeze-shear factor and one stick stiffness for all
 strips, for several smoothings m of Coulomb's law: a smooth law imitates a corner that slips a
-little at any load.  A sixth strip that is not fitted checks the result.  Writes
-fitted_universal.json and universal.png beside this file; takes some minutes:
-
-    python calibration/fit_universal.py
+little at any load.  A sixth strip that is not fitted checks the result.  Takes some minutes.
 """
 
-import csv
-import json
-import time
-from pathlib import Path
+from typing import Any
 
-import jax
+import matplotlib.pyplot as plt
+import numpy as np
+from tqdm import tqdm
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from calibration.strip import in_load_steps
+from calibration.tables import energies
+from jbeamshell import identify, plotting
+from jbeamshell.measured.curves import DissipationCurve
+from jbeamshell.measured.example import HEIGHT_RATIOS
 
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-from provenance import provenance  # noqa: E402
-from strip import in_load_steps  # noqa: E402
-from tqdm import tqdm  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell import identify, plotting  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.measured.curves import DissipationCurve  # noqa: E402
-from jbeamshell.measured.example import HEIGHT_RATIOS, data_folder  # noqa: E402
-
-HERE = Path(__file__).parent
 FREE = ("strip.kappa_s", "contact.stick_stiffness")
 START = {"strip.kappa_s": 1.0, "contact.stick_stiffness": 8.0}
 SMOOTHINGS = (4.0, 6.0, 8.0, 11.0, 16.0)
@@ -42,12 +30,12 @@ STRONG = 0.3  # of the cubic law: strips that dissipate more are what a joint is
 
 def curve(height_ratio: float) -> tuple[DissipationCurve, np.ndarray]:
     """Dissipation of a strip by finite elements, and its ratio to the cubic law."""
-    with (data_folder() / "energy.csv").open(newline="", encoding="utf-8") as file:
-        rows = [
-            [float(r[name]) for name in ("eta", "A", "D", "ratio")] for r in csv.DictReader(file)
-        ]
-    own = [row for row in rows if row[0] == height_ratio and row[1] >= LEAST_AMPLITUDE]
-    _, amplitude, dissipation, ratio = np.transpose(own)
+    own = [
+        [row[name] for name in ("A", "D", "ratio")]
+        for (eta, amplitude), row in energies().items()
+        if eta == height_ratio and amplitude >= LEAST_AMPLITUDE
+    ]
+    amplitude, dissipation, ratio = np.transpose(own)
     return DissipationCurve(amplitude, dissipation, f"eta = {height_ratio:g}"), ratio
 
 
@@ -70,15 +58,14 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def study(smoothing: float) -> tuple[identify.Fit, dict]:
+def study(smoothing: float) -> dict[str, Any]:
     """Fit all strips together with one smoothing."""
-    begin = time.perf_counter()
     values = START | {"contact.smoothing": smoothing}
     fit = identify.fit([specimen(eta, values) for eta in HEIGHT_RATIOS], free=FREE, throw=False)
     error = errors(fit)
     strong = np.array([curve(eta)[1] for eta in HEIGHT_RATIOS]) > STRONG
     unseen = specimen(UNSEEN, fit.values | {"contact.smoothing": smoothing})
-    return fit, fit.figures() | {
+    return fit.figures() | {
         "smoothing": smoothing,
         "rms_all": rms(error),
         "rms_strong": rms(error[strong]),
@@ -86,7 +73,6 @@ def study(smoothing: float) -> tuple[identify.Fit, dict]:
         "cells": [int(error.size), int(strong.sum())],
         "log_error": dict(zip(map(str, HEIGHT_RATIOS), error.tolist(), strict=True)),
         "rms_unseen": rms(predicted(unseen)),
-        "wall_s_with_compilation": time.perf_counter() - begin,
     }
 
 
@@ -100,58 +86,53 @@ def predicted(strip: identify.Specimen) -> np.ndarray:
     return np.log(model / data.dissipation)
 
 
-def main() -> None:
-    """Run all fits, print a table, write the record and the picture."""
-    fits, record = {}, []
-    for smoothing in tqdm(SMOOTHINGS, disable=None, unit="fit"):
-        fits[smoothing], figures = study(smoothing)
-        record.append(figures)
-        values = fits[smoothing].values
-        print(
-            f"m = {smoothing:<4g} kappa_s = {values[FREE[0]]:.3f}, alpha = {values[FREE[1]]:.3f}: "
-            f"rms error of log D {100 * figures['rms_all']:.1f} % ({figures['cells'][0]} cells), "
-            f"{100 * figures['rms_strong']:.2f} % where D exceeds {STRONG:g} of the cubic law "
-            f"({figures['cells'][1]}), unseen strip {100 * figures['rms_unseen']:.2f} %; "
-            f"{fits[smoothing].model_runs} runs, {fits[smoothing].status}"
+def measure() -> dict[str, Any]:
+    """Fit with all smoothings."""
+    fits = [study(smoothing) for smoothing in tqdm(SMOOTHINGS, disable=None, unit="fit")]
+    return {"chosen_smoothing": CHOSEN, "unseen": UNSEEN, "fits": fits}
+
+
+def tell(record: dict[str, Any]) -> str:
+    """Values and errors, a line for each smoothing."""
+    lines = []
+    for one in record["fits"]:
+        kappa_s, alpha = (one["values"][key]["value"] for key in FREE)
+        every, strong = one["cells"]
+        lines.append(
+            f"m = {one['smoothing']:<4g} kappa_s = {kappa_s:.3f}, alpha = {alpha:.3f}: rms error "
+            f"of log D {100 * one['rms_all']:.1f} % ({every} cells), {100 * one['rms_strong']:.2f} "
+            f"% where D exceeds {STRONG:g} of the cubic law ({strong}), unseen strip "
+            f"{100 * one['rms_unseen']:.2f} %; {one['status']}"
         )
-    text = {
-        "provenance": provenance(),
-        "chosen_smoothing": CHOSEN,
-        "unseen": UNSEEN,
-        "fits": record,
-    }
-    write_text(HERE / "fitted_universal.json", json.dumps(text, indent=1, allow_nan=False) + "\n")
-    plotting.save(picture(fits[CHOSEN], record), HERE / "universal.png")
+    return "\n".join(lines)
 
 
-def picture(fit: identify.Fit, record: list[dict]) -> plt.Figure:
+def draw(record: dict[str, Any]) -> plt.Figure:
     """Picture of the dissipation with one pair for all strips, and of the error by smoothing."""
+    fits = record["fits"]
+    (chosen,) = (one for one in fits if one["smoothing"] == record["chosen_smoothing"])
     with plotting.style():
         figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2))
         shades = plotting.colours(len(HEIGHT_RATIOS))
-        for data, model, eta, shade in zip(fit.data, fit.model, HEIGHT_RATIOS, shades, strict=True):
-            ratio = curve(eta)[1]
+        for eta, shade in zip(HEIGHT_RATIOS, shades, strict=True):
+            data, ratio = curve(eta)
+            model = ratio * np.exp(chosen["log_error"][f"{eta}"])
             left.loglog(data.amplitude, ratio, **plotting.DOTS | {"markersize": 4.0})
-            left.loglog(
-                model.amplitude,
-                ratio * model.dissipation / data.dissipation,
-                color=shade,
-                label=rf"$\eta$ = {eta:g}",
-            )
-        values = fit.values
+            left.loglog(data.amplitude, model, color=shade, label=rf"$\eta$ = {eta:g}")
+        kappa_s, alpha = (chosen["values"][key]["value"] for key in FREE)
         left.set(
             xlabel=r"amplitude  $A\,/\,\mu F_N a$  [1]",
             ylabel=r"$D\,/\,(2/3)A^3$  [1]",
-            title=rf"one $\kappa_s$ = {values[FREE[0]]:.2f} and $\alpha$ = {values[FREE[1]]:.2f} "
+            title=rf"one $\kappa_s$ = {kappa_s:.2f} and $\alpha$ = {alpha:.2f} "
             f"for all strips ($m$ = {CHOSEN:g})",
         )
         left.legend()
-        places = [figures["smoothing"] for figures in record]
+        places = [one["smoothing"] for one in fits]
         for name, label, shade in (
             ("rms_all", f"all cells, $A \\geq$ {LEAST_AMPLITUDE:g}", plotting.PALETTE[0]),
             ("rms_strong", f"$D$ above {STRONG:g} of the cubic law", plotting.PALETTE[1]),
         ):
-            right.loglog(places, [100 * f[name] for f in record], "o-", color=shade, label=label)
+            right.loglog(places, [100 * one[name] for one in fits], "o-", color=shade, label=label)
         right.set_xticks(places, [f"{m:g}" for m in places])
         right.set_yticks((2, 5, 10, 20), ("2", "5", "10", "20"))
         right.minorticks_off()
@@ -162,7 +143,3 @@ def picture(fit: identify.Fit, record: list[dict]) -> plt.Figure:
         )
         right.legend()
     return figure
-
-
-if __name__ == "__main__":
-    main()

@@ -1,33 +1,24 @@
 """Segalman's four parameters from geometry alone, over height, friction, nu and pressure patch.
 
-    python calibration/four_parameters.py
-
-writes four_parameters.json beside this file (a quarter of an hour).  Every scene is plane
-elasticity in steady cycles of .1 to .95 of gross slip.  A row holds the exponents of D ~ F^n, the
-parameters of the four-parameter Iwan model that is nearest to the scene's displacement and
-dissipation, those of the short formula of `jbeamshell.laws.iwan4_of_strip`, the errors of both, and
-those of `jbeamshell.reference.slip_energy`.
-`python -m calibration.charts.four_parameters` draws it.
+Every scene is plane elasticity in steady cycles of .1 to .95 of gross slip.  A row holds the
+exponents of D ~ F^n, the parameters of the four-parameter Iwan model that is nearest to the scene's
+displacement and dissipation, those of the short formula of `jbeamshell.laws.iwan4_of_strip`, the
+errors of both, and those of `jbeamshell.reference.slip_energy`.  Takes a quarter of an hour.
 """
 
-import json
-import warnings
+import functools
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
-import jax
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from calibration.charts import PLAIN, Chart, Curve, sheet
+from jbeamshell.dynamics import four_parameters
+from jbeamshell.reference import energy_exponent
 
-import numpy as np  # noqa: E402
-from provenance import provenance  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.dynamics import four_parameters  # noqa: E402
-
-HERE = Path(__file__).parent
 HEIGHTS = (0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
 FRICTIONS = (0.05, 0.1, 0.3)
 CURVES = ("force", "displacement", "dissipation", "exponents", "energy_errors")
@@ -106,9 +97,8 @@ def energy_errors(about: dict[str, Any], each: dict[str, Any]) -> dict[str, Any]
     return {"energy_errors": (energy / each["dissipation"] - 1.0).tolist()}
 
 
-def main() -> None:
-    """Write the record."""
-    warnings.simplefilter("ignore", jb.DoubtfulWarning)
+def measure() -> dict[str, Any]:
+    """Rows of all scenes."""
     rows: list[dict[str, Any]] = []
     failed: list[dict[str, Any]] = []
     for about, scene in scenes():
@@ -120,9 +110,102 @@ def main() -> None:
         further = formula_errors(scene, each) | energy_errors(about, each)
         rows.append(about | each | further)
         print({key: rows[-1][key] for key in rows[-1] if key not in CURVES}, flush=True)
-    record = {"about": provenance(), "rows": rows, "failed": failed}
-    write_text(HERE / "four_parameters.json", json.dumps(record, indent=1) + "\n")
+    return {"rows": rows, "failed": failed}
 
 
-if __name__ == "__main__":
-    main()
+# --- charts ---------------------------------------------------------------------------------------
+
+LABELS = {
+    "even": "even, up to the load",
+    "middle": "middle half (bolt)",
+    "tapered": "tapered (cone)",
+    "single lap": "single lap, one bolt",
+}
+TYPICAL = {"mu": 0.1, "nu": 0.3}
+HEIGHT = "height ratio  2H/L"
+Rows = list[dict[str, Any]]
+
+
+def typical(rows: Rows, patch: str) -> Rows:
+    """Rows of a patch with usual friction and Poisson's ratio, over the height."""
+    return [
+        row
+        for row in rows
+        if row["patch"] == patch and all(row[key] == value for key, value in TYPICAL.items())
+    ]
+
+
+def _exponents(rows: Rows) -> Iterator[Curve]:
+    points, lines = [], []
+    for patch, (edge, part) in EDGES.items():
+        own = typical(rows, patch)
+        x = np.concatenate([2.0 * part * np.array(row["force"]) / row["eta"] for row in own])
+        n = np.concatenate([row["exponents"] for row in own])
+        points.append(Curve(LABELS[patch], x, n, look={"linestyle": "", "markersize": 3.0}))
+        line = np.geomspace(np.min(x), np.max(x), 200)
+        look = {"marker": "", "color": "0.4", "linewidth": 1.0}
+        formula = np.asarray(energy_exponent(line, edge))
+        lines.append(Curve("_" if lines else "short formulas", line, formula, look=look))
+    yield from (*points, *lines)
+
+
+def _parameter(rows: Rows, place: int, named: bool = False) -> Iterator[Curve]:
+    """Parameter over the height: the fitted one, and dashed that of the formula."""
+    for patch, words in LABELS.items():
+        label = words if named else "_"
+        own = typical(rows, patch)
+        given = [row.get("formula", [np.nan] * 3)[place] for row in own]
+        dashed = None if np.all(np.isnan(given)) else given
+        fitted = [row["fitted"][place] for row in own]
+        yield Curve(label, [row["eta"] for row in own], fitted, dashed)
+
+
+def _errors(rows: Rows, place: int) -> Iterator[Curve]:
+    """Errors of D over the height, worst over friction; dashed those of the formula."""
+    for patch in LABELS:
+        own = [row for row in rows if row["patch"] == patch and row["nu"] == TYPICAL["nu"]]
+        heights = sorted({row["eta"] for row in own})
+        found = []
+        for name in ("fitted_errors", "formula_errors"):
+            by_height = [[r.get(name, [np.nan] * 2) for r in own if r["eta"] == h] for h in heights]
+            found.append([float(np.max(np.array(each)[:, place])) for each in by_height])
+        dashed = None if np.all(np.isnan(found[1])) else found[1]
+        yield Curve("_", heights, found[0], dashed)
+
+
+def _plain(axes: Axes, rows: Any) -> None:
+    axes.xaxis.set_major_formatter(PLAIN)
+
+
+def _from_a_hundredth(axes: Axes, rows: Any) -> None:
+    _plain(axes, rows)
+    axes.set_ylim(bottom=0.003)
+
+
+def _over_height(
+    label: str, curves: Any, log: str = "x", title: str = "", extra: Any = _plain
+) -> Chart:
+    return Chart("rows", HEIGHT, label, title, curves, log, extra=extra)
+
+
+NEAREST, SHORT = "nearest four parameters", "dashed: short formulas"
+CHARTS = {
+    "exponents": Chart(
+        "rows", "slipped length  s/H", r"exponent $n$ of $D \sim F^n$", "", _exponents, "x",
+        extra=_plain,
+    ),
+    "stiffness": _over_height(
+        r"$K_T\, L / E'2H$", functools.partial(_parameter, place=0, named=True), "xy", NEAREST
+    ),
+    "chi": _over_height(r"$\chi$", functools.partial(_parameter, place=1), title=SHORT),
+    "beta": _over_height(
+        r"$\beta$", functools.partial(_parameter, place=2), "xy", extra=_from_a_hundredth
+    ),
+    "median": _over_height("median error of D  [1]", functools.partial(_errors, place=0), "xy"),
+    "worst": _over_height("worst error of D  [1]", functools.partial(_errors, place=1), "xy"),
+}  # fmt: skip
+
+
+def draw(record: dict[str, Any]) -> Figure:
+    """Sheet of all charts."""
+    return sheet(CHARTS, record)

@@ -3,30 +3,18 @@
 The standard strip of five heights is cycled between forces of .2 to 1.9 (gross slip is at 2).
 Segalman's four parameters, Bouc-Wen, Jenkins and some numbers of parallel sliders are fitted to the
 dissipation and the secant stiffness of these cycles over the displacement, all logarithms alike.
-The error of D is that at the displacement which the strip reaches.  Writes laws_of_a_strip.json and
-laws_of_a_strip.png beside this file; takes minutes:
-
-    python calibration/laws_of_a_strip.py
+The error of D is that at the displacement which the strip reaches.  Takes minutes.
 """
 
-import json
-from pathlib import Path
 from typing import Any
 
-import jax
+import matplotlib.pyplot as plt
+import numpy as np
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from jbeamshell import plotting
+from jbeamshell.identify.comparison import Comparison
 
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-from provenance import provenance  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell import plotting  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.identify.comparison import Comparison  # noqa: E402
-
-HERE = Path(__file__).parent
 HEIGHTS = (0.01, 0.0511, 0.1126, 0.2358, 0.4)
 AMPLITUDES = np.linspace(0.2, 1.9, 18)
 SHOWN = "0.1126"  # height whose energies are drawn
@@ -57,6 +45,17 @@ def figures(eta: float) -> dict[str, Any]:
     return {"energy": found.energy.tolist(), "models": table}
 
 
+def measure() -> dict[str, Any]:
+    """Compare on all heights."""
+    heights = {}
+    for eta in HEIGHTS:
+        heights[f"{eta:g}"] = figures(eta)
+        for name, own in heights[f"{eta:g}"]["models"].items():
+            told = f"median {100 * own['median']:.3g} %, worst {100 * own['worst']:.3g} %"
+            print(f"eta {eta:g}  {name:10s} {told}, misfit {100 * own['misfit']:.3g} %")
+    return {"amplitude": AMPLITUDES.tolist(), "heights": heights}
+
+
 def draw(record: dict[str, Any]) -> Any:
     """Draw D over the force of one height, and the errors over all heights."""
     heights, force = record["heights"], np.array(record["amplitude"])
@@ -82,20 +81,3 @@ def draw(record: dict[str, Any]) -> Any:
         errors.set_xticks(eta, list(heights))
         errors.minorticks_off()
     return figure
-
-
-def main() -> None:
-    """Compare on all heights; write the record and the chart."""
-    heights = {}
-    for eta in HEIGHTS:
-        heights[f"{eta:g}"] = figures(eta)
-        for name, own in heights[f"{eta:g}"]["models"].items():
-            told = f"median {100 * own['median']:.3g} %, worst {100 * own['worst']:.3g} %"
-            print(f"eta {eta:g}  {name:10s} {told}, misfit {100 * own['misfit']:.3g} %")
-    record = {"provenance": provenance(), "amplitude": AMPLITUDES.tolist(), "heights": heights}
-    write_text(HERE / "laws_of_a_strip.json", json.dumps(record, indent=1) + "\n")
-    plotting.save(draw(record), HERE / "laws_of_a_strip.png")
-
-
-if __name__ == "__main__":
-    main()

@@ -4,38 +4,28 @@ The model's own loops of one strip at three amplitudes get independent noise of 
 their range, fifty times each.  To each set mu, eta, kappa_s and alpha are fitted, with the noise
 estimated from the residual.  Two figures count: the mean of the estimates less the true values, in
 standard errors on the scale of the search; and how often the 68 % and 95 % intervals hold the true
-values, both those of `Fit.intervals_at` and those of the likelihood
-ratio, for which the true value is held and all others are fitted again.  Writes
-recovered_under_noise.json and recovered_under_noise.png beside this file; takes a quarter
-of an hour on two cores, a process for each:
-
-    python calibration/recover_under_noise.py
+values, both those of `Fit.intervals_at` and those of the likelihood ratio, for which the true value
+is held and all others are fitted again.  Takes a quarter of an hour on two cores, a process for
+each.
 """
 
-import json
 import multiprocessing
 import os
-import time
+import warnings
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from pathlib import Path
+from typing import Any
 
 import jax
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy import stats
+from tqdm import tqdm
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from calibration.strip import in_load_steps
+from jbeamshell import identify, plotting
+from jbeamshell.measured.loops import Loop, make_loop
 
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-from provenance import provenance  # noqa: E402
-from scipy import stats  # noqa: E402
-from strip import in_load_steps  # noqa: E402
-from tqdm import tqdm  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell import identify, plotting  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.measured.loops import Loop, make_loop  # noqa: E402
-
-HERE = Path(__file__).parent
 TRUTH = {
     "contact.friction": 0.1,
     "strip.height_ratio": 0.2358,
@@ -108,9 +98,9 @@ def likelihood_root(fit: identify.Fit, loops: list[Loop], key: str) -> float:
     return float(np.sqrt(max(rest / least - 1.0, 0.0) * freedom))
 
 
-def summary(noise: float, fits: list[dict]) -> dict:
-    """Bias and coverage at one level of noise."""
-    record: dict = {"noise": noise, "repeats": len(fits)}
+def summary(noise: float, fits: list[dict]) -> dict[str, Any]:
+    """Estimates, bias and coverage at one level of noise."""
+    record: dict[str, Any] = {"noise": noise, "repeats": len(fits)}
     record["settled"] = sum(fit["status"] == "converged" for fit in fits)
     record["model_runs"] = float(np.mean([fit["model_runs"] for fit in fits]))
     points = fits[0]["points"]
@@ -120,6 +110,7 @@ def summary(noise: float, fits: list[dict]) -> dict:
         shift = np.log(values / truth)
         roots = np.array([fit["likelihood_root"][key] for fit in fits])
         own = {
+            "estimates": values.tolist(),
             "median": float(np.median(values)),
             "spread": float(np.std(shift, ddof=1)),
             "standard_error": float(np.nanmedian(error)),
@@ -135,14 +126,13 @@ def summary(noise: float, fits: list[dict]) -> dict:
     return record
 
 
-def main() -> None:
-    """Run all fits, print a table, write the record and the picture."""
-    begin = time.perf_counter()
+def measure() -> dict[str, Any]:
+    """Fit to all sets of loops, on all cores."""
     everything: dict[float, list[dict]] = {noise: [{}] * REPEATS for noise in NOISES}
     total = len(NOISES) * REPEATS
     spawned = multiprocessing.get_context("spawn")
     with (
-        ProcessPoolExecutor(os.cpu_count(), mp_context=spawned) as pool,
+        ProcessPoolExecutor(os.cpu_count(), mp_context=spawned, initializer=_double) as pool,
         tqdm(total=total, disable=None, unit="set") as bar,
     ):
         # The noisiest take longest: they come first.
@@ -155,12 +145,24 @@ def main() -> None:
             noise, seed = tasks[done]
             everything[noise][seed] = done.result()
             bar.update()
-    record = [summary(noise, fits) for noise, fits in everything.items()]
-    for own in record:
-        print(f"noise {100 * own['noise']:g} %: {own['settled']} of {REPEATS} settled")
+    noises = [summary(noise, fits) for noise, fits in everything.items()]
+    return {"truth": TRUTH, "amplitudes": list(AMPLITUDES), "noises": noises}
+
+
+def _double() -> None:
+    """Double precision, without doubts, in a process of its own."""
+    jax.config.update("jax_enable_x64", True)
+    warnings.simplefilter("ignore", jb.DoubtfulWarning)
+
+
+def tell(record: dict[str, Any]) -> str:
+    """Bias and coverage in lines."""
+    lines = []
+    for own in record["noises"]:
+        lines.append(f"noise {100 * own['noise']:g} %: {own['settled']} of {REPEATS} settled")
         for key in TRUTH:
             told = own[key]
-            print(
+            lines.append(
                 f"  {key:24s} median {told['median']:.4g} (planted {TRUTH[key]:g}), error "
                 f"{100 * told['standard_error']:.2g} %, spread {100 * told['spread']:.2g} %, "
                 f"bias {told['bias_in_standard_errors']:+.2f} errors; holds "
@@ -168,21 +170,18 @@ def main() -> None:
                 f"likelihood {100 * told['likelihood_holds_68']:.0f} and "
                 f"{100 * told['likelihood_holds_95']:.0f} %"
             )
-    machine = provenance() | {"wall_s": time.perf_counter() - begin}
-    text = {"provenance": machine, "truth": TRUTH, "amplitudes": AMPLITUDES, "noises": record}
-    write_text(HERE / "recovered_under_noise.json", json.dumps(text, indent=1) + "\n")
-    plotting.save(picture(everything), HERE / "recovered_under_noise.png")
+    return "\n".join(lines)
 
 
-def picture(everything: dict[float, list[dict]]) -> plt.Figure:
+def draw(record: dict[str, Any]) -> plt.Figure:
     """Picture of all estimates over the true values, by noise."""
     with plotting.style():
         figure, panels = plt.subplots(1, len(TRUTH), figsize=(11.0, 3.6))
         for panel, (key, truth), symbol in zip(panels, TRUTH.items(), SYMBOLS, strict=True):
-            for place, (noise, shade) in enumerate(
-                zip(NOISES, plotting.colours(len(NOISES)), strict=True)
+            for place, (own, shade) in enumerate(
+                zip(record["noises"], plotting.colours(len(NOISES)), strict=True)
             ):
-                values = np.array([fit["values"][key] for fit in everything[noise]]) / truth
+                values = np.array(own[key]["estimates"]) / truth
                 across = place + np.linspace(-0.3, 0.3, values.size)
                 panel.plot(across, np.sort(values), ".", color=shade, markersize=3.5)
             panel.axhline(1.0, color=plotting.DATA, linewidth=1.0)
@@ -190,7 +189,3 @@ def picture(everything: dict[float, list[dict]]) -> plt.Figure:
             panel.set(title=symbol, xlabel="noise over range  [1]", yscale="log")
         panels[0].set_ylabel("fitted over true value, sorted  [1]")
     return figure
-
-
-if __name__ == "__main__":
-    main()

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from calibration.charts.table import Record
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.patheffects import withStroke
 
-from calibration.charts.table import Record
 from jbeamshell.common.errors import InputError
 from jbeamshell.plotting.style import single, style
 

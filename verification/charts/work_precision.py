@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import matplotlib.pyplot as plt
+from calibration.charts.table import Record, plain_numbers
 from matplotlib.axes import Axes
 
-from calibration.charts.table import Record, plain_numbers
 from jbeamshell.plotting.style import DATA, FAINT, style
 
 LOOKS: dict[str, dict[str, Any]] = {  # by family

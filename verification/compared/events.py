@@ -20,8 +20,8 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import jbeamshell as jb
-from calibration.methods import grids
 from jbeamshell.load_steps.system import BETA, PSI, System, V, W
+from verification.compared import grids
 
 FIELDS = [V, BETA, PSI]
 ROUNDING = 1e-11  # of the cap, or of the fastest node

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import jbeamshell as jb
-from calibration.methods.strips import stiffness_of_section
 from calibration.strip import in_load_steps
 from jbeamshell.mechanics.kinematics import FIELDS, linear_strains
+from verification.compared.strips import stiffness_of_section
 
 GAUSS = 0.5 + 0.5 / np.sqrt(3.0) * np.array([-1.0, 1.0])
 
@@ -104,9 +104,3 @@ def squeezed(elements_per_height: float, name: str, kappa_s: float = 0.44) -> fl
     matrix = stiffness(scene, x, RULES[name])
     psi = solved(matrix, load.ravel(), [0, 1, 2])[:, 3] * float(scene.strip.plane_modulus)
     return float(max(-1.0 - np.min(psi), np.max(psi)))
-
-
-def convergence(grid: str, nodes: int, scene: jb.Scene) -> tuple[float, float]:
-    """Dissipation and secant stiffness of a scene on one of the library's grids."""
-    history = jb.solve(scene.replace({"model.grid": grid, "model.nodes": nodes}), throw=False)
-    return float(history.dissipation), float(history.secant_stiffness)

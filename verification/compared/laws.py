@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import jbeamshell as jb
-from calibration.methods.strips import number, scene_of
+from verification.compared.strips import number, scene_of
 
 LAWS: dict[str, dict[str, Any]] = {
     "sharp": {"contact.smoothing": "sharp"},

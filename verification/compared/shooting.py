@@ -21,8 +21,8 @@ import numpy as np
 from scipy.linalg import expm
 
 import jbeamshell as jb
-from calibration.methods.strips import stiffness_of_section
 from jbeamshell.mechanics.kinematics import linear_strains
+from verification.compared.strips import stiffness_of_section
 
 DIGITS = -np.log10(np.finfo(float).eps)
 CORRECTIONS = 5

@@ -11,7 +11,6 @@ import numpy as np
 
 import jbeamshell as jb
 from calibration.strip import in_load_steps
-from jbeamshell.scene import library
 
 LINEAR = {"model.kinematics": "linear"}
 # What is changed of the standard strip, on whose nodes they all are.
@@ -26,16 +25,11 @@ STRIPS: dict[str, dict[str, Any]] = {
     },
     "near gross slip": {"load.amplitude": 1.98},
 }
-CLAMP = "receding clamp"
-SHARP = "sharp"
-FORGETFUL = 1e-3  # of its width: a loop that ends further off is not closed
 
 
 def scene_of(name: str, nodes: int = 81, **load: int) -> jb.Scene:
     """One of the scenes, with linear kinematics; ``load`` sets counts of its load path."""
     counts = {f"load.{key}": value for key, value in load.items()}
-    if name == CLAMP:
-        return library.receding_rough().replace(LINEAR | {"model.nodes": 2 * nodes} | counts)
     return in_load_steps().replace(STRIPS[name] | LINEAR | {"model.nodes": nodes} | counts)
 
 

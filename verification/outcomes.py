@@ -1,4 +1,4 @@
-"""Charts of the record of calibration/failure_map.py: right, slow, wrong and failed runs.
+"""What becomes of runs: right, slow, wrong or failed; and charts of the record of failure_map.py.
 
 A cell of the record is a row of figures of one run: the ratio of its dissipation to the bar's, the
 estimates of the errors from the grid and from the corner, the closure of the loop, the Newton
@@ -18,7 +18,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from calibration.charts.table import Record
+from calibration.charts import Record
 from jbeamshell.common.errors import InputError
 from jbeamshell.history.reliability import CLOSES, TOLERANCE
 from jbeamshell.plotting.style import single, style
@@ -74,12 +74,17 @@ def outcome(cell: Sequence[Any]) -> str:
     return "right, but slow" if effort > SLOW else "right"
 
 
+def maps(record: Record) -> dict[str, Any]:
+    """Maps of the record by name."""
+    return {name: part for name, part in record.items() if "cells" in part}
+
+
 def outcome_map(record: Record, name: str, axes: Axes | None = None) -> Axes:
     """Draw the outcome of every run of a map, with the error of its dissipation in per cent.
 
     Parameters
     ----------
-    record : record of calibration/failure_map.py
+    record : record of verification/failure_map.py
     name : name of one of its maps
     axes : where to draw; new ones when not given
 
@@ -88,9 +93,10 @@ def outcome_map(record: Record, name: str, axes: Axes | None = None) -> Axes:
     InputError
         if the record has no such map
     """
-    if name not in record["maps"]:
-        raise InputError(f"name = {name!r}: the record has {', '.join(record['maps'])}")
-    chart = record["maps"][name]
+    known = maps(record)
+    if name not in known:
+        raise InputError(f"name = {name!r}: the record has {', '.join(known)}")
+    chart = known[name]
     kinds, shades = list(OUTCOMES), ListedColormap(list(OUTCOMES.values()))
     places = np.array([[kinds.index(outcome(cell)) for cell in row] for row in chart["cells"]])
     with style():
@@ -117,7 +123,7 @@ def scatter(record: Record, axes: Axes | None = None) -> Axes:
 
     Parameters
     ----------
-    record : record of calibration/failure_map.py
+    record : record of verification/failure_map.py
     axes : where to draw; new ones when not given
     """
     counts = Counter(map(outcome, record["scenes"]))
@@ -146,18 +152,11 @@ def scatter(record: Record, axes: Axes | None = None) -> Axes:
 
 
 def sheets(record: Record) -> dict[str, Figure]:
-    """Sheets with all maps of the record, by name, each with a key to the colours."""
-    names = list(record["maps"])
-    by_method = [name for name in names if record["maps"][name]["y"] == "method"]
-    settings = [name for name in names if name not in by_method]
-    figures = {}
+    """Sheet of all maps of the record, with a key to the colours, and the random strips."""
     with style():
-        for sheet, some in (("methods", by_method), ("settings", settings)):
-            if some:
-                figures[sheet] = _sheet(record, some)
-        if record.get("scenes"):
-            figures["scenes"] = plt.subplots(figsize=(6.4, 5.2))[0]
-            scatter(record, figures["scenes"].axes[0])
+        figures = {"maps": _sheet(record, list(maps(record)))}
+        figures["scenes"] = plt.subplots(figsize=(6.4, 5.2))[0]
+        scatter(record, figures["scenes"].axes[0])
     return figures
 
 
