@@ -2,10 +2,11 @@
 
 A study is a module with the function ``measure``, whose keyword arguments are those of the command
 line and which returns its record, or with the table ``PARTS`` of such functions by name, each of
-which returns one entry of the record.  The record is the JSON file beside the module.  If it has a
-function ``draw`` of the record, the figure that this returns is the picture beside it (or several,
-by name); ``tell`` of the record returns what is printed.  A study that writes its own record
-returns None.
+which returns one entry of the record.  The record is the JSON file beside the module; its entry
+"about" tells machine, versions and date, by part if there are parts.  If the study has a function
+``draw`` of the record, the figure that this returns is the picture beside it (or several, by name);
+``tell`` of the record returns what is printed; ``ship`` of the record writes what the package keeps
+of it.  A study that writes its own record returns None.
 """
 
 from __future__ import annotations
@@ -28,8 +29,6 @@ from typing import Any
 
 ROOT = Path(__file__).parents[1]
 DIGITS = 9  # of the numbers of a record
-# Times are taken of one thread: the matrices are small, and threads of LAPACK only wait.
-ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 Record = dict[str, Any]
 
 
@@ -81,33 +80,35 @@ def main(folder: str, arguments: Sequence[str] | None = None) -> int:
         return max(subprocess.call([*command, name, *rest], cwd=ROOT) for name in chosen)
     timed = known[chosen[0]][0].parent.name == "benchmarks"
     if timed:
-        os.environ |= ONE_THREAD  # before NumPy is imported
-    _prepare(timed)
-    from jbeamshell.common.errors import InputError
+        _take_one_core()
+    import jax
 
+    jax.config.update("jax_enable_x64", True)
+    modules = {known[name][0]: load(known[name][0]) for name in chosen}
+    import jbeamshell as jb
+
+    jb.configure(cache=not timed)
+    if timed:  # first calls are to be compiled, whatever an earlier process has left
+        jax.config.update("jax_enable_compilation_cache", False)
+    warnings.simplefilter("ignore", jb.DoubtfulWarning)  # doubts are for the records
     try:
-        for name in chosen:
-            run(known[name][0], words, asked.draw, asked.only, asked.missing)
-    except InputError as error:
+        for path, study in modules.items():
+            run(study, path, words, asked.draw, asked.only, asked.missing)
+    except jb.InputError as error:
         print(error, file=sys.stderr)
         return 2
     return 0
 
 
-def _prepare(timed: bool) -> None:
-    """Double precision; doubts are for the record; first calls of what is timed are compiled."""
-    import jax
-
-    import jbeamshell as jb
-
-    jax.config.update("jax_enable_x64", True)
-    jb.configure(cache=not timed)
-    if timed:
-        jax.config.update("jax_enable_compilation_cache", False)
-    warnings.simplefilter("ignore", jb.DoubtfulWarning)
+def _take_one_core() -> None:
+    """Take one core and one thread, before NumPy is imported: other threads only wait."""
+    os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
 def run(
+    study: ModuleType,
     path: Path,
     words: Mapping[str, str],
     draw: bool = False,
@@ -115,7 +116,6 @@ def run(
     missing: bool = False,
 ) -> None:
     """Renew the record of a study, or the parts of it that are asked for, and draw it."""
-    study = load(path)
     target = path.with_suffix(".json")
     record = read(target)
     if not draw:
@@ -153,7 +153,7 @@ def _renew(
         if found is not None:
             record.clear()
             record |= {"about": provenance()} | found
-            write(target, record)
+            _write(study, target, record)
         return
     parts: dict[str, Callable[..., Any]] = study.PARTS
     if unknown := set(only or ()) - set(parts):
@@ -163,8 +163,8 @@ def _renew(
 
         begin = time.perf_counter()
         record[name] = parts[name](**_arguments(parts[name], words))
-        record["about"] = provenance()
-        write(target, record)
+        record.setdefault("about", {})[name] = provenance()
+        _write(study, target, record)
         jax.clear_caches()
         print(f"{name}: {time.perf_counter() - begin:.0f} s", file=sys.stderr, flush=True)
 
@@ -204,11 +204,13 @@ def short(value: Any) -> Any:
     return value
 
 
-def write(path: Path, record: Record) -> None:
-    """Write a record whole, or not at all."""
+def _write(study: ModuleType, path: Path, record: Record) -> None:
+    """Write a record whole, or not at all, and what the package keeps of it."""
     from jbeamshell.common.files import write_text
 
     write_text(path, as_text(record))
+    if hasattr(study, "ship"):
+        study.ship(record)
 
 
 def save(figures: Any, target: Path) -> None:

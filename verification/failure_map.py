@@ -21,6 +21,7 @@ import jbeamshell as jb
 from calibration.strip import changed, in_load_steps
 from jbeamshell.history import error_estimates, reliability
 from jbeamshell.mechanics.friction import ElasticSlip
+from verification import outcomes
 
 FIGURES = ("ratio", "grid", "corner", "closure", "iterations", "status")
 
@@ -250,3 +251,4 @@ def scattered(name: str) -> list[list[Any]]:
 
 PARTS = {name: functools.partial(chart, name) for name in MAPS}
 PARTS |= {name: functools.partial(scattered, name) for name in SCENES}
+draw = outcomes.sheets

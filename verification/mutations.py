@@ -1,13 +1,11 @@
-"""Faults planted in the core, one at a time: are they found by the ordinary tests?
+"""Faults planted in the core, one at a time, and the ordinary tests that find them.
 
-    python tests/mutations.py [--only WORD ...] [--again]
-
-copies the project, plants a fault of mutations.txt, runs the tests that the list names for its
-file until one fails, and writes mutations.json beside this file after every fault: the test that
-found it, or nothing.  Faults that were found before are left out, unless --again is given.
+Copies the project, plants a fault of mutations.txt, runs the tests that the list names for its file
+until one fails, and writes mutations.json beside this file after every fault: the test that found
+it, or nothing.  Faults that were found before are left out, unless again=true is given; word=WORD
+takes those that have the word in their names.
 """
 
-import argparse
 import json
 import os
 import random
@@ -18,6 +16,8 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
+
+from calibration.running import read
 
 ROOT = Path(__file__).parents[1]
 RECORD = Path(__file__).with_suffix(".json")
@@ -68,7 +68,7 @@ def sample(count: int, seed: int) -> list[Fault]:
 
 def copied(folder: Path) -> Path:
     """Copy of the project in a folder, as far as tests read it."""
-    for name in ("jbeamshell", "tests", "calibration"):
+    for name in ("jbeamshell", "tests", "calibration", "verification"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "README.md"):
         shutil.copy(ROOT / name, folder)
@@ -103,24 +103,15 @@ def killed(fault: Fault, project: Path) -> str:
     return ""
 
 
-def main() -> None:
+def measure(word: str = "", again: bool = False) -> None:
     """Plant the faults, and write the record after each."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--only", nargs="*", default=[""], help="parts of their names")
-    parser.add_argument("--again", action="store_true", help="those that were found before too")
-    given = parser.parse_args()
-    record = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
+    record = read(RECORD)
     with tempfile.TemporaryDirectory() as folder:
         project, every = copied(Path(folder)), list(faults())
         for fault in every:
-            chosen = any(word in fault.name for word in given.only)
-            if not chosen or (record.get(fault.name) and not given.again):
+            if word not in fault.name or (record.get(fault.name) and not again):
                 continue
             record[fault.name] = killed(fault, project)
             print(record[fault.name] or "SURVIVES", "|", fault.name, flush=True)
             known = {one.name: record[one.name] for one in every if one.name in record}
             RECORD.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

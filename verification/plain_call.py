@@ -1,9 +1,9 @@
 """Plain calls beside finite elements: how far off `jb.solve(scene)` is, and whether it says so.
 
 Solves every scene of the finite elements in calibration/data (strips under every entry of the
-force, and lap joints) without a single setting.  Of each scene the record has the section and the nodes that were
-taken, how far its dissipation and its secant
-stiffness are off, in per cent, what it doubts, and the time of a warm call; and a summary.  Scenes
+force, and lap joints) without a single setting.  Of each scene the record has the section and the
+nodes that were taken, how far its dissipation and its secant stiffness are off, in per cent, what
+it doubts, and the time of a warm call; and a summary.  Scenes
 that lose less than a thousandth of the bar's cubic law are left out.
 """
 

@@ -1,64 +1,53 @@
 """Time of steady cycles of plane elasticity from factors, at their error, on one core.
 
-    python tests/benchmarks/condensed.py            # --quick: little of everything, no record
-
-writes condensed.json beside this file: best and median of repeated warm calls and their time of the
-core, which other work on the machine disturbs least; compile time apart; with the machine, the
-versions and the precision.  Rates and ratios are of the core's time.  Its parts:
+The record has best and median of repeated warm calls and their time of the core, which other work
+on the machine disturbs least; compile time apart.  Rates and ratios are of the core's time.  Its
+parts:
 
 - cycle: one pull and a cycle of the standard strip, factors kept and building included;
 - batch: 64 height ratios x 256 amplitudes; sweeps are in sweeps.py;
 - error: over the contact nodes, against converged finite elements;
-- peer: given by ``--peer SCRIPT`` (a module with `Strip(eta, lines=, keep_lu=)` and `cyc(strip,
-  amplitude, steps_per_quarter, cycles)`, which condenses finite elements), at equal error.
+- peer: elements of your own at equal error, by peer=SCRIPT: a module that condenses finite elements
+  with `Strip(eta, lines=, keep_lu=)` and `cyc(strip, amplitude, steps_per_quarter, cycles)`.
 """
 
-import os
-
-os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # before NumPy
-if hasattr(os, "sched_setaffinity"):
-    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-
-import argparse
-import csv
 import functools
 import importlib.util
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-jax.config.update("jax_enable_x64", True)
-
-import jax.numpy as jnp  # noqa: E402
-import numpy as np  # noqa: E402
-from ladder import as_text  # noqa: E402
-from speeds import machine  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell import contact_line  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.contact_line.dissipation import NODES, REFINED  # noqa: E402
-from jbeamshell.measured.example import data_folder  # noqa: E402
+import jbeamshell as jb
+from calibration.running import read
+from calibration.tables import rows
+from jbeamshell import contact_line
+from jbeamshell.contact_line.dissipation import NODES, REFINED
+from jbeamshell.plotting.style import DATA, PALETTE, single, style
+from verification.benchmarks.speeds.machine import peak_gflops
 
 ETA, AMPLITUDE = 0.1126, 0.7855
 COUNTS = (17, 25, 33, 49, 65, 89, 129)
 BUDGET = 2.0  # seconds of a repeated call
+SINGLE = {  # rows of the record of speed, of another machine: label, colour and marker of each
+    "dissipation, 1 step": ("beamshell, 41 nodes", PALETTE[2], "^"),
+    "CalculiX, 4 steps": ("CalculiX", DATA, "P"),
+    "CalculiX, 20 steps": ("", DATA, "P"),
+}
+KINDS = (("kept_us", "matrices kept", "-"), ("built_us", "building included", "--"))
 WANTED = (0.01, 0.005, 0.002)
 MESHES = ((30, 3), (40, 4), (60, 6), (80, 8), (120, 12))
 STEPS = (10, 20, 40)  # per quarter cycle
 
 
-def cells() -> list[dict[str, float]]:
-    """Dissipation by converged finite elements."""
-    with (data_folder() / "energy.csv").open(encoding="utf-8") as table:
-        return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(table)]
-
-
-def repeated(call: Callable[[], Any], budget: float) -> dict[str, float]:
+def repeated(call: Callable[[], Any], budget: float = BUDGET) -> dict[str, float]:
     """Best and median time of a call and the mean of the core's, in microseconds."""
     jax.block_until_ready(call())
     seconds: list[float] = []
@@ -94,7 +83,7 @@ def builder(nodes: int) -> Callable[[jax.Array], contact_line.SteadyCycles]:
 # --- parts ----------------------------------------------------------------------------------------
 
 
-def cycle(budget: float) -> dict[str, Any]:
+def cycle() -> dict[str, Any]:
     """One pull and a cycle, dissipation only."""
     found = {}
     for name, nodes in (("default", NODES), ("refined", REFINED)):
@@ -109,11 +98,11 @@ def cycle(budget: float) -> dict[str, Any]:
             "value_and_slope": lambda k=kept, a=amplitude, f=slope: f(k, a),
             "built": lambda e=eta, a=amplitude, b=build, f=ask: f(b(e), a),
         }
-        found[name] |= {key: repeated(call, budget) for key, call in calls.items()}
+        found[name] |= {key: repeated(call) for key, call in calls.items()}
     return found
 
 
-def batch(budget: float) -> dict[str, Any]:
+def batch() -> dict[str, Any]:
     """Many strips and amplitudes."""
     etas, amplitudes = jnp.geomspace(0.03, 0.4, 64), jnp.linspace(0.1, 1.9, 256)
     many = etas.size * amplitudes.size
@@ -131,21 +120,21 @@ def batch(budget: float) -> dict[str, Any]:
     }
     found: dict[str, Any] = {}
     for name, (count, call) in calls.items():
-        took = repeated(call, budget)
+        took = repeated(call)
         rate = 1e6 * count / took["core_us"]
         found[name] = took | {"lanes": count, "lanes_per_s": rate}
     return found
 
 
-def error(counts: tuple[int, ...]) -> list[dict[str, Any]]:
+def error() -> list[dict[str, Any]]:
     """Worst errors over the nodes."""
-    rows, found = cells(), []
-    for nodes in counts:
+    cells, found = rows("energy.csv"), []
+    for nodes in COUNTS:
         build = builder(nodes)
         worst = {"above_tenth": 0.0, "above_ten_thousandth": 0.0}
-        for eta in sorted({row["eta"] for row in rows}):
+        for eta in sorted({row["eta"] for row in cells}):
             kept = build(jnp.asarray(eta))
-            for row in rows:
+            for row in cells:
                 if row["eta"] == eta and row["ratio"] > 1e-4:
                     off = abs(float(kept.dissipation([row["A"]])[0]) / row["D"] - 1.0)
                     key = "above_tenth" if row["ratio"] > 0.1 else "above_ten_thousandth"
@@ -154,18 +143,18 @@ def error(counts: tuple[int, ...]) -> list[dict[str, Any]]:
     return found
 
 
-def peer(script: str, counts: tuple[int, ...], budget: float) -> dict[str, Any]:
+def beside(script: str, budget: float = 0.2 * BUDGET) -> dict[str, Any]:
     """Cheapest settings of both that meet an error over the amplitudes of the standard strip."""
     module = loaded(script)
-    rows = [row for row in cells() if row["eta"] == ETA and row["ratio"] > 0.25][::2]
-    theirs = [settings for mesh in MESHES for settings in meshed(module, mesh, rows, budget)]
+    own = [row for row in rows("energy.csv") if row["eta"] == ETA and row["ratio"] > 0.25][::2]
+    theirs = [settings for mesh in MESHES for settings in meshed(module, mesh, own, budget)]
     ours = []
-    for nodes in counts:
+    for nodes in COUNTS:
         build = builder(nodes)
         ask = jax.jit(lambda kept, a: kept.dissipation(a))
         eta, amplitude = jnp.asarray(ETA), jnp.asarray([AMPLITUDE])
         kept = build(eta)
-        off = max(abs(float(kept.dissipation([r["A"]])[0]) / r["D"] - 1.0) for r in rows)
+        off = max(abs(float(kept.dissipation([r["A"]])[0]) / r["D"] - 1.0) for r in own)
         run = repeated(lambda k=kept, a=amplitude, f=ask: f(k, a), budget)["core_us"]
         whole = run + repeated(lambda e=eta, b=build: b(e), budget)["core_us"]
         ours.append({"nodes": nodes, "error": off, "kept_us": run, "built_us": whole})
@@ -182,13 +171,13 @@ def peer(script: str, counts: tuple[int, ...], budget: float) -> dict[str, Any]:
         if len(pair) == 2:
             times = {key: pair[1][key][key] / pair[0][key][key] for key in pair[0]}
             ratios.append({"error": wanted, "ours": pair[0], "theirs": pair[1], "times": times})
-    return {"amplitudes": [row["A"] for row in rows], "ours": ours, "theirs": theirs} | {
+    return {"amplitudes": [row["A"] for row in own], "ours": ours, "theirs": theirs} | {
         "at_equal_error": ratios
     }
 
 
 def meshed(
-    module: Any, mesh: tuple[int, int], rows: list[dict[str, float]], budget: float
+    module: Any, mesh: tuple[int, int], cells: list[dict[str, float]], budget: float
 ) -> list[dict[str, Any]]:
     """Error and time of the peer on a mesh, with several numbers of load steps."""
     nx, ny = mesh
@@ -204,7 +193,8 @@ def meshed(
     found = []
     for steps in STEPS:
         off = max(
-            abs(module.cyc(strip, row["A"], steps, 2)["Dfric"][-1] / row["D"] - 1.0) for row in rows
+            abs(module.cyc(strip, row["A"], steps, 2)["Dfric"][-1] / row["D"] - 1.0)
+            for row in cells
         )
         run = repeated(lambda n=steps: module.cyc(strip, AMPLITUDE, n, 2), budget)["core_us"]
         whole = {"kept_us": run, "built_us": run + built}
@@ -222,43 +212,45 @@ def loaded(script: str) -> Any:
     return module
 
 
-def report(record: Mapping[str, Any], indent: str = "") -> str:
-    """Figures of a record, one on a line."""
-    lines = []
-    for key, value in record.items():
-        if isinstance(value, Mapping):
-            lines += [f"{indent}{key}", report(value, indent + "    ")]
-        else:
-            lines.append(
-                f"{indent}{key}: {value:.4g}"
-                if isinstance(value, float)
-                else f"{indent}{key}: {value}"
-            )
-    return "\n".join(lines)
-
-
-def main() -> None:
-    """Measure, say what was found, write the record."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="little of everything, no record")
-    parser.add_argument("--peer", metavar="SCRIPT", help="condensed elements to be timed beside")
-    options = parser.parse_args()
-    jb.configure(cache=False)
-    jax.config.update("jax_enable_compilation_cache", False)
-    budget = 0.1 if options.quick else BUDGET
-    counts = (NODES,) if options.quick else COUNTS
-    record: dict[str, Any] = {
-        "about": machine.about() | {"cores_used": 1, "peak_gflops": machine.peak_gflops()},
-        "cycle": cycle(budget),
-        "batch": batch(budget),
-        "error": error(counts),
+def measure(peer: str = "") -> dict[str, Any]:
+    """All parts; the peer's stay as they are where none is given."""
+    known = read(Path(__file__).with_suffix(".json"))
+    found: dict[str, Any] = {
+        "peak_gflops": peak_gflops(),
+        "cycle": cycle(),
+        "batch": batch(),
+        "error": error(),
     }
-    if options.peer:
-        record["peer"] = peer(options.peer, counts, 0.2 * budget)
-    print(report(record))
-    if not options.quick:
-        write_text(Path(__file__).with_suffix(".json"), as_text(record))
+    return found | {"peer": beside(peer) if peer else known.get("peer")}
 
 
-if __name__ == "__main__":
-    main()
+# --- chart ----------------------------------------------------------------------------------------
+
+
+def draw(record: dict[str, Any]) -> Figure:
+    """Draw errors of D against elasticity [%] over the time of a cycle [ms], both logarithmic."""
+    with style():
+        axes = single(None)
+        _draw(axes, record, read(Path(__file__).with_name("speed.json")))
+    return axes.figure
+
+
+def _draw(axes: Axes, condensed: dict[str, Any], speeds: dict[str, Any]) -> None:
+    rivals = (("ours", "plane", PALETTE[0], "o"), ("theirs", "condensed elements", PALETTE[1], "s"))
+    for name, label, colour, marker in rivals:
+        rows = [r for r in condensed["peer"][name] if r.get("steps_per_quarter", 10) == 10]
+        error = [100.0 * abs(row["error"]) for row in rows]
+        for kind, how, dashes in KINDS:
+            times = [1e-3 * row[kind] for row in rows]
+            axes.plot(times, error, dashes, color=colour, marker=marker, label=f"{label}, {how}")
+    for row in speeds["one"]["rows"]:
+        if row["what"] in SINGLE:
+            label, colour, marker = SINGLE[row["what"]]
+            place = 1e-3 * row["best_us"], 100.0 * abs(row["error_to_elements"])
+            axes.plot(*place, linestyle="", color=colour, marker=marker, label=label or None)
+    axes.set(xscale="log", yscale="log", xlim=(1e-2, 1e5))
+    axes.set_xlabel("time of a cycle on one core  [ms]")
+    axes.set_ylabel("error of the dissipation to elasticity  [%]")
+    axes.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8, handlelength=3.5
+    )

@@ -1,8 +1,6 @@
 """Cost of fitting four parameters to five loops, beside searches that know no derivatives.
 
-    python tests/benchmarks/identification.py        # --defaults: only a fit at the defaults
-
-writes identification.json beside this file.  The loops are the model's own with noise of a
+The loops are the model's own with noise of a
 thousandth of their range; every search starts from the same values, off by a third to a half, and
 counts as done when its cost is within 1 % of the least.  Differential evolution searches between a
 quarter and four times the start, and is stopped after CAP runs.  Times are warm, compile time
@@ -10,31 +8,19 @@ apart; the peers run the model without derivatives, which is cheaper, and `ratio
 """
 
 import contextlib
-import json
-import os
-import platform
 import statistics
-import subprocess
-import sys
 import time
-from importlib.metadata import version
-from pathlib import Path
+from typing import Any
 
-import jax
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from scipy.optimize import differential_evolution, minimize
 
-jax.config.update("jax_enable_x64", True)
-
-import equinox as eqx  # noqa: E402
-import jax.numpy as jnp  # noqa: E402
-import jaxlib  # noqa: E402
-import numpy as np  # noqa: E402
-import scipy  # noqa: E402
-from scipy.optimize import differential_evolution, minimize  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell import identify  # noqa: E402
-from jbeamshell.identify.experiment import Experiment  # noqa: E402
-from jbeamshell.measured.loops import Loop, make_loop  # noqa: E402
+import jbeamshell as jb
+from jbeamshell import identify
+from jbeamshell.identify.experiment import Experiment
+from jbeamshell.measured.loops import Loop, make_loop
 
 HELD = {"model.kinematics": "exact", "contact.normal": "held"}
 
@@ -207,60 +193,31 @@ def at_the_defaults() -> dict:
         "model_runs": result.model_runs,
         "values": result.values,
         "errors": result.errors,
-        "load": os.getloadavg()[0],
-        "jax": jax.__version__,
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
     }
 
 
-def main() -> None:
-    """Measure and write the record."""
-    target = Path(__file__).with_suffix(".json")
-    if "--defaults" in sys.argv:
-        known = json.loads(target.read_text(encoding="utf-8"))
-        known["defaults"] = at_the_defaults()
-        target.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
-        return
-    record = {}
+def fits() -> dict[str, Any]:
+    """Fits of all models, and of one its peers."""
+    record: dict[str, Any] = {}
     for name, keys in SCENES.items():
         print(name, flush=True)
         fit, record[name] = fitted(keys)
-        if name == COMPARED:
-            truth = jb.library.standard().replace(HELD | TRUTH | keys)
-            ours = record[name]["levenberg-marquardt"]
-            ours["runs_to_target"] = runs_to_target(fit, truth.replace(START), planted(truth))
-            record[name] |= (others := peers(fit))
-            record[name]["ratios"] = {
-                peer: {
-                    "runs_over_ours": own["model_runs"] / ours["runs_to_target"],
-                    "runs_over_our_whole_fit": own["model_runs"] / ours["model_runs"],
-                    "wall_over_our_whole_fit": own["wall_s"] / ours["wall_s"],
-                    "run_over_ours": own["run_ms"] / ours["run_ms"],
-                }
-                for peer, own in others.items()
+        if name != COMPARED:
+            continue
+        truth = jb.library.standard().replace(HELD | TRUTH | keys)
+        ours = record[name]["levenberg-marquardt"]
+        ours["runs_to_target"] = runs_to_target(fit, truth.replace(START), planted(truth))
+        record[name] |= (others := peers(fit))
+        record[name]["ratios"] = {
+            peer: {
+                "runs_over_ours": own["model_runs"] / ours["runs_to_target"],
+                "runs_over_our_whole_fit": own["model_runs"] / ours["model_runs"],
+                "wall_over_our_whole_fit": own["wall_s"] / ours["wall_s"],
+                "run_over_ours": own["run_ms"] / ours["run_ms"],
             }
-            print(record[name]["ratios"])
-    asked = ["git", "rev-parse", "--short", "HEAD"]
-    commit = subprocess.run(asked, capture_output=True, text=True)
-    about = {
-        "what": f"fit of {', '.join(START)} to {len(AMPLITUDES)} loops by jbeamshell.identify.fit",
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
-        "load": os.getloadavg(),
-        "python": platform.python_version(),
-        "jax": jax.__version__,
-        "jaxlib": jaxlib.__version__,
-        "jaxopt": version("jaxopt"),
-        "optax": version("optax"),
-        "scipy": scipy.__version__,
-        "dtype": "float64",
-        "flags": os.environ.get("XLA_FLAGS", ""),
-        "commit": commit.stdout.strip(),
-        "rounds": ROUNDS,
-        "cap": CAP,
-    }
-    whole = {"about": about, "scenes": record, "defaults": at_the_defaults()}
-    target.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
+            for peer, own in others.items()
+        }
+    return record
 
 
-if __name__ == "__main__":
-    main()
+PARTS = {"scenes": fits, "defaults": at_the_defaults}

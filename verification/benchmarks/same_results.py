@@ -1,24 +1,24 @@
 """Results of two checkouts over 60 scenes of all kinds, compared number by number.
 
-In the one checkout ``python tests/benchmarks/same_results.py --write FILE.npz``, in the other
-``python tests/benchmarks/same_results.py --against FILE.npz``; both with PYTHONPATH at the root of
-their checkout.  The second prints the largest relative difference of every scene and exits with 1
-if one exceeds 1e-12 of the largest number of its kind.
+``python -m verification same_results before=PATH`` compares this checkout with the one at PATH.  It
+prints the largest relative difference of every scene, and exits with 1 if one exceeds 1e-12 of the
+largest number of its kind.
 """
 
 from __future__ import annotations
 
-import argparse
+import os
+import subprocess
 import sys
+import tempfile
 import warnings
+from pathlib import Path
 
 import jax
 import numpy as np
 from tqdm import tqdm
 
-jax.config.update("jax_enable_x64", True)
-
-import jbeamshell as jb  # noqa: E402
+import jbeamshell as jb
 
 HELD = {"model.kinematics": "exact", "contact.normal": "held"}
 CLOSED_FORM = ("bar", "bar, displaced")  # the other scenes are solved in load steps
@@ -132,28 +132,25 @@ def results() -> dict[str, np.ndarray]:
     return found | {f"sweep/{name}": np.asarray(values) for name, values in swept.values.items()}
 
 
-def main() -> int:
-    """Write the results, or compare them with those of another checkout."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--write", metavar="FILE.npz")
-    parser.add_argument("--against", metavar="FILE.npz")
-    options = parser.parse_args()
-    warnings.simplefilter("ignore", jb.DoubtfulWarning)
-    found = results()
-    if options.write:
-        np.savez(options.write, **found)
-        return 0
-    with np.load(options.against) as file:
-        before = dict(file)
-    worst: dict[str, float] = {}
-    for name in sorted(before.keys() | found.keys()):
+def measure(before: str) -> None:
+    """Compare the results with those of another checkout."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "before.npz"
+        command = [sys.executable, __file__, str(path)]
+        subprocess.run(command, check=True, cwd=before, env=os.environ | {"PYTHONPATH": before})
+        with np.load(path) as file:
+            known = dict(file)
+    found, worst = results(), {}
+    for name in sorted(known.keys() | found.keys()):
         scene = name.partition("/")[0]
-        worst[scene] = max(worst.get(scene, 0.0), _difference(before.get(name), found.get(name)))
+        off = _difference(known.get(name), found.get(name))
+        worst[scene] = max(worst.get(scene, 0.0), off)
     for scene, difference in worst.items():
         print(f"{scene:24s} {difference:.2g}")
     same = sum(difference == 0.0 for difference in worst.values())
     print(f"{len(worst)} compared, {same} equal to the last bit, worst {max(worst.values()):.2g}")
-    return int(max(worst.values()) > 1e-12)
+    if max(worst.values()) > 1e-12:
+        raise SystemExit(1)
 
 
 def _difference(a: np.ndarray | None, b: np.ndarray | None) -> float:
@@ -167,4 +164,6 @@ def _difference(a: np.ndarray | None, b: np.ndarray | None) -> float:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    jax.config.update("jax_enable_x64", True)
+    warnings.simplefilter("ignore", jb.DoubtfulWarning)
+    np.savez(sys.argv[1], **results())

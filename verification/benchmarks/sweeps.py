@@ -1,47 +1,30 @@
 """Strips a second of plain sweeps and responses of plane elasticity, and their errors, on one core.
 
-    python tests/benchmarks/sweeps.py            # --quick: few lanes, no record
-
-writes sweeps.json beside this file, with the machine, the versions and the precision.  All in, with
-compiling, and once more when compiled; of some random lanes the error to plane elasticity of twice
-the nodes:
+All in, with compiling, and once more when compiled; of some random lanes the error to plane
+elasticity of twice the nodes:
 
 - grid: heights x amplitudes of one strip;
 - own: every lane has its own height, Poisson's ratio, friction and amplitude;
 - response: one call, over the load alone and over height, friction and load.
 """
 
-import os
-
-os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # before NumPy
-if hasattr(os, "sched_setaffinity"):
-    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-
-import argparse
 import time
-import warnings
-from pathlib import Path
 from typing import Any
 
 import jax
+import numpy as np
 
-jax.config.update("jax_enable_x64", True)
-
-import numpy as np  # noqa: E402
-from ladder import as_text  # noqa: E402
-from speeds import machine  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
+import jbeamshell as jb
 
 HEIGHT, POISSON = "strip.height_ratio", "strip.poisson_ratio"
 FRICTION, LOAD = "contact.friction", "load.amplitude"
 ENTRIES = ("member", "traction")
 FINE = 129  # nodes of the strips that lanes are compared with
 RATIOS = 0.03, 0.4  # least and most height ratio
+SIDE, CHECKED, CALLS = 64, 100, 200  # heights and loads of a grid, lanes compared, calls
 
 
-def swept(scene: jb.Scene, over: dict[str, np.ndarray], paired: bool, check: int) -> dict[str, Any]:
+def swept(scene: jb.Scene, over: dict[str, np.ndarray], paired: bool) -> dict[str, Any]:
     """Times of a sweep at the defaults, and the errors of some of its lanes."""
     seconds = []
     for _ in range(2):
@@ -49,7 +32,7 @@ def swept(scene: jb.Scene, over: dict[str, np.ndarray], paired: bool, check: int
         found = jb.sweep(scene, over, ["dissipation"], paired=paired, processes=1)
         seconds.append(time.perf_counter() - begin)
     works = found["dissipation"]
-    lanes = np.random.default_rng(5).choice(works.size, check, replace=False)
+    lanes = np.random.default_rng(5).choice(works.size, CHECKED, replace=False)
     errors, ratios = [], []
     for lane in lanes:
         places = np.unravel_index(lane, works.shape) * (len(over) if paired else 1)
@@ -66,14 +49,14 @@ def swept(scene: jb.Scene, over: dict[str, np.ndarray], paired: bool, check: int
         "failed": int(np.sum(found.status != 0)),
         "cold_s": seconds[0],
         "lanes_per_s": works.size / seconds[1],
-        "checked": check,
+        "checked": CHECKED,
         "worst_error": float(np.max(errors)),
         "worst_error_above_a_thousandth": float(np.max(seen)),
         "median_error": float(np.median(errors)),
     }
 
 
-def asked(over: list[str], calls: int) -> dict[str, float]:
+def asked(over: list[str]) -> dict[str, float]:
     """Times of the first call of a response, and of one when it is compiled."""
     scene = jb.Scene()
     values = np.array([float(scene.get(key)) for key in over])
@@ -82,24 +65,17 @@ def asked(over: list[str], calls: int) -> dict[str, float]:
     jax.block_until_ready(ask(*values))
     first = time.perf_counter() - begin
     seconds = []
-    for call in range(calls):
+    for call in range(CALLS):
         begin = time.perf_counter()
         jax.block_until_ready(ask(*(values * (1.0 + 1e-4 * call))))
         seconds.append(time.perf_counter() - begin)
     return {"first_s": first, "median_us": 1e6 * float(np.median(seconds))}
 
 
-def main() -> None:
-    """Measure, say what was found, write the record."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="few lanes, no record")
-    options = parser.parse_args()
-    jb.configure(cache=False)
-    jax.config.update("jax_enable_compilation_cache", False)
-    warnings.simplefilter("ignore", jb.DoubtfulWarning)
-    side, check = (8, 4) if options.quick else (64, 100)
-    random, many = np.random.default_rng(1), side**2
-    grid = {HEIGHT: np.geomspace(*RATIOS, side), LOAD: np.geomspace(0.1, 1.8, side)}
+def measure() -> dict[str, Any]:
+    """Sweeps under both entries of the force, and responses."""
+    random, many = np.random.default_rng(1), SIDE**2
+    grid = {HEIGHT: np.geomspace(*RATIOS, SIDE), LOAD: np.geomspace(0.1, 1.8, SIDE)}
     friction = random.uniform(0.05, 0.5, many)
     own = {
         HEIGHT: np.exp(random.uniform(*np.log(RATIOS), many)),
@@ -107,22 +83,9 @@ def main() -> None:
         FRICTION: friction,
         LOAD: 20.0 * friction * random.uniform(0.05, 0.95, many),
     }
-    record: dict[str, Any] = {"about": machine.about() | {"cores_used": 1}}
+    record: dict[str, Any] = {}
     for entry in ENTRIES:
         scene = jb.Scene().replace({"load.entry": entry})
-        record[entry] = {
-            "grid": swept(scene, grid, False, check),
-            "own": swept(scene, own, True, check),
-        }
-    calls = 10 if options.quick else 200
-    record["response"] = {
-        "load": asked([LOAD], calls),
-        "height, friction and load": asked([HEIGHT, FRICTION, LOAD], calls),
-    }
-    print(as_text(record))
-    if not options.quick:
-        write_text(Path(__file__).with_suffix(".json"), as_text(record))
-
-
-if __name__ == "__main__":
-    main()
+        record[entry] = {"grid": swept(scene, grid, False), "own": swept(scene, own, True)}
+    response = {"load": asked([LOAD]), "height, friction and load": asked([HEIGHT, FRICTION, LOAD])}
+    return record | {"response": response}

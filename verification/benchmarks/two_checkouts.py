@@ -1,11 +1,10 @@
-"""Speed of two checkouts side by side: ``python tests/benchmarks/two_checkouts.py BEFORE AFTER``.
+"""Speed of two checkouts side by side.
 
-BEFORE and AFTER are the roots of two checkouts.  Each runs in a process of its own, and the two
-take turns, so that other load on the machine meets both alike.  The table gives the best and the
-median of all rounds, and the ratio of AFTER to BEFORE.
+``python -m verification two_checkouts before=PATH after=PATH`` takes their roots.  Each runs in
+a process of its own, and the two take turns, so that other load on the machine meets both alike.
+The table gives the best and the median of all rounds, and the ratio of after to before.
 """
 
-import argparse
 import json
 import os
 import statistics
@@ -71,26 +70,22 @@ def child() -> None:
         print((time.perf_counter() - begin) / count, flush=True)
 
 
-def main() -> None:
+def measure(before: str, after: str = ".", rounds: int = ROUNDS) -> None:
     """Let two checkouts take turns and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("roots", nargs=2, metavar="ROOT")
-    parser.add_argument("--rounds", type=int, default=ROUNDS)
-    options = parser.parse_args()
     running = [
         subprocess.Popen(
-            [sys.executable, os.path.abspath(__file__), "child"],
+            [sys.executable, os.path.abspath(__file__)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
             env=os.environ | {"PYTHONPATH": root, "OMP_NUM_THREADS": "1"},
         )
-        for root in options.roots
+        for root in (before, os.path.abspath(after))
     ]
     names, _ = (json.loads(process.stdout.readline()) for process in running)
     for name in names:
         seconds = [[], []]
-        for _ in range(options.rounds):
+        for _ in range(rounds):
             for process, found in zip(running, seconds, strict=True):
                 process.stdin.write(name + "\n")
                 process.stdin.flush()
@@ -107,4 +102,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    child() if sys.argv[1:] == ["child"] else main()
+    child()

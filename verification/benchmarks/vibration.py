@@ -1,10 +1,7 @@
 """Time of harmonic balance: forced responses beside tmdsimpy, and a structure of 10,000.
 
-    python tests/benchmarks/vibration.py            # --quick: little of everything, no record
-
-writes vibration.json beside this file: the core's seconds of warm calls, which other work on the
-machine disturbs least, and those of the wall; compile time apart; with machine, versions and
-precision.  Its parts:
+The record has the core's seconds of warm calls, which other work on the machine disturbs least, and
+those of the wall; compile time apart.  Its parts:
 
 - peer: forced response of ten masses with Segalman's four-parameter joint of 100 sliders,
   harmonics 1, 3, ... 9, by jbeamshell and by tmdsimpy (github.com/tmd-lab/tmdsimpy) if it is
@@ -13,29 +10,15 @@ precision.  Its parts:
 - large: backbone of 40 points of a lattice of 10,000 degrees of freedom with four joints.
 """
 
-import os
-
-os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # before NumPy
-
-import argparse
 import importlib.util
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-import jax
+import numpy as np
+import scipy.sparse as sp
 
-jax.config.update("jax_enable_x64", True)
-
-import numpy as np  # noqa: E402
-import scipy.sparse as sp  # noqa: E402
-from ladder import as_text  # noqa: E402
-from speeds import machine  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from jbeamshell import dynamics  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
+from jbeamshell import dynamics
 
 U = np.geomspace(0.05, 4.0, 9)
 MASSES, DAMPING, FORCE = 10, 0.02, 0.3
@@ -203,21 +186,4 @@ def large() -> dict[str, Any]:
     }
 
 
-def main() -> None:
-    """Measure, say what was found, write the record."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="little of everything, no record")
-    options = parser.parse_args()
-    jb.configure(cache=False)
-    jax.config.update("jax_enable_compilation_cache", False)
-    record: dict[str, Any] = {"about": machine.about(), "peer": peer()}
-    if not options.quick:
-        record["large"] = large()
-    text = as_text(record)
-    print(text)
-    if not options.quick:
-        write_text(Path(__file__).with_suffix(".json"), text)
-
-
-if __name__ == "__main__":
-    main()
+PARTS = {"peer": peer, "large": large}

@@ -1,55 +1,38 @@
 """Error to elasticity over time, for everything that answers the energy of a cycle.
 
-    python tests/benchmarks/work_precision.py        # --quick: few calls, no record
-
-writes work_precision.json beside this file and draws calibration/work_precision.png from it.  Three
-strips under an even traction slip over .7, 2 and 5 H; their energies by converged elements are in
-calibration/data.  On each, warm and on one core:
+Three strips under an even traction slip over .7, 2 and 5 H; their energies by converged elements
+are in calibration/data.  On each, warm and on one core:
 
 - plain: `jb.solve` without settings, on a body that is kept and on one that was never seen;
 - sections: every section that can be named, on 17 to 129 nodes;
 - bulk: a call of `jb.response` over the load, and a lane of a plain `jb.sweep`.
 
-``--peer SCRIPT`` times condensed elements, by a script of your own that takes ETA A NX NY
+peer=SCRIPT times condensed elements, by a script of your own that takes ETA A NX NY
 STEPS_PER_QUARTER and prints a JSON line with "ratio" (to the cubic law), "build_s" and
-"run_s_2_cycles".  ``--calculix`` runs CalculiX.  Without them their rows stay as they are.
+"run_s_2_cycles".  calculix=true runs CalculiX.  Without them their rows stay as they are.
 """
 
-import os
-
-os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # before NumPy
-if hasattr(os, "sched_setaffinity"):
-    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-
-import argparse
-import csv
-import functools
 import json
 import statistics
 import subprocess
 import sys
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
 
-jax.config.update("jax_enable_x64", True)
+import jbeamshell as jb
+from calibration import finite_elements
+from calibration.charts import plain_numbers
+from calibration.running import read
+from calibration.tables import energies
+from jbeamshell.plotting.style import DATA, FAINT, style
 
-import numpy as np  # noqa: E402
-from ladder import as_text  # noqa: E402
-from speeds import machine  # noqa: E402
-
-import jbeamshell as jb  # noqa: E402
-from calibration import charts, finite_elements  # noqa: E402
-from jbeamshell import plotting  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.measured.example import data_folder  # noqa: E402
-
-RECORD = Path(__file__).with_suffix(".json")
-PICTURE = Path(__file__).parents[2] / "calibration" / "work_precision.png"
 HEIGHT, LOAD = "strip.height_ratio", "load.amplitude"
 STRIPS = ((0.2358, 0.5851), (0.1126, 0.4359), (0.1126, 0.7855))  # eta and A
 SECTIONS = ("shell", "squeeze", "p2", "p4", "p6", "plane")
@@ -58,6 +41,21 @@ PEER_MESHES = ((20, 2, 6), (40, 4, 10), (80, 8, 20))  # along x, over the height
 SIDE = 64  # heights and loads of the sweep
 CALLS = 9
 APART = 1e-7  # relative change from call to call, so that none is answered from memory
+LOOKS: dict[str, dict[str, Any]] = {  # by family
+    "bar": {"color": "0.6", "marker": "s"},
+    "shell": {"color": "#D55E00", "marker": "v"},
+    "squeeze": {"color": "#CC79A7", "marker": "o"},
+    "p2": {"color": "#56B4E9", "marker": "^"},
+    "p4": {"color": "#009E73", "marker": "X"},
+    "p6": {"color": "#332288", "marker": "P"},
+    "plane": {"color": "#117733", "marker": "h"},
+    "plain call": {"color": "#E69F00", "marker": "*", "markersize": 13.0},
+    "response": {"color": "#E69F00", "marker": "D"},
+    "sweep": {"color": "#E69F00", "marker": "<", "markersize": 8.0},
+    "condensed elements": {"color": DATA, "marker": "+", "markersize": 8.0},
+    "CalculiX": {"color": DATA, "marker": "H", "markersize": 8.0},
+}
+LEAST = 0.01  # per cent, lower end of the errors
 
 Call = Callable[[int], float]  # from its number to the energy of a cycle
 
@@ -76,14 +74,6 @@ class Way(NamedTuple):
     what: str
     nodes: int | None
     call: Call
-
-
-@functools.cache
-def elements() -> dict[tuple[float, float], dict[str, float]]:
-    """Energies by converged elements by (eta, A)."""
-    with (data_folder() / "energy.csv").open(encoding="utf-8") as table:
-        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(table)]
-    return {(row["eta"], row["A"]): row for row in rows}
 
 
 def scene_of(strip: tuple[float, float], values: dict[str, Any] | None = None) -> jb.Scene:
@@ -117,12 +107,12 @@ def ways(strip: tuple[float, float]) -> Iterator[Way]:
     )
 
 
-def timed(strip: tuple[float, float], calls: int) -> list[dict[str, Any]]:
+def timed(strip: tuple[float, float]) -> list[dict[str, Any]]:
     """Rows of a strip; its calls take turns."""
     known = list(ways(strip))
     answers = [float(way.call(0)) for way in known]
     seconds: list[list[float]] = [[] for _ in known]
-    for i in range(1, calls + 1):
+    for i in range(1, CALLS + 1):
         for way, own in zip(known, seconds, strict=True):
             begin = time.perf_counter()
             jax.block_until_ready(way.call(i))
@@ -137,7 +127,7 @@ def row(
     strip: tuple[float, float], family: str, what: str, energy: float, seconds: float
 ) -> dict[str, Any]:
     """Row of the record."""
-    error = energy / elements()[strip]["D"] - 1.0
+    error = energy / energies()[strip]["D"] - 1.0
     return {
         "eta": strip[0],
         "A": strip[1],
@@ -148,10 +138,10 @@ def row(
     }
 
 
-def swept(side: int) -> list[dict[str, Any]]:
+def swept() -> list[dict[str, Any]]:
     """Rows of a lane of a plain sweep that has the strips among its heights and loads."""
     heights, loads = (
-        np.unique([*values, *np.geomspace(*ends, side - len(set(values)))])
+        np.unique([*values, *np.geomspace(*ends, SIDE - len(set(values)))])
         for values, ends in zip(zip(*STRIPS, strict=True), ((0.03, 0.4), (0.1, 1.8)), strict=True)
     )
     over, scene = {HEIGHT: heights, LOAD: loads}, scene_of(STRIPS[0])
@@ -170,7 +160,7 @@ def condensed(script: str) -> list[dict[str, Any]]:
     """Rows of elements condensed to the contact, by a script run beside this one."""
     rows = []
     for strip in STRIPS:
-        cubic_law = elements()[strip]["D"] / elements()[strip]["ratio"]
+        cubic_law = energies()[strip]["D"] / energies()[strip]["ratio"]
         for mesh in PEER_MESHES:
             command = [sys.executable, script, *map(str, (*strip, *mesh))]
             answer = subprocess.run(command, capture_output=True, text=True, check=True).stdout
@@ -182,7 +172,7 @@ def condensed(script: str) -> list[dict[str, Any]]:
     return rows
 
 
-def calculix() -> list[dict[str, Any]]:
+def by_calculix() -> list[dict[str, Any]]:
     """Rows of CalculiX, one cycle on meshes graded towards the loaded corner."""
     rows = []
     for strip in STRIPS:
@@ -194,39 +184,61 @@ def calculix() -> list[dict[str, Any]]:
     return rows
 
 
-def main() -> None:
-    """Measure, write the record, draw it."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="few calls; writes nothing")
-    parser.add_argument("--peer", metavar="SCRIPT", help="condensed elements to be timed")
-    parser.add_argument("--calculix", action="store_true", help="run CalculiX")
-    parser.add_argument("--draw", action="store_true", help="draw the record that is there")
-    options = parser.parse_args()
-    warnings.simplefilter("ignore", jb.DoubtfulWarning)
-    record: dict[str, Any] = {"ours": [], "others": []}
-    if RECORD.exists():
-        record = json.loads(RECORD.read_text(encoding="utf-8"))
-    if not options.draw:
-        calls, side = (2, 8) if options.quick else (CALLS, SIDE)
-        others = {"condensed elements": condensed(options.peer) if options.peer else None}
-        others["CalculiX"] = calculix() if options.calculix else None
-        for family, rows in others.items():
-            if rows is not None:
-                kept = [own for own in record["others"] if own["family"] != family]
-                record["others"] = kept + rows
-        ours = [own for strip in STRIPS for own in timed(strip, calls)] + swept(side)
-        truth = [
-            {"eta": eta, "A": load, "error": elements()[eta, load]["D_err_pct"] / 100.0}
-            for eta, load in STRIPS
-        ]
-        about = machine.about() | {"cores_used": 1, "calls": calls}
-        record = {"about": about, "truth": truth, "ours": ours, "others": record["others"]}
-    for own in record["ours"] + record["others"]:
-        print("{eta:<7} {A:<7} {family:18s} {what:13s} {error:+9.2%} {ms:10.3f} ms".format(**own))
-    if not options.quick:
-        write_text(RECORD, as_text(record))
-        plotting.save(charts.work_precision.chart(record), PICTURE)
+def measure(peer: str = "", calculix: bool = False) -> dict[str, Any]:
+    """Rows of all ways; those of others stay as they are where none are asked for."""
+    others = read(Path(__file__).with_suffix(".json")).get("others", [])
+    renewed = (condensed(peer) if peer else []) + (by_calculix() if calculix else [])
+    families = {own["family"] for own in renewed}
+    others = renewed + [own for own in others if own["family"] not in families]
+    truth = [
+        {"eta": eta, "A": load, "error": energies()[eta, load]["D_err_pct"] / 100.0}
+        for eta, load in STRIPS
+    ]
+    ours = [own for strip in STRIPS for own in timed(strip)] + swept()
+    return {"truth": truth, "ours": ours, "others": others}
 
 
-if __name__ == "__main__":
-    main()
+def tell(record: dict[str, Any]) -> str:
+    """Errors and times in lines."""
+    line = "{eta:<7} {A:<7} {family:18s} {what:13s} {error:+9.2%} {ms:10.3f} ms"
+    return "\n".join(line.format(**own) for own in record["ours"] + record["others"])
+
+
+# --- chart ----------------------------------------------------------------------------------------
+
+
+def draw(record: dict[str, Any]) -> plt.Figure:
+    """Figure with a panel for each strip of the record."""
+    with style():
+        count = len(record["truth"])
+        figure, panels = plt.subplots(
+            1, count, figsize=(4.6 * count, 4.8), sharex=True, sharey=True, layout="constrained"
+        )
+        for axes, truth in zip(panels, record["truth"], strict=True):
+            _strip(axes, record, truth)
+        panels[0].set_ylabel("error of the dissipation, to elements  [%]")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside right center", fontsize=9)
+    return figure
+
+
+def _strip(axes: Axes, record: dict[str, Any], truth: dict[str, Any]) -> None:
+    """Dots of all ways to the energy of one strip; lines join a section's grids."""
+    rows = [
+        row
+        for row in record["ours"] + record["others"]
+        if (row["eta"], row["A"]) == (truth["eta"], truth["A"])
+    ]
+    for family, look in LOOKS.items():
+        own = [row for row in rows if row["family"] == family]
+        off = [max(100.0 * abs(row["error"]), LEAST) for row in own]
+        line = "-" if len(own) > 1 and family not in ("plain call", "condensed elements") else ""
+        shown = {"linestyle": line, "linewidth": 1.0, "markersize": 6.0} | look
+        axes.plot([row["ms"] for row in own], off, label=family, **shown)
+    tolerance = {"color": FAINT, "linestyle": "--", "linewidth": 1.0}
+    axes.axhline(1.0, label="tolerance of a plain call", **tolerance)
+    dotted = tolerance | {"linestyle": ":"}
+    axes.axhline(max(100.0 * truth["error"], LEAST), label="error of the elements", **dotted)
+    axes.set(xscale="log", yscale="log", xlabel="time of a warm call  [ms]")
+    axes.set_title(f"$\\eta = {truth['eta']:g}$, $A = {truth['A']:g}$")
+    plain_numbers(axes.xaxis, axes.yaxis)

@@ -1,18 +1,16 @@
 """The strip that is timed, its truth, and how it is timed."""
 
-import csv
 import statistics
 import time
 from collections.abc import Callable, Mapping
-from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 from tqdm import tqdm
 
 import jbeamshell as jb
-from jbeamshell.measured.example import data_folder
+from calibration.tables import energies
 
 ETA, AMPLITUDE = 0.1126, 0.7855
 
@@ -28,42 +26,10 @@ STANDARD = {
 }
 FINE = {"model.nodes": 321, "load.steps_per_half_cycle": 40}
 END_SIZE, FINE_END_SIZE = 1.0 / 36.0, 1.0 / 3.0  # smallest elements before scaling, over H
-MOST = 200  # calls in a spell
+MOST, SPELL = 200, 0.1  # calls and seconds of a spell
+ROUNDS = 7  # in each of which every variant is timed
 
 Call = Callable[[], Any]
-
-
-class Plan(NamedTuple):
-    """Size of a measurement.
-
-    Attributes
-    ----------
-    rounds : in each of which every variant is timed
-    spell : seconds for which it is called again and again there
-    nodes : of grids
-    studied : nodes of the study of derivatives, the finest last
-    starts : of a command that finds its programs compiled
-    calculix : whether CalculiX is run where it is found
-    peer : script of condensed finite elements, timed if given
-    """
-
-    rounds: int = 7
-    spell: float = 0.1
-    nodes: tuple[int, ...] = (33, 65, 129, 257, 513, 1025)
-    studied: tuple[int, ...] = (41, 81, 161, 321)
-    starts: int = 1
-    calculix: bool = True
-    peer: str | None = None
-
-
-QUICK = Plan(
-    rounds=2,
-    spell=0.02,
-    nodes=(33, 65, 129),
-    studied=(41, 81),
-    starts=1,
-    calculix=False,
-)
 
 
 # --- the strip and its truth ----------------------------------------------------------------------
@@ -76,16 +42,9 @@ def scene(values: Mapping[str, Any] | None = None, end_size: float = END_SIZE) -
     return found.on_grid(own["model.nodes"], end_size).by_load_steps()
 
 
-@cache
 def truth() -> float:
     """Dissipation of the standard strip by fine finite elements."""
-    with (data_folder() / "energy.csv").open(encoding="utf-8") as table:
-        (row,) = (
-            row
-            for row in csv.DictReader(table)
-            if (float(row["eta"]), float(row["A"])) == (ETA, AMPLITUDE)
-        )
-    return float(row["D"])
+    return energies()[ETA, AMPLITUDE]["D"]
 
 
 # --- timing ---------------------------------------------------------------------------------------
@@ -98,7 +57,7 @@ def seconds_of(call: Call) -> float:
     return time.perf_counter() - begin
 
 
-def spell(call: Call, seconds: float) -> list[float]:
+def spell(call: Call, seconds: float = SPELL) -> list[float]:
     """Seconds of every call, called again and again for so long, at least once."""
     found: list[float] = []
     end = time.perf_counter() + seconds
@@ -107,12 +66,12 @@ def spell(call: Call, seconds: float) -> list[float]:
     return found
 
 
-def interleaved(calls: Mapping[str, Call], plan: Plan, name: str) -> dict[str, list[float]]:
+def interleaved(calls: Mapping[str, Call], rounds: int, name: str) -> dict[str, list[float]]:
     """Seconds of the calls, all of them in every round."""
     found: dict[str, list[float]] = {key: [] for key in calls}
-    for _ in tqdm(range(plan.rounds), disable=None, unit="round", desc=name):
+    for _ in tqdm(range(rounds), disable=None, unit="round", desc=name):
         for key, call in calls.items():
-            found[key] += spell(call, plan.spell)
+            found[key] += spell(call)
     return found
 
 

@@ -1,35 +1,21 @@
-"""Cost of gradients beside a run, and derivatives over the grid."""
+"""Cost of gradients beside a run."""
 
 from typing import Any
 
 import jax
 import jax.numpy as jnp
-from tqdm import tqdm
 
 import jbeamshell as jb
 
-from .common import (
-    END_SIZE,
-    FINE,
-    FINE_END_SIZE,
-    OVER,
-    Plan,
-    compiled,
-    interleaved,
-    numbers,
-    scene,
-    seconds_of,
-    summary,
-)
+from .common import ROUNDS, compiled, interleaved, numbers, scene, seconds_of, summary
 
 KEYS = ("contact.friction", "strip.height_ratio", "strip.kappa_s", "strip.axial_stiffness")
 STEPS = "load.steps_per_half_cycle"
 OFF = 1.05  # times the parameters, with which the loop to be met is made
-END_SIZES = {"1/36": END_SIZE, "1/3": FINE_END_SIZE}
 
 
-def gradient(plan: Plan) -> dict[str, Any]:
-    """Gradients of a loop's misfit in four parameters; dD/d(eta) over nodes."""
+def gradient(rounds: int = ROUNDS) -> dict[str, Any]:
+    """Gradients of a loop's misfit in four parameters."""
     start = jnp.ones(len(KEYS))
     ways = {"run": lambda f: f, "forward": jax.jacfwd, "reverse": jax.grad}
     built = {
@@ -40,7 +26,7 @@ def gradient(plan: Plan) -> dict[str, Any]:
     calls = {name: lambda f=built[name, 4][0]: f(start) for name in ways}
     for call in calls.values():
         seconds_of(call)
-    seconds = interleaved(calls, plan, "gradient")
+    seconds = interleaved(calls, rounds, "gradient")
     found = {name: summary(own) for name, own in seconds.items()}
     rows = [
         {"what": name, "compile_s": built[name, 4][1]}
@@ -67,7 +53,6 @@ def gradient(plan: Plan) -> dict[str, Any]:
         "rows": rows,
         "forward_to_reverse": float(jnp.max(jnp.abs(forward / reverse - 1.0))),
         "memory": memory,
-        "study": study(plan),
     }
 
 
@@ -83,26 +68,3 @@ def misfit(steps: int) -> Any:
         return jnp.mean((loop(*(factors * nominal))["displacement"] - target) ** 2) / size
 
     return function
-
-
-def study(plan: Plan) -> dict[str, Any]:
-    """Derivative of the dissipation along eta, the grid moving with it."""
-    rows = []
-    cases = [(name, count) for name in END_SIZES for count in plan.studied]
-    for name, count in tqdm(cases, disable=None, unit="grid", desc="derivative"):
-        here = scene({STEPS: 4, "model.nodes": count}, END_SIZES[name])
-        rows.append({"end_size": name, "nodes": count} | _derivative(here))
-    best = _derivative(scene(FINE | {STEPS: 4}, FINE_END_SIZE))
-    for row in rows:
-        row["D_error"] = row["D"] / best["D"] - 1.0
-        row["error"] = row["dD_deta"] / best["dD_deta"] - 1.0
-    return {"steps": 4, "against": {"nodes": FINE["model.nodes"], "end_size": "1/3"}, "rows": rows}
-
-
-def _derivative(here: jb.Scene) -> dict[str, float]:
-    eta, amplitude = numbers(here)
-    figure = jb.response(here, OVER)
-    value, slope = jax.jvp(
-        lambda e: figure(e, amplitude)["dissipation"], (eta,), (jnp.ones_like(eta),)
-    )
-    return {"D": float(value), "dD_deta": float(slope)}

@@ -1,9 +1,7 @@
-"""Machine of a measurement, its versions and its peak; and processes beside this one."""
+"""Processes beside that of a measurement, and the peak of a core."""
 
 import json
 import os
-import platform
-import re
 import subprocess
 import sys
 import time
@@ -12,44 +10,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import jax
-import jaxlib
 import numpy as np
 
-from jbeamshell.common.jax_options import is_asynchronous
-
 ROOT = Path(__file__).parents[3]
-SCRIPT = Path(__file__).parents[1] / "speed.py"
 GIVEN_FLAGS = os.environ.get("XLA_FLAGS", "")  # before this process adds its own
 PEAK_SIZE, PEAK_TRIES = 1024, 7
-
-
-def about() -> dict[str, Any]:
-    """Machine, versions and settings of this process."""
-    information = Path("/proc/cpuinfo")
-    text = information.read_text(encoding="utf-8") if information.exists() else ""
-    model = re.search(r"model name\s*:\s*(.*)", text)
-    return {
-        "machine": f"{platform.machine()}, {os.cpu_count()} cores",
-        "cpu": model[1] if model else platform.processor(),
-        "device": jax.devices()[0].device_kind,
-        "python": platform.python_version(),
-        "jax": jax.__version__,
-        "jaxlib": jaxlib.__version__,
-        "numpy": np.__version__,
-        "dtype": "float64",
-        "flags": os.environ.get("XLA_FLAGS", ""),
-        "async_dispatch": is_asynchronous(),
-        "omp_threads": int(os.environ["OMP_NUM_THREADS"]),
-        "commit": _git("rev-parse", "--short", "HEAD"),
-        "changed_since": bool(_git("status", "--porcelain", "jbeamshell")),
-        "date": time.strftime("%Y-%m-%d"),
-    }
-
-
-def _git(*words: str) -> str:
-    answer = subprocess.run(["git", *words], capture_output=True, text=True, cwd=ROOT)
-    return answer.stdout.strip()
 
 
 def peak_gflops() -> float:
@@ -66,24 +31,14 @@ def peak_gflops() -> float:
 def environment(**changes: str) -> dict[str, str]:
     """For a process that begins as this one did, without compiled programs of an earlier one."""
     values = {k: v for k, v in os.environ.items() if k != "JAX_COMPILATION_CACHE_DIR"}
-    return values | {"XLA_FLAGS": GIVEN_FLAGS} | changes
-
-
-def told(*words: object, **changes: str) -> Any:
-    """JSON that a child process of this script prints."""
-    command = [sys.executable, str(SCRIPT), "--child", *map(str, words)]
-    answer = subprocess.run(
-        command, stdout=subprocess.PIPE, text=True, check=True, env=environment(**changes)
-    )
-    return json.loads(answer.stdout)
+    return values | {"XLA_FLAGS": GIVEN_FLAGS, "PYTHONPATH": str(ROOT)} | changes
 
 
 @contextmanager
-def child(*words: object) -> Iterator[subprocess.Popen[str]]:
-    """A child of this script's that can be asked, and that ends with the block."""
-    command = [sys.executable, str(SCRIPT), "--child", *map(str, words)]
+def child(module: str, *words: object) -> Iterator[subprocess.Popen[str]]:
+    """A module run in a process that can be asked, and that ends with the block."""
     with subprocess.Popen(
-        command,
+        [sys.executable, "-m", module, *map(str, words)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -11,10 +11,12 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from rivals import condensed_elements, cubic_law, iwan, patterns_numpy
 from tqdm import tqdm
 
 import jbeamshell as jb
+from calibration import finite_elements
+from calibration.running import read
+from verification.benchmarks.rivals import condensed_elements, cubic_law, iwan, patterns_numpy
 
 from . import machine
 from .common import (
@@ -23,9 +25,9 @@ from .common import (
     FINE,
     FINE_END_SIZE,
     OVER,
+    ROUNDS,
+    SPELL,
     Call,
-    Plan,
-    interleaved,
     numbers,
     scene,
     seconds_of,
@@ -39,7 +41,7 @@ EXACT = {"model.kinematics": "exact"}
 LIFT = {"contact.normal": "rigid"}
 SMOOTH = {"contact.smoothing": 16.0}
 LOOP = ("force", "displacement", "dissipation")
-CALCULIX = machine.ROOT / "calibration" / "finite_elements" / "checked.json"
+CALCULIX = machine.ROOT / "calibration" / "finite_elements" / "check.json"
 SLOW_ROUNDS = 2  # of what takes seconds
 BACKBONE = np.linspace(0.0, 1.9, 41)  # forces of Iwan's network
 
@@ -110,7 +112,7 @@ def own_variants() -> list[Variant]:
     return found
 
 
-def rival_variants(plan: Plan) -> list[Variant]:
+def rival_variants(peer: str) -> list[Variant]:
     """Everything else."""
     found = []
     for size, steps in (((40, 4), 1), ((40, 4), 4), ((60, 6), 1)):
@@ -132,9 +134,9 @@ def rival_variants(plan: Plan) -> list[Variant]:
     row["returns"] = "loop; the cycle alone, of a network fitted to jbeamshell's backbone before"
     call = functools.partial(iwan.cycle, network, AMPLITUDE, 20)
     found.append(of_call(row, call, lambda answer: answer["dissipation"], fine()))
-    if plan.peer:
-        found += [_peer(plan.peer, steps) for steps in (2, 4)]
-    if plan.calculix and shutil.which("ccx"):
+    if peer:
+        found += [_peer(peer, steps) for steps in (2, 4)]
+    if shutil.which("ccx"):
         found += [_calculix(steps) for steps in (4, 20)]
     else:
         found.append(_calculix_recorded())
@@ -178,11 +180,8 @@ def _peer(script: str, steps: int) -> Variant:
 
 
 def _calculix(steps: int) -> Variant:
-    sys.path.append(str(machine.ROOT))  # calibration is no part of the package
-    from calibration.finite_elements import solve
-
     here = scene({STEPS: steps})
-    call = functools.partial(solve, here)
+    call = functools.partial(finite_elements.solve, here)
     row = {"what": f"CalculiX, {steps} steps", "by": "CalculiX", "steps": steps}
     row["returns"] = "History; quadratic elements, meshing and reading included"
     found = float(call().dissipation)
@@ -190,7 +189,7 @@ def _calculix(steps: int) -> Variant:
 
 
 def _calculix_recorded() -> Variant:
-    record = json.loads(CALCULIX.read_text(encoding="utf-8"))
+    record = read(CALCULIX)
     loop = next(
         loop
         for loop in record["loops"]
@@ -201,23 +200,23 @@ def _calculix_recorded() -> Variant:
     return Variant(row, lambda _: [loop["wall_s"]], loop["D"], truth(), 1)
 
 
-def one(plan: Plan) -> dict[str, Any]:
+def one(rounds: int = ROUNDS, peer: str = "") -> dict[str, Any]:
     """All variants of one run, interleaved."""
-    variants = own_variants() + rival_variants(plan)
+    variants = own_variants() + rival_variants(peer)
     with contextlib.ExitStack() as stack:
         for steps in (1, 4):
             like = next(v for v in variants if v.row["what"].startswith(f"dissipation, {steps}"))
-            process = stack.enter_context(machine.child("unflagged", steps))
+            process = stack.enter_context(machine.child(__name__, steps))
             row = {"what": f"{like.row['what']}, no flag", "by": "jbeamshell without the flag"}
             row |= {"steps": steps, "returns": "dissipation; in a process of its own"}
             row["first_s"] = machine.ask(process, 0.0)[0]
             timed = functools.partial(machine.ask, process)
             variants.append(like._replace(row=row, spell=timed))
         seconds: list[list[float]] = [[] for _ in variants]
-        for number in tqdm(range(plan.rounds), disable=None, unit="round", desc="one"):
+        for number in tqdm(range(rounds), disable=None, unit="round", desc="one"):
             for own, variant in zip(seconds, variants, strict=True):
                 if number < variant.rounds:
-                    own += variant.spell(plan.spell)
+                    own += variant.spell(SPELL)
     rows = [
         variant.row
         | summary(own)
@@ -274,22 +273,8 @@ def unflagged(steps: int) -> None:
         print(json.dumps(found), flush=True)
 
 
-def nodes(plan: Plan) -> dict[str, Any]:
-    """The dissipation in 1 step per half cycle over nodes."""
-    calls = {str(count): dissipation_call({"model.nodes": count}) for count in plan.nodes}
-    first = {name: seconds_of(call) for name, call in calls.items()}
-    seconds = interleaved(calls, plan, "nodes")
-    rows = [
-        {"nodes": int(name), "first_s": first[name]}
-        | summary(own)
-        | {"error": float(calls[name]()["dissipation"]) / fine() - 1.0}
-        for name, own in seconds.items()
-    ]
-    count, us = (np.log([row[key] for row in rows]) for key in ("nodes", "median_us"))
-    half = len(rows) // 2
-    return {
-        "steps": 1,
-        "rows": rows,
-        "slope": float(np.polyfit(count, us, 1)[0]),
-        "slope_of_the_finer_half": float(np.polyfit(count[half:], us[half:], 1)[0]),
-    }
+if __name__ == "__main__":
+    jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_enable_compilation_cache", False)
+    jb.configure(fast_loops=False, cache=False)
+    unflagged(int(sys.argv[1]))

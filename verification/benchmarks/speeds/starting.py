@@ -13,7 +13,6 @@ import time
 from typing import Any
 
 from . import machine
-from .common import Plan
 
 COMMANDS = {
     "jbeamshell run": ("run",),
@@ -36,17 +35,17 @@ BEGIN = (
 )
 
 
-def start(plan: Plan) -> dict[str, Any]:
+def start(starts: int = 1) -> dict[str, Any]:
     """Seconds of fresh processes: to import, and to a result without and with a cache."""
     python = sys.executable
-    imports = [_seconds((python, "-c", "import jbeamshell"), ".") for _ in range(plan.starts)]
+    imports = [_seconds((python, "-c", "import jbeamshell"), ".") for _ in range(starts)]
     cases = {what: (python, "-m", "jbeamshell", *words) for what, words in COMMANDS.items()}
     cases |= {what: (python, "-c", BEGIN + code) for what, code in RESULTS.items()}
     rows = []
     for what, command in cases.items():
         with tempfile.TemporaryDirectory(prefix="jbeamshell-speed-") as folder:
             cold_cpu, cold = _seconds(command, folder)
-            warm = [_seconds(command, folder) for _ in range(plan.starts)]
+            warm = [_seconds(command, folder) for _ in range(starts)]
         cpu, clock = (statistics.median(column) for column in zip(*warm, strict=True))
         rows.append(
             {
@@ -60,12 +59,12 @@ def start(plan: Plan) -> dict[str, Any]:
         print(rows[-1], file=sys.stderr, flush=True)
     import_cpu = statistics.median(cpu for cpu, _ in imports)
     load = os.getloadavg()[0]
-    return {"import_cpu_s": import_cpu, "starts": plan.starts, "load": load, "rows": rows}
+    return {"import_cpu_s": import_cpu, "starts": starts, "load": load, "rows": rows}
 
 
 def _seconds(command: tuple[str, ...], folder: str) -> tuple[float, float]:
     """Seconds of the processors and of the clock that a process takes in a folder."""
-    environment = machine.environment(XDG_CACHE_HOME=folder, PYTHONPATH=str(machine.ROOT))
+    environment = machine.environment(XDG_CACHE_HOME=folder)
     before, begin = os.times(), time.perf_counter()
     subprocess.run(command, env=environment, cwd=folder, capture_output=True, check=True)
     after = os.times()
