@@ -1,9 +1,10 @@
-"""Faults planted in the core are found by the ordinary tests; see `mutations`."""
+"""Faults planted in the core are found by the ordinary tests; see `verification.mutations`."""
 
 import json
 
-import mutations
 import pytest
+
+from verification import mutations
 
 # Two survive that change no result: from how evenly pressing starts, and a margin of a check that
 # others of the same branch imply on all strips tried.  One is found by the slow tests alone: the

@@ -1,7 +1,6 @@
 """Comparisons of methods: the figure of each, and each trap seen to close."""
 
 import functools
-import json
 from pathlib import Path
 
 import jax
@@ -12,13 +11,13 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from calibration import charts
-from calibration.methods import controls, events, grids, laws, shooting, solvers
-from calibration.methods.strips import scene_of
+from calibration.running import read
 from jbeamshell.load_steps.system import BETA, System, V, W
+from verification import methods
+from verification.compared import events, grids, laws, shooting, solvers
+from verification.compared.strips import scene_of
 
 CYCLE = 8  # load steps per half cycle at most; fewer are held, so that all paths compile once
-RECORD = Path(__file__).parents[2] / "calibration" / "methods.json"
 
 
 @functools.cache
@@ -183,42 +182,31 @@ def test_the_librarys_element_is_the_one_that_is_compared():
     np.testing.assert_allclose(ours @ fields.ravel(), theirs, atol=1e-12 * np.max(np.abs(theirs)))
 
 
-# --- control --------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_beyond_gross_slip_a_free_strip_has_no_equilibrium_and_that_is_said():
-    (force,) = controls.to_gross_slip("force", [1.2], "free", steps=6, nodes=21)
-    assert force["unfound"] == 1
-    assert force["residual"] > 0.05
-    assert "set load.control to 'displacement'" in controls.refusal(1.1)
-
-
 # --- charts ---------------------------------------------------------------------------------------
 
 
 @pytest.fixture
 def record():
-    yield json.loads(RECORD.read_text(encoding="utf-8"))
+    yield read(Path(methods.__file__).with_suffix(".json"))
     plt.close("all")
 
 
 def test_charts_show_what_the_record_holds(record):
-    axes = charts.methods.draw(record, "steps")
+    axes = methods.chart(record, "steps")
     (row,) = (row for row in record["steps"]["rows"] if row["scene"] == "standard")
     lines = {line.get_label(): line for line in axes.lines}
     np.testing.assert_allclose(lines["standard"].get_ydata(), np.abs(row["off"]))
-    axes = charts.methods.draw(record, "solvers")
+    axes = methods.chart(record, "solvers")
     shares = [bar.get_width() for bar in axes.patches[: len(record["solvers"]["rows"])]]
     found = [100.0 * row["found"] for row in record["solvers"]["rows"]]
     np.testing.assert_allclose(shares[::-1], found)
-    assert sum(axes.axison for axes in charts.methods.sheet(record).axes) == 9
+    assert sum(axes.axison for axes in methods.draw(record).axes) == 6
 
 
 def test_what_the_record_lacks_is_said(record):
     with pytest.raises(jb.InputError, match="no section 'laws'"):
-        charts.methods.draw({}, "laws")
+        methods.chart({}, "laws")
     with pytest.raises(jb.InputError, match="name = 'heat': choose one of laws, steps"):
-        charts.methods.draw(record, "heat")
+        methods.chart(record, "heat")
     with pytest.raises(jb.InputError, match="nothing to draw"):
-        charts.methods.sheet({})
+        methods.draw({})
