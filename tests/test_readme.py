@@ -15,6 +15,8 @@ SITE = ROOT / "notebooks" / "pages"
 PAGES = (
     "README.md",
     "CONTRIBUTING.md",
+    "calibration/README.md",
+    "verification/README.md",
     "notebooks/index.md",
     *sorted(path.relative_to(ROOT).as_posix() for path in SITE.glob("*.md")),
 )

@@ -1,7 +1,10 @@
 """The command of studies and verification: what it lists, runs, writes, refuses and draws."""
 
 import json
+import re
+import shutil
 import sys
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -9,8 +12,10 @@ import pytest
 
 import jbeamshell as jb
 from calibration import running
+from jbeamshell.cli.main import main
 from verification.benchmarks import sections
 
+ROOT = Path(__file__).parents[2]
 FOUND = {
     f"{folder}/{name}": found
     for folder in ("calibration", "verification")
@@ -119,3 +124,21 @@ def test_a_map_of_a_section_shows_all_cells():
     drawn = np.asarray(axes.collections[0].get_array()).ravel()
     off = sorted(100.0 * abs(cell["squeeze"] - 1.0) for cell in record["cells"])
     np.testing.assert_allclose(sorted(drawn), off, rtol=1e-9)
+
+
+def test_the_readme_takes_a_loop_to_a_fitted_joint(tmp_path, monkeypatch, capsys):
+    folder = ROOT / "calibration"
+    text = (folder / "README.md").read_text("utf-8")
+    (shell, told), (python, printed) = (
+        re.search(rf"```{kind}\n(.*?)```\n.*?```text\n(.*?)```", text, re.DOTALL).groups()
+        for kind in ("sh", "python")
+    )
+    shutil.copytree(folder / "my_joint", tmp_path, dirs_exist_ok=True)
+    (tmp_path / "fit.png").unlink()
+    monkeypatch.chdir(tmp_path)
+    assert main(shell.split()[1:]) == 0
+    assert capsys.readouterr().out.startswith(told)
+    assert (tmp_path / "out" / "overlay.png").exists()
+    exec(python, {})
+    assert capsys.readouterr().out == printed
+    assert (tmp_path / "fit.png").exists()
