@@ -57,7 +57,6 @@ class Chart(NamedTuple):
     log : names of the logarithmic axes, such as "xy"
     ticks : function of the section that gives the only marks of the x axis
     extra : function of the axes and the section that draws anything else
-    width : width of the panel on a sheet, relative to the others
     """
 
     section: str
@@ -68,7 +67,6 @@ class Chart(NamedTuple):
     log: str = ""
     ticks: Callable[[Any], Iterable[float]] | None = None
     extra: Callable[[Axes, Any], None] | None = None
-    width: float = 1.0
 
 
 def draw(charts: Mapping[str, Chart], record: Record, name: str, axes: Axes | None = None) -> Axes:
@@ -142,14 +140,12 @@ def sheet(charts: Mapping[str, Chart], record: Record) -> Figure:
         raise InputError(f"record: has nothing to draw: give one with a section of {sections}")
     columns = min(COLUMNS, len(names))
     rows = -(-len(names) // columns)
-    widths = [max(charts[name].width for name in names[i::columns]) for i in range(columns)]
     with style():
         figure, grid = plt.subplots(
             rows,
             columns,
-            figsize=(5.0 * sum(widths), 4.3 * rows),
+            figsize=(5.0 * columns, 4.3 * rows),
             squeeze=False,
-            width_ratios=widths,
         )
     for axes in grid.flat[len(names) :]:
         axes.set_axis_off()

@@ -61,7 +61,7 @@ def single(record: dict) -> str:
     rows = (
         (NAMES.get(what := row["what"].split(",")[0], what), row["steps"], time(row["median_us"]),
          percent(row["error"]), percent(row["error_to_elements"]), row["returns"].split(";")[0])
-        for row in record["one"]["rows"] if "no flag" not in row["what"]
+        for row in record["one"]["rows"]
     )  # fmt: skip
     heads = ("what", "steps per half cycle", "time", "error of D", "to elements", "returns")
     return table(heads, rows) + machine(record["about"]["one"])
@@ -229,11 +229,7 @@ def laws(record: dict) -> str:
 def squeeze(record: dict) -> str:
     """Receding contact and Filon's tension over the order of the section."""
     exact = record["finite_elements"]
-    finest = {
-        row["order"]: row
-        for row in sorted(record["sections"], key=lambda row: row["nodes"])
-        if row["kinematics"] == "linear"
-    }
+    finest = {row["order"]: row for row in sorted(record["sections"], key=lambda row: row["nodes"])}
     rows = [
         (order, f"{row['receding']['contact_end_mm']:.3f}",
          f"{row['receding']['reaction_max_MPa']:.2f}", f"{row['receding']['lift_slope']:.4g}",

@@ -5,7 +5,6 @@ on the machine disturbs least; compile time apart.  Rates and ratios are of the 
 parts:
 
 - cycle: one pull and a cycle of the standard strip, factors kept and building included;
-- batch: 64 height ratios x 256 amplitudes; sweeps are in sweeps.py;
 - error: over the contact nodes, against converged finite elements;
 - peer: elements of your own at equal error, by peer=SCRIPT: a module that condenses finite elements
   with `Strip(eta, lines=, keep_lu=)` and `cyc(strip, amplitude, steps_per_quarter, cycles)`.
@@ -102,30 +101,6 @@ def cycle() -> dict[str, Any]:
     return found
 
 
-def batch() -> dict[str, Any]:
-    """Many strips and amplitudes."""
-    etas, amplitudes = jnp.geomspace(0.03, 0.4, 64), jnp.linspace(0.1, 1.9, 256)
-    many = etas.size * amplitudes.size
-
-    def one(eta: jax.Array) -> contact_line.SteadyCycles:
-        return contact_line.factors(scene(eta))
-
-    build = jax.jit(lambda etas: jax.lax.map(one, etas))
-    ask = jax.jit(lambda kept: jax.lax.map(lambda own: own.dissipation(amplitudes), kept))
-    both = jax.jit(lambda etas: jax.lax.map(lambda e: one(e).dissipation(amplitudes), etas))
-    kept = build(etas)
-    calls: dict[str, tuple[int, Callable[[], Any]]] = {
-        "64 eta x 256 A, factors kept": (many, lambda: ask(kept)),
-        "64 eta x 256 A, all built": (many, lambda: both(etas)),
-    }
-    found: dict[str, Any] = {}
-    for name, (count, call) in calls.items():
-        took = repeated(call)
-        rate = 1e6 * count / took["core_us"]
-        found[name] = took | {"lanes": count, "lanes_per_s": rate}
-    return found
-
-
 def error() -> list[dict[str, Any]]:
     """Worst errors over the nodes."""
     cells, found = rows("energy.csv"), []
@@ -218,7 +193,6 @@ def measure(peer: str = "") -> dict[str, Any]:
     found: dict[str, Any] = {
         "peak_gflops": peak_gflops(),
         "cycle": cycle(),
-        "batch": batch(),
         "error": error(),
     }
     return found | {"peer": beside(peer) if peer else known.get("peer")}

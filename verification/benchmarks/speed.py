@@ -24,7 +24,7 @@ def tell(record: dict[str, Any]) -> str:
     lines = []
     for name in PARTS:
         lines.append(name)
-        for row in (*record[name]["rows"], *record[name].get("ratios", [])):
+        for row in record[name]["rows"]:
             words = (
                 f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
                 for key, value in row.items()

@@ -18,18 +18,14 @@ def gradient(rounds: int = ROUNDS) -> dict[str, Any]:
     """Gradients of a loop's misfit in four parameters."""
     start = jnp.ones(len(KEYS))
     ways = {"run": lambda f: f, "forward": jax.jacfwd, "reverse": jax.grad}
-    built = {
-        (name, steps): compiled(way(misfit(steps)), start)
-        for steps in (4, 40)
-        for name, way in ways.items()
-    }
-    calls = {name: lambda f=built[name, 4][0]: f(start) for name in ways}
+    built = {name: compiled(way(misfit(4)), start) for name, way in ways.items()}
+    calls = {name: lambda f=program: f(start) for name, (program, _) in built.items()}
     for call in calls.values():
         seconds_of(call)
     seconds = interleaved(calls, rounds, "gradient")
     found = {name: summary(own) for name, own in seconds.items()}
     rows = [
-        {"what": name, "compile_s": built[name, 4][1]}
+        {"what": name, "compile_s": built[name][1]}
         | found[name]
         | {
             f"{key}_runs": found[name][f"{key}_us"] / found["run"][f"{key}_us"]
@@ -38,21 +34,12 @@ def gradient(rounds: int = ROUNDS) -> dict[str, Any]:
         for name in ways
     ]
     forward, reverse = (calls[name]() for name in ("forward", "reverse"))
-    memory = [
-        {
-            "what": name,
-            "steps": steps,
-            "temporary_kb": 1e-3 * program.memory_analysis().temp_size_in_bytes,
-        }
-        for (name, steps), (program, _) in built.items()
-    ]
     return {
         "parameters": list(KEYS),
         "steps": 4,
         "nodes": scene().plan.nodes,
         "rows": rows,
         "forward_to_reverse": float(jnp.max(jnp.abs(forward / reverse - 1.0))),
-        "memory": memory,
     }
 
 

@@ -1,6 +1,5 @@
 """One run: every variant and rival side by side, and over nodes."""
 
-import contextlib
 import functools
 import json
 import shutil
@@ -203,20 +202,11 @@ def _calculix_recorded() -> Variant:
 def one(rounds: int = ROUNDS, peer: str = "") -> dict[str, Any]:
     """All variants of one run, interleaved."""
     variants = own_variants() + rival_variants(peer)
-    with contextlib.ExitStack() as stack:
-        for steps in (1, 4):
-            like = next(v for v in variants if v.row["what"].startswith(f"dissipation, {steps}"))
-            process = stack.enter_context(machine.child(__name__, steps))
-            row = {"what": f"{like.row['what']}, no flag", "by": "jbeamshell without the flag"}
-            row |= {"steps": steps, "returns": "dissipation; in a process of its own"}
-            row["first_s"] = machine.ask(process, 0.0)[0]
-            timed = functools.partial(machine.ask, process)
-            variants.append(like._replace(row=row, spell=timed))
-        seconds: list[list[float]] = [[] for _ in variants]
-        for number in tqdm(range(rounds), disable=None, unit="round", desc="one"):
-            for own, variant in zip(seconds, variants, strict=True):
-                if number < variant.rounds:
-                    own += variant.spell(SPELL)
+    seconds: list[list[float]] = [[] for _ in variants]
+    for number in tqdm(range(rounds), disable=None, unit="round", desc="one"):
+        for own, variant in zip(seconds, variants, strict=True):
+            if number < variant.rounds:
+                own += variant.spell(SPELL)
     rows = [
         variant.row
         | summary(own)
@@ -226,55 +216,4 @@ def one(rounds: int = ROUNDS, peer: str = "") -> dict[str, Any]:
         }
         for variant, own in zip(variants, seconds, strict=True)
     ]
-    return {"eta": ETA, "A": AMPLITUDE, "nodes": 41, "rows": rows, "ratios": ratios(rows)}
-
-
-def ratios(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Rivals' medians over that of our fastest answer without a larger error, and the flag's gain.
-
-    By either error; None where none of ours is as right.
-    """
-    by_name = {row["what"]: row for row in rows}
-    ours = [row for row in rows if row["by"] == "jbeamshell"]
-    found = []
-    for rival in rows:
-        if rival["by"] not in ("condensed elements", "peer", "CalculiX"):
-            continue
-        for error in ("error", "error_to_elements"):
-            fair = [row for row in ours if abs(row[error]) <= abs(rival[error])]
-            best = min(fair, key=lambda row: row["median_us"], default=None)
-            found.append(
-                {
-                    "of": rival["what"],
-                    "over": best["what"] if best else None,
-                    "no_worse_in": error,
-                    "times": rival["median_us"] / best["median_us"] if best else None,
-                }
-            )
-    for steps in ("1 step", "4 steps"):
-        name = f"dissipation, {steps}"
-        times = by_name[f"{name}, no flag"]["median_us"] / by_name[name]["median_us"]
-        found.append({"of": f"{name}, no flag", "over": name, "no_worse_in": None, "times": times})
-    calculix = [row for row in rows if row["by"] == "CalculiX"]
-    for rival in calculix:
-        name = "dissipation, 1 step"
-        times = rival["median_us"] / by_name[name]["median_us"]
-        found.append({"of": rival["what"], "over": name, "no_worse_in": None, "times": times})
-    return found
-
-
-def unflagged(steps: int) -> None:
-    """Answer lines of seconds with those of every call; of a process without the flag."""
-    call = dissipation_call({STEPS: steps})
-    first = True
-    for line in sys.stdin:
-        found = [seconds_of(call)] if first else spell(call, json.loads(line))
-        first = False
-        print(json.dumps(found), flush=True)
-
-
-if __name__ == "__main__":
-    jax.config.update("jax_enable_x64", True)
-    jax.config.update("jax_enable_compilation_cache", False)
-    jb.configure(fast_loops=False, cache=False)
-    unflagged(int(sys.argv[1]))
+    return {"eta": ETA, "A": AMPLITUDE, "nodes": 41, "rows": rows}
