@@ -7,9 +7,7 @@ goes on where a run was cut.
 """
 
 import functools
-import multiprocessing
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import jax
@@ -56,7 +54,6 @@ SOLVERS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "linear": (LINEAR, EXACT),
     "collocation": ({"model.grid": "collocation"}, EXACT),
     "smooth, m = 16": (SMOOTH, EXACT),
-    "single precision": ({"single": True}, EXACT),
     "one step": ({"load.steps_per_half_cycle": 1}, EXACT),
 }
 MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
@@ -96,7 +93,6 @@ Row = tuple[Any, dict[str, Any], dict[str, Any], dict[str, float]]
 def runner(settings: tuple[tuple[str, Any], ...]) -> Callable[[jax.Array], jax.Array]:
     """Compiled function from the numbers of `STANDARD` to the figures, for some settings."""
     given = {key: list(v) if isinstance(v, tuple) else v for key, v in settings}
-    given.pop("single", None)
     base = changed(in_load_steps(), given)
 
     @jax.jit
@@ -159,20 +155,9 @@ def doubts_beforehand(settings: Mapping[str, Any], point: Mapping[str, float]) -
 
 
 def _figures(settings: Mapping[str, Any], point: Mapping[str, float]) -> list[Any]:
-    """Figures of a run, in single precision if the settings ask for it."""
+    """Figures of a run with some of the numbers of `STANDARD` replaced."""
     fixed = tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in settings.items())
-    given = fixed, tuple((STANDARD | point).values())
-    return (
-        single_precision().submit(figures, *given).result()
-        if "single" in settings
-        else figures(*given)
-    )
-
-
-@functools.cache
-def single_precision() -> ProcessPoolExecutor:
-    """Process in single precision."""
-    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
+    return figures(fixed, tuple((STANDARD | point).values()))
 
 
 # --- maps -----------------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ from calibration.charts import OFF, Chart, Curve, column
 from jbeamshell.plotting.style import FAINT, PALETTE
 from verification.compared import events, grids, laws, shooting, solvers, strips
 
+PER_HALF_CYCLE = "load steps per half cycle  [1]"
 STEPS = [2, 10, 40, 320]
 FEWER_STEPS = [10, 40]  # of all scenes but the first
 LAW_STRIPS, NODES = ("standard", "thick", "near gross slip"), 41  # on which laws are compared
@@ -109,16 +110,7 @@ def compared_steps() -> Section:
 def compared_shooting() -> Section:
     """Errors of shooting over the growth of its solutions."""
     lengths = [float(x) for x in np.geomspace(1.0, 100.0, 25)]
-    squeeze = [shooting.shoot_squeeze(x)._asdict() for x in lengths]
-    stuck = []
-    for alpha in (6.0, 1000.0):
-        for eta in np.geomspace(0.02, 4.0, 24):
-            scene = strips.scene_of("standard").replace({"strip.height_ratio": float(eta)})
-            unit = float(scene.strip.shear_modulus / scene.strip.half_height)
-            shot = shooting.shoot(scene, alpha * unit)._asdict()
-            shot = {key: strips.number(value) for key, value in shot.items()}
-            stuck.append({"eta": float(eta), "alpha": alpha} | shot)
-    return {"squeeze": squeeze, "stuck": stuck}
+    return {"squeeze": [shooting.shoot_squeeze(x)._asdict() for x in lengths]}
 
 
 PARTS = {
@@ -169,14 +161,10 @@ def _solvers(axes: Axes, section: Any) -> None:
 
 
 def _shooting(section: Any) -> Iterator[Curve]:
-    """Errors of shooting over the digits by which the fastest solution grows."""
-    families = {"squeezed": ("o", section["squeeze"], "error")}
-    for alpha in sorted({row["alpha"] for row in section["stuck"]}):
-        rows = [r for r in section["stuck"] if r["alpha"] == alpha and r["path_error"] is not None]
-        families[rf"stuck, $\alpha = {alpha:g}$"] = ("s", rows, "path_error")
-    for label, (marker, rows, name) in families.items():
-        error = np.maximum(column(rows, name), SMALLEST)
-        yield Curve(label, column(rows, "growth"), error, look={"marker": marker, "linestyle": ""})
+    """Errors of shooting over the digits by which its solution grows."""
+    rows = section["squeeze"]
+    error, look = np.maximum(column(rows, "error"), SMALLEST), {"linestyle": ""}
+    yield Curve("squeezed strip", column(rows, "growth"), error, look=look)
 
 
 def _rounding(axes: Axes, section: Any) -> None:
@@ -193,9 +181,9 @@ def _families(x: str, name: str, section: Any) -> Iterator[Curve]:
 
 
 CHARTS = {
-    "laws": Chart("laws", STEPS, OFF, f"friction laws, {LAW_STRIPS[0]}", _laws, "xy"),
+    "laws": Chart("laws", PER_HALF_CYCLE, OFF, f"friction laws, {LAW_STRIPS[0]}", _laws, "xy"),
     "steps": Chart(
-        "steps", STEPS, OFF, "load steps against events (dashed: loop area)", _steps, "xy"
+        "steps", PER_HALF_CYCLE, OFF, "load steps against events (dashed: loop area)", _steps, "xy"
     ),
     "solvers": Chart(
         "solvers", lambda section: f"of {section['strips']} random strips  [%]", "", extra=_solvers

@@ -70,8 +70,9 @@ def draw(record: dict[str, Any]) -> plt.Figure:
             plotting.PALETTE, record["fits"][name][f"{eta:g}"].values(), strict=False
         ):
             loop = figures["loop"]
-            axes[0].plot(loop["measured"], loop["force"], **plotting.DOTS)
             axes[0].plot(loop["fitted"], loop["force"], color=colour)
+            axes[0].plot(loop["measured"], loop["force"], **plotting.DOTS)
+        axes[0].legend(["fit", "finite elements"])
         axes[0].set(xlabel=plotting.DISPLACEMENT, ylabel=plotting.FORCE)
         axes[0].set_title(rf"single loops of $\eta$ = {eta:g}, fitted by the {name}")
         for axis, key, symbol in zip(axes[1:], FREE, SYMBOLS, strict=True):

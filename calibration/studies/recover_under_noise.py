@@ -99,7 +99,7 @@ def likelihood_root(fit: identify.Fit, loops: list[Loop], key: str) -> float:
 
 
 def summary(noise: float, fits: list[dict]) -> dict[str, Any]:
-    """Estimates, bias and coverage at one level of noise."""
+    """Bias and coverage at one level of noise."""
     record: dict[str, Any] = {"noise": noise, "repeats": len(fits)}
     record["settled"] = sum(fit["status"] == "converged" for fit in fits)
     record["model_runs"] = float(np.mean([fit["model_runs"] for fit in fits]))
@@ -110,7 +110,6 @@ def summary(noise: float, fits: list[dict]) -> dict[str, Any]:
         shift = np.log(values / truth)
         roots = np.array([fit["likelihood_root"][key] for fit in fits])
         own = {
-            "estimates": values.tolist(),
             "median": float(np.median(values)),
             "spread": float(np.std(shift, ddof=1)),
             "standard_error": float(np.nanmedian(error)),
@@ -174,18 +173,24 @@ def tell(record: dict[str, Any]) -> str:
 
 
 def draw(record: dict[str, Any]) -> plt.Figure:
-    """Picture of all estimates over the true values, by noise."""
+    """Picture of the estimates over the true values, by noise: median, spread and its estimate."""
     with plotting.style():
         figure, panels = plt.subplots(1, len(TRUTH), figsize=(11.0, 3.6))
+        place = np.arange(len(NOISES))
         for panel, (key, truth), symbol in zip(panels, TRUTH.items(), SYMBOLS, strict=True):
-            for place, (own, shade) in enumerate(
-                zip(record["noises"], plotting.colours(len(NOISES)), strict=True)
+            own = [noise[key] for noise in record["noises"]]
+            middle = np.array([one["median"] for one in own]) / truth
+            for shift, name, label in (
+                (-0.1, "spread", "spread of 50 fits"),
+                (0.1, "standard_error", "standard error that they tell"),
             ):
-                values = np.array(own[key]["estimates"]) / truth
-                across = place + np.linspace(-0.3, 0.3, values.size)
-                panel.plot(across, np.sort(values), ".", color=shade, markersize=3.5)
+                size = np.array([one[name] for one in own])
+                bars = middle * np.stack([1.0 - np.exp(-size), np.exp(size) - 1.0])
+                look = {"fmt": "o", "markersize": 4.0, "capsize": 3.0, "label": label}
+                panel.errorbar(place + shift, middle, bars, **look)
             panel.axhline(1.0, color=plotting.DATA, linewidth=1.0)
-            panel.set_xticks(range(len(NOISES)), [f"{100 * noise:g} %" for noise in NOISES])
-            panel.set(title=symbol, xlabel="noise over range  [1]", yscale="log")
-        panels[0].set_ylabel("fitted over true value, sorted  [1]")
+            panel.set_xticks(place, [f"{100 * noise:g} %" for noise in NOISES])
+            panel.set(title=symbol, xlabel="noise over range  [1]")
+        panels[0].set_ylabel("fitted over true value  [1]")
+        panels[0].legend(loc="upper left", fontsize=7)
     return figure

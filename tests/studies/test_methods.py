@@ -12,7 +12,7 @@ from toy import STRIP
 
 import jbeamshell as jb
 from calibration.running import read
-from jbeamshell.load_steps.system import BETA, System, V, W
+from jbeamshell.load_steps.system import System
 from verification import methods
 from verification.compared import events, grids, laws, shooting, solvers
 from verification.compared.strips import scene_of
@@ -93,43 +93,6 @@ def test_shooting_loses_the_digits_by_which_its_solutions_grow():
     hopeless = shooting.shoot_squeeze(100.0)
     assert hopeless.growth * np.log(10.0) == pytest.approx(440.0, abs=2.0)
     assert hopeless.error > 1e90
-
-
-@pytest.mark.parametrize(("alpha", "reach"), [(6.0, 9.0), (1000.0, 0.7)])
-def test_shooting_at_a_stuck_strip_reaches_as_far_as_its_exponents_let_it(alpha, reach):
-    """Reach: L/H at which it has eight digits left; at three times that it has none."""
-    for factor, right in ((1.0, True), (3.0, False)):
-        scene = scene_of("standard").replace({"strip.height_ratio": 2.0 / (factor * reach)})
-        unit = float(scene.strip.shear_modulus / scene.strip.half_height)
-        shot = shooting.shoot(scene, alpha * unit)
-        assert (shot.growth < 8.0) == right
-        assert (shot.path_error < 1e-7) == right
-        assert (shot.path_error > 1e-3) != right
-
-
-def test_the_bounded_solution_is_that_of_elements():
-    """Shooting's yardstick, against linear elements on the same foundation: second order."""
-    scene = scene_of("standard")
-    strip = scene.strip
-    length, half_height = float(strip.length), float(strip.half_height)
-    sliding = 6.0 * float(strip.shear_modulus) / half_height
-    pull = np.array([1.0, -half_height, 0.0])
-    exact = shooting.bounded(shooting.equations(scene, sliding), length, pull)[-1, :2] @ pull[:2]
-    off = []
-    for count in (40, 80):
-        x = np.linspace(0.0, length, count + 1)
-        matrix = grids.stiffness(scene, x, grids.RULES[grids.LIBRARY])
-        share = np.full(x.size, x[1])
-        share[[0, -1]] *= 0.5
-        places = 4 * np.arange(x.size)
-        matrix[places, places] += sliding * share
-        load = np.zeros(places.size * 4)
-        load[-4], load[-2] = pull[:2]
-        held = [0, 2, *(places + W)]
-        found = grids.solved(matrix, load, held)[-1, [V, BETA]] @ pull[:2]
-        off.append(abs(found / exact - 1.0))
-    assert off[1] < 0.02
-    assert np.log2(off[0] / off[1]) == pytest.approx(2.0, abs=0.3)
 
 
 # --- iterations -----------------------------------------------------------------------------------
