@@ -20,6 +20,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -29,7 +30,7 @@ from calibration.running import read
 from calibration.tables import rows
 from jbeamshell import contact_line
 from jbeamshell.contact_line.dissipation import NODES, REFINED
-from jbeamshell.plotting.style import DATA, PALETTE, single, style
+from jbeamshell.plotting.style import DATA, PALETTE, style
 from verification.benchmarks.speeds.machine import peak_gflops
 
 ETA, AMPLITUDE = 0.1126, 0.7855
@@ -204,9 +205,9 @@ def measure(peer: str = "") -> dict[str, Any]:
 def draw(record: dict[str, Any]) -> Figure:
     """Draw errors of D against elasticity [%] over the time of a cycle [ms], both logarithmic."""
     with style():
-        axes = single(None)
+        figure, axes = plt.subplots(figsize=(6.4, 4.8))
         _draw(axes, record, read(Path(__file__).with_name("speed.json")))
-    return axes.figure
+    return figure
 
 
 def _draw(axes: Axes, condensed: dict[str, Any], speeds: dict[str, Any]) -> None:
