@@ -19,9 +19,14 @@ def test_the_record_says_which_test_finds_each_fault():
     assert sum(map(bool, FOUND.values())) >= 0.95 * len(every)
 
 
-def test_every_fault_has_its_place_in_the_code():
+def test_every_fault_has_its_place_in_the_code_and_its_tests():
     for fault in mutations.faults():
         assert fault.right in mutations.text_of(fault), fault.name
+        for test in fault.tests:
+            path, *names = test.split("::")
+            place = mutations.ROOT / path
+            assert place.exists(), test
+            assert not names or f"{names[-1].partition('[')[0]}(" in place.read_text("utf-8"), test
 
 
 @pytest.mark.slow
