@@ -189,16 +189,16 @@ def _arguments(function: Callable[..., Any], words: Mapping[str, str]) -> dict[s
 
 def as_text(record: Record) -> str:
     """Record as JSON, every innermost list or row on one line."""
-    text = json.dumps(short(record), indent=1, allow_nan=False)
+    text = json.dumps(_short(record), indent=1, allow_nan=False)
     return re.sub(r"[\[{][^][{}]*[\]}]", lambda row: " ".join(row[0].split()), text) + "\n"
 
 
-def short(value: Any) -> Any:
+def _short(value: Any) -> Any:
     """The same with nine digits of every number; what is not finite is None."""
     if isinstance(value, dict):
-        return {key: short(item) for key, item in value.items()}
+        return {key: _short(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [short(item) for item in value]
+        return [_short(item) for item in value]
     if isinstance(value, float):
         return float(f"{value:.{DIGITS}g}") if abs(value) < float("inf") else None
     return value

@@ -30,7 +30,6 @@ from tqdm import tqdm
 import jbeamshell as jb
 from calibration.charts import OFF
 from calibration.provenance import provenance
-from calibration.running import short
 from calibration.strip import changed
 from jbeamshell.common.files import write_text
 from jbeamshell.history.reliability import TOLERANCE
@@ -173,6 +172,15 @@ def compared(values: Values, other: Values | None, before: Row | None = None) ->
     return {"outcome": outcome(row)} | row
 
 
+def _rounded(value: Any) -> Any:
+    """Value with nine digits of its numbers; an estimate may be infinite."""
+    if isinstance(value, float):
+        return float(f"{value:.9g}")
+    if isinstance(value, dict):
+        return {key: _rounded(each) for key, each in value.items()}
+    return value
+
+
 def read() -> list[Row]:
     """Rows of the record; the line before them tells its provenance."""
     if not RECORD.exists():
@@ -203,7 +211,7 @@ def measure(kind: str = "", share: float = 1.0, seed: int = SEED, again: bool = 
     known = {(row["seed"], row["kind"], row["number"]): row for row in read()}
 
     def line(row: Row) -> str:
-        return json.dumps(short(row)) + "\n"
+        return json.dumps(_rounded(row)) + "\n"
 
     def write() -> None:
         about = {"about": provenance(), "tolerance": TOLERANCE}
