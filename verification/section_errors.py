@@ -29,7 +29,7 @@ from jbeamshell.scene.keys import ENTRIES
 SHIPPED = Path(jb.__file__).parent / "scene" / "section_errors.json"
 SEED = 46
 FIGURES = ("dissipation", "secant_stiffness", "slip_length", "dissipation_ratio")
-PARTS = np.geomspace(0.03, 0.95, 9)  # of gross slip
+LOADS = np.geomspace(0.03, 0.95, 9)  # over gross slip
 FINE, NODES = 257, 129  # contact nodes of plane elasticity, and of the sections
 BINS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0)
 BINS += (8.0, 10.0, 14.0, 20.0, 60.0)  # of the slip length over H
@@ -127,9 +127,9 @@ def runs(scenes: list[Values], gross: np.ndarray, model: Values) -> np.ndarray:
     numbers = [key for key, value in scenes[0].items() if not isinstance(value, str)]
     begin = scenes[0] | model | {"load.amplitude": 0.1 * gross[0]}
     ask = jb.response(jb.Scene().replace(begin), (*numbers, "load.amplitude"), FIGURES)
-    found = np.full((len(scenes), PARTS.size, len(FIGURES)), np.nan)
+    found = np.full((len(scenes), LOADS.size, len(FIGURES)), np.nan)
     for i, values in enumerate(scenes):
-        for j, part in enumerate(PARTS):
+        for j, part in enumerate(LOADS):
             answer = ask(*(values[key] for key in numbers), part * gross[i])
             if int(answer["status"]) == 0:
                 found[i, j] = [float(answer[name]) for name in FIGURES]
