@@ -1,9 +1,11 @@
-"""Faults planted in the core are found by the ordinary tests; see `mutations`."""
+"""Faults planted in the core are found by the ordinary tests; see `verification.mutations`."""
 
 import json
+import re
 
-import mutations
 import pytest
+
+from verification import mutations
 
 # Two survive that change no result: from how evenly pressing starts, and a margin of a check that
 # others of the same branch imply on all strips tried.  One is found by the slow tests alone: the
@@ -18,9 +20,15 @@ def test_the_record_says_which_test_finds_each_fault():
     assert sum(map(bool, FOUND.values())) >= 0.95 * len(every)
 
 
-def test_every_fault_has_its_place_in_the_code():
+def test_every_fault_has_its_place_in_the_code_and_its_tests():
     for fault in mutations.faults():
         assert fault.right in mutations.text_of(fault), fault.name
+        for test in fault.tests:
+            path, *names = test.split("::")
+            assert (mutations.ROOT / path).exists(), test
+            for name in names:
+                code = (mutations.ROOT / path).read_text("utf-8")
+                assert re.search(rf"(def|class) {name.partition('[')[0]}\b", code), test
 
 
 @pytest.mark.slow

@@ -15,6 +15,8 @@ SITE = ROOT / "notebooks" / "pages"
 PAGES = (
     "README.md",
     "CONTRIBUTING.md",
+    "calibration/README.md",
+    "verification/README.md",
     "notebooks/index.md",
     *sorted(path.relative_to(ROOT).as_posix() for path in SITE.glob("*.md")),
 )
@@ -36,7 +38,9 @@ def test_what_a_page_points_to_is_there(page):
         if not link.startswith("#") and "generated/" not in link
     }
     paths = set(
-        re.findall(r"`(?:python )?((?:calibration|tests|notebooks|jbeamshell)/[\w./]+)", text)
+        re.findall(
+            r"`(?:python )?((?:calibration|verification|tests|notebooks|jbeamshell)/[\w./]+)", text
+        )
     )
     inner = {
         path for path in re.findall(r"`([a-z_]+/[\w./]+)`", text) if path.split("/")[0] in FOLDERS
@@ -66,11 +70,12 @@ class TestFiguresOfTheReadme:
 
     def test_cycles_and_errors(self):
         rows = {
-            row["what"]: row for row in self.record("tests/benchmarks/speed.json")["one"]["rows"]
+            row["what"]: row
+            for row in self.record("verification/benchmarks/speed.json")["one"]["rows"]
         }
         calculix, iwan = rows["CalculiX, 4 steps"], rows["Iwan's network, 20 steps"]
         own = rows["patterns in NumPy, 1 step"]
-        peer = self.record("tests/benchmarks/condensed.json")["peer"]
+        peer = self.record("verification/benchmarks/condensed.json")["peer"]
         (ours,) = (row for row in peer["ours"] if row["nodes"] == 49)
         for words in (
             f"{ours['built_us'] / 1e3:.3g} ms; {ours['kept_us']:.3g} µs if only",
@@ -85,7 +90,7 @@ class TestFiguresOfTheReadme:
             assert words in README, words
 
     def test_laws_batches_and_derivatives(self):
-        heights = self.record("calibration/laws_of_a_strip.json")["heights"].values()
+        heights = self.record("calibration/studies/laws_of_a_strip.json")["heights"].values()
         shares = {
             law: [100 * np.median(np.abs(height["models"][law]["error"])) for height in heights]
             for law in ("iwan4", "sliders8")
@@ -93,12 +98,12 @@ class TestFiguresOfTheReadme:
         low, high = (min(shares["sliders8"]), max(shares["sliders8"]))
         iwan = f"{min(shares['iwan4']):.0f} to {max(shares['iwan4']):.0f} %"
         assert f"{iwan}, eight sliders {low:.1f} to {high:.0f} %" in README
-        speed = self.record("tests/benchmarks/speed.json")
+        speed = self.record("verification/benchmarks/speed.json")
         runs = [row["median_runs"] for row in speed["gradient"]["rows"]]
         assert f"{runs[1]:.1f} to {runs[2]:.1f} runs" in README
-        swept = self.record("tests/benchmarks/sweeps.json")["member"]["grid"]["lanes_per_s"]
+        swept = self.record("verification/benchmarks/sweeps.json")["member"]["grid"]["lanes_per_s"]
         assert f"| {1e4 / swept:.0f} s of plane elasticity, after compiling" in README
-        friction = self.record("calibration/methods.json")["laws"]["rows"]
+        friction = self.record("verification/methods.json")["laws"]["rows"]
         (sharp, _, _, tanh) = (row for row in friction if row["scene"] == "standard")
         excess = tanh["dissipation"][-1] / sharp["dissipation"][-1] - 1.0
         assert f"{100 * excess:.0f} % too much after {tanh['steps'][-1]} steps" in README

@@ -10,7 +10,7 @@ Coulomb's friction, so that figures, pictures and comparisons work alike.  On th
     python -m calibration.finite_elements --set strip.height_ratio=0.2
 
 The standard strips dissipate what the data in calibration/data say to half a per cent, in about
-half a minute a cycle (checked.json, by `python -m calibration.finite_elements.check`).
+half a minute a cycle (check.json, by `python -m calibration check`).
 
 The force enters as ``load.entry`` says.  A member that goes on is meshed as far beyond the contact
 as plane elasticity continues it, and u leaves out that length's even stretch as there.

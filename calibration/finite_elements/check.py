@@ -3,33 +3,21 @@
 The data that ship were made by an independent solver with exact Coulomb friction and contact, on
 meshes graded a thousand times finer (see calibration/data).  Three loops and a contact that recedes
 are compared with them.  Strips under each entry of the force are compared with them and with plane
-elasticity.  Writes checked.json beside this file; takes an hour:
-
-    python -m calibration.finite_elements.check
+elasticity.  Takes an hour.
 """
 
 from __future__ import annotations
 
-import csv
-import json
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
-import jax
+import jbeamshell as jb
+from calibration.finite_elements import program, solve
+from calibration.strip import in_load_steps
+from calibration.tables import energies, rows
+from jbeamshell.scene import library
 
-jax.config.update("jax_enable_x64", True)
-
-import jbeamshell as jb  # noqa: E402
-from calibration.finite_elements import program, solve  # noqa: E402
-from calibration.provenance import provenance  # noqa: E402
-from calibration.strip import in_load_steps  # noqa: E402
-from jbeamshell.common.files import write_text  # noqa: E402
-from jbeamshell.measured.example import data_folder  # noqa: E402
-from jbeamshell.scene import library  # noqa: E402
-
-HERE = Path(__file__).parent
 CASES = ((0.1126, 0.7855), (0.1126, 1.6), (0.2358, 1.0))  # height ratio, amplitude
 CYCLE = {"load.cycles": 1, "load.steps_per_half_cycle": 20}
 STEADY = CYCLE | {"load.cycles": 2}  # the first cycle does not close
@@ -44,12 +32,6 @@ STRIPS = (
 )
 BEYOND = (0.0, 4.0)  # H that a member goes on in the data; other entries have none
 RECEDING = {"contact_end": 50.779, "reaction_max": 103.12, "lift_slope": 1.9858e-4}
-
-
-def reference() -> dict[tuple[float, float], float]:
-    """Dissipation by (eta, A), per unit width."""
-    with open(data_folder() / "energy.csv", newline="", encoding="utf-8") as file:
-        return {(float(r["eta"]), float(r["A"])): float(r["D"]) for r in csv.DictReader(file)}
 
 
 def timed(scene: jb.Scene, **options: Any) -> tuple[jb.History, dict[str, Any]]:
@@ -70,7 +52,7 @@ def loop(height_ratio: float, amplitude: float, elements: str) -> dict[str, Any]
     change = {"strip.height_ratio": height_ratio, "load.amplitude": amplitude} | CYCLE
     history, took = timed(in_load_steps().replace(change), elements=elements)
     dissipation, area = float(history.dissipation), float(history.dissipation_loop)
-    there = reference()[height_ratio, amplitude]
+    there = energies()[height_ratio, amplitude]["D"]
     return {
         "eta": height_ratio,
         "A": amplitude,
@@ -90,14 +72,12 @@ def entries() -> Iterator[tuple[jb.Scene, dict[str, float]]]:
 
     K is that of the displacement which is conjugate to the force, as a history has it.
     """
-    with open(data_folder() / "entry.csv", newline="") as file:
-        for row in csv.DictReader(file):
-            place = tuple(float(row[name]) for name in ("eta", "A", "mu"))
-            if place in STRIPS and float(row["overhang_over_H"]) in BEYOND:
-                keys = ("strip.height_ratio", "load.amplitude", "contact.friction")
-                values = dict(zip(keys, place, strict=True)) | {"load.entry": row["entry"]}
-                there = {"D": float(row["D"]), "K": float(row["K_conjugate"])}
-                yield jb.Scene().replace(values), there
+    for row in rows("entry.csv"):
+        place = row["eta"], row["A"], row["mu"]
+        if place in STRIPS and row["overhang_over_H"] in BEYOND:
+            keys = ("strip.height_ratio", "load.amplitude", "contact.friction")
+            values = dict(zip(keys, place, strict=True)) | {"load.entry": row["entry"]}
+            yield jb.Scene().replace(values), {"D": row["D"], "K": row["K_conjugate"]}
 
 
 def entry(scene: jb.Scene, there: dict[str, float]) -> dict[str, Any]:
@@ -137,8 +117,8 @@ def receding() -> dict[str, Any]:
     return {"found": found, "reference": RECEDING, "elements": "quadratic", **took}
 
 
-def main() -> None:
-    """Run all, print a line each, write the record."""
+def measure() -> dict[str, Any]:
+    """Run all, and print a line each."""
     loops = []
     for kind in ("quadratic", "linear"):
         for case in CASES if kind == "quadratic" else CASES[:1]:
@@ -148,17 +128,11 @@ def main() -> None:
     for scene, there in entries():
         strips.append(row := entry(scene, there))
         print(row)
-    record = {
-        "provenance": provenance() | {"calculix": program.version(program.find_program())},
+    return {
+        "calculix": program.version(program.find_program()),
         "steps": CYCLE,
         "D_source": "calibration/data/energy.csv",
         "loops": loops,
         "entries": strips,
         "receding": receding(),
     }
-    print(record["receding"])
-    write_text(HERE / "checked.json", json.dumps(record, indent=1) + "\n")
-
-
-if __name__ == "__main__":
-    main()

@@ -8,18 +8,13 @@ X = L.
 Members that go on are pressed together first, with free ends and only kept from moving as a whole.
 Then they are tied to their lengths beyond the contact, without stress, and held at the outer ends.
 
-`python -m calibration.finite_elements.lap` compares dissipation, stiffness and the open length, and
-writes lap.json beside this file.
+`python -m calibration lap` compares dissipation, stiffness and the open length.
 """
 
 from __future__ import annotations
 
-import json
-import sys
-from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
 import jbeamshell as jb
@@ -45,12 +40,9 @@ from calibration.finite_elements.mesh import (
 )
 from calibration.finite_elements.program import find_program, run, version
 from calibration.finite_elements.results import read
-from calibration.provenance import provenance
 from jbeamshell.common.checks import require_choice
-from jbeamshell.common.files import write_text
 from jbeamshell.scene import library, load_path
 
-RECORD = Path(__file__).with_name("lap.json")
 BOLTS = [[0.6, 10.0, 0.3], [1.4, 10.0, 0.3]]  # X, force and width of the patch
 STEPS = 20  # per half cycle
 CYCLE = {"load.cycles": 1, "load.steps_per_half_cycle": STEPS}
@@ -315,20 +307,18 @@ def on_contact_line(scene: jb.Scene) -> Loop:
     )
 
 
-def main(refinements: tuple[float, ...] = (0.5, 1.0, 2.0)) -> int:
-    """Compare, print and record."""
-    jax.config.update("jax_enable_x64", True)
-    record = provenance() | {"calculix": version(find_program()), "bolts": BOLTS, "inner": INNER}
+def measure() -> dict[str, Any]:
+    """Compare all joints on three meshes."""
+    record = {"calculix": version(find_program()), "bolts": BOLTS, "inner": INNER}
     for name, scene in scenes().items():
         rows = {"plane": on_contact_line(scene.replace({"model.nodes": NODES})).figures()}
-        for refinement in refinements:
+        for refinement in (0.5, 1.0, 2.0):
             rows[f"CalculiX, refinement {refinement:g}"] = by_elements(scene, refinement).figures()
         print(name)
         for source, figures in rows.items():
             print(f"  {source:26}", "  ".join(f"{k} {v:.5g}" for k, v in figures.items()))
         record[name] = rows
-    write_text(RECORD, json.dumps(record, indent=1) + "\n")
-    return 0
+    return record
 
 
 def scenes() -> dict[str, jb.Scene]:
@@ -339,7 +329,3 @@ def scenes() -> dict[str, jb.Scene]:
         "double shear": double_shear(),
         "double shear that goes on": double_shear("member"),
     }
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -65,7 +65,7 @@ def dissipation_errors(cycle: SlipCycle) -> tuple[Array, ...]:
     D is small beside sum W_i, and little is known of where friction works.  The error of the corner
     is the part of the work that comes from the jumps of the reaction between neighbouring nodes,
     times the relative fall of the slip over the last H before the end.  Both are measured rules,
-    rather too large than too small (calibration/failure_map.py).
+    rather too large than too small (verification/failure_map.py).
 
     Returns
     -------
@@ -205,7 +205,7 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     Single nodes hold rigid sliders on any grid that is used.
 
     Where the pressure has steps, small elements lie there too, and the slip zone holds larger ones
-    (measured by calibration/campaign.py).
+    (measured by verification/campaign.py).
     """
     grid, corner = dissipation_errors(cycle)
     numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy

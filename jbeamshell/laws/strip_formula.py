@@ -11,8 +11,8 @@ With eta = 2H/L, E A = E' 2H and the free length L_0 between the pressed part an
         K_T = E A/(2.17 H),   chi = -.99/(1 + (eta/.325)^1.71),   beta = .92 eta + 10.4 eta^3.
 
 They are fits to plane elasticity with nu = .3, eta from .01 to .4 (.2 for the cone), mu from .05 to
-.2 and .1 to .95 of gross slip (`calibration/four_parameters.py`).  A strip that is pressed evenly
-up to the loaded end has no such model: see `jbeamshell.reference.height_factor`.
+.2 and .1 to .95 of gross slip (`calibration/studies/four_parameters.py`).  A strip that is pressed
+evenly up to the loaded end has no such model: see `jbeamshell.reference.height_factor`.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def iwan4_of_strip(scene: Scene) -> Iwan4:
     Notes
     -----
     Error of D to plane elasticity, up to mu = .3: 11 % (median) and 57 % (worst) for the middle
-    half, 21 % and 46 % for the taper (`calibration/four_parameters.json`).
+    half, 21 % and 46 % for the taper (`calibration/studies/four_parameters.json`).
     """
     strip, contact = scene.strip, scene.contact
     plain = scene.member.support == "none" and strip.layers is None and scene.energy is None

@@ -13,7 +13,8 @@ singular like r^(lambda - 1), from which n = 2/(1 - lambda) = 6.9 there (William
 Where the pressed part ends inside the strip, as under a bolt, n is between 3 and 3.4.
 
 The numbers were fitted to plane elasticity with nu = .3 at heights eta = 2H/L from .01 to .4, mu
-from .05 to .2 and .1 to .95 of gross slip (`calibration/four_parameters.py`), pulled and pushed.
+from .05 to .2 and .1 to .95 of gross slip (`calibration/studies/four_parameters.py`), pulled and
+pushed.
 
 References
 ----------

@@ -41,7 +41,8 @@ def calibrated() -> Scene:
 
     One kappa_s, one alpha and m = 8 serve all heights, so the height may be set freely.  With
     nu = .3 the dissipation is within 11 % (rms) of finite elements for eta = .03 to .4 and A from
-    .3 up, and within 2 % where it exceeds .3 of the cubic law (`calibration/fit_universal.py`).
+    .3 up, and within 2 % where it exceeds .3 of the cubic law
+    (`calibration/studies/fit_universal.py`).
     """
     return named("calibrated")
 

@@ -15,7 +15,7 @@ from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
 from jbeamshell.scene.plan import Plan
 from jbeamshell.scene.pressure import is_table
 
-# Constants of `bound`, fitted by calibration/map_kinematics.py to map_kinematics.json beside it.
+# Constants of `bound`, fitted by verification/map_kinematics.py to map_kinematics.json beside it.
 BEAMSHELL = (3.2, 3.6, 3.6, 0.5, 0.0, 3.0)
 SECTIONS = (14.0, 2.7, 3.5, 1.7, 1.7, 3.0)
 
@@ -84,7 +84,7 @@ def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> 
 
     Sections of order p have other constants, because their exact material is St. Venant and
     Kirchhoff's.  The bound was measured for loads up to E' 2H/10 and pressures up to E'/3
-    (calibration/map_kinematics.json).  Beyond, and for a strip that is curved or on a compliant
+    (verification/map_kinematics.json).  Beyond, and for a strip that is curved or on a compliant
     foundation, it is a guess.
 
     Parameters

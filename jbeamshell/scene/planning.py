@@ -1,7 +1,7 @@
 """Rules by which a scene is planned: section, kinematics, engine, grid and load steps.
 
 A setting that is `AUTO` is decided here, when a scene is made, for its ``model.tolerance``.  The
-rules were measured (calibration/campaign.py, calibration/default_settings.py).
+rules were measured (verification/campaign.py, verification/default_settings.py).
 
 * Rotations are linear where the bound on what that leaves out is a small part of the tolerance,
   see `jbeamshell.scene.linearisation`.

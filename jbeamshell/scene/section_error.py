@@ -3,7 +3,7 @@
 Two things decide the dissipation before any grid does: how the force enters the loaded end, and
 whether the section may warp.  A straight section (the beamshell) is a rigid face that may turn,
 whatever ``load.entry`` says.  What that makes falls on curves of the slip length over the half
-height, which `calibration/section_errors.py` records and writes to section_errors.json beside this
+height, which `verification/section_errors.py` records and writes to section_errors.json beside this
 file.
 """
 

@@ -1,4 +1,4 @@
-"""Tables made from the recorded figures in calibration and tests/benchmarks."""
+"""Tables made from the recorded figures in calibration and verification."""
 
 import json
 from collections import Counter
@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from calibration.charts.campaign import chosen, counts, read
-from calibration.charts.failures import OUTCOMES, outcome
+from verification.campaign import chosen, counts, read
+from verification.outcomes import OUTCOMES, outcome
 
 Rows = Iterable[Sequence[Any]]
 HEIGHTS = (0.01, 0.0511, 0.1126, 0.2358, 0.4)
@@ -30,28 +30,29 @@ NAMES = {  # of programs in the record of the speed
 
 def tables(root: Path) -> dict[str, str]:
     """Included pages by their file names."""
-    benchmarks, studies = root / "tests" / "benchmarks", root / "calibration"
+    verification, studies = root / "verification", root / "calibration" / "studies"
+    benchmarks = verification / "benchmarks"
     speed = _read(benchmarks / "speed.json")
     return {
-        "table_single.md": single(speed["one"]),
+        "table_single.md": single(speed),
         "table_sweeps.md": sweeps(_read(benchmarks / "sweeps.json")),
-        "table_gradients.md": gradients(speed["gradient"]),
-        "table_starting.md": starting(speed["start"]),
+        "table_gradients.md": gradients(speed),
+        "table_starting.md": starting(speed),
         "table_condensed.md": condensed(_read(benchmarks / "condensed.json")),
         "table_peer.md": peer(_read(benchmarks / "condensed.json")["peer"]),
         "table_entries.md": entries(_read(root / "jbeamshell" / "scene" / "section_errors.json")),
-        "table_sections.md": sections(_read(benchmarks / "ladder.json")["map"]),
+        "table_sections.md": sections(_read(benchmarks / "sections.json")),
         "table_identification.md": identification(_read(benchmarks / "identification.json")),
         "table_motion.md": motion(_read(benchmarks / "dynamics.json")),
         "table_laws.md": laws(_read(studies / "laws_of_a_strip.json")),
-        "table_squeeze.md": squeeze(_read(studies / "ladder_squeeze.json")),
-        "table_random.md": random_strips(_read(studies / "failure_map.json")),
-        "table_derivatives.md": derivatives(_read(studies / "gradients.json")),
-        "table_campaign.md": campaign(read(studies)),
-        "table_defaults.md": defaults(read(studies)),
-        "table_balance.md": balance(_read(studies / "balance_in_time.json")),
-        "table_solvers.md": solvers(_read(studies / "methods.json")["solvers"]),
-        "table_friction.md": friction(_read(studies / "methods.json")["laws"]),
+        "table_squeeze.md": squeeze(_read(verification / "squeezed_sections.json")),
+        "table_random.md": random_strips(_read(verification / "failure_map.json")),
+        "table_derivatives.md": derivatives(_read(verification / "gradients.json")),
+        "table_campaign.md": campaign(read()),
+        "table_defaults.md": defaults(read()),
+        "table_balance.md": balance(_read(verification / "balance_in_time.json")),
+        "table_solvers.md": solvers(_read(verification / "methods.json")["solvers"]),
+        "table_friction.md": friction(_read(verification / "methods.json")["laws"]),
     }
 
 
@@ -60,10 +61,10 @@ def single(record: dict) -> str:
     rows = (
         (NAMES.get(what := row["what"].split(",")[0], what), row["steps"], time(row["median_us"]),
          percent(row["error"]), percent(row["error_to_elements"]), row["returns"].split(";")[0])
-        for row in record["rows"] if "no flag" not in row["what"]
+        for row in record["one"]["rows"]
     )  # fmt: skip
     heads = ("what", "steps per half cycle", "time", "error of D", "to elements", "returns")
-    return table(heads, rows) + machine(record)
+    return table(heads, rows) + machine(record["about"]["one"])
 
 
 def sweeps(record: dict) -> str:
@@ -77,7 +78,7 @@ def sweeps(record: dict) -> str:
     ]  # fmt: skip
     heads = ("`load.entry`", "strips", "nodes", "strips a second", "error, median",
              "worst where D is above a thousandth of the bar's")  # fmt: skip
-    return table(heads, rows) + machine(record)
+    return table(heads, rows) + machine(record["about"])
 
 
 def gradients(record: dict) -> str:
@@ -89,9 +90,11 @@ def gradients(record: dict) -> str:
             f"{row['median_runs']:.1f}",
             f"{row['compile_s']:.0f} s",
         )
-        for row in record["rows"]
+        for row in record["gradient"]["rows"]
     ]
-    return table(("derivative by 4 numbers", "time", "runs", "compiled in"), rows) + machine(record)
+    return table(("derivative by 4 numbers", "time", "runs", "compiled in"), rows) + machine(
+        record["about"]["gradient"]
+    )
 
 
 def derivatives(record: dict) -> str:
@@ -104,7 +107,8 @@ def derivatives(record: dict) -> str:
             len(kind["figures"]),
             *(kind["counts"].get(k, 0) for k in kinds),
         )
-        for name, kind in record["settings"].items()
+        for name, kind in record.items()
+        if name != "about"
     ]
     return table(("scene", "numbers", "figures", *kinds), rows)
 
@@ -113,10 +117,10 @@ def starting(record: dict) -> str:
     """Processor time until the first result."""
     rows = [
         (row["what"], f"{row['cold_cpu_s']:.1f} s", f"{row['warm_cpu_s']:.1f} s")
-        for row in record["rows"]
+        for row in record["start"]["rows"]
     ]
     heads = ("processor time of a new process", "nothing compiled yet", "compiled programs kept")
-    return table(heads, rows) + machine(record)
+    return table(heads, rows) + machine(record["about"]["start"])
 
 
 def condensed(record: dict) -> str:
@@ -129,7 +133,7 @@ def condensed(record: dict) -> str:
     ]  # fmt: skip
     heads = ("contact nodes", "largest error of D where D exceeds .1 of the bar's",
              "1e-4 of the bar's", "a cycle, factors kept", "a cycle, all built")  # fmt: skip
-    return table(heads, rows) + machine(record)
+    return table(heads, rows) + machine(record["about"])
 
 
 def peer(record: dict) -> str:
@@ -193,7 +197,9 @@ def identification(record: dict) -> str:
         for method, found in methods.items()
         if "model_runs" in found
     ]
-    return table(("model", "search", "runs of the model", "time, compiled"), rows) + machine(record)
+    return table(("model", "search", "runs of the model", "time, compiled"), rows) + machine(
+        record["about"]["scenes"]
+    )
 
 
 def motion(record: dict) -> str:
@@ -223,11 +229,7 @@ def laws(record: dict) -> str:
 def squeeze(record: dict) -> str:
     """Receding contact and Filon's tension over the order of the section."""
     exact = record["finite_elements"]
-    finest = {
-        row["order"]: row
-        for row in sorted(record["sections"], key=lambda row: row["nodes"])
-        if row["kinematics"] == "linear"
-    }
+    finest = {row["order"]: row for row in sorted(record["sections"], key=lambda row: row["nodes"])}
     rows = [
         (order, f"{row['receding']['contact_end_mm']:.3f}",
          f"{row['receding']['reaction_max_MPa']:.2f}", f"{row['receding']['lift_slope']:.4g}",
@@ -332,9 +334,8 @@ def table(heads: Sequence[str], rows: Rows) -> str:
     return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines) + "\n"
 
 
-def machine(record: dict) -> str:
+def machine(about: dict) -> str:
     """Line that says where and when figures were taken."""
-    about = record["about"]
     words = [about.get("cpu"), about["machine"], f"jax {about['jax']}", about.get("date")]
     return f"\n*{', '.join(word for word in words if word)}*\n"
 

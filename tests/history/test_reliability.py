@@ -13,15 +13,15 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from calibration.charts.failures import outcome
 from jbeamshell.cli import main
 from jbeamshell.history import error_estimates, reliability
 from jbeamshell.history.reliability import TOLERANCE
+from verification.outcomes import outcome
 
 RECORD = json.loads(
-    (Path(__file__).parents[2] / "calibration" / "failure_map.json").read_text(encoding="utf-8")
+    (Path(__file__).parents[2] / "verification" / "failure_map.json").read_text(encoding="utf-8")
 )
-# Numbers of the random scenes; the draws are those of calibration/failure_map.py.
+# Numbers of the random scenes; the draws are those of verification/failure_map.py.
 LOW = np.array([0.005, 0.02, 0.02, 0.0, 0.05, 2.0])
 HIGH = np.array([0.5, 1.0, 0.98, 0.49, 3.0, 1e4])
 EVEN = np.array([False, False, True, True, False, False])

@@ -11,7 +11,7 @@ import jbeamshell as jb
 from jbeamshell.scene.linearisation import linear_error
 
 RECORD = json.loads(
-    (Path(__file__).parents[2] / "calibration" / "map_kinematics.json").read_text(encoding="utf-8")
+    (Path(__file__).parents[2] / "verification" / "map_kinematics.json").read_text(encoding="utf-8")
 )
 LEAST = 1e-4  # smaller differences are not worth a sharp bound
 

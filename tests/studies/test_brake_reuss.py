@@ -1,23 +1,18 @@
 """The fit to the ring-down of the Brake-Reuss beam, from the curves that ship; its predictions."""
 
-import json
-import sys
 from pathlib import Path
 
 import pytest
 
-CALIBRATION = Path(__file__).parents[2] / "calibration"
+from calibration.running import read
+from calibration.studies import brake_reuss
 
 
 @pytest.mark.slow
 @pytest.mark.doubtful("few nodes")
-def test_the_fit_follows_the_measured_damping_and_predicts_the_sweeps_within_it(monkeypatch):
-    monkeypatch.syspath_prepend(str(CALIBRATION))
-    import brake_reuss as study
-
-    record = json.loads((CALIBRATION / "brake_reuss.json").read_text("utf-8"))
-    found, _ = study.figures(record)
-    sys.modules.pop("brake_reuss")
+def test_the_fit_follows_the_measured_damping_and_predicts_the_sweeps_within_it():
+    record = read(Path(brake_reuss.__file__).with_suffix(".json"))
+    found, _ = brake_reuss.figures(record)
     assert found["worst_damping"] < 0.05
     assert found["worst_frequency"] < 1e-3
     key = "predicted_amplitude"

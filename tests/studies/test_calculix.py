@@ -461,7 +461,7 @@ def recorded(name):
 
 @pytest.mark.parametrize("entry", ENTRIES)
 def test_entries_on_record_agree(entry):
-    rows = [row for row in recorded("checked.json")["entries"] if row["entry"] == entry]
+    rows = [row for row in recorded("check.json")["entries"] if row["entry"] == entry]
     assert len(rows) == 4
     for row in rows:
         coarse, fine = row["refinement 1"], row["refinement 2"]

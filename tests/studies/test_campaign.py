@@ -1,37 +1,20 @@
 """The campaign: its record holds no silent failure, and its figures are those that pages tell."""
 
-import importlib.util
-import sys
 from collections import Counter
-from pathlib import Path
 
 import pytest
 
-from calibration.charts.campaign import chosen
+from verification import campaign
 
-CALIBRATION = Path(__file__).parents[2] / "calibration"
 FIRST, FRESH = 22, 23  # seeds
 
 
 @pytest.fixture(scope="module")
-def campaign():
-    """The program, imported as a script that lies among others."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(CALIBRATION))
-        spec = importlib.util.spec_from_file_location("campaign", CALIBRATION / "campaign.py")
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        yield module
-    sys.modules.pop("random_scenes", None)
-    sys.modules.pop("provenance", None)
+def rows():
+    return campaign.read()
 
 
-@pytest.fixture(scope="module")
-def rows(campaign):
-    return campaign.read()[1:]
-
-
-def test_every_outcome_follows_from_the_figures(campaign, rows):
+def test_every_outcome_follows_from_the_figures(rows):
     for row in rows:
         if "dissipation" in row:
             assert row["outcome"] == campaign.outcome(row), row
@@ -42,7 +25,7 @@ def test_no_scene_is_silently_wrong(rows):
     assert silent == []
 
 
-def test_enough_scenes_are_recorded(campaign, rows):
+def test_enough_scenes_are_recorded(rows):
     found = Counter((row["seed"], row["kind"]) for row in rows)
     assert {kind for _, kind in found} <= set(campaign.KINDS)
     assert sum(count for (seed, _), count in found.items() if seed == FIRST) >= 3000
@@ -56,7 +39,7 @@ def test_few_right_runs_are_doubted(rows):
 
 
 def test_chosen_settings_keep_their_tolerance_or_are_doubted(rows):
-    found = chosen(rows)
+    found = campaign.chosen(rows)
     assert len(found) >= 1000
     beyond = [run.error for run in found if run.error > 0.005 and not run.doubted]
     assert len(beyond) <= 0.01 * len(found)
@@ -66,7 +49,7 @@ def test_chosen_settings_keep_their_tolerance_or_are_doubted(rows):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::jbeamshell.DoubtfulWarning")
 @pytest.mark.parametrize("kind", ["plain", "both faces"])
-def test_a_row_of_the_record(campaign, rows, kind):
+def test_a_row_of_the_record(rows, kind):
     row = next(row for row in rows if row["kind"] == kind and "refined" in row.get("errors", {}))
     values = campaign.drawn(kind, row["seed"], row["number"])
     found = campaign.compared(values, campaign.KINDS[kind].other)
@@ -75,7 +58,7 @@ def test_a_row_of_the_record(campaign, rows, kind):
     assert found["errors"] == pytest.approx(row["errors"], rel=1e-2, abs=1e-9)
 
 
-def test_an_error_over_nothing_is_whole(campaign):
+def test_an_error_over_nothing_is_whole():
     assert campaign.off(1.0, 0.0) == 1.0
     assert campaign.off(0.0, 0.0) == 0.0
     assert campaign.off(1.1, 1.0) == pytest.approx(0.1)

@@ -1,7 +1,5 @@
 """The failure maps: what a run is called, the record that is there, and its pictures."""
 
-import importlib.util
-import json
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -9,25 +7,16 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from calibration import charts
+from calibration.running import read
+from verification import failure_map, outcomes
 
-CALIBRATION = Path(__file__).parents[2] / "calibration"
 RIGHT = [1.0, 0.004, 0.003, 1e-9, 3.0, 0.0, 1.001, 0]
 COARSE = {"model.nodes": 21, "model.kinematics": "linear", "load.steps_per_half_cycle": 4}
 
 
 @pytest.fixture(scope="module")
 def record():
-    return json.loads((CALIBRATION / "failure_map.json").read_text(encoding="utf-8"))
-
-
-@pytest.fixture
-def script(monkeypatch):
-    monkeypatch.syspath_prepend(str(CALIBRATION))
-    spec = importlib.util.spec_from_file_location("failure_map", CALIBRATION / "failure_map.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return read(Path(failure_map.__file__).with_suffix(".json"))
 
 
 @pytest.fixture(autouse=True)
@@ -54,22 +43,22 @@ def _close():
     ],
 )
 def test_what_becomes_of_a_run(changes, name):
-    assert charts.failures.outcome([changes.get(i, value) for i, value in enumerate(RIGHT)]) == name
+    assert outcomes.outcome([changes.get(i, value) for i, value in enumerate(RIGHT)]) == name
 
 
 @pytest.mark.slow
-def test_a_cell_of_the_map(script):
+def test_a_cell_of_the_map():
     fine = COARSE | {"model.nodes": 41}
-    cell = script.cell(COARSE, fine, {"load": 0.39})
-    assert len(cell) == len(script.FIGURES) + 2
-    sliders = {"contact.stick_stiffness": script.STANDARD["alpha"]}
+    cell = failure_map.cell(COARSE, fine, {"load": 0.39})
+    assert len(cell) == len(failure_map.FIGURES) + 2
+    sliders = {"contact.stick_stiffness": failure_map.STANDARD["alpha"]}
     held = {"contact.normal": "held", "load.amplitude": 0.78}
     strip = jb.solve(STRIP.replace(COARSE | sliders | held), throw=False)
     assert cell[0] == pytest.approx(float(strip.dissipation_ratio), rel=1e-5)
     assert max(cell[1:3]) == pytest.approx(float(strip.dissipation_error), rel=1e-5)
     assert 0.0 < abs(cell[0] / cell[6] - 1.0) < 0.1
-    assert charts.failures.outcome(script.cell(COARSE, fine, {"load": 1.0})) == "fails, and says so"
-    points = script.random_points(*script.SCENES["scenes"])
+    assert outcomes.outcome(failure_map.cell(COARSE, fine, {"load": 1.0})) == "fails, and says so"
+    points = failure_map.random_points(*failure_map.SCENES["scenes"])
     assert points.shape == (2000, 6)
     assert points.min(axis=0) == pytest.approx(
         [0.005, 0.02, 0.02, 0.0, 0.05, 2.0], rel=0.02, abs=1e-3
@@ -77,19 +66,19 @@ def test_a_cell_of_the_map(script):
 
 
 def test_every_map_of_the_record_is_drawn(record):
-    sheets = charts.failures.sheets(record)
+    sheets = outcomes.sheets(record)
     assert "scenes" in sheets
-    for name, chart in record["maps"].items():
+    for name, chart in outcomes.maps(record).items():
         assert [len(row) for row in chart["cells"]] == [len(chart["columns"])] * len(chart["rows"])
         titles = [axes.get_title() for sheet in sheets.values() for axes in sheet.axes]
         assert titles.count(name) == 1
     with pytest.raises(jb.InputError, match="the record has"):
-        charts.failures.outcome_map(record, "nothing")
+        outcomes.outcome_map(record, "nothing")
 
 
 def test_the_defaults_are_nowhere_wrong_silently(record):
-    for name, chart in record["maps"].items():
+    for name, chart in outcomes.maps(record).items():
         for label, row in zip(chart["rows"], chart["cells"], strict=True):
             if label == "default" or name in ("height and load", "friction and load"):
-                silent = [charts.failures.outcome(cell) for cell in row].count("wrong, silently")
+                silent = [outcomes.outcome(cell) for cell in row].count("wrong, silently")
                 assert silent == 0, (name, label)

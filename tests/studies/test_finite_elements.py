@@ -102,7 +102,7 @@ def test_a_plain_fit_finds_the_friction_and_the_height_that_made_a_loop():
 
 
 def test_the_record_of_fits_says_so_for_all_loops():
-    record = json.loads((data_folder().parent / "fitted_finite_elements.json").read_text())
+    record = json.loads((data_folder().parent / "studies" / "fit_finite_elements.json").read_text())
     plain = [own for loads in record["fits"]["plain call"].values() for own in loads.values()]
     friction, height = np.abs([list(own["relative_bias"].values()) for own in plain]).T
     assert len(plain) == 15

@@ -1,16 +1,14 @@
-"""Record of the study of four parameters: figures of its page, and its charts."""
+"""Record of the study of four parameters: figures of its page."""
 
-import json
 import re
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 
-from calibration.charts import four_parameters
+from calibration.running import read
 
 ROOT = Path(__file__).parents[2]
-RECORD = json.loads((ROOT / "calibration" / "four_parameters.json").read_text("utf-8"))
+RECORD = read(ROOT / "calibration" / "studies" / "four_parameters.json")
 
 
 def errors(patch, name):
@@ -41,10 +39,3 @@ def test_iwans_model_is_right_under_bolts_alone():
     }
     assert np.max(exponents["even"]) > 6.9
     assert np.max(exponents["middle"]) < 3.6
-
-
-def test_every_chart_is_drawn():
-    for name in four_parameters.CHARTS:
-        axes = four_parameters.draw(RECORD, name)
-        assert axes.lines
-        plt.close(axes.figure)

@@ -1,50 +1,41 @@
 """Derivatives by every number: the record holds no wrong one, and a row of it comes again."""
 
-import importlib.util
-import json
 from pathlib import Path
 
 import jax
 import pytest
 
 import jbeamshell as jb
+from calibration.running import read
+from calibration.strip import changed
+from verification import gradients
 
-CALIBRATION = Path(__file__).parents[2] / "calibration"
-RECORD = json.loads((CALIBRATION / "gradients.json").read_text(encoding="utf-8"))["settings"]
-
-
-@pytest.fixture
-def script(monkeypatch):
-    monkeypatch.syspath_prepend(str(CALIBRATION))
-    spec = importlib.util.spec_from_file_location("gradients", CALIBRATION / "gradients.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+RECORD = read(Path(gradients.__file__).with_suffix(".json"))
+SETTINGS = [name for name in RECORD if name != "about"]
 
 
-@pytest.mark.parametrize("setting", list(RECORD))
+@pytest.mark.parametrize("setting", SETTINGS)
 def test_the_record_holds_no_wrong_derivative(setting):
     assert set(RECORD[setting]["counts"]) <= {"right", "kink", "jump", "undefined"}
     for row in RECORD[setting]["others"]:
         assert abs(row["jax"]) < float("inf")
 
 
-def test_the_record_holds_all_settings(script):
-    assert set(RECORD) == set(script.SETTINGS)
+def test_the_record_holds_all_settings():
+    assert set(SETTINGS) == set(gradients.PARTS)
 
 
 @pytest.mark.slow
-def test_a_setting_of_the_record(script):
-    name = "contact line, steps of pressure"
-    found = script.study(script.SETTINGS[name], points=1, seed=[0])
+def test_a_setting_of_the_record():
+    found = gradients.study("contact line, steps of pressure")
     assert found["counts"]["right"] > 500
     assert "wrong" not in found["counts"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("setting", ["contact line, squeeze", "load steps, sharp", "double shear"])
-def test_no_nan_is_kept_for_a_gradient(script, setting):
-    scene = script.changed(jb.Scene(), script.SETTINGS[setting])
+def test_no_nan_is_kept_for_a_gradient(setting):
+    scene = changed(jb.Scene(), gradients.SETTINGS[setting])
 
     def dissipation(friction):
         return jb.solve(scene.replace({"contact.friction": friction})).dissipation

@@ -1,7 +1,6 @@
 """Comparisons of methods: the figure of each, and each trap seen to close."""
 
 import functools
-import json
 from pathlib import Path
 
 import jax
@@ -12,13 +11,13 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from calibration import charts
-from calibration.methods import controls, events, grids, laws, shooting, solvers
-from calibration.methods.strips import scene_of
-from jbeamshell.load_steps.system import BETA, System, V, W
+from calibration.running import read
+from jbeamshell.load_steps.system import System
+from verification import methods
+from verification.compared import events, grids, laws, shooting, solvers
+from verification.compared.strips import scene_of
 
 CYCLE = 8  # load steps per half cycle at most; fewer are held, so that all paths compile once
-RECORD = Path(__file__).parents[2] / "calibration" / "methods.json"
 
 
 @functools.cache
@@ -96,43 +95,6 @@ def test_shooting_loses_the_digits_by_which_its_solutions_grow():
     assert hopeless.error > 1e90
 
 
-@pytest.mark.parametrize(("alpha", "reach"), [(6.0, 9.0), (1000.0, 0.7)])
-def test_shooting_at_a_stuck_strip_reaches_as_far_as_its_exponents_let_it(alpha, reach):
-    """Reach: L/H at which it has eight digits left; at three times that it has none."""
-    for factor, right in ((1.0, True), (3.0, False)):
-        scene = scene_of("standard").replace({"strip.height_ratio": 2.0 / (factor * reach)})
-        unit = float(scene.strip.shear_modulus / scene.strip.half_height)
-        shot = shooting.shoot(scene, alpha * unit)
-        assert (shot.growth < 8.0) == right
-        assert (shot.path_error < 1e-7) == right
-        assert (shot.path_error > 1e-3) != right
-
-
-def test_the_bounded_solution_is_that_of_elements():
-    """Shooting's yardstick, against linear elements on the same foundation: second order."""
-    scene = scene_of("standard")
-    strip = scene.strip
-    length, half_height = float(strip.length), float(strip.half_height)
-    sliding = 6.0 * float(strip.shear_modulus) / half_height
-    pull = np.array([1.0, -half_height, 0.0])
-    exact = shooting.bounded(shooting.equations(scene, sliding), length, pull)[-1, :2] @ pull[:2]
-    off = []
-    for count in (40, 80):
-        x = np.linspace(0.0, length, count + 1)
-        matrix = grids.stiffness(scene, x, grids.RULES[grids.LIBRARY])
-        share = np.full(x.size, x[1])
-        share[[0, -1]] *= 0.5
-        places = 4 * np.arange(x.size)
-        matrix[places, places] += sliding * share
-        load = np.zeros(places.size * 4)
-        load[-4], load[-2] = pull[:2]
-        held = [0, 2, *(places + W)]
-        found = grids.solved(matrix, load, held)[-1, [V, BETA]] @ pull[:2]
-        off.append(abs(found / exact - 1.0))
-    assert off[1] < 0.02
-    assert np.log2(off[0] / off[1]) == pytest.approx(2.0, abs=0.3)
-
-
 # --- iterations -----------------------------------------------------------------------------------
 
 
@@ -183,42 +145,31 @@ def test_the_librarys_element_is_the_one_that_is_compared():
     np.testing.assert_allclose(ours @ fields.ravel(), theirs, atol=1e-12 * np.max(np.abs(theirs)))
 
 
-# --- control --------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_beyond_gross_slip_a_free_strip_has_no_equilibrium_and_that_is_said():
-    (force,) = controls.to_gross_slip("force", [1.2], "free", steps=6, nodes=21)
-    assert force["unfound"] == 1
-    assert force["residual"] > 0.05
-    assert "set load.control to 'displacement'" in controls.refusal(1.1)
-
-
 # --- charts ---------------------------------------------------------------------------------------
 
 
 @pytest.fixture
 def record():
-    yield json.loads(RECORD.read_text(encoding="utf-8"))
+    yield read(Path(methods.__file__).with_suffix(".json"))
     plt.close("all")
 
 
 def test_charts_show_what_the_record_holds(record):
-    axes = charts.methods.draw(record, "steps")
+    axes = methods.chart(record, "steps")
     (row,) = (row for row in record["steps"]["rows"] if row["scene"] == "standard")
     lines = {line.get_label(): line for line in axes.lines}
     np.testing.assert_allclose(lines["standard"].get_ydata(), np.abs(row["off"]))
-    axes = charts.methods.draw(record, "solvers")
+    axes = methods.chart(record, "solvers")
     shares = [bar.get_width() for bar in axes.patches[: len(record["solvers"]["rows"])]]
     found = [100.0 * row["found"] for row in record["solvers"]["rows"]]
     np.testing.assert_allclose(shares[::-1], found)
-    assert sum(axes.axison for axes in charts.methods.sheet(record).axes) == 9
+    assert sum(axes.axison for axes in methods.draw(record).axes) == 6
 
 
 def test_what_the_record_lacks_is_said(record):
     with pytest.raises(jb.InputError, match="no section 'laws'"):
-        charts.methods.draw({}, "laws")
+        methods.chart({}, "laws")
     with pytest.raises(jb.InputError, match="name = 'heat': choose one of laws, steps"):
-        charts.methods.draw(record, "heat")
+        methods.chart(record, "heat")
     with pytest.raises(jb.InputError, match="nothing to draw"):
-        charts.methods.sheet({})
+        methods.draw({})

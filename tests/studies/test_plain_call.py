@@ -1,13 +1,14 @@
 """Plain calls beside finite elements: the record, and some of its scenes solved again."""
 
-import json
+from pathlib import Path
 
 import pytest
 
 import jbeamshell as jb
-from calibration import plain_call
+from calibration.running import read
+from verification import plain_call
 
-RECORD = json.loads(plain_call.RECORD.read_text("utf-8"))
+RECORD = read(Path(plain_call.__file__).with_suffix(".json"))
 AGAIN = ("standard", "member", "guided", "double-shear")
 
 

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.rivals import STIFFNESS, cubic_law, iwan
-from benchmarks.rivals import condensed_elements as elements
-from benchmarks.rivals import patterns_numpy as patterns
 from toy import STRIP
 
 import jbeamshell as jb
+from verification.benchmarks.rivals import STIFFNESS, cubic_law, iwan
+from verification.benchmarks.rivals import condensed_elements as elements
+from verification.benchmarks.rivals import patterns_numpy as patterns
 
 DATA = Path(__file__).parents[2] / "calibration" / "data"
 ETA, A = 0.1126, 0.7855

@@ -1,0 +1,231 @@
+"""Time of steady cycles of plane elasticity from factors, at their error, on one core.
+
+The record has best and median of repeated warm calls and their time of the core, which other work
+on the machine disturbs least; compile time apart.  Rates and ratios are of the core's time.  Its
+parts:
+
+- cycle: one pull and a cycle of the standard strip, factors kept and building included;
+- error: over the contact nodes, against converged finite elements;
+- peer: elements of your own at equal error, by peer=SCRIPT: a module that condenses finite elements
+  with `Strip(eta, lines=, keep_lu=)` and `cyc(strip, amplitude, steps_per_quarter, cycles)`.
+"""
+
+import functools
+import importlib.util
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import jbeamshell as jb
+from calibration.running import read
+from calibration.tables import rows
+from jbeamshell import contact_line
+from jbeamshell.contact_line.dissipation import NODES, REFINED
+from jbeamshell.plotting.style import DATA, PALETTE, style
+from verification.benchmarks.speeds.machine import peak_gflops
+
+ETA, AMPLITUDE = 0.1126, 0.7855
+COUNTS = (17, 25, 33, 49, 65, 89, 129)
+BUDGET = 2.0  # seconds of a repeated call
+SINGLE = {  # rows of the record of speed, of another machine: label, colour and marker of each
+    "dissipation, 1 step": ("beamshell, 41 nodes", PALETTE[2], "^"),
+    "CalculiX, 4 steps": ("CalculiX", DATA, "P"),
+    "CalculiX, 20 steps": ("", DATA, "P"),
+}
+KINDS = (("kept_us", "matrices kept", "-"), ("built_us", "building included", "--"))
+WANTED = (0.01, 0.005, 0.002)
+MESHES = ((30, 3), (40, 4), (60, 6), (80, 8), (120, 12))
+STEPS = (10, 20, 40)  # per quarter cycle
+
+
+def repeated(call: Callable[[], Any], budget: float = BUDGET) -> dict[str, float]:
+    """Best and median time of a call and the mean of the core's, in microseconds."""
+    jax.block_until_ready(call())
+    seconds: list[float] = []
+    core = time.process_time()
+    end = time.perf_counter() + budget
+    while len(seconds) < 3 or time.perf_counter() < end:
+        begin = time.perf_counter()
+        jax.block_until_ready(call())
+        seconds.append(time.perf_counter() - begin)
+    core = (time.process_time() - core) / len(seconds)
+    times = {"core_us": core, "best_us": min(seconds), "median_us": statistics.median(seconds)}
+    return {key: 1e6 * value for key, value in times.items()} | {"calls": len(seconds)}
+
+
+def first(call: Callable[[], Any]) -> float:
+    """Seconds of the first call."""
+    begin = time.perf_counter()
+    jax.block_until_ready(call())
+    return time.perf_counter() - begin
+
+
+def scene(eta: Any = ETA) -> jb.Scene:
+    """Standard strip of a height ratio."""
+    return jb.library.standard().replace({"strip.height_ratio": eta})
+
+
+@functools.cache
+def builder(nodes: int) -> Callable[[jax.Array], contact_line.SteadyCycles]:
+    """Compiled function from a height ratio to factors."""
+    return jax.jit(lambda eta: contact_line.factors(scene(eta), nodes=nodes))
+
+
+# --- parts ----------------------------------------------------------------------------------------
+
+
+def cycle() -> dict[str, Any]:
+    """One pull and a cycle, dissipation only."""
+    found = {}
+    for name, nodes in (("default", NODES), ("refined", REFINED)):
+        build = builder(nodes)
+        ask = jax.jit(lambda kept, amplitudes: kept.dissipation(amplitudes))
+        eta, amplitude = jnp.asarray(ETA), jnp.asarray([AMPLITUDE])
+        found[name] = {"nodes": nodes, "compile_s": first(lambda b=build, e=eta: b(e))}
+        kept = build(eta)
+        slope = jax.jit(jax.value_and_grad(lambda kept, a: kept.dissipation(a)[0], argnums=1))
+        calls = {
+            "factors_kept": lambda k=kept, a=amplitude, f=ask: f(k, a),
+            "value_and_slope": lambda k=kept, a=amplitude, f=slope: f(k, a),
+            "built": lambda e=eta, a=amplitude, b=build, f=ask: f(b(e), a),
+        }
+        found[name] |= {key: repeated(call) for key, call in calls.items()}
+    return found
+
+
+def error() -> list[dict[str, Any]]:
+    """Worst errors over the nodes."""
+    cells, found = rows("energy.csv"), []
+    for nodes in COUNTS:
+        build = builder(nodes)
+        worst = {"above_tenth": 0.0, "above_ten_thousandth": 0.0}
+        for eta in sorted({row["eta"] for row in cells}):
+            kept = build(jnp.asarray(eta))
+            for row in cells:
+                if row["eta"] == eta and row["ratio"] > 1e-4:
+                    off = abs(float(kept.dissipation([row["A"]])[0]) / row["D"] - 1.0)
+                    key = "above_tenth" if row["ratio"] > 0.1 else "above_ten_thousandth"
+                    worst[key] = max(worst[key], off)
+        found.append({"nodes": nodes} | worst)
+    return found
+
+
+def beside(script: str, budget: float = 0.2 * BUDGET) -> dict[str, Any]:
+    """Cheapest settings of both that meet an error over the amplitudes of the standard strip."""
+    module = loaded(script)
+    own = [row for row in rows("energy.csv") if row["eta"] == ETA and row["ratio"] > 0.25][::2]
+    theirs = [settings for mesh in MESHES for settings in meshed(module, mesh, own, budget)]
+    ours = []
+    for nodes in COUNTS:
+        build = builder(nodes)
+        ask = jax.jit(lambda kept, a: kept.dissipation(a))
+        eta, amplitude = jnp.asarray(ETA), jnp.asarray([AMPLITUDE])
+        kept = build(eta)
+        off = max(abs(float(kept.dissipation([r["A"]])[0]) / r["D"] - 1.0) for r in own)
+        run = repeated(lambda k=kept, a=amplitude, f=ask: f(k, a), budget)["core_us"]
+        whole = run + repeated(lambda e=eta, b=build: b(e), budget)["core_us"]
+        ours.append({"nodes": nodes, "error": off, "kept_us": run, "built_us": whole})
+    ratios = []
+    for wanted in WANTED:
+        pair = [
+            {
+                key: min((s for s in side if s["error"] <= wanted), key=lambda s, k=key: s[k])
+                for key in ("kept_us", "built_us")
+            }
+            for side in (ours, theirs)
+            if any(s["error"] <= wanted for s in side)
+        ]
+        if len(pair) == 2:
+            times = {key: pair[1][key][key] / pair[0][key][key] for key in pair[0]}
+            ratios.append({"error": wanted, "ours": pair[0], "theirs": pair[1], "times": times})
+    return {"amplitudes": [row["A"] for row in own], "ours": ours, "theirs": theirs} | {
+        "at_equal_error": ratios
+    }
+
+
+def meshed(
+    module: Any, mesh: tuple[int, int], cells: list[dict[str, float]], budget: float
+) -> list[dict[str, Any]]:
+    """Error and time of the peer on a mesh, with several numbers of load steps."""
+    nx, ny = mesh
+    lengths, heights = 8.0 ** (-np.arange(nx) / nx), 4.0 ** (np.arange(ny) / ny)
+    x = np.append(0.0, np.cumsum(lengths / lengths.sum())) * 2.0
+    y = np.append(0.0, np.cumsum(heights / heights.sum())) * 2.0 * ETA
+
+    def build() -> Any:
+        return module.Strip(ETA, lines=(x, y), keep_lu=False)
+
+    strip = build()
+    built = repeated(build, budget)["core_us"]
+    found = []
+    for steps in STEPS:
+        off = max(
+            abs(module.cyc(strip, row["A"], steps, 2)["Dfric"][-1] / row["D"] - 1.0)
+            for row in cells
+        )
+        run = repeated(lambda n=steps: module.cyc(strip, AMPLITUDE, n, 2), budget)["core_us"]
+        whole = {"kept_us": run, "built_us": run + built}
+        found.append({"mesh": [nx, ny], "steps_per_quarter": steps, "error": off} | whole)
+    return found
+
+
+def loaded(script: str) -> Any:
+    """A module of a file."""
+    spec = importlib.util.spec_from_file_location("peer", script)
+    if spec is None or spec.loader is None:
+        raise SystemExit(f"--peer {script}: is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def measure(peer: str = "") -> dict[str, Any]:
+    """All parts; the peer's stay as they are where none is given."""
+    known = read(Path(__file__).with_suffix(".json"))
+    found: dict[str, Any] = {
+        "peak_gflops": peak_gflops(),
+        "cycle": cycle(),
+        "error": error(),
+    }
+    return found | {"peer": beside(peer) if peer else known.get("peer")}
+
+
+# --- chart ----------------------------------------------------------------------------------------
+
+
+def draw(record: dict[str, Any]) -> Figure:
+    """Draw errors of D against elasticity [%] over the time of a cycle [ms], both logarithmic."""
+    with style():
+        figure, axes = plt.subplots(figsize=(6.4, 4.8))
+        _draw(axes, record, read(Path(__file__).with_name("speed.json")))
+    return figure
+
+
+def _draw(axes: Axes, condensed: dict[str, Any], speeds: dict[str, Any]) -> None:
+    rivals = (("ours", "plane", PALETTE[0], "o"), ("theirs", "condensed elements", PALETTE[1], "s"))
+    for name, label, colour, marker in rivals:
+        rows = [r for r in condensed["peer"][name] if r.get("steps_per_quarter", 10) == 10]
+        error = [100.0 * abs(row["error"]) for row in rows]
+        for kind, how, dashes in KINDS:
+            times = [1e-3 * row[kind] for row in rows]
+            axes.plot(times, error, dashes, color=colour, marker=marker, label=f"{label}, {how}")
+    for row in speeds["one"]["rows"]:
+        if row["what"] in SINGLE:
+            label, colour, marker = SINGLE[row["what"]]
+            place = 1e-3 * row["best_us"], 100.0 * abs(row["error_to_elements"])
+            axes.plot(*place, linestyle="", color=colour, marker=marker, label=label or None)
+    axes.set(xscale="log", yscale="log", xlim=(1e-2, 1e5))
+    axes.set_xlabel("time of a cycle on one core  [ms]")
+    axes.set_ylabel("error of the dissipation to elasticity  [%]")
+    axes.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8, handlelength=3.5
+    )

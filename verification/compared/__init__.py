@@ -1,0 +1,1 @@
+"""Ways to solve a strip that `verification.methods` compares with those of the library."""
