@@ -38,7 +38,7 @@ def fitted(half_window: float, nodes: int, constants: str) -> tuple[dict[str, An
     start = {"strip.kappa_s": START[constants], "model.constants": constants, "model.nodes": nodes}
     scene = library.squeezed().replace(start)
     curve = squeezed_curve().between(EDGE - half_window, EDGE + half_window)
-    fit = identify.fit_kappa_s(curve, scene)
+    fit = identify.fit(curve, scene, ["strip.kappa_s"])
     kappa_s, strip = fit.values["strip.kappa_s"], scene.strip
     per_consistent = 1.0 if constants == "consistent" else 24.0
     decay = squeeze_decay_length(strip.half_height, per_consistent * kappa_s, strip.poisson_ratio)
