@@ -55,7 +55,7 @@ def case(kind: str, number: int) -> Case:
     spring = stiffness * random.uniform(0.3, 2.0) * np.array([[1.0, -1.0], [-1.0, 1.0]])
     ratio = random.uniform(0.02, 0.04)
     structure = Structure(mass, spring, [Attachment(joint, 0)], damping_ratio=ratio)
-    force = float(joint.force[-1]) * random.uniform(1.0, 5.0) * ratio
+    force = float(joint.forces[-1]) * random.uniform(1.0, 5.0) * ratio
     omega = structure.modes(1)[0][0] * np.array(BESIDE)
     while True:
         try:
@@ -74,7 +74,7 @@ def integrated(cases: list[Case]) -> NDArray[np.complex128]:
         np.stack([np.pad(each, (0, most - each.size)) for each in values])
         for values in zip(*(_sliders(one.joint) for one, _ in lanes), strict=True)
     )
-    last = np.array([float(one.joint.springs[-1]) for one, _ in lanes])
+    last = np.array([float(one.joint.spring) for one, _ in lanes])
     stiffness = np.stack([np.asarray(one.structure.stiffness) for one, _ in lanes])
     stiffness[:, 0, 0] += last
     mass, damping = (
@@ -116,7 +116,7 @@ def integrated(cases: list[Case]) -> NDArray[np.complex128]:
 
 def _sliders(joint: Joint) -> tuple[Floats, Floats]:
     """Springs and limits of a joint's sliders, without the spring that never slips."""
-    return np.asarray(joint.springs)[:-1], np.asarray(joint.limits)
+    return np.asarray(joint.springs), np.asarray(joint.limits)
 
 
 def main() -> None:
@@ -134,7 +134,7 @@ def main() -> None:
         balance = one.shapes[:, 0, 1]
         errors = abs(end / balance - 1.0)
         row = {"kind": kind, "number": number, "amplitude": abs(balance).tolist()}
-        joint = abs(one.shapes[:, 0, 0]) / float(one.joint.displacement[-1])
+        joint = abs(one.shapes[:, 0, 0]) / float(one.joint.displacements[-1])
         row |= {"joint": joint.tolist(), "in_time": abs(end).tolist(), "error": errors.tolist()}
         rows.append(row)
     record = {"about": provenance(), "seed": SEED, "beside": BESIDE, "rows": rows}

@@ -202,8 +202,8 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
         reach = np.geomspace(smallest, largest, AMPLITUDES)
         force, loss = np.asarray(joint.backbone(reach)), np.asarray(joint.dissipation(reach))
     else:
-        known = np.asarray(joint.force)
-        low = np.interp(smallest, np.asarray(joint.displacement), known)
+        known = np.asarray(joint.forces)
+        low = np.interp(smallest, np.asarray(joint.displacements), known)
         force = np.geomspace(low, known[-1], AMPLITUDES)
         reach, loss = jax.device_get(_cycles((joint.network, force)))
         nested = np.isfinite(loss)

@@ -108,7 +108,7 @@ def masing():
     late = study.found.damping < 0.02
     off = np.abs(study.ratio[late] - 1.0)
     joint = dynamics.Joint.of(scene(FINE), 1.7)
-    u = np.interp(FORCES, np.asarray(joint.force), np.asarray(joint.displacement))
+    u = np.interp(FORCES, np.asarray(joint.forces), np.asarray(joint.displacements))
     slopes = np.diff(np.log(np.asarray(joint.dissipation(u)))) / np.diff(np.log(FORCES))
     bar = dynamics.Joint.of(scene(FINE, **{"strip.height_ratio": 0.02}), 1.7)
     v = np.interp(FORCES, np.asarray(bar.force), np.asarray(bar.displacement))

@@ -41,9 +41,9 @@ def random_joint(draw):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of few nodes
             strip = Joint.of(scene, draw.choice([0.6, 0.995, 0.995]) * float(jb_gross_slip(scene)))
-        size = float(strip.force[-1]) / float(strip.stiffness)
+        size = float(strip.forces[-1]) / float(strip.stiffness)
         stretch = draw.uniform(0.2, 0.6) / size
-        u, f = np.asarray(strip.displacement) * stretch, np.asarray(strip.force)
+        u, f = np.asarray(strip.displacements) * stretch, np.asarray(strip.forces)
         scale = draw.uniform(0.5, 2.0) / f[-1]
         return Joint(*resampled(u, f * scale), capacity=float(strip.capacity) * scale)
     law, far = random_law(draw)
@@ -91,11 +91,11 @@ class Brute:
     def __init__(self, structure):
         self.mass, self.damping = np.diag(structure.mass), structure.damping
         self.stiffness, self.b = structure.stiffness, structure.directions
-        joints = [attached.joint for attached in structure.attachments]
-        self.springs = np.concatenate([np.asarray(j.springs)[:-1] for j in joints])
+        joints = structure.joints
+        self.springs = np.concatenate([np.asarray(j.springs) for j in joints])
         self.limits = np.concatenate([np.asarray(j.limits) for j in joints])
         self.joint = np.repeat(np.arange(len(joints)), [j.limits.size for j in joints])
-        self.remaining = np.array([float(j.springs[-1]) for j in joints])
+        self.remaining = np.array([float(j.spring) for j in joints])
         stuck = structure.modes(9)[0]
         self.longest, self.shortest = 2.0 * np.pi / stuck[0], 2.0 * np.pi / stuck[-1]
         self.sliders = np.zeros(self.springs.size)
@@ -133,15 +133,15 @@ class Brute:
 def checked_joint(draw):
     """Errors of backbone and dissipation of a joint at an amplitude."""
     joint = random_joint(draw)
-    size = draw.uniform(0.2, 2.5) * float(joint.displacement[-2])
+    size = draw.uniform(0.2, 2.5) * float(joint.displacements[-2])
     part = np.linspace(-1.0, 1.0, 801)
     path = size * np.concatenate([part[400:], -part[1:], part[1:], -part[1:]])
     sliders, last, forces = 0.0, 0.0, []
-    springs, limits = np.asarray(joint.springs)[:-1], np.asarray(joint.limits)
+    springs, limits = np.asarray(joint.springs), np.asarray(joint.limits)
     for u in path:
         sliders = np.clip(sliders + springs * (u - last), -limits, limits)
         last = u
-        forces.append(np.sum(sliders) + float(joint.springs[-1]) * u)
+        forces.append(np.sum(sliders) + float(joint.spring) * u)
     loop, way = np.array(forces)[-1601:], path[-1601:]
     area = np.sum(0.5 * (loop[1:] + loop[:-1]) * np.diff(way))
     # Beyond what the joint knows, any value is wrong.
@@ -166,7 +166,7 @@ def checked_law(draw):
 
 def amplitudes(draw, structure):
     """Modal displacements up to and beyond gross slip."""
-    reach = min(float(a.joint.displacement[-2]) for a in structure.attachments)
+    reach = min(float(j.displacements[-2]) for j in structure.joints)
     _, shapes = structure.modes(1)
     moved = np.max(np.abs(structure.directions.T @ shapes[:, 0]))
     return draw.uniform(0.3, 3.0) * reach / moved * np.geomspace(0.2, 1.0, 5)

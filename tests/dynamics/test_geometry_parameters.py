@@ -77,6 +77,6 @@ class TestScenes:
         cycles = SteadyCycles.of(scene, force)
         joint = Joint.of(scene, force[-1])
         assert joint.network is None
-        u = np.interp(force, np.append(0.0, joint.force), np.append(0.0, joint.displacement))
+        u = np.interp(force, np.append(0.0, joint.forces), np.append(0.0, joint.displacements))
         np.testing.assert_allclose(u, cycles.displacement, rtol=0.025)
         np.testing.assert_allclose(joint.dissipation(u), cycles.dissipation, rtol=0.05)

@@ -65,18 +65,18 @@ class TestJoint:
 
     def test_a_strips_points_are_the_means_of_pull_and_push(self):
         joint = Joint.of(PLANE, 1.2, width=3.0)
-        assert float(joint.force[-1]) == pytest.approx(3.6)
+        assert float(joint.forces[-1]) == pytest.approx(3.6)
         rest = joint.network.rest
         pull, push = (joint.network.sliders(rest, jnp.asarray(way)) for way in (1.0, -1.0))
-        force = joint.force / 3.0
+        force = joint.forces / 3.0
         mean = 0.5 * (pull.displacement_after(force) + push.displacement_after(force))
-        np.testing.assert_allclose(joint.displacement, mean, rtol=1e-12)
+        np.testing.assert_allclose(joint.displacements, mean, rtol=1e-12)
         np.testing.assert_allclose(joint.stiffness * joint.network.body.c, 3.0, rtol=1e-6)
 
     def test_a_spring_in_series_adds_its_displacement(self):
         springy = JOINT.in_series(2.0)
         force = jnp.array([0.1, 0.5, 0.9])
-        u = jnp.interp(force, JOINT.force, JOINT.displacement)
+        u = jnp.interp(force, JOINT.forces, JOINT.displacements)
         np.testing.assert_allclose(springy.backbone(u + force / 2.0), force, rtol=1e-9)
         loss = JOINT.dissipation(u)
         np.testing.assert_allclose(springy.dissipation(u + force / 2.0), loss, rtol=1e-9)
@@ -119,7 +119,7 @@ class TestJoint:
         bar = STRIP.replace({"model.section": "bar", "model.nodes": 101})
         joint = Joint.of(bar, 1.2)
         assert joint.network is None
-        u = 0.5 * float(joint.displacement[-1])
+        u = 0.5 * float(joint.displacements[-1])
         force = float(joint.backbone(u))
         assert float(joint.dissipation(u)) == pytest.approx(2.0 / 3.0 * force**3 / 3.4e4, rel=0.01)
 
@@ -130,9 +130,9 @@ class TestJoint:
         joint = Joint.of(strip, 1.0, width=2.0)
         loop = jb.solve(strip.replace({"load.amplitude": 1.0}))
         u = 0.5 * float(jnp.max(loop.displacement) - jnp.min(loop.displacement))
-        assert float(joint.force[-1]) == 2.0
-        assert float(joint.displacement[-1]) == pytest.approx(u, rel=0.003)
-        energy = float(joint.dissipation(joint.displacement[-1]))
+        assert float(joint.forces[-1]) == 2.0
+        assert float(joint.displacements[-1]) == pytest.approx(u, rel=0.003)
+        energy = float(joint.dissipation(joint.displacements[-1]))
         assert energy == pytest.approx(2.0 * float(loop.dissipation), rel=1e-3)
 
 
@@ -175,7 +175,7 @@ class TestReach:
     @pytest.mark.doubtful("damping may be off")
     def test_a_joint_that_was_followed_to_gross_slip_slides(self):
         joint = Joint.of(PLANE, 1.99, width=3.0)
-        end = float(joint.displacement[-2])
+        end = float(joint.displacements[-2])
         assert float(joint.backbone(50.0 * end)) == pytest.approx(3.0 * 1.99, rel=1e-9)
         slid = float(joint.dissipation(9.0 * end) - joint.dissipation(end))
         assert slid == pytest.approx(4.0 * 3.0 * 1.99 * 8.0 * end, rel=1e-9)
@@ -211,7 +211,7 @@ class TestModes:
         stiff = float(joint.stiffness)
         spring = 0.5 * stiff * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
         structure = Structure(20.0 * np.eye(3), spring, [Attachment(joint, 0)])
-        small = 0.02 * float(joint.displacement[-2]) * np.sqrt(20.0)
+        small = 0.02 * float(joint.displacements[-2]) * np.sqrt(20.0)
         assert modal_curve(structure, [0.1 * small]).doubts == ()
         with pytest.warns(jb.DoubtfulWarning, match="damping may be off by.*take nonlinear_mode"):
             curve = modal_curve(structure, [small, 20.0 * small])
@@ -429,7 +429,7 @@ def test_pull_and_push_each_have_their_backbone():
     assert joint.sides is not None
     pull, push = (float(joint.backbone(way * 1e-5, mean=False)) for way in (1.0, -1.0))
     assert pull > float(joint.backbone(1e-5)) > -push > 0.0  # a pull presses the corner down
-    apart = np.abs(np.asarray(joint.sides) - joint.displacement) / joint.displacement
+    apart = np.abs(np.asarray(joint.sides) - joint.displacements) / joint.displacements
     assert float(joint.asymmetry) == pytest.approx(float(apart.max()), rel=1e-9)
     at_end = joint.backbone(jnp.stack([joint.sides[0, -1], -joint.sides[1, -1]]), mean=False)
     np.testing.assert_allclose(at_end, [3.6, -3.6], rtol=1e-9)
@@ -445,5 +445,5 @@ def test_a_lap_joint_is_walked_exactly_on_any_path():
     np.testing.assert_allclose(joint.path_forces(path), forces, atol=1e-8)
     for way, side in zip((1.0, -1.0), joint.sides, strict=True):
         u = jb.solve(lap, [way * 0.7], throw=False).displacement[-1]
-        assert float(jnp.interp(0.7, joint.force, side)) == pytest.approx(way * float(u), rel=2e-3)
+        assert float(jnp.interp(0.7, joint.forces, side)) == pytest.approx(way * float(u), rel=2e-3)
         assert float(joint.backbone(u, mean=False)) == pytest.approx(way * 0.7, rel=2e-3)

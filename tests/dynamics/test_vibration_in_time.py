@@ -62,9 +62,9 @@ def integrated(structure, force, response, points, periods):
 
     Central differences with the exact law of the sliders, whose memory is that of the cycle before.
     """
-    joint, cubic = (a.joint for a in structure.attachments)
+    joint, cubic = structure.joints
     springs, limits = np.asarray(joint.springs), np.asarray(joint.limits)
-    stiffness = structure.stiffness + np.diag([springs[-1], float(cubic.stiffness)])
+    stiffness = structure.stiffness + np.diag([float(joint.spring), float(cubic.stiffness)])
     mass, damping = np.diag(structure.mass), np.diag(structure.damping)
     omega, h = response.frequency[points, None], response.harmonic
     shapes = response.coefficients[points]
@@ -78,7 +78,7 @@ def integrated(structure, force, response, points, periods):
     )
     for before, after in itertools.pairwise(angles):
         moved = (on_curve(after) - on_curve(before))[:, :1]
-        sliders = np.clip(sliders + springs[:-1] * moved, -limits, limits)
+        sliders = np.clip(sliders + springs * moved, -limits, limits)
     step = 2.0 * np.pi / STEPS / omega
     x, before = on_curve(0.0), on_curve(-2.0 * np.pi / STEPS)
     sums = np.zeros(len(points), complex)
@@ -89,7 +89,7 @@ def integrated(structure, force, response, points, periods):
         inner[:, 1] += float(cubic.cubic) * x[:, 1] ** 3 - force * np.cos(angle)
         inertia, drag = mass / step**2, damping / (2.0 * step)
         after = (inertia * (2.0 * x - before) + drag * before - inner) / (inertia + drag)
-        sliders = np.clip(sliders + springs[:-1] * (after - x)[:, :1], -limits, limits)
+        sliders = np.clip(sliders + springs * (after - x)[:, :1], -limits, limits)
         before, x = x, after
         if number >= (periods - 1) * STEPS:
             sums += 2.0 / STEPS * x[:, 1] * np.exp(-1j * (angle + 2.0 * np.pi / STEPS))

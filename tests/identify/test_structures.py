@@ -85,7 +85,7 @@ def test_a_wider_strip_and_more_mass_are_what_they_say(monkeypatch):
     other = model.replace(more).structure()
     np.testing.assert_allclose(other.mass, 1.5 * np.asarray(one.mass))
     np.testing.assert_allclose(other.stiffness, 0.5 * np.asarray(one.stiffness))
-    narrow, wide = (each.attachments[0].joint for each in (one, other))
+    narrow, wide = (each.attachments[0].law for each in (one, other))
     np.testing.assert_allclose(wide.force, 2.0 * np.asarray(narrow.force), rtol=1e-12)
     np.testing.assert_allclose(wide.displacement, narrow.displacement, rtol=1e-12)
 

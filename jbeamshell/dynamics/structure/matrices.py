@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import TINY, as_leaf, is_traced, require, require_number
 from jbeamshell.common.errors import InputError
-from jbeamshell.dynamics.structure.backbone import ROUNDING
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.vibration.elements import CubicSpring
+from jbeamshell.laws.law import ROUNDING, Law
 
 SQUARE = "give a square matrix of numbers, dense or scipy sparse, as large as the mass matrix"
 SYMMETRIC = "must be symmetric; take (A + A.T)/2 if only rounding makes it unsymmetric"
@@ -31,15 +31,15 @@ RATIOS = "give one damping ratio, or one for each of the lowest modes"
 
 
 class Attachment(NamedTuple):
-    """Joint between two degrees of freedom.
+    """Law of a joint between two degrees of freedom.
 
     Attributes
     ----------
-    joint : force element
+    law : `Joint`, or any law with Masing's memory, which becomes one (`Joint.of`)
     first, second : degrees of freedom, counted from 0; None is the ground
     """
 
-    joint: Joint | CubicSpring
+    law: Law | CubicSpring
     first: int
     second: int | None = None
 
@@ -54,6 +54,7 @@ class Structure:
     ----------
     mass, stiffness : (n, n) symmetric matrices, dense or scipy sparse
     attachments : joints; the matrices do not contain their stiffness
+    joints : their laws as sliders
     damping_ratio : (m,) damping ratios of the lowest modes with all joints stuck, beside those of
         the given damping matrix; zeros beyond them
 
@@ -92,7 +93,7 @@ class Structure:
             that is not positive definite; for a damping with a negative mode; for a joint at a
             degree of freedom that does not exist; for a rigid-body mode, or one of negative
             stiffness, with all joints stuck; for a negative damping ratio, or more than modes; for
-            ratios or traced numbers of a large structure
+            ratios or traced numbers of a large structure; for a law that no sliders hold
         """
         self.mass = _checked("mass", mass)
         size = self.mass.shape[0]
@@ -101,6 +102,7 @@ class Structure:
         self._given_damping = undamped if damping is None else _checked("damping", damping, size)
         self.damping_ratio = _ratios(damping_ratio, size)
         self.attachments = tuple(attachments)
+        self.joints = [_as_sliders(attached.law) for attached in self.attachments]
         for place, attached in enumerate(self.attachments):
             ends = [attached.first, *([] if attached.second is None else [attached.second])]
             inside = all(isinstance(e, int | np.integer) and 0 <= e < size for e in ends)
@@ -117,7 +119,7 @@ class Structure:
     def traced(self) -> bool:
         """True if any number of the structure is traced by a JAX transformation."""
         matrices = (self.mass, self.stiffness, self._given_damping, self.damping_ratio)
-        return is_traced(*matrices, [a.joint for a in self.attachments])
+        return is_traced(*matrices, self.joints)
 
     @property
     def damping(self) -> Any:
@@ -161,7 +163,7 @@ class Structure:
     @property
     def stuck_stiffness(self) -> Any:
         """Stiffness matrix (n, n) with all joints stuck."""
-        springs = [a.joint.stiffness for a in self.attachments]
+        springs = [joint.stiffness for joint in self.joints]
         directions = self.directions
         if self.traced:
             return self.stiffness + (directions * jnp.asarray(springs)) @ directions.T
@@ -200,7 +202,7 @@ class Structure:
 
     def within_reach(self, peaks: Any) -> Array:
         """True where joints are known at their largest displacements (..., joints)."""
-        ends = [a.joint.reach for a in self.attachments]
+        ends = [joint.reach for joint in self.joints]
         return jnp.abs(peaks) <= (1.0 + ROUNDING) * jnp.stack(ends) if ends else jnp.abs(peaks) >= 0
 
     def knows(self, peaks: Any, what: str) -> Any:
@@ -221,7 +223,7 @@ class Structure:
             return jnp.all(within, axis=-1)
         peaks = np.asarray(peaks)
         place = int(np.argmin(np.all(np.asarray(within), axis=0)))
-        joint, most = self.attachments[place].joint, float(np.nanmax(abs(peaks[:, place])))
+        joint, most = self.joints[place], float(np.nanmax(abs(peaks[:, place])))
         assert isinstance(joint, Joint)
         words = joint.unknown_at(most)
         raise InputError(f"{what} moves the joint of attachments[{place}] by {words}")
@@ -243,6 +245,11 @@ class Structure:
         fix = f"leaves a rigid mode, in which degree of freedom {most} moves most: hold the "
         fix += "structure by a spring or a joint"
         require("stiffness", self.stiffness.shape, held, fix)
+
+
+def _as_sliders(law: Law | CubicSpring) -> Joint | CubicSpring:
+    """Force element of a law; raises `InputError`."""
+    return law if isinstance(law, Joint | CubicSpring) else Joint.of(law)
 
 
 def _ratios(given: ArrayLike | None, size: int) -> Any:

@@ -144,7 +144,7 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
 
     Examples
     --------
-    >>> joint = Joint(displacement=[1.0, 3.0], force=[1.0, 2.0])
+    >>> joint = Joint(displacements=[1.0, 3.0], forces=[1.0, 2.0])
     >>> structure = Structure([[1.0]], [[0.0]], [Attachment(joint, 0)])
     >>> modal_curve(structure, [0.5, 2.0]).frequency.round(3).tolist()
     [1.0, 0.866]
@@ -171,10 +171,10 @@ def by_statics(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> Mo
         directions.T @ displacements[:, 1:],
         structure.modal_damping(shape, omega[mode], mode),
     )
-    joints = [a.joint for a in structure.attachments if isinstance(a.joint, Joint)]
-    sliding = len(joints) == len(structure.attachments)
+    joints = [joint for joint in structure.joints if isinstance(joint, Joint)]
+    sliding = len(joints) == len(structure.joints)
     require("attachments", structure.attachments, sliding, SLIDING)
-    backbones = tuple((joint.displacement, joint.force) for joint in joints)
+    backbones = tuple((joint.displacements, joint.forces) for joint in joints)
     curve, sound = _curve(
         backbones, statics, _Modes.of(structure, load, mode), jnp.asarray(amplitude)
     )
@@ -281,7 +281,7 @@ def _alike(backbones: tuple[tuple[Array, Array], ...]) -> Joint:
     stacked = []
     for u, f in backbones:
         steps = jnp.arange(1, size + 1 - u.size)
-        slope = Joint(u, f).springs[-1]
+        slope = Joint(u, f).spring
         further = u[-1] * (1.0 + steps)
         longer = jnp.append(f, f[-1] + slope * (further - u[-1]))
         stacked.append(Joint(jnp.append(u, further), longer))

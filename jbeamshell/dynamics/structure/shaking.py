@@ -283,7 +283,7 @@ def _model(structure: Structure) -> _Model:
     """Matrices and force elements as arrays."""
     mass, damping, stiffness = map(dense, (structure.mass, structure.damping, structure.stiffness))
     directions = structure.directions
-    laws = laws_of(doubled([attached.joint for attached in structure.attachments]))
+    laws = laws_of(doubled(structure.joints))
     stiffness = stiffness + (directions * np.asarray(laws.remaining)) @ directions.T
     arrays = [jnp.asarray(a) for a in (mass, damping, stiffness, directions)]
     return _Model(arrays[0], arrays[1], arrays[2], arrays[3], laws)

@@ -41,16 +41,6 @@ class CubicSpring(eqx.Module):
         require_number("spring.stiffness", self.stiffness, "must not be negative", low=-TINY)
 
     @property
-    def springs(self) -> Array:
-        """Stiffness (1,) of the spring that remains without sliders."""
-        return self.stiffness[None]
-
-    @property
-    def limits(self) -> Array:
-        """Forces (0,) at which sliders slip; none."""
-        return jnp.zeros(0)
-
-    @property
     def reach(self) -> Array:
         """Largest displacement at which the spring is known: infinite."""
         return jnp.asarray(jnp.inf)
@@ -96,7 +86,6 @@ def laws_of(elements: list[Joint | CubicSpring]) -> Laws:
 
 def _row(element: Joint | CubicSpring) -> tuple[Array, Array, Array, Array, Array]:
     """Springs and limits of the sliders, stuck stiffness, remaining spring, cubic coefficient."""
-    cubic = element.cubic if isinstance(element, CubicSpring) else jnp.zeros(())
-    springs = element.springs
-    # Their sum, not the first slope, so that r = f - k u is zero where nothing slips.
-    return springs[:-1], element.limits, jnp.sum(springs), springs[-1], cubic
+    if isinstance(element, CubicSpring):
+        return jnp.zeros(0), jnp.zeros(0), element.stiffness, element.stiffness, element.cubic
+    return element.springs, element.limits, element.stiffness, element.spring, jnp.zeros(())

@@ -90,7 +90,7 @@ def forced_response(
     Examples
     --------
     >>> u = np.linspace(0.25, 3.0, 12)
-    >>> joint = Joint(displacement=u, force=2.0 * np.tanh(u / 2.0))
+    >>> joint = Joint(displacements=u, forces=2.0 * np.tanh(u / 2.0))
     >>> structure = Structure([[1.0]], [[1.0]], [Attachment(joint, 0)], damping=[[0.02]])
     >>> response = forced_response(structure, [0.3], (0.8, 2.0))
     >>> bool(response.amplitude.max() > 1.0)

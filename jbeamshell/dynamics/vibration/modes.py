@@ -60,7 +60,7 @@ def nonlinear_mode(
 
     Examples
     --------
-    >>> joint = Joint(displacement=[1.0, 3.0], force=[1.0, 2.0])
+    >>> joint = Joint(displacements=[1.0, 3.0], forces=[1.0, 2.0])
     >>> structure = Structure([[1.0]], [[0.0]], [Attachment(joint, 0)])
     >>> nonlinear_mode(structure, [0.5, 2.0]).frequency.round(2).tolist()
     [1.0, 0.87]
