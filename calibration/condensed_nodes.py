@@ -39,7 +39,7 @@ def both(body: Body, friction: jax.Array, amplitudes: jax.Array) -> tuple[jax.Ar
         path = branches.path(body, factors, friction, start, amplitude * TURNS)
         return jnp.sum(path.slip_work[-2:])
 
-    followed = cycles.steady_cycles(body, friction).dissipation(amplitudes)
+    followed = cycles.cycle_factors(body, friction).dissipation(amplitudes)
     return followed, jax.vmap(one)(amplitudes)
 
 

@@ -27,10 +27,9 @@ from jbeamshell.contact_line.network import Network
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.over_amplitude import RingDown
 from jbeamshell.dynamics.ringdown import ring_down
-from jbeamshell.dynamics.steady_cycles import largest_force
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.motion import Motion
-from jbeamshell.dynamics.structure.joint import Joint
+from jbeamshell.dynamics.structure.joint import Joint, largest_force
 from jbeamshell.dynamics.structure.modal import ModalCurve
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene

@@ -86,7 +86,7 @@ def scene(eta: Any = ETA) -> jb.Scene:
 
 
 @functools.cache
-def builder(nodes: int) -> Callable[[jax.Array], contact_line.SteadyCycles]:
+def builder(nodes: int) -> Callable[[jax.Array], contact_line.CycleFactors]:
     """Compiled function from a height ratio to factors."""
     return jax.jit(lambda eta: contact_line.factors(scene(eta), nodes=nodes))
 
@@ -118,7 +118,7 @@ def batch(budget: float) -> dict[str, Any]:
     etas, amplitudes = jnp.geomspace(0.03, 0.4, 64), jnp.linspace(0.1, 1.9, 256)
     many = etas.size * amplitudes.size
 
-    def one(eta: jax.Array) -> contact_line.SteadyCycles:
+    def one(eta: jax.Array) -> contact_line.CycleFactors:
         return contact_line.factors(scene(eta))
 
     build = jax.jit(lambda etas: jax.lax.map(one, etas))

@@ -42,9 +42,8 @@ from jbeamshell.dynamics.export.targets import write
 from jbeamshell.dynamics.four_parameters import (
     ENOUGH,
     FRACTIONS,
-    FourParameters,
+    four_parameters,
 )
-from jbeamshell.dynamics.steady_cycles import gross_slip, largest_force
 from jbeamshell.dynamics.structure.strip_line import (
     cycled_line,
     network_forces,
@@ -52,9 +51,9 @@ from jbeamshell.dynamics.structure.strip_line import (
     slider_line_once,
     walked_forces,
 )
-from jbeamshell.laws.four_parameters import iwan4_through
 from jbeamshell.laws.law import Law, as_path
 from jbeamshell.laws.parallel_iwan import ParallelIwan, backbone_points
+from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
 BACKBONE = "give as many displacements as forces, both rising from above zero, softening throughout"
@@ -182,7 +181,7 @@ class Joint(ParallelIwan):
         require_number("width", width)
         require_choice("by", by, (None, *BY))
         bolted = scene.member.bolt_stiffness is not None  # which holds beyond
-        capacity = np.inf if bolted else width * gross_slip(scene)
+        capacity = np.inf if bolted else width * scene.gross_slip
         condensed = scene.plan.on_contact_line
         traced = is_traced(scene, force)
         opens = scene.member.support != "none" or (condensed and goes_on(scene))
@@ -348,29 +347,6 @@ class Joint(ParallelIwan):
             return self.width * walked_forces(self.scene, np.asarray(points))
         return super().path_forces(self._where_known(points, points))
 
-    def four_parameters(self) -> FourParameters:
-        """Segalman's model nearest to the joint's own loops, with its errors.
-
-        `jbeamshell.dynamics.four_parameters` takes the scene's steady cycles instead, up to .95 of
-        gross slip.
-
-        Raises
-        ------
-        InputError
-            if the force of gross slip is not known, or the backbone ends below .3 of it
-        """
-        capacity = float(self.capacity)
-        fix = "is not known: take Joint.of(scene), or give capacity="
-        require("joint.capacity", capacity, bool(np.isfinite(capacity)), fix)
-        force = capacity * np.array(FRACTIONS)
-        force = force[force <= float(self.forces[-1])]
-        fix = f"ends too far below gross slip, {capacity:.6g}: take Joint.of(scene) with more force"
-        require("joint.forces", float(self.forces[-1]), force.size >= ENOUGH, fix)
-        u = np.asarray(self.displacement(force))
-        d = np.asarray(self.dissipation(u))
-        law = iwan4_through(capacity, float(self.stiffness), force, u, d)
-        return FourParameters(law, force, u, d)
-
     def export(
         self,
         to: str,
@@ -418,7 +394,7 @@ class Joint(ParallelIwan):
             capacity=float(self.capacity),
             units=(units[0], units[1]),
             sides=None if self.sides is None else np.asarray(self.sides, float),
-            model=self.four_parameters() if to == "tmdsimpy" and self._nears_slip else None,
+            model=four_parameters(self) if to == "tmdsimpy" and self._nears_slip else None,
         )
         written = write(element, to, path)
         if element.asymmetry > DOUBTED_ASYMMETRY:
@@ -465,6 +441,24 @@ class Joint(ParallelIwan):
     def _nears_slip(self) -> bool:
         """True if the backbone tells the four parameters."""
         return float(self.forces[-1]) >= FRACTIONS[ENOUGH - 1] * float(self.capacity)
+
+
+def largest_force(scene: Scene, force: Any = None) -> Any:
+    """Force up to which a joint is wanted, checked; None is the scene's amplitude."""
+    key = "force" if force is not None else "load.amplitude"
+    if force is None:
+        control = scene.load.control
+        fix = "is no force: give force=, or take load.control = 'force'"
+        require("load.amplitude", scene.load.amplitude, control == "force", fix)
+        force = scene.load.amplitude
+    require_number("force", force)
+    if not is_traced(scene, force):
+        by_force = dataclasses.replace(scene.load, control="force")
+        rule = gross_slip_rule(by_force, scene.member, scene.number, force)
+        limit = float(scene.gross_slip)
+        fix = f"must stay below gross slip, mu F_N L = {limit:.6g}: take less, such as half of it, "
+        rule._replace(key=key, fix=f"{fix}{0.5 * limit:.4g}").demand()
+    return force
 
 
 def _longer(places: Array) -> Array:
