@@ -56,10 +56,12 @@ def case(kind: str, number: int) -> Case:
     ratio = random.uniform(0.02, 0.04)
     structure = Structure(mass, spring, [Attachment(joint, 0)], damping_ratio=ratio)
     force = float(joint.forces[-1]) * random.uniform(1.0, 5.0) * ratio
-    omega = structure.modes(1)[0][0] * np.array(BESIDE)
+    omega = structure.modes(1).omega[0] * np.array(BESIDE)
     while True:
         try:
-            found = steady_response(structure, [0.0, force], omega, harmonics=HARMONICS)
+            found = steady_response(
+                structure, [0.0, force], omega / (2.0 * np.pi), harmonics=HARMONICS
+            )
         except jb.InputError:  # the joint leaves its backbone
             force *= 0.7
         else:

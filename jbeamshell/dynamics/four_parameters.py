@@ -6,12 +6,11 @@ beta follow from the curves of displacement and dissipation, without a test.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require, require_number
+from jbeamshell.common.pytrees import Tree
 from jbeamshell.laws.four_parameters import exponents, iwan4_through
 from jbeamshell.laws.iwan4 import Iwan4
 from jbeamshell.laws.law import Law
@@ -24,7 +23,7 @@ LEAST = 1e-9  # energy of a cycle that is felt, over F u
 ENOUGH = 4  # amplitudes
 
 
-class FourParameters(NamedTuple):
+class FourParameters(Tree):
     """Four-parameter Iwan model of a scene or joint, and how far it is from it.
 
     Attributes

@@ -13,7 +13,7 @@ of gross slip, frequencies without the strip's inertia are too high by m_1/2m an
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -54,7 +54,8 @@ SAMPLES_PER_CYCLE = 50
 AMPLITUDES = 40  # of the prediction
 
 
-class RingDownStudy(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class RingDownStudy:
     """Ring-down of a payload on a strip, and its prediction by quasi-static modal analysis.
 
     Attributes
@@ -102,7 +103,7 @@ class RingDownStudy(NamedTuple):
             if ends is not None:
                 columns[f"{name}_low"], columns[f"{name}_high"] = ends.T
         columns |= {
-            "predicted_frequency": self._prediction(self.predicted.frequency) / (2.0 * np.pi),
+            "predicted_frequency": self._prediction(self.predicted.frequency),
             "predicted_damping": self._prediction(self.predicted.damping),
         }
         lists = {name: np.asarray(column).tolist() for name, column in columns.items()}
@@ -211,7 +212,7 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
     softer = elastic * reach / force
     return ModalCurve(
         amplitude=reach * np.sqrt(mass),
-        frequency=np.sqrt(force / (mass * reach)),
+        frequency=np.sqrt(force / (mass * reach)) / (2.0 * np.pi),
         damping=loss / (2.0 * np.pi * force * reach),
         dissipation=loss,
         joints=reach[:, None],

@@ -146,13 +146,13 @@ class Assembly(eqx.Module):
         inverse of a modal mass.
         """
         structure = self.structure()
-        _, shapes = structure.modes(self.mode + 1)
+        shapes = structure.modes(self.mode + 1).shapes
         shape = jnp.asarray(shapes)[:, self.mode]
         seen = jnp.asarray(1.0) if self.point is None else jnp.abs(shape[self.point])
         driven = self.point if self.driven is None else self.driven
         felt = jnp.asarray(1.0) if driven is None else jnp.abs(shape[driven])
         found = by_statics(structure, jnp.asarray(amplitudes) / seen, self.mode)
-        return found._replace(amplitude=amplitudes), felt * seen
+        return found.but(amplitude=amplitudes), felt * seen
 
 
 class _Plain(eqx.Module):

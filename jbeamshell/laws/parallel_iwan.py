@@ -52,7 +52,7 @@ class Equivalent(Tree):
     stiffness : force over displacement, of the first harmonic
     damping : damping coefficient, force over velocity
     damping_ratio : half the loss factor
-    frequency : angular frequency of the mass
+    frequency : of the mass, cycles per time
     """
 
     amplitude: Array
@@ -160,9 +160,9 @@ class ParallelIwan(MasingLaw):
         require_number("mass", mass)
         complex_stiffness = self.first_harmonic(amplitude)
         stiffness, loss = jnp.real(complex_stiffness), jnp.imag(complex_stiffness)
-        frequency = jnp.sqrt(stiffness / mass)
-        size = jnp.abs(jnp.asarray(amplitude))
-        return Equivalent(size, stiffness, loss / frequency, 0.5 * loss / stiffness, frequency)
+        omega, size = jnp.sqrt(stiffness / mass), jnp.abs(jnp.asarray(amplitude))
+        frequency = omega / (2.0 * jnp.pi)
+        return Equivalent(size, stiffness, loss / omega, 0.5 * loss / stiffness, frequency)
 
     def line(self, u: Array) -> Array:
         """Backbone whose last slope goes on; any shape."""

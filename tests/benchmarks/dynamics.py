@@ -54,7 +54,7 @@ def ringing(strip, cycles, per_cycle, **options):
     """Ring-down of a payload of 50 strips, with a number of time steps in a period."""
     mass = HEAVY * 2.0 * float(strip.strip.half_height * strip.strip.length)
     attached = dynamics.AttachedMasses(mass)
-    period = 2.0 * np.pi / float(dynamics.modes(strip, attached=attached).frequency[0])
+    period = 1.0 / float(dynamics.modes(strip, attached=attached).frequency[0])
     step = {} if per_cycle is None else {"step": period / per_cycle}
     return dynamics.simulate(
         strip,
@@ -89,7 +89,7 @@ def slow_limit():
     attached = dynamics.AttachedMasses(
         HEAVY * 2.0 * float(strip.strip.half_height * strip.strip.length)
     )
-    first = float(dynamics.modes(strip, attached=attached).frequency[0]) / (2.0 * np.pi)
+    first = float(dynamics.modes(strip, attached=attached).frequency[0])
     rows = []
     for ratio in (0.1, 0.03, 0.01):
         slow = 1.0 / (ratio * first)

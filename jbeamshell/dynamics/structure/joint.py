@@ -95,8 +95,8 @@ class Joint(ParallelIwan):
 
     heading: ClassVar[str] = "joint"
 
-    displacements: Array
-    forces: Array
+    displacements: Any
+    forces: Any
     network: Network | None = None
     width: Any = 1.0
     asymmetry: Any = 0.0

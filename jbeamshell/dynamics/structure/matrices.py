@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import TINY, as_leaf, is_traced, require, require_number
 from jbeamshell.common.errors import InputError
+from jbeamshell.dynamics.frequencies import Modes
 from jbeamshell.dynamics.structure.joint import Joint
-from jbeamshell.dynamics.vibration.elements import CubicSpring
 from jbeamshell.laws.law import ROUNDING, Law
 
 SQUARE = "give a square matrix of numbers, dense or scipy sparse, as large as the mass matrix"
@@ -39,7 +39,7 @@ class Attachment(NamedTuple):
     first, second : degrees of freedom, counted from 0; None is the ground
     """
 
-    law: Law | CubicSpring
+    law: Law
     first: int
     second: int | None = None
 
@@ -102,7 +102,11 @@ class Structure:
         self._given_damping = undamped if damping is None else _checked("damping", damping, size)
         self.damping_ratio = _ratios(damping_ratio, size)
         self.attachments = tuple(attachments)
-        self.joints = [_as_sliders(attached.law) for attached in self.attachments]
+        laws = [attached.law for attached in self.attachments]
+        for place, law in enumerate(laws):
+            fix = "give a Joint, or another jbeamshell.laws.Law"
+            require(f"attachments[{place}].law", type(law).__name__, isinstance(law, Law), fix)
+        self.joints = [law if isinstance(law, Joint) else Joint.of(law) for law in laws]
         for place, attached in enumerate(self.attachments):
             ends = [attached.first, *([] if attached.second is None else [attached.second])]
             inside = all(isinstance(e, int | np.integer) and 0 <= e < size for e in ends)
@@ -127,9 +131,9 @@ class Structure:
         if not self.damping_ratio.size:
             return self._given_damping
         require("damping_ratio", self.damping_ratio.shape, self.size <= DENSE, LARGE)
-        omega, shapes = self.modes(self.damping_ratio.size)
-        momenta = dense(self.mass) @ shapes
-        own = (momenta * (2.0 * self.damping_ratio * omega)) @ momenta.T
+        modes = self.modes(self.damping_ratio.size)
+        momenta = dense(self.mass) @ modes.shapes
+        own = (momenta * (2.0 * self.damping_ratio * modes.omega)) @ momenta.T
         return dense(self._given_damping) + own
 
     def modal_damping(self, shape: Any, omega: Any, mode: int) -> Any:
@@ -173,14 +177,15 @@ class Structure:
             return self.stiffness + directions @ scipy.sparse.diags_array(own) @ directions.T
         return self.stiffness + (directions * own) @ directions.T
 
-    def modes(self, count: int = 6) -> tuple[Any, Any]:
-        """Angular frequencies (k,) and shapes (n, k) of unit modal mass, all joints stuck.
+    def modes(self, count: int = 6) -> Modes:
+        """Frequencies (k,) and shapes (n, k) of unit modal mass, all joints stuck.
 
         Traced ones have derivatives where no other mode has the same frequency.
         """
         stuck, count = self.stuck_stiffness, min(count, self.size)
         if self.traced:
-            return _traced_modes(stuck, jnp.asarray(self.mass), count)
+            omega, shapes = _traced_modes(stuck, jnp.asarray(self.mass), count)
+            return Modes(omega / (2.0 * jnp.pi), shapes)
         if self.size <= DENSE or count >= self.size - 1:
             values, shapes = scipy.linalg.eigh(dense(stuck), dense(self.mass))
         else:
@@ -189,7 +194,7 @@ class Structure:
             shift = -SYMMETRY_ROUNDING * abs(stuck).max() / abs(self.mass).max()
             values, shapes = scipy.sparse.linalg.eigsh(stiffness, count, mass, sigma=shift)
         order = np.argsort(values)[:count]
-        return np.sqrt(np.maximum(values[order], 0.0)), shapes[:, order]
+        return Modes(np.sqrt(np.maximum(values[order], 0.0)) / (2.0 * np.pi), shapes[:, order])
 
     def static_displacements(self, loads: Any) -> Any:
         """Static displacements (n, k) under loads (n, k), all joints stuck."""
@@ -224,7 +229,6 @@ class Structure:
         peaks = np.asarray(peaks)
         place = int(np.argmin(np.all(np.asarray(within), axis=0)))
         joint, most = self.joints[place], float(np.nanmax(abs(peaks[:, place])))
-        assert isinstance(joint, Joint)
         words = joint.unknown_at(most)
         raise InputError(f"{what} moves the joint of attachments[{place}] by {words}")
 
@@ -238,18 +242,13 @@ class Structure:
         stable = _is_positive(self.stuck_stiffness, SYMMETRY_ROUNDING)
         fix = "has a negative mode with all joints stuck: the structure is unstable"
         require("stiffness", self.stiffness.shape, stable, fix)
-        frequency, shapes = self.modes(1)
+        lowest = self.modes(1)
         scale = float(abs(self.stuck_stiffness).max() / abs(self.mass).max())
-        held = frequency[0] ** 2 > SYMMETRY_ROUNDING * scale
-        most = int(np.argmax(abs(shapes[:, 0])))
+        held = lowest.omega[0] ** 2 > SYMMETRY_ROUNDING * scale
+        most = int(np.argmax(abs(lowest.shapes[:, 0])))
         fix = f"leaves a rigid mode, in which degree of freedom {most} moves most: hold the "
         fix += "structure by a spring or a joint"
         require("stiffness", self.stiffness.shape, held, fix)
-
-
-def _as_sliders(law: Law | CubicSpring) -> Joint | CubicSpring:
-    """Force element of a law; raises `InputError`."""
-    return law if isinstance(law, Joint | CubicSpring) else Joint.of(law)
 
 
 def _ratios(given: ArrayLike | None, size: int) -> Any:
@@ -268,7 +267,7 @@ def _ratios(given: ArrayLike | None, size: int) -> Any:
 
 
 def _traced_modes(stiffness: Array, mass: Array, count: int) -> tuple[Array, Array]:
-    """Modes of traced matrices; their derivatives are those of K phi = lambda M phi."""
+    """Angular frequencies and shapes, whose derivatives are those of K phi = lambda M phi."""
     k, m = map(lax.stop_gradient, (stiffness, mass))
     lower = jnp.linalg.cholesky(m)
     half = solve_triangular(lower, k, lower=True)

@@ -72,7 +72,7 @@ def basis_of(structure: Structure, loads: Any, mode: int, xp: Any) -> Any:
     """
     if structure.size <= SMALL:
         return np.eye(structure.size)
-    _, modes = structure.modes(MODES + mode)
+    modes = structure.modes(MODES + mode).shapes
     static = structure.static_displacements(loads)
     for _ in range(2):  # the second time for rounding
         static = static - modes @ (modes.T @ (structure.mass @ static))
