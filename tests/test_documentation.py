@@ -119,7 +119,7 @@ OF_A_USER = ("joint.toml", "upper, lower")  # what examples name and only a user
 
 def names_of_examples():
     """Names that examples use without saying where they come from."""
-    joint = jb.dynamics.Joint(displacement=[1.0, 3.0], force=[1.0, 2.0])
+    joint = jb.dynamics.Joint(displacements=[1.0, 3.0], forces=[1.0, 2.0])
     springs = [jb.dynamics.Attachment(joint, 0)]
     structure = jb.dynamics.Structure(np.eye(2), [[2.0, -2.0], [-2.0, 2.0]], springs)
     own = {name: getattr(jb.dynamics, name) for name in jb.dynamics.__all__}

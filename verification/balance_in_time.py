@@ -41,11 +41,13 @@ def case(kind: str, number: int) -> Case:
     spring = stiffness * random.uniform(0.3, 2.0) * np.array([[1.0, -1.0], [-1.0, 1.0]])
     ratio = random.uniform(0.02, 0.04)
     structure = Structure(mass, spring, [Attachment(joint, 0)], damping_ratio=ratio)
-    force = float(joint.force[-1]) * random.uniform(1.0, 5.0) * ratio
-    omega = structure.modes(1)[0][0] * np.array(BESIDE)
+    force = float(joint.forces[-1]) * random.uniform(1.0, 5.0) * ratio
+    omega = structure.modes(1).omega[0] * np.array(BESIDE)
     while True:
         try:
-            found = steady_response(structure, [0.0, force], omega, harmonics=HARMONICS)
+            found = steady_response(
+                structure, [0.0, force], omega / (2.0 * np.pi), harmonics=HARMONICS
+            )
         except jb.InputError:  # the joint leaves its backbone
             force *= 0.7
         else:
@@ -60,7 +62,7 @@ def integrated(cases: list[Case]) -> NDArray[np.complex128]:
         np.stack([np.pad(each, (0, most - each.size)) for each in values])
         for values in zip(*(_sliders(one.joint) for one, _ in lanes), strict=True)
     )
-    last = np.array([float(one.joint.springs[-1]) for one, _ in lanes])
+    last = np.array([float(one.joint.spring) for one, _ in lanes])
     stiffness = np.stack([np.asarray(one.structure.stiffness) for one, _ in lanes])
     stiffness[:, 0, 0] += last
     mass, damping = (
@@ -102,7 +104,7 @@ def integrated(cases: list[Case]) -> NDArray[np.complex128]:
 
 def _sliders(joint: Joint) -> tuple[Floats, Floats]:
     """Springs and limits of a joint's sliders, without the spring that never slips."""
-    return np.asarray(joint.springs)[:-1], np.asarray(joint.limits)
+    return np.asarray(joint.springs), np.asarray(joint.limits)
 
 
 def measure(scenes: int = 25) -> dict[str, Any]:
@@ -115,7 +117,7 @@ def measure(scenes: int = 25) -> dict[str, Any]:
         balance = one.shapes[:, 0, 1]
         errors = abs(end / balance - 1.0)
         row = {"kind": kind, "number": number, "amplitude": abs(balance).tolist()}
-        joint = abs(one.shapes[:, 0, 0]) / float(one.joint.displacement[-1])
+        joint = abs(one.shapes[:, 0, 0]) / float(one.joint.displacements[-1])
         row |= {"joint": joint.tolist(), "in_time": abs(end).tolist(), "error": errors.tolist()}
         rows.append(row)
     return {"seed": SEED, "beside": BESIDE, "rows": rows}

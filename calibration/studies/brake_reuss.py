@@ -168,15 +168,14 @@ def predicted(fit: Fit, record: Mapping[str, Any]) -> list[dict[str, float]]:
     for kind, resonances in record["resonances"].items():
         for one in resonances:
             row = {"response_control": float(kind == "ResponseControl")} | one
-            span = 2.0 * np.pi * np.array([78.5, 81.5])
             try:
-                curve = dynamics.forced_response(structure, [one["force"]], tuple(span))
+                curve = dynamics.forced_response(structure, [one["force"]], (78.5, 81.5))
             except jb.InputError:  # beyond what the joint is known for
                 rows.append(row)
                 continue
             top = int(np.argmax(curve.amplitude))
             row["predicted_amplitude"] = float(curve.amplitude[top])
-            row["predicted_frequency"] = float(curve.frequency[top] / (2.0 * np.pi))
+            row["predicted_frequency"] = float(curve.frequency[top])
             rows.append(row)
     return rows
 

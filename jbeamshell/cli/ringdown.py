@@ -119,9 +119,9 @@ def _pull(scene: Scene, chosen: bool) -> float:
     The latter is taken where the amplitude is no force below gross slip, or where nobody chose it
     and it is a small part of gross slip.
     """
-    from jbeamshell.dynamics.steady_cycles import gross_slip, largest_force
+    from jbeamshell.dynamics.structure.joint import largest_force
 
-    limit = float(gross_slip(scene))
+    limit = float(scene.gross_slip)
     with contextlib.suppress(InputError):
         force = float(largest_force(scene))
         if chosen or not SMALL * limit > force:

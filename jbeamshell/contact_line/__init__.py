@@ -5,7 +5,7 @@ gives the work of a steady cycle at many amplitudes from one factorisation, whic
 `jbeamshell.solve_contact` takes bodies from other programs.
 """
 
-from jbeamshell.contact_line.cycles import SteadyCycles as SteadyCycles
+from jbeamshell.contact_line.cycles import CycleFactors as CycleFactors
 from jbeamshell.contact_line.dissipation import dissipation as dissipation
 from jbeamshell.contact_line.dissipation import factors as factors
 from jbeamshell.contact_line.solve import solve as solve

@@ -37,7 +37,7 @@ GROUPS = 16  # of events, over which the least rate of a reaction stands for all
 LITTLE = 1e-6  # of the largest rate or load: less does not count as a wrong sign
 
 
-class SteadyCycles(NamedTuple):
+class CycleFactors(NamedTuple):
     """Factors of a body for steady cycles, for k of its n nodes that may slip.
 
     The first axis of pairs is 0 for pushes and 1 for pulls.
@@ -117,18 +117,18 @@ class SteadyCycles(NamedTuple):
 
 
 @jax.jit
-def _works(cycles: SteadyCycles, amplitudes: Array) -> Array:
+def _works(cycles: CycleFactors, amplitudes: Array) -> Array:
     return jax.vmap(cycles._work)(amplitudes)
 
 
-def steady_cycles(body: Body, friction: Array) -> SteadyCycles:
+def cycle_factors(body: Body, friction: Array) -> CycleFactors:
     """Factors of a body for steady cycles with friction mu."""
     push, pull = (_first_loading(body, friction, sense) for sense in (-1.0, 1.0))
     y_g, z, threshold = (jnp.stack(pair) for pair in zip(push[:3], pull[:3], strict=True))
     bad = push.bad | pull.bad
     begin, width = _passage(body.x, threshold)
     limit = jnp.append(begin[0], jnp.inf)[jnp.argmax(bad[1:])]
-    return SteadyCycles(
+    return CycleFactors(
         y_g,
         z,
         threshold,
@@ -147,7 +147,7 @@ class _FirstLoading(NamedTuple):
 
     Attributes
     ----------
-    y_g, z, threshold, reaction, rate : see `SteadyCycles`, the last two turned
+    y_g, z, threshold, reaction, rate : see `CycleFactors`, the last two turned
     upper, inverse : (k, k) U and its inverse
     bad : (k + 1,) True where so many slipping nodes contradict what is assumed
     """

@@ -10,7 +10,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.errors import UnconvergedError
-from jbeamshell.contact_line.cycles import STEADY, SteadyCycles, steady_cycles
+from jbeamshell.contact_line.cycles import STEADY, CycleFactors, cycle_factors
 from jbeamshell.contact_line.drives import with_springs
 from jbeamshell.contact_line.entry import goes_on
 from jbeamshell.contact_line.solve import solve
@@ -72,7 +72,7 @@ def dissipation(scene: Scene, amplitudes: ArrayLike, *, nodes: int | None = None
     return jnp.asarray(works)
 
 
-def factors(scene: Scene, *, nodes: int | None = None) -> SteadyCycles:
+def factors(scene: Scene, *, nodes: int | None = None) -> CycleFactors:
     """Factors of a strip, from which many amplitudes cost microseconds each.
 
     They hold for all amplitudes, for one strip, contact and pressure.  Many strips are built by one
@@ -84,7 +84,7 @@ def factors(scene: Scene, *, nodes: int | None = None) -> SteadyCycles:
 
     Returns
     -------
-    SteadyCycles
+    CycleFactors
         whose method ``dissipation`` takes (k,) amplitudes and returns (k,) works; NaN where slip
         zones are not nested, which `dissipation` would walk event by event
 
@@ -121,12 +121,12 @@ def on_contact_line(scene: Scene, nodes: int | None) -> Scene:
 
 
 @eqx.filter_jit
-def _factors(scene: Scene) -> SteadyCycles:
+def _factors(scene: Scene) -> CycleFactors:
     strip = condensed(scene, scene.plan.nodes)
     body = strip.body
     if scene.contact.stick_stiffness is not None:
         body, _ = with_springs(body, spring_stiffness(scene, strip))
-    return steady_cycles(body, scene.contact.friction)
+    return cycle_factors(body, scene.contact.friction)
 
 
 @eqx.filter_jit

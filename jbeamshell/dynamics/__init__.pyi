@@ -1,3 +1,4 @@
+from .frequencies import Modes as Modes
 from .four_parameters import (
     FourParameters as FourParameters,
     four_parameters as four_parameters,
@@ -14,7 +15,7 @@ from .strip.excitation import (
     Shaker as Shaker,
 )
 from .strip.inertia import THICKNESS_STRETCH as THICKNESS_STRETCH, Inertia as Inertia
-from .strip.modes import Modes as Modes, modes as modes
+from .strip.modes import modes as modes
 from .strip.motion import (
     Ending as Ending,
     InterruptedMotionError as InterruptedMotionError,
@@ -33,7 +34,6 @@ from .structure.shaking import (
     StructureMotion as StructureMotion,
     shake as shake,
 )
-from .vibration.elements import CubicSpring as CubicSpring
 from .vibration.forced import (
     forced_response as forced_response,
     level_response as level_response,

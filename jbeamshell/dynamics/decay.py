@@ -297,8 +297,8 @@ def _noise(
     n, numbers = left.size, mean + numbers
     square = float(np.sum(left**2))
     power = 2.0 * np.abs(np.fft.rfft(left)) ** 2 / n
-    frequency = 2.0 * np.pi * np.arange(power.size) / n
-    inside = (frequency > band[0]) & (frequency < band[1])
+    omega = 2.0 * np.pi * np.arange(power.size) / n
+    inside = (omega > band[0]) & (omega < band[1])
     inside[0] = False
     known, within = 2 * int(np.count_nonzero(inside)), float(np.sum(power[inside]))
     whole = square / (n - numbers) + ROUNDING**2

@@ -1,21 +1,21 @@
-"""Segalman's four parameters of a strip or lap joint, from its geometry alone.
+"""Segalman's four parameters of a strip or lap joint from its geometry alone, or of another law.
 
-The scene is solved in steady cycles of rising amplitude; F_S is its gross slip, and K_T, chi and
+A scene is solved in steady cycles of rising amplitude; F_S is its gross slip, and K_T, chi and
 beta follow from the curves of displacement and dissipation, without a test.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require, require_number
-from jbeamshell.dynamics.steady_cycles import SteadyCycles, gross_slip
+from jbeamshell.common.pytrees import Tree
 from jbeamshell.laws.four_parameters import exponents, iwan4_through
 from jbeamshell.laws.iwan4 import Iwan4
+from jbeamshell.laws.law import Law
 from jbeamshell.scene.scene import Scene
+from jbeamshell.solving.steady_cycles import steady_cycles
 
 FRACTIONS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  # of gross slip
 LITTLE = 0.01  # of gross slip, at which the contact is taken to stick
@@ -23,7 +23,7 @@ LEAST = 1e-9  # energy of a cycle that is felt, over F u
 ENOUGH = 4  # amplitudes
 
 
-class FourParameters(NamedTuple):
+class FourParameters(Tree):
     """Four-parameter Iwan model of a scene or joint, and how far it is from it.
 
     Attributes
@@ -66,18 +66,20 @@ class FourParameters(NamedTuple):
         )
 
 
-def four_parameters(scene: Scene, *, width: float = 1.0) -> FourParameters:
+def four_parameters(scene: Scene | Law, *, width: float = 1.0) -> FourParameters:
     """Four-parameter Iwan model of a strip or lap joint, fitted to no test but to its geometry.
 
     Parameters
     ----------
-    scene : scene, whose load is not used; take ``model.section = plane`` for elasticity's figures
+    scene : scene, whose load is not used; take ``model.section = plane`` for elasticity's figures.
+        Or a law, such as a `Joint`, whose own loops count
     width : of the strip, by which forces and energies are multiplied
 
     Raises
     ------
     InputError
-        for a scene without gross slip, or one that is driven otherwise than by a force
+        for a scene or law without gross slip, a scene that is driven otherwise than by a force, or
+        a joint that ends below .3 of gross slip
     UnconvergedError
         if a load step has no equilibrium
 
@@ -86,16 +88,18 @@ def four_parameters(scene: Scene, *, width: float = 1.0) -> FourParameters:
     >>> print(jb.dynamics.four_parameters(jb.Scene().replace({"model.section": "plane"})))
     """
     require_number("width", width)
+    if isinstance(scene, Law):
+        return _of_law(scene, width)
     force = scene.load.control == "force"
     require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
     fix = "must be 'force': a moment has no gross slip"
     require("load.kind", scene.load.kind, scene.load.kind == "force", fix)
-    limit = float(gross_slip(scene))
+    limit = float(scene.gross_slip)
     slips = limit > 0.0 and scene.contact.normal != "none"
     fix = "must have gross slip: give it friction and contact"
     require("contact.friction", scene.contact.friction, slips, fix)
     sizes = limit * np.array([LITTLE, *FRACTIONS])
-    cycles = SteadyCycles.of(scene, sizes)
+    cycles = steady_cycles(scene, sizes)
     u, d = np.asarray(cycles.displacement), width * np.asarray(cycles.dissipation)
     f = width * sizes
     stiffest = float(np.max(f / u))
@@ -105,3 +109,20 @@ def four_parameters(scene: Scene, *, width: float = 1.0) -> FourParameters:
     require("scene", int(np.sum(felt)), int(np.sum(felt)) >= ENOUGH, fix)
     law = iwan4_through(width * limit, stiffest, f[felt], u[felt], d[felt])
     return FourParameters(law, f[felt], u[felt], d[felt])
+
+
+def _of_law(law: Law, width: float) -> FourParameters:
+    """Model nearest to the loops of a law, as far as it is known below gross slip."""
+    capacity = float(law.capacity)
+    fix = "has no gross slip that is known: take Joint.of(scene), or give capacity="
+    require(f"{law.heading}.capacity", capacity, bool(np.isfinite(capacity)), fix)
+    sizes = capacity * np.array(FRACTIONS)
+    known = bool(np.isinf(law.reach))
+    top = capacity if known else float(law.backbone(law.reach))
+    sizes = sizes[sizes <= top]
+    fix = f"ends too far below gross slip, {capacity:.6g}: take Joint.of(scene) with more force"
+    require(f"{law.heading}.forces", top, sizes.size >= ENOUGH, fix)
+    u = np.asarray(law.displacement(sizes))
+    d = np.asarray(law.dissipation(u))
+    stiffest, f, d = width * float(law.stiffness), width * sizes, width * d
+    return FourParameters(iwan4_through(width * capacity, stiffest, f, u, d), f, u, d)

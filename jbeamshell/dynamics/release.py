@@ -13,7 +13,7 @@ of gross slip, frequencies without the strip's inertia are too high by m_1/2m an
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -27,10 +27,9 @@ from jbeamshell.contact_line.network import Network
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.over_amplitude import RingDown
 from jbeamshell.dynamics.ringdown import ring_down
-from jbeamshell.dynamics.steady_cycles import largest_force
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.dynamics.strip.motion import Motion
-from jbeamshell.dynamics.structure.joint import Joint
+from jbeamshell.dynamics.structure.joint import Joint, largest_force
 from jbeamshell.dynamics.structure.modal import ModalCurve
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
@@ -55,7 +54,8 @@ SAMPLES_PER_CYCLE = 50
 AMPLITUDES = 40  # of the prediction
 
 
-class RingDownStudy(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class RingDownStudy:
     """Ring-down of a payload on a strip, and its prediction by quasi-static modal analysis.
 
     Attributes
@@ -103,7 +103,7 @@ class RingDownStudy(NamedTuple):
             if ends is not None:
                 columns[f"{name}_low"], columns[f"{name}_high"] = ends.T
         columns |= {
-            "predicted_frequency": self._prediction(self.predicted.frequency) / (2.0 * np.pi),
+            "predicted_frequency": self._prediction(self.predicted.frequency),
             "predicted_damping": self._prediction(self.predicted.damping),
         }
         lists = {name: np.asarray(column).tolist() for name, column in columns.items()}
@@ -202,8 +202,8 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
         reach = np.geomspace(smallest, largest, AMPLITUDES)
         force, loss = np.asarray(joint.backbone(reach)), np.asarray(joint.dissipation(reach))
     else:
-        known = np.asarray(joint.force)
-        low = np.interp(smallest, np.asarray(joint.displacement), known)
+        known = np.asarray(joint.forces)
+        low = np.interp(smallest, np.asarray(joint.displacements), known)
         force = np.geomspace(low, known[-1], AMPLITUDES)
         reach, loss = jax.device_get(_cycles((joint.network, force)))
         nested = np.isfinite(loss)
@@ -212,7 +212,7 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
     softer = elastic * reach / force
     return ModalCurve(
         amplitude=reach * np.sqrt(mass),
-        frequency=np.sqrt(force / (mass * reach)),
+        frequency=np.sqrt(force / (mass * reach)) / (2.0 * np.pi),
         damping=loss / (2.0 * np.pi * force * reach),
         dissipation=loss,
         joints=reach[:, None],

@@ -10,7 +10,6 @@ import numpy as np
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.scene.keys import unit_of
-from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
 STEPS = 200  # of a slider, about
@@ -68,7 +67,7 @@ def _load(scene: Scene) -> Control:
     """Control of the amplitude, below gross slip where a force is controlled."""
     key, amplitude = "load.amplitude", float(scene.load.amplitude)
     label = f"Load amplitude A [{unit_of(key, scene.load)}]"
-    limit = gross_slip(scene)
+    limit = largest_force(scene)
     if scene.load.control != "force" or not math.isfinite(limit):
         return _around(key, label, amplitude)
     low, high = 0.02 * limit, NEAR_GROSS_SLIP * limit
@@ -107,14 +106,10 @@ def bolts_of(scene: Scene) -> np.ndarray | None:
     return np.array(contact.bolts, dtype=float) if same else None
 
 
-def gross_slip(scene: Scene) -> float:
-    """Force mu F_N L at which all of the contact slides; infinite where something else holds."""
-    if scene.member.bolt_stiffness is not None or scene.load.kind == "moment":
-        return math.inf
-    top, bottom = scene.number("contact.pressure"), scene.number("contact.bottom_pressure")
-    length = scene.number("strip.length")
-    force, _ = resultant(top, bottom, length, scene.member.support)
-    return float(scene.contact.friction) * float(force)
+def largest_force(scene: Scene) -> float:
+    """Force at which all of the contact slides; infinite where something else holds."""
+    shanks = scene.member.bolt_stiffness is not None
+    return math.inf if shanks else float(scene.gross_slip)
 
 
 def scene_at(scene: Scene, values: Mapping[str, float]) -> Scene:

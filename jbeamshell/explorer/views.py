@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.errors import DoubtfulWarning
-from jbeamshell.explorer.controls import gross_slip
+from jbeamshell.explorer.controls import largest_force
 from jbeamshell.history.history import History
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
@@ -112,7 +112,7 @@ def curve_of(scene: Scene) -> Curve:
     Amplitudes go up to gross slip where a force is controlled.  A step without equilibrium ends the
     curve.
     """
-    limit = gross_slip(scene) if scene.load.control == "force" else np.inf
+    limit = largest_force(scene) if scene.load.control == "force" else np.inf
     own = LARGEST * float(scene.load.amplitude)
     amplitudes = CURVE * (limit if np.isfinite(limit) else own)
     half = 1 if scene.plan.on_contact_line else CURVE_STEPS

@@ -12,7 +12,6 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require, require_number
 from jbeamshell.common.errors import InputError, warn_of_doubts
-from jbeamshell.dynamics.steady_cycles import gross_slip
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.dynamics.structure.modal import ModalCurve, by_statics
@@ -155,13 +154,13 @@ class Assembly(Model):
         inverse of a modal mass.
         """
         structure = self.structure()
-        _, shapes = structure.modes(self.mode + 1)
+        shapes = structure.modes(self.mode + 1).shapes
         shape = jnp.asarray(shapes)[:, self.mode]
         seen = jnp.asarray(1.0) if self.point is None else jnp.abs(shape[self.point])
         driven = self.point if self.driven is None else self.driven
         felt = jnp.asarray(1.0) if driven is None else jnp.abs(shape[driven])
         found = by_statics(structure, jnp.asarray(amplitudes) / seen, self.mode)
-        return found._replace(amplitude=amplitudes), felt * seen
+        return found.but(amplitude=amplitudes), felt * seen
 
 
 class _Plain(eqx.Module):
@@ -175,7 +174,7 @@ class _Plain(eqx.Module):
     def __call__(self, scene: Scene | None, numbers: Mapping[str, Array]) -> Structure:
         assert scene is not None
         forced = scene.load.kind == "force"
-        force = self.reach * gross_slip(scene) if forced else scene.load.amplitude
+        force = self.reach * scene.gross_slip if forced else scene.load.amplitude
         joint = Joint.of(scene, force, width=numbers["width"])
         if "series_stiffness" in numbers:
             joint = joint.in_series(numbers["series_stiffness"])

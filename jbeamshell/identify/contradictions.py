@@ -57,7 +57,8 @@ def contradiction(
     deviations = np.array([wish.deviation for wish in wishes])
     apart = np.abs(steps[:, None] - steps[None])
     errors = np.sqrt(deviations[:, None] ** 2 + deviations[None] ** 2)
-    ratio = np.divide(apart, errors, out=np.zeros_like(apart), where=np.isfinite(errors))
+    some = np.isfinite(errors) & (apart != 0.0)  # 0 over 0 where both are met exactly
+    ratio = np.divide(apart, errors, out=np.zeros_like(apart), where=some)
     axis = int(np.argmax(np.max(ratio, axis=(0, 1))))
     if np.max(ratio[..., axis]) < MANY:
         return None

@@ -316,20 +316,18 @@ class ModalObservation(LogObservation):
         """Curve, and change (n,) of the logarithms if it were without the errors that it states."""
         curve, mobility = _structure("modal curve", model).response(self.level)
         parts = (1.0 - np.asarray([curve.frequency_error, curve.damping_error])).clip(LEAST_PART)
-        exact = curve._replace(
-            frequency=parts[0] * curve.frequency, damping=parts[1] * curve.damping
-        )
+        exact = curve.but(frequency=parts[0] * curve.frequency, damping=parts[1] * curve.damping)
         own, other = (np.asarray(self._figures(each, mobility)) for each in (curve, exact))
         return curve, np.log(other / own)
 
     def _figures(self, curve: ModalCurve, mobility: Array) -> Array:
         """Figures (n,) of a curve over the levels."""
         frequency, damping = jnp.asarray(curve.frequency), jnp.asarray(curve.damping)
-        natural, ratio = frequency[self.place], damping[self.place]
+        natural, ratio = 2.0 * jnp.pi * frequency[self.place], damping[self.place]
         elastic = natural**2 - self.omega**2
         size = jnp.hypot(elastic, 2.0 * ratio * natural * self.omega)
         force = self.level[self.place] * size / mobility
-        return lax.select_n(self.figure, natural / (2.0 * jnp.pi), ratio, force)
+        return lax.select_n(self.figure, frequency[self.place], ratio, force)
 
 
 def _logarithm(values: Array, measured: Array) -> tuple[Array, Array]:

@@ -22,7 +22,6 @@ from jbeamshell.laws.law import Law as Law
 from jbeamshell.laws.lugre import LuGre as LuGre
 from jbeamshell.laws.masing import MasingLaw as MasingLaw
 from jbeamshell.laws.mindlin import Mindlin as Mindlin
-from jbeamshell.laws.parallel_iwan import ParallelIwan as ParallelIwan
 from jbeamshell.laws.parallel_iwan import sliders as sliders
 from jbeamshell.laws.power_law import PowerLaw as PowerLaw
 from jbeamshell.laws.series_iwan import SeriesIwan as SeriesIwan

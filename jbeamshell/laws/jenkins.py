@@ -10,15 +10,14 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from jbeamshell.laws.masing import MasingLaw
+from jbeamshell.laws.parallel_iwan import ParallelIwan
 from jbeamshell.scene.rows import number
 
 
-class Jenkins(MasingLaw):
+class Jenkins(ParallelIwan):
     """Spring and slider in series; no work is lost below gross slip.
 
     Attributes
@@ -34,24 +33,14 @@ class Jenkins(MasingLaw):
     )
 
     @property
-    def capacity(self) -> Array:
-        """Force of gross slip, F_S."""
-        return self.slip_force
+    def springs(self) -> Array:
+        """Stiffness (1,) of the spring."""
+        return self.stiffness[None]
 
-    def backbone(self, u: ArrayLike) -> Array:
-        """Force on first loading, an odd function of the displacement; any shape."""
-        return jnp.clip(self.stiffness * jnp.asarray(u), -self.slip_force, self.slip_force)
-
-    def work(self, u: ArrayLike) -> Array:
-        """Work on first loading, the integral of the backbone from 0 to u; any shape."""
-        size, limit = jnp.abs(jnp.asarray(u)), self.slip_force / self.stiffness
-        stuck = jnp.minimum(size, limit)
-        return self.stiffness * stuck * (size - 0.5 * stuck)
-
-    def dissipation(self, amplitude: ArrayLike) -> Array:
-        """Energy lost per steady cycle at a displacement amplitude; any shape."""
-        slip = jnp.abs(jnp.asarray(amplitude)) - self.slip_force / self.stiffness
-        return 4.0 * self.slip_force * jnp.maximum(slip, 0.0)
+    @property
+    def slips(self) -> Array:
+        """Displacement (1,) at which it slips."""
+        return (self.slip_force / self.stiffness)[None]
 
     def displacement(self, force: ArrayLike) -> Array:
         """Displacement amplitude of a force amplitude; see `Law.displacement`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
@@ -22,15 +23,16 @@ BISECTIONS = 64  # halvings of the logarithm of a displacement
 LONGEST = 40.0  # logarithm of the displacements tried, about that without slip
 CYCLES = 3  # cycles that are run where no closed form is known; the last one counts
 POINTS = 129  # of one branch of such a cycle; odd, for Simpson's rule
+ROUNDING = 1e-6  # of a displacement at the end of what is known
 BEYOND = "is gross slip of this law or more: ask for less than"
 
 
 class Law(Part):
     """Law of a joint between two points, a pytree of its numbers.
 
-    A subclass declares its numbers as fields, and implements `stiffness`, `capacity`, `backbone`,
-    `path_forces` and a start of fits.  Closed forms of `dissipation` and `displacement` replace the
-    slow ones here.
+    A subclass declares its numbers as fields, and implements `stiffness`, `capacity`, `backbone`
+    and `path_forces`; one that is fitted has a start too.  Closed forms of `dissipation` and
+    `displacement` replace the slow ones here.
 
     Raises
     ------
@@ -50,6 +52,15 @@ class Law(Part):
     @abc.abstractmethod
     def capacity(self) -> Array:
         """Largest force, at gross slip; infinite if the force rises for ever."""
+
+    @property
+    def reach(self) -> Any:
+        """Largest displacement at which the law is known: infinite, unless it is one of points."""
+        return math.inf
+
+    def unknown_at(self, u: float) -> str:
+        """Words of an error at a displacement beyond the `reach`, with the fix."""
+        return f"{u:.4g}, beyond {float(self.reach):.4g}, up to which {self.heading} is known"
 
     @abc.abstractmethod
     def backbone(self, u: ArrayLike) -> Array:
@@ -123,9 +134,9 @@ class Law(Part):
         return dataclasses.replace(cls(), **cls._start(force, displacement, work, stiffness))
 
     @staticmethod
-    @abc.abstractmethod
     def _start(force: float, displacement: float, work: float, stiffness: float) -> dict[str, Any]:
         """Numbers to start a fit from; see `started`."""
+        raise InputError("the law has no start of a fit: give its numbers")
 
     @classmethod
     def _field_of(cls, key: str) -> str:
@@ -133,6 +144,18 @@ class Law(Part):
             known = ", ".join(cls.table())
             raise InputError(f"unknown key {key!r}: the numbers of this law are {known}")
         return key.partition(".")[2]
+
+    def _where_known(self, u: Array, values: Array) -> Array:
+        """Values (...) at displacements within the reach; others raise, or are NaN if traced."""
+        if isinstance(self.reach, float):  # known everywhere
+            return values
+        within = jnp.abs(u) <= (1.0 + ROUNDING) * self.reach
+        if is_traced(within):
+            return nan_unless(within, values)
+        if not np.all(within):
+            most = float(np.max(np.abs(np.asarray(u))))
+            raise InputError(f"the {self.heading} is moved by {self.unknown_at(most)}")
+        return values
 
     def _below_capacity(self, force: ArrayLike) -> Array:
         """Sizes of forces, checked; NaN at gross slip and beyond where they are traced."""

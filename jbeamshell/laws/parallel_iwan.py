@@ -1,9 +1,18 @@
-"""Iwan's parallel-series network: n Jenkins elements side by side, F = sum clip(k_i u, -f_i, f_i).
+r"""Iwan's parallel network: n Jenkins elements and a spring side by side.
+
+    F = k_0 u + sum_i k_i clip(u, -u_i, u_i),   D = 4 sum_i k_i u_i max(U - u_i, 0),
+
+and the first harmonic of the loop over the amplitude is the complex stiffness
+
+    k_0 + sum_i k_i (theta_i - sin(2 theta_i)/2)/pi + i D/(pi U^2),  cos(theta_i) = 1 - 2 u_i/U,
+
+where theta_i is the angle of the cycle from its turn until the slider slips.
 
 References
 ----------
 Iwan, W. D. (1966). A distributed-element model for hysteresis and its steady-state dynamic
     response. J. Appl. Mech. 33, 893-900.
+Krylov, N. & Bogoliubov, N. (1943). Introduction to non-linear mechanics. Princeton.
 """
 
 from __future__ import annotations
@@ -11,119 +20,220 @@ from __future__ import annotations
 import abc
 import functools
 import types
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import is_traced, require, require_count
+from jbeamshell.common.checks import is_traced, require, require_count, require_number
+from jbeamshell.common.pytrees import Tree
+from jbeamshell.common.summary import Summary, ranged
+from jbeamshell.laws.law import Law
 from jbeamshell.laws.masing import MasingLaw
 from jbeamshell.scene.rows import number
 
 FROM = 0.02  # first slip displacement of `sliders` over the last, at the start of a fit
 MOST = 32
+POINTS = 160  # of a smooth backbone
+LEAST = 1e-5  # displacement of the first of them, over the last one's
+NEARLY = 1e-6  # part of gross slip that the last of them lacks
+NO_MASING = "has no Masing memory, so no sliders hold it: take iwan4, bar, mindlin or sliders8"
+ENDLESS = "rises for ever: give the largest force, Joint.of(law, force)"
 
 
-class Network(MasingLaw):
-    """Jenkins elements side by side; a subclass has their `springs` and `limits`."""
+class Equivalent(Tree):
+    """Spring and damper in place of a joint under a mass, at an amplitude; any shape.
+
+    Attributes
+    ----------
+    amplitude : displacement amplitude
+    stiffness : force over displacement, of the first harmonic
+    damping : damping coefficient, force over velocity
+    damping_ratio : half the loss factor
+    frequency : of the mass, cycles per time
+    """
+
+    amplitude: Array
+    stiffness: Array
+    damping: Array
+    damping_ratio: Array
+    frequency: Array
+
+    def __str__(self) -> str:
+        rows = [
+            (name.replace("_", " "), ranged(np.asarray(column)))
+            for name, column in vars(self).items()
+        ]
+        return Summary("spring and damper in place of a joint", rows).as_text()
+
+
+class ParallelIwan(MasingLaw):
+    """Sliders and a spring side by side; a subclass has the `springs` and `slips` of the sliders.
+
+    `line`, `loss` and `harmonic` go on beyond the `reach`, for searches.
+    """
 
     @property
     @abc.abstractmethod
     def springs(self) -> Array:
-        """Stiffnesses (n,)."""
+        """Stiffnesses (n,) of the sliders."""
 
     @property
     @abc.abstractmethod
+    def slips(self) -> Array:
+        """Displacements (n,) at which the sliders slip on first loading."""
+
+    @property
+    def spring(self) -> Array:
+        """Stiffness of the spring, which never slips."""
+        return jnp.zeros(())
+
+    @property
     def limits(self) -> Array:
         """Slip forces (n,)."""
+        return self.springs * self.slips
 
     @property
     def stiffness(self) -> Array:
         """Stiffness of the stuck joint."""
-        return jnp.sum(self.springs)
+        return self.spring + jnp.sum(self.springs)
 
     @property
     def capacity(self) -> Array:
-        """Force of gross slip, of all sliders."""
-        return jnp.sum(self.limits)
+        """Force of gross slip, of all sliders; infinite with a spring."""
+        return jnp.where(self.spring > 0.0, jnp.inf, jnp.sum(self.limits))
 
     def backbone(self, u: ArrayLike) -> Array:
-        """Force on first loading, an odd function of the displacement; any shape."""
-        stretched = self.springs * jnp.asarray(u)[..., None]
-        return jnp.sum(jnp.clip(stretched, -self.limits, self.limits), axis=-1)
+        """Force on first loading, an odd function of the displacement; any shape.
+
+        Raises
+        ------
+        InputError
+            for a displacement beyond the `reach`, here and below; traced ones give NaN there
+        """
+        u = jnp.asarray(u)
+        return self._where_known(u, self.line(u))
 
     def work(self, u: ArrayLike) -> Array:
         """Work on first loading, the integral of the backbone from 0 to u; any shape."""
-        size = jnp.abs(jnp.asarray(u))[..., None]
-        stuck = jnp.minimum(size, self.limits / self.springs)
-        return jnp.sum(self.springs * stuck * (size - 0.5 * stuck), axis=-1)
+        size = jnp.abs(jnp.asarray(u))
+        stuck = jnp.minimum(size[..., None], self.slips)
+        own = jnp.sum(self.springs * stuck * (size[..., None] - 0.5 * stuck), axis=-1)
+        return self._where_known(size, 0.5 * self.spring * size**2 + own)
 
     def dissipation(self, amplitude: ArrayLike) -> Array:
         """Energy lost per steady cycle at a displacement amplitude; any shape."""
-        slips = jnp.abs(jnp.asarray(amplitude))[..., None] - self.limits / self.springs
-        return 4.0 * jnp.sum(self.limits * jnp.maximum(slips, 0.0), axis=-1)
+        size = jnp.abs(jnp.asarray(amplitude))
+        return self._where_known(size, self.loss(size))
 
+    def first_harmonic(self, amplitude: ArrayLike) -> Array:
+        """Complex stiffness, the first harmonic of the loop over the amplitude; any shape.
 
-class ParallelIwan(Network):
-    """Parallel Jenkins elements of any stiffness and slip force.
-
-    Attributes
-    ----------
-    springs, limits : (n,) stiffness k_i and slip force f_i of each element
-    """
-
-    heading: ClassVar[str] = "parallel-iwan"
-
-    springs: Array = number(
-        1.0, "Stiffnesses k_i.", symbol="k_i", unit="(force/width)/length", table=True
-    )
-    limits: Array = number(1.0, "Slip forces f_i.", symbol="f_i", unit="force/width", table=True)
-
-    def __check_init__(self) -> None:
-        for name in ("springs", "limits"):
-            value, key = getattr(self, name), self.table()[f"{self.heading}.{name}"]
-            if not is_traced(value):
-                require(key.name, value, bool(np.all(key.holds(np.asarray(value)))), key.words)
-        shapes = jnp.shape(self.springs), jnp.shape(self.limits)
-        require("parallel-iwan.limits", shapes[1], shapes[0] == shapes[1], "give one per spring")
-
-    @classmethod
-    def of_points(cls, displacement: ArrayLike, force: ArrayLike) -> Self:
-        """Network with a backbone that is straight between points (n,), and slips from the last.
-
-        The points rise from the first one above zero, and soften throughout.
+        The real part is elastic; the imaginary part is the energy per cycle over pi amplitude^2.
         """
-        u, f = jnp.asarray(displacement), jnp.asarray(force)
-        slopes = jnp.diff(f, prepend=0.0) / jnp.diff(u, prepend=0.0)
-        springs = slopes - jnp.append(slopes[1:], 0.0)
-        return cls(springs, springs * u)
+        size = jnp.abs(jnp.asarray(amplitude))
+        return self._where_known(size, self.harmonic(size))
 
-    @staticmethod
-    def _start(force: float, displacement: float, work: float, stiffness: float) -> dict[str, Any]:
-        """Numbers to start a fit from; see `Law.started`."""
-        return {"springs": stiffness, "limits": force}
+    def equivalent(self, amplitude: ArrayLike, mass: Any) -> Equivalent:
+        """Spring and damper of a mass that the joint holds, at a displacement amplitude; any shape.
+
+        They are the first harmonic of the loop (Krylov & Bogoliubov 1943).
+
+        Parameters
+        ----------
+        amplitude : displacement amplitude, positive
+        mass : mass on the joint
+
+        Raises
+        ------
+        InputError
+            for an amplitude beyond the `reach`, or a mass that is not positive
+
+        Examples
+        --------
+        >>> found = Joint([1.0, 3.0], [1.0, 2.0]).equivalent(2.0, mass=4.0)
+        >>> float(found.stiffness), round(float(found.damping_ratio), 4)
+        (0.75, 0.1061)
+        """
+        require_number("mass", mass)
+        complex_stiffness = self.first_harmonic(amplitude)
+        stiffness, loss = jnp.real(complex_stiffness), jnp.imag(complex_stiffness)
+        omega, size = jnp.sqrt(stiffness / mass), jnp.abs(jnp.asarray(amplitude))
+        frequency = omega / (2.0 * jnp.pi)
+        return Equivalent(size, stiffness, loss / omega, 0.5 * loss / stiffness, frequency)
+
+    def line(self, u: Array) -> Array:
+        """Backbone whose last slope goes on; any shape."""
+        stretched = jnp.clip(u[..., None], -self.slips, self.slips)
+        return self.spring * u + jnp.sum(self.springs * stretched, axis=-1)
+
+    def tangent(self, u: ArrayLike) -> Array:
+        """Slope of the `line`; any shape."""
+        stuck = jnp.abs(jnp.asarray(u))[..., None] < self.slips
+        return self.spring + jnp.sum(jnp.where(stuck, self.springs, 0.0), axis=-1)
+
+    def loss(self, amplitude: Array) -> Array:
+        """Energy lost per cycle by the sliders of the `line`; any shape."""
+        slip = jnp.maximum(amplitude[..., None] - self.slips, 0.0)
+        return 4.0 * jnp.sum(self.limits * slip, axis=-1)
+
+    def harmonic(self, size: Array) -> Array:
+        """First harmonic of the `line`; any shape."""
+        moves = self.slips < size[..., None]
+        part = jnp.where(moves, self.slips, 0.5) / jnp.where(moves, size[..., None], 1.0)
+        angle = jnp.arccos(1.0 - 2.0 * part)  # of the cycle from its turn until the slider slips
+        share = jnp.where(moves, (angle - 0.5 * jnp.sin(2.0 * angle)) / jnp.pi, 1.0)
+        elastic = self.spring + jnp.sum(self.springs * share, axis=-1)
+        return elastic + 1j * self.loss(size) / (jnp.pi * jnp.where(size > 0.0, size, 1.0) ** 2)
 
 
-class Sliders(Network):
+def backbone_points(law: Law, force: Any = None) -> tuple[Array, Array]:
+    """Points (k,) of a law's backbone whose chords are sliders: displacements and forces.
+
+    Sliders give their own points, exactly.  Other laws of Masing's rule give 160 points from 1e-5
+    of the displacement at gross slip on, or of that of the force; sliders on them lose the law's
+    energy within 1 % from 1e-3 of that displacement on.  The last point lies on the plateau of
+    gross slip, unless a force is given.  All numbers of the law may be traced.
+
+    Raises
+    ------
+    InputError
+        for a law without Masing's memory, or one whose force rises for ever
+    """
+    require("law", law.heading, isinstance(law, MasingLaw), NO_MASING)
+    endless = not is_traced(law) and force is None and not np.isfinite(law.capacity)
+    require("law", law.heading, not endless, ENDLESS)
+    if isinstance(law, ParallelIwan) and force is None:
+        u = jnp.sort(law.slips)
+    else:
+        end = law.displacement((1.0 - NEARLY) * law.capacity if force is None else force)
+        u = end * jnp.geomspace(LEAST, 1.0, POINTS)
+    f = law.backbone(u)
+    if force is not None:
+        return u, f
+    return jnp.append(u, 2.0 * u[-1]), jnp.append(f, f[-1])
+
+
+class Sliders(ParallelIwan):
     """Sliders whose slip displacements are spread evenly on a logarithmic scale.
 
     Attributes
     ----------
-    first, reach : slip displacements of the first slider and of the last
+    first, last : slip displacements of the first slider and of the last
     force1, force2, ... : slip forces, of the first slider first
     """
 
     first: Array = number(FROM, "First slip displacement.", symbol="u_1", unit="length")
-    reach: Array = number(1.0, "Largest slip displacement.", symbol="u_n", unit="length")
+    last: Array = number(1.0, "Last slip displacement.", symbol="u_n", unit="length")
     count: ClassVar[int]
 
     @property
     def slips(self) -> Array:
         """Slip displacements (n,)."""
         part = jnp.linspace(0.0, 1.0, self.count)
-        return self.first * (self.reach / self.first) ** part
+        return self.first * (self.last / self.first) ** part
 
     @property
     def limits(self) -> Array:
@@ -150,10 +260,10 @@ def sliders(count: int) -> type[Sliders]:
     def start(force: float, displacement: float, work: float, stiffness: float) -> dict[str, Any]:
         # A bar's backbone softens like a root; its points give positive sliders.
         slips = 1.05 * displacement * np.geomspace(FROM, 1.0, count)
-        rise = 1.05 * force * np.sqrt(slips / slips[-1])
-        network = ParallelIwan.of_points(slips, rise)
-        ends = {"first": slips[0], "reach": slips[-1]}
-        return ends | dict(zip(names, np.asarray(network.limits), strict=True))
+        slopes = np.diff(1.05 * force * np.sqrt(slips / slips[-1]), prepend=0.0)
+        slopes = np.append(slopes / np.diff(slips, prepend=0.0), 0.0)
+        limits = -np.diff(slopes) * slips
+        return {"first": slips[0], "last": slips[-1]} | dict(zip(names, limits, strict=True))
 
     sentence = "Slip force of slider {}."
     fields = {

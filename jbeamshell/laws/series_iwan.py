@@ -112,11 +112,6 @@ class SeriesIwan(MasingLaw):
         now = jnp.where(size > 0.0, self.backbone(size), force[0])
         return done[place] + 0.5 * (force[place] + now) * (size - at[place])
 
-    @staticmethod
-    def _start(force: float, displacement: float, work: float, stiffness: float) -> dict[str, Any]:
-        """Numbers to start a fit from; see `Law.started`."""
-        return {"springs": stiffness, "limits": 0.5 * force}
-
     @property
     def _thresholds(self) -> Array:
         """Forces T_j (n,) beyond which each spring is stretched."""

@@ -108,8 +108,8 @@ def modal_curve(
     axes : two axes; a new figure when not given
     """
     amplitude = np.asarray(curve.amplitude) / np.sqrt(1.0 if mass is None else mass)
-    frequency = np.asarray(curve.frequency) / (2.0 * np.pi)
-    columns, along = (amplitude, frequency, curve.damping), MODAL if mass is None else AMPLITUDE
+    columns = amplitude, np.asarray(curve.frequency), curve.damping
+    along = MODAL if mass is None else AMPLITUDE
     return _pair(columns, axes, label, "", PALETTE[1], along)
 
 

@@ -164,10 +164,8 @@ class ResponseCurve(Protocol):
 
     Attributes
     ----------
-    frequency, level : (k,) angular frequency and factor of the force; one of them varies
-    harmonic, harmonics : (H,) numbers of the harmonics, and their (k, H) amplitudes
-    stable : (k,) True where small deviations do not grow
-    folds : (f,) numbers of the points at which the curve turns back
+    frequency, level : (k,) frequency and factor of the force; one of them varies
+    harmonics, harmonic_amplitudes : (H,) numbers of the harmonics, and their (k, H) amplitudes
     """
 
     @property
@@ -175,13 +173,9 @@ class ResponseCurve(Protocol):
     @property
     def level(self) -> np.ndarray: ...
     @property
-    def harmonic(self) -> np.ndarray: ...
-    @property
     def harmonics(self) -> np.ndarray: ...
     @property
-    def stable(self) -> np.ndarray: ...
-    @property
-    def folds(self) -> np.ndarray: ...
+    def harmonic_amplitudes(self) -> np.ndarray: ...
 
 
 class RingDownComparison(Protocol):
@@ -190,8 +184,8 @@ class RingDownComparison(Protocol):
     Attributes
     ----------
     motion : the transient
-    found : its frequency, in cycles, and damping over the amplitude of u(L)
-    predicted : angular frequency and damping over the modal amplitude
+    found : its frequency and damping over the amplitude of u(L)
+    predicted : frequency and damping over the modal amplitude
     payload : mass per width, whose root turns modal amplitudes into those of u(L)
     """
 

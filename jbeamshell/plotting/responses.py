@@ -1,4 +1,4 @@
-"""Pictures of steady responses: amplitude around folds, and superharmonics."""
+"""Pictures of steady responses: amplitude, and superharmonics."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from jbeamshell.plotting.protocols import ResponseCurve
-from jbeamshell.plotting.style import DATA, PALETTE, beside, looks, panels, style
+from jbeamshell.plotting.style import PALETTE, beside, looks, panels, style
 
 AMPLITUDE = "amplitude  [length]"
 FREQUENCY, LEVEL = "frequency  [1/time]", "level of the force"
@@ -21,8 +21,6 @@ def forced_response(
 ) -> Any:
     """Draw the amplitude over frequency or level, and all harmonics beside it, on two axes.
 
-    Unstable parts are dashed, folds are dots.
-
     Parameters
     ----------
     response : result of `jbeamshell.dynamics.forced_response` or `level_response`
@@ -31,21 +29,15 @@ def forced_response(
     """
     level, frequency = np.asarray(response.level), np.asarray(response.frequency)
     over_level = np.ptp(frequency) == 0.0
-    x = level if over_level else frequency / (2.0 * np.pi)
-    amplitudes, stable = np.asarray(response.harmonics), np.asarray(response.stable)
+    x = level if over_level else frequency
+    amplitudes = np.asarray(response.harmonic_amplitudes)
     with style():
         pair = panels(1, 2)[0] if axes is None else axes
         first = amplitudes[:, 0]
         colour = PALETTE[len(pair[0].lines) % len(PALETTE)] if label else PALETTE[0]
-        both = np.ones(stable.size, bool)
-        parts = ((stable, "-", label), (~stable, "--", ""))
-        for shown, line, name in parts if not np.all(stable) else ((both, "-", label),):
-            y = np.where(_with_neighbours(shown), first, np.nan)
-            pair[0].plot(x, y, color=colour, linestyle=line, label=name or None)
-        folds = np.asarray(response.folds)
-        pair[0].plot(x[folds], first[folds], "o", color=DATA, markersize=4.0)
+        pair[0].plot(x, first, color=colour, label=label or None)
         kinds = looks(amplitudes.shape[1])
-        for number, row, look in zip(response.harmonic, amplitudes.T, kinds, strict=True):
+        for number, row, look in zip(response.harmonics, amplitudes.T, kinds, strict=True):
             pair[1].plot(x, row, **look, label=f"harmonic {number}")
         top = float(first.max())
         along = LEVEL if over_level else FREQUENCY
@@ -56,9 +48,3 @@ def forced_response(
         if len(pair[1].get_lines()) == amplitudes.shape[1]:
             beside(pair[1])
     return pair
-
-
-def _with_neighbours(shown: np.ndarray) -> np.ndarray:
-    """Points that are shown, and those beside them, so that parts of a line meet."""
-    wide = np.pad(shown, 1)
-    return np.asarray(wide[:-2] | wide[1:-1] | wide[2:])

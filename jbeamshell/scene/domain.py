@@ -94,6 +94,19 @@ def support_rules(
     return rules
 
 
+def gross_slip(numbers: Callable[[str], Any], support: str) -> Any:
+    """End force per width at which all of the contact slides, mu F_N L; any shape, may be traced.
+
+    Parameters
+    ----------
+    numbers : values by dotted key
+    support : of the member, see `resultant`
+    """
+    top, bottom = numbers("contact.pressure"), numbers("contact.bottom_pressure")
+    force, _ = resultant(top, bottom, numbers("strip.length"), support)
+    return numbers("contact.friction") * force
+
+
 @np.errstate(over="ignore", invalid="ignore")
 def gross_slip_rule(
     load: Load, member: Member, numbers: Numbers, targets: Any, part: Any = 1.0
@@ -107,14 +120,12 @@ def gross_slip_rule(
     targets : controlled loads, any shape
     part : part of the pressures that acts with each
     """
-    key, friction, size = "load.amplitude", numbers("contact.friction"), np.abs(np.asarray(targets))
+    key, size = "load.amplitude", np.abs(np.asarray(targets))
     if load.control != "force" or load.kind == "moment":
         return Rule(key, size, True, "")
     if np.all(numbers("member.bolt_stiffness") > 0.0):
         return Rule(key, size, True, "")  # bolts hold a joint beyond
-    top, bottom = numbers("contact.pressure"), numbers("contact.bottom_pressure")
-    force, _ = resultant(top, bottom, numbers("strip.length"), member.support)
-    limit = friction * force
+    limit = gross_slip(numbers, member.support)
     below = stays_below(size, limit, np.asarray(part))
     worst = np.max(np.broadcast_to(size, np.shape(below)), where=~below, initial=0.0)
     return Rule(

@@ -32,7 +32,7 @@ from jbeamshell.mechanics.friction import (
 )
 from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
-from jbeamshell.scene.domain import Numbers, support_rules
+from jbeamshell.scene.domain import Numbers, gross_slip, support_rules
 from jbeamshell.scene.joint import check_joint
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, KAPPA_S, TABLE, check_key
 from jbeamshell.scene.parts import PARTS, Contact, Load, Member, Model, Part, Strip
@@ -247,6 +247,15 @@ class Scene(Tree):
             length = numbers.minimum(tributary, strip.half_height)
             k_t = ALMOST_RIGID * strip.shear_modulus / length
         return cast(Array, k_t)
+
+    @property
+    def gross_slip(self) -> Any:
+        """End force per width at which all of the contact slides, mu F_N L; may be traced.
+
+        Infinite for a moment, under which nothing slides off.  Shanks of bolts hold beyond it.
+        """
+        moment = self.load.kind == "moment"
+        return np.inf if moment else gross_slip(self.get, self.member.support)
 
     def get(self, key: str) -> Any:
         """Value of a dotted key, such as ``scene.get("strip.height_ratio")``."""

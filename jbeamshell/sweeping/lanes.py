@@ -14,10 +14,9 @@ from numpy.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, require
 from jbeamshell.common.errors import InputError
 from jbeamshell.mechanics.homogeneous import plane_modulus
-from jbeamshell.scene.domain import bar_rule, gross_slip_rule, support_rules
+from jbeamshell.scene.domain import bar_rule, gross_slip, gross_slip_rule, support_rules
 from jbeamshell.scene.keys import DERIVED, NUMBERS, TABLE, check_key
 from jbeamshell.scene.layers import fill_height
-from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 
 LARGEST = 400_000_000  # bytes of a sweep's arrays; with those of the compiler less than 1 GB
@@ -110,10 +109,7 @@ class Lanes:
     @property
     def gross_slip(self) -> np.ndarray:
         """End force at which the whole contact slides: mu times the pressures' force."""
-        top, bottom = self.value("contact.pressure"), self.value("contact.bottom_pressure")
-        support = self.scene.member.support
-        force, _ = resultant(top, bottom, self.value("strip.length"), support)
-        return self.value("contact.friction") * force
+        return np.asarray(gross_slip(self.value, self.scene.member.support))
 
     @property
     def amplitude_over_height(self) -> np.ndarray:

@@ -17,7 +17,7 @@ from jbeamshell.contact_line.dissipation import NODES
 DATA = Path(__file__).parents[2] / "calibration" / "data"
 TURNS = jnp.asarray([1.0, -1.0, 1.0, -1.0, 1.0])
 BODY = jax.jit(lambda scene: strip.condensed(scene, NODES).body)
-FACTORS = jax.jit(cycles.steady_cycles)
+FACTORS = jax.jit(cycles.cycle_factors)
 
 
 def scene_of(eta, mu=0.1, nu=0.3):

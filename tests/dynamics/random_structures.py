@@ -41,9 +41,9 @@ def random_joint(draw):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of few nodes
             strip = Joint.of(scene, draw.choice([0.6, 0.995, 0.995]) * float(jb_gross_slip(scene)))
-        size = float(strip.force[-1]) / float(strip.stiffness)
+        size = float(strip.forces[-1]) / float(strip.stiffness)
         stretch = draw.uniform(0.2, 0.6) / size
-        u, f = np.asarray(strip.displacement) * stretch, np.asarray(strip.force)
+        u, f = np.asarray(strip.displacements) * stretch, np.asarray(strip.forces)
         scale = draw.uniform(0.5, 2.0) / f[-1]
         return Joint(*resampled(u, f * scale), capacity=float(strip.capacity) * scale)
     law, far = random_law(draw)
@@ -91,13 +91,13 @@ class Brute:
     def __init__(self, structure):
         self.mass, self.damping = np.diag(structure.mass), structure.damping
         self.stiffness, self.b = structure.stiffness, structure.directions
-        joints = [attached.joint for attached in structure.attachments]
-        self.springs = np.concatenate([np.asarray(j.springs)[:-1] for j in joints])
+        joints = structure.joints
+        self.springs = np.concatenate([np.asarray(j.springs) for j in joints])
         self.limits = np.concatenate([np.asarray(j.limits) for j in joints])
         self.joint = np.repeat(np.arange(len(joints)), [j.limits.size for j in joints])
-        self.remaining = np.array([float(j.springs[-1]) for j in joints])
-        stuck = structure.modes(9)[0]
-        self.longest, self.shortest = 2.0 * np.pi / stuck[0], 2.0 * np.pi / stuck[-1]
+        self.remaining = np.array([float(j.spring) for j in joints])
+        stuck = structure.modes(9).frequency
+        self.longest, self.shortest = 1.0 / stuck[0], 1.0 / stuck[-1]
         self.sliders = np.zeros(self.springs.size)
 
     def follow(self, u):
@@ -133,15 +133,15 @@ class Brute:
 def checked_joint(draw):
     """Errors of backbone and dissipation of a joint at an amplitude."""
     joint = random_joint(draw)
-    size = draw.uniform(0.2, 2.5) * float(joint.displacement[-2])
+    size = draw.uniform(0.2, 2.5) * float(joint.displacements[-2])
     part = np.linspace(-1.0, 1.0, 801)
     path = size * np.concatenate([part[400:], -part[1:], part[1:], -part[1:]])
     sliders, last, forces = 0.0, 0.0, []
-    springs, limits = np.asarray(joint.springs)[:-1], np.asarray(joint.limits)
+    springs, limits = np.asarray(joint.springs), np.asarray(joint.limits)
     for u in path:
         sliders = np.clip(sliders + springs * (u - last), -limits, limits)
         last = u
-        forces.append(np.sum(sliders) + float(joint.springs[-1]) * u)
+        forces.append(np.sum(sliders) + float(joint.spring) * u)
     loop, way = np.array(forces)[-1601:], path[-1601:]
     area = np.sum(0.5 * (loop[1:] + loop[:-1]) * np.diff(way))
     # Beyond what the joint knows, any value is wrong.
@@ -166,9 +166,8 @@ def checked_law(draw):
 
 def amplitudes(draw, structure):
     """Modal displacements up to and beyond gross slip."""
-    reach = min(float(a.joint.displacement[-2]) for a in structure.attachments)
-    _, shapes = structure.modes(1)
-    moved = np.max(np.abs(structure.directions.T @ shapes[:, 0]))
+    reach = min(float(j.displacements[-2]) for j in structure.joints)
+    moved = np.max(np.abs(structure.directions.T @ structure.modes(1).shapes[:, 0]))
     return draw.uniform(0.3, 3.0) * reach / moved * np.geomspace(0.2, 1.0, 5)
 
 
@@ -178,13 +177,13 @@ def checked_mode(draw):
     found = dynamics.nonlinear_mode(structure, amplitudes(draw, structure))
     worst = 0.0
     for k in (2, -1):
-        omega, rate = found.frequency[k], 1j * found.harmonic[:, None]
+        omega, rate = found.omega[k], 1j * found.harmonics[:, None]
         shape = found.coefficients[k] @ found.basis.T
         start = shape.real.sum(axis=0), omega * (rate * shape).real.sum(axis=0)
         motion = np.concatenate([*start, [omega, -found_excess(found, k, structure)]])
 
         def missed(motion, shape=shape):
-            return period_missed(structure, shape, found.harmonic, motion)
+            return period_missed(structure, shape, found.harmonics, motion)
 
         off = missed(motion)[: structure.size]
         error = np.max(np.abs(off)) / np.max(np.abs(shape[0]))
@@ -204,7 +203,7 @@ def period_missed(structure, shape, harmonic, motion):
     path = brute.motion(x, v, span + step, extra=extra, step=step)
     ended = (path[-1] - path[-3]) / (2.0 * step)
     turn = np.exp(-2j * np.pi * np.arange(len(path) - 2) / (len(path) - 2))
-    modal = structure.modes(1)[1][:, 0] @ structure.mass
+    modal = structure.modes(1).shapes[:, 0] @ structure.mass
     first = modal @ (2.0 * np.mean(path[:-2] * turn[:, None], axis=0) - shape[0])
     return np.concatenate([path[-2] - x, (ended - v) / omega, [first.real, first.imag]])
 
@@ -225,7 +224,7 @@ def moved_to_close(missed, motion, shape):
 
 def found_excess(found, k, structure):
     """Negative damping per mass that holds a nonlinear mode."""
-    return 2.0 * found.damping[k] * found.frequency[k]
+    return 2.0 * found.damping[k] * found.omega[k]
 
 
 def steady(structure, shape, harmonic):
@@ -257,14 +256,14 @@ def checked_response(draw):
     structure = random_structure(draw)
     force = np.zeros(structure.size)
     force[-1] = draw.uniform(0.05, 0.6)
-    omega = draw.uniform(0.5, 1.2) * structure.modes(1)[0][0]
+    top = draw.uniform(0.5, 1.2) * structure.modes(1).frequency[0]
     if np.allclose(structure.damping, 0.0):
         damping = 0.01 * (structure.mass + structure.stiffness)
         structure = Structure(structure.mass, structure.stiffness, structure.attachments, damping)
-    response = dynamics.forced_response(structure, force, (0.3 * omega, omega))
+    response = dynamics.forced_response(structure, force, (0.3 * top, top))
     shape = response.coefficients[-1] @ response.basis.T
-    brute = steady(structure, shape, response.harmonic)
-    omega, rate = response.frequency[-1], 1j * response.harmonic[:, None]
+    brute = steady(structure, shape, response.harmonics)
+    omega, rate = response.omega[-1], 1j * response.harmonics[:, None]
     start = shape.real.sum(axis=0), omega * (rate * shape).real.sum(axis=0)
     path = brute.motion(*start, 10 * 2.0 * np.pi / omega, lambda t: force * np.cos(omega * t))
     last = path[-(len(path) - 1) // 10 - 1 :]
@@ -296,8 +295,8 @@ def checked_ring_down(draw):
     structure = random_structure(draw)
     brute = Brute(structure)
     brute.u = np.zeros(structure.directions.shape[1])
-    omega, shapes = structure.modes(1)
-    speed = omega[0] * amplitudes(draw, structure)[-1] * shapes[:, 0]
+    modes = structure.modes(1)
+    speed = modes.omega[0] * amplitudes(draw, structure)[-1] * modes.shapes[:, 0]
     motion = dynamics.shake(structure, 5.0 * brute.longest, velocity=speed, samples=201)
     lost = motion.friction_work + motion.damping_work
     path = brute.motion(0.0 * speed, speed, 5.0 * brute.longest)

@@ -40,7 +40,7 @@ def test_a_table_comes_back_to_the_last_digit(tmp_path, name):
 @pytest.mark.parametrize("capacity", [np.inf, 80.0, 45.5])
 def test_a_table_keeps_what_is_known_of_the_joint(tmp_path, name, capacity):
     sides = np.stack([0.98 * U, 1.02 * U])
-    joint = Joint(U, JOINT.force, None, 30.0, 0.02, capacity, sides)
+    joint = Joint(U, JOINT.forces, None, 30.0, 0.02, capacity, sides)
     back = Joint.read(joint.export("table", tmp_path / name))
     for one, other in zip(jax.tree.leaves(back), jax.tree.leaves(joint), strict=True):
         np.testing.assert_array_equal(one, other)
@@ -53,7 +53,7 @@ def test_every_file_says_units_width_sign_and_range(tmp_path, to):
     text = JOINT.export(to, path, units=("mm", "N")).read_text("utf-8")
     for words in ("11 sliders", "u in mm, F in N", "Width: 30.0 mm", "positive in a pull"):
         assert words in text
-    assert f"|F| <= {float(JOINT.force[-1]):.6g}" in text
+    assert f"|F| <= {float(JOINT.forces[-1]):.6g}" in text
     assert "up to 0 % of u" in text
 
 
@@ -71,7 +71,7 @@ def test_the_sliders_of_a_module_follow_our_path(tmp_path, to):
 
 
 def test_a_strip_says_how_its_pull_and_push_differ(tmp_path):
-    lopsided = Joint(U, JOINT.force, asymmetry=0.21)
+    lopsided = Joint(U, JOINT.forces, asymmetry=0.21)
     with pytest.warns(DoubtfulWarning, match="pull and push differ by 21%"):
         path = lopsided.export("table", tmp_path / "joint.csv")
     assert "differs from it by up to 21 %" in path.read_text("utf-8")
@@ -134,8 +134,8 @@ def test_the_unit_steps_as_we_do(tmp_path):
     assert deviation(forces) < 1e-12
     work = np.trapezoid([0.0, *forces], [0.0, *PATH])
     held = np.array(states[-1]["tractions"])
-    spring = 0.5 * float(JOINT.springs[-1]) * PATH[-1] ** 2
-    stored = 0.5 * np.sum(held**2 / np.asarray(JOINT.springs[:-1])) + spring
+    spring = 0.5 * float(JOINT.spring) * PATH[-1] ** 2
+    stored = 0.5 * np.sum(held**2 / np.asarray(JOINT.springs)) + spring
     assert slave.dissipated == pytest.approx(work - stored, rel=0.1)  # coarse steps
     slave._set_fmu_state(states[40])
     slave.displacement = PATH[41]

@@ -28,7 +28,7 @@ def random_motion(random, between):
     values = {"contact.friction": friction, "strip.height_ratio": eta}
     scene = STRIP.replace(LINEAR | values | {"contact.stick_stiffness": log(20.0, 1e3)})
     attached = dynamics.AttachedMasses(log(2.0, 200.0) * 4.0 * eta)
-    period = 2.0 * np.pi / float(dynamics.modes(scene, attached=attached).frequency[0])
+    period = 1.0 / float(dynamics.modes(scene, attached=attached).frequency[0])
     step = period / log(2.0, 400.0)
     span, gross = (SAMPLES - 1) * between * step, 20.0 * friction
     times = np.sort(random.uniform(0.0, span, 9))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.explorer.controls import FACTOR, bolts_of, controls_of, gross_slip, scene_at
+from jbeamshell.explorer.controls import FACTOR, bolts_of, controls_of, largest_force, scene_at
 from jbeamshell.scene import library
 
 
@@ -40,10 +40,10 @@ def test_ranges_hold_the_scene_and_their_ends_are_scenes(name):
 
 def test_the_slider_of_a_force_ends_below_gross_slip():
     load = next(c for c in controls_of(jb.Scene()) if c.name == "load.amplitude")
-    assert gross_slip(jb.Scene()) == pytest.approx(2.0)
+    assert largest_force(jb.Scene()) == pytest.approx(2.0)
     assert 1.9 < load.high < 2.0
     held = library.single_lap().replace({"member.bolt_stiffness": 10.0})
-    assert math.isinf(gross_slip(held))
+    assert math.isinf(largest_force(held))
     by_length = {"load.control": "displacement", "load.amplitude": 1e-5}
     load = next(c for c in controls_of(jb.Scene().replace(by_length)) if "A" in c.label)
     assert load.label == "Load amplitude A [length]"
@@ -63,7 +63,7 @@ def test_pressures_in_tables_have_a_factor():
     scene = library.receding_rough()
     twice = scene_at(scene, {FACTOR: 2.0})
     assert np.array_equal(twice.contact.pressure[:, 0], scene.contact.pressure[:, 0])
-    assert gross_slip(twice) == pytest.approx(2.0 * gross_slip(scene))
+    assert largest_force(twice) == pytest.approx(2.0 * largest_force(scene))
 
 
 def test_numbers_outside_their_domain_are_refused_by_name():

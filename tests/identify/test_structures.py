@@ -36,7 +36,7 @@ START = Assembly(
 def curves(model, random, noise=(1e-4, 0.02)):
     """Frequency and damping of a model, with noise that they know."""
     true = model.curve(SIZE)
-    frequency = true.frequency / (2.0 * np.pi) * (1.0 + noise[0] * random.standard_normal(16))
+    frequency = true.frequency * (1.0 + noise[0] * random.standard_normal(16))
     damping = true.damping * (1.0 + noise[1] * random.standard_normal(16))
     return [
         FrequencyCurve(SIZE, frequency, noise=noise[0] * frequency),
@@ -50,10 +50,10 @@ def forced(model, random, noise=0.02):
     The force is that of x = |(K_n - omega^2 + i 2 zeta omega_n omega)^-1 phi f phi| of one mode.
     """
     curve, _ = model.response(SIZE)
-    _, shapes = model.structure().modes(1)
-    omega = curve.frequency * (1.0 + 0.02 * random.uniform(-1.0, 1.0, SIZE.size))
+    shapes = model.structure().modes(1).shapes
+    omega = curve.omega * (1.0 + 0.02 * random.uniform(-1.0, 1.0, SIZE.size))
     q = SIZE / abs(shapes[0, 0])
-    dynamic = curve.frequency**2 - omega**2 + 2j * curve.damping * curve.frequency * omega
+    dynamic = curve.omega**2 - omega**2 + 2j * curve.damping * curve.omega * omega
     force = np.abs(dynamic * q / shapes[1, 0]) * (1.0 + noise * random.standard_normal(16))
     return ForcedCurve(omega / (2.0 * np.pi), force, SIZE, noise=noise * force)
 
@@ -70,7 +70,7 @@ def test_amplitudes_are_those_of_the_point():
     )
     curve, per_force = alone.response(SIZE)
     secant = joint.backbone(SIZE) / SIZE + 0.5
-    np.testing.assert_allclose(curve.frequency, np.sqrt(secant / 4.0), rtol=1e-6)
+    np.testing.assert_allclose(curve.frequency, np.sqrt(secant / 4.0) / (2.0 * np.pi), rtol=1e-6)
     assert float(per_force) == pytest.approx(0.25)  # 1/m
 
 
@@ -85,9 +85,9 @@ def test_a_wider_strip_and_more_mass_are_what_they_say(monkeypatch):
     other = model.replace(more).structure()
     np.testing.assert_allclose(other.mass, 1.5 * np.asarray(one.mass))
     np.testing.assert_allclose(other.stiffness, 0.5 * np.asarray(one.stiffness))
-    narrow, wide = (each.attachments[0].joint for each in (one, other))
-    np.testing.assert_allclose(wide.force, 2.0 * np.asarray(narrow.force), rtol=1e-12)
-    np.testing.assert_allclose(wide.displacement, narrow.displacement, rtol=1e-12)
+    narrow, wide = (each.attachments[0].law for each in (one, other))
+    np.testing.assert_allclose(wide.forces, 2.0 * np.asarray(narrow.forces), rtol=1e-12)
+    np.testing.assert_allclose(wide.displacements, narrow.displacements, rtol=1e-12)
 
 
 def test_planted_numbers_are_recovered_within_their_intervals():
@@ -117,7 +117,7 @@ def test_a_fit_by_statics_says_how_far_it_may_be_off():
     curve = start.replace({"structure.limit": 1.2}).response(size)[0]
 
     def found(size, frequency, damping):
-        data = [FrequencyCurve(size, frequency / (2.0 * np.pi)), DampingCurve(size, damping)]
+        data = [FrequencyCurve(size, frequency), DampingCurve(size, damping)]
         return fit(data, start, ["structure.limit"])
 
     own = found(size, curve.frequency, curve.damping)
@@ -155,7 +155,7 @@ def test_a_strip_in_a_structure_is_recovered_with_honest_intervals():
     curve = true.curve(size)
     for seed in range(24):
         random = np.random.default_rng(seed)
-        frequency = curve.frequency / (2.0 * np.pi) * (1.0 + 1e-3 * random.standard_normal(24))
+        frequency = curve.frequency * (1.0 + 1e-3 * random.standard_normal(24))
         damping = curve.damping * (1.0 + 0.03 * random.standard_normal(24))
         data = [
             FrequencyCurve(size, frequency, noise=1e-3 * frequency),

@@ -169,19 +169,9 @@ def test_condensation_of_a_row_is_exact_along_nested_reversals():
     np.testing.assert_allclose(found, chain(springs, limits, path), atol=1e-10)
 
 
-@pytest.mark.slow
-def test_parallel_sliders_meet_the_points_of_a_backbone():
-    u, f = np.array([0.1, 0.3, 0.7, 1.5]), np.array([0.5, 1.0, 1.4, 1.6])
-    law = laws.ParallelIwan.of_points(u, f)
-    np.testing.assert_allclose(law.backbone(u), f, rtol=1e-12)
-    np.testing.assert_allclose(law.capacity, 1.6, rtol=1e-12)
-    area, _ = steady_loop(law, 1.1, points=3000, cycles=1)
-    assert float(law.dissipation(1.1)) == pytest.approx(area, rel=1e-4)
-
-
 def test_sliders_by_name_have_a_number_each():
     law = laws.law_named("sliders4").started(1.0, 0.01, 0.01, 150.0)
-    names = ("first", "reach", "force1", "force2", "force3", "force4")
+    names = ("first", "last", "force1", "force2", "force3", "force4")
     assert law.free() == tuple(f"sliders4.{name}" for name in names)
     assert float(law.capacity) == pytest.approx(1.05, rel=1e-9)
     assert bool(jnp.all(law.springs > 0.0))
@@ -223,8 +213,6 @@ def test_bad_input_is_one_clear_line():
         laws.PowerLaw().path_forces([0.0, 1.0])
     with pytest.raises(InputError, match=r"^series-iwan.limits = .*: give one per spring, or one"):
         laws.SeriesIwan([1.0, 2.0], [1.0])
-    with pytest.raises(InputError, match=r"^parallel-iwan.springs = .*: must be a positive number"):
-        laws.ParallelIwan.of_points([0.1, 0.2], [0.1, 0.3])
     with pytest.raises(InputError, match=r"^model = 'iwan5': choose jenkins, iwan4, "):
         laws.law_named("iwan5")
     with pytest.raises(InputError, match=r"^sliders = 1: must be a whole number, 2 to 32"):

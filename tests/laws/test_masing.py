@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.laws import LAWS, Bar, Iwan4, Jenkins, Mindlin, ParallelIwan
+from jbeamshell.laws import LAWS, Bar, Iwan4, Jenkins, Mindlin, sliders
 from jbeamshell.laws.masing import MasingLaw
 
 LAW = Iwan4(slip_force=2.0, stiffness=100.0, chi=-0.5, beta=0.3)
@@ -57,7 +57,7 @@ MASING = {
     "jenkins": Jenkins(slip_force=2.0, stiffness=100.0),
     "bar": Bar(2.0, 0.05),
     "mindlin": Mindlin(2.0, 100.0),
-    "parallel": ParallelIwan([60.0, 30.0, 10.0], [0.6, 0.9, 0.5]),
+    "sliders": sliders(3)(0.01, 0.05, 0.6, 0.9, 0.5),
 }
 
 

@@ -75,7 +75,7 @@ def scene(eta: Any = ETA) -> jb.Scene:
 
 
 @functools.cache
-def builder(nodes: int) -> Callable[[jax.Array], contact_line.SteadyCycles]:
+def builder(nodes: int) -> Callable[[jax.Array], contact_line.CycleFactors]:
     """Compiled function from a height ratio to factors."""
     return jax.jit(lambda eta: contact_line.factors(scene(eta), nodes=nodes))
 

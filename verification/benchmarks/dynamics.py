@@ -35,7 +35,7 @@ def ringing(per_cycle: int | None, **options: Any) -> Any:
     strip = jb.Scene().replace(STRIP).on_grid(NODES, END_SIZE)
     mass = HEAVY * 2.0 * float(strip.strip.half_height * strip.strip.length)
     attached = dynamics.AttachedMasses(mass)
-    period = 2.0 * np.pi / float(dynamics.modes(strip, attached=attached).frequency[0])
+    period = 1.0 / float(dynamics.modes(strip, attached=attached).frequency[0])
     step = {} if per_cycle is None else {"step": period / per_cycle}
     return dynamics.simulate(
         strip,

@@ -22,7 +22,7 @@ from jbeamshell import dynamics
 
 U = np.geomspace(0.05, 4.0, 9)
 MASSES, DAMPING, FORCE = 10, 0.02, 0.3
-RANGE = (0.10, 0.30)
+RANGE = (0.10, 0.30)  # angular
 HARMONICS, SAMPLES = (1, 3, 5, 7, 9), 256
 IWAN = {"kt": 1.0, "Fs": 1.0, "chi": -0.5, "beta": 0.5}
 SLIDERS = 100
@@ -73,7 +73,8 @@ def peer() -> dict[str, Any]:
     force = np.zeros(MASSES)
     force[-1] = FORCE * 0.2
     setting = {"harmonics": HARMONICS[-1], "samples": SAMPLES}
-    found, times = timed(lambda: dynamics.forced_response(structure, force, RANGE, **setting))
+    span = tuple(np.array(RANGE) / (2.0 * np.pi))
+    found, times = timed(lambda: dynamics.forced_response(structure, force, span, **setting))
     points = found.frequency.size
     record: dict[str, Any] = {
         "harmonics": list(HARMONICS),
@@ -93,7 +94,7 @@ def peer() -> dict[str, Any]:
     }
     at = {
         name: dynamics.steady_response(
-            structure, force, omega, harmonics=HARMONICS[-1], samples=samples
+            structure, force, omega / (2.0 * np.pi), harmonics=HARMONICS[-1], samples=samples
         ).amplitude
         for name, samples in {"ours": SAMPLES, "exact": EXACT}.items()
     }
@@ -173,7 +174,7 @@ def large() -> dict[str, Any]:
     structure, built = timed(
         lambda: dynamics.Structure(mass, 4e6 * grid, corners, damping=10.0 * mass)
     )
-    _, shapes = structure.modes(1)
+    shapes = structure.modes(1).shapes
     amplitudes = 1e-3 * np.geomspace(0.01, 3.0, 40) / np.max(np.abs(shapes[:100, 0]))
     found, times = timed(lambda: dynamics.nonlinear_mode(structure, amplitudes))
     return {

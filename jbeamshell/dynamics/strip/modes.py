@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 from jax import Array
-from numpy.typing import NDArray
 
+from jbeamshell.dynamics.frequencies import Modes
 from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
 from jbeamshell.dynamics.strip.equations import Equations, movable
 from jbeamshell.dynamics.strip.excitation import Excitation
@@ -19,21 +17,6 @@ from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.load_steps.system import V, W
 from jbeamshell.mechanics.normal_contact import Compliance
 from jbeamshell.scene.scene import Scene
-
-
-class Modes(NamedTuple):
-    """Natural vibrations of a strip.
-
-    Attributes
-    ----------
-    frequency : (k,) angular frequencies, rising
-    x : (n,) node positions
-    shapes : (k, n, m) nodal fields of unit modal mass
-    """
-
-    frequency: NDArray[np.float64]
-    x: NDArray[np.float64]
-    shapes: NDArray[np.float64]
 
 
 def modes(
@@ -72,7 +55,7 @@ def modes(
     active = np.zeros((free.size, moves.size))
     active[:, free] = vectors.T
     shapes[..., list(scene.plan.active)] = active.reshape(-1, *moves.shape)
-    return Modes(np.sqrt(np.maximum(values, 0.0)), x, shapes)
+    return Modes(np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), shapes, x)
 
 
 @eqx.filter_jit
@@ -101,10 +84,10 @@ def _matrices(
     return equations.mass.dense(), symmetric, system.x, jnp.asarray(equations.mass.free)
 
 
-def highest_frequency(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> float:
+def highest_omega(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> float:
     """Upper bound of the angular frequencies of the stuck strip with its attached masses."""
     strip = modes(scene, inertia, attached)
-    highest = float(strip.frequency[-1])
+    highest = float(strip.omega[-1])
     if not attached.count:
         return highest
     # A spring adds at most its stiffness over the masses at its two ends (Gershgorin).
@@ -120,4 +103,4 @@ def highest_frequency(scene: Scene, inertia: Inertia, attached: AttachedMasses) 
 def first_period(scene: Scene, inertia: Inertia, attached: AttachedMasses) -> float:
     """Period of the stuck strip's first mode, with the masses of the chain fixed to its end."""
     fixed = AttachedMasses(attached.payload + attached.masses.sum())
-    return 2.0 * np.pi / float(modes(scene, inertia, fixed).frequency[0])
+    return 1.0 / float(modes(scene, inertia, fixed).frequency[0])

@@ -15,7 +15,7 @@ from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
 from jbeamshell.dynamics.strip.equations import Equations, movable
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
-from jbeamshell.dynamics.strip.modes import first_period, highest_frequency
+from jbeamshell.dynamics.strip.modes import first_period, highest_omega
 from jbeamshell.scene.scene import Scene
 
 STIFF: dict[str, Callable[..., Any]] = {
@@ -58,7 +58,7 @@ def stable_step(
     require_choice("method", method, tuple(EXPLICIT))
     scene = movable(scene, inertia)
     vibration, decay = stability_limits(EXPLICIT[method]().tableau)
-    limit = vibration / highest_frequency(scene, inertia, attached)
+    limit = vibration / highest_omega(scene, inertia, attached)
     has_friction = float(scene.contact.friction) > 0.0 and scene.contact.normal != "none"
     if has_friction:
         limit = min(limit, decay * float(_relaxation_time(scene, inertia, attached)))

@@ -1,4 +1,4 @@
-r"""Joint as a force element: a network of Jenkins sliders with the backbone of a strip.
+r"""Joint as a law of points: sliders in parallel, of a strip, of another law or of measurements.
 
 Parallel sliders have a backbone F(u) that is linear between points: where its slope falls by s at
 u, a spring of stiffness s starts to slip at the force s u; a spring with the last slope remains
@@ -16,15 +16,13 @@ import dataclasses
 import os
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
-from numpy.typing import NDArray
 
 from jbeamshell.common.checks import (
     as_leaf,
@@ -34,6 +32,7 @@ from jbeamshell.common.checks import (
     require_number,
 )
 from jbeamshell.common.errors import DoubtfulWarning
+from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.summary import Summary, with_unit
 from jbeamshell.contact_line.entry import goes_on
 from jbeamshell.contact_line.network import Network
@@ -43,10 +42,8 @@ from jbeamshell.dynamics.export.targets import write
 from jbeamshell.dynamics.four_parameters import (
     ENOUGH,
     FRACTIONS,
-    FourParameters,
+    four_parameters,
 )
-from jbeamshell.dynamics.steady_cycles import gross_slip, largest_force
-from jbeamshell.dynamics.structure.backbone import Backbone
 from jbeamshell.dynamics.structure.strip_line import (
     cycled_line,
     network_forces,
@@ -54,22 +51,26 @@ from jbeamshell.dynamics.structure.strip_line import (
     slider_line_once,
     walked_forces,
 )
-from jbeamshell.laws.four_parameters import iwan4_through
+from jbeamshell.laws.law import Law, as_path
+from jbeamshell.laws.parallel_iwan import ParallelIwan, backbone_points
+from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
 BACKBONE = "give as many displacements as forces, both rising from above zero, softening throughout"
 SIDES = "give the displacements of pull and push, (2, k), both positive, at the forces"
 DOUBTED_ASYMMETRY = 0.05  # of an exported joint
 BY = ("sliders", "cycles")
+GROSS = 0.99  # force over that of gross slip from which on the last point counts as gross slip
+FLAT = 1e-9  # last slope over the first one that counts as zero
 UNLIKE = "needs sliders that follow one another: take 'cycles', or None"
 
 
-class Joint(Backbone):
-    """Force element between two points, given by its backbone.
+class Joint(ParallelIwan):
+    """Law between two points of a structure, given by points of its backbone.
 
     Attributes
     ----------
-    displacement, force : (k,) points of the backbone.  At .99 of the capacity or more a point on
+    displacements, forces : (k,) points of the backbone.  At .99 of the capacity or more a point on
         the plateau of gross slip follows the given ones
     network : sliders of the strip behind it, per width; None for a backbone alone
     width : of the strip
@@ -87,72 +88,71 @@ class Joint(Backbone):
 
     Examples
     --------
-    >>> joint = Joint(displacement=[1.0, 3.0], force=[1.0, 2.0])
-    >>> joint.springs.tolist(), joint.limits.tolist()
-    ([0.5, 0.5], [0.5])
+    >>> joint = Joint(displacements=[1.0, 3.0], forces=[1.0, 2.0])
+    >>> joint.springs.tolist(), joint.limits.tolist(), float(joint.spring)
+    ([0.5], [0.5], 0.5)
     """
 
-    network: Network | None
-    asymmetry: Array
-    sides: Array | None
-    scene: Scene | None
+    heading: ClassVar[str] = "joint"
 
-    def __init__(
-        self,
-        displacement: Any,
-        force: Any,
-        network: Network | None = None,
-        width: Any = 1.0,
-        asymmetry: Any = 0.0,
-        capacity: Any = np.inf,
-        sides: Any = None,
-        scene: Scene | None = None,
-    ) -> None:
-        self.displacement = as_leaf(displacement, "joint.displacement", BACKBONE)
-        self.force = as_leaf(force, "joint.force", BACKBONE)
-        self.network, self.width = network, as_leaf(width, "joint.width")
-        self.asymmetry = as_leaf(asymmetry, "joint.asymmetry")
-        self.capacity = as_leaf(capacity, "joint.capacity")
-        self.sides = None if sides is None else as_leaf(sides, "joint.sides", SIDES)
-        self.scene = scene
+    displacements: Any
+    forces: Any
+    network: Network | None = None
+    width: Any = 1.0
+    asymmetry: Any = 0.0
+    capacity: Any = np.inf
+    sides: Any = None
+    scene: Scene | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("displacements", "forces"):
+            setattr(self, name, as_leaf(getattr(self, name), f"joint.{name}", BACKBONE))
+        for name in ("width", "asymmetry", "capacity"):
+            setattr(self, name, as_leaf(getattr(self, name), f"joint.{name}"))
+        if self.sides is not None:
+            self.sides = as_leaf(self.sides, "joint.sides", SIDES)
         if self._ends_in_gross_slip:
-            self.force = jnp.append(self.force, self.force[-1])
-            self.displacement = _longer(self.displacement)
+            self.forces = jnp.append(self.forces, self.forces[-1])
+            self.displacements = _longer(self.displacements)
             self.sides = None if self.sides is None else _longer(self.sides)
 
     def __check_init__(self) -> None:
-        if is_traced(self.displacement, self.force):
+        if is_traced(self.displacements, self.forces):
             return
-        u, f = np.asarray(self.displacement), np.asarray(self.force)
+        u, f = np.asarray(self.displacements), np.asarray(self.forces)
         if self.sides is not None:
             shape = self.sides.shape
             require("joint.sides", shape, shape == (2, u.size), SIDES)
         paired = u.ndim == 1 and u.shape == f.shape and u.size > 0
-        require("joint.force", f.shape, paired, BACKBONE)
+        require("joint.forces", f.shape, paired, BACKBONE)
         slopes = np.diff(f, prepend=0.0) / np.diff(u, prepend=0.0)
         rising = bool(np.all(np.diff(u, prepend=0.0) > 0.0) and np.all(slopes >= 0.0))
         rounding = np.finfo(u.dtype).eps * u[1:] / np.diff(u)  # of slopes, where points lie close
         softening = bool(np.all(np.diff(slopes) <= (1e-9 + 4.0 * rounding) * slopes[0]))
-        require("joint.force", f, rising and softening and slopes[0] > 0.0, BACKBONE)
+        require("joint.forces", f, rising and softening and slopes[0] > 0.0, BACKBONE)
 
     @classmethod
     def of(
-        cls, scene: Scene, force: Any = None, *, width: Any = 1.0, by: str | None = None
+        cls, scene: Scene | Law, force: Any = None, *, width: Any = 1.0, by: str | None = None
     ) -> Joint:
-        """Joint with the mean backbone of a strip's pull and push.
+        """Joint with the mean backbone of a strip's pull and push, or with that of a law.
 
         Scenes that are solved on their contact line give the sliders of their contact where slip
         zones are nested.  Lap joints and members that go on open, and are no network.  Their
         sliders, and those of other scenes, are those whose loops are nearest to the scene's own
         steady cycles.
 
+        A law of Masing's rule gives its sliders, or those on 160 points of its backbone, within
+        1 % of its energy, see `jbeamshell.laws.parallel_iwan.backbone_points`.
+
         All numbers may be traced by `jax.jit` and `jax.grad`.  A traced scene cannot tell whether
         its slip zones are nested, nor whether a load step failed: the joint then holds NaN.
 
         Parameters
         ----------
-        scene : scene of the strip, whose load path is not used
-        force : largest end force per width, below gross slip; None is ``scene.load.amplitude``
+        scene : scene of the strip, whose load path is not used; or law
+        force : largest end force per width, below gross slip; None is ``scene.load.amplitude``, and
+            gross slip of a law
         width : width of the strip, by which forces are multiplied
         by : "sliders" of the contact, or "cycles" that are run; None takes the sliders where they
             are nested.  A traced strip on a contact line takes them unless told otherwise; a traced
@@ -161,14 +161,19 @@ class Joint(Backbone):
         Raises
         ------
         InputError
-            for a force or a width that is not positive, a force beyond gross slip, or sliders of a
-            scene that has none
+            for a force or a width that is not positive, a force beyond gross slip, sliders of a
+            scene that has none, or a law without Masing's memory
 
         Examples
         --------
         >>> joint = Joint.of(jb.Scene(), 1.2)
-        >>> joint.dissipation(joint.displacement[-1])  # energy per cycle
+        >>> joint.dissipation(joint.displacements[-1])  # energy per cycle
+        >>> Joint.of(jb.laws.Iwan4(slip_force=2.0, stiffness=100.0), width=3.0)
         """
+        if isinstance(scene, Law):
+            require_number("width", width)
+            u, f = backbone_points(scene, force)
+            return cls(u, width * f, None, width, capacity=width * scene.capacity)
         force = largest_force(scene, force)
         if scene.load.control != "force":
             load = dataclasses.replace(scene.load, control="force", amplitude=as_leaf(force))
@@ -176,7 +181,7 @@ class Joint(Backbone):
         require_number("width", width)
         require_choice("by", by, (None, *BY))
         bolted = scene.member.bolt_stiffness is not None  # which holds beyond
-        capacity = np.inf if bolted else width * gross_slip(scene)
+        capacity = np.inf if bolted else width * scene.gross_slip
         condensed = scene.plan.on_contact_line
         traced = is_traced(scene, force)
         opens = scene.member.support != "none" or (condensed and goes_on(scene))
@@ -228,14 +233,62 @@ class Joint(Backbone):
 
         Examples
         --------
-        >>> Joint([1.0, 3.0], [1.0, 2.0]).in_series(1.0).displacement.tolist()
+        >>> Joint([1.0, 3.0], [1.0, 2.0]).in_series(1.0).displacements.tolist()
         [2.0, 5.0]
         """
         require_number("series stiffness", stiffness)
-        more = self.force / as_leaf(stiffness, "series stiffness")
-        u, sides = self.displacement + more, None if self.sides is None else self.sides + more
-        asymmetry = jnp.max(self.asymmetry * self.displacement / u)
-        return Joint(u, self.force, None, self.width, asymmetry, self.capacity, sides)
+        more = self.forces / as_leaf(stiffness, "series stiffness")
+        u, sides = self.displacements + more, None if self.sides is None else self.sides + more
+        asymmetry = jnp.max(self.asymmetry * self.displacements / u)
+        return Joint(u, self.forces, None, self.width, asymmetry, self.capacity, sides)
+
+    @property
+    def springs(self) -> Array:
+        """Stiffnesses (k-1,) of the sliders."""
+        return -jnp.diff(self._slopes)
+
+    @property
+    def slips(self) -> Array:
+        """Displacements (k-1,) at which the sliders slip on first loading."""
+        return self.displacements[:-1]
+
+    @property
+    def spring(self) -> Array:
+        """Stiffness of the spring that remains beyond the last point but one."""
+        return self._slopes[-1]
+
+    @property
+    def reach(self) -> Array:
+        """Largest displacement at which the joint is known; infinite if it ends in gross slip."""
+        slopes = self._slopes
+        return jnp.where(slopes[-1] <= FLAT * slopes[0], jnp.inf, self.displacements[-1])
+
+    @property
+    def below_gross_slip(self) -> tuple[Array, Array]:
+        """Displacements and forces of the points up to the largest force, without a plateau."""
+        count = 1 + int(jnp.argmax(self.forces >= self.forces[-1]))
+        return self.displacements[:count], self.forces[:count]
+
+    @property
+    def _slopes(self) -> Array:
+        """Slopes (k,) of the backbone's segments."""
+        zero = jnp.zeros(1)
+        rise = jnp.diff(jnp.append(zero, self.forces))
+        return rise / jnp.diff(jnp.append(zero, self.displacements))
+
+    def unknown_at(self, u: float) -> str:
+        """Words of an error at a displacement beyond the reach, with the fix."""
+        capacity, top = float(self.capacity), float(self.forces[-1])
+        if np.isfinite(capacity):
+            level = 0.5 * (1.0 + GROSS) * capacity / float(self.width)
+            fix = f"give Joint.of the force {level:.6g} per width, or points up to there: this is "
+            fix += "nearly gross slip, beyond which the force is known"
+        else:
+            fix = f"give more points, or capacity={top:.6g} if it slides at this force (gross slip)"
+        return (
+            f"{u:.4g}, beyond its backbone, which ends at {float(self.displacements[-1]):.4g} and "
+            f"the force {top:.4g}, below gross slip: take less, or {fix}"
+        )
 
     def backbone(self, u: ArrayLike, *, mean: bool = True) -> Array:
         """Force on first loading; any shape.
@@ -252,13 +305,28 @@ class Joint(Backbone):
         """
         u = jnp.asarray(u)
         if not mean and self.sides is not None:
-            pull, push = (
-                eqx.tree_at(lambda joint: joint.displacement, self, s) for s in self.sides
-            )
+            pull, push = (self.but(displacements=side) for side in self.sides)
             return pull.backbone(jnp.maximum(u, 0.0)) + push.backbone(jnp.minimum(u, 0.0))
-        return self._where_known(u, self.line(u))
+        return super().backbone(u)
 
-    def path_forces(self, path: ArrayLike) -> NDArray[np.float64]:
+    def displacement(self, force: ArrayLike) -> Array:
+        """Displacement amplitude of a force amplitude; any shape.
+
+        Raises
+        ------
+        InputError
+            for a force beyond the last point; traced ones give NaN there
+        """
+        size, top = jnp.abs(jnp.asarray(force)), self.forces[-1]
+        within = size <= top
+        if not is_traced(within):
+            largest = float(jnp.max(size, initial=0.0))
+            fix = f"is beyond the last point of the backbone: ask for {float(top):.6g} or less"
+            require("force of joint", largest, bool(np.all(within)), fix)
+        u, f = jnp.append(0.0, self.displacements), jnp.append(0.0, self.forces)
+        return nan_unless(within, jnp.interp(size, f, u))
+
+    def path_forces(self, path: ArrayLike) -> Array:
         """Forces (T,) on a path (T,) of displacements, which starts with unloaded sliders.
 
         Those of a strip or a lap joint are exact, pull and push apart, and not those of the mean
@@ -272,42 +340,12 @@ class Joint(Backbone):
         UnconvergedError
             for a path of a lap joint without equilibrium
         """
-        points = np.atleast_1d(np.asarray(path, float))
+        points = as_path(path)
         if self.network is not None:
-            return np.asarray(self.width * network_forces(self.network, points))
+            return self.width * network_forces(self.network, np.asarray(points))
         if self.scene is not None and not is_traced(self.scene):
-            return np.asarray(self.width * walked_forces(self.scene, points))
-        self._where_known(jnp.asarray(points), jnp.zeros(points.shape))
-        springs, limits = np.asarray(self.springs), np.asarray(self.limits)
-        sliders, last, forces = np.zeros(limits.size), 0.0, []
-        for u in points:
-            sliders = np.clip(sliders + springs[:-1] * (u - last), -limits, limits)
-            last = u
-            forces.append(sliders.sum() + springs[-1] * u)
-        return np.array(forces)
-
-    def four_parameters(self) -> FourParameters:
-        """Segalman's model nearest to the joint's own loops, with its errors.
-
-        `jbeamshell.dynamics.four_parameters` takes the scene's steady cycles instead, up to .95 of
-        gross slip.
-
-        Raises
-        ------
-        InputError
-            if the force of gross slip is not known, or the backbone ends below .3 of it
-        """
-        capacity = float(self.capacity)
-        fix = "is not known: take Joint.of(scene), or give capacity="
-        require("joint.capacity", capacity, bool(np.isfinite(capacity)), fix)
-        force = capacity * np.array(FRACTIONS)
-        force = force[force <= float(self.force[-1])]
-        fix = f"ends too far below gross slip, {capacity:.6g}: take Joint.of(scene) with more force"
-        require("joint.force", float(self.force[-1]), force.size >= ENOUGH, fix)
-        u = np.interp(force, np.append(0.0, self.force), np.append(0.0, self.displacement))
-        d = np.asarray(self.dissipation(u))
-        law = iwan4_through(capacity, float(self.stiffness), force, u, d)
-        return FourParameters(law, force, u, d)
+            return self.width * walked_forces(self.scene, np.asarray(points))
+        return super().path_forces(self._where_known(points, points))
 
     def export(
         self,
@@ -345,19 +383,18 @@ class Joint(Backbone):
         require("joint", "traced", not is_traced(self), "export it outside jit, grad and vmap")
         words = isinstance(units, tuple | list) and len(units) == 2 and all(map(_is_word, units))
         require("units", units, words, "name those of length and force, such as ('mm', 'N')")
-        springs = np.asarray(self.springs, float)
         element = Element(
-            np.asarray(self.displacement, float),
-            np.asarray(self.force, float),
-            springs[:-1],
+            np.asarray(self.displacements, float),
+            np.asarray(self.forces, float),
+            np.asarray(self.springs, float),
             np.asarray(self.limits, float),
-            spring=float(springs[-1]),
+            spring=float(self.spring),
             width=float(self.width),
             asymmetry=float(self.asymmetry),
             capacity=float(self.capacity),
             units=(units[0], units[1]),
             sides=None if self.sides is None else np.asarray(self.sides, float),
-            model=self.four_parameters() if to == "tmdsimpy" and self._nears_slip else None,
+            model=four_parameters(self) if to == "tmdsimpy" and self._nears_slip else None,
         )
         written = write(element, to, path)
         if element.asymmetry > DOUBTED_ASYMMETRY:
@@ -371,7 +408,7 @@ class Joint(Backbone):
         """Summary in a few lines."""
         if is_traced(self):
             return Summary("joint, traced", [])
-        count, end, top = self.limits.size, float(self.displacement[-1]), float(self.force[-1])
+        count, end, top = self.limits.size, float(self.displacements[-1]), float(self.forces[-1])
         if np.isinf(self.reach):
             known = f"everywhere: it slides at {top:.4g}"
         else:
@@ -391,9 +428,37 @@ class Joint(Backbone):
         return self.summary.as_html()
 
     @property
+    def _ends_in_gross_slip(self) -> bool:
+        """True if the last point is gross slip, and no plateau follows yet."""
+        u, f = self.displacements, self.forces
+        paired = u.ndim == 1 and u.shape == f.shape and u.size > 0
+        if is_traced(u, f, self.capacity) or not paired or np.ndim(self.capacity):
+            return False
+        rising = f.size == 1 or float(f[-1]) > float(f[-2])
+        return rising and float(f[-1]) >= GROSS * float(self.capacity)
+
+    @property
     def _nears_slip(self) -> bool:
         """True if the backbone tells the four parameters."""
-        return float(self.force[-1]) >= FRACTIONS[ENOUGH - 1] * float(self.capacity)
+        return float(self.forces[-1]) >= FRACTIONS[ENOUGH - 1] * float(self.capacity)
+
+
+def largest_force(scene: Scene, force: Any = None) -> Any:
+    """Force up to which a joint is wanted, checked; None is the scene's amplitude."""
+    key = "force" if force is not None else "load.amplitude"
+    if force is None:
+        control = scene.load.control
+        fix = "is no force: give force=, or take load.control = 'force'"
+        require("load.amplitude", scene.load.amplitude, control == "force", fix)
+        force = scene.load.amplitude
+    require_number("force", force)
+    if not is_traced(scene, force):
+        by_force = dataclasses.replace(scene.load, control="force")
+        rule = gross_slip_rule(by_force, scene.member, scene.number, force)
+        limit = float(scene.gross_slip)
+        fix = f"must stay below gross slip, mu F_N L = {limit:.6g}: take less, such as half of it, "
+        rule._replace(key=key, fix=f"{fix}{0.5 * limit:.4g}").demand()
+    return force
 
 
 def _longer(places: Array) -> Array:

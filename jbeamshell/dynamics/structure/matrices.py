@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import TINY, as_leaf, is_traced, require, require_number
 from jbeamshell.common.errors import InputError
-from jbeamshell.dynamics.structure.backbone import ROUNDING
+from jbeamshell.dynamics.frequencies import Modes
 from jbeamshell.dynamics.structure.joint import Joint
-from jbeamshell.dynamics.vibration.elements import CubicSpring
+from jbeamshell.laws.law import ROUNDING, Law
 
 SQUARE = "give a square matrix of numbers, dense or scipy sparse, as large as the mass matrix"
 SYMMETRIC = "must be symmetric; take (A + A.T)/2 if only rounding makes it unsymmetric"
@@ -31,15 +31,15 @@ RATIOS = "give one damping ratio, or one for each of the lowest modes"
 
 
 class Attachment(NamedTuple):
-    """Joint between two degrees of freedom.
+    """Law of a joint between two degrees of freedom.
 
     Attributes
     ----------
-    joint : force element
+    law : `Joint`, or any law with Masing's memory, which becomes one (`Joint.of`)
     first, second : degrees of freedom, counted from 0; None is the ground
     """
 
-    joint: Joint | CubicSpring
+    law: Law
     first: int
     second: int | None = None
 
@@ -54,6 +54,7 @@ class Structure:
     ----------
     mass, stiffness : (n, n) symmetric matrices, dense or scipy sparse
     attachments : joints; the matrices do not contain their stiffness
+    joints : their laws as sliders
     damping_ratio : (m,) damping ratios of the lowest modes with all joints stuck, beside those of
         the given damping matrix; zeros beyond them
 
@@ -92,7 +93,7 @@ class Structure:
             that is not positive definite; for a damping with a negative mode; for a joint at a
             degree of freedom that does not exist; for a rigid-body mode, or one of negative
             stiffness, with all joints stuck; for a negative damping ratio, or more than modes; for
-            ratios or traced numbers of a large structure
+            ratios or traced numbers of a large structure; for a law that no sliders hold
         """
         self.mass = _checked("mass", mass)
         size = self.mass.shape[0]
@@ -101,6 +102,11 @@ class Structure:
         self._given_damping = undamped if damping is None else _checked("damping", damping, size)
         self.damping_ratio = _ratios(damping_ratio, size)
         self.attachments = tuple(attachments)
+        laws = [attached.law for attached in self.attachments]
+        for place, law in enumerate(laws):
+            fix = "give a Joint, or another jbeamshell.laws.Law"
+            require(f"attachments[{place}].law", type(law).__name__, isinstance(law, Law), fix)
+        self.joints = [law if isinstance(law, Joint) else Joint.of(law) for law in laws]
         for place, attached in enumerate(self.attachments):
             ends = [attached.first, *([] if attached.second is None else [attached.second])]
             inside = all(isinstance(e, int | np.integer) and 0 <= e < size for e in ends)
@@ -117,7 +123,7 @@ class Structure:
     def traced(self) -> bool:
         """True if any number of the structure is traced by a JAX transformation."""
         matrices = (self.mass, self.stiffness, self._given_damping, self.damping_ratio)
-        return is_traced(*matrices, [a.joint for a in self.attachments])
+        return is_traced(*matrices, self.joints)
 
     @property
     def damping(self) -> Any:
@@ -125,9 +131,9 @@ class Structure:
         if not self.damping_ratio.size:
             return self._given_damping
         require("damping_ratio", self.damping_ratio.shape, self.size <= DENSE, LARGE)
-        omega, shapes = self.modes(self.damping_ratio.size)
-        momenta = dense(self.mass) @ shapes
-        own = (momenta * (2.0 * self.damping_ratio * omega)) @ momenta.T
+        modes = self.modes(self.damping_ratio.size)
+        momenta = dense(self.mass) @ modes.shapes
+        own = (momenta * (2.0 * self.damping_ratio * modes.omega)) @ momenta.T
         return dense(self._given_damping) + own
 
     def modal_damping(self, shape: Any, omega: Any, mode: int) -> Any:
@@ -161,7 +167,7 @@ class Structure:
     @property
     def stuck_stiffness(self) -> Any:
         """Stiffness matrix (n, n) with all joints stuck."""
-        springs = [a.joint.stiffness for a in self.attachments]
+        springs = [joint.stiffness for joint in self.joints]
         directions = self.directions
         if self.traced:
             return self.stiffness + (directions * jnp.asarray(springs)) @ directions.T
@@ -171,14 +177,15 @@ class Structure:
             return self.stiffness + directions @ scipy.sparse.diags_array(own) @ directions.T
         return self.stiffness + (directions * own) @ directions.T
 
-    def modes(self, count: int = 6) -> tuple[Any, Any]:
-        """Angular frequencies (k,) and shapes (n, k) of unit modal mass, all joints stuck.
+    def modes(self, count: int = 6) -> Modes:
+        """Frequencies (k,) and shapes (n, k) of unit modal mass, all joints stuck.
 
         Traced ones have derivatives where no other mode has the same frequency.
         """
         stuck, count = self.stuck_stiffness, min(count, self.size)
         if self.traced:
-            return _traced_modes(stuck, jnp.asarray(self.mass), count)
+            omega, shapes = _traced_modes(stuck, jnp.asarray(self.mass), count)
+            return Modes(omega / (2.0 * jnp.pi), shapes)
         if self.size <= DENSE or count >= self.size - 1:
             values, shapes = scipy.linalg.eigh(dense(stuck), dense(self.mass))
         else:
@@ -187,7 +194,7 @@ class Structure:
             shift = -SYMMETRY_ROUNDING * abs(stuck).max() / abs(self.mass).max()
             values, shapes = scipy.sparse.linalg.eigsh(stiffness, count, mass, sigma=shift)
         order = np.argsort(values)[:count]
-        return np.sqrt(np.maximum(values[order], 0.0)), shapes[:, order]
+        return Modes(np.sqrt(np.maximum(values[order], 0.0)) / (2.0 * np.pi), shapes[:, order])
 
     def static_displacements(self, loads: Any) -> Any:
         """Static displacements (n, k) under loads (n, k), all joints stuck."""
@@ -200,7 +207,7 @@ class Structure:
 
     def within_reach(self, peaks: Any) -> Array:
         """True where joints are known at their largest displacements (..., joints)."""
-        ends = [a.joint.reach for a in self.attachments]
+        ends = [joint.reach for joint in self.joints]
         return jnp.abs(peaks) <= (1.0 + ROUNDING) * jnp.stack(ends) if ends else jnp.abs(peaks) >= 0
 
     def knows(self, peaks: Any, what: str) -> Any:
@@ -221,8 +228,7 @@ class Structure:
             return jnp.all(within, axis=-1)
         peaks = np.asarray(peaks)
         place = int(np.argmin(np.all(np.asarray(within), axis=0)))
-        joint, most = self.attachments[place].joint, float(np.nanmax(abs(peaks[:, place])))
-        assert isinstance(joint, Joint)
+        joint, most = self.joints[place], float(np.nanmax(abs(peaks[:, place])))
         words = joint.unknown_at(most)
         raise InputError(f"{what} moves the joint of attachments[{place}] by {words}")
 
@@ -236,10 +242,10 @@ class Structure:
         stable = _is_positive(self.stuck_stiffness, SYMMETRY_ROUNDING)
         fix = "has a negative mode with all joints stuck: the structure is unstable"
         require("stiffness", self.stiffness.shape, stable, fix)
-        frequency, shapes = self.modes(1)
+        lowest = self.modes(1)
         scale = float(abs(self.stuck_stiffness).max() / abs(self.mass).max())
-        held = frequency[0] ** 2 > SYMMETRY_ROUNDING * scale
-        most = int(np.argmax(abs(shapes[:, 0])))
+        held = lowest.omega[0] ** 2 > SYMMETRY_ROUNDING * scale
+        most = int(np.argmax(abs(lowest.shapes[:, 0])))
         fix = f"leaves a rigid mode, in which degree of freedom {most} moves most: hold the "
         fix += "structure by a spring or a joint"
         require("stiffness", self.stiffness.shape, held, fix)
@@ -261,7 +267,7 @@ def _ratios(given: ArrayLike | None, size: int) -> Any:
 
 
 def _traced_modes(stiffness: Array, mass: Array, count: int) -> tuple[Array, Array]:
-    """Modes of traced matrices; their derivatives are those of K phi = lambda M phi."""
+    """Angular frequencies and shapes, whose derivatives are those of K phi = lambda M phi."""
     k, m = map(lax.stop_gradient, (stiffness, mass))
     lower = jnp.linalg.cholesky(m)
     half = solve_triangular(lower, k, lower=True)

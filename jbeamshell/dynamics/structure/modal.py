@@ -34,11 +34,11 @@ from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
 from jbeamshell.common.summary import Summary, ranged
+from jbeamshell.dynamics.frequencies import OverFrequency
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration.reduction import basis_of
 
-SLIDING = "must be joints: take nonlinear_mode for cubic springs"
 AMPLITUDES = "give rising positive modal displacements"
 SHAPE = 1e-4  # change of displacements at which a shape is found
 PHASES = 64  # of half a cycle
@@ -50,13 +50,13 @@ ROUNDING = 4e3  # residual over the rounding of a displacement, at which an equi
 LINEAR = "give a joint: a structure without any is linear, see its modes"
 
 
-class ModalCurve(NamedTuple):
+class ModalCurve(OverFrequency):
     """Frequency and damping of a mode over its amplitude, (k,) each.
 
     Attributes
     ----------
     amplitude : modal displacement q
-    frequency : angular frequency
+    frequency : cycles per time; see `omega`
     damping : damping ratio zeta of joints and structure
     dissipation : energy lost in the joints per cycle
     joints : (k, joints) amplitudes of the joints' displacements
@@ -64,7 +64,6 @@ class ModalCurve(NamedTuple):
     """
 
     amplitude: Any
-    frequency: Any
     damping: Any
     dissipation: Any
     joints: Any
@@ -104,7 +103,7 @@ def summary_of_mode(title: str, mode: Any, doubts: Sequence[str] = ()) -> Summar
         return Summary(f"{title}, traced", [])
     columns = {
         "modal displacement": mode.amplitude,
-        "angular frequency": mode.frequency,
+        "frequency": mode.frequency,
         "damping ratio": mode.damping,
         "lost per cycle": mode.dissipation,
         "joints move by": np.max(np.asarray(mode.joints), axis=-1, initial=0.0),
@@ -144,10 +143,10 @@ def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> M
 
     Examples
     --------
-    >>> joint = Joint(displacement=[1.0, 3.0], force=[1.0, 2.0])
+    >>> joint = Joint(displacements=[1.0, 3.0], forces=[1.0, 2.0])
     >>> structure = Structure([[1.0]], [[0.0]], [Attachment(joint, 0)])
     >>> modal_curve(structure, [0.5, 2.0]).frequency.round(3).tolist()
-    [1.0, 0.866]
+    [0.159, 0.138]
     """
     curve = by_statics(structure, amplitudes, mode)
     if not (is_traced(curve) or is_staged()):
@@ -159,8 +158,8 @@ def by_statics(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> Mo
     """Curve as `modal_curve` has it, without a warning."""
     amplitude = _checked(amplitudes)
     require("attachments", 0, bool(structure.attachments), LINEAR)
-    omega, shapes = structure.modes(mode + 1)
-    shape, directions = shapes[:, mode], structure.directions
+    modes, directions = structure.modes(mode + 1), structure.directions
+    shape = modes.shapes[:, mode]
     load = structure.mass @ shape
     stack = jnp.column_stack if structure.traced else np.column_stack
     displacements = structure.static_displacements(stack([load, directions]))
@@ -169,12 +168,9 @@ def by_statics(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> Mo
         load @ displacements[:, 0],
         directions.T @ displacements[:, 0],
         directions.T @ displacements[:, 1:],
-        structure.modal_damping(shape, omega[mode], mode),
+        structure.modal_damping(shape, modes.omega[mode], mode),
     )
-    joints = [a.joint for a in structure.attachments if isinstance(a.joint, Joint)]
-    sliding = len(joints) == len(structure.attachments)
-    require("attachments", structure.attachments, sliding, SLIDING)
-    backbones = tuple((joint.displacement, joint.force) for joint in joints)
+    backbones = tuple((joint.displacements, joint.forces) for joint in structure.joints)
     curve, sound = _curve(
         backbones, statics, _Modes.of(structure, load, mode), jnp.asarray(amplitude)
     )
@@ -268,8 +264,15 @@ def _curve(
         damped = jnp.where(zeta > 0.0, zeta, 1.0)
         off = jnp.where(zeta > 0.0, 1.0 - ratio / damped, 0.0)
         off = off + jnp.where(off < 0.0, -1.0, 1.0) * THIRD * third
-        size = jnp.abs(u)
-        return ModalCurve(q, omega, zeta, loss, size, 1.0 - moved / omega, off)
+        return ModalCurve(
+            amplitude=q,
+            frequency=omega / (2.0 * jnp.pi),
+            damping=zeta,
+            dissipation=loss,
+            joints=jnp.abs(u),
+            frequency_error=1.0 - moved / omega,
+            damping_error=off,
+        )
 
     curve = jax.vmap(one)(amplitude, lax.stop_gradient(path[SUBSTEPS - 1 :: SUBSTEPS]))
     return curve, jnp.cumprod(sound)[SUBSTEPS - 1 :: SUBSTEPS] > 0
@@ -281,7 +284,7 @@ def _alike(backbones: tuple[tuple[Array, Array], ...]) -> Joint:
     stacked = []
     for u, f in backbones:
         steps = jnp.arange(1, size + 1 - u.size)
-        slope = Joint(u, f).springs[-1]
+        slope = Joint(u, f).spring
         further = u[-1] * (1.0 + steps)
         longer = jnp.append(f, f[-1] + slope * (further - u[-1]))
         stacked.append(Joint(jnp.append(u, further), longer))

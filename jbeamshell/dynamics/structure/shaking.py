@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import POSITIVE, require, require_count, require_number
 from jbeamshell.common.errors import InputError, UnconvergedError, warn_of_doubts
 from jbeamshell.common.precision import doubled
+from jbeamshell.common.pytrees import Tree
 from jbeamshell.common.summary import Summary, with_unit
 from jbeamshell.dynamics.strip.motion import doubts_of_balance
 from jbeamshell.dynamics.structure.matrices import Structure, dense
@@ -48,7 +49,7 @@ UNTRACED = "shake it outside jit, grad and vmap"
 NO_MOTION = "nothing happens: give a force, or an initial displacement or velocity"
 
 
-class StructureMotion(NamedTuple):
+class StructureMotion(Tree):
     """Motion of a structure at T evenly spaced times; times that were not reached hold NaN.
 
     Attributes
@@ -231,12 +232,12 @@ def shake(
 
 def _until(motion: StructureMotion, known: NDArray[np.bool_]) -> StructureMotion:
     """Motion whose other times hold NaN."""
-    changed = motion._asdict() | {"complete": bool(np.all(known))}
+    columns = {}
     for name in COLUMNS:
-        column = changed[name]
+        column = getattr(motion, name)
         seen = known.reshape(-1, *[1] * (column.ndim - 1))
-        changed[name] = np.where(seen, column, np.nan)
-    return StructureMotion(**changed)
+        columns[name] = np.where(seen, column, np.nan)
+    return motion.but(complete=bool(np.all(known)), **columns)
 
 
 def _converged(
@@ -253,7 +254,7 @@ def _converged(
     sliders = jnp.clip(springs * (model.directions.T @ x)[:, None], -limits, limits)
     first = _State(x, v, sliders, jnp.zeros(3), jnp.abs(model.directions.T @ x))
     times = np.linspace(0.0, span, samples)
-    period = 2.0 * np.pi / float(structure.modes(1)[0][0])
+    period = 1.0 / float(structure.modes(1).frequency[0])
     parts = max(1, int(np.ceil(FIRST * times[1] / period)))
     count = min(samples, 1 + most_steps // (2 * parts))  # times that the second run reaches
     coarse = _run(model, first, force, times[1], parts, count)
@@ -283,7 +284,7 @@ def _model(structure: Structure) -> _Model:
     """Matrices and force elements as arrays."""
     mass, damping, stiffness = map(dense, (structure.mass, structure.damping, structure.stiffness))
     directions = structure.directions
-    laws = laws_of(doubled([attached.joint for attached in structure.attachments]))
+    laws = laws_of(doubled(structure.joints))
     stiffness = stiffness + (directions * np.asarray(laws.remaining)) @ directions.T
     arrays = [jnp.asarray(a) for a in (mass, damping, stiffness, directions)]
     return _Model(arrays[0], arrays[1], arrays[2], arrays[3], laws)
@@ -321,17 +322,16 @@ def _marched(
     def load(number: Array) -> Array:
         return jnp.zeros_like(first.x) if force is None else force(number * step)
 
-    def forces(held: Array, u: Array, w: Array) -> tuple[Array, Array, Array]:
+    def forces(held: Array, w: Array) -> tuple[Array, Array, Array]:
         """Forces of the sliders, those of the elements, and their slopes."""
         trial = held + laws.springs * w[:, None]
         kept = jnp.clip(trial, -laws.limits, laws.limits)
         slopes = jnp.sum(jnp.where(trial == kept, laws.springs, 0.0), axis=1)
-        cubic = laws.cubic * (u + w) ** 2
-        return kept, jnp.sum(kept, axis=1) + cubic * (u + w), slopes + 3.0 * cubic
+        return kept, jnp.sum(kept, axis=1), slopes
 
     def advance(number: Array, state: _State) -> _State:
         u = directions.T @ state.x
-        _, begun, _ = forces(state.sliders, u, jnp.zeros_like(u))
+        begun = jnp.sum(state.sliders, axis=1)
         outside = load(number) + load(number + 1)
         free = 4.0 / step * mass @ state.v - 2.0 * stiffness @ state.x + outside
         moved = inverse @ (free - directions @ begun)
@@ -343,13 +343,13 @@ def _marched(
 
         def improved(search: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
             w, _, count = search
-            _, now, slopes = forces(state.sliders, u, w)
+            _, now, slopes = forces(state.sliders, w)
             change = jnp.linalg.solve(jnp.eye(u.size) + felt * slopes, w - aim + felt @ now)
             return w - change, jnp.max(jnp.abs(change), initial=0.0), count + 1
 
         search = (directions.T @ state.v * step, jnp.asarray(jnp.inf), jnp.zeros((), int))
         w, last, _ = lax.while_loop(left, improved, search)
-        kept, ended, _ = forces(state.sliders, u, w)
+        kept, ended, _ = forces(state.sliders, w)
         d = jnp.where(last <= most, moved - answer @ ended, jnp.nan)
         springs = jnp.where(laws.springs > 0.0, laws.springs, 1.0)
         slid = jnp.where(laws.springs > 0.0, w[:, None] - (kept - state.sliders) / springs, 0.0)
@@ -369,6 +369,5 @@ def _marched(
     springs = jnp.where(laws.springs > 0.0, laws.springs, 1.0)
     kinetic = 0.5 * jnp.einsum("ti,ij,tj->t", y.v, mass, y.v)
     held = 0.5 * jnp.sum(y.sliders**2 / springs, axis=(1, 2))
-    stretched = 0.25 * jnp.sum(laws.cubic * (y.x @ directions) ** 4, axis=1)
-    stored = 0.5 * jnp.einsum("ti,ij,tj->t", y.x, stiffness, y.x) + held + stretched
+    stored = 0.5 * jnp.einsum("ti,ij,tj->t", y.x, stiffness, y.x) + held
     return y.x, y.v, kinetic, stored, *y.work.T, y.peaks

@@ -14,9 +14,9 @@ from jbeamshell.common.checks import is_traced, require
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.jax_options import ONCE
 from jbeamshell.contact_line.network import Network, Response, Sliders
-from jbeamshell.dynamics.steady_cycles import SteadyCycles
 from jbeamshell.scene.scene import Scene
 from jbeamshell.solving.solve import run
+from jbeamshell.solving.steady_cycles import steady_cycles
 
 # Amplitudes of steady cycles, over the largest
 AMPLITUDES = np.append(np.geomspace(0.05, 0.4, 16), np.linspace(0.4, 1.0, 17)[1:])
@@ -85,7 +85,7 @@ def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, A
     ways = (1.0, -1.0)
     sides = [way * run(scene, way * levels, throw=throw).displacement for way in ways]
     sides = [side[-levels.size :] for side in sides]
-    cycles = SteadyCycles.of(scene, levels)
+    cycles = steady_cycles(scene, levels)
     u, loss = cycles.displacement, cycles.dissipation
     d = jnp.maximum(loss, LEAST * levels * u)
     thresholds = jnp.append(0.0, levels[:-1])

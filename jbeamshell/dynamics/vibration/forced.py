@@ -12,7 +12,7 @@ from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced
-from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration import setup
@@ -41,8 +41,8 @@ from jbeamshell.dynamics.vibration.results import (
     SteadyResponse,
     over_a_cycle,
 )
-from jbeamshell.dynamics.vibration.stability import are_stable
 
+TURN = 2.0 * np.pi
 SLIGHT = 1e-3  # part of a force at which a structure is nearly elastic
 
 
@@ -56,13 +56,13 @@ def forced_response(
     samples: int | None = None,
     most_points: int = MOST_POINTS,
 ) -> ForcedResponse:
-    """Steady response to a force cos(omega t) over its frequency, around folds.
+    """Steady response to a force cos(omega t) over its frequency.
 
     Parameters
     ----------
     structure : structure with its joints
     force : (n,) amplitudes of the force on the degrees of freedom
-    frequencies : angular frequencies from which and to which the curve is followed
+    frequencies : cycles per time from which and to which the curve is followed
     place : degree of freedom of ``amplitude`` and ``phase``; None is that of the largest force
     harmonics : highest harmonic; odd ones up to it are balanced
     samples : of a cycle; None is 16 for a period of the highest harmonic, 128 at least
@@ -84,21 +84,21 @@ def forced_response(
 
     Notes
     -----
-    Structures whose joints are sliders have no folds, and all their motions are stable; see
-    `jbeamshell.dynamics.vibration.stability`.
+    Joints of sliders have one steady motion under each load, and it is stable, so that no curve
+    folds; see `jbeamshell.dynamics.vibration.continuation`.
 
     Examples
     --------
     >>> u = np.linspace(0.25, 3.0, 12)
-    >>> joint = Joint(displacement=u, force=2.0 * np.tanh(u / 2.0))
+    >>> joint = Joint(displacements=u, forces=2.0 * np.tanh(u / 2.0))
     >>> structure = Structure([[1.0]], [[1.0]], [Attachment(joint, 0)], damping=[[0.02]])
-    >>> response = forced_response(structure, [0.3], (0.8, 2.0))
+    >>> response = forced_response(structure, [0.3], (0.13, 0.32))
     >>> bool(response.amplitude.max() > 1.0)
     True
     """
     first, last = setup.checked_pair("frequencies", frequencies, setup.RANGE)
     setting = (place, harmonics, samples, most_points)
-    return _followed(structure, force, (first, 1.0), OMEGA, last, setting)
+    return _followed(structure, force, (TURN * first, 1.0), OMEGA, TURN * last, setting)
 
 
 def level_response(
@@ -112,11 +112,11 @@ def level_response(
     samples: int | None = None,
     most_points: int = MOST_POINTS,
 ) -> ForcedResponse:
-    """Steady response at one frequency over the level of the force, around folds.
+    """Steady response at one frequency over the level of the force.
 
     Parameters
     ----------
-    frequency : angular frequency of the force
+    frequency : of the force, cycles per time
     levels : factors of ``force`` from which and to which the curve is followed
     structure, force, place, harmonics, samples, most_points : see `forced_response`, also for
         errors and doubts
@@ -124,7 +124,7 @@ def level_response(
     setup.check_frequency(frequency)
     first, last = setup.checked_pair("levels", levels, setup.LEVELS)
     setting = (place, harmonics, samples, most_points)
-    return _followed(structure, force, (float(frequency), first), LEVEL, last, setting)
+    return _followed(structure, force, (TURN * frequency, first), LEVEL, last, setting)
 
 
 def steady_response(
@@ -144,7 +144,7 @@ def steady_response(
 
     Parameters
     ----------
-    frequencies : (k,) angular frequencies
+    frequencies : (k,) cycles per time
     structure, force, place, harmonics, samples : see `forced_response`
 
     Raises
@@ -154,7 +154,8 @@ def steady_response(
     UnconvergedError
         if a response is not found
     """
-    omega = setup.checked_rising("frequencies", frequencies, setup.RANGE, rising=False)
+    frequency = setup.checked_rising("frequencies", frequencies, setup.RANGE, rising=False)
+    omega = TURN * frequency
     balance = setup.checked_balance(harmonics, samples)
     force = setup.checked_force(structure, force)
     place = setup.checked_place(structure, place, force)
@@ -167,24 +168,31 @@ def steady_response(
         if traced:
             good = good & structure.knows(peaks, "")
         x = nan_unless(good, found.point.x)
-        harmonic = x @ basis[place]
-        first = harmonic[:, 0]
+        first = x[:, 0] @ basis[place]
         after = left_out(model, balance, omega, x @ model.directions, found.lost)
-        result = SteadyResponse(omega, abs(first), jnp.angle(first), harmonic, x, basis, after)
+        result = SteadyResponse(
+            frequency=frequency,
+            amplitude=abs(first),
+            phase=jnp.angle(first),
+            harmonics=np.array(balance.harmonics),
+            coefficients=x,
+            basis=basis,
+            truncation=after,
+        )
         if traced:
             return result
-        result = SteadyResponse(*map(np.asarray, result))
+        result = jax.tree.map(np.asarray, result)
     if not np.all(found.converged):
-        lost = float(omega[int(np.argmin(found.converged))])
+        lost = float(frequency[int(np.argmin(found.converged))])
         raise UnconvergedError(f"no steady response is found at the frequency {lost:.6g}")
     structure.knows(peaks, "the force")
-    setup.doubt_harmonics(result.truncation, balance.harmonics)
+    warn_of_doubts(result.doubts)
     return result
 
 
 @partial(jax.jit, static_argnums=(1, 3))
 def _steady(model: Reduced, balance: Balance, omegas: Array, differentiable: bool) -> Found:
-    """Solutions (k, ...) at frequencies (k,) under the whole force."""
+    """Solutions (k, ...) at angular frequencies (k,) under the whole force."""
     number = jnp.eye(3)[jnp.array([EXCITATION, OMEGA, LEVEL])]
     whole, fixed = jnp.ones(1), lax.stop_gradient(model)
 
@@ -220,7 +228,7 @@ def _followed(
     end: float,
     setting: tuple[Any, Any, Any, int],
 ) -> ForcedResponse:
-    """Curve over frequency or level from (frequency, level)."""
+    """Curve over frequency or level from (omega, level)."""
     balance = setup.checked_balance(*setting[1:3])
     force = setup.checked_force(structure, force)
     place = setup.checked_place(structure, setting[0], force)
@@ -230,7 +238,7 @@ def _followed(
 
         def check(found: Found) -> None:
             omega, level, _ = found.point.p
-            what = f"the force times {level:.4g} at the frequency {omega:.6g}"
+            what = f"the force times {level:.4g} at the frequency {omega / TURN:.6g}"
             peaks = setup.joint_peaks(found.point.x[None], directions, balance.harmonics)
             structure.knows(peaks, what)
 
@@ -242,7 +250,7 @@ def _followed(
             curve = follow(model, balance, begin, along, end, check, setting[3])
         if not curve.points:
             raise UnconvergedError(
-                f"no steady response is found at the frequency {omega:.6g} and the level "
+                f"no steady response is found at the frequency {omega / TURN:.6g} and the level "
                 f"{level:.6g}, where the curve begins: begin farther from resonance"
             )
         response = _response(model, balance, curve, basis, place)
@@ -253,7 +261,7 @@ def _followed(
             f"{curve.stalled}; take another range, more damping or more harmonics",
             response,
         )
-    setup.doubt_harmonics(response.truncation, balance.harmonics)
+    warn_of_doubts(response.doubts, stacklevel=3)
     return response
 
 
@@ -271,17 +279,14 @@ def _response(
     found: Found = jax.tree.map(lambda *rows: np.stack(rows), *curve.points)
     directions = np.asarray(model.directions)
     omega, u = found.point.p[:, OMEGA], found.point.x @ directions
-    folds = np.array(curve.folds, int)
     return ForcedResponse(
-        frequency=np.asarray(omega),
+        frequency=np.asarray(omega) / TURN,
         level=np.asarray(found.point.p[:, LEVEL]),
-        harmonic=np.array(balance.harmonics),
+        harmonics=np.array(balance.harmonics),
         coefficients=np.asarray(found.point.x),
         basis=np.asarray(basis),
         place=place,
         joints=np.max(np.abs(over_a_cycle(u, balance.harmonics)), axis=1),
         dissipation=np.asarray(setup.dissipation(found, directions, balance.harmonics)),
-        stable=are_stable(model, balance, found.point, folds),
-        folds=folds,
         truncation=np.asarray(left_out(model, balance, omega, u, found.lost)),
     )

@@ -11,7 +11,7 @@ from jax import lax
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced
-from jbeamshell.common.errors import UnconvergedError
+from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration import setup
 from jbeamshell.dynamics.vibration.balance import Point, Rows, left_out, marched, polished
@@ -60,10 +60,10 @@ def nonlinear_mode(
 
     Examples
     --------
-    >>> joint = Joint(displacement=[1.0, 3.0], force=[1.0, 2.0])
+    >>> joint = Joint(displacements=[1.0, 3.0], forces=[1.0, 2.0])
     >>> structure = Structure([[1.0]], [[0.0]], [Attachment(joint, 0)])
     >>> nonlinear_mode(structure, [0.5, 2.0]).frequency.round(2).tolist()
-    [1.0, 0.87]
+    [0.16, 0.14]
     """
     amplitude = setup.checked_rising("amplitudes", amplitudes, setup.AMPLITUDES)
     setup.check_mode(structure, mode)
@@ -89,11 +89,11 @@ def nonlinear_mode(
         omega, u = xp.where(good, found.point.p[:, 0], xp.nan), found.point.x @ directions
         result = NonlinearMode(
             amplitude=amplitude,
-            frequency=omega,
+            frequency=omega / (2.0 * np.pi),
             damping=found.point.p[:, 2] / (2.0 * omega),
             dissipation=setup.dissipation(found, directions, balance.harmonics, xp),
             joints=peaks,
-            harmonic=np.array(balance.harmonics),
+            harmonics=np.array(balance.harmonics),
             coefficients=found.point.x,
             basis=basis,
             truncation=xp.asarray(left_out(model, balance, omega, u, found.lost)),
@@ -107,7 +107,7 @@ def nonlinear_mode(
             "below it, or fewer harmonics"
         )
     structure.knows(peaks, f"the modal displacement {float(amplitude[-1]):.6g}")
-    setup.doubt_harmonics(result.truncation, balance.harmonics)
+    warn_of_doubts(result.doubts)
     return result
 
 
@@ -115,12 +115,14 @@ def _linear(
     structure: Structure, model: Reduced, basis: Any, mode: int, count: int
 ) -> tuple[Point, Rows]:
     """Linear mode of unit amplitude, and the conditions of free vibration at an amplitude."""
-    omegas, shapes = structure.modes(mode + 1)
-    momentum = jnp.asarray(basis.T @ (structure.mass @ shapes[:, mode]))
+    modes = structure.modes(mode + 1)
+    momentum = jnp.asarray(basis.T @ (structure.mass @ modes.shapes[:, mode]))
     shape = jnp.linalg.solve(model.mass, momentum)
     first = jnp.zeros((count, shape.size)).at[0]
     own = shape @ model.damping @ shape
-    start = Point(first.set(shape) + 0j, jnp.stack([jnp.asarray(omegas[mode]), 0.0 * own, own]))
+    start = Point(
+        first.set(shape) + 0j, jnp.stack([jnp.asarray(modes.omega[mode]), 0.0 * own, own])
+    )
     measure = first.set(momentum)
     no_force = jnp.zeros((3, 3)).at[0, 1].set(1.0)
     return start, Rows(

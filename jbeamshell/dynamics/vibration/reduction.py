@@ -59,8 +59,7 @@ def reduced(structure: Structure, force: Any, mode: int = 0) -> tuple[Reduced, A
     unused = jnp.all(jnp.asarray(basis) == 0.0, axis=0)
     mass = mass + jnp.diag(jnp.where(unused, 1.0, 0.0))
     stiffness = stiffness + jnp.diag(jnp.where(unused, jnp.max(stiffness), 0.0))
-    elements: Any = [attached.joint for attached in structure.attachments]
-    laws = laws_of(elements if traced else doubled(elements))
+    laws = laws_of(structure.joints if traced else doubled(structure.joints))
     drive = jnp.asarray(basis.T @ force)
     return Reduced(mass, damping, stiffness, jnp.asarray(basis.T @ own), drive, laws), basis
 
@@ -73,7 +72,7 @@ def basis_of(structure: Structure, loads: Any, mode: int, xp: Any) -> Any:
     """
     if structure.size <= SMALL:
         return np.eye(structure.size)
-    _, modes = structure.modes(MODES + mode)
+    modes = structure.modes(MODES + mode).shapes
     static = structure.static_displacements(loads)
     for _ in range(2):  # the second time for rounding
         static = static - modes @ (modes.T @ (structure.mass @ static))

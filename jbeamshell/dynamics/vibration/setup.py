@@ -1,9 +1,8 @@
-"""Input of harmonic balance: checks, reduced structures, doubts."""
+"""Input of harmonic balance, checked, and energies and largest displacements of its result."""
 
 from __future__ import annotations
 
 import contextlib
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,7 +18,6 @@ from jbeamshell.common.checks import (
     require_count,
     require_number,
 )
-from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration.balance import Balance, Found
 from jbeamshell.dynamics.vibration.results import over_a_cycle
@@ -27,8 +25,7 @@ from jbeamshell.dynamics.vibration.results import over_a_cycle
 HARMONICS = 9  # highest one, unless told otherwise
 PER_HARMONIC = 16  # samples of a period of the highest harmonic
 FEWEST = 128  # samples of a cycle
-DOUBTED = 1e-3  # displacement in the next harmonic over that in the first
-RANGE = "give two different positive angular frequencies, (from, to)"
+RANGE = "give two different positive frequencies, (from, to), in cycles per time"
 LEVELS = "give two different positive factors of the force, (from, to)"
 AMPLITUDES = "give positive modal displacements that rise"
 
@@ -106,23 +103,11 @@ def dissipation(found: Found, directions: Any, harmonics: Sequence[int], xp: Any
     return np.pi * xp.sum(parts, axis=(-2, -1))
 
 
-def doubt_harmonics(truncation: Any, harmonics: Sequence[int]) -> None:
-    """Warn if the next harmonic is not small."""
-    most = float(np.max(truncation, initial=0.0))
-    if most > DOUBTED:
-        warnings.warn(
-            f"doubtful: harmonic {harmonics[-1] + 2}, which is left out, moves the joints by "
-            f"{most:.2g} of the first one: give more harmonics",
-            DoubtfulWarning,
-            stacklevel=3,
-        )
-
-
 def check_mode(structure: Structure, mode: Any) -> None:
     """Raise `InputError` unless a mode exists."""
     require_count("mode", mode, 0, structure.size - 1)
 
 
 def check_frequency(frequency: Any) -> None:
-    """Raise `InputError` unless an angular frequency is positive."""
-    require_number("frequency", frequency, "must be a positive angular frequency")
+    """Raise `InputError` unless a frequency is positive."""
+    require_number("frequency", frequency, "must be a positive frequency, in cycles per time")

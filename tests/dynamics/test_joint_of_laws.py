@@ -1,0 +1,73 @@
+"""Joints of laws: sliders in place of a fitted law, in a structure and on their own."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell import laws
+from jbeamshell.dynamics import Attachment, Joint, Structure, modal_curve
+
+MASING = {
+    "jenkins": laws.Jenkins(2.0, 100.0),
+    "sliders": laws.law_named("sliders3")(0.01, 0.05, 0.6, 0.9, 0.5),
+    "iwan4": laws.Iwan4(2.0, 100.0, -0.5, 0.3),
+    "iwan4, steep": laws.Iwan4(2.0, 100.0, -0.9, 0.0),
+    "iwan4, even": laws.Iwan4(2.0, 100.0, 0.0, 2.0),
+    "bar": laws.Bar(2.0, 0.05),
+    "mindlin": laws.Mindlin(2.0, 100.0),
+    "row": laws.SeriesIwan.of_bar(3.4e4, 1.0, 2.0, 8),
+}
+
+
+@pytest.mark.parametrize("name", MASING)
+def test_a_joint_has_the_loops_of_its_law(name):
+    law = MASING[name]
+    joint = Joint.of(law, width=3.0)
+    slides = float(joint.displacements[-2])
+    size = slides * np.geomspace(1e-3, 4.0, 57)
+    lost = 3.0 * np.asarray(law.dissipation(size))
+    np.testing.assert_allclose(joint.dissipation(size), lost, rtol=1.01e-2, atol=1e-9 * lost[-1])
+    np.testing.assert_allclose(joint.backbone(size), 3.0 * law.backbone(size), rtol=2e-3)
+    path = slides * np.array([0.5, -0.3, 0.2, -0.1, 0.9, -1.2, 0.1, 1.3])
+    forces = 3.0 * np.asarray(law.path_forces(path))
+    np.testing.assert_allclose(joint.path_forces(path), forces, rtol=0.0, atol=1.2e-2)
+    exact = isinstance(law, laws.Jenkins | laws.parallel_iwan.Sliders)
+    assert not exact or np.max(np.abs(np.asarray(joint.path_forces(path)) - forces)) < 1e-12
+    u = joint.displacement(jnp.asarray([0.6, 3.0]))
+    np.testing.assert_allclose(joint.backbone(u), [0.6, 3.0], rtol=1e-12)
+
+
+def test_a_structure_takes_a_law_as_its_joint_with_derivatives_to_its_numbers():
+    """One mass on a Jenkins element: F(U)/U is omega^2, and 4 F (U - u_S) is lost per cycle."""
+
+    def frequency(limit):
+        law = laws.Jenkins(limit, 4.0)
+        return modal_curve(Structure([[1.0]], [[0.0]], [Attachment(law, 0)]), [1.0]).frequency[0]
+
+    assert float(jax.jit(frequency)(1.5)) == pytest.approx(1.5**0.5 / (2.0 * np.pi), rel=1e-9)
+    slope = jax.grad(frequency)(1.5)
+    assert float(slope) == pytest.approx(0.5 / 1.5**0.5 / (2.0 * np.pi), rel=1e-9)
+
+
+def test_a_force_below_gross_slip_ends_the_joint_there():
+    law = MASING["iwan4"]
+    joint = Joint.of(law, 1.0)
+    assert float(joint.forces[-1]) == pytest.approx(1.0, rel=1e-9)
+    assert float(joint.reach) == pytest.approx(float(law.displacement(1.0)), rel=1e-9)
+    with pytest.raises(jb.InputError, match=r"force of joint = 1\.5: is beyond the last point"):
+        joint.displacement(1.5)
+
+
+@pytest.mark.parametrize("name", ["bouc-wen", "dahl", "lugre", "jang-barber", "power-law"])
+def test_a_law_without_masings_memory_is_refused(name):
+    with pytest.raises(jb.InputError, match=f"^law = '{name}': has no Masing memory.*take iwan4"):
+        Structure([[1.0]], [[1.0]], [Attachment(laws.LAWS[name](), 0)])
+
+
+def test_a_law_that_rises_for_ever_needs_a_force():
+    held = laws.SeriesIwan([1.0, 2.0], [0.5, 0.5])
+    with pytest.raises(jb.InputError, match=r"^law = 'series-iwan': rises for ever"):
+        Joint.of(held)
+    assert float(Joint.of(held, 3.0).forces[-1]) == pytest.approx(3.0)
