@@ -129,7 +129,7 @@ def results() -> dict[str, np.ndarray]:
         found[f"gradient, {name}/dissipation"] = np.asarray(slopes(np.array([0.12, 0.15, 0.25])))
     over = {"strip.height_ratio": np.geomspace(0.02, 0.4, 8), "load.amplitude": [0.3, 0.8, 1.9]}
     swept = jb.sweep(scene("linear"), over)
-    return found | {f"sweep/{name}": np.asarray(values) for name, values in swept.values.items()}
+    return found | {f"sweep/{name}": np.asarray(values) for name, values in swept.data_vars.items()}
 
 
 def main() -> int:
