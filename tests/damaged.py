@@ -216,7 +216,7 @@ def _state(path):
 
 
 def _block(path):
-    block = Store(path.parent).load(0, *BLOCK.values.shape)
+    block = Store(path.parent, "a sweep").load(0, *BLOCK.values.shape)
     if block is None:
         raise jb.InputError("a block is left out")
     return list(block)

@@ -44,7 +44,7 @@ class TestSinglePrecision:
         amplitude = float(fine().load.amplitude)
         assert float(ask(amplitude)["dissipation"]) == pytest.approx(expected, rel=2e-6)
         swept = jb.sweep(fine(), {"load.amplitude": [amplitude]})
-        assert swept["dissipation"][0] == pytest.approx(expected, rel=2e-6)
+        assert float(swept["dissipation"][0]) == pytest.approx(expected, rel=2e-6)
 
     def test_scenes_made_before_double_precision_is_switched_on(self, single: None) -> None:
         scene = fine()
