@@ -15,7 +15,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from typing import Any
+from typing import Any, cast
 
 import jax
 import numpy as np
@@ -37,7 +37,7 @@ _compiling = threading.Lock()
 
 
 @in_one_lapack_thread
-def run_block(about: str, fast_loops: bool, columns: np.ndarray) -> Block:
+def run_block(about: str, fast_loops: bool, cache: bool, columns: np.ndarray) -> Block:
     """Figures of a block of lanes; a worker calls this.
 
     Parameters
@@ -45,11 +45,12 @@ def run_block(about: str, fast_loops: bool, columns: np.ndarray) -> Block:
     about : `Job.description` of the sweep
     fast_loops : how loops are compiled, on which the last bits depend; a worker whose JAX has
         started keeps its own
+    cache : True to keep compiled programs in the machine's folder, see `jbeamshell.configure`
     columns : (keys, lanes) numbers of the lanes
     """
     with _compiling:  # the threads of a worker share one program
         if not started():
-            configure(fast_loops=fast_loops, cache=False)
+            configure(fast_loops=fast_loops, cache=cache)
         with jax.enable_x64(True):
             runner = _runner(about)
     return _run(runner, columns)
@@ -90,7 +91,8 @@ def blocks_of(job: Job, numbers: Sequence[int], executor: Executor | None) -> Bl
             yield from _finished(job, numbers, threads, functools.partial(_run, runner))
         return
     fast_loops = FAST_LOOPS in os.getenv("XLA_FLAGS", "")
-    task = functools.partial(run_block, job.description(), fast_loops)
+    cache = bool(cast(Any, jax.config).jax_compilation_cache_dir)  # as this process has it
+    task = functools.partial(run_block, job.description(), fast_loops, cache)
     try:
         yield from _finished(job, numbers, executor, task)
     except Exception as error:
