@@ -52,7 +52,6 @@ from .scene.toml import (
     scene_to_toml as scene_to_toml,
     write_scene as write_scene,
 )
-from .sweeping.results import Sweep as Sweep
 from .sweeping.run import sweep as sweep
 
 __version__: str

@@ -35,7 +35,7 @@ from jbeamshell.sweeping.runner import Block
 from jbeamshell.sweeping.store import Store
 
 TESTS = Path(__file__).parent
-OURS = ("history.npz", "body.npz", "block-000000.npz", "sweep.npz", "fit.state")  # check sums
+OURS = ("history.npz", "body.npz", "block-000000.npz", "fit.state")  # check sums
 CHECKED = (*OURS, "loop.npz", "loop.squeezed.mat")  # sums of the archive too
 SCARCE = 6  # a MATLAB file, which is read in a process of its own, for so many of each other
 TINY = {"model.nodes": 9, "load.steps_per_half_cycle": 2, "load.cycles": 1}
@@ -97,11 +97,8 @@ def good_files(folder):
 
 
 def _stores(folder):
-    """Block and description of a sweep, and the state of a fit."""
-    with Store(folder / "parts").opened("a sweep", {"load.amplitude": np.linspace(0.1, 0.9, 7)}):
-        shutil.copy(folder / "parts" / "sweep.npz", folder)
-    shutil.rmtree(folder / "parts")
-    Store(folder).save(0, BLOCK)
+    """Block of a sweep, and the state of a fit."""
+    Store(folder, "a sweep").save(0, BLOCK)
     random = np.random.default_rng(0)
     runs = _runs(folder / "fit.state")
     runs.read()
@@ -219,7 +216,7 @@ def _state(path):
 
 
 def _block(path):
-    block = Store(path.parent).load(0, *BLOCK.values.shape)
+    block = Store(path.parent, "a sweep").load(0, *BLOCK.values.shape)
     if block is None:
         raise jb.InputError("a block is left out")
     return list(block)
@@ -262,7 +259,6 @@ READERS = {
     "body": lambda path: jax.tree.leaves(jb.Substructure.read(path)),
     "matrix": _matrix,
     "block-000000": _block,
-    "sweep": lambda path: Store(path.parent).read()[1],
     "fit": _state,
     "table": lambda path: jax.tree.leaves(table.read(path)),
     "curve": _curve,

@@ -82,14 +82,14 @@ def killed_again_and_again(words, folder, kills, seed, whole_run, check):
     check(finished(*words, folder=folder)[0])
 
 
-def sweep_words(size, table, processes):
+def sweep_words(size, table):
     amplitudes, heights = f"load.amplitude=0.2:2.2:{size}", f"strip.height_ratio=.03:.4:{size}:log"
     over = "--over", amplitudes, "--over", heights
-    return ["sweep", *SET, *over, "--out", table, "--processes", processes]
+    return ["sweep", *SET, *over, "--out", table]
 
 
-def sweep_survives(tmp_path, size, kills, processes):
-    _, whole_run = finished(*sweep_words(size, tmp_path / "whole.csv", 1), folder=tmp_path)
+def sweep_survives(tmp_path, size, kills):
+    _, whole_run = finished(*sweep_words(size, tmp_path / "whole.csv"), folder=tmp_path)
     whole = (tmp_path / "whole.csv").read_bytes()
     assert whole.count(b"\n") == size**2 + 1
     folder = tmp_path / "killed"
@@ -101,8 +101,8 @@ def sweep_survives(tmp_path, size, kills, processes):
         assert [path.name for path in folder.iterdir()] == ["sweep.csv"]
         table.unlink()
 
-    words = sweep_words(size, table, processes)
-    killed_again_and_again(words, folder, kills, processes, whole_run, check)
+    words = sweep_words(size, table)
+    killed_again_and_again(words, folder, kills, 1, whole_run, check)
 
 
 def fit_survives(tmp_path, kills):
@@ -132,14 +132,8 @@ def fit_survives(tmp_path, kills):
 
 
 @pytest.mark.slow
-def test_a_sweep_of_two_processes_survives_a_kill(tmp_path):
-    sweep_survives(tmp_path, 20, kills=1, processes=2)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("processes", [1, 2])
-def test_a_sweep_survives_twenty_kills(tmp_path, processes):
-    sweep_survives(tmp_path, 200, kills=20, processes=processes)
+def test_a_sweep_survives_twenty_kills(tmp_path):
+    sweep_survives(tmp_path, 200, kills=20)
 
 
 @pytest.mark.slow

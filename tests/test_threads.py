@@ -73,7 +73,7 @@ def test_solves_sweeps_and_fits_at_once_answer_as_alone(tmp_path):
 
     def swept(scene, name):
         found = jb.sweep(scene, OVER, ["dissipation", "secant_stiffness"], out=tmp_path / name)
-        return [found["dissipation"], found["secant_stiffness"], found.status]
+        return [found["dissipation"], found["secant_stiffness"], found["status"]]
 
     def fitted(data):
         found = identify.fit(data, "jenkins", starts=1)

@@ -1,5 +1,6 @@
 """The standard strip in load steps, and a measurement that a formula answers."""
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -27,9 +28,9 @@ class Readings(Curve):
 
     x: np.ndarray
     y: np.ndarray
-
-    def __init__(self, x, y, label="toy", noise=None, weight=1.0):
-        self._hold(label, noise, weight, x=x, y=y)
+    label: str = eqx.field(static=True, default="toy")
+    noise: np.ndarray | None = None
+    weight: float = eqx.field(static=True, default=1.0)
 
 
 class Formula(Observation):

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import math
 import os
+import time
 import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
@@ -18,6 +19,7 @@ from jbeamshell.cli.arguments import add_json, add_scene, add_settings, scene_of
 from jbeamshell.cli.terminal import UNCONVERGED, put, say, say_written, warn
 from jbeamshell.common.errors import DoubtfulWarning, InputError
 from jbeamshell.common.files import as_path
+from jbeamshell.common.summary import Summary
 
 MOST = 2_000_000  # numbers in one JSON text
 WAIT = 10.0  # seconds in which a scheduler must answer
@@ -58,17 +60,12 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("--plot", metavar="FILE.png", help="draw the sweep to this file")
     parser.add_argument(
-        "--processes",
-        type=int,
-        metavar="N",
-        help="number of processes on this machine (default: as many as pay)",
-    )
-    parser.add_argument(
         "--dask",
         metavar="ADDRESS",
         help="share the lanes among the workers of the dask scheduler at this address, such as "
         "tcp://10.0.0.1:8786",
     )
+    parser.add_argument("--processes", help=argparse.SUPPRESS)
     add_settings(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -78,6 +75,8 @@ def run(options: argparse.Namespace) -> int:
     """Sweep, report and write; returns the exit code."""
     from jbeamshell.sweeping.run import FIGURES, sweep
 
+    if options.processes is not None:
+        raise InputError("--processes: is no option any more: a sweep takes all cores by itself")
     over = ranges(options.over)
     figures = FIGURES if options.figures is None else _names(options.figures)
     scene = scene_of(options)
@@ -90,36 +89,39 @@ def run(options: argparse.Namespace) -> int:
     if options.plot is not None:
         _check_picture(options.plot)
     say("compiling ...")
+    begun = time.perf_counter()
     with _workers(options.dask) as executor, warnings.catch_warnings():
-        warnings.simplefilter("ignore", DoubtfulWarning)  # printed below, on one line
+        warnings.simplefilter("ignore", DoubtfulWarning)  # printed below
         result = sweep(
             scene,
             over,
             figures,
             paired=options.paired,
             out=options.out,
-            processes=options.processes,
             executor=executor,
         )
-    return _report(options, result)
+    return _report(options, result, time.perf_counter() - begun)
 
 
-def _report(options: argparse.Namespace, result: Any) -> int:
+def _report(options: argparse.Namespace, result: Any, wall_s: float) -> int:
     """Print and draw the sweep; returns the exit code."""
     from jbeamshell.common import files
+    from jbeamshell.sweeping.lanes import Outcome
 
-    put(files.as_json(result.figures()) if options.json else f"{result}\n")
-    for doubt in result.doubts:
-        warn(doubt)
-    if result.outside:
-        warn(f"{result.outside:,} lanes lie outside the model's domain: {result.why_outside}")
-    if result.undefined:
-        warn(f"{result.undefined:,} lanes have a figure that is not defined there (0/0)")
-    if result.failed:
-        warn(
-            f"{result.failed:,} lanes found no equilibrium, neither in the batch nor alone: see "
-            "their status"
-        )
+    about, counts = (
+        result.attrs,
+        np.bincount(result["status"].values.ravel(), minlength=len(Outcome)),
+    )
+    failed = int(np.sum(counts[Outcome.MAX_ITERATIONS : Outcome.OUTSIDE]))
+    if options.json:
+        found = {"lanes": int(np.sum(counts)), "failed": failed, "wall_s": wall_s}
+        put(files.as_json(found | _plain(result)))
+    else:
+        figures = ((str(name), result[name].values) for name in list(result)[:-2])
+        spans = [(name.replace("_", " "), _span(values)) for name, values in figures]
+        put(Summary(f"{about['summary']}; {wall_s:.1f} s", spans).as_text() + "\n")
+    for words in filter(None, (about["doubts"], about["notes"])):
+        warn(words)
     written = [options.out] if options.out else []
     if options.plot:
         from jbeamshell import plotting
@@ -130,7 +132,30 @@ def _report(options: argparse.Namespace, result: Any) -> int:
         written.append(options.plot)
     if written:
         say_written(written)
-    return UNCONVERGED if result.failed else 0
+    return UNCONVERGED if failed else 0
+
+
+def _plain(result: Any) -> dict[str, Any]:
+    """Sweep as plain numbers, words and lists, for JSON; None where there is no number."""
+    words = np.array(result["status"].attrs["flag_meanings"].split())
+    axes = {key: axis.values.tolist() for key, axis in result.coords.items() if "." in key}
+    figures = {name: result[name].values for name in list(result)[:-2]}
+    return {
+        "shape": list(result["status"].shape),
+        "axes": axes,
+        "values": {
+            name: np.where(np.isfinite(values), values, np.array(None)).tolist()
+            for name, values in figures.items()
+        },
+        "status": words[result["status"].values].tolist(),
+        "doubtful": result["doubtful"].values.tolist(),
+    } | {name: result.attrs[name] for name in ("summary", "doubts", "notes", "plan")}
+
+
+def _span(values: np.ndarray) -> str:
+    """Smallest and largest number, in words."""
+    known = values[np.isfinite(values)]
+    return f"{known.min():.6g} to {known.max():.6g}" if known.size else "none"
 
 
 def ranges(texts: Sequence[str]) -> dict[str, np.ndarray]:

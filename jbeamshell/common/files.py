@@ -76,46 +76,28 @@ def written_whole(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def locked(path: Path) -> Iterator[bool]:
-    """Context with True if this is the only one, of all processes and threads, with the file.
+def locked(folder: Path) -> Iterator[bool]:
+    """Context with True if this is the only one, of all processes and threads, with the folder.
 
-    A process that dies lets go of its files.  Where the system has no such locks, nobody is told.
+    A process that dies lets go of its folders.  Where the system has no such locks, nobody is told.
     """
-    while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        alone = _lock(handle)
-        if not alone or _is_at(handle, path):
-            break
-        os.close(handle)  # the one before has removed the file since it was opened
-    try:
-        yield alone
-    finally:
-        if alone:
-            with contextlib.suppress(OSError):
-                path.unlink(missing_ok=True)
-        os.close(handle)
-
-
-def _lock(handle: int) -> bool:
     try:
         import fcntl
     except ImportError:  # Windows
-        return True
+        yield True
+        return
+    handle = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks
-        return True
-    return True
-
-
-def _is_at(handle: int, path: Path) -> bool:
-    """True if an open file is the one at a path."""
-    try:
-        return os.path.samestat(os.fstat(handle), path.stat())
-    except FileNotFoundError:
-        return False
+        alone = True
+        with contextlib.suppress(OSError):  # a file system without locks
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                alone = folder.exists()  # the one before may have removed it
+            except BlockingIOError:
+                alone = False
+        yield alone
+    finally:
+        os.close(handle)
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

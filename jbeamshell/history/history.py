@@ -11,7 +11,6 @@ from jax import Array
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
-from jbeamshell.common.extras import table_library
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
 from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
@@ -184,16 +183,14 @@ class History(Profiles, ContactLine, CycleFigures):
     def to_dataframe(self) -> Any:
         """Load path as a `pandas.DataFrame`, a row for every step; see `table`.
 
-        Raises
-        ------
-        InputError
-            if pandas is not installed
-
         Examples
         --------
         >>> history.to_dataframe().plot("displacement", "force")
         """
-        return table_library("pandas").DataFrame(self.table())
+        import xarray
+
+        columns = {name: ("row", column) for name, column in self.table().items()}
+        return xarray.Dataset(columns).to_dataframe()
 
     def save(self, path: Any) -> None:
         """Write to an .npz file that `jbeamshell.read_history` reads.

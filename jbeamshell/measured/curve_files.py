@@ -9,12 +9,10 @@ import numpy as np
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.columns import bare, choice, factor_of, no_header, unit_of
-from jbeamshell.measured.curves import IN_FILES, Curve
+from jbeamshell.measured.curves import CURVES, Curve
 from jbeamshell.measured.form import NUMBER
 from jbeamshell.measured.read_table import read_table
 from jbeamshell.measured.recordings import FilePath, check_words_of, labels_of
-
-CURVES = {curve.form.name: curve for curve in IN_FILES}
 
 
 def read_curves(

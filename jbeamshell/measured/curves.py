@@ -3,17 +3,19 @@
 Every curve may carry its noise, the standard deviation of the column that the model answers, in
 that column's units: one number, or one for each point. Its weight multiplies its residuals.
 
-A new kind of curve is a class with two columns and a `Form`; its entry in `IN_FILES` lets it be
+A new kind of curve is a class with two columns and a `Form`; its entry in `CURVES` lets it be
 read from files.
 """
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+import abc
+import dataclasses
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import equinox as eqx
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
@@ -53,16 +55,29 @@ class Curve(eqx.Module):
     form: ClassVar[Form]
     fewest: ClassVar[int] = 1
 
-    label: str = eqx.field(static=True)
-    noise: Floats | None
-    weight: float = eqx.field(static=True)
+    @property
+    @abc.abstractmethod
+    def label(self) -> str: ...
+    @property
+    @abc.abstractmethod
+    def noise(self) -> Floats | None: ...
+    @property
+    @abc.abstractmethod
+    def weight(self) -> float: ...
 
-    def _hold(self, label: str, noise: Any, weight: Any, **columns: Any) -> None:
+    def __post_init__(self) -> None:
         """Keep columns as arrays, the noise as one of their length."""
-        for name, values in columns.items():
-            setattr(self, name, as_column(values, name, label))
-        self.label, self.weight = label, _weight(weight, label)
-        self.noise = _noise(noise, getattr(self, next(iter(columns))), label)
+        names = [field.name for field in dataclasses.fields(self)]
+        kept: dict[str, Any] = {
+            name: as_column(getattr(self, name), name, self.label)
+            for name in names
+            if name not in ("label", "noise", "weight")
+        }
+        first = next(iter(kept.values()))
+        kept["noise"] = _noise(self.noise, first, self.label)
+        kept["weight"] = _weight(self.weight, self.label)
+        for name, value in kept.items():
+            setattr(self, name, value)
 
     def __check_init__(self) -> None:
         columns = {name: getattr(self, name) for name in self.form.columns}
@@ -105,16 +120,9 @@ class SqueezeCurve(Curve):
 
     x: Floats
     stress: Floats
-
-    def __init__(
-        self,
-        x: ArrayLike,
-        stress: ArrayLike,
-        label: str = "squeeze",
-        noise: ArrayLike | None = None,
-        weight: float = 1.0,
-    ) -> None:
-        self._hold(label, noise, weight, x=x, stress=stress)
+    label: str = eqx.field(static=True, default="squeeze")
+    noise: Floats | None = None
+    weight: float = eqx.field(static=True, default=1.0)
 
     def _check_columns(self, columns: dict[str, Floats]) -> None:
         back = np.flatnonzero(np.diff(self.x) <= 0.0)
@@ -140,7 +148,7 @@ class SqueezeCurve(Curve):
         """Part of the curve with low < x < high."""
         inside = (self.x > low) & (self.x < high)
         noise = None if self.noise is None else self.noise[inside]
-        return SqueezeCurve(self.x[inside], self.stress[inside], self.label, noise, self.weight)
+        return dataclasses.replace(self, x=self.x[inside], stress=self.stress[inside], noise=noise)
 
 
 class Backbone(Curve):
@@ -158,16 +166,9 @@ class Backbone(Curve):
 
     force: Floats
     displacement: Floats
-
-    def __init__(
-        self,
-        force: ArrayLike,
-        displacement: ArrayLike,
-        label: str = "backbone",
-        noise: ArrayLike | None = None,
-        weight: float = 1.0,
-    ) -> None:
-        self._hold(label, noise, weight, force=force, displacement=displacement)
+    label: str = eqx.field(static=True, default="backbone")
+    noise: Floats | None = None
+    weight: float = eqx.field(static=True, default=1.0)
 
     def _check_columns(self, columns: dict[str, Floats]) -> None:
         for name, column in columns.items():
@@ -179,14 +180,10 @@ class Backbone(Curve):
 
 
 class AmplitudeCurve(Curve):
-    """A figure of the steady cycle over its amplitude, compared by its logarithm.
+    """A figure of the steady cycle over its amplitude, compared by its logarithm."""
 
-    Attributes
-    ----------
-    amplitude : (points,) half the range of the column that drives, force or displacement
-    """
-
-    amplitude: Floats
+    if TYPE_CHECKING:  # a column of each kind, in its own place
+        amplitude: Floats
 
     def _check_columns(self, columns: dict[str, Floats]) -> None:
         for name, column in columns.items():
@@ -216,17 +213,11 @@ class DissipationCurve(AmplitudeCurve):
 
     form = _over_amplitude("dissipation", DISSIPATION)
 
+    amplitude: Floats
     dissipation: Floats
-
-    def __init__(
-        self,
-        amplitude: ArrayLike,
-        dissipation: ArrayLike,
-        label: str = "dissipation",
-        noise: ArrayLike | None = None,
-        weight: float = 1.0,
-    ) -> None:
-        self._hold(label, noise, weight, amplitude=amplitude, dissipation=dissipation)
+    label: str = eqx.field(static=True, default="dissipation")
+    noise: Floats | None = None
+    weight: float = eqx.field(static=True, default=1.0)
 
 
 class StiffnessCurve(AmplitudeCurve):
@@ -241,17 +232,11 @@ class StiffnessCurve(AmplitudeCurve):
 
     form = _over_amplitude("stiffness", SECANT_STIFFNESS)
 
+    amplitude: Floats
     stiffness: Floats
-
-    def __init__(
-        self,
-        amplitude: ArrayLike,
-        stiffness: ArrayLike,
-        label: str = "stiffness",
-        noise: ArrayLike | None = None,
-        weight: float = 1.0,
-    ) -> None:
-        self._hold(label, noise, weight, amplitude=amplitude, stiffness=stiffness)
+    label: str = eqx.field(static=True, default="stiffness")
+    noise: Floats | None = None
+    weight: float = eqx.field(static=True, default=1.0)
 
 
 class FrequencyCurve(AmplitudeCurve):
@@ -266,17 +251,11 @@ class FrequencyCurve(AmplitudeCurve):
 
     form = _over_amplitude("frequency", FREQUENCY)
 
+    amplitude: Floats
     frequency: Floats
-
-    def __init__(
-        self,
-        amplitude: ArrayLike,
-        frequency: ArrayLike,
-        label: str = "frequency",
-        noise: ArrayLike | None = None,
-        weight: float = 1.0,
-    ) -> None:
-        self._hold(label, noise, weight, amplitude=amplitude, frequency=frequency)
+    label: str = eqx.field(static=True, default="frequency")
+    noise: Floats | None = None
+    weight: float = eqx.field(static=True, default=1.0)
 
 
 class DampingCurve(AmplitudeCurve):
@@ -291,17 +270,11 @@ class DampingCurve(AmplitudeCurve):
 
     form = _over_amplitude("damping", DAMPING)
 
+    amplitude: Floats
     damping: Floats
-
-    def __init__(
-        self,
-        amplitude: ArrayLike,
-        damping: ArrayLike,
-        label: str = "damping",
-        noise: ArrayLike | None = None,
-        weight: float = 1.0,
-    ) -> None:
-        self._hold(label, noise, weight, amplitude=amplitude, damping=damping)
+    label: str = eqx.field(static=True, default="damping")
+    noise: Floats | None = None
+    weight: float = eqx.field(static=True, default=1.0)
 
 
 class ForcedCurve(AmplitudeCurve):
@@ -329,17 +302,10 @@ class ForcedCurve(AmplitudeCurve):
 
     frequency: Floats
     force: Floats
-
-    def __init__(
-        self,
-        frequency: ArrayLike,
-        force: ArrayLike,
-        amplitude: ArrayLike,
-        label: str = "forced response",
-        noise: ArrayLike | None = None,
-        weight: float = 1.0,
-    ) -> None:
-        self._hold(label, noise, weight, frequency=frequency, force=force, amplitude=amplitude)
+    amplitude: Floats
+    label: str = eqx.field(static=True, default="forced response")
+    noise: Floats | None = None
+    weight: float = eqx.field(static=True, default=1.0)
 
     def _check_columns(self, columns: dict[str, Floats]) -> None:
         super()._check_columns(columns | {"amplitude": self.amplitude})
@@ -350,13 +316,11 @@ class ForcedCurve(AmplitudeCurve):
             )
 
 
-IN_FILES: tuple[type[Curve], ...] = (
-    DissipationCurve,
-    StiffnessCurve,
-    SqueezeCurve,
-    FrequencyCurve,
-    DampingCurve,
-)
+CURVES: dict[str, type[Curve]] = {
+    kind.form.name: kind
+    for kind in (DissipationCurve, StiffnessCurve, SqueezeCurve, FrequencyCurve, DampingCurve)
+}
+"""Kinds of curve that are read from files, by name."""
 
 Measurement = Loop | Curve
 

@@ -6,7 +6,7 @@ class of results and any object with these attributes can be drawn.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -197,51 +197,6 @@ class RingDownComparison(Protocol):
     def predicted(self) -> ModalProperties: ...
     @property
     def payload(self) -> float: ...
-
-
-class SweptLanes(Protocol):
-    """Quantities of the lanes of a sweep, arrays that broadcast to its shape."""
-
-    @property
-    def amplitude_over_height(self) -> np.ndarray: ...
-    @property
-    def height_ratio(self) -> np.ndarray: ...
-    @property
-    def gross_slip(self) -> np.ndarray: ...
-    def value(self, key: str, /) -> np.ndarray: ...
-
-
-class SweptFigures(Protocol):
-    """Figures over the values of some keys, such as `jbeamshell.Sweep`.
-
-    A lane is one strip of the sweep: one value of each key.
-
-    Attributes
-    ----------
-    scene : scene with what was not varied
-    axes : (n,) values of every key
-    paired : True if the keys vary together
-    shape : shape of the arrays of figures
-    doubtful : True for lanes not to rely on
-    values : figures by name, which indexing by a name also gives
-    lanes : quantities of the lanes
-    """
-
-    @property
-    def scene(self) -> Scene: ...
-    @property
-    def axes(self) -> Mapping[str, np.ndarray]: ...
-    @property
-    def paired(self) -> bool: ...
-    @property
-    def doubtful(self) -> np.ndarray: ...
-    @property
-    def shape(self) -> tuple[int, ...]: ...
-    @property
-    def values(self) -> Mapping[str, np.ndarray]: ...
-    @property
-    def lanes(self) -> SweptLanes: ...
-    def __getitem__(self, figure: str, /) -> np.ndarray: ...
 
 
 class ModelOverData(Protocol):

@@ -5,7 +5,7 @@ A lane is one strip of a sweep: one value of each key.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,10 +14,9 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
+from jbeamshell.common.checks import require_choice
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.form import DISSIPATION, SECANT_STIFFNESS
-from jbeamshell.mechanics.bar import cubic_law
-from jbeamshell.plotting.protocols import SweptFigures
 from jbeamshell.plotting.style import (
     DATA,
     PALETTE,
@@ -28,7 +27,10 @@ from jbeamshell.plotting.style import (
     single,
     style,
 )
-from jbeamshell.scene.keys import TABLE, unit_of
+from jbeamshell.scene.keys import TABLE
+
+if TYPE_CHECKING:
+    from xarray import DataArray, Dataset
 
 FIGURES = {
     "dissipation": DISSIPATION.label,
@@ -37,12 +39,13 @@ FIGURES = {
     "loss_factor": "loss factor  [dimensionless]",
 }
 WIDE = 20.0  # ratio of largest to smallest value above which an axis is logarithmic
+HEIGHTS = "strip.height_ratio", "strip.half_height"
 NAMED = 10  # most curves that the legend names
 FLOOR = 1e-6  # part of the largest value at which a logarithmic axis ends
 
 
 def sweep(
-    result: SweptFigures,
+    result: Dataset,
     axes: Axes | None = None,
     *,
     figure: str = "dissipation",
@@ -78,17 +81,16 @@ def sweep(
     >>> plotting.sweep(jb.sweep(jb.Scene(), axes), figure="dissipation_ratio")
     """
     along, per = _keys(result, along, per)
-    values = result[figure]
+    values, x = _figure(result, figure), result[along].values
     with style():
         axes = single(axes)
-        x = result.axes[along]
-        if result.paired:
-            hue = np.full(x.size, 0.0) if per is None else result.axes[per]
-            _dots(axes, x, values, hue, per and _label(per, result))
+        if "lane" in result.dims:
+            hue = np.zeros(x.size) if per is None else result[per].values
+            _dots(axes, x, values.values, hue, per and _label(result[per]))
         else:
-            table, rest = _plane(result, values, along, per)
+            table, rest = _plane(values, along, per)
             order = np.argsort(x)
-            names: list[Any] = [None] if per is None else result.axes[per].tolist()
+            names: list[Any] = [None] if per is None else result[per].values.tolist()
             every = -(-len(names) // NAMED)
             curves = zip(table, names, looks(len(names)), strict=True)
             for number, (row, value, look) in enumerate(curves):
@@ -96,16 +98,17 @@ def sweep(
                 label = f"{_symbol(per)} = {value:.3g}" if named else None
                 axes.plot(x[order], row[order], **look, label=label, marker=".", markersize=4)
             axes.set_title(rest)
-        _cubic_law(result, axes, figure, along)
-        axes.set(xlabel=_label(along, result), ylabel=FIGURES.get(figure, figure.replace("_", " ")))
-        _scales(axes, x, values)
+        if figure == "dissipation" and along == "load.amplitude":
+            _bar(result, axes)
+        axes.set(xlabel=_label(result[along]), ylabel=FIGURES.get(figure, figure.replace("_", " ")))
+        _scales(axes, x, values.values)
         if axes.get_legend_handles_labels()[1]:
             beside(axes)
     return axes
 
 
 def sweep_contour(
-    result: SweptFigures,
+    result: Dataset,
     axes: Axes | None = None,
     *,
     figure: str = "dissipation",
@@ -127,11 +130,11 @@ def sweep_contour(
     >>> plotting.sweep_contour(jb.sweep(jb.Scene(), axes), figure="loss_factor")
     """
     along, per = _keys(result, along, per)
-    if per is None or result.paired:
+    if per is None or "lane" in result.dims:
         raise InputError("sweep: a map needs two keys that vary as a product: sweep over two")
-    table, rest = _plane(result, result[figure], along, per)
-    doubtful, _ = _plane(result, result.doubtful, along, per)
-    x, y = result.axes[along], result.axes[per]
+    table, rest = _plane(_figure(result, figure), along, per)
+    doubtful, _ = _plane(result["doubtful"], along, per)
+    x, y = result[along].values, result[per].values
     right, up = np.argsort(x), np.argsort(y)
     wide = _is_wide(table)
     with style():
@@ -145,7 +148,7 @@ def sweep_contour(
         axes.figure.colorbar(drawn, ax=axes, label=label)
         rows, columns = np.nonzero(doubtful)
         axes.plot(x[columns], y[rows], "x", color=DATA, markersize=3.0, markeredgewidth=0.7)
-        axes.set(xlabel=_label(along, result), ylabel=_label(per, result), title=rest)
+        axes.set(xlabel=_label(result[along]), ylabel=_label(result[per]), title=rest)
         for size, scaled in ((x, axes.set_xscale), (y, axes.set_yscale)):
             if _is_wide(size) and size.min() > 0.0:
                 scaled("log")
@@ -154,7 +157,7 @@ def sweep_contour(
 
 
 def master_curve(
-    result: SweptFigures, axes: Axes | None = None, *, figure: str = "dissipation_ratio"
+    result: Dataset, axes: Axes | None = None, *, figure: str = "dissipation_ratio"
 ) -> Axes:
     """Draw the dissipation over the bar's against A/eta, which puts all heights on one curve.
 
@@ -167,23 +170,24 @@ def master_curve(
     Returns
     -------
     matplotlib.axes.Axes
-        the axes drawn into: a dot for each lane that converged, coloured by its eta
+        the axes drawn into: a dot for each lane that converged, coloured by its
+        height if that varies
 
     Raises
     ------
     InputError
         if the result has no such figure, or no lane with friction and a known force
     """
-    y, x = result[figure], result.lanes.amplitude_over_height
-    eta = np.broadcast_to(result.lanes.height_ratio, result.shape)
-    good = np.isfinite(x) & np.isfinite(y)
+    y, x = _figure(result, figure).values, _scaled(result)
+    good = np.isfinite(x + y)
     if not np.any(good):
         fix = "sweep a scene with friction under force control"
         raise InputError(f"sweep: has no lane with a force, friction and a finite figure: {fix}")
     with style():
         axes = single(axes)
-        key = "strip.height_ratio" if np.ptp(eta) > 0.0 else None
-        _dots(axes, x[good], y[good], eta[good], key and _label(key, result))
+        height = next((result[key] for key in HEIGHTS if key in result.coords), None)
+        hue = x if height is None else height.broadcast_like(result[figure]).values
+        _dots(axes, x[good], y[good], hue[good], None if height is None else _label(height))
         axes.axhline(1.0, color=DATA, linestyle="--", linewidth=0.8)
         axes.set(
             xlabel=r"$A\,/\,(\mu F_N L/2)\,/\,\eta$",
@@ -194,7 +198,7 @@ def master_curve(
     return axes
 
 
-def sweep_sheet(result: SweptFigures) -> Figure:
+def sweep_sheet(result: Dataset) -> Figure:
     """Draw a sheet of a sweep: its first figure and, if there is one, the master curve.
 
     Parameters
@@ -206,19 +210,19 @@ def sweep_sheet(result: SweptFigures) -> Figure:
     matplotlib.figure.Figure
         the sheet, to be saved with `save` and closed with `close`
     """
-    ratio, scaled = "dissipation_ratio", result.lanes.amplitude_over_height
-    both = ratio in result.values and bool(np.any(np.isfinite(scaled + result.values[ratio])))
+    ratio = result.get("dissipation_ratio")
+    both = ratio is not None and bool(np.any(np.isfinite(_scaled(result) + ratio.values)))
     with style():
         row = panels(1, 1 + both)[0]
-        sweep(result, row[0], figure=next(iter(result.values)))
+        sweep(result, row[0], figure=str(next(iter(result.data_vars))))
         if both:
             master_curve(result, row[1])
     return row[0].figure
 
 
-def _keys(result: SweptFigures, along: str | None, per: str | None) -> tuple[str, str | None]:
+def _keys(result: Dataset, along: str | None, per: str | None) -> tuple[str, str | None]:
     """Key along the axis and key of the curves, as given or chosen."""
-    keys = list(result.axes)
+    keys = [str(key) for key in result.coords if key in TABLE]
     for name, key in (("along", along), ("per", per)):
         if key is not None and key not in keys:
             raise InputError(f"{name} = {key!r}: the sweep is over {', '.join(keys)}")
@@ -231,20 +235,26 @@ def _keys(result: SweptFigures, along: str | None, per: str | None) -> tuple[str
     return along, others[0] if per is None and others else per
 
 
-def _plane(
-    result: SweptFigures, values: np.ndarray, along: str, per: str | None
-) -> tuple[np.ndarray, str]:
+def _figure(result: Dataset, name: str) -> DataArray:
+    """Values of a figure."""
+    marks = "status", "doubtful"
+    require_choice("figure", name, tuple(str(one) for one in result if one not in marks))
+    return result[name]
+
+
+def _scaled(result: Dataset) -> np.ndarray:
+    """Load A/eta of every lane; NaN where it is not known."""
+    scaled = result.coords.get("amplitude_over_height")
+    return np.full(result["status"].shape, np.nan) if scaled is None else scaled.values
+
+
+def _plane(values: DataArray, along: str, per: str | None) -> tuple[np.ndarray, str]:
     """Values (per, along) at the middle values of the other keys, and a text that names these."""
-    kept, rest = [], []
-    for key, numbers in result.axes.items():
-        if key in (along, per):
-            kept.append(key)
-            continue
-        middle = numbers.size // 2
-        values = np.take(values, middle, axis=len(kept))
-        rest.append(f"{_symbol(key)} = {numbers[middle]:.4g}")
-    table = values if kept[-1] == along else values.T
-    return np.atleast_2d(table), ", ".join(rest)
+    others = [str(key) for key in values.dims if key not in (along, per)]
+    middle = values.isel({key: values.sizes[key] // 2 for key in others})
+    rest = (f"{_symbol(key)} = {float(middle[key]):.4g}" for key in others)
+    shown = middle if per is None else middle.transpose(per, along)
+    return np.atleast_2d(shown.values), ", ".join(rest)
 
 
 def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, hue: np.ndarray, name: str | None) -> None:
@@ -266,19 +276,18 @@ def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, hue: np.ndarray, name: str |
     bar.ax.minorticks_off()
 
 
-def _cubic_law(result: SweptFigures, axes: Axes, figure: str, along: str) -> None:
-    """Draw the bar's cubic law if it is the same for all curves."""
-    lanes = result.lanes
-    friction = lanes.gross_slip / lanes.value("strip.length")
-    stiffness = lanes.value("strip.axial_stiffness")
-    alike = all(np.ndim(number) == 0 for number in (stiffness, friction))
-    pulled = result.scene.load.control == "force" and along == "load.amplitude"
-    if figure != "dissipation" or not alike or not pulled or float(friction) <= 0.0:
+def _bar(result: Dataset, axes: Axes) -> None:
+    """Draw the bar's dissipation if it is known and the same for all curves."""
+    if "dissipation_ratio" not in result or "lane" in result.dims:
         return
-    inside = np.sort(result.axes[along])
-    inside = inside[(inside > 0.0) & (inside < float(lanes.gross_slip))]
-    law = np.asarray(cubic_law(inside, float(stiffness), float(friction)))
-    axes.plot(inside, law, color=DATA, linestyle="--", linewidth=0.9, label="bar", zorder=1.5)
+    with np.errstate(divide="ignore", invalid="ignore"):  # nothing slips
+        bar = (result["dissipation"] / result["dissipation_ratio"]).transpose("load.amplitude", ...)
+    rows = bar.values.reshape(bar.shape[0], -1)
+    known = np.flatnonzero(np.any(np.isfinite(rows), axis=1))
+    law, order = np.nanmedian(rows[known], axis=1), np.argsort(bar["load.amplitude"].values[known])
+    if law.size and np.all(np.isnan(rows[known]) | np.isclose(rows[known], law[:, None])):
+        x = bar["load.amplitude"].values[known][order]
+        axes.plot(x, law[order], color=DATA, linestyle="--", linewidth=0.9, label="bar", zorder=1.5)
 
 
 def _scales(axes: Axes, x: np.ndarray, values: np.ndarray) -> None:
@@ -303,7 +312,7 @@ def _symbol(key: str | None) -> str:
     return TABLE[key].label if key else ""
 
 
-def _label(key: str, result: SweptFigures) -> str:
+def _label(axis: DataArray) -> str:
     """Label of an axis: symbol and unit of a key."""
-    unit = unit_of(key, result.scene.load)
-    return f"{_symbol(key)}  [{'dimensionless' if unit == '1' else unit}]"
+    unit = axis.attrs["units"]
+    return f"{_symbol(str(axis.name))}  [{'dimensionless' if unit == '1' else unit}]"

@@ -1,7 +1,5 @@
 """Sweeps: figures of many strips that differ in some numbers; each strip is a lane."""
 
-from jbeamshell.sweeping.lanes import Lanes as Lanes
 from jbeamshell.sweeping.lanes import Outcome as Outcome
-from jbeamshell.sweeping.results import Sweep as Sweep
 from jbeamshell.sweeping.run import FIGURES as FIGURES
 from jbeamshell.sweeping.run import sweep as sweep

@@ -1,4 +1,4 @@
-"""Sweep as a job: lanes dealt into blocks, blocks run and stored, results collected."""
+"""Sweep as a job: lanes dealt into blocks, and their results collected."""
 
 from __future__ import annotations
 
@@ -6,20 +6,19 @@ import dataclasses
 import functools
 import json
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from importlib.metadata import version
-from typing import Any
 
 import jax
 import numpy as np
 
+from jbeamshell.common.arrays import check_sum
 from jbeamshell.common.errors import InputError
 from jbeamshell.contact_line.interpolation import HEIGHT, POISSON
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.toml import scene_from_values, scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 from jbeamshell.sweeping.runner import BLOCK, Block, Runner, shared_keys, width_of_chunks
-from jbeamshell.sweeping.store import Store
 
 BLOCKS = 32  # least number of blocks of a large sweep, for equal shares of all processes
 LEAST = 8  # least lanes of a block that is worth a file
@@ -116,27 +115,18 @@ class Job:
         columns = self.lanes.columns(np.arange(self.lanes.size))[shared]
         return np.unique(columns, axis=1, return_inverse=True)[1].ravel()
 
-    def runner(self, devices: Sequence[Any] | None = None) -> Runner:
+    def columns(self, number: int) -> np.ndarray:
+        """Numbers of the lanes of a block, (keys, lanes)."""
+        return self.lanes.columns(self.blocks[number])
+
+    def sizes(self, number: int) -> tuple[int, int]:
+        """Numbers of figures and lanes of a block."""
+        return len(self.figures), self.blocks[number].size
+
+    def runner(self) -> Runner:
         """Runner with the model of this sweep, to be compiled."""
-        lanes = self.lanes
-        keys = tuple(lanes.axes)
-        about = lanes.scene, keys, self.figures, self.width, self.solver, devices
+        about = self.lanes.scene, tuple(self.lanes.axes), self.figures, self.width, self.solver
         return Runner(*about, many=self.many, ranges=self.ranges)
-
-    def run(self, numbers: Sequence[int], runner: Runner) -> Iterator[tuple[int, Block]]:
-        """Blocks by number, run in this process, one on each device at a time."""
-        abreast = len(runner.devices)
-        for first in range(0, len(numbers), abreast):
-            some = numbers[first : first + abreast]
-            batches = [self.lanes.columns(self.blocks[number]) for number in some]
-            yield from zip(some, runner(batches), strict=True)
-
-    def stored(self, store: Store) -> dict[int, Block]:
-        """Blocks that are in the store, by number."""
-        done, figures = store.done(), len(self.figures)
-        sizes = {n: block.size for n, block in enumerate(self.blocks) if n in done}
-        loaded = {number: store.load(number, figures, size) for number, size in sizes.items()}
-        return {number: block for number, block in loaded.items() if block is not None}
 
     def collected(self, blocks: Mapping[int, Block]) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Figures by name and codes of `Outcome` of all lanes, arrays of the lanes' shape."""
@@ -151,12 +141,16 @@ class Job:
 
     # --- on paper -------------------------------------------------------------------------------
 
+    def mark(self) -> str:
+        """Check sum that identifies the sweep, with the axes' values."""
+        return check_sum(self.lanes.axes, self.description())
+
     def description(self) -> str:
-        """Text that identifies the sweep, without the axes' values."""
+        """Text from which a worker makes the runner."""
         if self.scene is None:
             raise InputError(
-                "out, processes, executor: a scene with a function of your own cannot be written "
-                "down: sweep it without them and write the table with to_csv"
+                "out, executor: a scene with a function of your own cannot be written down: sweep "
+                "it without them"
             )
         about = {
             "version": version("jbeamshell"),
@@ -172,7 +166,7 @@ class Job:
         return json.dumps(about)
 
 
-def runner_of(text: str, devices: Sequence[Any]) -> Runner:
+def runner_of(text: str) -> Runner:
     """Runner of the sweep with this description; raises `InputError` for one of another version."""
     about = json.loads(text)
     here = version("jbeamshell")
@@ -187,5 +181,5 @@ def runner_of(text: str, devices: Sequence[Any]) -> Runner:
     solver = None if about["solver"] is None else Newton(**about["solver"])
     *_, width, many = about["layout"]
     ranges = about["ranges"] and {key: tuple(ends) for key, ends in about["ranges"].items()}
-    own = scene, about["keys"], about["figures"], width, solver, devices
+    own = scene, about["keys"], about["figures"], width, solver
     return Runner(*own, many=many, ranges=ranges)

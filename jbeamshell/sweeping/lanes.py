@@ -203,15 +203,7 @@ def check_size(lanes: int, figures: int) -> None:
     need = lanes * (8 * (2 * figures + 4) + 3)
     if need > LARGEST:
         raise InputError(
-            f"over: {lanes:,} lanes of {figures} figures take {_bytes(need)} of memory, of which a "
-            f"sweep may take {_bytes(LARGEST)}: give fewer values, or split an axis and sweep "
-            f"{-(-need // LARGEST)} times"
+            f"over: {lanes:,} lanes of {figures} figures take {1e-6 * need:,.0f} MB of memory, of "
+            f"which a sweep may take {1e-6 * LARGEST:,.0f} MB: give fewer values, or split an axis "
+            f"and sweep {-(-need // LARGEST)} times"
         )
-
-
-def _bytes(count: int) -> str:
-    size, units = float(count), iter(("bytes", "kB", "MB", "GB", "TB", "PB"))
-    unit = next(units)
-    while size >= 1000.0 and unit != "PB":
-        size, unit = size / 1000.0, next(units)
-    return f"{size:.3g} {unit}"

@@ -1,18 +1,16 @@
-"""Blocks of lanes on the devices: one compiled shape, chunks, and lanes that fail solved alone."""
+"""Blocks of lanes: one compiled shape, chunks, and lanes that fail solved alone."""
 
 from __future__ import annotations
 
 import functools
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
-from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
@@ -133,7 +131,6 @@ class Runner:
     Attributes
     ----------
     width : lanes of a chunk, see `width_of_chunks`
-    devices : devices on which blocks run side by side
     many : True for so many lanes that a program that takes longer to compile is worth it
     ranges : least and most height ratio and Poisson's ratio, by key, if strips may be interpolated
     """
@@ -145,16 +142,13 @@ class Runner:
         figures: Sequence[str],
         width: int,
         solver: Newton | None = None,
-        devices: Sequence[Any] | None = None,
         *,
         many: bool = False,
         ranges: Mapping[str, Range] | None = None,
     ) -> None:
         self.scene, self.keys, self.figures = scene, tuple(keys), tuple(figures)
         self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
-        self.devices = list(devices or jax.local_devices())
         self.width = width
-        self._mesh = Mesh(np.array(self.devices), "lanes")
         template, self._numbers = Template.of(scene)
         strips = None if ranges is None else shared(scene, self.keys, self.figures, ranges)
         layout, self._strips = None, np.zeros(0, self.dtype)
@@ -164,40 +158,35 @@ class Runner:
         axes = tuple(None if place in self._shared else 0 for place in range(len(self.keys)))
         asked = self.keys, axes, self.figures, solver
         given = self._shape, self._strips.size
-        self._about = template, layout, asked, given, self.dtype, self._mesh, many
+        self._about = template, layout, asked, given, self.dtype, many
 
-    def compile(self) -> float:
-        """Compile the model without running a lane; returns the seconds it took, now or before."""
-        return _compiled(*self._about)[1]
+    def compile(self) -> None:
+        """Compile the model without running a lane, unless it was compiled before."""
+        _compiled(*self._about)
 
-    def __call__(self, batches: Sequence[np.ndarray]) -> Iterator[Block]:
-        """Blocks of batches of lanes, (keys, lanes) each; at most one batch for every device."""
-        found = jax.device_get(self._answers(batches))
-        for device, columns in enumerate(batches):
-            places = places_in_chunks(columns[self._shared], self.width)
-            values, status = (f[device].reshape(*f.shape[1:-2], -1)[..., places] for f in found)
-            block = Block(np.array(values), status.astype(np.int8))
-            self._mend(columns, block)
-            yield block
+    def __call__(self, columns: np.ndarray) -> Block:
+        """Block of lanes, whose numbers are (keys, lanes)."""
+        found = jax.device_get(self._answers(columns))
+        places = places_in_chunks(columns[self._shared], self.width)
+        values, status = (f.reshape(*f.shape[:-2], -1)[..., places] for f in found)
+        block = Block(np.array(values), status.astype(np.int8))
+        self._mend(columns, block)
+        return block
 
     @property
-    def _shape(self) -> tuple[int, int, int, int]:
+    def _shape(self) -> tuple[int, int, int]:
         chunks = BLOCK if self._shared else BLOCK // self.width  # each lane may need its own
-        return len(self.devices), len(self.keys), chunks, self.width
+        return len(self.keys), chunks, self.width
 
-    def _answers(self, batches: Sequence[np.ndarray]) -> tuple[Array, Array]:
+    def _answers(self, columns: np.ndarray) -> tuple[Array, Array]:
         # Chunks without lanes are not computed; a part-filled chunk repeats its last lane.
-        filled, counts = np.ones(self._shape, self.dtype), np.zeros(len(self.devices), np.int32)
-        for device, columns in enumerate(batches):
-            places = places_in_chunks(columns[self._shared], self.width)
-            counts[device] = places[-1] // self.width + 1
-            last = np.searchsorted(places, np.arange(counts[device] * self.width), "right") - 1
-            repeated = columns[:, last].reshape(len(self.keys), -1, self.width)
-            filled[device, :, : counts[device]] = repeated
-        program, _ = _compiled(*self._about)
-        given = jax.device_put((filled, counts), _spread(self._mesh))
-        same = jax.device_put((self._numbers, self._strips), _everywhere(self._mesh))
-        return program(*same, *given)
+        filled = np.ones(self._shape, self.dtype)
+        places = places_in_chunks(columns[self._shared], self.width)
+        count = places[-1] // self.width + 1
+        last = np.searchsorted(places, np.arange(count * self.width), side="right") - 1
+        filled[:, :count] = columns[:, last].reshape(len(self.keys), count, self.width)
+        program = _compiled(*self._about)
+        return program(self._numbers, self._strips, filled, np.int32(count))
 
     def _mend(self, columns: np.ndarray, block: Block) -> None:
         """Solve failed lanes alone, where long load steps are divided; mark what still fails."""
@@ -226,14 +215,6 @@ class Runner:
         return values, Outcome.UNDEFINED if np.any(np.isnan(values)) else status
 
 
-def _spread(mesh: Mesh) -> NamedSharding:
-    return NamedSharding(mesh, PartitionSpec("lanes"))
-
-
-def _everywhere(mesh: Mesh) -> NamedSharding:
-    return NamedSharding(mesh, PartitionSpec())
-
-
 @functools.lru_cache(KEPT)
 def _compiled(
     template: Template,
@@ -241,16 +222,14 @@ def _compiled(
     asked: tuple[tuple[str, ...], tuple[int | None, ...], tuple[str, ...], Newton | None],
     given: tuple[tuple[int, ...], int],
     dtype: np.dtype,
-    mesh: Mesh,
     many: bool,
-) -> tuple[Callable[..., tuple[Array, Array]], float]:
-    """Compiled program that runs one block on every device, and the seconds of its compilation.
+) -> Callable[..., tuple[Array, Array]]:
+    """Compiled program that runs one block.
 
-    It takes the scene's numbers, those of the strips that lanes share, those of the lanes (devices,
-    keys, chunks, width) and the count of filled chunks of each device.  Only filled chunks run, one
-    after the other, so that one shape serves sweeps of all sizes.
+    It takes the scene's numbers, those of the strips that lanes share, those of the lanes (keys,
+    chunks, width) and the count of filled chunks.  Only filled chunks run, one after the other, so
+    that one shape serves sweeps of all sizes.
     """
-    begun = time.perf_counter()
     keys, axes, names, solver = asked
     shape, size = given
 
@@ -277,23 +256,15 @@ def _compiled(
         nothing = jnp.full((len(names), chunks, width), jnp.nan, lanes.dtype)
         return lax.fori_loop(0, count, step, (nothing, jnp.zeros((chunks, width), jnp.int32)))
 
-    def each(fixed: list[Array], strips: Array, lanes: Array, counts: Array) -> tuple[Array, Array]:
-        values, status = block(fixed, strips, lanes[0], counts[0])
-        return values[None], status[None]
-
-    spread = PartitionSpec("lanes")
-    run: Callable[..., Any] = each
-    if mesh.size > 1:
-        specs = (PartitionSpec(), PartitionSpec(), spread, spread)
-        run = jax.shard_map(each, mesh=mesh, in_specs=specs, out_specs=spread, check_vma=False)
-    kinds = ((shape, dtype), (shape[:1], np.int32))
-    lanes = [jax.ShapeDtypeStruct(*kind, sharding=_spread(mesh)) for kind in kinds]
-    fixed = [jax.ShapeDtypeStruct((), dtype, sharding=_everywhere(mesh))] * template.numbers
-    strips = jax.ShapeDtypeStruct((size,), dtype, sharding=_everywhere(mesh))
-    small = template.scene(fixed).plan.on_contact_line
+    about = (
+        [jax.ShapeDtypeStruct((), dtype)] * template.numbers,
+        jax.ShapeDtypeStruct((size,), dtype),
+        jax.ShapeDtypeStruct(shape, dtype),
+        jax.ShapeDtypeStruct((), np.int32),
+    )
+    small = template.scene(about[0]).plan.on_contact_line
     options = quick_options(vectors=many) if small else None
-    program = jax.jit(run, compiler_options=options).lower(fixed, strips, *lanes).compile()
-    return program, time.perf_counter() - begun
+    return jax.jit(block, compiler_options=options).lower(*about).compile()
 
 
 @eqx.filter_jit

@@ -43,8 +43,8 @@ class TestSinglePrecision:
         ask = jb.response(fine(), ["load.amplitude"])
         amplitude = float(fine().load.amplitude)
         assert float(ask(amplitude)["dissipation"]) == pytest.approx(expected, rel=2e-6)
-        swept = jb.sweep(fine(), {"load.amplitude": [amplitude]}, processes=1)
-        assert swept["dissipation"][0] == pytest.approx(expected, rel=2e-6)
+        swept = jb.sweep(fine(), {"load.amplitude": [amplitude]})
+        assert float(swept["dissipation"][0]) == pytest.approx(expected, rel=2e-6)
 
     def test_scenes_made_before_double_precision_is_switched_on(self, single: None) -> None:
         scene = fine()

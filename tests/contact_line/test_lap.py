@@ -431,7 +431,7 @@ def test_a_sweep_runs_over_both_heights():
     sweep = jb.sweep(
         SQUEEZE, {"strip.height_ratio": [0.05, 0.1], "member.height_ratio": [0.05, 0.2]}
     )
-    assert np.all(np.isfinite(sweep.values["dissipation"]))
+    assert np.all(np.isfinite(sweep["dissipation"]))
 
 
 @pytest.mark.parametrize(

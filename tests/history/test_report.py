@@ -98,7 +98,6 @@ def test_the_loop_table_keeps_every_bit(history):
 
 
 def test_a_frame_holds_the_load_path(history):
-    pytest.importorskip("pandas")
     frame = history.to_dataframe()
     assert len(frame) == history.force.size
     np.testing.assert_array_equal(frame["displacement"], history.displacement)

@@ -29,9 +29,9 @@ def swept(scene: jb.Scene, over: dict[str, np.ndarray], paired: bool) -> dict[st
     seconds = []
     for _ in range(2):
         begin = time.perf_counter()
-        found = jb.sweep(scene, over, ["dissipation"], paired=paired, processes=1)
+        found = jb.sweep(scene, over, ["dissipation"], paired=paired)
         seconds.append(time.perf_counter() - begin)
-    works = found["dissipation"]
+    works = found["dissipation"].values
     lanes = np.random.default_rng(5).choice(works.size, CHECKED, replace=False)
     errors, ratios = [], []
     for lane in lanes:
@@ -44,9 +44,9 @@ def swept(scene: jb.Scene, over: dict[str, np.ndarray], paired: bool) -> dict[st
     seen = np.array(errors)[np.array(ratios) > 1e-3]
     return {
         "lanes": works.size,
-        "section": found.scene.plan.section,
-        "nodes": found.scene.plan.nodes,
-        "failed": int(np.sum(found.status != 0)),
+        "plan": found.attrs["plan"],
+        "nodes": int(found.attrs["plan"].split()[-2]),
+        "failed": int(np.sum(found["status"] != 0)),
         "cold_s": seconds[0],
         "lanes_per_s": works.size / seconds[1],
         "checked": CHECKED,

@@ -50,7 +50,7 @@ def calls():
         "loop of 20 steps": (lambda: loop(*numbers), 100),
         "exact rotations": (lambda: rotated(*numbers), 50),
         "gradient": (lambda: slope(*numbers), 200),
-        "batch of 4,096": (lambda: jb.sweep(walked, lanes)["dissipation"], 1),
+        "batch of 4,096": (lambda: jb.sweep(walked, lanes)["dissipation"].values, 1),
     }
 
 

@@ -147,7 +147,7 @@ def swept() -> list[dict[str, Any]]:
     over, scene = {HEIGHT: heights, LOAD: loads}, scene_of(STRIPS[0])
     for _ in range(2):  # the first compiles
         begin = time.perf_counter()
-        found = jb.sweep(scene, over, ["dissipation"], processes=1)
+        found = jb.sweep(scene, over, ["dissipation"])
         seconds = (time.perf_counter() - begin) / found.status.size
     places = [(np.searchsorted(heights, eta), np.searchsorted(loads, load)) for eta, load in STRIPS]
     return [
