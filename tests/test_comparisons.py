@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import comparisons
-from comparisons import measurements, table
-from comparisons.__main__ import main
-from comparisons.case import Case, Source
+from calibration import comparisons
+from calibration.comparisons import measurements, table
+from calibration.comparisons.__main__ import main
+from calibration.comparisons.case import Case, Source
 
 HERE = Path(comparisons.__file__).parent
 CASES = comparisons.all_cases()

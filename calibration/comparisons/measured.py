@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.case import Case, Floats, Source
-from comparisons.measurements import RECORD
+from calibration.comparisons.case import Case, Floats, Source
+from calibration.comparisons.measurements import RECORD
 from jbeamshell import identify, laws, reference
 from jbeamshell.measured import DissipationCurve
 

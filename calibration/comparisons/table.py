@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from comparisons.case import Floats, Result, Source
+from calibration.comparisons.case import Floats, Result, Source
 
 KINDS = {
     "closed form": "Closed forms",

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 import jbeamshell as jb
-from comparisons.case import Floats, rounded
+from calibration.comparisons.case import Floats, rounded
 from jbeamshell import identify, laws, plotting
 from jbeamshell.cli.main import main as command
 from jbeamshell.common.files import write_text

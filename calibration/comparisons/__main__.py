@@ -14,7 +14,7 @@ jax.config.update("jax_enable_x64", True)
 from tqdm import tqdm  # noqa: E402
 
 import jbeamshell as jb  # noqa: E402
-from comparisons import all_cases, measurements, table  # noqa: E402
+from calibration.comparisons import all_cases, measurements, table  # noqa: E402
 from jbeamshell.common.files import write_text  # noqa: E402
 
 HERE = Path(__file__).parent
@@ -22,7 +22,7 @@ HERE = Path(__file__).parent
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; the exit code is 1 if a case is outside its bound."""
-    parser = argparse.ArgumentParser(prog="python -m comparisons", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m calibration.comparisons", description=__doc__)
     parser.add_argument("name", nargs="*", help="words of the names of the cases (default: all)")
     parser.add_argument("--data", type=Path, help="folder of measurements, to take them again")
     options = parser.parse_args(arguments)

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.integrate import quad
 
 import jbeamshell as jb
-from comparisons import bodies
-from comparisons.case import Case, Floats, Source
-from comparisons.finite_elements import frictionless
+from calibration.comparisons import bodies
+from calibration.comparisons.case import Case, Floats, Source
+from calibration.comparisons.finite_elements import frictionless
 from jbeamshell import reference
 
 THROUGH = "Read through Brink 2015."

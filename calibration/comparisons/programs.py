@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 import jbeamshell as jb
-from comparisons.case import Case, Floats, Source
-from comparisons.closed_forms import cylinder, stuck_parts
-from comparisons.measured import recorded
+from calibration.comparisons.case import Case, Floats, Source
+from calibration.comparisons.closed_forms import cylinder, stuck_parts
+from calibration.comparisons.measured import recorded
 from jbeamshell import laws, reference
 
 CONTACT = Source(

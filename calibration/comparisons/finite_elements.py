@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 import jbeamshell as jb
-from comparisons.case import Case, Floats, Source
+from calibration.comparisons.case import Case, Floats, Source
 from jbeamshell.measured.example import data_folder
 
 OWN = Source(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import jbeamshell as jb
-from comparisons.case import Floats
+from calibration.comparisons.case import Floats
 
 FRICTION = 0.3  # of the cylinders
 NODES = 40  # of a layer, besides its clamped one
