@@ -317,7 +317,7 @@ class TestMoments:
         assert f"{float(history.peak_displacement):.6g}  [rad]" in str(history)
         joint = Joint.of(moments(0.3))
         assert np.isinf(joint.capacity)
-        assert float(joint.dissipation(joint.displacement[-1])) == pytest.approx(
+        assert float(joint.dissipation(joint.displacements[-1])) == pytest.approx(
             float(jb.solve(moments(0.3)).dissipation), rel=0.02
         )
 
