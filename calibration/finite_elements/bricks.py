@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import subprocess
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -17,7 +18,7 @@ from jbeamshell.contact_line.stiffness_model import StiffnessModel
 MODULUS, POISSON = 210e3, 0.3
 STEEL = [(MODULUS, POISSON)]
 SOFTNESS = 0.3 / MODULUS  # of the pairs, displacement per stress
-SMALLEST_PART = 1e-3  # of a level, below which CalculiX gives up
+SMALLEST_PART = 1e-7  # of a level, below which CalculiX gives up
 TIGHTENED = 8  # steps of the pressing, as `solve_faces` takes
 TENSION = 1e-3  # stress that CalculiX lets an open pair carry
 
@@ -102,6 +103,12 @@ def run(deck: str, folder: Path, job: str, program: str | None = None) -> str:
     subprocess.run([find_program(program), job], cwd=folder, check=True, capture_output=True)
     printed = folder / f"{job}.dat"
     return printed.read_text(encoding="ascii") if printed.exists() else ""
+
+
+def seconds_of_programs() -> float:
+    """Seconds of the processor that programs run from here have used."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def contact(friction: float, above: Iterable[int], below: Iterable[int]) -> str:
