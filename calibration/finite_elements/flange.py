@@ -225,7 +225,7 @@ def main(lap: tuple[int, int] = (18, 8), layers: int = 2, steps_per_half_cycle: 
         print(f"  {key.replace('_', ' ')}: here {value:.6g}, CalculiX {there:.6g}{off}")
     times = found["seconds_calculix"], found["seconds_here"]
     print(f"  seconds of the processor: CalculiX {times[0]:.1f}, here {times[1]:.3f}")
-    record = {"provenance": provenance(), "calculix": version(find_program()), "load": LOAD}
+    record = {"provenance": provenance(), "program": version(find_program()), "load": LOAD}
     RECORD.write_text(json.dumps(record | found, indent=1) + "\n", encoding="utf-8")
 
 
