@@ -77,7 +77,7 @@ class Flange(NamedTuple):
     pull: np.ndarray
 
 
-def flange(lap: tuple[int, int] = (18, 8), layers: int = 2) -> Flange:
+def flange(lap: tuple[int, int], layers: int) -> Flange:
     """Flange of ``lap`` bricks along and across the lap, and ``layers`` through a plate."""
     beyond = round(lap[0] * FREE / LAP)
     counts, sizes = (lap[0] + beyond, lap[1], layers), (LAP * (1 + beyond / lap[0]), WIDTH, THICK)
@@ -167,7 +167,7 @@ def gaps_there(made: Flange, text: str) -> np.ndarray:
     return above - below
 
 
-def compare(lap: tuple[int, int], layers: int = 2, steps_per_half_cycle: int = 16) -> dict:
+def compare(lap: tuple[int, int], layers: int, steps_per_half_cycle: int) -> dict[str, Any]:
     """Figures of the last cycle here and by CalculiX, and seconds of the processor."""
     made = flange(lap, layers)
     options = LOAD | {
@@ -214,7 +214,7 @@ def compare(lap: tuple[int, int], layers: int = 2, steps_per_half_cycle: int = 1
     return found
 
 
-def main(lap: tuple[int, int] = (18, 8), layers: int = 2, steps_per_half_cycle: int = 16) -> None:
+def main(lap: tuple[int, int] = (18, 8), layers: int = 1, steps_per_half_cycle: int = 8) -> None:
     """Compare, print and record."""
     jax.config.update("jax_enable_x64", True)
     found = compare(lap, layers, steps_per_half_cycle)
