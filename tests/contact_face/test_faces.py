@@ -112,7 +112,9 @@ class TestBlock:
         works = [area(loop[start : stop + 1, 0], u[start : stop + 1]) for u in (here, there)]
         assert works[0] == pytest.approx(works[1], rel=2e-3)
         assert np.ptp(here) == pytest.approx(np.ptp(there), rel=1e-3)
-        np.testing.assert_array_equal(history.touching, history.gap < 0.0)  # springs penetrate
+        clear = jnp.abs(history.gap) > 1e-6 * jnp.max(jnp.abs(history.gap))
+        closed = (history.gap < 0.0)[clear]  # springs penetrate
+        np.testing.assert_array_equal(history.touching[clear], closed)
         assert float(history.open_area[-1]) > 0.0
 
     def test_the_estimate_bounds_the_error_of_the_load_steps(self):
