@@ -100,17 +100,18 @@ def _stores(folder):
     """Block of a sweep, and the state of a fit."""
     Store(folder, "a sweep").save(0, BLOCK)
     random = np.random.default_rng(0)
-    runs = _runs(folder / "fit.state")
+    runs = saved_runs(folder / "fit.state")
     runs.read()
     for _ in range(4):
         numbers = random.random(4), random.random((4, 2)), random.random(4)
         runs.append([(random.random(2), Evaluation(*numbers, True))])
 
 
-def _runs(path):
+def saved_runs(path, **settings):
+    """State of a fit of two numbers."""
     experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), models=(), observations=())
     space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
-    return SavedRuns(path, experiment, space, Newton())
+    return SavedRuns(path, experiment, space, Newton(**settings))
 
 
 def _bodies(folder):
@@ -209,7 +210,7 @@ KINDS = (
 
 
 def _state(path):
-    runs = _runs(path).read()
+    runs = saved_runs(path).read()
     if len(runs) < 4:
         raise jb.InputError("a run is left out")
     return [array for values, run in runs for array in (values, *run)]

@@ -83,11 +83,6 @@ class TestForcedResponse:
         assert over.amplitude[-1] == pytest.approx(response.amplitude[20], rel=1e-9)
         assert np.all(np.diff(over.level) > 0.0)
 
-    def test_it_is_drawn(self, response):
-        left, right = response.plot()
-        assert left.get_xlabel().startswith("frequency")
-        assert len(right.get_lines()) == 4
-
 
 class TestNonlinearMode:
     def test_its_damping_is_the_energy_that_the_joint_loses(self, mode):

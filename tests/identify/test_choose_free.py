@@ -31,10 +31,7 @@ def sliding(reach):
 
 
 def root():
-    """Closed loop beyond gross slip of a bar that slides from its end."""
-    way = np.clip((1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, 201))) / 0.4, 0.0, None)
-    down = 7.0 - 14.0 * np.sqrt(np.minimum(way[0] - way[:101], 1.0))
-    return make_loop(np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0))._replace(units=SI)
+    return make_loop(*rig.sliding_bar())._replace(units=SI)
 
 
 def in_si(amplitude=1.3):
@@ -65,7 +62,10 @@ def test_what_is_given_is_not_fitted():
 
 def test_the_numbers_of_a_whole_scene_are_starts():
     assert chosen([in_si()], known=jb.Scene()) == [MU, ETA]
-    assert chosen([root()], known=jb.Scene()) == [MU, STIFF]
+    assert chosen([root()], known=jb.Scene()) == [
+        MU,
+        STIFF,
+    ]
     sticky = jb.Scene().replace({SLIDERS: 1e-3})
     assert chosen([sliding(0.3)], known=sticky) == [MU, SLIDERS]
     x = np.linspace(0.0, 2.0, 9)

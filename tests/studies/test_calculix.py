@@ -12,7 +12,6 @@ import pytest
 import toy
 
 import jbeamshell as jb
-from calibration.finite_elements import __main__ as command
 from calibration.finite_elements import deck, histories, lap, mesh, program, results, solve
 from jbeamshell.scene import library, load_path
 from jbeamshell.scene.keys import ENTRIES
@@ -385,12 +384,6 @@ def test_an_interrupted_run_stops_calculix(giving_up, monkeypatch, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         program.run("", 1, str(giving_up), tmp_path)
     assert started[0].returncode == -9
-
-
-def test_the_command_line_says_what_is_wrong(capsys, monkeypatch):
-    monkeypatch.setenv("CCX", "no-such-ccx")
-    assert command.main(["bimaterial"]) == 2
-    assert "strip.layers" in capsys.readouterr().err
 
 
 # --- real runs ------------------------------------------------------------------------------------

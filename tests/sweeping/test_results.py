@@ -56,13 +56,6 @@ def test_a_grid_has_a_dimension_for_every_key():
     assert "amplitude_over_height" not in moved.coords
 
 
-def test_pairs_are_a_set_of_lanes():
-    found = made_up(paired=True)
-    assert found["dissipation"].dims == ("lane",)
-    assert found["strip.height_ratio"].dims == ("lane",)
-    assert dict(found.sizes) == {"lane": 2}
-
-
 @pytest.mark.parametrize("paired", [False, True])
 def test_a_netcdf_file_holds_all_of_it(paired, tmp_path):
     swept = made_up(paired)
