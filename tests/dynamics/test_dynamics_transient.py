@@ -189,13 +189,7 @@ class TestAttachedMasses:
         assert float(motion.damping_work[-1]) > 0.0
 
 
-@pytest.mark.parametrize(
-    ("method", "options"),
-    [
-        ("bosh3", {}),
-        ("kvaerno3", {"tolerance": 1e-6}),
-    ],
-)
+@pytest.mark.parametrize(("method", "options"), [("bosh3", {}), ("kvaerno3", {"tolerance": 1e-6})])
 @pytest.mark.slow
 def test_other_solvers_find_the_same_motion(method, options):
     strip = scene(model__nodes=11, contact__smoothing=16.0, contact__stick_stiffness=50.0)

@@ -62,10 +62,7 @@ def test_what_is_given_is_not_fitted():
 
 def test_the_numbers_of_a_whole_scene_are_starts():
     assert chosen([in_si()], known=jb.Scene()) == [MU, ETA]
-    assert chosen([root()], known=jb.Scene()) == [
-        MU,
-        STIFF,
-    ]
+    assert chosen([root()], known=jb.Scene()) == [MU, STIFF]
     sticky = jb.Scene().replace({SLIDERS: 1e-3})
     assert chosen([sliding(0.3)], known=sticky) == [MU, SLIDERS]
     x = np.linspace(0.0, 2.0, 9)
@@ -96,13 +93,3 @@ def test_a_contact_that_slides_forgets_its_zero(tmp_path, centre, middle):
     (taken,) = plan.specimens[0].measurements
     found = 0.5 * (np.max(taken.displacement) + np.min(taken.displacement))
     assert found == pytest.approx(middle, abs=1e-9)
-
-
-@pytest.mark.slow
-def test_a_planted_slider_is_found_from_the_file_alone():
-    fit = jb.fit(sliding(0.3))
-    scene = fit.scene
-    gross = float(scene.contact.friction * scene.contact.pressure * scene.strip.length)
-    assert gross == pytest.approx(7.0, rel=0.005)
-    assert fit.describes
-    assert fit.misfit < 0.02

@@ -19,7 +19,6 @@ from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import search_space
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
-from jbeamshell.measured.example import example_loops
 from jbeamshell.measured.loops import Loop, make_loop
 
 MU, ETA, KAPPA = KEYS
@@ -162,13 +161,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
 
     def fit(**options):
         free = [Parameter(KAPPA, low=0.1, high=2.0), MU, ETA]
-        return identify.fit(
-            readings(1e-3),
-            scene(),
-            free,
-            max_iterations=90,
-            **options,
-        )
+        return identify.fit(readings(1e-3), scene(), free, max_iterations=90, **options)
 
     whole = fit()
     everything, runs[:] = len(runs), []
@@ -301,16 +294,6 @@ def planted():
     return jb.solve(start.replace({MU: 0.27, ETA: 0.13}), throw=False), start
 
 
-@pytest.mark.slow
-def test_planted_parameters_come_back_from_load_steps():
-    truth = STRIP.replace(MODEL)
-    history, start = jb.solve(truth), truth.replace({MU: 0.13, ETA: 0.09})
-    fit = identify.fit(make_loop(*history.loop), start, FREE)
-    np.testing.assert_allclose(values_of(fit), [0.1, 0.1126], rtol=1e-5)
-    assert fit.misfit < 1e-6
-    assert fit.model_runs < 12
-
-
 def test_planted_parameters_come_back(planted, tmp_path):
     """The sliders of a fit are as rigid as those of the run."""
     history, start = planted
@@ -427,27 +410,6 @@ def test_planted_parameters_come_back_where_pairs_of_nodes_are_open():
         loops.append(make_loop(*history.loop))
     fit = identify.fit(loops, start, list(planted), starts=1)
     assert fit.values == pytest.approx(planted, rel=1e-4)
-
-
-@pytest.mark.slow
-def test_finite_element_loops_are_recovered_with_small_bias():
-    """True values mu = 0.1, eta = 0.1126; what remains is the model's error, not noise."""
-    start = STRIP.replace(
-        MODEL | {"model.nodes": 81, "contact.smoothing": "sharp", MU: 0.15, ETA: 0.2}
-    )
-    fit = identify.fit(example_loops(), start, FREE)
-    problem, space = fit.problem, fit.uncertainty.space
-    theirs = scipy.optimize.least_squares(
-        lambda point: problem(point).residual,
-        fit.uncertainty.point + 0.02,
-        jac=lambda point: problem(point).jacobian,
-        xtol=1e-12,
-        ftol=1e-12,
-    )
-    np.testing.assert_allclose(space.values(theirs.x), list(fit.values.values()), rtol=1e-6)
-    assert fit.values[MU] == pytest.approx(0.1, rel=0.01)
-    assert fit.values[ETA] == pytest.approx(0.1126, rel=0.03)
-    assert fit.misfit < 0.01
 
 
 def test_what_a_scene_cannot_answer(planted):

@@ -165,10 +165,7 @@ def test_what_the_data_leave_open_is_said_in_words():
 
 def test_a_value_at_its_bound_has_no_error():
     fit = identify.fit(
-        readings(NOISE, known=True),
-        TWO,
-        [Parameter(MU, low=0.12, high=0.5), ETA],
-        starts=1,
+        readings(NOISE, known=True), TWO, [Parameter(MU, low=0.12, high=0.5), ETA], starts=1
     )
     assert fit.values[MU] == pytest.approx(0.12, rel=1e-3)
     assert np.isnan(fit.errors[MU])

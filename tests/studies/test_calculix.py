@@ -68,29 +68,6 @@ def test_elements_fill_the_strip_and_run_anticlockwise(elements):
         np.testing.assert_allclose(middles, halfway, atol=1e-12)
 
 
-def test_elements_are_small_at_the_loaded_end_and_at_steps_of_the_pressure():
-    half_height = 0.1126
-    even = np.diff(mesh.make_mesh(STRIP).columns)
-    assert even[-1] < half_height / 7.0
-    assert np.all(even[1:] < even[:-1] * 1.001)
-    stepped = mesh.make_mesh(STRIP.replace({"contact.pressure": STEPPED}))
-    at = np.searchsorted(stepped.columns, 1.5)
-    sizes = np.diff(stepped.columns)
-    assert max(sizes[at - 2 : at + 1]) < half_height / 5.0
-    assert max(sizes) > half_height / 2.0
-    finer = mesh.make_mesh(STRIP, refinement=2.0)
-    assert finer.columns.size == pytest.approx(2 * even.size, abs=2)
-
-
-def test_the_base_has_a_node_under_every_node_and_one_beyond_each_end():
-    made = mesh.make_mesh(STRIP)
-    np.testing.assert_array_equal(made.base_x[1:-1], made.x)
-    assert made.base_x[0] < 0.0
-    assert made.base_x[-1] > 2.0
-    assert made.base.min() == made.number.max() + 1
-    assert np.sum(made.tributary) == pytest.approx(2.0)
-
-
 @pytest.mark.parametrize("elements", ["linear", "quadratic"])
 def test_a_member_goes_on_from_a_twin_of_its_last_column(elements):
     made = mesh.make_mesh(STRIP.replace({"load.entry": "member"}), elements)
@@ -360,16 +337,6 @@ def test_an_early_end_says_where_why_and_keeps_the_files(giving_up, tmp_path):
         history = solve(scene, program=giving_up, folder=folder, refinement=0.3, throw=False)
     assert history.status.tolist() == [1, *[3] * 10]
     assert np.all(np.isnan(history.displacement))
-
-
-def test_temporary_files_stay_only_after_a_failure(giving_up, monkeypatch, tmp_path):
-    monkeypatch.setattr(program.tempfile, "tempdir", str(tmp_path))
-    outcome = program.run("", 1, str(giving_up))
-    assert outcome.folder.exists()
-    giving_up.write_text("#!/bin/sh\necho ' Job finished'\n")
-    outcome = program.run("", 1, str(giving_up))
-    assert outcome.finished
-    assert not outcome.folder.exists()
 
 
 def test_an_interrupted_run_stops_calculix(giving_up, monkeypatch, tmp_path):

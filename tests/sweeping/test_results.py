@@ -12,10 +12,7 @@ from jbeamshell.sweeping import run
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 from jbeamshell.sweeping.results import dataset, write_csv
 
-AXES = {
-    "load.amplitude": np.array([0.2, 0.8, 1.4]),
-    "strip.height_ratio": np.array([0.05, 0.2]),
-}
+AXES = {"load.amplitude": np.array([0.2, 0.8, 1.4]), "strip.height_ratio": np.array([0.05, 0.2])}
 STATUS = np.array([[0, 0], [0, Outcome.MAX_ITERATIONS], [Outcome.OUTSIDE, Outcome.UNDEFINED]])
 
 
