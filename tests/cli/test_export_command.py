@@ -18,7 +18,7 @@ def test_it_writes_a_joint(cli, tmp_path):
     assert (code, out) == (0, "")
     assert err == f"wrote {path}\n"
     assert "u in mm, F in N" in path.read_text()
-    assert float(Joint.read(path).force[-1]) == pytest.approx(36.0)
+    assert float(Joint.read(path).forces[-1]) == pytest.approx(36.0)
 
 
 def test_doubts_are_one_line_each(capsys):

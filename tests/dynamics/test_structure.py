@@ -97,7 +97,7 @@ class TestJoint:
         section = "squeeze" if name == "lap" else name
         scene = scene.replace({"model.section": section, "model.nodes": 41})
         plain = Joint.of(scene, 0.8)
-        u = 0.93 * plain.displacement[-1]
+        u = 0.93 * plain.displacements[-1]
 
         @jax.jit
         @jax.value_and_grad
