@@ -8,7 +8,7 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from jbeamshell import dynamics, identify
+from jbeamshell import dynamics, identify, plotting
 from jbeamshell.dynamics.release import let_go
 
 LINEAR = {"model.kinematics": "linear", "model.nodes": 21, "contact.normal": "held"}
@@ -79,6 +79,23 @@ class TestRingDown:
         start = study.motion.scene.replace({"contact.friction": 0.15, "load.cycles": 1})
         fit = identify.fit(curves, start, ["contact.friction"])
         assert fit.scene.contact.friction == pytest.approx(0.1, rel=0.05)
+
+    @pytest.mark.slow
+    def test_its_curves_are_energy_and_stiffness(self, study):
+        loss, stiffness = study.found.curves(study.payload)
+        predicted = study.predicted
+        at = loss.amplitude / stiffness.stiffness * np.sqrt(study.payload)
+        mean = np.interp(at, predicted.amplitude, predicted.omega) ** 2 * study.payload
+        assert np.allclose(stiffness.stiffness, mean, rtol=0.03)
+        energy = np.interp(at, predicted.amplitude, predicted.dissipation)
+        assert np.median(np.abs(loss.dissipation / energy - 1.0)) < 0.1
+
+    @pytest.mark.slow
+    def test_its_figure_has_four_charts(self, study):
+        sheet = plotting.ring_down_sheet(study)
+        assert len(sheet.axes) == 4
+        assert plotting.spectrogram(study.motion).get_ylabel().startswith("frequency")
+        plotting.close(sheet)
 
 
 @pytest.mark.slow
@@ -189,7 +206,13 @@ class TestAttachedMasses:
         assert float(motion.damping_work[-1]) > 0.0
 
 
-@pytest.mark.parametrize(("method", "options"), [("bosh3", {}), ("kvaerno3", {"tolerance": 1e-6})])
+@pytest.mark.parametrize(
+    ("method", "options"),
+    [
+        ("bosh3", {}),
+        ("kvaerno3", {"tolerance": 1e-6}),
+    ],
+)
 @pytest.mark.slow
 def test_other_solvers_find_the_same_motion(method, options):
     strip = scene(model__nodes=11, contact__smoothing=16.0, contact__stick_stiffness=50.0)

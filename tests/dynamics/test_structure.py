@@ -97,7 +97,7 @@ class TestJoint:
         section = "squeeze" if name == "lap" else name
         scene = scene.replace({"model.section": section, "model.nodes": 41})
         plain = Joint.of(scene, 0.8)
-        u = 0.93 * plain.displacements[-1]
+        u = 0.93 * plain.displacement[-1]
 
         @jax.jit
         @jax.value_and_grad
@@ -219,6 +219,13 @@ class TestModes:
         mode = dynamics.nonlinear_mode(structure, small * np.geomspace(1.0, 20.0, 5))
         off = curve.damping[-1] / mode.damping[-1] - 1.0
         assert 0.02 < abs(off) < abs(curve.damping_error[-1])
+
+    def test_results_print_few_lines(self):
+        curve = modal_curve(chain(), [0.01, 0.02])
+        for found in (JOINT, curve):
+            assert str(found).count("\n") < 8
+        assert str(JOINT).startswith("joint of 40 sliders")
+        assert curve.plot()[0].get_xlabel().startswith("modal displacement")
 
     @pytest.mark.doubtful("damping may be off")
     def test_one_mass_is_the_joint_itself(self):
@@ -346,6 +353,13 @@ class TestRingDown:
         assert np.allclose(found.damping[inner], 0.01, rtol=0.05)
         envelope = np.exp(-2.0 * np.pi * 0.01 * found.time)
         assert np.allclose(found.amplitude[inner], envelope[inner], rtol=0.02)
+
+    def test_damping_that_grows_with_amplitude(self):
+        """An amplitude of 1/(1 + c t) decreases by c A^2 per time, so zeta grows with A."""
+        size = 1.0 / (1.0 + 0.1 * self.TIME)
+        found = dynamics.ring_down(self.TIME, size * np.sin(2.0 * np.pi * self.TIME))
+        expected = 0.1 * found.amplitude / (2.0 * np.pi)
+        assert np.allclose(found.damping, expected, rtol=0.02)
 
 
 def many(diagonal):

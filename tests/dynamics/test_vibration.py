@@ -70,11 +70,23 @@ class TestForcedResponse:
         lost = np.pi * 0.02 * omega * np.sum(harmonic**2 * np.abs(x) ** 2, axis=(0, 2))
         np.testing.assert_allclose(supplied, lost + response.dissipation, rtol=1e-9)
 
+    @pytest.mark.slow
+    def test_given_frequencies_lie_on_the_curve(self, response):
+        pick = [0, 20, -1]
+        found = dynamics.steady_response(HELD, FORCE, response.frequency[pick], **SETTING)
+        np.testing.assert_allclose(found.amplitude, response.amplitude[pick], rtol=1e-9)
+        np.testing.assert_allclose(found.phase, response.phase[pick], rtol=1e-8)
+
     def test_a_growing_force_ends_on_the_curve(self, response):
         frequency = float(response.frequency[20])
         over = dynamics.level_response(HELD, FORCE, frequency, (0.1, 1.0), **SETTING)
         assert over.amplitude[-1] == pytest.approx(response.amplitude[20], rel=1e-9)
         assert np.all(np.diff(over.level) > 0.0)
+
+    def test_it_is_drawn(self, response):
+        left, right = response.plot()
+        assert left.get_xlabel().startswith("frequency")
+        assert len(right.get_lines()) == 4
 
 
 class TestNonlinearMode:

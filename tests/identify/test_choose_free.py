@@ -31,7 +31,10 @@ def sliding(reach):
 
 
 def root():
-    return make_loop(*rig.sliding_bar())._replace(units=SI)
+    """Closed loop beyond gross slip of a bar that slides from its end."""
+    way = np.clip((1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, 201))) / 0.4, 0.0, None)
+    down = 7.0 - 14.0 * np.sqrt(np.minimum(way[0] - way[:101], 1.0))
+    return make_loop(np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0))._replace(units=SI)
 
 
 def in_si(amplitude=1.3):
@@ -93,3 +96,13 @@ def test_a_contact_that_slides_forgets_its_zero(tmp_path, centre, middle):
     (taken,) = plan.specimens[0].measurements
     found = 0.5 * (np.max(taken.displacement) + np.min(taken.displacement))
     assert found == pytest.approx(middle, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_a_planted_slider_is_found_from_the_file_alone():
+    fit = jb.fit(sliding(0.3))
+    scene = fit.scene
+    gross = float(scene.contact.friction * scene.contact.pressure * scene.strip.length)
+    assert gross == pytest.approx(7.0, rel=0.005)
+    assert fit.describes
+    assert fit.misfit < 0.02

@@ -19,6 +19,7 @@ from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import search_space
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.example import example_loops
 from jbeamshell.measured.loops import Loop, make_loop
 
 MU, ETA, KAPPA = KEYS
@@ -161,7 +162,13 @@ def test_an_interrupted_fit_goes_on_where_it_was(tmp_path, monkeypatch):
 
     def fit(**options):
         free = [Parameter(KAPPA, low=0.1, high=2.0), MU, ETA]
-        return identify.fit(readings(1e-3), scene(), free, max_iterations=90, **options)
+        return identify.fit(
+            readings(1e-3),
+            scene(),
+            free,
+            max_iterations=90,
+            **options,
+        )
 
     whole = fit()
     everything, runs[:] = len(runs), []
@@ -191,6 +198,18 @@ def test_a_state_cut_off_while_it_was_written(tmp_path):
     text = state.read_text()
     state.write_text(text[:-100])
     assert identify.fit(readings(), scene(), KEYS, save=state).values == whole.values
+    assert state.read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("", "is no state"), ("{}\n", "is no state"), ("[1]\n", "is no state"), ("\n\n", "no state")],
+)
+def test_files_that_are_no_state(text, message, tmp_path):
+    state = tmp_path / "fit.state"
+    state.write_text(text)
+    with pytest.raises(jb.InputError, match=rf"save .*fit.state: {message}|is no state"):
+        identify.fit(readings(), scene(), KEYS, save=state)
     assert state.read_text() == text
 
 
@@ -238,11 +257,6 @@ def test_a_state_that_can_no_longer_be_written(tmp_path):
         ({"free": Parameter(MU, start=60.0)}, "no equilibrium at the start values"),
         ({"starts": 0}, "starts = 0: must be a whole number"),
         ({"starts": 1.5}, "starts = 1.5"),
-        ({"starts": True}, "starts = True: must be a whole number, 1 to 1000000"),
-        ({"points": 3}, "points = 3: must be a whole number, 8 to 1000000"),
-        ({"max_iterations": "a"}, "max_iterations = 'a': must be a whole number, 1 to 1000000"),
-        ({"tolerance": -1.0}, r"tolerance = -1\.0: give a positive number, such as 1e-7"),
-        ({"noise": "a"}, "noise = 'a': give a positive part of the range"),
         ({"noise": -0.01}, "noise = -0.01: give a positive part"),
         ({"weights": (1.0, 2.0)}, r"weights = \[1.0, 2.0\]: give one positive number for each"),
         ({"weights": (0.0,)}, r"weights = \[0.0\]: give one positive"),
@@ -292,6 +306,16 @@ def planted():
     coarse = {"model.section": "squeeze", "model.nodes": 17}
     start = jb.Scene().replace(coarse | {"load.amplitude": 0.6})
     return jb.solve(start.replace({MU: 0.27, ETA: 0.13}), throw=False), start
+
+
+@pytest.mark.slow
+def test_planted_parameters_come_back_from_load_steps():
+    truth = STRIP.replace(MODEL)
+    history, start = jb.solve(truth), truth.replace({MU: 0.13, ETA: 0.09})
+    fit = identify.fit(make_loop(*history.loop), start, FREE)
+    np.testing.assert_allclose(values_of(fit), [0.1, 0.1126], rtol=1e-5)
+    assert fit.misfit < 1e-6
+    assert fit.model_runs < 12
 
 
 def test_planted_parameters_come_back(planted, tmp_path):
@@ -412,6 +436,27 @@ def test_planted_parameters_come_back_where_pairs_of_nodes_are_open():
     assert fit.values == pytest.approx(planted, rel=1e-4)
 
 
+@pytest.mark.slow
+def test_finite_element_loops_are_recovered_with_small_bias():
+    """True values mu = 0.1, eta = 0.1126; what remains is the model's error, not noise."""
+    start = STRIP.replace(
+        MODEL | {"model.nodes": 81, "contact.smoothing": "sharp", MU: 0.15, ETA: 0.2}
+    )
+    fit = identify.fit(example_loops(), start, FREE)
+    problem, space = fit.problem, fit.uncertainty.space
+    theirs = scipy.optimize.least_squares(
+        lambda point: problem(point).residual,
+        fit.uncertainty.point + 0.02,
+        jac=lambda point: problem(point).jacobian,
+        xtol=1e-12,
+        ftol=1e-12,
+    )
+    np.testing.assert_allclose(space.values(theirs.x), list(fit.values.values()), rtol=1e-6)
+    assert fit.values[MU] == pytest.approx(0.1, rel=0.01)
+    assert fit.values[ETA] == pytest.approx(0.1126, rel=0.03)
+    assert fit.misfit < 0.01
+
+
 def test_what_a_scene_cannot_answer(planted):
     history, start = planted
     force, displacement = history.loop
@@ -421,6 +466,21 @@ def test_what_a_scene_cannot_answer(planted):
     noisy = Loop(np.asarray(force), np.asarray(displacement), "rig", noise=1.0)
     with pytest.raises(jb.InputError, match="rig: noise = 1 is more than the range of disp"):
         identify.fit(noisy, start, FREE)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"points": 3}, "points = 3: must be a whole number, 8 to 1000000"),
+        ({"max_iterations": "a"}, "max_iterations = 'a': must be a whole number, 1 to 1000000"),
+        ({"starts": True}, "starts = True: must be a whole number, 1 to 1000000"),
+        ({"tolerance": -1.0}, r"tolerance = -1\.0: give a positive number, such as 1e-7"),
+        ({"noise": "a"}, "noise = 'a': give a positive part of the range"),
+    ],
+)
+def test_options_that_make_no_sense(options, told):
+    with pytest.raises(jb.InputError, match=told):
+        identify.fit(readings(), scene(), KEYS, **options)
 
 
 def test_a_profile_says_that_the_others_did_not_converge():

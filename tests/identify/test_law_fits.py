@@ -8,7 +8,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.identify.driving import feature_doubts
 from jbeamshell.identify.models import LawModel, StripModel
 from jbeamshell.identify.specimens import Specimen, inspected
-from jbeamshell.measured.curves import SqueezeCurve
+from jbeamshell.measured.curves import DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene.library import standard
 
@@ -49,6 +49,31 @@ def test_the_four_parameters_of_iwan_are_found_with_their_intervals():
     assert float(fit.law.dissipation(0.01)) == pytest.approx(
         float(PLANTED["iwan4"].dissipation(0.01)), rel=0.02
     )
+
+
+@pytest.mark.slow
+def test_curves_over_the_force_amplitude_tell_a_law():
+    law = laws.Mindlin(2.0, 50.0)
+    force = np.linspace(0.2, 1.9, 9)
+    size = np.asarray(law.displacement(force))
+    curves = [
+        DissipationCurve(force, np.asarray(law.dissipation(size))),
+        StiffnessCurve(force, np.asarray(law.secant_stiffness(size))),
+    ]
+    fit = identify.fit(curves, "mindlin", starts=1)
+    assert set(fit.controls) == {"force"}
+    assert fit.values["mindlin.slip_force"] == pytest.approx(2.0, rel=1e-6)
+    assert fit.values["mindlin.stiffness"] == pytest.approx(50.0, rel=1e-6)
+    power = identify.fit(curves[:1], "power-law", starts=1)
+    assert 3.0 < power.values["power-law.exponent"] < 4.0
+
+
+@pytest.mark.slow
+def test_a_model_that_cannot_follow_the_data_says_so():
+    data = loops(PLANTED["dahl"])
+    fit = identify.fit(data, "bar", starts=1)
+    assert not fit.describes
+    assert "this model does not describe these data" in fit.doubts[0]
 
 
 def test_asymmetry_and_memory_that_a_law_lacks_are_doubts():

@@ -97,35 +97,23 @@ def test_a_point_counts_with_the_length_it_stands_for():
 # --- what is refused ------------------------------------------------------------------------------
 
 
-REFUSED = [
-    (SqueezeCurve, (X[:5], STRESS[:5]), {}, r"squeeze: x has shape \(5,\): give 8 points or more"),
-    (SqueezeCurve, (X, STRESS[:-1]), {}, "11 and 10 points"),
-    (SqueezeCurve, (X[:, None], STRESS), {}, "x has shape"),
-    (SqueezeCurve, (np.where(X == 50.0, np.nan, X), STRESS), {}, "x is nan at point 6"),
-    (SqueezeCurve, (X, np.where(X == 50.0, np.inf, STRESS)), {}, "stress is inf at point 6"),
-    (SqueezeCurve, (X[::-1], STRESS), {}, "x goes from 55 to 54 at point 2: it must increase"),
-    (SqueezeCurve, (np.minimum(X, 54.0), STRESS), {}, "x goes from 54 to 54 at point 11"),
-    (SqueezeCurve, (X, np.full(11, -100.0)), {}, r"stress is constant \(-100\)"),
-    (SqueezeCurve, (X, -STRESS), {}, "compression is negative"),
-    (SqueezeCurve, (X, STRESS), {"noise": 0.0}, "squeeze: noise is 0 at point 1: give a positive"),
-    (SqueezeCurve, (X, STRESS), {"noise": [1.0, 2.0]}, r"\(2,\): give one number, or one for each"),
-    (SqueezeCurve, (X, STRESS), {"noise": np.where(X == 50.0, np.inf, 1.0)}, "inf at point 6"),
-    (SqueezeCurve, (X, STRESS), {"weight": 0.0}, "weight = 0.0: must be a positive number"),
-    (SqueezeCurve, (X, STRESS), {"weight": np.nan}, "weight = nan"),
-    (Backbone, ([0.0, 1.0], [0.0, 1.0]), {}, r"force has shape \(2,\): give 3 points or more"),
-    (Backbone, ([1.0, 2.0, 3.0], [1.0] * 3), {}, r"displacement is constant \(1\): no load"),
-    (DissipationCurve, ([], []), {}, r"amplitude has shape \(0,\): give 1 point or more"),
-    (DissipationCurve, ([1.0, 2.0], [1.0, 0.0]), {}, "dissipation is 0 at point 2: it must be"),
-    (StiffnessCurve, ([1.0, -2.0], [1.0, 1.0]), {}, "amplitude is -2 at point 2: it must be"),
-    (StiffnessCurve, ([1.0], [np.nan]), {}, "stiffness is nan at point 1"),
-    (StiffnessCurve, ([1.0, 2.0], [1.0]), {}, "amplitude and stiffness have 2 and 1 points"),
-]
-
-
-@pytest.mark.parametrize(("kind", "columns", "options", "message"), REFUSED)
-def test_curves_that_are_refused(kind, columns, options, message):
+@pytest.mark.parametrize(
+    ("x", "stress", "message"),
+    [
+        (X[:5], STRESS[:5], r"squeeze: x has shape \(5,\): give 8 points or more"),
+        (X, STRESS[:-1], "11 and 10 points"),
+        (X[:, None], STRESS, "x has shape"),
+        (np.where(X == 50.0, np.nan, X), STRESS, "x is nan at point 6"),
+        (X, np.where(X == 50.0, np.inf, STRESS), "stress is inf at point 6"),
+        (X[::-1], STRESS, "x goes from 55 to 54 at point 2: it must increase"),
+        (np.minimum(X, 54.0), STRESS, "x goes from 54 to 54 at point 11"),
+        (X, np.full(11, -100.0), r"stress is constant \(-100\)"),
+        (X, -STRESS, "compression is negative"),
+    ],
+)
+def test_curves_that_are_refused(x, stress, message):
     with pytest.raises(jb.InputError, match=message):
-        kind(*columns, **options)
+        SqueezeCurve(x, stress)
 
 
 def test_curves_that_a_scene_cannot_answer():
@@ -135,6 +123,45 @@ def test_curves_that_a_scene_cannot_answer():
     with pytest.raises(jb.InputError, match=r"section = shell has no squeeze stress: take squee"):
         observe(SqueezeCurve(X, STRESS), scene.replace({"model.section": "shell"}))
     observe(SqueezeCurve(X + 45.00001, STRESS), scene)  # rounded by the table it came from
+
+
+def test_what_is_no_measurement():
+    with pytest.raises(jb.InputError, match="a ndarray is no measurement: give a Loop, a Squeeze"):
+        identify.fit(X, STRIP, ("contact.friction",))
+    with pytest.raises(jb.InputError, match="no measurement given"):
+        identify.fit([], STRIP, ("contact.friction",))
+
+
+@pytest.mark.parametrize(
+    ("kind", "columns", "message"),
+    [
+        (Backbone, ([0.0, 1.0], [0.0, 1.0]), r"force has shape \(2,\): give 3 points or more"),
+        (Backbone, ([1.0, 2.0, 3.0], [1.0, 1.0, 1.0]), r"displacement is constant \(1\): no load"),
+        (DissipationCurve, ([], []), r"amplitude has shape \(0,\): give 1 point or more"),
+        (DissipationCurve, ([1.0, 2.0], [1.0, 0.0]), "dissipation is 0 at point 2: it must be"),
+        (StiffnessCurve, ([1.0, -2.0], [1.0, 1.0]), "amplitude is -2 at point 2: it must be"),
+        (StiffnessCurve, ([1.0], [np.nan]), "stiffness is nan at point 1"),
+        (StiffnessCurve, ([1.0, 2.0], [1.0]), "amplitude and stiffness have 2 and 1 points"),
+    ],
+)
+def test_further_curves_that_are_refused(kind, columns, message):
+    with pytest.raises(jb.InputError, match=message):
+        kind(*columns)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"noise": 0.0}, "squeeze: noise is 0 at point 1: give a positive"),
+        ({"noise": [1.0, 2.0]}, r"noise has shape \(2,\): give one number, or one for each"),
+        ({"noise": np.where(X == 50.0, np.inf, 1.0)}, "noise is inf at point 6"),
+        ({"weight": 0.0}, "weight = 0.0: must be a positive number"),
+        ({"weight": np.nan}, "weight = nan"),
+    ],
+)
+def test_noise_and_weights_that_are_refused(options, message):
+    with pytest.raises(jb.InputError, match=message):
+        SqueezeCurve(X, STRESS, **options)
 
 
 def test_noise_goes_with_the_part_of_a_curve():

@@ -143,7 +143,11 @@ def test_a_fit_by_statics_says_how_far_it_may_be_off():
 @pytest.mark.slow
 def test_a_strip_in_a_structure_is_recovered_with_honest_intervals():
     """Errors of 24 fits of three numbers each are as large as the fits say."""
-    truth = {"contact.friction": 0.12, "structure.stiffness": 1.1, "structure.damping_ratio": 2e-3}
+    truth = {
+        "contact.friction": 0.12,
+        "structure.stiffness": 1.1,
+        "structure.damping_ratio": 2e-3,
+    }
     scene = jb.Scene().replace({"model.section": "plane", "model.nodes": 17})
     stiffness = np.array([[1.0, -1.0], [-1.0, 1.5]]) * 1e5
     start = jointed(scene, np.diag([1.0, 0.3]), stiffness, point=1, damping_ratio=1e-3)

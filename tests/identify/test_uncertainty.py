@@ -163,9 +163,19 @@ def test_what_the_data_leave_open_is_said_in_words():
         exact.uncertainty.at_noise(0)
 
 
+def test_a_model_that_is_wrong_is_named():
+    data = readings(known=True, noise=1e-5)
+    bent = type(data)(X, np.asarray(data.y) + 0.01 * np.sin(9.0 * X), noise=1e-5)
+    fit = identify.fit(bent, scene(), KEYS)
+    assert any("times the measured noise unexplained" in warning for warning in fit.doubts)
+
+
 def test_a_value_at_its_bound_has_no_error():
     fit = identify.fit(
-        readings(NOISE, known=True), TWO, [Parameter(MU, low=0.12, high=0.5), ETA], starts=1
+        readings(NOISE, known=True),
+        TWO,
+        [Parameter(MU, low=0.12, high=0.5), ETA],
+        starts=1,
     )
     assert fit.values[MU] == pytest.approx(0.12, rel=1e-3)
     assert np.isnan(fit.errors[MU])

@@ -112,6 +112,24 @@ def test_the_bar_is_the_closed_bar():
     np.testing.assert_allclose(law.dissipation_at_force(force), expected, rtol=1e-12)
 
 
+@pytest.mark.slow
+def test_a_row_of_sliders_tends_to_the_bar_with_order_two():
+    bar = laws.Bar.of(3.4e4, 1.0, 2.0)
+    errors = []
+    for count in (8, 16, 32, 64):
+        row = laws.SeriesIwan.of_bar(3.4e4, 1.0, 2.0, count)
+        force = jnp.array([0.61, 1.234])
+        errors.append(
+            float(
+                jnp.max(
+                    jnp.abs(row.dissipation_at_force(force) / bar.dissipation_at_force(force) - 1.0)
+                )
+            )
+        )
+    assert errors[-1] < 2e-3
+    assert np.log2(errors[0] / errors[-1]) / 3.0 > 1.7
+
+
 def chain(springs, limits, path):
     """End displacements of a row of springs and sliders on a path of forces: all nodes, no rule.
 

@@ -79,13 +79,12 @@ def test_iwan4_dissipates_by_a_power_of_its_displacement(chi):
     assert float(small) == pytest.approx(float(expected), rel=1e-12)
 
 
-@pytest.mark.parametrize("name", MASING)
-def test_the_area_of_a_simulated_loop_is_the_closed_dissipation(name):
-    law, size = MASING[name], 0.031
+def test_the_area_of_a_simulated_loop_is_the_closed_dissipation():
+    size = 0.6 * float(LAW.phi_max)
     way = np.cos(np.pi * np.arange(401) / 200)
-    force = np.asarray(law.path_forces(size * np.append(np.linspace(0, 1, 9), way)))[-401:]
+    force = np.asarray(LAW.path_forces(size * np.append(np.linspace(0, 1, 9), way)))[-401:]
     area = np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(size * way))
-    assert area == pytest.approx(float(law.dissipation(size)), rel=1e-3)
+    assert area == pytest.approx(float(LAW.dissipation(size)), rel=1e-3)
 
 
 @pytest.mark.slow

@@ -299,6 +299,12 @@ def test_a_drift_that_turns_is_removed_cycle_by_cycle():
     np.testing.assert_allclose(area(loop), planted_area("force"), rtol=0.02)
 
 
+def test_a_drift_that_is_kept_is_told():
+    recording = recorded(driven([1.0] * 8, 200), "force", 0.01, drifts=(0.1, 0.0))
+    (loop,) = steady_loops(recording, "force")
+    assert any("remove it by --drift" in note for note in loop.notes)
+
+
 # --- bad recordings -----------------------------------------------------------------------------
 
 PULL = driven([1.0] * 2, 200)

@@ -153,6 +153,14 @@ def test_titles_in_four_languages_below_lines_of_a_test_rig(tmp_path, language, 
     assert got.mean_normal_force() == pytest.approx(8e3)
 
 
+def test_columns_between_blanks(tmp_path):
+    path = tmp_path / "rig.txt"
+    path.write_text(table_of(("t", "Load (kN)", "Stroke (mm)", "Fn (kN)"), "   "), "utf-8")
+    (got,) = read_recordings(path)
+    np.testing.assert_allclose(got.force, 1e3 * COLUMNS["force"])
+    np.testing.assert_allclose(got.displacement, 1e-3 * COLUMNS["displacement"])
+
+
 def test_a_rate_or_a_count_in_any_language_is_no_column(tmp_path):
     path = tmp_path / "rig.csv"
     path.write_text("Lastwechsel;Zyklus Last;Kraft [kN];Weg [mm]\n" + "1;2;3;4\n" * 9, "utf-8")

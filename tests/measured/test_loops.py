@@ -5,7 +5,8 @@ import pytest
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.example import EXAMPLE_AMPLITUDES, HEIGHT_RATIOS, example_loops
-from jbeamshell.measured.loops import Loop, make_loop
+from jbeamshell.measured.loops import Loop, driver_of, make_loop
+from jbeamshell.measured.recordings import FEWEST_POINTS
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 13)
 FORCE, DISPLACEMENT = 3.0 * np.cos(PHASE), 0.25 * np.cos(PHASE - 0.3)
@@ -26,6 +27,26 @@ def test_example_loops_that_do_not_exist():
         example_loops(0.2)
     with pytest.raises(InputError, match=r"amplitudes: there is no A = 0\.33; there are A = 0\.1,"):
         example_loops(amplitudes=(1.0, 0.33))
+
+
+def test_arrays_make_a_loop():
+    assert FEWEST_POINTS == 8
+    loop = make_loop(list(FORCE[:8]), tuple(DISPLACEMENT[:8]), "rig")
+    np.testing.assert_array_equal(loop.force, FORCE[:8])
+    assert (loop.label, loop.cycles, loop.dropped, loop.noise) == ("rig", 1, 0, None)
+    assert loop.standard_error is None
+
+
+def test_points_without_a_number_are_dropped_and_told():
+    loop = make_loop(np.where(np.isin(np.arange(13), (4, 6)), np.nan, FORCE), DISPLACEMENT, "rig")
+    np.testing.assert_array_equal(loop.displacement, np.delete(DISPLACEMENT, (4, 6)))
+    assert loop.dropped == 2
+    assert loop.notes == ("2 of 13 rows lack a number: left out",)
+
+
+def test_bad_arrays_are_refused():
+    with pytest.raises(InputError, match=r"rig: force is constant \(0\): no loop to fit"):
+        make_loop(np.zeros(13), DISPLACEMENT, "rig")
 
 
 def test_a_standard_error_is_that_of_a_mean():
@@ -67,6 +88,17 @@ def test_thinned_loops_keep_their_turns_and_ends(driver):
 def test_short_loops_are_not_thinned():
     loop = Loop(FORCE, DISPLACEMENT, "rig")
     assert loop.thinned(FORCE.size, "force") is loop
+
+
+def test_the_driver_is_the_smoother_column():
+    random = np.random.default_rng(1)
+    phase = np.linspace(0.0, 2.0 * np.pi, 200)
+    force, displacement = 3.0 * np.cos(phase), 0.25 * np.cos(phase - 0.3)
+    noise = 0.01 * random.standard_normal(phase.size)
+    assert driver_of([Loop(force, displacement, "")]) == "force"
+    assert driver_of([Loop(force, displacement + 0.5 * noise, "")]) == "force"
+    assert driver_of([Loop(force + 6.0 * noise, displacement, "")]) == "displacement"
+    assert driver_of(example_loops()) == "force"
 
 
 def test_a_centred_loop_has_lost_its_zeros_and_nothing_else():

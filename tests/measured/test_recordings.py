@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.recordings import read_recordings, recording_from_arrays
+from jbeamshell.measured.recordings import FEWEST_POINTS, read_recordings, recording_from_arrays
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 13)
 FORCE, DISPLACEMENT = 3.0 * np.cos(PHASE), 0.25 * np.cos(PHASE - 0.3)
@@ -236,6 +236,13 @@ def test_points_without_a_number_are_dropped_and_counted():
     np.testing.assert_array_equal(got.time, TIME[kept])
     assert got.dropped == 3
     assert got.notes == ("3 of 13 rows lack a number: left out",)
+
+
+def test_arrays_of_any_kind():
+    assert FEWEST_POINTS == 8
+    got = recording_from_arrays(list(FORCE[:8]), tuple(DISPLACEMENT[:8]), "rig")
+    np.testing.assert_array_equal(got.force, FORCE[:8])
+    assert (got.label, got.time, got.dropped, got.notes) == ("rig", None, 0, ())
 
 
 NAN = np.where(TIME < 7, np.nan, FORCE)

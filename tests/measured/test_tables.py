@@ -115,13 +115,18 @@ def test_every_dialect_reads_back_to_the_last_bit(
         np.testing.assert_allclose(got.time, values["time"][kept], rtol=1e-15)
 
 
+def test_a_measured_style_header(read):
+    rows = [["0.5", u, f, "-800"] for f, u in ROWS]
+    header = ["time_s", "displacement_m", "tangential_force_N", "normal_force_N"]
+    np.testing.assert_array_equal(columns(read(text(header, rows))), [FORCE, DISPLACEMENT])
+
+
 @pytest.mark.parametrize(
     "titles",
     [
         ("Load cell A", "LVDT displacement", "load step"),
         ("Load (N)", "Stroke (mm)", "Preload (N)"),
         ("Ft", "ux", "FN"),
-        ("tangential_force_N", "displacement_m", "normal_force_N"),
         ("Tangential force [N]", "Slip [mm]", "Clamping force [N]"),
         ("Force", "Extension", "Load rate"),
     ],
@@ -430,6 +435,15 @@ def test_bad_options_are_refused(read, options, told):
     with pytest.raises(InputError) as caught:
         read(text(), **options)
     assert told in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("missing.csv", "No such file"), (".", "Is a directory"), ("missing.mat", "No such file")],
+)
+def test_files_that_cannot_be_read(tmp_path, name, reason):
+    with pytest.raises(InputError, match=rf"{tmp_path}.*: cannot be read \({reason}"):
+        read_loops(tmp_path / name)
 
 
 def test_a_pipe_is_refused_and_does_not_block(tmp_path):

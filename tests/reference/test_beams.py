@@ -203,10 +203,26 @@ def test_stuck_rotation_does_not_overflow():
     np.testing.assert_allclose(jax.vmap(jax.grad(beta))(x), [0, 0, slope], rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("constants", "slope", "intercept"),
+    [("printed", 1.768, -0.0015), ("consistent", 2.693, -0.0047)],
+)
+def test_first_slip_force_fits_a_line(constants, slope, intercept):
+    force = reference.first_slip_force(FIGURE_3_11, constants=constants)
+    fitted = np.polyfit(FIGURE_3_11, np.asarray(force), 1)
+    assert abs(fitted[0] - slope) < 0.002
+    assert abs(fitted[1] - intercept) < 0.0003
+
+
 def test_printed_first_slip_is_the_printed_line():
     """Line of Brink 2015, eq. 3.65, within the deviation of the curve from it."""
     force = reference.first_slip_force(FIGURE_3_11, constants="printed")
     np.testing.assert_allclose(force, 1.767 * FIGURE_3_11 - 0.0013, atol=0.005)
+
+
+def test_consistent_first_slip_of_the_standard_strip():
+    expected = FIGURE_3_11 / (0.3542 * np.tanh(0.4723 * LENGTH / FIGURE_3_11) + 0.0223)
+    np.testing.assert_allclose(reference.first_slip_force(FIGURE_3_11), expected, rtol=2e-4)
 
 
 @pytest.mark.parametrize(("constants", "bending_share"), [("consistent", 1.0), ("printed", 1 / 16)])

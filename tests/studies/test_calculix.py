@@ -12,6 +12,7 @@ import pytest
 import toy
 
 import jbeamshell as jb
+from calibration.finite_elements import __main__ as command
 from calibration.finite_elements import deck, histories, lap, mesh, program, results, solve
 from jbeamshell.scene import library, load_path
 from jbeamshell.scene.keys import ENTRIES
@@ -66,6 +67,29 @@ def test_elements_fill_the_strip_and_run_anticlockwise(elements):
         corners, middles = points[made.elements[:, :4]], points[made.elements[:, 4:]]
         halfway = 0.5 * (corners + np.roll(corners, -1, axis=1))
         np.testing.assert_allclose(middles, halfway, atol=1e-12)
+
+
+def test_elements_are_small_at_the_loaded_end_and_at_steps_of_the_pressure():
+    half_height = 0.1126
+    even = np.diff(mesh.make_mesh(STRIP).columns)
+    assert even[-1] < half_height / 7.0
+    assert np.all(even[1:] < even[:-1] * 1.001)
+    stepped = mesh.make_mesh(STRIP.replace({"contact.pressure": STEPPED}))
+    at = np.searchsorted(stepped.columns, 1.5)
+    sizes = np.diff(stepped.columns)
+    assert max(sizes[at - 2 : at + 1]) < half_height / 5.0
+    assert max(sizes) > half_height / 2.0
+    finer = mesh.make_mesh(STRIP, refinement=2.0)
+    assert finer.columns.size == pytest.approx(2 * even.size, abs=2)
+
+
+def test_the_base_has_a_node_under_every_node_and_one_beyond_each_end():
+    made = mesh.make_mesh(STRIP)
+    np.testing.assert_array_equal(made.base_x[1:-1], made.x)
+    assert made.base_x[0] < 0.0
+    assert made.base_x[-1] > 2.0
+    assert made.base.min() == made.number.max() + 1
+    assert np.sum(made.tributary) == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("elements", ["linear", "quadratic"])
@@ -339,6 +363,16 @@ def test_an_early_end_says_where_why_and_keeps_the_files(giving_up, tmp_path):
     assert np.all(np.isnan(history.displacement))
 
 
+def test_temporary_files_stay_only_after_a_failure(giving_up, monkeypatch, tmp_path):
+    monkeypatch.setattr(program.tempfile, "tempdir", str(tmp_path))
+    outcome = program.run("", 1, str(giving_up))
+    assert outcome.folder.exists()
+    giving_up.write_text("#!/bin/sh\necho ' Job finished'\n")
+    outcome = program.run("", 1, str(giving_up))
+    assert outcome.finished
+    assert not outcome.folder.exists()
+
+
 def test_an_interrupted_run_stops_calculix(giving_up, monkeypatch, tmp_path):
     giving_up.write_text("#!/bin/sh\nexec sleep 60\n")
     started = []
@@ -351,6 +385,12 @@ def test_an_interrupted_run_stops_calculix(giving_up, monkeypatch, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         program.run("", 1, str(giving_up), tmp_path)
     assert started[0].returncode == -9
+
+
+def test_the_command_line_says_what_is_wrong(capsys, monkeypatch):
+    monkeypatch.setenv("CCX", "no-such-ccx")
+    assert command.main(["bimaterial"]) == 2
+    assert "strip.layers" in capsys.readouterr().err
 
 
 # --- real runs ------------------------------------------------------------------------------------

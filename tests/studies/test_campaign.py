@@ -6,6 +6,8 @@ import pytest
 
 from verification import campaign
 
+FIRST, FRESH = 22, 23  # seeds
+
 
 @pytest.fixture(scope="module")
 def rows():
@@ -21,6 +23,13 @@ def test_every_outcome_follows_from_the_figures(rows):
 def test_no_scene_is_silently_wrong(rows):
     silent = [row for row in rows if row["outcome"] == "wrong, silently"]
     assert silent == []
+
+
+def test_enough_scenes_are_recorded(rows):
+    found = Counter((row["seed"], row["kind"]) for row in rows)
+    assert {kind for _, kind in found} <= set(campaign.KINDS)
+    assert sum(count for (seed, _), count in found.items() if seed == FIRST) >= 3000
+    assert sum(count for (seed, _), count in found.items() if seed == FRESH) >= 300
 
 
 def test_few_right_runs_are_doubted(rows):
@@ -47,3 +56,9 @@ def test_a_row_of_the_record(rows, kind):
     assert found["outcome"] == row["outcome"]
     assert found["dissipation"] == pytest.approx(row["dissipation"], rel=1e-6)
     assert found["errors"] == pytest.approx(row["errors"], rel=1e-2, abs=1e-9)
+
+
+def test_an_error_over_nothing_is_whole():
+    assert campaign.off(1.0, 0.0) == 1.0
+    assert campaign.off(0.0, 0.0) == 0.0
+    assert campaign.off(1.1, 1.0) == pytest.approx(0.1)

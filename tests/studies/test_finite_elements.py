@@ -1,6 +1,7 @@
 """The model against plane-strain finite elements, without calibration."""
 
 import csv
+import json
 
 import jax
 import jax.numpy as jnp
@@ -98,6 +99,17 @@ def test_a_plain_fit_finds_the_friction_and_the_height_that_made_a_loop():
     keys = ("contact.friction", "strip.height_ratio")
     fit = jb.identify.fit(loop, jb.Scene().replace(start), keys, points=48)
     np.testing.assert_allclose([fit.values[key] for key in keys], [0.1, 0.2358], rtol=0.002)
+
+
+def test_the_record_of_fits_says_so_for_all_loops():
+    record = json.loads((data_folder().parent / "studies" / "fit_finite_elements.json").read_text())
+    plain = [own for loads in record["fits"]["plain call"].values() for own in loads.values()]
+    friction, height = np.abs([list(own["relative_bias"].values()) for own in plain]).T
+    assert len(plain) == 15
+    assert friction.max() < 0.002
+    assert height.max() < 0.02
+    assert np.sum(height < 0.01) >= 13
+    assert all(own["status"] == "converged" for own in plain)
 
 
 def test_first_loading_follows_the_finite_element_backbone():

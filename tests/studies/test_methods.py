@@ -1,15 +1,20 @@
 """Comparisons of methods: the figure of each, and each trap seen to close."""
 
 import functools
+from pathlib import Path
 
+import jax
 import jax.numpy as jnp
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from toy import STRIP
 
 import jbeamshell as jb
+from calibration.running import read
 from jbeamshell.load_steps.system import System
-from verification.compared import events, grids, laws
+from verification import methods
+from verification.compared import events, grids, laws, shooting, solvers
 from verification.compared.strips import scene_of
 
 CYCLE = 8  # load steps per half cycle at most; fewer are held, so that all paths compile once
@@ -79,7 +84,34 @@ def test_events_balance_their_energy():
 # --- shooting -------------------------------------------------------------------------------------
 
 
+def test_shooting_loses_the_digits_by_which_its_solutions_grow():
+    for length in (3.0, 5.0, 7.0):
+        shot = shooting.shoot_squeeze(length)
+        assert 1e-3 < shot.error / (np.finfo(float).eps * 10.0**shot.growth) < 10.0
+    assert shooting.shoot_squeeze(9.5).error > 1.0
+    # The dissertation's strip: 200 x 2 mm, half of it.
+    hopeless = shooting.shoot_squeeze(100.0)
+    assert hopeless.growth * np.log(10.0) == pytest.approx(440.0, abs=2.0)
+    assert hopeless.error > 1e90
+
+
 # --- iterations -----------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_plain_newton_fails_where_the_limit_does_not():
+    strips = solvers.random_strips(16)
+    runs = {}
+    for name in ("plain Newton", "limit, no search"):
+        run = solvers.runner(name)
+        runs[name] = [jax.tree.map(float, run(values)) for values in strips]
+    right = np.array([run.dissipation for run in runs["limit, no search"]])
+    nothing = solvers.NEGLIGIBLE * np.array([solvers.bar_dissipation(one) for one in strips])
+    plain, limited = (solvers.tally(some, right, nothing) for some in runs.values())
+    assert limited.found == 1.0
+    assert plain.found < 0.8
+    assert plain.wrong_but_found == 0.0
+    assert plain.worst > 2.0  # by which its dissipation is off, with nothing to show for it
 
 
 # --- grids ----------------------------------------------------------------------------------------
@@ -114,3 +146,30 @@ def test_the_librarys_element_is_the_one_that_is_compared():
 
 
 # --- charts ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def record():
+    yield read(Path(methods.__file__).with_suffix(".json"))
+    plt.close("all")
+
+
+def test_charts_show_what_the_record_holds(record):
+    axes = methods.chart(record, "steps")
+    (row,) = (row for row in record["steps"]["rows"] if row["scene"] == "standard")
+    lines = {line.get_label(): line for line in axes.lines}
+    np.testing.assert_allclose(lines["standard"].get_ydata(), np.abs(row["off"]))
+    axes = methods.chart(record, "solvers")
+    shares = [bar.get_width() for bar in axes.patches[: len(record["solvers"]["rows"])]]
+    found = [100.0 * row["found"] for row in record["solvers"]["rows"]]
+    np.testing.assert_allclose(shares[::-1], found)
+    assert sum(axes.axison for axes in methods.draw(record).axes) == 6
+
+
+def test_what_the_record_lacks_is_said(record):
+    with pytest.raises(jb.InputError, match="no section 'laws'"):
+        methods.chart({}, "laws")
+    with pytest.raises(jb.InputError, match="name = 'heat': choose one of laws, steps"):
+        methods.chart(record, "heat")
+    with pytest.raises(jb.InputError, match="nothing to draw"):
+        methods.draw({})

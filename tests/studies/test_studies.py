@@ -7,11 +7,13 @@ import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
 import jbeamshell as jb
 from calibration import running
 from jbeamshell.cli.main import main
+from verification.benchmarks import sections
 
 ROOT = Path(__file__).parents[2]
 FOUND = {
@@ -63,6 +65,12 @@ def closed():
     plt.close("all")
 
 
+def test_every_study_says_in_a_line_what_it_does():
+    for name, (_, line) in FOUND.items():
+        assert line.endswith("."), name
+    assert len(FOUND) > 20
+
+
 @pytest.mark.parametrize("name", RECORDED)
 def test_a_record_is_told_and_drawn(name):
     study = running.load(STUDIES[name])
@@ -106,6 +114,16 @@ def test_what_there_is_not_is_refused(toys, capsys):
     assert "rows: the study takes count" in capsys.readouterr().err
     assert toys("parts", "--only", "c") == 2
     assert "choose of a, b" in capsys.readouterr().err
+
+
+def test_a_map_of_a_section_shows_all_cells():
+    record = running.read(STUDIES["verification/sections"].with_suffix(".json"))
+    with pytest.raises(jb.InputError):
+        sections.error_map(record, "p5")
+    axes = sections.error_map(record, "squeeze")
+    drawn = np.asarray(axes.collections[0].get_array()).ravel()
+    off = sorted(100.0 * abs(cell["squeeze"] - 1.0) for cell in record["cells"])
+    np.testing.assert_allclose(sorted(drawn), off, rtol=1e-9)
 
 
 def test_the_readme_takes_a_loop_to_a_fitted_joint(tmp_path, monkeypatch, capsys):
