@@ -1,12 +1,11 @@
 """Damaged files of all formats, read one after the other; run as a program that must survive.
 
-    python tests/damaged.py SEED COUNT [RECORD.json]
+    python tests/damaged.py SEED COUNT
 
 makes a good file of each format and damages them in turn, in ways drawn at random.  It prints a
 line of JSON for each: file, damage, outcome and seconds of the processor, children's included.
 """
 
-import collections
 import importlib.util
 import json
 import os
@@ -100,17 +99,18 @@ def _stores(folder):
     """Block of a sweep, and the state of a fit."""
     Store(folder, "a sweep").save(0, BLOCK)
     random = np.random.default_rng(0)
-    runs = _runs(folder / "fit.state")
+    runs = saved_runs(folder / "fit.state")
     runs.read()
     for _ in range(4):
         numbers = random.random(4), random.random((4, 2)), random.random(4)
         runs.append([(random.random(2), Evaluation(*numbers, True))])
 
 
-def _runs(path):
+def saved_runs(path, **settings):
+    """State of a fit of two numbers."""
     experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), models=(), observations=())
     space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
-    return SavedRuns(path, experiment, space, Newton())
+    return SavedRuns(path, experiment, space, Newton(**settings))
 
 
 def _bodies(folder):
@@ -209,7 +209,7 @@ KINDS = (
 
 
 def _state(path):
-    runs = _runs(path).read()
+    runs = saved_runs(path).read()
     if len(runs) < 4:
         raise jb.InputError("a run is left out")
     return [array for values, run in runs for array in (values, *run)]
@@ -330,30 +330,7 @@ def main(folder, seed, count):
         yield row
 
 
-def counted(rows, seed):
-    """Record of a run: outcomes by file and by damage, and the longest time."""
-
-    def by(what):
-        counts = collections.defaultdict(collections.Counter)
-        for row in rows:
-            counts[row[what]][row["outcome"]] += 1
-        return {key: dict(sorted(counts[key].items())) for key in sorted(counts)}
-
-    return {
-        "seed": seed,
-        "files": len(rows),
-        "faults": [row for row in rows if judged(row)],
-        "slowest_s": max(row["seconds"] for row in rows),
-        "by_file": by("file"),
-        "by_damage": by("damage"),
-    }
-
-
 if __name__ == "__main__":
-    seed, rows = int(sys.argv[1]), []
     with tempfile.TemporaryDirectory() as place:
-        for row in main(Path(place), seed, int(sys.argv[2])):
-            rows.append(row)
+        for row in main(Path(place), int(sys.argv[1]), int(sys.argv[2])):
             print(json.dumps(row), flush=True)
-    for path in sys.argv[3:]:
-        Path(path).write_text(json.dumps(counted(rows, seed), indent=1) + "\n", encoding="utf-8")

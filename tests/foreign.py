@@ -11,18 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.corpus import (
-    HONEST,
-    KNOWN,
-    LENGTHS,
-    MU,
-    REFUSED,
-    RIGHT,
-    WIDTH,
-    Case,
-    strip,
-    text,
-)
+from tests.corpus import HONEST, KNOWN, LENGTHS, MU, REFUSED, RIGHT, WIDTH, Case, strip, text
 
 LOST = ("refused", "not this model")
 NO_MODULUS = [w for w in LENGTHS if w not in ("--modulus", "210GPa")]

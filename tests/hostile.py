@@ -128,6 +128,17 @@ HUGE = b"[load]\ncycles = 99\nsteps_per_half_cycle = 998\n[model]\nnodes = 99999
 
 FREE = "[free.'contact.friction']\n"
 DATA = "[[specimen]]\ndata = ['none.csv']\n"
+LONG = "0x" + "f" * 5000
+OF_DATA = [
+    "kind = 1", "kind = ['loop']", "width = nan", "width = true", f"width = {LONG}", "centre = 1",
+    "columns = 1", "columns = {force = 1}", "units = []", "decimal = 1", "set = 1", "driver = 3",
+    "drift = {}", "cycles = 2", "nonsense = 1",
+]  # fmt: skip
+OF_PLAN = ["scene = 1", "scene = ''", "scene = 'none.toml'", "set = 1", "nonsense = 1"]
+OF_FREE = [
+    "low = 'a'", "low = nan", "high = true", "prior = [1, 2, 3]", "prior = 'a'", "each = 1",
+    "scale = 1", "scale = ['log']", "start = [1]", "nonsense = 1", f"start = {LONG}",
+]  # fmt: skip
 PLANS = {
     "a number for specimens": "specimen = 1\n",
     "no specimens": "specimen = []\n",
@@ -140,58 +151,9 @@ PLANS = {
     "a folder": "[[specimen]]\ndata = ['.']\n",
     "a NUL": '[[specimen]]\ndata = ["a\\u0000b.csv"]\n',
     "a name too long": f"[[specimen]]\ndata = ['{'a' * 5000}.csv']\n",
-    **{
-        f"{entry.partition(' ')[0]} {i}": f"{DATA}{entry}\n"
-        for i, entry in enumerate(
-            [
-                "kind = 1",
-                "kind = ['loop']",
-                "width = nan",
-                "width = true",
-                "width = 0x" + "f" * 5000,
-                "centre = 1",
-                "columns = 1",
-                "columns = {force = 1}",
-                "units = []",
-                "decimal = 1",
-                "set = 1",
-                "driver = 3",
-                "drift = {}",
-                "cycles = 2",
-                "nonsense = 1",
-            ]
-        )
-    },
-    **{
-        f"{entry.partition(' ')[0]} {i}": f"{entry}\n{FREE}{DATA}"
-        for i, entry in enumerate(
-            [
-                "scene = 1",
-                "scene = ''",
-                "scene = 'none.toml'",
-                "set = 1",
-                "nonsense = 1",
-            ]
-        )
-    },
-    **{
-        f"free {i}": f"{FREE}{entry}\n{DATA}"
-        for i, entry in enumerate(
-            [
-                "low = 'a'",
-                "low = nan",
-                "high = true",
-                "prior = [1, 2, 3]",
-                "prior = 'a'",
-                "each = 1",
-                "scale = 1",
-                "scale = ['log']",
-                "start = [1]",
-                "nonsense = 1",
-                "start = 0x" + "f" * 5000,
-            ]
-        )
-    },
+    **{f"of data {i}": f"{DATA}{entry}\n" for i, entry in enumerate(OF_DATA)},
+    **{f"of a plan {i}": f"{entry}\n{FREE}{DATA}" for i, entry in enumerate(OF_PLAN)},
+    **{f"free {i}": f"{FREE}{entry}\n{DATA}" for i, entry in enumerate(OF_FREE)},
     "a number for free": "free = 1\n" + DATA,
     "a number for a free key": "[free]\n'contact.friction' = 1\n" + DATA,
 }

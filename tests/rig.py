@@ -72,6 +72,13 @@ def bouc_wen(u, smoothness=2.0, reach=0.3, stuck=0.1):
     return force + stuck * u
 
 
+def sliding_bar():
+    """Closed loop of a bar that slides from its end, whose force is a root of the displacement."""
+    way = np.clip((1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, 201))) / 0.4, 0.0, None)
+    down = 7.0 - 14.0 * np.sqrt(np.minimum(way[0] - way[:101], 1.0))
+    return np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0)
+
+
 def viscous(u, loss=0.3):
     """Spring and dashpot, for a path of sines."""
     rate = np.gradient(u)

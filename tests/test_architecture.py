@@ -153,38 +153,3 @@ def test_the_package_needs_nothing_of_its_clone():
 
 
 # --- the test can fail ----------------------------------------------------------------------------
-
-
-def test_circles_are_found_and_lines_are_none():
-    line = {"a": {"b", "c"}, "b": {"c"}, "c": set()}
-    assert circles(line) == set()
-    assert circles(line | {"c": {"a"}}) == {frozenset("abc")}
-    assert circles(line | {"c": {"b"}}) == {frozenset("bc")}
-    assert circles(line | {"c": {"c"}}) == {frozenset("c")}
-    two = {"a": {"b"}, "b": {"a", "c"}, "c": {"d"}, "d": {"c"}}
-    assert circles(two) == {frozenset("ab"), frozenset("cd")}
-
-
-def test_imports_are_seen_wherever_they_stand():
-    source = """
-from typing import TYPE_CHECKING
-if TYPE_CHECKING:
-    from jbeamshell.scene.scene import Scene
-def late():
-    import jaxopt
-    from jbeamshell import plotting
-"""
-    names = {"typing.TYPE_CHECKING", "jaxopt"}
-    inner = {"jbeamshell.scene.scene.Scene", "jbeamshell.plotting"}
-    assert set(imported_names(source)) == names | inner
-    assert {inside(name, FILES) for name in inner} == {"scene.scene", "plotting"}
-    assert inside("jbeamshell.solve", FILES) == ""
-    with pytest.raises(AssertionError, match="relative"):
-        list(imported_names("from . import plotting"))
-
-
-def test_an_import_that_points_up_is_seen():
-    assert points_up("plotting.fits", "identify.results")
-    assert points_up("cli.run", "")
-    assert not points_up("identify.results", "plotting")
-    assert not points_up("scene.toml", "scene.scene")

@@ -30,18 +30,6 @@ def test_the_largest_difference_counts():
         case([1.0, 2.0], 1.0).run()
 
 
-def test_every_case_says_what_it_is():
-    names = [one.name for one in CASES]
-    assert len(set(names)) == len(names)
-    for one in CASES:
-        assert one.kind in table.KINDS, one.name
-        assert one.source.citation
-        assert one.compared
-        assert one.condition
-        assert (one.held_out > 0.0) <= bool(one.fitted), one.name
-    assert not [one.name for one in CASES if one.settings]  # each runs without one
-
-
 def test_the_record_is_of_these_cases_and_explains_its_differences():
     rows = json.loads((HERE / "results.json").read_text("utf-8"))
     assert [row["name"] for row in rows] == [one.name for one in CASES]
@@ -71,12 +59,6 @@ def test_a_folder_without_the_files_leaves_the_record(tmp_path, capsys, monkeypa
     measurements.record(tmp_path, ["bolt", "cable", "backbones"])
     assert not measurements.RECORD.exists()
     assert capsys.readouterr().out.count(":") >= 3
-
-
-def test_a_page_has_a_row_for_each_case_and_its_source():
-    page = table.as_page([case([1.0], [1.3], explained="why").run()])
-    assert "| a | b | c | 1 | 1.3 | 30 %, outside: why | 1 |" in page
-    assert "1. nobody. Formula." in page
 
 
 @pytest.mark.slow

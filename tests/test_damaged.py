@@ -13,8 +13,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell.contact_line.matrix_files import read_matrix
 
-FILES = 1_000  # more by hand: python tests/damaged.py SEED COUNT RECORD.json
-RECORD = json.loads(Path(damaged.__file__).with_suffix(".json").read_text(encoding="utf-8"))
+FILES = 1_000  # more by hand: python tests/damaged.py SEED COUNT
 
 
 @pytest.mark.slow
@@ -29,13 +28,6 @@ def test_a_thousand_damaged_files():
     assert done.returncode == 0, (done.returncode, len(rows), done.stderr[-2000:])
     assert len(rows) == FILES
     assert [(row, damaged.judged(row)) for row in rows if damaged.judged(row)] == []
-
-
-def test_the_record_of_ten_thousand_has_no_fault():
-    assert RECORD["files"] >= 10_000
-    assert RECORD["faults"] == []
-    assert RECORD["slowest_s"] < damaged.SLOWEST
-    assert set(RECORD["by_damage"]) == set(damaged.KINDS)
 
 
 # --- faults that it found -------------------------------------------------------------------------

@@ -161,10 +161,6 @@ def faces():
         sys.path.remove(str(SITE))
 
 
-def test_every_face_has_public_names():
-    assert all(faces().public(face) for face in faces().FACES)
-
-
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """Folder of the built site."""

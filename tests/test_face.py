@@ -50,15 +50,9 @@ def test_the_face_lists_its_names_and_no_others():
         _ = jb.sovle
 
 
-def test_a_room_and_a_function_of_its_name_are_told_apart():
-    assert callable(jb.response)
-    assert callable(jb.sweep)
-    assert callable(jb.plotting.loop)
-    assert callable(jb.identify.fit)
-
-
 def test_importing_the_package_loads_nothing_heavy():
     assert not loaded_by("import jbeamshell; dir(jbeamshell)") & HEAVY
+    loaded_by("import jax, jbeamshell; assert not jax.config.jax_enable_x64")
 
 
 def test_a_name_loads_what_it_needs_alone():

@@ -28,7 +28,6 @@ from jbeamshell.measured.recordings import read_recordings
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import KEYS, NUMBERS
 from jbeamshell.scene.toml import overridden, scene_from_values
-from jbeamshell.sweeping import store
 
 TINY = {
     "model.nodes": 9,
@@ -90,9 +89,7 @@ def none_of(faults):
 
 # --- what is typed and handed over ----------------------------------------------------------------
 
-SETTINGS = [(key, kind) for key in KEYS for kind in hostile.WORDS]
 TYPED = [(key, "not a number") for key in KEYS] + [("strip.length", kind) for kind in hostile.WORDS]
-HANDED = [(key, kind) for key in KEYS for kind in hostile.OBJECTS]
 PARTS = {
     jb.Strip: "length height_ratio axial_stiffness poisson_ratio kappa_s far_end layers "
     "plane curvature",
@@ -136,17 +133,13 @@ NAMES = ["", "a\0b", "x" * 300, "\ud800", "x\ny", "block/", "*", "~", "-", ".tom
 NAMES += ["a\0.toml", "x" * 300 + ".toml", "x y.toml", "loop", "here", "/dev/null.toml"]
 
 
-@pytest.mark.parametrize("words", [["run"], ["advise"], ["sweep", *SWEEP], ["fit", "--scene"]])
-def test_names_of_no_scene(folder, fault, words):
+@pytest.mark.parametrize(
+    "words", [["run"], ["advise"], ["sweep", *SWEEP], ["fit"], ["fit", "--scene"]]
+)
+def test_names_of_no_scene_or_data(folder, fault, words):
     os.symlink("loop", "loop")
     os.mkdir("here")
     none_of(fault(*words, name) for name in NAMES)
-
-
-def test_names_of_no_data(folder, fault):
-    os.symlink("loop", "loop")
-    os.mkdir("here")
-    none_of(fault("fit", name) for name in NAMES)
 
 
 GOOD = np.cos(RUN_IN), np.sin(RUN_IN)
@@ -221,7 +214,6 @@ ENTRIES = {
 SCENE = jb.Scene().replace(TINY)
 # Python itself writes no number of thousands of digits into a message, and no file can hold one.
 ASKABLE = [kind for kind in hostile.OBJECTS if kind != "beyond Python's digits"]
-ASKED = [(entry, kind) for entry in ENTRIES for kind in ASKABLE]
 # As good as nothing, or what they seem to be.
 HARMLESS = {("weights", "no rows")}
 
@@ -269,7 +261,6 @@ READERS = {
     "scene of a fit": ["fit", "--scene"],
     "plan": ["fit"],
 }
-BROKEN_TOML = [(command, kind) for command in READERS for kind in hostile.TOML]
 WAYS = {"loop": [], "backbone": ["--kind", "backbone"], "squeeze": ["--kind", "squeeze"]}
 WAYS |= {"recorded": ["--cycles", "recorded"], "dissipation": ["--kind", "dissipation"]}
 
@@ -321,44 +312,6 @@ def test_files_of_a_gigabyte_are_refused_at_once(folder, fault):
     none_of([fault(*fit, "--save", state), fault(*fit, "--save", "/dev/full")])
     assert time.process_time() - begin < 10.0
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000  # kB
-
-
-BLOCKS = [b"", b"noise", b"\0" * 1000, b"PK\3\4" + bytes(range(256))]
-
-
-def test_broken_blocks_of_a_sweep_are_computed_again(folder):
-    over = {"load.amplitude": np.linspace(0.2, 1.9, 120)}
-    whole = jb.sweep(SCENE, over, ["dissipation"])
-
-    def cut(done, total):
-        if done >= 96:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        jb.sweep(SCENE, over, ["dissipation"], out="sweep.csv", progress=cut)
-    blocks = sorted(folder.glob("sweep.csv.parts/block-*"))
-    assert len(blocks) >= 3
-    good = np.load(blocks[0])
-    lanes = good["status"].size
-    wrong = [
-        {"values": np.zeros((1, lanes + 1)), "status": good["status"]},
-        {"values": np.zeros(lanes), "status": good["status"]},
-        {"values": np.array([["x"] * lanes]), "status": good["status"]},
-        {"values": good["values"], "status": good["status"] * 1.0},
-        {"values": good["values"]},
-        {"something": good["values"]},
-        {"values": np.zeros((1, lanes)), "status": np.array([hostile.Evil("evil")] * lanes)},
-    ]
-    for path, arrays in zip(blocks * 3, wrong, strict=False):
-        np.savez(path, **arrays)
-        kept = store.Store(folder / "sweep.csv.parts", "")
-        assert kept.load(int(path.stem[-6:]), 1, lanes) is None
-    for path, content in zip(blocks * 2, BLOCKS, strict=False):
-        path.write_bytes(content)
-    rest = jb.sweep(SCENE, over, ["dissipation"], out="sweep.csv")
-    assert "lanes were done before" in rest.notes
-    np.testing.assert_array_equal(rest["dissipation"], whole["dissipation"])
-    assert not (folder / "evil").exists()
 
 
 # --- places to write to ---------------------------------------------------------------------------
@@ -453,14 +406,3 @@ def test_labels_in_letters_that_a_terminal_has_not(monkeypatch, tmp_path):
         monkeypatch.setattr(sys, "stdout", stream)
         terminal.put("größe\n")
     assert path.read_text() == "gr\\xf6\\xdfe\n"
-
-
-def test_how_many_bad_inputs_are_tried():
-    cases = [SETTINGS, TYPED, HANDED, MADE, ASKED, BROKEN_TOML]
-    cases += [[*hostile.PLANS], hostile.OPTIONS]
-    cases += [[(name, way) for name in hostile.data_files("") for way in WAYS]]
-    cases += [[(name, i) for name in NAMES for i in range(5)], NO_FOLDERS, NO_FILES, NO_TABLES]
-    assert all(len(set(some)) >= len(some) - 1 for some in cases)
-    assert sum(map(len, cases)) > 3000
-    by_command_line = (TYPED, BROKEN_TOML, *cases[6:])
-    assert sum(map(len, by_command_line)) > 600

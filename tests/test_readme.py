@@ -1,16 +1,13 @@
 """README, CONTRIBUTING and the pages agree with the code: lines, links, paths, keys, figures."""
 
-import json
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from jbeamshell.scene.keys import TABLE
 
 ROOT = Path(__file__).parent.parent
-README = (ROOT / "README.md").read_text("utf-8")
 SITE = ROOT / "notebooks" / "pages"
 PAGES = (
     "README.md",
@@ -21,11 +18,6 @@ PAGES = (
     *sorted(path.relative_to(ROOT).as_posix() for path in SITE.glob("*.md")),
 )
 FOLDERS = {path.name for path in (ROOT / "jbeamshell").iterdir() if path.is_dir()}
-
-
-def test_integration_runs_the_line_of_the_readme():
-    line = next(line for line in README.splitlines() if "-m pytest -n" in line)
-    assert line in (ROOT / ".ci" / "run").read_text("utf-8").splitlines()
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -60,50 +52,3 @@ def test_keys_that_a_page_names_exist(page):
         "contact.png",
     }  # an array; a key with a slip
     assert named - others <= set(TABLE)
-
-
-class TestFiguresOfTheReadme:
-    """The table beside the alternatives holds what the records hold."""
-
-    def record(self, path):
-        return json.loads((ROOT / path).read_text("utf-8"))
-
-    def test_cycles_and_errors(self):
-        rows = {
-            row["what"]: row
-            for row in self.record("verification/benchmarks/speed.json")["one"]["rows"]
-        }
-        calculix, iwan = rows["CalculiX, 4 steps"], rows["Iwan's network, 20 steps"]
-        own = rows["patterns in NumPy, 1 step"]
-        peer = self.record("verification/benchmarks/condensed.json")["peer"]
-        (ours,) = (row for row in peer["ours"] if row["nodes"] == 49)
-        for words in (
-            f"{ours['built_us'] / 1e3:.3g} ms; {ours['kept_us']:.3g} µs if only",
-            f"{calculix['median_us'] / 1e6:.3g} s, CalculiX",
-            f"{iwan['median_us']:.3g} µs, once fitted",
-            f"{own['median_us']:.3g} µs, guessed slip patterns in NumPy",
-            f"{100 * ours['error']:.2g} %, plane elasticity on 49 nodes",
-            f"| {100 * calculix['error_to_elements']:.2g} % |",
-            f"| {calculix['median_us'] * 1e-6 * 1e4 / 3600:.0f} hours |",
-            f"| {own['median_us'] * 1e-6 * 1e4:.0f} s |",
-        ):
-            assert words in README, words
-
-    def test_laws_batches_and_derivatives(self):
-        heights = self.record("calibration/studies/laws_of_a_strip.json")["heights"].values()
-        shares = {
-            law: [100 * np.median(np.abs(height["models"][law]["error"])) for height in heights]
-            for law in ("iwan4", "sliders8")
-        }
-        low, high = (min(shares["sliders8"]), max(shares["sliders8"]))
-        iwan = f"{min(shares['iwan4']):.0f} to {max(shares['iwan4']):.0f} %"
-        assert f"{iwan}, eight sliders {low:.1f} to {high:.0f} %" in README
-        speed = self.record("verification/benchmarks/speed.json")
-        runs = [row["median_runs"] for row in speed["gradient"]["rows"]]
-        assert f"{runs[1]:.1f} to {runs[2]:.1f} runs" in README
-        swept = self.record("verification/benchmarks/sweeps.json")["member"]["grid"]["lanes_per_s"]
-        assert f"| {1e4 / swept:.0f} s of plane elasticity, after compiling" in README
-        friction = self.record("verification/methods.json")["laws"]["rows"]
-        (sharp, _, _, tanh) = (row for row in friction if row["scene"] == "standard")
-        excess = tanh["dissipation"][-1] / sharp["dissipation"][-1] - 1.0
-        assert f"{100 * excess:.0f} % too much after {tanh['steps'][-1]} steps" in README

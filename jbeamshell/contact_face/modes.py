@@ -98,7 +98,7 @@ def modal_bodies(
     history = solve_faces(
         *pressed, friction=friction, bolts=sizes, path=np.append(0.0, sizes)[None]
     )
-    touching = np.asarray(history.reaction[0]) > 0.0
+    touching = np.asarray(history.touching[0])
     omega, forces = _stuck_mode(parts, touching, mode)
     bodies = [_body(part, pull, normals, areas) for part, pull in zip(parts, forces, strict=True)]
     return ModalBodies(bodies[0], bodies[1] if lower is not None else None, omega, touching)

@@ -21,6 +21,7 @@ FIGURES = (
     "peak_displacement",
 )
 SLIDES = 1e-9  # of friction times reaction, within which a pair is at its limit
+TOUCHES = 1e-9  # of the largest reaction, below which a reaction is that of an open pair, rounded
 STEADY = 5e-3  # slip left over by a cycle, over its range, up to which D has settled
 COARSE = 0.02  # error of the dissipation, from which on it is doubted
 
@@ -87,7 +88,7 @@ class FaceHistory(LoopFigures, eqx.Module):
     @property
     def touching(self) -> Array:
         """True if a pair is in contact, (steps+1, n)."""
-        return self.reaction > 0.0
+        return self.reaction > TOUCHES * jnp.max(self.reaction, axis=-1, keepdims=True)
 
     @property
     def slipping(self) -> Array:  # type: ignore[override]

@@ -28,7 +28,8 @@ def refused(cli, tmp_path):
             return {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
 
         before = held()
-        words = [*words] if "--out" in words else [*words, "--out", tmp_path / "new" / "out"]
+        if "--out" not in words and words[0] not in ("advise", "sweep"):
+            words = [*words, "--out", tmp_path / "new" / "out"]
         got, out, err = cli(*words)
         assert (got, out) == (code, "")
         assert re.fullmatch(r"jbeamshell: [^\n]+\n", err), err

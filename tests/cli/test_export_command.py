@@ -21,19 +21,6 @@ def test_it_writes_a_joint(cli, tmp_path):
     assert float(Joint.read(path).forces[-1]) == pytest.approx(36.0)
 
 
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (["--to", "table", "--force", "5"], "gross slip"),
-        (["--to", "table", "--width", "0"], "width = 0.0"),
-        (["--to", "table", "--units", "mm"], "name those of length and force"),
-        (["--to", "opensees"], "end the name of a file for 'opensees' in .py"),
-    ],
-)
-def test_bad_input_is_one_line(refused, words, complaint):
-    assert complaint in refused("export", *PLANE, *words)
-
-
 def test_doubts_are_one_line_each(capsys):
     with doubts_in_lines():
         for text in ("doubtful: few\nnodes", "doubtful: few\nnodes", "doubtful: soft"):

@@ -4,7 +4,6 @@ import csv
 import dataclasses
 import json
 import re
-import tomllib
 
 import numpy as np
 import pytest
@@ -147,18 +146,6 @@ def test_a_fit_that_does_not_settle(refused, planted, monkeypatch):
     monkeypatch.setattr(multistart, "MAX_ITERATIONS", 1)
     line = refused("fit", planted, *FIT, "--json", code=3)
     assert line.startswith("the fit has not converged after 1 iterations, at contact.friction = ")
-
-
-@pytest.mark.slow
-def test_fit_driven_by_the_displacement(cli, closed, tmp_path):
-    drive = options(KNOWN | {"load.control": "displacement", "load.amplitude": 2e-5})
-    code, out, _ = cli("fit", closed, *FIT, *drive, "--json", "--out", tmp_path)
-    assert code == 0
-    values = json.loads(out)["values"]
-    for key, value in TRUE.items():
-        assert values[key]["value"] == pytest.approx(value, rel=1e-2)
-    load = tomllib.loads((tmp_path / "scene.toml").read_text())["load"]
-    assert (load["control"], load["amplitude"]) == ("displacement", 2e-5)
 
 
 def test_a_plan_of_two_strips_is_fitted_profiled_saved_and_resumed(cli, closed, tmp_path):
@@ -305,60 +292,11 @@ def test_the_control_that_is_set_decides_how_cycles_are_averaged(asked, tmp_path
 # --- bad input ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["--free", ""], "free: name at least one key, such as contact.friction"),
-        (["--free", "contact.mu"], "unknown key 'contact.mu': "),
-        (["--free", "contact.friction,contact.friction"], "names a key twice"),
-        (["--free", "load.amplitude"], "free 'load.amplitude': is not a parameter of the strip"),
-        (["--free", "model.nodes"], "free 'model.nodes': is not a parameter of the strip"),
-        (["--free", "contact.smoothing"], "is 'sharp' in this scene; give a number"),
-        (["--start", "strip.kappa_s=1"], "--start strip.kappa_s: is not among the free keys cont"),
-        (["--start", "contact.friction"], "'contact.friction': write KEY=VALUE, such as"),
-        (["--start", "contact.friction=high"], "start = 'high': give a finite number"),
-        (["--start", "contact.friction=-1"], "contact.friction = -1.0: must be a number, not"),
-        (["--bounds", "contact.friction=0.2"], "--bounds contact.friction=0.2: write two numbers"),
-        (["--bounds", "contact.friction=0.2:0.3"], "start = 0.15: must lie between low = 0.2"),
-        (["--prior", "contact.friction=0.1:a"], "write two numbers with a colon between"),
-        (["--profile", "strip.kappa_s"], "--profile strip.kappa_s: is not among the free keys"),
-        (["--noise", "-1"], "noise = -1.0: give a positive part of the range"),
-        (["--starts", "0"], "starts = 0: must be a whole number, 1 to"),
-        (["plan.toml"], "plan.toml: cannot be read (No such file"),
-        (["plan.toml", "a.csv"], "plan.toml a.csv: give one plan, or files of data"),
-        (["plan.toml", "--kind", "loop"], "--kind: plan.toml is a plan; write this into the plan"),
-        (["a.csv", "--kind", "lop"], "kind = 'lop': choose among 'loop', 'backbone'"),
-        (["a.csv", "--unit", "kN"], "'kN': write KEY=VALUE, such as force=kN"),
-        (["--set", "load.control=stress"], "load.control = 'stress': choose 'force' or 'displ"),
-        (["--set", "load.control=a,b"], "load.control = ['a', 'b']: must be a word"),
-        (["--set", "contact.pressure=1"], "contact.friction = 0.15: slides at mu F_N L = 0.3"),
-    ],
-)
-def test_bad_fits_are_refused(refused, words, told):
-    assert told in refused("fit", *words)
-
-
 @pytest.mark.slow
 def test_free_keys_that_the_loops_do_not_depend_on(refused, planted):
     bar = options({"model.section": "bar", "model.nodes": 5, "model.kinematics": "linear"})
     line = refused("fit", planted, *bar, "--free", "strip.kappa_s")
     assert line == "free 'strip.kappa_s': the data do not depend on it at its start; leave it out"
-
-
-@pytest.mark.parametrize(
-    ("content", "told"),
-    [
-        ("", "rig.csv: is empty: give a header and rows"),
-        ("force,displacement\n1,2\n1,x\n", "rig.csv: line 3, column 'displacement' holds 'x'"),
-        ("force,travel\n1,2\n", "rig.csv: needs one column named 'displacement' in line 1"),
-        (None, "rig.csv: cannot be read (No such file"),
-    ],
-)
-def test_bad_data_are_refused(refused, tmp_path, content, told):
-    path = tmp_path / "rig.csv"
-    if content is not None:
-        path.write_text(content)
-    assert told in refused("fit", path)
 
 
 def test_a_law_takes_the_place_of_the_strip(tmp_path, capsys):

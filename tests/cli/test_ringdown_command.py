@@ -40,27 +40,6 @@ def test_it_reports_and_writes_what_it_says(capsys, tmp_path, words):
         assert np.all(high - low < table[name].max())
 
 
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (["--density", "-1"], "inertia.density = -1.0"),
-        (["--force", "5"], "gross slip"),
-        (["--payload", "0"], "payload = 0.0"),
-        (["--cycles", "0"], "cycles = 0.0"),
-        (["--strip", "whole", "--set", "model.section=plane"], "model.section = 'plane'"),
-        (["--strip", "sliders", "--set", "contact.smoothing=8"], "no network"),
-    ],
-)
-def test_bad_input_is_one_line(capsys, tmp_path, words, complaint):
-    code = main.main(["ringdown", *COARSE, *words, "--out", str(tmp_path / "out")])
-    out, err = capsys.readouterr()
-    assert code == 2
-    assert out == ""
-    assert complaint in err
-    assert err.count("\n") == 1
-    assert not (tmp_path / "out").exists()
-
-
 BOLTED = ["--set", "contact.bolts=[[0.5, 0.5, 0.3]]", "--cycles", "8"]
 
 

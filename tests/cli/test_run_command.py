@@ -79,23 +79,6 @@ def test_run_takes_a_specimen_and_settings_with_units(cli, tmp_path):
         assert line in text
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        ([*SPECIMEN, "--pressure", "8MPa"], "slides at mu F_N L = 4.8 kN: give a part of it, such"),
-        (SPECIMEN, "contact.pressure: the specimen is in SI, the standard strip is not: give it"),
-        (
-            ["--set", "load.amplitude=2kN"],
-            "load.amplitude = '2kN': forces are per width: give --wi",
-        ),
-        (["--set", "strip.length=2kg"], "strip.length = '2kg': 'kg' is no unit of it: write m"),
-        (["--set", "contact.friction=2mm"], "contact.friction = '2mm': takes no unit"),
-    ],
-)
-def test_a_specimen_is_not_mixed_with_the_standard_strip(refused, words, told):
-    assert told in refused("run", *words)
-
-
 def test_run_leaves_what_runs_again_to_the_last_bit(cli, tmp_path):
     folder = tmp_path / "new" / "run"
     third = 1.0 / 30.0 + 0.1
@@ -198,18 +181,6 @@ def test_scenes_are_listed_with_a_line_each(cli):
     assert json.loads(out) == {name: library.summary(name) for name in library.NAMES}
 
 
-@pytest.mark.slow
-def test_a_bent_laminate_by_name(cli):
-    code, out, err = cli("run", "bimaterial", "--json", "--set", "model.nodes=41")
-    assert (code, err) == (0, "")
-    figures = json.loads(out)
-    assert set(figures) == {"curvature", "tip_deflection", "squeeze_stress_max"} | PRESSED
-    curvature = 0.0312604e-4  # per mm, at 1e-4 of the soft layer's modulus
-    assert figures["curvature"] == pytest.approx(curvature, rel=1e-5)
-    assert figures["tip_deflection"] == pytest.approx(0.5 * curvature * 100.0**2, rel=1e-5)
-    assert figures["squeeze_stress_max"] == pytest.approx(0.209)
-
-
 def test_a_scene_without_cycles_by_name(cli, tmp_path):
     few = {"model.nodes": 41, "model.kinematics": "linear"}
     code, out, err = cli("run", "block", "--json", *options(few), "--out", tmp_path)
@@ -246,24 +217,3 @@ def test_a_file_goes_before_a_name(tmp_path, monkeypatch):
     assert library.values_from("receding") == library.values_of("receding")
     (tmp_path / "block").write_text("[strip]\nlength = 3.0\n")
     assert library.values_from("block") == {"strip.length": 3.0}
-
-
-@pytest.mark.parametrize(
-    ("word", "told"),
-    [
-        ("recedng", "unknown scene 'recedng': did you mean 'receding'? (`jbeamshell scenes` lists"),
-        ("point_load", "unknown scene 'point_load': did you mean 'point-load'? (`jbeamshell scen"),
-        (
-            "block.tml",
-            "unknown scene 'block.tml': did you mean 'block'? (`jbeamshell scenes` lists",
-        ),
-        ("xyz", "unknown scene 'xyz': scenes are standard, calibrated, bimaterial, squeezed"),
-        ("receding.toml", "receding.toml: cannot be read (No such file"),
-        ("./receding", "receding: cannot be read (No such file"),
-        (".", ".: cannot be read (Is a directory)"),
-        ("long" * 100, "unknown scene 'long"),
-    ],
-)
-@pytest.mark.parametrize("command", [["run"], ["fit", "--scene"]])
-def test_unknown_scenes_are_refused(refused, command, word, told):
-    assert refused(*command, word).startswith(told)

@@ -2,14 +2,12 @@
 
 import csv
 import json
-import re
 
 import numpy as np
 import pytest
 
 import jbeamshell as jb
 from jbeamshell import plotting
-from jbeamshell.cli import main
 from jbeamshell.cli.sweep import ranges
 from jbeamshell.common.errors import InputError
 from jbeamshell.sweeping import lanes, run
@@ -17,21 +15,13 @@ from jbeamshell.sweeping.lanes import Outcome
 from jbeamshell.sweeping.results import dataset
 
 FIGURES = "dissipation,dissipation_ratio,secant_stiffness,reaction_max"  # of test_sweep
-WORDS = [
+SWEEP = [
+    "sweep",
     *("--set", "model.nodes=9", "--set", "model.kinematics=linear"),
     *("--set", "load.steps_per_half_cycle=2", "--set", "load.cycles=1", "--figures", FIGURES),
 ]
 AMPLITUDES = ("--over", "load.amplitude=0.5:2.5:3")
 HEIGHTS = ("--over", "strip.height_ratio=0.05, .4")
-
-
-@pytest.fixture
-def cli(capsys):
-    def cli(*words):
-        code = main.main(["sweep", *map(str, words)])
-        return code, *capsys.readouterr()
-
-    return cli
 
 
 @pytest.mark.parametrize(
@@ -77,7 +67,7 @@ def test_ranges_that_are_none_are_refused_in_one_line(texts, says):
 
 def test_json_is_strict_and_files_hold_the_same(cli, tmp_path):
     table, picture = tmp_path / "sweep.csv", tmp_path / "sweep.png"
-    code, out, err = cli(*WORDS, *AMPLITUDES, *HEIGHTS, "--json", "--out", table, "--plot", picture)
+    code, out, err = cli(*SWEEP, *AMPLITUDES, *HEIGHTS, "--json", "--out", table, "--plot", picture)
     assert code == 0
     assert "2 lanes lie outside the model's domain: load.amplitude = 2.5: must stay below" in err
     found = json.loads(out, parse_constant=pytest.fail)
@@ -103,36 +93,12 @@ def test_the_summary_counts_and_a_lane_that_fails_shows_in_the_exit_code(cli, mo
         result["status"][0, 0] = Outcome.MAX_ITERATIONS
         return result
 
-    code, out, err = cli(*WORDS, "--over", "load.amplitude=.5,1.5", *HEIGHTS)
+    code, out, err = cli(*SWEEP, "--over", "load.amplitude=.5,1.5", *HEIGHTS)
     assert (code, err) == (0, "")
     assert out.startswith("4 lanes over load.amplitude (2), strip.height_ratio (2): 4 converged")
     monkeypatch.setattr(run, "sweep", failing)
-    code, out, err = cli(*WORDS, "--over", "load.amplitude=.5,1.5", *HEIGHTS)
+    code, out, err = cli(*SWEEP, "--over", "load.amplitude=.5,1.5", *HEIGHTS)
     assert code == 3
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["--over", "contact.law=1"], "no single number"),
-        ([*AMPLITUDES, "--paired", "--over", "contact.friction=0.1,0.2"], "equally many"),
-        ([*AMPLITUDES, "--figures", "nonsense"], "choose"),
-        (["--json", "--over", "load.amplitude=0:1:600000"], "3,000,000 numbers are more than"),
-        ([*AMPLITUDES, "--processes", "2"], "--processes: is no option any more"),
-        ([*AMPLITUDES, "--out", "folder"], "end the name in .csv"),
-        ([*AMPLITUDES, "--plot", "nowhere/sweep.png"], "there is no folder nowhere"),
-        ([*AMPLITUDES, "--plot", "sweep.doc"], "end the name in .png"),
-        ([*AMPLITUDES, "--dask", "nowhere"], "--dask nowhere: finds no dask scheduler there"),
-        (["no-such-scene", *AMPLITUDES], "no-such-scene"),
-    ],
-)
-def test_bad_input_is_one_line(cli, words, says, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, out, err = cli(*words)
-    assert (code, out) == (2, "")
-    assert re.fullmatch(r"jbeamshell: [^\n]+\n", err), err
-    assert says in err
-    assert not list(tmp_path.iterdir())
 
 
 # --- pictures -------------------------------------------------------------------------------------

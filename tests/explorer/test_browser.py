@@ -133,21 +133,6 @@ def processor_time(process):
     return times.user + times.system
 
 
-def test_a_load_beyond_gross_slip_is_one_line_and_reset_mends_it(page):
-    loop = page.execute_script(FORCE, "loop", "F")
-    pressure = deep(page, ".noUi-handle")[3]
-    pressure.click()
-    press(page, webdriver.Keys.ARROW_RIGHT)
-    press(page, webdriver.Keys.HOME)
-    until(lambda: "must stay below gross slip" in words(page))
-    time.sleep(1.0)  # words of the move before do not come after it
-    assert "must stay below gross slip" in words(page)
-    assert "Traceback" not in page.page_source
-    assert page.execute_script(FORCE, "loop", "F") == loop
-    next(b for b in deep(page, "button") if b.text == "Reset").click()
-    until(lambda: "computed in" in words(page))
-
-
 def test_a_file_is_drawn_and_the_scene_is_taken_away(page):
     file = data_folder() / "loops_eta0.1126.csv"
     deep(page, "input[type=file]")[0].send_keys(str(file))

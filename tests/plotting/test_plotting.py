@@ -103,18 +103,8 @@ class TestLoop:
     def test_draws_a_path_without_a_cycle(self, pull):
         assert list(drawn(plotting.loop(pull))) == ["path"]
 
-    def test_draws_where_it_is_told(self, history):
-        _, axes = plt.subplots()
-        assert history.plot(axes) is axes
-
 
 class TestProfiles:
-    def test_labels_four_panels(self, history):
-        axes = history.plot_profiles()
-        assert axes.shape == (2, 2)
-        assert all(labels(axes))
-        assert all(panel.get_title() for panel in axes.ravel())
-
     def test_takes_turns_and_zero_crossings_of_the_last_cycle(self, history):
         traction = plotting.profiles(history).ravel()[2]
         # The second cycle: steps 15 to 27, through zero at 18 and 24, turning at 21.
@@ -157,16 +147,6 @@ class TestProfiles:
         legend = plotting.profiles(pressing).ravel()[2].get_legend().get_texts()
         shares = ["25 % of $F_N$", "50 % of $F_N$", "75 % of $F_N$", "100 % of $F_N$", "slips"]
         assert [text.get_text() for text in legend] == shares
-
-    def test_refuses_steps_off_the_path(self, pull):
-        with pytest.raises(
-            InputError, match="steps: 28 is not on the path, whose steps are 0 to 27"
-        ):
-            plotting.profiles(pull, [28])
-
-    def test_refuses_other_than_four_axes(self, pull):
-        with pytest.raises(InputError, match="four"):
-            plotting.profiles(pull, axes=plt.subplots(1, 3)[1])
 
 
 class TestContact:
@@ -260,19 +240,6 @@ class TestContact:
         assert plotting.contact(clamped, axes=axes, panels=["psi", "gap"]) is not None
         assert [panel.get_title() for panel in axes] == ["squeeze strain", "gap under the strip"]
 
-    @pytest.mark.parametrize(
-        ("options", "message"),
-        [
-            ({"panels": ["heat"]}, "panels: there is no 'heat' in reaction, gap"),
-            ({"reference": {"w": ([0.0], [0.0])}}, "reference: there is no 'w'"),
-            ({"steps": [19]}, "steps: 19 is not on the path"),
-            ({"axes": [], "panels": ["gap"]}, "axes: gap need 1, not 0"),
-        ],
-    )
-    def test_refuses_what_is_not_there(self, clamped, options, message):
-        with pytest.raises(InputError, match=message):
-            plotting.contact(clamped, **options)
-
 
 class TestContactMap:
     @staticmethod
@@ -325,15 +292,6 @@ class TestContactMap:
         ticks = [text.get_text() for text in axes.get_xticklabels()]
         assert ticks == ["$0$", "$30$", "$-30$", "$-10$"]
 
-    def test_shows_a_part(self, clamped):
-        _, axes = plt.subplots()
-        assert plotting.contact_map(clamped, axes, xlim=(4.0, 6.0)) is axes
-        assert axes.get_ylim() == (4.0, 6.0)
-
-    def test_needs_a_foundation(self, clamped):
-        with pytest.raises(InputError, match="no contact to draw"):
-            plotting.contact_map(with_scene(clamped, contact_normal="none"))
-
 
 class TestLikelihoods:
     PROFILES = (
@@ -351,10 +309,6 @@ class TestLikelihoods:
         assert kappa_s.get_title() == "68 %: 0.11 to inf"
         assert all(labels(mu))
 
-    def test_needs_axes_for_each(self):
-        with pytest.raises(InputError, match="there are 2 to draw, not 1"):
-            plotting.likelihoods(self.PROFILES, plt.subplots()[1])
-
 
 class TestStyle:
     def test_leaves_the_settings_alone(self, history):
@@ -364,10 +318,6 @@ class TestStyle:
         plotting.contact(history)
         plotting.contact_map(history)
         assert dict(plt.rcParams) == before
-
-    @pytest.mark.parametrize("count", [1, 6, 7, 20])
-    def test_colours_differ(self, count):
-        assert len({tuple(colour) for colour in plotting.colours(count)}) == count
 
     def test_families_are_told_apart_in_grey(self):
         few = plotting.looks(6)
@@ -414,13 +364,6 @@ class TestFilm:
         slips = {line.get_label(): line for line in traction.get_lines()}["slips"]
         np.testing.assert_array_equal(slips.get_xdata(), history.x[history.slipping[21]])
 
-    def test_refuses_another_format(self, history, tmp_path):
-        with pytest.raises(InputError, match=r"end the name in \.gif"):
-            history.animate([0]).save(tmp_path / "cycle.mp4")
-
-    def test_shows_itself_in_a_notebook(self, history):
-        assert history.animate([0])._repr_html_().startswith("<img")
-
 
 class TestSave:
     @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
@@ -444,11 +387,43 @@ class TestSave:
             plotting.save(figure, path)
         assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("loop.png", "old")]
 
-    @pytest.mark.parametrize("name", ["loop", "loop.xyz"])
-    def test_refuses_an_unknown_format(self, history, tmp_path, name):
-        with pytest.raises(InputError, match=r"end the name in .*\.png"):
-            plotting.save(plotting.loop(history).figure, tmp_path / name)
-        assert not list(tmp_path.iterdir())
+
+REFUSED = {
+    "steps": (lambda h, _: plotting.profiles(h, [19]), "steps: 19 is not on the path, whose"),
+    "axes": (lambda h, _: plotting.profiles(h, axes=plt.subplots(1, 3)[1]), "four"),
+    "panels": (lambda h, _: plotting.contact(h, panels=["heat"]), "there is no 'heat' in reaction"),
+    "reference": (
+        lambda h, _: plotting.contact(h, reference={"w": ([0.0], [0.0])}),
+        "reference: there is no 'w'",
+    ),
+    "contact steps": (lambda h, _: plotting.contact(h, steps=[19]), "steps: 19 is not on the path"),
+    "few axes": (lambda h, _: plotting.contact(h, axes=[], panels=["gap"]), "gap need 1, not 0"),
+    "no foundation": (
+        lambda h, _: plotting.contact_map(with_scene(h, contact_normal="none")),
+        "no contact to draw",
+    ),
+    "likelihoods": (
+        lambda *_: plotting.likelihoods(TestLikelihoods.PROFILES, plt.subplots()[1]),
+        "there are 2 to draw, not 1",
+    ),
+    "film": (lambda h, folder: h.animate([0]).save(folder / "a.mp4"), r"end the name in \.gif"),
+    "no suffix": (
+        lambda _, folder: plotting.save(plt.figure(), folder / "loop"),
+        r"end the name in .*\.png",
+    ),
+    "suffix": (
+        lambda _, folder: plotting.save(plt.figure(), folder / "loop.xyz"),
+        r"end the name in .*\.png",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_drawn_is_refused(clamped, tmp_path, name):
+    call, message = REFUSED[name]
+    with pytest.raises(InputError, match=message):
+        call(clamped, tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 def gaps_between_labels(axis):

@@ -12,10 +12,7 @@ from jbeamshell.sweeping import run
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 from jbeamshell.sweeping.results import dataset, write_csv
 
-AXES = {
-    "load.amplitude": np.array([0.2, 0.8, 1.4]),
-    "strip.height_ratio": np.array([0.05, 0.2]),
-}
+AXES = {"load.amplitude": np.array([0.2, 0.8, 1.4]), "strip.height_ratio": np.array([0.05, 0.2])}
 STATUS = np.array([[0, 0], [0, Outcome.MAX_ITERATIONS], [Outcome.OUTSIDE, Outcome.UNDEFINED]])
 
 
@@ -54,13 +51,6 @@ def test_a_grid_has_a_dimension_for_every_key():
     moved = made_up(**{"load.control": "displacement", "load.amplitude": 1e-4})
     assert moved["load.amplitude"].attrs["units"] == "length"
     assert "amplitude_over_height" not in moved.coords
-
-
-def test_pairs_are_a_set_of_lanes():
-    found = made_up(paired=True)
-    assert found["dissipation"].dims == ("lane",)
-    assert found["strip.height_ratio"].dims == ("lane",)
-    assert dict(found.sizes) == {"lane": 2}
 
 
 @pytest.mark.parametrize("paired", [False, True])

@@ -4,21 +4,28 @@ import json
 import os
 import subprocess
 import sys
-import types
 from pathlib import Path
 
+import hostile
 import numpy as np
 import pytest
+from damaged import BLOCK, saved_runs
 
 import jbeamshell as jb
 from jbeamshell.common import files
 from jbeamshell.identify.experiment import Evaluation
-from jbeamshell.identify.saved_runs import SavedRuns
-from jbeamshell.numerics.newton import Newton
-from jbeamshell.sweeping.runner import Block
 from jbeamshell.sweeping.store import Store
 
-BLOCK = Block(np.linspace(0.0, 1.0, 21).reshape(3, 7), np.zeros(7, np.int8))
+EVIL = Path("evil")  # what unpickling would make
+WRONG = [  # arrays that are no block of three figures of seven lanes
+    {"values": np.zeros((3, 8)), "status": BLOCK.status},
+    {"values": np.zeros(7), "status": BLOCK.status},
+    {"values": np.array([["x"] * 7] * 3), "status": BLOCK.status},
+    {"values": BLOCK.values, "status": BLOCK.status * 1.0},
+    {"values": BLOCK.values},
+    {"something": BLOCK.values},
+    {"values": BLOCK.values, "status": np.array([hostile.Evil(EVIL)] * 7)},
+]
 FLIPS = 300
 
 
@@ -49,6 +56,13 @@ def test_a_block_that_was_changed_or_belongs_elsewhere_is_computed_again(tmp_pat
         assert store.load(2, 3, 7) is None
         assert store.load(3, 3, 7) is not None
         assert store.load(3, 3, 8) is None
+        for arrays in WRONG:
+            np.savez(place, **arrays)
+            assert store.load(3, 3, 7) is None
+        for content in (b"", b"noise", bytes(1000), b"PK\3\4" + bytes(range(256))):
+            place.write_bytes(content)
+            assert store.load(3, 3, 7) is None
+        assert not EVIL.exists()
         store.save(3, BLOCK)
     other = Store(tmp_path / "other", "another sweep")
     with other.opened():
@@ -96,9 +110,7 @@ def test_a_lock_ends_with_the_process_that_holds_it(tmp_path):
 
 def test_a_run_of_a_fit_that_was_changed_is_made_again(tmp_path):
     random, path = np.random.default_rng(23), tmp_path / "state"
-    experiment = types.SimpleNamespace(weight=np.ones(4), owners=(), models=(), observations=())
-    space = types.SimpleNamespace(keys=("a", "b"), names=("a", "b"))
-    runs = SavedRuns(path, experiment, space, Newton())
+    runs = saved_runs(path)
     assert runs.read() == []
     made = [
         (random.random(2), Evaluation(random.random(4), random.random((4, 2)), random.random(4), c))
@@ -117,7 +129,7 @@ def test_a_run_of_a_fit_that_was_changed_is_made_again(tmp_path):
             assert all(map(np.array_equal, run, right))
     assert path.read_bytes().count(b"\n") == len(found) + 1
     _, *rest = good.splitlines(keepends=True)
-    other = SavedRuns(path, experiment, space, Newton(tolerance=1e-9))
+    other = saved_runs(path, tolerance=1e-9)
     path.write_bytes(json.dumps(json.loads(other._header)).encode() + b"\n" + b"".join(rest))
     assert other.read() == []
     path.write_bytes(good + b"".join(rest))

@@ -24,6 +24,7 @@ TINY = {
 SCENE = STRIP.replace(TINY)
 OVER = {"load.amplitude": [0.3, 1.9, 1.1, 2.5, 0.7], "strip.height_ratio": [0.05, 0.4]}
 FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "reaction_max")
+HELD = SCENE.replace({"contact.normal": "held"})
 PATCH = [[0.0, 12.0], [1.0, 12.0], [1.0, 5.0], [2.0, 8.0]]
 
 
@@ -273,34 +274,19 @@ def test_a_sweep_wholly_outside_runs_nothing():
 
 
 @pytest.mark.parametrize(
-    ("over", "says"),
+    ("given", "says"),
     [
-        ({}, "name at least one"),
-        ({"contact.frction": [0.1]}, "did you mean 'contact.friction'"),
-        ({"strip.layers": [1.0]}, "no single number"),
-        ({"model.nodes": [9]}, "no single number"),
-        ({"load.amplitude": []}, "is empty"),
-        ({"load.amplitude": [[1.0]]}, "not an array of shape"),
-        ({"load.amplitude": [0.1, np.nan]}, "must be finite"),
-        ({"load.amplitude": ["a"]}, "give numbers"),
-        ({"strip.half_height": [0.1], "strip.height_ratio": [0.1]}, "say the same thing"),
-        ({"load.amplitude": np.ones(5000), "strip.length": np.ones(5000)}, "25,000,000 lanes"),
-    ],
-)
-def test_axes_that_make_no_sweep_are_refused(over, says):
-    with pytest.raises(InputError, match=says) as caught:
-        jb.sweep(SCENE, over)
-    assert "\n" not in str(caught.value)
-
-
-def test_curvatures_of_a_strip_that_is_held_down_are_refused():
-    with pytest.raises(InputError, match="needs a strip that may lift off"):
-        jb.sweep(SCENE.replace({"contact.normal": "held"}), {"strip.curvature": [0.1]})
-
-
-@pytest.mark.parametrize(
-    ("more", "says"),
-    [
+        ({"over": {}}, "name at least one"),
+        ({"over": {"contact.frction": [0.1]}}, "did you mean 'contact.friction'"),
+        ({"over": {"strip.layers": [1.0]}}, "no single number"),
+        ({"over": {"model.nodes": [9]}}, "no single number"),
+        ({"over": {"load.amplitude": []}}, "is empty"),
+        ({"over": {"load.amplitude": [[1.0]]}}, "not an array of shape"),
+        ({"over": {"load.amplitude": [0.1, np.nan]}}, "must be finite"),
+        ({"over": {"load.amplitude": ["a"]}}, "give numbers"),
+        ({"over": {"strip.half_height": [0.1], **_eta([0.1])}}, "say the same thing"),
+        ({"over": dict.fromkeys(["load.amplitude", "strip.length"], np.ones(5000))}, "25,000,000"),
+        ({"scene": HELD, "over": {"strip.curvature": [0.1]}}, "needs a strip that may lift off"),
         ({"figures": ()}, "name at least one"),
         ({"figures": ("dissipatoin",)}, "choose"),
         ({"figures": ("dissipation", "dissipation")}, "names one twice"),
@@ -312,10 +298,11 @@ def test_curvatures_of_a_strip_that_is_held_down_are_refused():
         ({"out": "nowhere/sweep.csv"}, "there is no folder"),
     ],
 )
-def test_what_cannot_be_done_is_refused_before_anything_is(more, says, tmp_path, monkeypatch):
+def test_what_cannot_be_done_is_refused_before_anything_is(given, says, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match=says):
-        jb.sweep(SCENE, OVER, **more)
+    with pytest.raises(InputError, match=says) as caught:
+        jb.sweep(**{"scene": SCENE, "over": OVER} | given)
+    assert "\n" not in str(caught.value)
     assert not list(tmp_path.iterdir())
 
 

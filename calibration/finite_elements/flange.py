@@ -1,0 +1,234 @@
+"""Single lap of two plates with two round bolts: its contact by `solve_faces` and by CalculiX.
+
+Two plates of bricks (C3D8) lap over a face whose nodes match.  The far end of the lower one is
+clamped.  That of the upper one is held across and pulled along X.  A bolt is an even pressure
+below its two washers, equal and opposite; the plates have no holes.  Both programs have the same
+bricks, the same softness of the pairs and the same load steps.
+
+`python -m calibration.finite_elements.flange` compares dissipation, stiffness and open area.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from calibration.finite_elements.bricks import (
+    MODULUS,
+    SOFTNESS,
+    TIGHTENED,
+    Box,
+    area,
+    box,
+    cards_of,
+    contact,
+    displacement_there,
+    material,
+    matrix,
+    run,
+    seconds_of_programs,
+    shares,
+    steps,
+)
+from calibration.finite_elements.cards import card, node_set
+from calibration.finite_elements.program import find_program, version
+from calibration.finite_elements.results import read
+from calibration.provenance import provenance
+from jbeamshell.contact_face.body import FaceBody
+from jbeamshell.contact_face.solve import solve_faces
+
+RECORD = Path(__file__).with_name("flange.json")
+LAP, FREE, WIDTH, THICK = 60.0, 20.0, 30.0, 8.0  # mm; of the lap, beyond it, across, of a plate
+BOLTS = ((15.0, 15.0), (45.0, 15.0))  # their middles, from the lap's corner
+WASHER = 9.0  # its radius
+LOAD: dict[str, Any] = {"friction": 0.2, "amplitude": 2000.0, "bolts": 8000.0, "cycles": 1}
+
+
+class Plate(NamedTuple):
+    """Plate with its face and its loads.
+
+    Attributes
+    ----------
+    bricks : nodes and bricks
+    face : (n,) numbers of the nodes of the lap
+    far : (k,) numbers of the nodes of the far end
+    press : for each bolt, (k, 3) node, direction and force of its washer
+    """
+
+    bricks: Box
+    face: np.ndarray
+    far: np.ndarray
+    press: list[np.ndarray]
+
+
+class Flange(NamedTuple):
+    """Lap of two plates: the plates, the areas (n,) of the face, and the pull (k, 3)."""
+
+    upper: Plate
+    lower: Plate
+    areas: np.ndarray
+    pull: np.ndarray
+
+
+def flange(lap: tuple[int, int], layers: int) -> Flange:
+    """Flange of ``lap`` bricks along and across the lap, and ``layers`` through a plate."""
+    beyond = round(lap[0] * FREE / LAP)
+    counts, sizes = (lap[0] + beyond, lap[1], layers), (LAP * (1 + beyond / lap[0]), WIDTH, THICK)
+    above = box(counts, sizes)
+    start = (LAP - sizes[0], 0.0, -THICK)
+    below = box(counts, sizes, start, first=int(above.number.max()) + 1)
+    on_upper, on_lower = above.number[: lap[0] + 1], below.number[beyond:]
+    areas = shares(lap, (LAP, WIDTH))
+    end = above.number[-1]
+    pull = np.column_stack(
+        [end.ravel(), np.full(end.size, 1), shares(counts[1:], sizes[1:]) / (WIDTH * THICK)]
+    )
+    upper, lower = (
+        Plate(made, face.ravel(), far.ravel(), [washer(made, outer, at, sign) for at in BOLTS])
+        for made, face, far, outer, sign in (
+            (above, on_upper[:, :, 0], end, on_upper[:, :, -1], -1.0),
+            (below, on_lower[:, :, -1], below.number[0], on_lower[:, :, 0], 1.0),
+        )
+    )
+    return Flange(upper, lower, areas, pull)
+
+
+def washer(made: Box, outer: np.ndarray, middle: tuple[float, float], sign: float) -> np.ndarray:
+    """Unit force (k, 3) along Z, even over the nodes of an outer face below a washer."""
+    counts = outer.shape[0] - 1, outer.shape[1] - 1
+    distance = np.linalg.norm(made.at(outer)[..., :2] - middle, axis=-1)
+    inside = distance.ravel() <= WASHER * (1.0 + 1e-9)
+    part = shares(counts, (LAP, WIDTH))[inside]
+    nodes = outer.ravel()[inside]
+    return np.column_stack([nodes, np.full(nodes.size, 3), sign * part / np.sum(part)])
+
+
+def bodies_of(made: Flange, folder: Path) -> tuple[FaceBody, FaceBody]:
+    """Upper and lower plate on their face, their matrices from CalculiX."""
+    upper, lower = (
+        FaceBody.of(
+            matrix(cards_of(plate.bricks, "PLATE") + material() + held, folder),
+            np.column_stack([plate.face, plate.bricks.at(plate.face)]),
+            pull=pull,
+            press=plate.press,
+            areas=made.areas,
+        )
+        for plate, held, pull in (
+            (made.upper, supports(made.upper, 2), made.pull),
+            (made.lower, supports(made.lower, 1), None),
+        )
+    )
+    return upper, lower
+
+
+def supports(plate: Plate, first: int) -> str:
+    """Supports of the far end in the directions from ``first`` to 3."""
+    return card("BOUNDARY", ((node, first, 3) for node in plate.far))
+
+
+def contact_deck(made: Flange, loads: np.ndarray) -> str:
+    """Deck of the contact: pressing, then the loads (levels,), a step for each."""
+    upper, lower = made.upper, made.lower
+    first = len(upper.bricks.bricks) + 1
+    above = 1 + upper.bricks.with_corner_in(upper.face, slice(4))
+    below = first + lower.bricks.with_corner_in(lower.face, slice(4, 8))
+    press = [np.concatenate(both) for both in zip(upper.press, lower.press, strict=True)]
+    return (
+        cards_of(upper.bricks, "UPPER")
+        + cards_of(lower.bricks, "LOWER", first)
+        + material()
+        + node_set("END", upper.far)
+        + node_set("TOP", upper.face)
+        + node_set("BOTTOM", lower.face)
+        + supports(upper, 2)
+        + supports(lower, 1)
+        + contact(LOAD["friction"], above, below)
+        + steps(press, made.pull, LOAD["bolts"], loads, "END", "TOP", "BOTTOM")
+    )
+
+
+def gaps_there(made: Flange, text: str) -> np.ndarray:
+    """Gaps (levels, n) of the pairs after the pressing."""
+    printed = read(text)
+    above, below = (
+        table.values[TIGHTENED - 1 :, np.searchsorted(table.nodes, face), 2]
+        for table, face in (
+            (printed["U", "TOP"], made.upper.face),
+            (printed["U", "BOTTOM"], made.lower.face),
+        )
+    )
+    return above - below
+
+
+def compare(lap: tuple[int, int], layers: int, steps_per_half_cycle: int) -> dict[str, Any]:
+    """Figures of the last cycle here and by CalculiX, and seconds of the processor."""
+    made = flange(lap, layers)
+    options = LOAD | {
+        "steps_per_half_cycle": steps_per_half_cycle,
+        "softness": SOFTNESS,
+        "throw": False,
+    }
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        upper, lower = bodies_of(made, folder)
+        jax.block_until_ready(solve_faces(upper, lower, **options).loads)
+        begin = time.process_time()
+        history = jax.block_until_ready(solve_faces(upper, lower, **options))
+        ours = time.process_time() - begin
+        deck = contact_deck(made, np.asarray(history.force)[1:])
+        begin = seconds_of_programs()
+        text = run(deck, folder, "contact")
+        theirs = seconds_of_programs() - begin
+    start, turn, stop = history.cycles[-1]
+    force = np.asarray(history.force)
+    both = {
+        "here": (np.asarray(history.displacement), np.asarray(history.open_area)),
+        "calculix": (
+            displacement_there(made.pull, "END", text),
+            (gaps_there(made, text) > 0.0) @ made.areas,
+        ),
+    }
+    found: dict[str, Any] = {
+        "pairs": int(made.areas.size),
+        "steps_per_half_cycle": steps_per_half_cycle,
+        "softness_times_modulus": SOFTNESS * MODULUS,
+        "seconds_here": ours,
+        "seconds_calculix": theirs,
+        "slipping": float(np.mean(history.slipping[turn])),
+    }
+    for key, (moved, opened) in both.items():
+        loop = slice(start, stop + 1)
+        found[key] = {
+            "dissipation": area(force[loop], moved[loop]),
+            "secant_stiffness": float(np.ptp(force[loop]) / np.ptp(moved[loop])),
+            "open_area_end": float(opened[stop]),
+            "open_area_turn": float(opened[turn]),
+        }
+    return found
+
+
+def main(lap: tuple[int, int] = (18, 8), layers: int = 1, steps_per_half_cycle: int = 8) -> None:
+    """Compare, print and record."""
+    jax.config.update("jax_enable_x64", True)
+    found = compare(lap, layers, steps_per_half_cycle)
+    print(f"{found['pairs']} pairs, {found['slipping']:.0%} of them slip at the turn")
+    for key, value in found["here"].items():
+        there = found["calculix"][key]
+        off = f", CalculiX {there / value - 1.0:+.2%}" if value else ""
+        print(f"  {key.replace('_', ' ')}: here {value:.6g}, CalculiX {there:.6g}{off}")
+    times = found["seconds_calculix"], found["seconds_here"]
+    print(f"  seconds of the processor: CalculiX {times[0]:.1f}, here {times[1]:.3f}")
+    record = {"provenance": provenance(), "program": version(find_program()), "load": LOAD}
+    RECORD.write_text(json.dumps(record | found, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    words = [int(word) for word in sys.argv[1:]]
+    main((words[0], words[1]), *words[2:]) if words else main()
