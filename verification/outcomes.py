@@ -1,4 +1,4 @@
-"""What becomes of runs: right, slow, wrong or failed; and charts of the record of failure_map.py.
+"""Outcomes of runs: right, slow, wrong or failed; and charts of the record of failure_map.py.
 
 A cell of the record is a row of figures of one run: the ratio of its dissipation to the bar's, the
 estimates of the errors from the grid and from the corner, the closure of the loop, the Newton

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Source:
-    """Where numbers come from.
+    """Source of numbers.
 
     Attributes
     ----------

@@ -191,7 +191,7 @@ def screws(folder: Path) -> Figures:
 
 
 def plainly(force: Floats, displacement: Floats) -> Figures:
-    """What ``jbeamshell fit FILE --model iwan4`` ends with."""
+    """Ending of ``jbeamshell fit FILE --model iwan4``."""
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / "test.csv"
         rows = zip(displacement.tolist(), force.tolist(), strict=True)

@@ -57,7 +57,8 @@ class FaceBody(eqx.Module):
     stiffness : (3n, 3n) K, in the frames of `frames`
     forces : (3n, m) f, of the pull and of m - 1 pressures
     flexibility : (m, m) c; zero if left out
-    areas : (n,) contact areas; equal parts of the face's extent if left out
+    areas : (n,) contact areas; 1 if left out, so that pressures are forces, and softness is
+        displacement per force
     fixed : (3n,) True for displacements that a support holds; none if left out
 
     Raises
@@ -165,7 +166,7 @@ class FaceBody(eqx.Module):
         press : for each bolt or pressure, (k, 3) node, direction and force
         held : (k, 2) node and direction of supports that the matrix still has
         normals : (3,) or (n, 3), from the body below to the one above
-        areas : (n,) contact areas
+        areas : (n,) contact areas; 1 if left out
 
         Raises
         ------

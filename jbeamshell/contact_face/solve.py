@@ -42,7 +42,7 @@ FIX = "take a smaller amplitude or more steps, or control='displacement'"
 
 
 class Levels(NamedTuple):
-    """What a path leaves at each step."""
+    """Levels of a path: loads, displacements, slip and forces at each step."""
 
     load: Array
     w: Array
@@ -431,7 +431,10 @@ def _demand(history: FaceHistory) -> None:
         return
     first = int(np.argmax(failed))
     if first == 0:
-        raise UnconvergedError(f"bolts: no equilibrium while they are tightened; {FIX}")
+        raise UnconvergedError(
+            "bolts: no equilibrium while they are tightened; most likely nothing holds a body "
+            "along the face: hold it, or give more friction"
+        )
     raise UnconvergedError(
         f"step {first}: no equilibrium after {ITERATIONS} iterations; most likely all of the "
         f"contact slides: {FIX}"

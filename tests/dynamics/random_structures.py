@@ -194,7 +194,7 @@ def checked_mode(draw):
 
 
 def period_missed(structure, shape, harmonic, motion):
-    """What a period in time misses: to close (2n,), and the first harmonic of the mode (2,)."""
+    """Misses of a period in time: its ends (2n,), and the first harmonic of the mode (2,)."""
     size = structure.size
     x, v, (omega, extra) = motion[:size], motion[size : 2 * size], motion[2 * size :]
     span = 2.0 * np.pi / omega
