@@ -23,7 +23,7 @@ from jbeamshell.contact_face.pair import Pairs, contact_force
 TOLERANCE = 1e-11  # force out of balance over the largest load of a node
 ITERATIONS = 40
 SHORTER = 0.5 ** np.arange(1.0, 7.0)  # lengths that are tried where a whole Newton step fails
-PARTS = 8  # sizes of the part of a face that is solved for
+PARTS = 16  # sizes of the part of a face that is solved for
 
 
 class Face(NamedTuple):
@@ -99,34 +99,34 @@ def _off_balance(face: Face, v: Array, slip: Array, load: Array) -> Array:
 def _newton_step(face: Face, v: Array, slip: Array, load: Array, off: Array) -> Array:
     """Step (n, 3) of Newton's method.
 
-    The residual of a pair that sticks names its own displacement alone.  The other pairs are
-    solved for beside it, on the least part of the face that holds them all.
+    Many rows of the residual name one displacement alone: all those of a pair that sticks, and the
+    normal one of a pair that slides.  The other displacements are solved for beside them, on the
+    least part of the face that holds them all.
     """
-    n, scales = v.shape[0], face.scales
-    force = face.reaction(v, load)
+    n, size = v.shape[0], v.size
     slopes = jax.vmap(jax.jacfwd(contact_force, (0, 1)))
-    by_force, by_move = slopes(force, v, slip, face.pairs)
-    by_force = jnp.where(face.held[:, :, None], np.eye(3), by_force)
-    by_move = jnp.where(face.held[:, :, None], -scales[:, :, None] * np.eye(3), by_move)
-    free = np.eye(3) - by_force
-    sticks = jnp.all(free == 0.0, axis=(1, 2))
-    known = jnp.where(sticks[:, None], -off / scales, 0.0)
+    by_force, by_move = slopes(face.reaction(v, load), v, slip, face.pairs)
+    held = face.held[:, :, None]
+    free = jnp.where(held, 0.0, np.eye(3) - by_force)
+    own = jnp.where(held, face.scales[:, :, None] * np.eye(3), -by_move)
+    alone = jnp.all(free == 0.0, axis=2)
+    known = jnp.where(alone, -off / face.scales, 0.0)
     pushed = (face.stiffness @ known.ravel()).reshape(n, 3)
-    rest = -off - jnp.einsum("nij,nj->ni", free, pushed)
-    blocks = face.stiffness.reshape(n, 3, n, 3)
-    order = jnp.argsort(sticks, stable=True)
-    parts = sorted({-(-n * part // PARTS) for part in range(1, PARTS + 1)})
+    moved = jnp.einsum("nij,nj->ni", free, pushed) + jnp.einsum("nij,nj->ni", own, known)
+    rest = jnp.where(alone, 0.0, -off - moved).ravel()
+    order = jnp.argsort(alone.ravel(), stable=True)
+    parts = sorted({-(-size * part // PARTS) for part in range(1, PARTS + 1)})
 
     def on_part(count: int) -> Array:
-        pairs = order[:count]
-        stiffness = jnp.take(jnp.take(blocks, pairs, axis=0), pairs, axis=2)
-        matrix = jnp.einsum("nij,njmk->nimk", free[pairs], stiffness)
-        at = np.arange(count)
-        matrix = matrix.at[at, :, at, :].add(-by_move[pairs]).reshape(3 * count, 3 * count)
-        found = jnp.linalg.solve(matrix, rest[pairs].ravel())
-        return known.at[pairs].set(found.reshape(count, 3))
+        chosen = order[:count]
+        pair, way = chosen // 3, chosen % 3
+        rows = jnp.einsum("rj,rjk->rk", free[pair, way], face.stiffness.reshape(n, 3, size)[pair])
+        matrix = jnp.take(rows, chosen, axis=1)
+        matrix += jnp.where(pair[:, None] == pair, own[pair, way][:, way], 0.0)
+        found = jnp.linalg.solve(matrix, rest[chosen])
+        return known.ravel().at[chosen].add(found).reshape(n, 3)
 
-    branch = jnp.searchsorted(np.array(parts), n - jnp.sum(sticks))
+    branch = jnp.searchsorted(np.array(parts), size - jnp.sum(alone))
     return lax.switch(branch, [lambda count=count: on_part(count) for count in parts])
 
 
