@@ -314,7 +314,7 @@ CASES = (
         LAYER,
         "half of the length of contact over the height",
         "plane strain; no friction; patch of 1/20 of the half height",
-        float(reference.strip_contact_length(1.0, "rigid")),
+        lambda: float(reference.strip_contact_length(1.0, "rigid")),
         pressed_at_a_point,
         0.02,
     ),

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import functools
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from calibration.comparisons.case import Case, Floats, Source
 from calibration.comparisons.measurements import RECORD
+from calibration.running import read
+from calibration.studies import brake_reuss
 from jbeamshell import identify, laws, reference
 from jbeamshell.measured import DissipationCurve
 
@@ -56,30 +59,6 @@ ORION = Source(
     "MIT, five numbers quoted",
 )
 TORQUES, GROWTH = np.array([80.0, 30.0, 20.0, 10.0]), np.array([3.4628, 7.0892, 16.4968, 46.1316])
-# Of brake_reuss.json of the studies: largest response to each force, micrometres.
-MASS = 1.99222  # kg, of the mode
-SHAKEN = np.array(  # force N, amplitude m and frequency Hz at phase resonance
-    [
-        [0.0295922, 1.95623e-05, 80.3654],
-        [0.150221, 7.9241e-05, 80.1827],
-        [0.278506, 1.1746e-04, 80.1772],
-        [0.485852, 1.5842e-04, 80.1082],
-        [0.768888, 1.97673e-04, 80.2466],
-        [1.11116, 2.36456e-04, 80.3289],
-        [1.56637, 2.75738e-04, 80.3937],
-        [2.07349, 3.14807e-04, 80.4384],
-    ]
-)
-DECAYED = np.array(  # amplitude m, frequency Hz and damping ratio of the decay
-    [
-        [2.28731e-05, 80.4631, 0.00179377],
-        [3.19488e-05, 80.4514, 0.00189046],
-        [4.46225e-05, 80.4394, 0.00204015],
-        [6.2298e-05, 80.4054, 0.00233098],
-    ]
-)
-SWEEPS = [19.5623, 79.241, 83.982, 117.46, 158.42, 164.704]
-PREDICTED = [16.9082, 65.5936, 69.1279, 107.511, 167.071, 169.713]
 
 
 @functools.cache
@@ -122,24 +101,53 @@ def honest() -> int:
     return sum(answer["exit_code"] in (2, 3) for answer in recorded("screws")["answers"].values())
 
 
+@functools.cache
+def bolted() -> dict[str, Any]:
+    """Record of the study of the bolted beam."""
+    return read(Path(brake_reuss.__file__).with_suffix(".json"))
+
+
+def swept() -> Floats:
+    """Amplitudes at resonance, m, of the sweeps that the fitted joint reaches."""
+    rows = bolted()["found"]["predictions"]
+    return np.sort([row["amplitude"] for row in rows if "predicted_amplitude" in row])
+
+
+def by_decay() -> Floats:
+    """The same by the joint that the study fitted to the decay, solved again."""
+    model = brake_reuss.start(bolted()["modal_mass"]).replace(bolted()["found"]["values"])
+    rows = brake_reuss.predicted(model, bolted())
+    known = sorted((r for r in rows if "predicted_amplitude" in r), key=lambda r: r["amplitude"])
+    return np.array([row["predicted_amplitude"] for row in known])
+
+
 def restoring(amplitude: Floats, frequency: Floats) -> Floats:
     """Amplitude of the restoring force of the beam's mode."""
-    return np.asarray(MASS * (2.0 * np.pi * frequency) ** 2 * amplitude)
+    return np.asarray(bolted()["modal_mass"] * (2.0 * np.pi * frequency) ** 2 * amplitude)
 
 
-def lost_in_decay() -> Floats:
-    """Energy lost in a cycle of the decay."""
-    amplitude, frequency, damping = DECAYED.T
-    return 2.0 * np.pi * damping * restoring(amplitude, frequency) * amplitude
+def shaken() -> tuple[Floats, Floats]:
+    """Restoring force and energy of a cycle of the sweeps with controlled response."""
+    rows = bolted()["resonances"]["ResponseControl"]
+    force, amplitude, frequency = (
+        np.array([row[name] for row in rows]) for name in ("force", "amplitude", "frequency")
+    )
+    return restoring(amplitude, frequency), np.pi * force * amplitude
+
+
+def decayed() -> tuple[Floats, Floats]:
+    """The same of the decay, at every other amplitude that the sweeps reach."""
+    columns = (np.array(bolted()["ring_down"][n]) for n in ("amplitude", "frequency", "damping"))
+    amplitude, frequency, damping = (column[13::2] for column in columns)
+    force = restoring(amplitude, frequency)
+    return force, 2.0 * np.pi * damping * force * amplitude
 
 
 def by_sweeps() -> Floats:
-    """The same by a power law that is fitted to the sweeps."""
-    force, amplitude, frequency = SHAKEN.T
-    curve = DissipationCurve(restoring(amplitude, frequency), np.pi * force * amplitude)
-    (row,) = identify.compare([curve], ["power-law"]).rows
+    """Energy of a cycle of the decay by a power law that is fitted to the sweeps."""
+    (row,) = identify.compare([DissipationCurve(*shaken())], ["power-law"]).rows
     assert row.fit is not None
-    return np.asarray(row.fit.law.dissipation_at_force(restoring(*DECAYED[:, :2].T)))
+    return np.asarray(row.fit.law.dissipation_at_force(decayed()[0]))
 
 
 def pair(
@@ -161,13 +169,13 @@ def pair(
             f"{words} of the tests that were not fitted",
             condition,
             functools.partial(held_out, study, name),
-            functools.partial(read, study),
+            functools.partial(figure, study),
             bound,
             explained=why,
             fitted=fitted,
             held_out=share,
         )
-        for name, words, read, bound, why in (
+        for name, words, figure, bound, why in (
             ("energy", "energy lost in a cycle", energy, bounds[0], explained[0]),
             ("force", "largest force", force, bounds[1], explained[1]),
         )
@@ -233,11 +241,11 @@ CASES = (
         "bolted beam, ring-down to sweeps",
         "measured",
         BEAM,
-        "amplitude at resonance under six forces of a shaker, micrometres",
-        "first bending of the Brake-Reuss beam; of a study's record; six larger forces are beyond "
-        "the joint that the decay tells, and refused",
-        SWEEPS,
-        lambda: PREDICTED,
+        "amplitude at resonance under six forces of a shaker",
+        "first bending of the Brake-Reuss beam; the joint of a study's record, solved again; six "
+        "larger forces are beyond the joint that the decay tells, and refused",
+        swept,
+        by_decay,
         0.20,
         explained="with the shaker the beam is softer and damps less from the smallest force on",
         fitted="the ring-down's frequency and damping, by a strip between springs",
@@ -249,7 +257,7 @@ CASES = (
         BEAM,
         "energy lost in a cycle of the decay, four amplitudes that the sweeps reach too",
         "first bending of the Brake-Reuss beam; a power law of the mode's restoring force",
-        lost_in_decay,
+        lambda: decayed()[1],
         by_sweeps,
         0.45,
         explained="the shaken beam damps 15 % less than the free one at the same amplitude, and a "

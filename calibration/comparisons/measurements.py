@@ -13,7 +13,7 @@ import csv
 import io
 import json
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +21,17 @@ import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy.optimize import least_squares
 
 import jbeamshell as jb
 from calibration.comparisons.case import Floats, rounded
-from jbeamshell import identify, laws, plotting
+from jbeamshell import dynamics, identify, laws, plotting
 from jbeamshell.cli.main import main as command
 from jbeamshell.common.files import write_text
+from jbeamshell.identify import Parameter
 from jbeamshell.measured import (
     Backbone,
+    DampingCurve,
+    FrequencyCurve,
     Loop,
     Recording,
     read_recordings,
@@ -183,8 +185,11 @@ def cable(folder: Path) -> Figures:
 
 def screws(folder: Path) -> Figures:
     """Cyclic shear tests of screwed sheets by the plain line: exit code and last words of each."""
+    paths = sorted(folder.glob("Tao_2016_*-C*.json")) + sorted(folder.glob("Peterman*.json"))
+    if not paths:
+        raise FileNotFoundError(f"no Tao_2016_*-C*.json or Peterman*.json in {folder}")
     found = {}
-    for path in sorted(folder.glob("Tao_2016_*-C*.json")) + sorted(folder.glob("Peterman*.json")):
+    for path in paths:
         test = json.loads(path.read_text("utf-8"))["test"]
         found[path.stem] = plainly(np.array(test["force"]), np.array(test["displacement"]))
     return {"answers": found}
@@ -204,28 +209,37 @@ def plainly(force: Floats, displacement: Floats) -> Figures:
 
 
 def backbones(folder: Path) -> Figures:
-    """Computed frequency and damping of a bolted beam: every other amplitude is fitted.
-
-    A mode of unit mass on a spring and a four-parameter Iwan element, with a damping ratio of its
-    own: the stiffness is ``K + F(a)/a`` and the damping ratio ``z + D(a)/(2 pi k a^2)``.
-    """
+    """Computed frequency and damping of a bolted beam: every other amplitude is fitted."""
     found: Figures = {}
     for kind in ("flat", "meso"):
         lines = (folder / f"brb_epmc_{kind}.yaml").read_text("utf-8").splitlines()
         columns = {key.strip(): np.array(json.loads(text)) for key, text in map(_halves, lines)}
         names = ("modal_amplitude", "frequency_rad_per_s", "damping_factor_frac_crit")
         amplitude, omega, damping = (columns[name] for name in names)
-        best = min(
-            (_mode(amplitude[::2], omega[::2], damping[::2], share) for share in (0.3, 0.5, 0.8)),
-            key=lambda fit: fit.cost,
-        )
-        frequency, ratio = map(
-            np.asarray, _modal(jnp.asarray(best.x), jnp.asarray(amplitude[1::2]))
-        )
+        frequency = omega / (2.0 * np.pi)
+        curves = [
+            FrequencyCurve(amplitude[::2], frequency[::2]),
+            DampingCurve(amplitude[::2], damping[::2]),
+        ]
+        half = 0.5 * omega[0] ** 2
+        start = {
+            "spring": half,
+            "slip_force": half * amplitude[-1],
+            "stiffness": half,
+            "beta": 1.0,
+            "damping_ratio": damping[0],
+        }
+        free = [Parameter("structure.chi_above", low=1e-3, high=1.0)]
+        model = identify.Assembly(mode, None, start | {"chi_above": 0.7}, point=0)
+        fit = identify.fit(curves, model, [*free, *(f"structure.{name}" for name in start)])
+        assert isinstance(fit.scene, identify.Assembly)
+        curve = fit.scene.curve(amplitude[1::2])
         found[kind] = {
-            "chi": float(best.x[3]),
-            "frequency_over_theirs": rounded(frequency / omega[1::2]),
-            "damping_over_theirs": rounded(ratio / damping[1::2]),
+            "values": fit.values,
+            "misfit": fit.misfit,
+            "describes": bool(fit.describes),
+            "frequency_over_theirs": rounded(np.asarray(curve.frequency) / frequency[1::2]),
+            "damping_over_theirs": rounded(np.asarray(curve.damping) / damping[1::2]),
         }
     return found
 
@@ -234,29 +248,12 @@ def _halves(line: str) -> list[str]:
     return line.split(":", 1)
 
 
-@jax.jit
-def _modal(numbers: jax.Array, amplitude: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Frequency and damping ratio of the mode; all numbers but chi are logarithms."""
-    spring, slip, stiffness, chi, beta, own = numbers
-    law = laws.Iwan4(jnp.exp(slip), jnp.exp(stiffness), chi, jnp.exp(beta))
-    whole = jnp.exp(spring) + jax.vmap(law.backbone)(amplitude) / amplitude
-    lost = jax.vmap(law.dissipation)(amplitude) / (2.0 * jnp.pi * whole * amplitude**2)
-    return jnp.sqrt(whole), jnp.exp(own) + lost
-
-
-def _mode(amplitude: Floats, omega: Floats, damping: Floats, share: float) -> Any:
-    """Least squares of .1 % of the frequency and 3 % of the damping, from a joint's share."""
-
-    def residual(numbers: Floats) -> Floats:
-        frequency, ratio = _modal(jnp.asarray(numbers), jnp.asarray(amplitude))
-        off = (np.asarray(frequency) / omega - 1.0) / 1e-3
-        return np.append(off, np.log(np.asarray(ratio) / damping) / 0.03)
-
-    joint = share * omega[0] ** 2
-    start = [np.log((1.0 - share) * omega[0] ** 2), np.log(3e-5 * joint), np.log(joint)]
-    start += [-0.3, 0.0, np.log(damping[0])]
-    bounds = [-5.0, -20.0, -5.0, -0.999, -12.0, -20.0], [30.0, 20.0, 30.0, 0.0, 5.0, 0.0]
-    return least_squares(residual, start, bounds=bounds)
+def mode(_: Any, numbers: Mapping[str, jax.Array]) -> dynamics.Structure:
+    """Mode of unit mass on a spring and a four-parameter Iwan element, with damping of its own."""
+    names = ("slip_force", "stiffness", "beta")
+    law = laws.Iwan4(chi=numbers["chi_above"] - 1.0, **{name: numbers[name] for name in names})
+    spring, joint = jnp.reshape(numbers["spring"], (1, 1)), dynamics.Attachment(law, 0)
+    return dynamics.Structure([[1.0]], spring, [joint], damping_ratio=numbers["damping_ratio"])
 
 
 STUDIES: dict[str, Callable[[Path], Figures]] = {

@@ -7,26 +7,26 @@ from collections.abc import Callable
 import numpy as np
 
 import jbeamshell as jb
+from calibration.comparisons import bodies
 from calibration.comparisons.case import Case, Floats, Source
-from calibration.comparisons.closed_forms import cylinder, stuck_parts
+from calibration.comparisons.closed_forms import cylinder
 from calibration.comparisons.measured import recorded
-from jbeamshell import laws, reference
+from jbeamshell import dynamics, laws, reference
 
 CONTACT = Source(
     "E. Vollebregt, CONTACT, case cattaneo, https://github.com/eve70a/CONTACT at d431cdb",
-    "Apache-2.0, one figure quoted",
-    "Not opened again here: the figure is quoted from notes of this project on it.",
+    "Apache-2.0, one figure quoted from examples/cattaneo.ref_out",
 )
 LEVEL_SET = Source(
-    "LevelSetWear, cylinder on flat, https://github.com/illavori/LevelSetWear at f5a3cad",
-    "BSD-3-Clause, figures quoted",
-    "Not opened again here: the figure is quoted from notes of this project on it.",
+    "I. Llavori, LevelSetWear, https://github.com/illavori/LevelSetWear at f5a3cad, "
+    "figures/fig11_surface_mindlin, contact_standard.csv and contact_level_set.csv",
+    "BSD-3-Clause, figures quoted, means of both sides",
 )
 FRONTISTR = Source(
     "FrontISTR, NAFEMS contact patch test CGS-4, "
     "https://gitlab.com/FrontISTR-Commons/FrontISTR/-/merge_requests/599",
-    "MIT, figures quoted",
-    "Read in the text of the merge request; its input files were not run.",
+    "MIT (its License.txt was read), figures quoted",
+    "Read in the text of the merge request; the case is not in the repository, so it was not run.",
 )
 TMDSIMPY = Source(
     "J. H. Porter, tmdsimpy, https://github.com/tmd-lab/tmdsimpy at 17d5fc3; its VectorIwan4 with "
@@ -42,9 +42,18 @@ OPENSEES = Source(
     "OpenSees 3.7.1 (openseespy 3.7.1.2), uniaxialMaterial BoucWen in 4000 steps for each branch",
     "figures of own runs",
 )
+PYHARM = Source(
+    "Safran, pyHarm 1.2.2 (pyharm-os on PyPI), element Jenkins, harmonics 0 to 9, 1024 samples, "
+    "each frequency solved from its linear start",
+    "Apache-2.0, figures of own runs",
+)
 SLOPE, FRICTION = 0.1, 0.3  # of the patch test
 IWAN = (1000.0, 2e6, -0.5, 0.3)  # F_S, K_T, chi, beta
 AMPLITUDES = np.array([1e-4, 3e-4, 6e-4, 9e-4, 2e-3])
+PLACES = np.array([0.0, 0.328458, 0.547429, 0.766401])  # over half of the width of the contact
+ABAQUS = [0.29451, 0.31995, 0.38492, 0.61452, 0.02710, 0.03453, 0.05597, 0.16861, 0.99760]
+IMMERSED = [0.29313, 0.31859, 0.39064, 0.63802, 0.02665, 0.03419, 0.06287, 0.17577, 0.99705]
+DRIVEN = {0.1: (1.1, 1.15, 1.2, 1.25, 1.3), 0.4: (0.9, 1.0, 1.05, 1.1, 1.3)}  # rad/s by force
 TURNS = np.array([0.05, -0.03, 0.04, -0.05, 0.05])  # nested reversals
 
 
@@ -65,6 +74,20 @@ def sphere() -> float:
     return float(law.displacement(0.875 * slip))
 
 
+def sheared() -> Floats:
+    """Shear of a cylinder at `PLACES`, at half of gross slip and back at no force, and pressure."""
+    history = cylinder()
+    start, turn, _ = history.cycles[-1]
+    rest = start + int(np.argmin(np.abs(np.asarray(history.force[start : turn + 1]))))
+    x, peak = np.asarray(history.x), bodies.FRICTION * 2.0 / np.pi  # Hertz, for a load of 1 on 2
+    sense = np.sign(np.asarray(history.traction[start, x.size // 2]))
+    shear = [
+        0.5 * (np.interp(PLACES, x, row) + np.interp(-PLACES, x, row)) * sense / peak
+        for row in np.asarray(history.traction)[[start, rest]]
+    ]
+    return np.append(shear, np.max(np.asarray(history.reaction[0])) * np.pi / 2.0)
+
+
 def iwan() -> Floats:
     """Energy of a cycle, and largest force, of five amplitudes."""
     law = laws.Iwan4(*IWAN)
@@ -80,6 +103,21 @@ def bouc_wen() -> Floats:
         for bend in (0.5, 0.8)
     ]
     return np.concatenate([np.asarray(force) for force in forces])
+
+
+def oscillator() -> Floats:
+    """Amplitude of a unit mass on a spring and a slider, below, at and above its resonance."""
+    slider = dynamics.Attachment(laws.Jenkins(slip_force=0.3, stiffness=0.6), 0)
+    structure = dynamics.Structure([[1.0]], [[1.0]], [slider], damping=[[0.02]])
+    return np.array(
+        [
+            dynamics.level_response(
+                structure, [1.0], omega / (2.0 * np.pi), (0.02, force)
+            ).amplitude[-1]
+            for force, row in DRIVEN.items()
+            for omega in row
+        ]
+    )
 
 
 def beam(kind: str, what: str) -> tuple[Callable[[], Floats], Callable[[], Floats]]:
@@ -130,25 +168,24 @@ CASES = (
         sphere,
         0.005,
     ),
-    Case(
-        "cylinder of LevelSetWear",
-        "other program",
-        LEVEL_SET,
-        "part that sticks at half of gross slip, part without counter-slip back at no force",
-        "their finite elements of a cylinder, our half-planes of equal material on 161 nodes",
-        [0.70711, 0.86603],
-        stuck_parts,
-        0.005,
-    ),
-    Case(
-        "largest pressure of LevelSetWear",
-        "other program",
-        LEVEL_SET,
-        "largest pressure under a cylinder over that of the mean over its width",
-        "their finite elements, 120 N/mm on a half width of .091336 mm; our half-planes",
-        836.41 / (120.0 / (2.0 * 0.091336)),
-        lambda: 2.0 * float(np.max(np.asarray(cylinder().reaction[0]))),
-        0.01,
+    *(
+        Case(
+            f"cylinder of {name}",
+            "other program",
+            LEVEL_SET,
+            "shear over the coefficient of friction and the largest pressure of Hertz, at four "
+            "places, at half of gross slip and back at no force; largest pressure likewise",
+            f"{what}, 18 elements over the contact; our half-planes of equal material on 161 nodes",
+            theirs,
+            sheared,
+            bound,
+            each=False,
+            explained="their elements are wide at the ends of the zones of slip",
+        )
+        for name, what, theirs, bound in (
+            ("Abaqus", "contact by penalty", ABAQUS, 0.04),
+            ("LevelSetWear", "immersed contact, dual mortars", IMMERSED, 0.03),
+        )
     ),
     Case(
         "four-parameter Iwan of tmdsimpy",
@@ -180,6 +217,29 @@ CASES = (
         0.75,
         "patches of a wavy interface let go one by one; damping grows nearly with the square of "
         "the amplitude, and no law of sliders with chi <= 0 does",
+    ),
+    Case(
+        "slider under vibration of pyHarm",
+        "other program",
+        PYHARM,
+        "amplitude of a unit mass on a spring and a slider, five frequencies under each of two "
+        "forces, .1 in micro-slip and .4 in gross slip",
+        "k = 1, c = .02, slider of stiffness .6 that slips at .3; theirs harmonic balance of all "
+        "harmonics, ours of the odd ones",
+        [
+            0.25600326375521393,
+            0.35912894046648886,
+            0.6175197345101072,
+            0.6320241215043271,
+            0.5741713438898914,
+            0.5070428746903374,
+            1.8993348119523423,
+            3.0128509951024336,
+            2.100762467339873,
+            0.9420196654482207,
+        ],
+        oscillator,
+        0.001,
     ),
     Case(
         "Bouc-Wen of OpenSees",

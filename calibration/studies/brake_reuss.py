@@ -161,10 +161,9 @@ def fitted(record: Mapping[str, Any]) -> Fit:
     return identify.fit(data, start(record["modal_mass"]), free)
 
 
-def predicted(fit: Fit, record: Mapping[str, Any]) -> list[dict[str, float]]:
+def predicted(model: Assembly, record: Mapping[str, Any]) -> list[dict[str, float]]:
     """Largest response to each force at phase resonance, by harmonic balance."""
-    assert isinstance(fit.scene, Assembly)
-    structure, rows = beam(fit.scene.scene, fit.scene.numbers, FARTHEST), []
+    structure, rows = beam(model.scene, model.numbers, FARTHEST), []
     for kind, resonances in record["resonances"].items():
         for one in resonances:
             row = {"response_control": float(kind == "ResponseControl")} | one
@@ -183,6 +182,7 @@ def predicted(fit: Fit, record: Mapping[str, Any]) -> list[dict[str, float]]:
 def figures(record: Mapping[str, Any]) -> tuple[dict[str, Any], Fit]:
     """Figures of the study, and the fit."""
     fit = fitted(record)
+    assert isinstance(fit.scene, Assembly)
     frequency, damping = (
         getattr(model, model.form.y) / getattr(data, data.form.y) - 1.0
         for model, data in zip(fit.model, fit.data, strict=True)
@@ -195,7 +195,7 @@ def figures(record: Mapping[str, Any]) -> tuple[dict[str, Any], Fit]:
         "worst_frequency": float(np.max(np.abs(frequency))),
         "fitted": {model.form.y: rounded(getattr(model, model.form.y)) for model in fit.model},
         "largest_of_ring_down": max(record["ring_down"]["amplitude"]),
-        "predictions": predicted(fit, record),
+        "predictions": predicted(fit.scene, record),
     }, fit
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
 from jbeamshell.common.checks import require
@@ -33,7 +34,7 @@ from jbeamshell.identify.search_space import search_space
 from jbeamshell.identify.specimens import Specimen, inspected
 from jbeamshell.identify.starts import Estimate, check_starts, estimate, started
 from jbeamshell.laws import LAWS, Law, law_named
-from jbeamshell.measured.curves import AmplitudeCurve, Measurement
+from jbeamshell.measured.curves import AmplitudeCurve, Backbone, Measurement
 from jbeamshell.measured.loops import Loop, driver_of
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene import library
@@ -269,6 +270,24 @@ def _law(
     model = driven(meant, data, control)
     given = {p.key: p.start for p in free if p.start is not None and p.key not in RIG}
     model = model.replace({**known, **given})
-    free = free or as_parameters([key for key in model.law.free() if key not in known])
-    note = f"{model.law.heading} in place of a strip, driven by the {model.control}"
-    return model, free, [note]
+    notes = [f"{model.law.heading} in place of a strip, driven by the {model.control}"]
+    if not free:
+        left = [key for key in model.law.free() if key not in known]
+        told = _told(model.law, data, left)
+        free = as_parameters(told)
+        notes += [
+            f"{key} stays as it is: a first loading tells nothing of it"
+            for key in left
+            if key not in told
+        ]
+    return model, free, notes
+
+
+def _told(law: Law, data: Sequence[Measurement], keys: Sequence[str]) -> list[str]:
+    """Those of a law's keys that the data tell: first loadings tell nothing of unloading."""
+    if not all(isinstance(item, Backbone) for item in data):
+        return list(keys)
+    way = np.concatenate([item.displacement for item in data if isinstance(item, Backbone)])
+    numbers = {key: law.get(key) for key in keys}
+    slopes = jax.jacfwd(lambda values: law.replace(values).backbone(way))(numbers)
+    return [key for key in keys if np.any(np.asarray(slopes[key]) != 0.0)]

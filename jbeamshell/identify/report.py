@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -16,23 +16,13 @@ from jbeamshell.identify.models import as_model
 from jbeamshell.laws import Law
 from jbeamshell.measured.form import by_form
 from jbeamshell.plotting.folder import write_folder
-from jbeamshell.plotting.protocols import LikelihoodProfile, ModelOverData
-
-
-class Fitted(ModelOverData, Protocol):
-    """Model over its data, with the fitted scenes: the first, and all by the specimens' labels."""
-
-    @property
-    def scene(self) -> Any: ...
-    @property
-    def scenes(self) -> Mapping[str, Any]: ...
 
 
 def write_fit(
     folder: Path,
-    result: Fitted,
+    result: Any,
     figures: Mapping[str, Any],
-    profiles: Sequence[LikelihoodProfile] = (),
+    profiles: Sequence[Any] = (),
 ) -> list[Path]:
     """Write tables, fitted scenes, figures and pictures of a fit.
 
@@ -84,7 +74,7 @@ def write_fit(
     return write_folder(folder, texts, pictures)
 
 
-def tables(result: ModelOverData) -> dict[str, str]:
+def tables(result: Any) -> dict[str, str]:
     """CSV texts by name, one for each form: labels, measured columns, answers of the model."""
     texts = {}
     for form, places in by_form(result.data):

@@ -2,8 +2,8 @@
 
 Only this package imports matplotlib. Every function draws into the axes it is given or into new
 ones and returns them; it neither shows them nor changes matplotlib's settings. `style` gives your
-own figures the same look. Pictures know no class of results: `jbeamshell.plotting.protocols` says
-which attributes they read.
+own figures the same look. Pictures import no class of results: any object with the attributes of
+the class that a docstring names can be drawn.
 
 >>> axes = plotting.loop(jb.solve(jb.Scene()))
 >>> plotting.save(axes.figure, "loop.png")

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from jbeamshell.plotting.protocols import ComparedModels
 from jbeamshell.plotting.style import DOTS, FAINT, looks, mark_decades, panels, style
 
 ALONG = {"force": "amplitude of $F$  [force/width]", "displacement": "amplitude of $u$  [length]"}
 
 
-def comparison(compared: ComparedModels, axes: Any = None) -> tuple[Axes, Axes]:
+def comparison(compared: Any, axes: Any = None) -> tuple[Axes, Axes]:
     """Draw the energy per cycle of each model over the amplitude, and its error.
 
     Parameters

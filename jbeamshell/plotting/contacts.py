@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.numerics.cycles import turning_points
-from jbeamshell.plotting.protocols import LoadPath
 from jbeamshell.plotting.steps import checked_steps, default_contact_steps, load_label
 from jbeamshell.plotting.style import (
     DATA,
@@ -47,7 +46,7 @@ AROUND = 5.0  # half heights H that `contact` shows beside corners and ends of c
 
 
 def contact(
-    history: LoadPath,
+    history: Any,
     steps: Sequence[int] | None = None,
     axes: ArrayLike | None = None,
     reference: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
@@ -60,7 +59,7 @@ def contact(
 
     Parameters
     ----------
-    history : LoadPath
+    history : jbeamshell.History
         Solved load path, such as a `jbeamshell.History`.
     steps : sequence of int, optional
         Indices into the path. When not given: the pressed strip and the turning points of the last
@@ -148,13 +147,13 @@ def contact(
 
 
 def contact_map(
-    history: LoadPath, axes: Axes | None = None, *, xlim: tuple[float, float] | None = None
+    history: Any, axes: Axes | None = None, *, xlim: tuple[float, float] | None = None
 ) -> Axes:
     """Draw the parts of the contact that stick, slip or are lifted along the load path.
 
     Parameters
     ----------
-    history : LoadPath
+    history : jbeamshell.History
         Solved load path, such as a `jbeamshell.History`.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
@@ -230,7 +229,7 @@ def _many(count: int) -> np.ndarray:
 
 
 def _checked_panels(
-    history: LoadPath, panels: Sequence[str] | None, reference: Mapping[str, Any]
+    history: Any, panels: Sequence[str] | None, reference: Mapping[str, Any]
 ) -> list[str]:
     """Names of the panels; raises `InputError` for one that the scene does not have."""
     fields = history.scene.plan.fields
@@ -249,7 +248,7 @@ def _checked_panels(
     return known if panels is None else list(panels)
 
 
-def _contact_ends(history: LoadPath) -> np.ndarray:
+def _contact_ends(history: Any) -> np.ndarray:
     """Ends of contact X, (steps+1,); NaN without equilibrium, or where it does not end before L."""
     if not history.scene.plan.lifts or history.scene.contact.normal == "none":
         return np.full(history.force.shape, np.nan)
@@ -257,7 +256,7 @@ def _contact_ends(history: LoadPath) -> np.ndarray:
     return np.where(failed | (ends >= float(history.x[-1])), np.nan, ends)
 
 
-def _surroundings(history: LoadPath, ends: np.ndarray) -> tuple[float, float]:
+def _surroundings(history: Any, ends: np.ndarray) -> tuple[float, float]:
     """Part of X around corners of the pressure and ends of contact; all of X if more than half."""
     contact, length = history.scene.contact, float(history.x[-1])
     tables = [np.asarray(p)[:, 0] for p in (contact.pressure, contact.bottom_pressure) if p.ndim]
@@ -270,7 +269,7 @@ def _surroundings(history: LoadPath, ends: np.ndarray) -> tuple[float, float]:
     return (low, high) if high - low < 0.5 * length else (0.0, length)
 
 
-def _pressure_corners(history: LoadPath, part: Any) -> tuple[np.ndarray, np.ndarray]:
+def _pressure_corners(history: Any, part: Any) -> tuple[np.ndarray, np.ndarray]:
     """Corners of the pressure on the top face, times the part that acts."""
     table, length = np.asarray(history.scene.contact.pressure), float(history.x[-1])
     if table.ndim == 0:
@@ -279,7 +278,7 @@ def _pressure_corners(history: LoadPath, part: Any) -> tuple[np.ndarray, np.ndar
     return x, float(part) * np.pad(table[:, 1], 1, mode="edge")
 
 
-def _size(history: LoadPath, name: str) -> float:
+def _size(history: Any, name: str) -> float:
     """Size that a profile typically has, so that rounding errors are not magnified."""
     strip = history.scene.strip
     stress = float(history.scene.contact.largest_pressure)

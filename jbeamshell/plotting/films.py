@@ -7,7 +7,7 @@ import io
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import cast
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -20,7 +20,6 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import written_whole
 from jbeamshell.plotting.joints import deformed
 from jbeamshell.plotting.paths import loop
-from jbeamshell.plotting.protocols import ContactPath, LoadPath
 from jbeamshell.plotting.shapes import visible_scale
 from jbeamshell.plotting.steps import checked_steps
 from jbeamshell.plotting.style import (
@@ -102,7 +101,7 @@ class Film:
 
 
 def animate(
-    history: LoadPath | ContactPath,
+    history: Any,
     steps: Sequence[int] | None = None,
     *,
     scale: float | None = None,
@@ -115,7 +114,7 @@ def animate(
 
     Parameters
     ----------
-    history : LoadPath or ContactPath
+    history : jbeamshell.History or jbeamshell.ContactHistory
         Solved load path, such as a `jbeamshell.History` or a `jbeamshell.ContactHistory`.
     steps : sequence of int, optional
         Steps of the path, one for each frame; up to 48 of the last cycle when not given, or of the
@@ -147,8 +146,7 @@ def animate(
         figure = plt.figure(figsize=(2.2 * PANEL[0], PANEL[1]))
         left, right = figure.subplots(1, 2, width_ratios=(1.8, 1.0))
         if hasattr(history, "fields"):  # a strip or a lap joint
-            joint = cast(LoadPath, history)
-            turns, draw_left = joint.scene.load.kind == "moment", _members(joint, scale)
+            turns, draw_left = history.scene.load.kind == "moment", _members(history, scale)
         else:
             turns, draw_left = False, _traction(history)
         loop(history, right, moment=turns).legend().remove()
@@ -165,13 +163,13 @@ def animate(
     return film
 
 
-def _members(history: LoadPath, scale: float | None) -> Callable[[int, Axes], object]:
+def _members(history: Any, scale: float | None) -> Callable[[int, Axes], object]:
     """Function that draws the deformed members at a step, all steps to one scale."""
     factor = visible_scale(history) if scale is None else scale
     return lambda step, axes: deformed(history, step, axes, scale=factor, sections=SECTIONS)
 
 
-def _traction(history: ContactPath) -> Callable[[int, Axes], object]:
+def _traction(history: Any) -> Callable[[int, Axes], object]:
     """Function that draws the friction traction at a step in the colours of the contact."""
     x, traction = np.asarray(history.x), np.asarray(history.traction)
     most = 1.1 * float(np.nanmax(np.abs(traction)))

@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.form import Form, by_form
-from jbeamshell.plotting.protocols import LikelihoodProfile, ModelOverData
 from jbeamshell.plotting.style import (
     DOTS,
     FAINT,
@@ -34,12 +33,12 @@ MOST_NAMED = 6  # measurements whose names fit into a panel
 SHORT = 14  # letters of a name of which two fit beside each other below a panel
 
 
-def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
+def overlay(fit: Any, axes: Any = None) -> list[Axes]:
     """Draw the model over the data, with its 95 % bands.
 
     Parameters
     ----------
-    fit : result of a fit
+    fit : `jbeamshell.identify.Fit`
     axes : axes, one for each form of measurement; new ones when not given
 
     Returns
@@ -72,14 +71,14 @@ def overlay(fit: ModelOverData, axes: Any = None) -> list[Axes]:
     return [panel for _, _, panel in drawn]
 
 
-def residuals(fit: ModelOverData, axes: Any = None) -> list[Axes]:
+def residuals(fit: Any, axes: Any = None) -> list[Axes]:
     """Draw the difference between model and data, in per cent.
 
     It is drawn over the column that drives the model, or over the position.
 
     Parameters
     ----------
-    fit : result of a fit
+    fit : `jbeamshell.identify.Fit`
     axes : axes, one for each form of measurement; new ones when not given
 
     Returns
@@ -127,14 +126,14 @@ def _xy(form: Form, measurement: Any) -> tuple[np.ndarray, np.ndarray]:
     return getattr(measurement, form.x), getattr(measurement, form.y)
 
 
-def _panels(fit: ModelOverData, axes: Any) -> list[tuple[Form, list[int], Axes]]:
+def _panels(fit: Any, axes: Any) -> list[tuple[Form, list[int], Axes]]:
     """Forms, the places of their measurements, and the axes of each."""
     forms = by_form(fit.data)
     drawn = _checked_axes(len(forms), axes)
     return [(form, places, panel) for (form, places), panel in zip(forms, drawn, strict=True)]
 
 
-def likelihoods(profiles: Sequence[LikelihoodProfile], axes: Any = None) -> list[Axes]:
+def likelihoods(profiles: Sequence[Any], axes: Any = None) -> list[Axes]:
     """Draw profile likelihoods: the rise of the misfit while a parameter is held at other values.
 
     Parameters

@@ -10,14 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import EngFormatter
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.plotting.protocols import InspectedData
 from jbeamshell.plotting.style import FAINT, PALETTE, PANEL, looks, style
 
 LAYOUT: Any = [["loop", "force"], ["loop", "displacement"]]
 MOST_NAMED = 6  # loops in a legend
 
 
-def inspection(seen: InspectedData, axes: Any = None) -> list[Axes]:
+def inspection(seen: Any, axes: Any = None) -> list[Axes]:
     """Draw what an inspection found: the recording, its mean loops, and both columns over time.
 
     Parameters
@@ -71,7 +70,7 @@ def _label(name: str, recording: Any) -> str:
     return f"{name}  [{recording.unit(name) or 'scene'}]"
 
 
-def _title(seen: InspectedData) -> str:
+def _title(seen: Any) -> str:
     """Label of the data with the words of its findings, grave ones first."""
     label = seen.views[0].recording.label if len(seen.views) == 1 else f"{len(seen.views)} loops"
     found = {finding.name: finding.grave for view in seen.views for finding in view.findings}

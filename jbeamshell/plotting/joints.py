@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
-from jbeamshell.plotting.protocols import LoadPath
 from jbeamshell.plotting.shapes import KINDS, Shape, pressure_arrows, reach_of, shape_of
 from jbeamshell.plotting.steps import checked_steps, load_label
 from jbeamshell.plotting.style import DATA, FAINT, POSITION, SLIPS, STICKS, below, single, style
@@ -19,7 +18,7 @@ FILL = ("#E8EEF4", "#F4EFE6")  # upper and lower member
 
 
 def deformed(
-    history: LoadPath,
+    history: Any,
     step: int | None = None,
     axes: Axes | None = None,
     *,
@@ -33,7 +32,7 @@ def deformed(
 
     Parameters
     ----------
-    history : LoadPath
+    history : jbeamshell.History
         Solved load path of a strip or of a lap joint, such as a `jbeamshell.History`.
     step : int, optional
         Index into the path; the end of the last cycle when not given.
@@ -83,7 +82,7 @@ def deformed(
     return axes
 
 
-def _draw_supports(axes: Axes, history: LoadPath, bottom: float) -> None:
+def _draw_supports(axes: Axes, history: Any, bottom: float) -> None:
     """Rigid base, symmetry plane, and the faces that are held or guided."""
     scene = history.scene
     support, top = scene.member.support, 2.0 * float(scene.strip.half_height)
@@ -102,7 +101,7 @@ def _draw_supports(axes: Axes, history: LoadPath, bottom: float) -> None:
         axes.plot([end, end], [0.0, top], color=DATA, linewidth=2.5, linestyle=(0, (1, 1)))
 
 
-def _draw_pressures(axes: Axes, history: LoadPath, drawn: Shape) -> None:
+def _draw_pressures(axes: Axes, history: Any, drawn: Shape) -> None:
     """Arrows of the pressures on the outer faces."""
     for place, head, tail in pressure_arrows(history, drawn):
         look = {"arrowstyle": "->", "color": FAINT, "linewidth": 0.8}
@@ -111,7 +110,7 @@ def _draw_pressures(axes: Axes, history: LoadPath, drawn: Shape) -> None:
     axes.autoscale_view()
 
 
-def _draw_sections(axes: Axes, history: LoadPath, step: int, drawn: Shape, count: int) -> None:
+def _draw_sections(axes: Axes, history: Any, step: int, drawn: Shape, count: int) -> None:
     """Cross-sections of each member at evenly spaced nodes, dark where the contact slips."""
     x = np.asarray(history.x)
     nodes = np.unique(np.abs(x[:, None] - np.linspace(x[0], x[-1], count)).argmin(axis=0))
@@ -122,7 +121,7 @@ def _draw_sections(axes: Axes, history: LoadPath, step: int, drawn: Shape, count
         axes.add_collection(LineCollection(list(lines), colors=list(shades), linewidths=widths))
 
 
-def _draw_contact(axes: Axes, history: LoadPath, drawn: Shape) -> None:
+def _draw_contact(axes: Axes, history: Any, drawn: Shape) -> None:
     """Contact face in the colours of what its nodes do."""
     if history.scene.contact.normal == "none":
         return

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from jbeamshell.plotting.protocols import ModalProperties, RingDownComparison, Vibration
 from jbeamshell.plotting.style import (
     DATA,
     DISPLACEMENT,
@@ -35,8 +34,8 @@ FLOOR = -70.0  # dB, the darkest shade of a spectrogram
 HARMONICS = 8.5  # multiples of the main frequency up to which a spectrogram goes
 
 
-def vibration(motion: Vibration, axes: Axes | None = None) -> Axes:
-    """Draw u(L) over time."""
+def vibration(motion: Any, axes: Axes | None = None) -> Axes:
+    """Draw u(L) of a `jbeamshell.dynamics.Motion` over time."""
     with style():
         axes = single(axes)
         axes.plot(motion.time, motion.displacement, color=PALETTE[0], linewidth=1.0)
@@ -44,8 +43,15 @@ def vibration(motion: Vibration, axes: Axes | None = None) -> Axes:
     return axes
 
 
-def energies(motion: Vibration, axes: Axes | None = None) -> Axes:
+def energies(motion: Any, axes: Axes | None = None) -> Axes:
     """Draw kinetic energy, stored energy and the losses over time, one on top of the other.
+
+    Parameters
+    ----------
+    motion : jbeamshell.dynamics.Motion
+        Transient of a strip.
+    axes : matplotlib.axes.Axes, optional
+        Where to draw; new axes when not given.
 
     Notes
     -----
@@ -75,9 +81,7 @@ def energies(motion: Vibration, axes: Axes | None = None) -> Axes:
     return axes
 
 
-def ring_down(
-    found: ModalProperties, *, label: str = "ring-down", axes: Sequence[Axes] | None = None
-) -> Any:
+def ring_down(found: Any, *, label: str = "ring-down", axes: Sequence[Axes] | None = None) -> Any:
     """Draw frequency and damping over amplitude on two axes.
 
     Parameters
@@ -91,7 +95,7 @@ def ring_down(
 
 
 def modal_curve(
-    curve: ModalProperties,
+    curve: Any,
     *,
     mass: float | None = None,
     label: str = "quasi-static",
@@ -113,8 +117,8 @@ def modal_curve(
     return _pair(columns, axes, label, "", PALETTE[1], along)
 
 
-def spectrogram(motion: Vibration, axes: Axes | None = None) -> Axes:
-    """Draw the spectrum of the velocity over time, in dB of its largest value."""
+def spectrogram(motion: Any, axes: Axes | None = None) -> Axes:
+    """Draw the spectrum of a motion's velocity over time, in dB of its largest value."""
     import scipy.signal  # takes longer to import than other pictures take to draw
 
     time, velocity = np.asarray(motion.time), np.asarray(motion.velocity)
@@ -140,8 +144,13 @@ def spectrogram(motion: Vibration, axes: Axes | None = None) -> Axes:
     return axes
 
 
-def ring_down_sheet(study: RingDownComparison) -> Figure:
-    """Draw motion, energies, frequency and damping of a ring-down, beside the prediction."""
+def ring_down_sheet(study: Any) -> Figure:
+    """Draw motion, energies, frequency and damping of a ring-down, beside the prediction.
+
+    Parameters
+    ----------
+    study : result of `jbeamshell.dynamics.let_go`
+    """
     with style():
         axes = panels(2, 2)
         vibration(study.motion, axes[0, 0])

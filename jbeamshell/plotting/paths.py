@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +12,6 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.plotting.protocols import ContactPath, LoadPath, LoopPath
 from jbeamshell.plotting.steps import checked_steps, default_steps, load_label
 from jbeamshell.plotting.style import (
     DATA,
@@ -29,12 +29,12 @@ from jbeamshell.plotting.style import (
 )
 
 
-def loop(history: LoopPath, axes: Axes | None = None, *, moment: bool = False) -> Axes:
+def loop(history: Any, axes: Axes | None = None, *, moment: bool = False) -> Axes:
     """Draw end force over end displacement, with the last closed cycle emphasised.
 
     Parameters
     ----------
-    history : LoopPath
+    history : jbeamshell.History or jbeamshell.ContactHistory
         Solved load path, such as a `jbeamshell.History`.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
@@ -67,13 +67,13 @@ def loop(history: LoopPath, axes: Axes | None = None, *, moment: bool = False) -
 
 
 def profiles(
-    history: LoadPath, steps: Sequence[int] | None = None, axes: ArrayLike | None = None
+    history: Any, steps: Sequence[int] | None = None, axes: ArrayLike | None = None
 ) -> np.ndarray:
     """Draw slip, rotation, friction traction and normal reaction along X at chosen steps.
 
     Parameters
     ----------
-    history : LoadPath
+    history : jbeamshell.History
         Solved load path, such as a `jbeamshell.History`.
     steps : sequence of int, optional
         Indices into the path: 0 is its first step, -1 its end. When not given: the zero crossings
@@ -137,13 +137,13 @@ def profiles(
 
 
 def contact_lines(
-    history: ContactPath, steps: Sequence[int] | None = None, axes: ArrayLike | None = None
+    history: Any, steps: Sequence[int] | None = None, axes: ArrayLike | None = None
 ) -> np.ndarray:
     """Draw slip, gap, friction traction and normal reaction of substructures along X.
 
     Parameters
     ----------
-    history : ContactPath
+    history : jbeamshell.ContactHistory
         Contact between substructures, such as a `jbeamshell.ContactHistory`.
     steps : sequence of int, optional
         Indices into the path. When not given: the pressing and the turns of the last cycle.

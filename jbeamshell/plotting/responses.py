@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from jbeamshell.plotting.protocols import ResponseCurve
 from jbeamshell.plotting.style import PALETTE, beside, looks, panels, style
 
 AMPLITUDE = "amplitude  [length]"
@@ -16,9 +15,7 @@ FREQUENCY, LEVEL = "frequency  [1/time]", "level of the force"
 DEPTH = 1e-6  # smallest superharmonic shown, over the largest amplitude
 
 
-def forced_response(
-    response: ResponseCurve, *, label: str = "", axes: Sequence[Axes] | None = None
-) -> Any:
+def forced_response(response: Any, *, label: str = "", axes: Sequence[Axes] | None = None) -> Any:
     """Draw the amplitude over frequency or level, and all harmonics beside it, on two axes.
 
     Parameters

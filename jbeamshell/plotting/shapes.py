@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
-
-from jbeamshell.plotting.protocols import LoadPath
 
 SHARE = 0.8  # of the half height H, as which the largest displacement is drawn
 ARROWS = 24  # of the pressure on a face, at most
@@ -38,7 +36,7 @@ class Shape(NamedTuple):
     tip: NDArray[np.float64]
 
 
-def shape_of(history: LoadPath, step: int, scale: float | None = None) -> Shape:
+def shape_of(history: Any, step: int, scale: float | None = None) -> Shape:
     """Shape of the members at a step.
 
     Displacements along X are counted from the pressed members, as u(L) is.
@@ -79,7 +77,7 @@ def shape_of(history: LoadPath, step: int, scale: float | None = None) -> Shape:
     )
 
 
-def reach_of(history: LoadPath, before: float, beyond: float) -> tuple[float, float]:
+def reach_of(history: Any, before: float, beyond: float) -> tuple[float, float]:
     """Range of X of both members, with margins in parts of it."""
     ends = history.scene.member.overhang, history.scene.strip.overhang
     first, last = (0.0 if end is None else float(end) for end in ends)
@@ -87,7 +85,7 @@ def reach_of(history: LoadPath, before: float, beyond: float) -> tuple[float, fl
     return -first - before * (first + stop), stop + beyond * (first + stop)
 
 
-def pressure_arrows(history: LoadPath, shape: Shape) -> NDArray[np.float64]:
+def pressure_arrows(history: Any, shape: Shape) -> NDArray[np.float64]:
     """Arrows (k, 3) of the pressures on the outer faces: X, height of the head, of the tail."""
     contact, x = history.scene.contact, np.asarray(history.x)
     size = 0.6 * shape.heights[0] / float(contact.largest_pressure)
@@ -103,13 +101,13 @@ def pressure_arrows(history: LoadPath, shape: Shape) -> NDArray[np.float64]:
     return np.concatenate(rows)
 
 
-def visible_scale(history: LoadPath) -> float:
+def visible_scale(history: Any) -> float:
     """Factor of the displacements with which the largest of a path is seen."""
     members = _members(history)
     return _visible([_faces(fields, up) for fields, up in members], members[0][1])
 
 
-def _members(history: LoadPath) -> list[tuple[NDArray[np.float64], float]]:
+def _members(history: Any) -> list[tuple[NDArray[np.float64], float]]:
     """Fields (steps, n, m) of each member, and the height of its outer face over the contact."""
     scene = history.scene
     members = [(_since_pressing(history, history.fields), 2.0 * float(scene.strip.half_height))]
@@ -119,7 +117,7 @@ def _members(history: LoadPath) -> list[tuple[NDArray[np.float64], float]]:
     return members
 
 
-def _since_pressing(history: LoadPath, fields: Array) -> NDArray[np.float64]:
+def _since_pressing(history: Any, fields: Array) -> NDArray[np.float64]:
     """Fields of a member, with v counted from the pressed member where loads follow."""
     counted, pressed = np.array(fields), history.pressed
     if pressed + 1 < counted.shape[0]:
@@ -139,7 +137,7 @@ Part = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 def _overhangs(
-    history: LoadPath, step: int, members: list[tuple[NDArray[np.float64], float]]
+    history: Any, step: int, members: list[tuple[NDArray[np.float64], float]]
 ) -> list[tuple[Part, Part]]:
     """Parts of each member before X = 0 and beyond L: X, and displacements of both its faces."""
     scene, x = history.scene, np.asarray(history.x)

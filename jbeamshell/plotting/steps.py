@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.numerics.cycles import turning_points
-from jbeamshell.plotting.protocols import LoadPath, LoopPath
 
 
-def checked_steps(history: LoopPath, steps: Sequence[int]) -> list[int]:
+def checked_steps(history: Any, steps: Sequence[int]) -> list[int]:
     """Indices counted from the start of the path; raises `InputError` for one that lies outside."""
     count = history.force.shape[0]
     for step in steps:
@@ -20,7 +20,7 @@ def checked_steps(history: LoopPath, steps: Sequence[int]) -> list[int]:
     return [int(step) % count for step in steps]
 
 
-def default_steps(history: LoadPath) -> list[int]:
+def default_steps(history: Any) -> list[int]:
     """Zero crossings and turning points of the last cycle; without one, turns or four steps."""
     force, pressed = np.asarray(history.force), history.pressed
     if not history.cycles:
@@ -37,7 +37,7 @@ def default_steps(history: LoadPath) -> list[int]:
     return chosen
 
 
-def default_contact_steps(history: LoadPath) -> list[int]:
+def default_contact_steps(history: Any) -> list[int]:
     """Pressed strip and turning points of the last cycle; without one, the end of the path."""
     if history.cycles:
         return [history.pressed, *history.cycles[-1][1:]]
@@ -51,7 +51,7 @@ def _four_steps(start: int, stop: int) -> list[int]:
     return sorted(set(np.maximum(steps, start + 1).tolist()))
 
 
-def load_label(history: LoadPath, step: int) -> str:
+def load_label(history: Any, step: int) -> str:
     """Label of a step: its load, and at a zero crossing whether the load rises or falls."""
     force, part = float(history.force[step]), float(history.pressure[step])
     if history.pressed + 1 == history.force.size:

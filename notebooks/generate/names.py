@@ -31,7 +31,6 @@ EXTENSIONS = (  # what one's own laws, energies and readers build on, and format
     "jbeamshell.identify.rig",
     "jbeamshell.identify.rig_keys",
     "jbeamshell.history.record",
-    "jbeamshell.plotting.protocols",
 )
 
 

@@ -8,7 +8,7 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.identify.driving import feature_doubts
 from jbeamshell.identify.models import LawModel, StripModel
 from jbeamshell.identify.specimens import Specimen, inspected
-from jbeamshell.measured.curves import DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene.library import standard
 
@@ -49,6 +49,16 @@ def test_the_four_parameters_of_iwan_are_found_with_their_intervals():
     assert float(fit.law.dissipation(0.01)) == pytest.approx(
         float(PLANTED["iwan4"].dissipation(0.01)), rel=0.02
     )
+
+
+def test_a_first_loading_leaves_out_what_bends_unloading_alone():
+    law = laws.BoucWen(2.0, 30.0, 1.4, 0.4, 0.05)
+    u = np.linspace(0.01, 0.3, 15)
+    fit = identify.fit(Backbone(np.asarray(law.backbone(u)), u), "bouc-wen", starts=1)
+    assert set(fit.values) == set(laws.BoucWen.free()) - {"bouc-wen.unloading"}
+    for key, value in fit.values.items():
+        assert value == pytest.approx(float(law.get(key)), rel=1e-5)
+    assert any("bouc-wen.unloading stays as it is" in note for note in fit.notes)
 
 
 @pytest.mark.slow
