@@ -47,7 +47,48 @@ PYHARM = Source(
     "each frequency solved from its linear start",
     "Apache-2.0, figures of own runs",
 )
+ELASTIC_DRY = Source(
+    "J. H. Porter, tmdsimpy, https://github.com/tmd-lab/tmdsimpy at 17d5fc3, its "
+    "ElasticDryFriction3D over 32 points of a cycle",
+    "MIT, figures of own runs",
+    "Its limit is a square of the two directions, ours a circle: the path keeps to one direction.",
+)
 SLOPE, FRICTION = 0.1, 0.3  # of the patch test
+PAIR_STIFFNESS = 4.0, 5.0  # tangential and normal
+PAIR_FORCES = [
+    1.967810624741,
+    1.711490422038,
+    1.302108728029,
+    0.8715098052281,
+    0.5523532823524,
+    0.3062508947862,
+    0.02692093572899,
+    -0.09213802960766,
+    0.05038192826017,
+    0.02486899400358,
+    0.0,
+    0.0,
+    -0.0,
+    -0.0,
+    -0.0,
+    -0.0,
+    -0.1321893752586,
+    -0.2127736466739,
+    -0.1978912719709,
+    -0.20422612606,
+    -0.2080018699122,
+    0.03810051765399,
+    0.3174304767112,
+    0.4364894420478,
+    0.29396948418,
+    -0.08274873198061,
+    -0.546031049793,
+    -0.8785453496788,
+    -0.8688667112679,
+    -0.3865583255799,
+    0.5687253916304,
+    1.860861668566,
+]  # tangential forces of a pair that slips, lifts and touches again
 IWAN = (1000.0, 2e6, -0.5, 0.3)  # F_S, K_T, chi, beta
 AMPLITUDES = np.array([1e-4, 3e-4, 6e-4, 9e-4, 2e-3])
 PLACES = np.array([0.0, 0.328458, 0.547429, 0.766401])  # over half of the width of the contact
@@ -118,6 +159,21 @@ def oscillator() -> Floats:
             for omega in row
         ]
     )
+
+
+def pair() -> Floats:
+    """Tangential forces of one pair of a face, on the loads that move it along their path."""
+    angle = 2.0 * np.pi * np.arange(32) / 32
+    slip = 0.9 * np.sin(angle) + 0.3 * np.sin(3.0 * angle + 0.4)
+    closing = 0.5 + 0.8 * np.cos(angle + 0.7) + 0.2 * np.cos(4.0 * angle)
+    pressed = PAIR_STIFFNESS[1] * np.maximum(closing, 0.0)
+    body = jb.FaceBody([[0.0, 0.0, 0.0]], np.eye(3), np.diag([1.0, 1.0, -1.0]))  # on springs of 1
+    loads = np.column_stack([slip + PAIR_FORCES, 0.0 * slip, closing + pressed])
+    softness = 1.0 / np.array(PAIR_STIFFNESS)
+    history = jb.solve_faces(
+        body, friction=FRICTION, bolts=[0.0, 1.0], softness=softness, path=np.tile(loads, (2, 1))
+    )
+    return np.asarray(history.traction[-32:, 0, 0])
 
 
 def beam(kind: str, what: str) -> tuple[Callable[[], Floats], Callable[[], Floats]]:
@@ -207,6 +263,18 @@ CASES = (
         ],
         iwan,
         0.001,
+    ),
+    Case(
+        "one pair of tmdsimpy's elastic dry friction",
+        "other program",
+        ELASTIC_DRY,
+        "tangential force over a cycle in which the pair slips, lifts and touches again",
+        "softness 1/4 and 1/5, mu = .3, one direction of slip; our forces from the loads that "
+        "move the pair along the same path",
+        PAIR_FORCES,
+        pair,
+        1e-10,
+        each=False,
     ),
     backbone("flat", "frequency", 0.005),
     backbone("flat", "damping", 0.25, "theirs grows faster than any law of sliders with chi <= 0"),
