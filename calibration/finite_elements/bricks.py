@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import resource
 import subprocess
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from calibration.finite_elements.cards import card
 from calibration.finite_elements.program import find_program
 from calibration.finite_elements.results import read
+from jbeamshell.contact_face.body import FaceBody
+from jbeamshell.contact_face.solve import solve_faces
 from jbeamshell.contact_line.stiffness_model import StiffnessModel
+from jbeamshell.history.face_history import FaceHistory
 
 MODULUS, POISSON = 210e3, 0.3
 STEEL = [(MODULUS, POISSON)]
@@ -21,6 +26,21 @@ SOFTNESS = 0.3 / MODULUS  # of the pairs, displacement per stress
 SMALLEST_PART = 1e-7  # of a level, below which CalculiX gives up
 TIGHTENED = 8  # steps of the pressing, as `solve_faces` takes
 TENSION = 1e-3  # stress that CalculiX lets an open pair carry
+
+
+class Runs(NamedTuple):
+    """Contact of the same bodies here and in CalculiX.
+
+    Attributes
+    ----------
+    history : here
+    text : what CalculiX printed at the same loads
+    seconds : of the processor here, warm, and there
+    """
+
+    history: FaceHistory
+    text: str
+    seconds: tuple[float, float]
 
 
 class Box(NamedTuple):
@@ -105,6 +125,24 @@ def run(deck: str, folder: Path, job: str, program: str | None = None) -> str:
     return printed.read_text(encoding="ascii") if printed.exists() else ""
 
 
+def run_both(
+    bodies: Sequence[FaceBody],
+    options: dict[str, Any],
+    deck_of: Callable[[np.ndarray], str],
+    folder: Path,
+) -> Runs:
+    """Contact of bodies with `SOFTNESS` here, and of the deck of its loads (levels,) there."""
+    options = options | {"softness": SOFTNESS, "throw": False}
+    jax.block_until_ready(solve_faces(*bodies, **options).loads)
+    begin = time.process_time()
+    history = jax.block_until_ready(solve_faces(*bodies, **options))
+    here = time.process_time() - begin
+    deck = deck_of(np.asarray(history.force)[1:])
+    begin = seconds_of_programs()
+    text = run(deck, folder, "contact")
+    return Runs(history, text, (here, seconds_of_programs() - begin))
+
+
 def seconds_of_programs() -> float:
     """Seconds of the processor that programs run from here have used."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -156,6 +194,16 @@ def displacement_there(pull: np.ndarray, name: str, text: str) -> np.ndarray:
     row = {int(node): i for i, node in enumerate(printed.nodes)}
     moved = printed.values[TIGHTENED - 1 :] - printed.values[TIGHTENED - 1]
     return sum(force * moved[:, row[int(node)], int(way) - 1] for node, way, force in pull)
+
+
+def loop_figures(history: FaceHistory, displacement: np.ndarray) -> dict[str, float]:
+    """Area and secant stiffness of the last cycle of a displacement (levels,) at its loads."""
+    start, _, stop = history.cycles[-1]
+    force, moved = np.asarray(history.force)[start : stop + 1], displacement[start : stop + 1]
+    return {
+        "dissipation": area(force, moved),
+        "secant_stiffness": float(np.ptp(force) / np.ptp(moved)),
+    }
 
 
 def area(force: np.ndarray, displacement: np.ndarray) -> float:
