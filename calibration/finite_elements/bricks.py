@@ -25,6 +25,7 @@ STEEL = [(MODULUS, POISSON)]
 SOFTNESS = 0.3 / MODULUS  # of the pairs, displacement per stress
 SMALLEST_PART = 1e-7  # of a level, below which CalculiX gives up
 TIGHTENED = 8  # steps of the pressing, as `solve_faces` takes
+MATRIX_STEP = card("STEP") + card("FREQUENCY, SOLVER=MATRIXSTORAGE", [(1,)]) + card("END STEP")
 TENSION = 1e-3  # stress that CalculiX lets an open pair carry
 
 
@@ -93,14 +94,14 @@ def shares(counts: Sequence[int], sizes: Sequence[float]) -> np.ndarray:
     return np.outer(along, across).ravel()
 
 
-def cards_of(made: Box, name: str, first: int = 1) -> str:
+def cards_of(made: Box, name: str, first: int = 1, kind: str = "C3D8") -> str:
     """Nodes and bricks of a box, both in sets of its name; its bricks numbered from ``first``."""
     start = int(made.number[0, 0, 0])
     nodes = [(start + i, *place) for i, place in enumerate(made.places)]
     numbers = np.arange(first, first + len(made.bricks))
     return (
         card(f"NODE, NSET={name}", nodes)
-        + card(f"ELEMENT, TYPE=C3D8, ELSET={name}", np.column_stack([numbers, made.bricks]))
+        + card(f"ELEMENT, TYPE={kind}, ELSET={name}", np.column_stack([numbers, made.bricks]))
         + card(f"SOLID SECTION, ELSET={name}, MATERIAL=STEEL")
     )
 
@@ -112,8 +113,7 @@ def material() -> str:
 
 def matrix(deck: str, folder: Path, program: str | None = None) -> StiffnessModel:
     """Matrix of a deck without steps."""
-    deck += card("STEP") + card("FREQUENCY, SOLVER=MATRIXSTORAGE", [(1,)]) + card("END STEP")
-    run(deck, folder, "matrix", program)
+    run(deck + MATRIX_STEP, folder, "matrix", program)
     return StiffnessModel.read(folder / "matrix.sti")
 
 

@@ -222,8 +222,8 @@ class FaceBody(eqx.Module):
 
     def rigid_motions(self) -> NDArray[np.float64]:
         """Rigid motions (6, 3n) in the frames: along X, Y, Z, and turns about the middle."""
-        middle = np.asarray(self.places) - np.mean(self.places, axis=0)
-        n = len(middle)
+        places = np.asarray(self.places)
+        middle, n = places - np.mean(places, axis=0), len(places)
         ways = np.broadcast_to(np.eye(3)[:, None], (3, n, 3))
         turns = np.cross(ways, middle[None])
         both = np.concatenate([ways, turns])

@@ -26,6 +26,7 @@ QUADRATIC = (
     "has nodes on its edges, whose corners bear nothing or pull under an even pressure: "
     "mesh the face with linear elements"
 )
+MATCH = 1e-6  # of the face's extent, within which nodes match
 SIDE = 0.1  # cosine to the direction that is given, from which on a side of an element is meant
 FLAT = 1e-9  # of the largest element, below which one has no area
 # Corners of the square, and where its area is summed up: 2 x 2 points of Gauss, of weight 1.
@@ -121,13 +122,12 @@ def spread(
     return table[np.abs(table[:, 2]) > 1e-12 * np.max(np.abs(table[:, 2]))]
 
 
-def matched(upper: ArrayLike, lower: ArrayLike, tolerance: float) -> NDArray[np.float64]:
+def matched(upper: ArrayLike, lower: ArrayLike) -> NDArray[np.float64]:
     """Rows of a lower face in the order of the upper one, node on node.
 
     Parameters
     ----------
     upper, lower : (n, 4) node, X, Y and Z
-    tolerance : distance over the extent of the face, up to which two nodes match
 
     Raises
     ------
@@ -138,7 +138,7 @@ def matched(upper: ArrayLike, lower: ArrayLike, tolerance: float) -> NDArray[np.
     table = np.asarray(lower, float)
     away, at = cKDTree(below).query(places)
     far = int(np.argmax(away))
-    near = away[far] <= tolerance * np.max(np.ptp(places, axis=0))
+    near = away[far] <= MATCH * np.max(np.ptp(places, axis=0))
     fix = f"is {away[far]:.3g} away from the next node of the lower face: mesh both faces alike"
     require("upper.face", f"node {numbers[far]}", bool(near), fix)
     fix = f"must have the {len(numbers)} nodes of the upper face: name the part that touches"

@@ -95,7 +95,7 @@ class TestMatch:
         upper, _ = grid(4, 3, jitter=0.2)
         lower = np.add(upper, [100.0, 0.0, 0.0, 1e-8])
         order = np.random.default_rng(0).permutation(len(lower))
-        found = matched(upper, lower[order], 1e-6)
+        found = matched(upper, lower[order])
         np.testing.assert_array_equal(found, lower)
 
     @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ class TestMatch:
     def test_faces_that_do_not_match_are_refused(self, change, words):
         upper, _ = grid(4, 3)
         with pytest.raises(jb.InputError, match=words):
-            matched(upper, change(upper.copy()), 1e-6)
+            matched(upper, change(upper.copy()))
 
 
 class TestRefusals:
