@@ -22,7 +22,10 @@ from .contact_face.modes import (
     face_curve as face_curve,
     modal_bodies as modal_bodies,
 )
+from .contact_face.deck import Deck as Deck
+from .contact_face.part_file import read_parts as read_parts
 from .contact_face.solve import solve_faces as solve_faces
+from .contact_face.surface import Surface as Surface, face_surface as face_surface
 from .contact_line.contact import solve_contact as solve_contact
 from .contact_line.contact_file import read_contact as read_contact
 from .contact_line.stiffness_model import StiffnessModel as StiffnessModel

@@ -10,7 +10,6 @@ and a torque about the normal with a force beside it turns it to and fro.
 from __future__ import annotations
 
 import tempfile
-import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,22 +17,20 @@ import jax
 import numpy as np
 
 from calibration.finite_elements.bricks import (
-    SOFTNESS,
     Box,
-    area,
     box,
     cards_of,
     contact,
     displacement_there,
+    loop_figures,
     material,
     matrix,
-    run,
+    run_both,
     shares,
     steps,
 )
 from calibration.finite_elements.cards import card
 from jbeamshell.contact_face.body import FaceBody
-from jbeamshell.contact_face.solve import solve_faces
 
 LOAD: dict[str, Any] = {"friction": 0.3, "amplitude": 700.0, "bolts": 10.0, "cycles": 1}
 
@@ -109,23 +106,15 @@ def main(counts: tuple[int, int, int] = (8, 4, 3), steps: int = 16) -> None:
     made = block(counts, (40.0, 20.0, 10.0))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        options = LOAD | {"steps_per_half_cycle": steps}
         body = body_of(made, folder)
-        options = LOAD | {"steps_per_half_cycle": steps, "softness": SOFTNESS, "throw": False}
-        jax.block_until_ready(solve_faces(body, **options).loads)
-        begin = time.perf_counter()
-        history = jax.block_until_ready(solve_faces(body, **options))
-        ours = time.perf_counter() - begin
-        loads = np.asarray(history.force)[1:]
-        begin = time.perf_counter()
-        text = run(contact_deck(made, loads), folder, "contact")
-        theirs = time.perf_counter() - begin
-        there = displacement_there(made.pull, "BLOCK", text)
-    start, _, stop = history.cycles[-1]
-    force, here = (np.asarray(a)[start : stop + 1] for a in (history.force, history.displacement))
-    there = there[start : stop + 1]
-    work = area(force, there) / area(force, here) - 1.0
-    stiffness = np.ptp(here) / np.ptp(there) - 1.0
-    print(f"{body.areas.size} pairs; CalculiX - here: D {work:+.2%}, stiffness {stiffness:+.3%}")
+        history, text, (ours, theirs) = run_both(
+            [body], options, lambda loads: contact_deck(made, loads), folder
+        )
+    moved = np.asarray(history.displacement), displacement_there(made.pull, "BLOCK", text)
+    here, there = (loop_figures(history, each) for each in moved)
+    off = ", ".join(f"{key} {there[key] / value - 1.0:+.3%}" for key, value in here.items())
+    print(f"{body.areas.size} pairs; CalculiX - here: {off.replace('_', ' ')}")
     print(f"seconds: CalculiX {theirs:.1f}, here {ours:.3f}, ratio {theirs / ours:.0f}")
 
 

@@ -4,23 +4,44 @@ from __future__ import annotations
 
 import resource
 import subprocess
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from calibration.finite_elements.cards import card
 from calibration.finite_elements.program import find_program
 from calibration.finite_elements.results import read
+from jbeamshell.contact_face.body import FaceBody
+from jbeamshell.contact_face.solve import solve_faces
 from jbeamshell.contact_line.stiffness_model import StiffnessModel
+from jbeamshell.history.face_history import FaceHistory
 
 MODULUS, POISSON = 210e3, 0.3
 STEEL = [(MODULUS, POISSON)]
 SOFTNESS = 0.3 / MODULUS  # of the pairs, displacement per stress
 SMALLEST_PART = 1e-7  # of a level, below which CalculiX gives up
 TIGHTENED = 8  # steps of the pressing, as `solve_faces` takes
+MATRIX_STEP = card("STEP") + card("FREQUENCY, SOLVER=MATRIXSTORAGE", [(1,)]) + card("END STEP")
 TENSION = 1e-3  # stress that CalculiX lets an open pair carry
+
+
+class Runs(NamedTuple):
+    """Contact of the same bodies here and in CalculiX.
+
+    Attributes
+    ----------
+    history : here
+    text : what CalculiX printed at the same loads
+    seconds : of the processor here, warm, and there
+    """
+
+    history: FaceHistory
+    text: str
+    seconds: tuple[float, float]
 
 
 class Box(NamedTuple):
@@ -73,14 +94,14 @@ def shares(counts: Sequence[int], sizes: Sequence[float]) -> np.ndarray:
     return np.outer(along, across).ravel()
 
 
-def cards_of(made: Box, name: str, first: int = 1) -> str:
+def cards_of(made: Box, name: str, first: int = 1, kind: str = "C3D8") -> str:
     """Nodes and bricks of a box, both in sets of its name; its bricks numbered from ``first``."""
     start = int(made.number[0, 0, 0])
     nodes = [(start + i, *place) for i, place in enumerate(made.places)]
     numbers = np.arange(first, first + len(made.bricks))
     return (
         card(f"NODE, NSET={name}", nodes)
-        + card(f"ELEMENT, TYPE=C3D8, ELSET={name}", np.column_stack([numbers, made.bricks]))
+        + card(f"ELEMENT, TYPE={kind}, ELSET={name}", np.column_stack([numbers, made.bricks]))
         + card(f"SOLID SECTION, ELSET={name}, MATERIAL=STEEL")
     )
 
@@ -92,8 +113,7 @@ def material() -> str:
 
 def matrix(deck: str, folder: Path, program: str | None = None) -> StiffnessModel:
     """Matrix of a deck without steps."""
-    deck += card("STEP") + card("FREQUENCY, SOLVER=MATRIXSTORAGE", [(1,)]) + card("END STEP")
-    run(deck, folder, "matrix", program)
+    run(deck + MATRIX_STEP, folder, "matrix", program)
     return StiffnessModel.read(folder / "matrix.sti")
 
 
@@ -103,6 +123,24 @@ def run(deck: str, folder: Path, job: str, program: str | None = None) -> str:
     subprocess.run([find_program(program), job], cwd=folder, check=True, capture_output=True)
     printed = folder / f"{job}.dat"
     return printed.read_text(encoding="ascii") if printed.exists() else ""
+
+
+def run_both(
+    bodies: Sequence[FaceBody],
+    options: dict[str, Any],
+    deck_of: Callable[[np.ndarray], str],
+    folder: Path,
+) -> Runs:
+    """Contact of bodies with `SOFTNESS` here, and of the deck of its loads (levels,) there."""
+    options = options | {"softness": SOFTNESS, "throw": False}
+    jax.block_until_ready(solve_faces(*bodies, **options).loads)
+    begin = time.process_time()
+    history = jax.block_until_ready(solve_faces(*bodies, **options))
+    here = time.process_time() - begin
+    deck = deck_of(np.asarray(history.force)[1:])
+    begin = seconds_of_programs()
+    text = run(deck, folder, "contact")
+    return Runs(history, text, (here, seconds_of_programs() - begin))
 
 
 def seconds_of_programs() -> float:
@@ -156,6 +194,16 @@ def displacement_there(pull: np.ndarray, name: str, text: str) -> np.ndarray:
     row = {int(node): i for i, node in enumerate(printed.nodes)}
     moved = printed.values[TIGHTENED - 1 :] - printed.values[TIGHTENED - 1]
     return sum(force * moved[:, row[int(node)], int(way) - 1] for node, way, force in pull)
+
+
+def loop_figures(history: FaceHistory, displacement: np.ndarray) -> dict[str, float]:
+    """Area and secant stiffness of the last cycle of a displacement (levels,) at its loads."""
+    start, _, stop = history.cycles[-1]
+    force, moved = np.asarray(history.force)[start : stop + 1], displacement[start : stop + 1]
+    return {
+        "dissipation": area(force, moved),
+        "secant_stiffness": float(np.ptp(force) / np.ptp(moved)),
+    }
 
 
 def area(force: np.ndarray, displacement: np.ndarray) -> float:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,15 +24,14 @@ from calibration.finite_elements.bricks import (
     SOFTNESS,
     TIGHTENED,
     Box,
-    area,
     box,
     cards_of,
     contact,
     displacement_there,
+    loop_figures,
     material,
     matrix,
-    run,
-    seconds_of_programs,
+    run_both,
     shares,
     steps,
 )
@@ -42,7 +40,6 @@ from calibration.finite_elements.program import find_program, version
 from calibration.finite_elements.results import read
 from calibration.provenance import provenance
 from jbeamshell.contact_face.body import FaceBody
-from jbeamshell.contact_face.solve import solve_faces
 
 RECORD = Path(__file__).with_name("flange.json")
 LAP, FREE, WIDTH, THICK = 60.0, 20.0, 30.0, 8.0  # mm; of the lap, beyond it, across, of a plate
@@ -170,24 +167,13 @@ def gaps_there(made: Flange, text: str) -> np.ndarray:
 def compare(lap: tuple[int, int], layers: int, steps_per_half_cycle: int) -> dict[str, Any]:
     """Figures of the last cycle here and by CalculiX, and seconds of the processor."""
     made = flange(lap, layers)
-    options = LOAD | {
-        "steps_per_half_cycle": steps_per_half_cycle,
-        "softness": SOFTNESS,
-        "throw": False,
-    }
+    options = LOAD | {"steps_per_half_cycle": steps_per_half_cycle}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        upper, lower = bodies_of(made, folder)
-        jax.block_until_ready(solve_faces(upper, lower, **options).loads)
-        begin = time.process_time()
-        history = jax.block_until_ready(solve_faces(upper, lower, **options))
-        ours = time.process_time() - begin
-        deck = contact_deck(made, np.asarray(history.force)[1:])
-        begin = seconds_of_programs()
-        text = run(deck, folder, "contact")
-        theirs = seconds_of_programs() - begin
-    start, turn, stop = history.cycles[-1]
-    force = np.asarray(history.force)
+        history, text, (ours, theirs) = run_both(
+            bodies_of(made, folder), options, lambda loads: contact_deck(made, loads), folder
+        )
+    _, turn, stop = history.cycles[-1]
     both = {
         "here": (np.asarray(history.displacement), np.asarray(history.open_area)),
         "calculix": (
@@ -204,13 +190,8 @@ def compare(lap: tuple[int, int], layers: int, steps_per_half_cycle: int) -> dic
         "slipping": float(np.mean(history.slipping[turn])),
     }
     for key, (moved, opened) in both.items():
-        loop = slice(start, stop + 1)
-        found[key] = {
-            "dissipation": area(force[loop], moved[loop]),
-            "secant_stiffness": float(np.ptp(force[loop]) / np.ptp(moved[loop])),
-            "open_area_end": float(opened[stop]),
-            "open_area_turn": float(opened[turn]),
-        }
+        opening = {"open_area_end": float(opened[stop]), "open_area_turn": float(opened[turn])}
+        found[key] = loop_figures(history, moved) | opening
     return found
 
 

@@ -10,6 +10,8 @@ from jbeamshell.cli.arguments import add_folder, add_json
 from jbeamshell.cli.terminal import put, say_written, warn
 from jbeamshell.common.errors import DoubtfulWarning
 
+OF_CURVE = ("softness", "assembly", "cycles", "steps_per_half_cycle")  # keys that a mode takes too
+
 
 def add_to(commands: Any) -> None:
     """Add the command and its options to the parser."""
@@ -21,11 +23,15 @@ def add_to(commands: Any) -> None:
         "assembly, and loaded until the loop is steady unless it says cycles.",
         epilog="The file says friction, amplitude, cycles, bolts, gap, ... and, in [upper] and "
         "[lower], the file of each stiffness matrix (.sti of CalculiX, .mtx, .mat, .npz, .op4) "
-        "with the tables contact (node, X), pull and press (node, direction, force).",
+        "with the tables contact (node, X), pull and press (node, direction, force).  With face in "
+        "place of contact the bodies touch on a face; deck = FILE.inp then names a deck of "
+        "CalculiX, whose surfaces are the face and bear the loads.",
     )
     parser.add_argument("file", metavar="JOINT.toml", help="the bodies and their loads")
     parser.add_argument("--amplitude", type=float, metavar="A", help="in place of the file's")
     parser.add_argument("--friction", type=float, metavar="MU", help="in place of the file's")
+    text = "frequency and damping of this mode over its amplitude (0 is the first), for a face"
+    parser.add_argument("--mode", type=int, metavar="N", help=text)
     add_folder(parser)
     add_json(parser)
     parser.set_defaults(run=run)
@@ -34,24 +40,53 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Solve a contact, report and write; returns the exit code."""
     from jbeamshell.common import files
-    from jbeamshell.common.checks import require
-    from jbeamshell.contact_line.contact import solve_contact
-    from jbeamshell.contact_line.contact_file import read_contact
     from jbeamshell.plotting.folder import check_folder
 
-    given = read_contact(options.file)
-    follows = options.amplitude is not None and "path" in given
-    require("--amplitude", options.amplitude, not follows, "the file gives a path: change that")
-    for name in ("amplitude", "friction"):
-        if getattr(options, name) is not None:
-            given[name] = getattr(options, name)
     folder = None if options.out is None else check_folder(options.out)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DoubtfulWarning)  # printed below, one line each
-        history = solve_contact(**given)
-    for doubt in history.doubts:
+        result = _result(options)
+    for doubt in result.doubts:
         warn(doubt)
-    put(files.as_json(history.figures()) if options.json else f"{history}\n")
+    put(files.as_json(result.figures()) if options.json else f"{result}\n")
     if folder is not None:
-        say_written(history.write(folder))
+        say_written(result.write(folder))
     return 0
+
+
+def _result(options: argparse.Namespace) -> Any:
+    """History of the bodies, or the curve of a mode."""
+    from jbeamshell.common.checks import require
+    from jbeamshell.common.files import read_toml
+    from jbeamshell.contact_face.modes import face_curve, modal_bodies
+    from jbeamshell.contact_face.part_file import read_parts
+    from jbeamshell.contact_face.solve import solve_faces
+    from jbeamshell.contact_line.contact import solve_contact
+    from jbeamshell.contact_line.contact_file import read_contact
+
+    upper = read_toml(options.file).get("upper")
+    on_face = isinstance(upper, dict) and "face" in upper
+    fix = "needs bodies that touch on a face: write face = in [upper]"
+    require("--mode", options.mode, options.mode is None or on_face, fix)
+    if not on_face:
+        return solve_contact(**_changed(options, read_contact(options.file)))
+    above, below, given = read_parts(options.file)
+    given = _changed(options, given)
+    if options.mode is None:
+        return solve_faces(above.body(), below and below.body(), **given)
+    fix = "a mode takes amplitudes of its own: leave it out"
+    require("--amplitude", options.amplitude, options.amplitude is None, fix)
+    pressing = {name: given[name] for name in ("friction", "bolts", "gap") if name in given}
+    bodies = modal_bodies(above, below, mode=options.mode, **pressing)
+    more = {name: given[name] for name in OF_CURVE if name in given}
+    return face_curve(bodies, **more)
+
+
+def _changed(options: argparse.Namespace, given: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of a file, with those of the command line in place of its own."""
+    from jbeamshell.common.checks import require
+
+    follows = options.amplitude is not None and "path" in given
+    require("--amplitude", options.amplitude, not follows, "the file gives a path: change that")
+    named = {name: getattr(options, name) for name in ("amplitude", "friction")}
+    return given | {name: value for name, value in named.items() if value is not None}

@@ -11,7 +11,7 @@ with d the displacements conjugate to the loads.  Load 0 pulls to and fro, the o
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -27,14 +27,9 @@ from jbeamshell.common.checks import (
     require,
     require_choice,
     require_finite,
-    whole_numbers,
 )
-from jbeamshell.contact_line.stiffness_model import (
-    StiffnessModel,
-    condensed_on,
-    nodal_forces,
-    table_of,
-)
+from jbeamshell.contact_face.surface import face_surface, node_table
+from jbeamshell.contact_line.stiffness_model import StiffnessModel, condensed_on, nodal_forces
 from jbeamshell.contact_line.substructure import check_energy, read_body, write_body
 
 RIGID = 1e-6  # energy of a rigid motion over that of the nodes alone, from which on it is held
@@ -154,6 +149,7 @@ class FaceBody(eqx.Module):
         held: ArrayLike | None = None,
         normals: ArrayLike = (0.0, 0.0, 1.0),
         areas: ArrayLike | None = None,
+        elements: Iterable[ArrayLike] | None = None,
     ) -> FaceBody:
         """Body on its face from the matrix of a finite-element program.
 
@@ -165,20 +161,22 @@ class FaceBody(eqx.Module):
             body that is not pulled
         press : for each bolt or pressure, (k, 3) node, direction and force
         held : (k, 2) node and direction of supports that the matrix still has
-        normals : (3,) or (n, 3), from the body below to the one above
+        normals : (3,) or (n, 3), from the body below to the one above; with elements, roughly
         areas : (n,) contact areas; 1 if left out
+        elements : (k, 3 or 4) nodes of each element of the face, which give areas and normals by
+            their shape functions, see `jbeamshell.face_surface`
 
         Raises
         ------
         InputError
-            for a node or a direction that the model does not have, or a support at the face that
-            does not lie along a frame
+            for a node or a direction that the model does not have, a support at the face that does
+            not lie along a frame, or elements that are no mesh of the nodes
         """
         model = model if held is None else model.without(held)
-        table = table_of("nodes", nodes, 4, "give rows of node, X, Y and Z")
-        numbers = whole_numbers("nodes", table[:, 0]).tolist()
-        fix = "names a node twice"
-        require("nodes", len(numbers), len(set(numbers)) == len(numbers) > 0, fix)
+        numbers, places = node_table(nodes)
+        if elements is not None:
+            require("areas", areas, areas is None, "are those of the elements: leave one out")
+            areas, normals = face_surface(nodes, elements, normals)
         row = {(int(a), int(b)): i for i, (a, b) in enumerate(model.dofs)}
         n = len(numbers)
         normal = np.broadcast_to(np.asarray(normals, float), (n, 3))
@@ -203,7 +201,7 @@ class FaceBody(eqx.Module):
         stiffness, loads, flexibility = condensed_on(model.matrix, forces, place, 3 * n)
         turn = scipy.sparse.block_diag(list(frames)).tocsr()
         return cls(
-            table[:, 1:],
+            places,
             turn @ (turn @ stiffness).T,
             turn @ loads,
             flexibility,
@@ -224,8 +222,8 @@ class FaceBody(eqx.Module):
 
     def rigid_motions(self) -> NDArray[np.float64]:
         """Rigid motions (6, 3n) in the frames: along X, Y, Z, and turns about the middle."""
-        middle = np.asarray(self.places) - np.mean(self.places, axis=0)
-        n = len(middle)
+        places = np.asarray(self.places)
+        middle, n = places - np.mean(places, axis=0), len(places)
         ways = np.broadcast_to(np.eye(3)[:, None], (3, n, 3))
         turns = np.cross(ways, middle[None])
         both = np.concatenate([ways, turns])

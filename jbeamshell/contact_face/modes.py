@@ -8,39 +8,62 @@ factor (quasi-static modal analysis: Festjens, Chevallier and Dion 2013; Allen, 
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Sequence
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 import scipy.sparse
+from jax import Array
+from jax.typing import ArrayLike as Number
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.linalg import eigsh
 
-from jbeamshell.common.checks import require, require_count
+from jbeamshell.common.checks import as_leaf, is_traced, require, require_count
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
+from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.summary import Summary, ranged
 from jbeamshell.contact_face.body import FaceBody
 from jbeamshell.contact_face.solve import solve_faces
 from jbeamshell.contact_line.stiffness_model import StiffnessModel
 
 RIGID = 1e-7  # eigenvalue over the largest one found, below which a mode is a rigid motion
+LEAST, POINTS = 0.03, 20  # of the amplitudes that are taken: part of `slides`, and how many
+COLUMNS = {
+    "amplitude": "modal displacement",
+    "frequency": "frequency",
+    "damping": "damping ratio",
+    "dissipation": "lost per cycle",
+}
 SHIFT = 1e-9  # of the stiffest node over the lightest one, below zero, where modes are sought
 
 
 class FacePart(NamedTuple):
-    """Finite-element model of a body, and what its face and its bolts are.
+    """Finite-element model of a body, and what its face, its bolts and its pull are.
 
     Attributes
     ----------
-    model : stiffness and mass
+    model : stiffness and mass, which only modes need
     nodes : (n, 4) node, X, Y and Z of the face's nodes
     press : for each bolt, (k, 3) node, direction and force
+    pull : (k, 3) node, direction and force of a unit of the load that is cycled; modes need none
+    normals, areas, elements : of the face, see `jbeamshell.FaceBody.of`
     """
 
     model: StiffnessModel
     nodes: ArrayLike
     press: Sequence[ArrayLike] = ()
+    pull: ArrayLike | None = None
+    normals: ArrayLike = (0.0, 0.0, 1.0)
+    areas: ArrayLike | None = None
+    elements: Iterable[ArrayLike] | None = None
+
+    def body(self) -> FaceBody:
+        """Body on its face; see `jbeamshell.FaceBody.of`."""
+        return FaceBody.of(**self._asdict())
 
 
 class ModalBodies(NamedTuple):
@@ -54,12 +77,18 @@ class ModalBodies(NamedTuple):
     upper, lower : bodies for `jbeamshell.solve_faces`; lower is None on a rigid base
     omega : angular frequency of the mode while the face sticks
     touching : (n,) True for the pairs that the bolts press together
+    slides : modal displacement at which friction would bear the forces on the stuck face in sum
+    friction, bolts, gap : of the pressing
     """
 
     upper: FaceBody
     lower: FaceBody | None
     omega: float
     touching: NDArray[np.bool_]
+    slides: float
+    friction: Number
+    bolts: Number
+    gap: Number
 
 
 def modal_bodies(
@@ -67,10 +96,9 @@ def modal_bodies(
     lower: FacePart | None = None,
     *,
     mode: int = 0,
-    friction: float = 0.1,
-    bolts: ArrayLike = 1.0,
-    normals: ArrayLike = (0.0, 0.0, 1.0),
-    areas: ArrayLike | None = None,
+    friction: Number = 0.1,
+    bolts: Number = 1.0,
+    gap: Number = 0.0,
 ) -> ModalBodies:
     """Bodies on their face, loaded by the inertia of a mode.
 
@@ -80,8 +108,7 @@ def modal_bodies(
     ----------
     upper, lower : bodies with masses; None is a rigid base
     mode : number of the mode, counted from 0; rigid motions do not count
-    friction, bolts : as in `jbeamshell.solve_faces`, for the pressing
-    normals, areas : of the face, see `FaceBody.of`
+    friction, bolts, gap : as in `jbeamshell.solve_faces`, for the pressing
 
     Raises
     ------
@@ -93,19 +120,31 @@ def modal_bodies(
     for key, part in zip(("upper", "lower"), parts, strict=False):
         fix = "has no mass: read the model with mass="
         require(f"{key}.model", part.model.matrix.shape, part.model.mass is not None, fix)
-    pressed = [_body(part, part.press[0] if part.press else None, normals, areas) for part in parts]
+    pulls: list[ArrayLike | None] = [part.press[0] if part.press else None for part in parts]
+    pressed = _bodies(parts, pulls)
     sizes = np.broadcast_to(np.asarray(bolts, float), max(body.bolts for body in pressed))
     history = solve_faces(
-        *pressed, friction=friction, bolts=sizes, path=np.append(0.0, sizes)[None]
+        *pressed, friction=friction, bolts=sizes, gap=gap, path=np.append(0.0, sizes)[None]
     )
     touching = np.asarray(history.touching[0])
-    omega, forces = _stuck_mode(parts, touching, mode)
-    bodies = [_body(part, pull, normals, areas) for part, pull in zip(parts, forces, strict=True)]
-    return ModalBodies(bodies[0], bodies[1] if lower is not None else None, omega, touching)
+    found = _stuck_mode(parts, touching, mode)
+    bodies = _bodies(parts, found.inertia)
+    shear = np.einsum("nij,nj->ni", bodies[0].frames, found.borne)[:, :2]
+    holds = float(np.sum(np.asarray(history.friction * history.reaction[0])))
+    size = float(np.sum(np.linalg.norm(shear[touching], axis=1)))
+    return ModalBodies(
+        upper=bodies[0],
+        lower=bodies[1] if lower is not None else None,
+        omega=found.omega,
+        touching=touching,
+        slides=holds / size if size > 0.0 else np.inf,
+        friction=friction,
+        bolts=bolts,
+        gap=gap,
+    )
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class FaceCurve:
+class FaceCurve(eqx.Module):
     """Frequency and damping of a mode over its amplitude, (k,) each.
 
     Attributes
@@ -117,20 +156,19 @@ class FaceCurve:
     doubts : reasons to doubt a point, the amplitude first
     """
 
-    amplitude: NDArray[np.float64]
-    frequency: NDArray[np.float64]
-    damping: NDArray[np.float64]
-    dissipation: NDArray[np.float64]
-    doubts: tuple[str, ...]
+    amplitude: Array
+    frequency: Array
+    damping: Array
+    dissipation: Array
+    doubts: tuple[str, ...] = eqx.field(static=True)
+
+    def figures(self) -> dict[str, Any]:
+        """Points of the curve as lists of plain numbers, and the doubts."""
+        columns = {name: np.asarray(getattr(self, name)).tolist() for name in COLUMNS}
+        return columns | {"doubts": list(self.doubts)}
 
     def __str__(self) -> str:
-        columns = {
-            "modal displacement": self.amplitude,
-            "frequency": self.frequency,
-            "damping ratio": self.damping,
-            "lost per cycle": self.dissipation,
-        }
-        rows = [(name, ranged(np.asarray(column))) for name, column in columns.items()]
+        rows = [(word, ranged(np.asarray(getattr(self, name)))) for name, word in COLUMNS.items()]
         notes = [f"doubtful: {doubt}" for doubt in self.doubts]
         return Summary(f"mode of a face, {len(self.amplitude)} points", rows, notes).as_text()
 
@@ -140,18 +178,38 @@ class FaceCurve:
 
         return plotting.modal_curve(self, axes=axes)
 
+    def write(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write ``backbone.csv``, ``result.json`` and a picture to a folder."""
+        from jbeamshell.plotting.folder import check_folder, write_folder
+
+        rows = np.column_stack([np.asarray(getattr(self, name)) for name in COLUMNS])
+        texts = {
+            "backbone.csv": csv_text(tuple(COLUMNS), rows.tolist()),
+            "result.json": as_json(self.figures()),
+        }
+        picture = {"backbone.png": np.ravel(self.plot())[0].figure}
+        return write_folder(check_folder(folder), texts, picture)
+
 
 def face_curve(
-    bodies: ModalBodies, amplitudes: ArrayLike, *, throw: bool = True, **options: Any
+    bodies: ModalBodies,
+    amplitudes: ArrayLike | None = None,
+    *,
+    throw: bool = True,
+    **options: Any,
 ) -> FaceCurve:
     """Frequency and damping of a mode over its amplitude, from the loops of its contact.
+
+    All numbers may be traced: friction, bolts, gap, softness and the amplitudes.
 
     Parameters
     ----------
     bodies : of `modal_bodies`
-    amplitudes : (k,) modal displacements, positive
+    amplitudes : (k,) modal displacements, positive; None is 20 of them, up to the one at which
+        nearly all of the face slides
     throw : as in `jbeamshell.solve_faces`
-    options : friction, bolts, gap and the like, as `jbeamshell.solve_faces` takes them
+    options : softness, steps_per_half_cycle and the like, as `jbeamshell.solve_faces` takes them;
+        friction, bolts and gap are those of `modal_bodies` if left out
 
     Raises
     ------
@@ -160,46 +218,66 @@ def face_curve(
     UnconvergedError
         if a loop has no equilibrium
     """
-    sizes = np.atleast_1d(np.asarray(amplitudes, float))
+    if amplitudes is None:
+        fix = "the mode does not shear the face, so that nothing slides: give amplitudes"
+        require("amplitudes", None, bool(np.isfinite(bodies.slides)), fix)
+        amplitudes = bodies.slides * np.geomspace(LEAST, 1.0, POINTS)
+    sizes = jnp.atleast_1d(as_leaf(amplitudes, "amplitudes"))
     fix = "give positive modal displacements"
-    require("amplitudes", sizes, bool(np.all(sizes > 0.0) and sizes.ndim == 1), fix)
+    positive = is_traced(sizes) or bool(np.all(np.asarray(sizes) > 0.0))
+    require("amplitudes", sizes, positive and sizes.ndim == 1, fix)
+    options = {name: getattr(bodies, name) for name in ("friction", "bolts", "gap")} | options
     options |= {"control": "displacement", "throw": False}
     loops = []
     for size in sizes:
         loop = solve_faces(bodies.upper, bodies.lower, amplitude=size, **options)
-        if throw and not loop.converged:
+        if throw and not is_traced(loop) and not loop.converged:
             raise UnconvergedError(
                 f"amplitude {size:.6g}: a step has no equilibrium; take more steps"
             )
         loops.append(loop)
+    said = [] if is_traced(loops) else list(zip(sizes, loops, strict=True))
+    stiffness = jnp.stack([loop.secant_stiffness for loop in loops])
     curve = FaceCurve(
         amplitude=sizes,
-        frequency=np.sqrt([float(loop.secant_stiffness) for loop in loops]) / (2.0 * np.pi),
-        damping=np.array([0.5 * float(loop.loss_factor) for loop in loops]),
-        dissipation=np.array([float(loop.dissipation) for loop in loops]),
-        doubts=tuple(
-            f"at {size:.4g}: {doubt}"
-            for size, loop in zip(sizes, loops, strict=True)
-            for doubt in loop.doubts
-        ),
+        frequency=jnp.sqrt(stiffness) / (2.0 * np.pi),
+        damping=0.5 * jnp.stack([loop.loss_factor for loop in loops]),
+        dissipation=jnp.stack([loop.dissipation for loop in loops]),
+        doubts=tuple(f"at {size:.4g}: {doubt}" for size, loop in said for doubt in loop.doubts),
     )
     if throw:
         warn_of_doubts(curve.doubts, stacklevel=2)
     return curve
 
 
-def _body(
-    part: FacePart, pull: ArrayLike | None, normals: ArrayLike, areas: ArrayLike | None
-) -> FaceBody:
-    return FaceBody.of(
-        part.model, part.nodes, pull=pull, press=part.press, normals=normals, areas=areas
-    )
+def _bodies(parts: list[FacePart], pulls: Sequence[ArrayLike | None]) -> list[FaceBody]:
+    """Bodies with other pulls, all with the areas and normals of the first one."""
+    first = parts[0]._replace(pull=pulls[0]).body()
+    areas, normals = np.asarray(first.areas), np.asarray(first.normals)
+    others = [
+        part._replace(pull=pull, areas=areas, normals=normals, elements=None).body()
+        for part, pull in zip(parts[1:], pulls[1:], strict=True)
+    ]
+    return [first, *others]
 
 
-def _stuck_mode(
-    parts: list[FacePart], touching: NDArray[np.bool_], mode: int
-) -> tuple[float, list[NDArray[np.float64]]]:
-    """Angular frequency, and for each body the rows (node, direction, force) of M phi."""
+class Stuck(NamedTuple):
+    """Mode while the face sticks.
+
+    Attributes
+    ----------
+    omega : angular frequency
+    inertia : for each body the rows (node, direction, force) of M phi
+    borne : (n, 3) force on the nodes of the upper face, along X, Y and Z, per modal displacement
+    """
+
+    omega: float
+    inertia: list[NDArray[np.float64]]
+    borne: NDArray[np.float64]
+
+
+def _stuck_mode(parts: list[FacePart], touching: NDArray[np.bool_], mode: int) -> Stuck:
+    """Mode of a number, rigid motions not counted."""
     ties = _ties(parts, touching)
     stiffness = scipy.sparse.block_diag([part.model.matrix for part in parts], format="csc")
     mass = scipy.sparse.block_diag([part.model.mass for part in parts], format="csc")
@@ -216,11 +294,15 @@ def _stuck_mode(
     shape = ties @ vectors[:, at]
     shape *= np.sign(shape[np.argmax(np.abs(shape))])
     inertia, begin, tables = mass @ shape, 0, []
+    borne = stiffness @ shape - values[at] * inertia
     for part in parts:
         rows = inertia[begin : begin + len(part.model.dofs)]
         tables.append(np.column_stack([part.model.dofs, rows]))
         begin += len(part.model.dofs)
-    return float(np.sqrt(values[at])), tables
+    force = {(int(a), int(b)): f for (a, b), f in zip(parts[0].model.dofs, borne, strict=False)}
+    face = np.asarray(parts[0].nodes, float)[:, 0].astype(int).tolist()
+    on_face = [[force.get((node, way), 0.0) for way in (1, 2, 3)] for node in face]
+    return Stuck(float(np.sqrt(values[at])), tables, np.array(on_face))
 
 
 def _ties(parts: list[FacePart], touching: NDArray[np.bool_]) -> scipy.sparse.csc_array:

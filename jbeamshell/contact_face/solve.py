@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -122,6 +123,9 @@ def solve_faces(
         coarse = _history(upper, bodies, _first(levels, last // 2 + 1), control, assembly)
         apart = history.dissipation - coarse.dissipation
         history = eqx.tree_at(lambda h: h.change, history, apart)
+    if path is None and is_traced(history):  # its loads are known but for their size
+        known = np.append(0.0, unit_path(cycles or MOST_CYCLES, steps_per_half_cycle))
+        history = dataclasses.replace(history, cycles=closed_cycles(known))
     if not is_traced(history) and throw:
         _demand(history)
         warn_of_doubts(history.doubts, stacklevel=2)

@@ -64,16 +64,23 @@ def read_contact(path: str | os.PathLike[str]) -> dict[str, Any]:
     >>> history = jb.solve_contact(**jb.read_contact("joint.toml"))
     """
     values = read_toml(path)
+    arguments = check_keys(path, values)
+    here = Path(path).parent
+    return arguments | {key: _body(key, values[key], here) for key in BODIES if key in values}
+
+
+def check_keys(
+    path: str | os.PathLike[str], values: dict[str, Any], more: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """Values of a file but those of its bodies; refuses unknown keys and those that clash."""
     for key in values:
-        known = (*BODIES, *NUMBERS)
+        known = (*BODIES, *NUMBERS, *more)
         require(str(path), f"key {key}", key in known, f"keys are {', '.join(known)}")
     require(str(path), "without [upper]", "upper" in values, "write the body that is pulled")
     for key in ("amplitude", "cycles", "steps_per_half_cycle"):
         clash = key in values and "path" in values
         require(key, values.get(key), not clash, "is given beside path: leave one of them out")
-    here = Path(path).parent
-    arguments = {key: values[key] for key in NUMBERS if key in values}
-    return arguments | {key: _body(key, values[key], here) for key in BODIES if key in values}
+    return {key: value for key, value in values.items() if key not in BODIES}
 
 
 def _body(key: str, table: Any, here: Path) -> Substructure:
@@ -89,17 +96,21 @@ def _body(key: str, table: Any, here: Path) -> Substructure:
         require(f"{key}.{', '.join(beside)}", "without contact", not beside, fix)
         return Substructure.read(here / str(file))
     options: dict[str, Any] = {
-        name: _table(f"{key}.{name}", table[name], here) for name in TABLES if name in table
+        name: table_from(f"{key}.{name}", table[name], here) for name in TABLES if name in table
     }
     options |= {name: table[name] for name in ("tangential", "normal") if name in table}
-    press = table.get("press", [])
-    press = [press] if isinstance(press, str) else press
-    loads = [_table(f"{key}.press[{i}]", rows, here) for i, rows in enumerate(press)]
+    loads = [table_from(f"{key}.press[{i}]", rows, here) for i, rows in enumerate(loads_of(table))]
     model = StiffnessModel.read(here / str(file), directions=table.get("directions", 2))
     return model.condensed(**options, press=loads)
 
 
-def _table(key: str, value: Any, here: Path) -> NDArray[np.float64]:
+def loads_of(table: dict[str, Any]) -> list[Any]:
+    """Loads that press, of a body's table: a name, or a list of names and tables."""
+    press = table.get("press", [])
+    return [press] if isinstance(press, str) else press
+
+
+def table_from(key: str, value: Any, here: Path) -> NDArray[np.float64]:
     """Rows of numbers, from a list or a CSV file."""
     try:
         if not isinstance(value, str):

@@ -1,12 +1,14 @@
-"""Stiffness matrices in files: NumPy, MATLAB, Matrix Market, CalculiX and Nastran.
+"""Matrices of stiffness and mass in files: NumPy, MATLAB, Matrix Market, CalculiX and Nastran.
 
 | suffix | content |
 |---|---|
-| ``.npz`` | of `scipy.sparse.save_npz`, or of `numpy.savez` with ``stiffness`` and ``dofs`` |
-| ``.mat`` | a square matrix, dense or sparse; ``stiffness`` or ``K`` if there are several |
+| ``.npz`` | of `scipy.sparse.save_npz`, or `numpy.savez` with ``stiffness``, ``mass``, ``dofs`` |
+| ``.mat`` | square matrices, dense or sparse: ``stiffness`` or ``K``, ``mass`` or ``M`` |
 | ``.mtx`` | Matrix Market, or what CalculiX and Abaqus write for ``*SUBSTRUCTURE GENERATE`` |
 | ``.sti``, ``.mas`` | CalculiX's ``*FREQUENCY, SOLVER=MATRIXSTORAGE``, with the ``.dof`` beside |
-| ``.op4`` | Nastran's OUTPUT4, read by pyyeti |
+| ``.op4`` | Nastran's OUTPUT4, read by pyyeti; its names begin with K and M |
+
+One file may hold both matrices, but for those of CalculiX and Matrix Market.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.measured import matlab
 from jbeamshell.measured.tables import LARGEST, read_bytes
 
-NAMES = ("stiffness", "K", "k")  # of the matrix, where a file holds several
+# Names of a matrix, where a file holds several.
+NAMES = {"stiffness": ("stiffness", "K", "k"), "mass": ("mass", "M", "m")}
 ARRAYS = "give an archive of scipy.sparse.save_npz, or of numpy.savez with stiffness= and dofs="
 
 
@@ -44,20 +47,25 @@ class Rows(NamedTuple):
     dofs: NDArray[np.int64] | None = None
 
 
-def read_matrix(path: str | os.PathLike[str]) -> Rows:
+def read_matrix(path: str | os.PathLike[str], what: str = "stiffness") -> Rows:
     """Matrix of a file, by its suffix.
+
+    Parameters
+    ----------
+    path : file
+    what : "stiffness" or "mass", where it may hold both
 
     Raises
     ------
     InputError
-        for a file that cannot be read, another suffix, or one that holds no matrix
+        for a file that cannot be read, another suffix, or one that holds no such matrix
     """
     name, suffix = Path(path).name, Path(path).suffix.lower()
     if suffix not in READERS:
         raise InputError(f"{name}: is no file of a matrix: it must end in {', '.join(READERS)}")
     data = read_bytes(path)
     try:
-        rows = READERS[suffix](data, Path(path))
+        rows = READERS[suffix](data, Path(path), what)
         if not np.all(np.isfinite(rows.matrix.data)):
             raise InputError("holds numbers that are not finite: write it again")
         return rows
@@ -68,7 +76,7 @@ def read_matrix(path: str | os.PathLike[str]) -> Rows:
         raise InputError(f"{name}: is no {suffix} file of a matrix ({reason})") from None
 
 
-def _archive(data: bytes, _: Path) -> Rows:
+def _archive(data: bytes, _: Path, what: str) -> Rows:
     with np.load(io.BytesIO(data), allow_pickle=False) as archive:
         if "indptr" in archive.files:
             matrix = scipy.sparse.load_npz(io.BytesIO(data))
@@ -76,10 +84,12 @@ def _archive(data: bytes, _: Path) -> Rows:
             return Rows(scipy.sparse.csc_array(matrix))
         arrays = {name: archive[name] for name in archive.files}
     dofs = arrays.pop("dofs", None)
-    return Rows(_the_matrix(arrays, ARRAYS), None if dofs is None else whole_numbers("dofs", dofs))
+    return Rows(
+        _the_matrix(arrays, what, ARRAYS), None if dofs is None else whole_numbers("dofs", dofs)
+    )
 
 
-def _matlab(data: bytes, _: Path) -> Rows:
+def _matlab(data: bytes, _: Path, what: str) -> Rows:
     variables: dict[str, Any] = {}
     for name, value in matlab.variables(data, LARGEST, sparse=True):
         base, mark, part = name.rpartition(matlab.SPARSE)
@@ -94,27 +104,30 @@ def _matlab(data: bytes, _: Path) -> Rows:
             variables[name] = scipy.sparse.csc_array(
                 (value["value"].ravel(), places), shape=tuple(value["shape"].ravel())
             )
-    matrix = _the_matrix(variables, "give one square matrix, or name it stiffness")
+    matrix = _the_matrix(variables, what, f"give one square matrix, or name it {what}")
     return Rows(matrix, None if dofs is None else whole_numbers("dofs", dofs))
 
 
-def _the_matrix(variables: dict[str, Any], fix: str) -> scipy.sparse.csc_array:
+def _the_matrix(variables: dict[str, Any], what: str, fix: str) -> scipy.sparse.csc_array:
     """Matrix among variables by name: the one of a known name, or the only square one."""
     square = {
         name: value
         for name, value in variables.items()
         if value.ndim == 2 and value.shape[0] == value.shape[1] > 1
     }
-    matrices = [square[name] for name in NAMES if name in square]
-    if not matrices and len(square) != 1:
-        raise InputError(f"holds {len(square)} square matrices: {fix}")
-    return scipy.sparse.csc_array(matrices[0] if matrices else next(iter(square.values())))
+    matrices = [square[name] for name in NAMES[what] if name in square]
+    others = {name for key, names in NAMES.items() if key != what for name in names}
+    matrices += [value for name, value in square.items() if name not in others and len(square) == 1]
+    if not matrices:
+        held = ", ".join(square) or "none"
+        raise InputError(f"holds no {what} among its square matrices ({held}): {fix}")
+    return scipy.sparse.csc_array(matrices[0])
 
 
-def _text(data: bytes, path: Path) -> Rows:
+def _text(data: bytes, _: Path, what: str) -> Rows:
     if data.lstrip()[:2] == b"%%":
         return Rows(_market(data.decode("ascii").lower()))
-    return _substructure(data.decode("ascii"))
+    return _substructure(data.decode("ascii"), what)
 
 
 def _market(text: str) -> scipy.sparse.csc_array:
@@ -155,14 +168,16 @@ def _placed(
     return scipy.sparse.csc_array(matrix)
 
 
-def _substructure(text: str) -> Rows:
+def _substructure(text: str, what: str) -> Rows:
     """Rows of ``*SUBSTRUCTURE MATRIX OUTPUT``: nodes in comments, degrees of freedom, lower half.
 
     Element node k is the k-th in the comments, and its directions are given from line "k, ..." on.
     """
-    head, marker, rest = text.partition("*MATRIX,TYPE=STIFFNESS")
+    head, _, _ = text.partition("*MATRIX")
+    _, marker, rest = text.partition(f"*MATRIX,TYPE={what.upper()}")
     if not marker:
-        raise InputError("holds no *MATRIX,TYPE=STIFFNESS: add STIFFNESS=YES to the output")
+        kind = what.upper()
+        raise InputError(f"holds no *MATRIX,TYPE={kind}: add {kind}=YES to the output")
     _, _, comments = head.partition("ELEMENT NODES")
     nodes: list[int] = []
     directions: list[tuple[int, list[int]]] = []
@@ -188,7 +203,7 @@ def _substructure(text: str) -> Rows:
     return Rows(scipy.sparse.csc_array(full), np.array(rows))
 
 
-def _stored(data: bytes, path: Path) -> Rows:
+def _stored(data: bytes, path: Path, _: str) -> Rows:
     """Rows of CalculiX's matrix storage: triplets of the upper half, and node.direction."""
     listing = path.with_suffix(".dof")
     words = read_bytes(listing).decode("ascii").split()
@@ -200,22 +215,21 @@ def _stored(data: bytes, path: Path) -> Rows:
     return Rows(_placed(row - 1, column - 1, value, len(dofs), True), dofs)
 
 
-def _nastran(_: bytes, path: Path) -> Rows:
+def _nastran(_: bytes, path: Path, what: str) -> Rows:
     try:
         from pyyeti.nastran import op4
     except ImportError:
         raise InputError("needs pyyeti: pip install 'jbeamshell[nastran]'") from None
     names, matrices, *_ = op4.load(str(path), into="list", sparse=True)
+    begins = {"k": "stiffness", "m": "mass"}
     variables = {
-        name: scipy.sparse.csc_array(matrix) for name, matrix in zip(names, matrices, strict=True)
+        begins.get(name[:1].lower(), name): scipy.sparse.csc_array(matrix)
+        for name, matrix in zip(names, matrices, strict=True)
     }
-    for name, matrix in list(variables.items()):
-        if name.lower().startswith("k"):
-            variables["stiffness"] = matrix
-    return Rows(_the_matrix(variables, "give one square matrix, or name it KAA"))
+    return Rows(_the_matrix(variables, what, "give one square matrix, or name it KAA or MAA"))
 
 
-READERS: dict[str, Callable[[bytes, Path], Rows]] = {
+READERS: dict[str, Callable[[bytes, Path, str], Rows]] = {
     ".npz": _archive,
     ".mat": _matlab,
     ".mtx": _text,

@@ -22,6 +22,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from jbeamshell.common.checks import require, require_count, shown, whole_numbers
 from jbeamshell.common.errors import InputError
+from jbeamshell.contact_line.craig_bampton import reduced
 from jbeamshell.contact_line.matrix_files import read_matrix
 from jbeamshell.contact_line.substructure import Substructure
 
@@ -32,6 +33,7 @@ TABLE = "give rows of node and X"
 FORCES = "give rows of node, direction and force"
 SUPPORTS = "give rows of node and direction"
 DIRECTIONS = 6  # three ways and three turns
+MODAL = 0  # direction of a row that is the coordinate of a mode, not of a node
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,7 +45,8 @@ class StiffnessModel:
     Attributes
     ----------
     matrix : (N, N) symmetric, dense or scipy sparse
-    dofs : (N, 2) node number and direction (1, 2, 3) of each row
+    dofs : (N, 2) node number and direction (1, 2, 3) of each row; the mode of a reduced body has
+        a row with a number of its own and the direction 0
     mass : (N, N) symmetric, or None; only modes need it
 
     Raises
@@ -70,8 +73,11 @@ class StiffnessModel:
         dofs = whole_numbers("dofs", self.dofs)
         fix = f"give the node and direction of each of its {matrix.shape[0]} rows"
         require("dofs", dofs.shape, dofs.shape == (matrix.shape[0], 2), fix)
-        valid = bool(np.all((dofs >= [0, 1]) & (dofs[:, 1:] <= DIRECTIONS)))
-        require("dofs", dofs, valid, f"directions are 1 to {DIRECTIONS}, and nodes not negative")
+        valid = bool(np.all((dofs >= [0, MODAL]) & (dofs[:, 1:] <= DIRECTIONS)))
+        modal = dofs[dofs[:, 1] == MODAL, 0]
+        valid &= int(np.sum(np.isin(dofs[:, 0], modal))) == modal.size
+        fix = f"directions are 1 to {DIRECTIONS}, and {MODAL} alone in a mode's only row"
+        require("dofs", dofs, valid, f"{fix}; nodes are not negative")
         unique = len({tuple(row) for row in dofs.tolist()}) == len(dofs)
         require("dofs", dofs.shape, unique, "must name each node and direction once")
         object.__setattr__(self, "matrix", matrix)
@@ -99,7 +105,7 @@ class StiffnessModel:
         path : file of the matrix
         dofs : (N, 2) node and direction of each row, where the file does not say them
         directions : rows of each node where neither does; nodes then count from 1
-        mass : file of the mass matrix, its rows in the same order
+        mass : file of the mass matrix, its rows in the same order; may be the same file
 
         Raises
         ------
@@ -107,7 +113,7 @@ class StiffnessModel:
             if the file cannot be read or holds no such matrix
         """
         rows = read_matrix(path)
-        masses = None if mass is None else read_matrix(mass)
+        masses = None if mass is None else read_matrix(mass, "mass")
         if masses is not None and rows.dofs is not None and masses.dofs is not None:
             same = np.array_equal(rows.dofs, masses.dofs)
             require("mass", str(mass), same, "must name the rows of the stiffness, in their order")
@@ -185,6 +191,37 @@ class StiffnessModel:
         require("held", f"{len(supports)} rows", bool(stay), fix)
         mass = None if self.mass is None else self.mass[stay][:, stay]
         return StiffnessModel(self.matrix[stay][:, stay], self.dofs[stay], mass)
+
+    def reduced(self, nodes: ArrayLike, modes: int = 20) -> StiffnessModel:
+        """Model of some nodes and of the modes of the rest (Craig and Bampton 1968).
+
+        Parameters
+        ----------
+        nodes : (k,) those of the contact, and all that bear loads
+        modes : how many modes of the body, with these nodes clamped, are retained
+
+        Returns
+        -------
+        StiffnessModel
+            its last rows are the modes, numbered after all nodes, with the direction 0
+
+        Raises
+        ------
+        InputError
+            for a model without mass, a node without a row, or more modes than there are
+        """
+        require("mass", self.mass, self.mass is not None, "is needed: read the model with mass=")
+        wanted = whole_numbers("nodes", np.ravel(np.asarray(nodes))).tolist()
+        for node in sorted(set(wanted) - set(self.dofs[:, 0].tolist())):
+            raise InputError(f"nodes = node {node}: has no row in the matrix: leave it out")
+        kept = np.isin(self.dofs[:, 0], wanted) & (self.dofs[:, 1] > MODAL)
+        inside = int(np.sum(~kept))
+        require_count("modes", modes, 0, max(inside - 1, 0))
+        factors = _factors(self.matrix[~kept][:, ~kept]) if inside else None
+        stiffness, mass = reduced(self.matrix, self.mass, kept, factors, modes)
+        number = np.max(self.dofs[:, 0]) + np.arange(1, modes + 1)
+        rows = np.column_stack([number, np.full(modes, MODAL)])
+        return StiffnessModel(stiffness, np.concatenate([self.dofs[kept], rows]), mass)
 
 
 def _symmetric(key: str, given: Any) -> scipy.sparse.csc_array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -10,6 +12,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.errors import Status
+from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.loop_figures import LoopFigures
 
@@ -180,3 +183,39 @@ class FaceHistory(LoopFigures, eqx.Module):
         from jbeamshell import plotting
 
         return plotting.face_map(self, step)
+
+    def write(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write ``loop.csv``, ``face.csv``, ``result.json`` and pictures to a folder.
+
+        ``face.csv`` is the face at the pressing, and at the start, the turn and the end of the last
+        cycle; without one, at the last step.
+        """
+        from jbeamshell.plotting.folder import check_folder, write_folder
+
+        names = ("force", "displacement", "slip_work")
+        loop = np.column_stack([np.asarray(getattr(self, name)) for name in names])
+        steps = [0, *(self.cycles[-1] if self.cycles else (self.force.size - 1,))]
+        along = {
+            "tributary": self.tributary,
+            "slip_1": self.slip[..., 0],
+            "slip_2": self.slip[..., 1],
+            "gap": self.gap,
+            "traction_1": self.traction[..., 0],
+            "traction_2": self.traction[..., 1],
+            "reaction": self.reaction,
+            "slipping": self.slipping,
+        }
+        size = self.gap.shape
+        columns = [np.indices(size)[0], *(np.broadcast_to(p, size) for p in self.places.T)]
+        columns += [np.broadcast_to(np.asarray(values), size) for values in along.values()]
+        face = np.column_stack([column[steps].ravel() for column in columns])
+        texts = {
+            "loop.csv": csv_text(names, loop.tolist()),
+            "face.csv": csv_text(("step", "x", "y", "z", *along), face.tolist()),
+            "result.json": as_json(self.figures()),
+        }
+        pictures = {
+            "loop.png": np.ravel(self.plot())[0].figure,
+            "face.png": self.plot_face(steps[-2] if self.cycles else -1),
+        }
+        return write_folder(check_folder(folder), texts, pictures)

@@ -112,7 +112,7 @@ def modal_curve(
     axes : two axes; a new figure when not given
     """
     amplitude = np.asarray(curve.amplitude) / np.sqrt(1.0 if mass is None else mass)
-    columns = amplitude, np.asarray(curve.frequency), curve.damping
+    columns = amplitude, np.asarray(curve.frequency), np.asarray(curve.damping)
     along = MODAL if mass is None else AMPLITUDE
     return _pair(columns, axes, label, "", PALETTE[1], along)
 

@@ -240,6 +240,31 @@ class TestMatrices:
         np.testing.assert_array_equal(model.matrix.toarray(), [[2.0, -1.0], [-1.0, 3.0]])
         np.testing.assert_array_equal(model.dofs, [[7, 1], [9, 1]])
 
+    @pytest.mark.parametrize("kind", ["npz", "mat", "op4", "mtx"])
+    def test_a_file_of_stiffness_and_mass_gives_both(self, tmp_path, kind):
+        stiffness, mass = np.array([[2.0, -1.0], [-1.0, 3.0]]), np.array([[0.5, 0.1], [0.1, 0.25]])
+        path, dofs = tmp_path / f"both.{kind}", [[7, 1], [9, 0]]  # the second one of a mode
+        if kind == "npz":
+            np.savez(path, stiffness=stiffness, mass=mass)
+        elif kind == "mat":
+            scipy.io.savemat(path, {"K": scipy.sparse.csc_array(stiffness), "M": mass})
+        elif kind == "op4":
+            op4 = pytest.importorskip("pyyeti.nastran.op4")
+            op4.write(str(path), {"KAA": stiffness, "MAA": mass})
+        else:
+            text = "*USER ELEMENT,NODES= 2\n** ELEMENT NODES\n** 7, 9\n  1\n 2, 1\n"
+            text += "*MATRIX,TYPE=STIFFNESS\n 2.0,\n-1.0, 3.0\n*MATRIX,TYPE=MASS\n .5,\n.1, .25\n"
+            path.write_text(text)
+        model = jb.StiffnessModel.read(path, mass=path, dofs=dofs)
+        np.testing.assert_array_equal(model.matrix.toarray(), stiffness)
+        np.testing.assert_array_equal(model.mass.toarray(), mass)
+        np.testing.assert_array_equal(model.dofs, dofs)
+
+    def test_a_file_without_masses_is_no_file_of_masses(self, tmp_path):
+        np.savez(tmp_path / "body.npz", stiffness=np.eye(2), dofs=[[1, 1], [2, 1]])
+        with pytest.raises(jb.InputError, match=r"body.npz: holds no mass among .* \(stiffness\)"):
+            jb.StiffnessModel.read(tmp_path / "body.npz", mass=tmp_path / "body.npz")
+
     def test_a_saved_body_is_read_again(self, tmp_path):
         lower().save(tmp_path / "lower.npz")
         again = jb.Substructure.read(tmp_path / "lower.npz")
