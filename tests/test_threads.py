@@ -14,7 +14,7 @@ import jbeamshell as jb
 from jbeamshell import identify, laws
 from jbeamshell.common.files import write_text
 from jbeamshell.common.progress import bar
-from jbeamshell.common.threads import VARIABLE, in_one_lapack_thread
+from jbeamshell.common.threads import VARIABLE, on_one_core
 from jbeamshell.common.workers import without_main
 
 TINY = {"model.nodes": 9, "load.steps_per_half_cycle": 2, "load.cycles": 1}
@@ -96,7 +96,7 @@ def test_lapack_has_one_thread_while_a_strip_is_solved(monkeypatch):
     def threads():
         return {library["num_threads"] for library in threadpool_info()}
 
-    asked = in_one_lapack_thread(threads)
+    asked = on_one_core(threads)
     with threadpool_limits(2, user_api="blas"):
         assert asked() == {2}  # OPENBLAS_NUM_THREADS says so in the tests
         monkeypatch.delenv(VARIABLE, raising=False)
@@ -113,7 +113,7 @@ def test_threads_at_once_leave_lapack_as_it_was(monkeypatch):
         inside.wait()
         go_on.wait()
 
-    jobs = [in_one_lapack_thread(inside.wait), in_one_lapack_thread(last)]
+    jobs = [on_one_core(inside.wait), on_one_core(last)]
     workers = [threading.Thread(target=job) for job in jobs]
     for worker in workers:
         worker.start()

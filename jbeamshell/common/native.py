@@ -14,7 +14,7 @@ from jax.flatten_util import ravel_pytree
 
 from jbeamshell.common.checks import is_staged, is_traced
 from jbeamshell.common.small import SOONEST, known_options, quick_options
-from jbeamshell.common.threads import in_one_lapack_thread
+from jbeamshell.common.threads import on_one_core
 
 # The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
 MARK = {"inlineable": "false", "xla_cpu_small_call": "true"}
@@ -149,7 +149,7 @@ class Native:
                 self.fits = False
         return self._called(*given)
 
-    @in_one_lapack_thread
+    @on_one_core
     def _called(self, *given: Any) -> Any:
         return jax.block_until_ready(self.ordinary(*given))
 

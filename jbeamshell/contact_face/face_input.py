@@ -87,7 +87,7 @@ def checked_distance(upper: FaceBody, gap: ArrayLike) -> Array:
 
 
 def checked_softness(upper: FaceBody, softness: ArrayLike) -> Array:
-    """Displacement per force (n, 3) of the surfaces at each pair, on two tangents and the normal."""
+    """Displacement per force (n, 3) of the surfaces at each pair, along tangents and normal."""
     soft = as_leaf(softness, "softness")
     fix = "give a number, or a tangential and a normal one"
     require("softness", softness, soft.shape in ((), (2,)), fix)

@@ -20,7 +20,7 @@ from jbeamshell.common.checks import require, require_count
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import counting
 from jbeamshell.common.summary import Summary
-from jbeamshell.common.threads import in_one_lapack_thread
+from jbeamshell.common.threads import on_one_core
 from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.plan import Plan, planned
@@ -89,7 +89,7 @@ class Fits:
         return self._summary.as_html()
 
 
-@in_one_lapack_thread
+@on_one_core
 def fit_each(
     data: Sequence[Any],
     scene: Any = None,
@@ -175,7 +175,7 @@ def _naming(place: int, count: int) -> Iterator[None]:
         raise InputError(f"fit {place + 1} of {count}: {error}") from None
 
 
-@in_one_lapack_thread
+@on_one_core
 def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
     """Fit copies of a fit's data, whose residuals are drawn anew.
 

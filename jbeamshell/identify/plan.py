@@ -18,7 +18,7 @@ import numpy as np
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
-from jbeamshell.common.threads import in_one_lapack_thread
+from jbeamshell.common.threads import on_one_core
 from jbeamshell.identify.choose_free import chosen_free
 from jbeamshell.identify.copies import counted_once
 from jbeamshell.identify.driving import driven
@@ -65,7 +65,7 @@ class Plan:
     notes: Sequence[str] = ()
     options: Options = DEFAULTS
 
-    @in_one_lapack_thread
+    @on_one_core
     def run(
         self,
         *,

@@ -25,7 +25,7 @@ from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, 
 from jbeamshell.common.native import Program
 from jbeamshell.common.precision import in_double, is_single
 from jbeamshell.common.progress import patience
-from jbeamshell.common.threads import in_one_lapack_thread
+from jbeamshell.common.threads import on_one_core
 from jbeamshell.contact_line.solve import Cycles, walks_pressures
 from jbeamshell.contact_line.solve import solve as walk
 from jbeamshell.contact_line.strip import Strip
@@ -119,7 +119,7 @@ def solve(
         return run(scene, path, contact=contact, solver=solver, throw=throw)
 
 
-@in_one_lapack_thread
+@on_one_core
 def run(
     scene: Scene,
     path: ArrayLike | None = None,

@@ -23,7 +23,7 @@ import numpy as np
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.jax_options import FAST_LOOPS, configure, started
-from jbeamshell.common.threads import in_one_lapack_thread
+from jbeamshell.common.threads import on_one_core
 from jbeamshell.common.workers import without_main
 from jbeamshell.sweeping.job import Job, runner_of
 from jbeamshell.sweeping.runner import KEPT, Block, Runner
@@ -36,7 +36,7 @@ _compiling = threading.Lock()
 # --- in a worker ----------------------------------------------------------------------------------
 
 
-@in_one_lapack_thread
+@on_one_core
 def run_block(about: str, fast_loops: bool, cache: bool, columns: np.ndarray) -> Block:
     """Figures of a block of lanes; a worker calls this.
 
@@ -63,6 +63,7 @@ def _runner(about: str) -> Runner:
     return runner
 
 
+@on_one_core
 def _run(runner: Runner, columns: np.ndarray) -> Block:
     with jax.enable_x64(True):  # each thread has its own
         return runner(columns)

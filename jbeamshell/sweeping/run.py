@@ -23,7 +23,7 @@ from jbeamshell.common.errors import InputError, UnconvergedError, warn_of_doubt
 from jbeamshell.common.files import as_path
 from jbeamshell.common.precision import doubled, is_single
 from jbeamshell.common.progress import counting, in_notebook
-from jbeamshell.common.threads import in_one_lapack_thread
+from jbeamshell.common.threads import on_one_core
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.scene import Scene
 from jbeamshell.solving.response import pinned
@@ -46,7 +46,7 @@ PARTS = ".parts"  # suffix of the folder of finished blocks, beside the file
 Progress = Callable[[int, int], None]
 
 
-@in_one_lapack_thread
+@on_one_core
 def sweep(
     scene: Scene,
     over: Mapping[str, ArrayLike],
