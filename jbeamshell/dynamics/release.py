@@ -267,19 +267,17 @@ def _whole(
     progress: bool | None,
 ) -> Motion:
     """Motion of the whole strip, whose end force falls to zero within `RELEASE` periods."""
-    from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
     from jbeamshell.dynamics.strip.excitation import Recorded
-    from jbeamshell.dynamics.strip.modes import first_period
+    from jbeamshell.dynamics.strip.modes import modes
     from jbeamshell.dynamics.strip.simulate import simulate
 
-    attached = AttachedMasses(payload=mass)
-    period = first_period(scene, inertia, attached)
+    period = 1.0 / float(modes(scene, inertia, payload=mass).frequency[0])
     return simulate(
         scene,
         cycles * period,
         Recorded([0.0, RELEASE * period], [force, 0.0]),
+        payload=mass,
         inertia=inertia,
-        attached=attached,
         released=force,
         samples=samples,
         step=period / per_cycle,

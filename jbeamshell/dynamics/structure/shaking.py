@@ -29,11 +29,10 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import POSITIVE, require, require_count, require_number
-from jbeamshell.common.errors import InputError, UnconvergedError, warn_of_doubts
+from jbeamshell.common.errors import InputError, warn_of_doubts
 from jbeamshell.common.precision import doubled
-from jbeamshell.common.pytrees import Tree
 from jbeamshell.common.summary import Summary, with_unit
-from jbeamshell.dynamics.strip.motion import doubts_of_balance
+from jbeamshell.dynamics.ledger import InterruptedMotionError, Ledger
 from jbeamshell.dynamics.structure.matrices import Structure, dense
 from jbeamshell.dynamics.vibration.elements import Laws, laws_of
 
@@ -49,54 +48,27 @@ UNTRACED = "shake it outside jit, grad and vmap"
 NO_MOTION = "nothing happens: give a force, or an initial displacement or velocity"
 
 
-class StructureMotion(Tree):
-    """Motion of a structure at T evenly spaced times; times that were not reached hold NaN.
+class StructureMotion(Ledger):
+    """Motion of a structure.
 
     Attributes
     ----------
-    time : (T,) times
-    displacement, velocity : (T, n) displacements and velocities of the degrees of freedom
-    kinetic, stored : (T,) kinetic energy; potential energy of structure and sliders
-    external_work : (T,) work done by forces since t = 0
-    friction_work, damping_work : (T,) work lost in joints and by C since t = 0
-    complete : True if the whole span was computed
     error : estimated error of the displacements, over the largest one
     tolerance : error that was asked for
     """
 
-    time: NDArray[np.float64]
-    displacement: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    kinetic: NDArray[np.float64]
-    stored: NDArray[np.float64]
-    external_work: NDArray[np.float64]
-    friction_work: NDArray[np.float64]
-    damping_work: NDArray[np.float64]
-    complete: bool
     error: float
     tolerance: float
 
     @property
-    def reached(self) -> float:
-        """Last time that was computed."""
-        return float(self.time[np.isfinite(self.kinetic)].max(initial=0.0))
-
-    @property
-    def imbalance(self) -> NDArray[np.float64]:
-        """Error of the energy balance, (T,); zero but for errors of the time steps."""
-        change = self.kinetic + self.stored - self.kinetic[0] - self.stored[0]
-        return change - self.external_work + self.friction_work + self.damping_work
-
-    @property
     def doubts(self) -> tuple[str, ...]:
         """Sentences that say what may be wrong, and the fix."""
-        found = doubts_of_balance(self)
         if self.error <= self.tolerance:
-            return found
+            return super().doubts
         return (
             f"displacements may be off by {self.error:.1%} of the largest one: take more steps "
             "(most_steps) or a shorter span",
-            *found,
+            *super().doubts,
         )
 
     def __str__(self) -> str:
@@ -113,14 +85,6 @@ class StructureMotion(Tree):
 
     def __repr__(self) -> str:
         return str(self)
-
-
-class InterruptedShakingError(UnconvergedError):
-    """Transient that ended before its span; ``motion`` is the part that was computed."""
-
-    def __init__(self, message: str, motion: StructureMotion) -> None:
-        super().__init__(message)
-        self.motion = motion
 
 
 class _State(NamedTuple):
@@ -186,7 +150,7 @@ def shake(
     InputError
         for a span that is not positive, displacements or velocities of another size than n,
         neither a force nor an initial motion, or a traced structure
-    InterruptedShakingError
+    InterruptedMotionError
         if the steps do not reach ``span``, or a joint moves beyond its `Joint.reach`; it carries
         the part before
 
@@ -225,7 +189,7 @@ def shake(
     if throw and not motion.complete:
         ends = f"the motion ends at t = {motion.reached:.6g} of {span:.6g}: "
         ends += unknown or "take fewer samples, a larger tolerance or more steps (most_steps)"
-        raise InterruptedShakingError(ends, motion)
+        raise InterruptedMotionError(ends, motion)
     warn_of_doubts(motion.doubts)
     return motion
 
@@ -237,7 +201,7 @@ def _until(motion: StructureMotion, known: NDArray[np.bool_]) -> StructureMotion
         column = getattr(motion, name)
         seen = known.reshape(-1, *[1] * (column.ndim - 1))
         columns[name] = np.where(seen, column, np.nan)
-    return motion.but(complete=bool(np.all(known)), **columns)
+    return motion.but(**columns)
 
 
 def _converged(
@@ -270,7 +234,7 @@ def _converged(
     assert before is not None
     columns = [_padded(column, samples) for column in before]
     named: Any = dict(zip(COLUMNS, columns[:-1], strict=True))
-    motion = StructureMotion(times, **named, complete=True, error=error, tolerance=tolerance)
+    motion = StructureMotion(times, **named, error=error, tolerance=tolerance)
     return _until(motion, np.isfinite(motion.kinetic)), columns[-1]
 
 
