@@ -30,13 +30,10 @@ from .structure.shaking import (
 )
 from .vibration.forced import (
     forced_response as forced_response,
-    level_response as level_response,
     steady_response as steady_response,
 )
 from .vibration.modes import nonlinear_mode as nonlinear_mode
 from .vibration.results import (
     ForcedResponse as ForcedResponse,
     NonlinearMode as NonlinearMode,
-    StalledContinuationError as StalledContinuationError,
-    SteadyResponse as SteadyResponse,
 )

@@ -164,14 +164,12 @@ class ResponseCurve(Protocol):
 
     Attributes
     ----------
-    frequency, level : (k,) frequency and factor of the force; one of them varies
+    frequency : (k,) frequency of the force
     harmonics, harmonic_amplitudes : (H,) numbers of the harmonics, and their (k, H) amplitudes
     """
 
     @property
     def frequency(self) -> np.ndarray: ...
-    @property
-    def level(self) -> np.ndarray: ...
     @property
     def harmonics(self) -> np.ndarray: ...
     @property

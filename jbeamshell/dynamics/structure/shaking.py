@@ -34,7 +34,7 @@ from jbeamshell.common.precision import doubled
 from jbeamshell.common.summary import Summary, with_unit
 from jbeamshell.dynamics.ledger import InterruptedMotionError, Ledger
 from jbeamshell.dynamics.structure.matrices import Structure, dense
-from jbeamshell.dynamics.vibration.elements import Laws, laws_of
+from jbeamshell.dynamics.vibration.elements import Elements, elements_of
 
 FIRST = 50  # steps of the longest period of the first run, or more
 TOLERANCE = 1e-4
@@ -111,7 +111,7 @@ class _Model(NamedTuple):
     damping: Array
     stiffness: Array
     directions: Array
-    laws: Laws
+    elements: Elements
 
 
 def shake(
@@ -214,7 +214,7 @@ def _converged(
     span, samples, tolerance, most_steps = settings
     model = _model(structure)
     x, v = map(jnp.asarray, start)
-    springs, limits = model.laws.springs, model.laws.limits
+    springs, limits = model.elements.springs, model.elements.limits
     sliders = jnp.clip(springs * (model.directions.T @ x)[:, None], -limits, limits)
     first = _State(x, v, sliders, jnp.zeros(3), jnp.abs(model.directions.T @ x))
     times = np.linspace(0.0, span, samples)
@@ -248,10 +248,10 @@ def _model(structure: Structure) -> _Model:
     """Matrices and force elements as arrays."""
     mass, damping, stiffness = map(dense, (structure.mass, structure.damping, structure.stiffness))
     directions = structure.directions
-    laws = laws_of(doubled(structure.joints))
-    stiffness = stiffness + (directions * np.asarray(laws.remaining)) @ directions.T
+    elements = elements_of(doubled(structure.joints))
+    stiffness = stiffness + (directions * np.asarray(elements.spring)) @ directions.T
     arrays = [jnp.asarray(a) for a in (mass, damping, stiffness, directions)]
-    return _Model(arrays[0], arrays[1], arrays[2], arrays[3], laws)
+    return _Model(arrays[0], arrays[1], arrays[2], arrays[3], elements)
 
 
 def _run(
@@ -276,7 +276,9 @@ def _marched(
     parts: Array,
     samples: int,
 ) -> tuple[Array, ...]:
-    mass, damping, stiffness, directions, laws = model
+    mass, damping, stiffness, directions, elements = model
+    springs, limits = elements.springs, elements.limits
+    divisors = jnp.where(springs > 0.0, springs, 1.0)
     step = spacing / parts
     inverse = jnp.linalg.inv(4.0 * mass / step**2 + 2.0 * damping / step + stiffness)
     answer = inverse @ directions  # (n, J) to unit forces of the joints
@@ -288,9 +290,9 @@ def _marched(
 
     def forces(held: Array, w: Array) -> tuple[Array, Array, Array]:
         """Forces of the sliders, those of the elements, and their slopes."""
-        trial = held + laws.springs * w[:, None]
-        kept = jnp.clip(trial, -laws.limits, laws.limits)
-        slopes = jnp.sum(jnp.where(trial == kept, laws.springs, 0.0), axis=1)
+        trial = held + springs * w[:, None]
+        kept = jnp.clip(trial, -limits, limits)
+        slopes = jnp.sum(jnp.where(trial == kept, springs, 0.0), axis=1)
         return kept, jnp.sum(kept, axis=1), slopes
 
     def advance(number: Array, state: _State) -> _State:
@@ -315,8 +317,7 @@ def _marched(
         w, last, _ = lax.while_loop(left, improved, search)
         kept, ended, _ = forces(state.sliders, w)
         d = jnp.where(last <= most, moved - answer @ ended, jnp.nan)
-        springs = jnp.where(laws.springs > 0.0, laws.springs, 1.0)
-        slid = jnp.where(laws.springs > 0.0, w[:, None] - (kept - state.sliders) / springs, 0.0)
+        slid = w[:, None] - (kept - state.sliders) / divisors
         lost = jnp.sum(jnp.abs(kept * slid))
         work = jnp.stack([0.5 * outside @ d, lost, d @ damping @ d / step])
         peaks = jnp.maximum(state.peaks, jnp.abs(u + w))
@@ -330,8 +331,7 @@ def _marched(
 
     _, later = lax.scan(until, first, jnp.arange(samples - 1))
     y = jax.tree.map(lambda a, b: jnp.concatenate([a[None], b]), first, later)
-    springs = jnp.where(laws.springs > 0.0, laws.springs, 1.0)
     kinetic = 0.5 * jnp.einsum("ti,ij,tj->t", y.v, mass, y.v)
-    held = 0.5 * jnp.sum(y.sliders**2 / springs, axis=(1, 2))
+    held = 0.5 * jnp.sum(y.sliders**2 / divisors, axis=(1, 2))
     stored = 0.5 * jnp.einsum("ti,ij,tj->t", y.x, stiffness, y.x) + held
     return y.x, y.v, kinetic, stored, *y.work.T, y.peaks

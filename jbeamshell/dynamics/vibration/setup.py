@@ -16,7 +16,6 @@ from jbeamshell.common.checks import (
     is_traced,
     require,
     require_count,
-    require_number,
 )
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration.balance import Balance, Found
@@ -26,7 +25,6 @@ HARMONICS = 9  # highest one, unless told otherwise
 PER_HARMONIC = 16  # samples of a period of the highest harmonic
 FEWEST = 128  # samples of a cycle
 RANGE = "give two different positive frequencies, (from, to), in cycles per time"
-LEVELS = "give two different positive factors of the force, (from, to)"
 AMPLITUDES = "give positive modal displacements that rise"
 
 
@@ -106,8 +104,3 @@ def dissipation(found: Found, directions: Any, harmonics: Sequence[int], xp: Any
 def check_mode(structure: Structure, mode: Any) -> None:
     """Raise `InputError` unless a mode exists."""
     require_count("mode", mode, 0, structure.size - 1)
-
-
-def check_frequency(frequency: Any) -> None:
-    """Raise `InputError` unless a frequency is positive."""
-    require_number("frequency", frequency, "must be a positive frequency, in cycles per time")
