@@ -245,10 +245,8 @@ def on_contact_line(scene: Scene) -> Scene | None:
 
 def _strip_mass(scene: Scene, inertia: Inertia) -> float:
     """Mass of the strip per width."""
-    layers, length = scene.strip.layers, float(scene.strip.length)
-    whole = [length * float(scene.strip.height_ratio)]
-    thickness = whole if layers is None else np.asarray(layers)[:, 0]
-    return length * float(np.sum(np.asarray(inertia.density) * thickness))
+    _, weights = inertia.through_height(scene)
+    return float(scene.strip.length * np.sum(np.asarray(weights)))
 
 
 def _share(network: Network, inertia: Inertia, mass: float) -> float:

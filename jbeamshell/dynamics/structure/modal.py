@@ -19,7 +19,6 @@ which is large where three times the frequency is that of another mode.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -33,8 +32,7 @@ from jbeamshell.common.checks import is_staged, is_traced, require
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
-from jbeamshell.common.summary import Summary, ranged
-from jbeamshell.dynamics.frequencies import OverFrequency
+from jbeamshell.dynamics.frequencies import OverAmplitude
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration.elements import Elements, elements_of
 from jbeamshell.dynamics.vibration.reduction import basis_of
@@ -50,23 +48,17 @@ ROUNDING = 4e3  # residual over the rounding of a displacement, at which an equi
 LINEAR = "give a joint: a structure without any is linear, see its modes"
 
 
-class ModalCurve(OverFrequency):
-    """Frequency and damping of a mode over its amplitude, (k,) each.
+class ModalCurve(OverAmplitude):
+    """Frequency and damping of a mode over its amplitude by statics, (k,) each.
 
     Attributes
     ----------
-    amplitude : modal displacement q
-    frequency : cycles per time; see `omega`
-    damping : damping ratio zeta of joints and structure
-    dissipation : energy lost in the joints per cycle
-    joints : (k, joints) amplitudes of the joints' displacements
     frequency_error, damping_error : estimated errors of statics, relative
     """
 
-    amplitude: Any
-    damping: Any
-    dissipation: Any
-    joints: Any
+    title = "modal curve, by statics"
+    label = "quasi-static"
+
     frequency_error: Any
     damping_error: Any
 
@@ -83,34 +75,6 @@ class ModalCurve(OverFrequency):
             f"damping may be off by up to {worst[1]:.0%} and the frequency by {worst[0]:.1%}, as "
             "statics know no inertia and no shape of the loop: take nonlinear_mode there",
         )
-
-    def __str__(self) -> str:
-        return summary_of_mode("modal curve, by statics", self, self.doubts).as_text()
-
-    def __repr__(self) -> str:
-        return str(self)
-
-    def plot(self, axes: Any = None) -> Any:
-        """Draw frequency and damping over amplitude; see `jbeamshell.plotting.modal_curve`."""
-        from jbeamshell import plotting
-
-        return plotting.modal_curve(self, axes=axes)
-
-
-def summary_of_mode(title: str, mode: Any, doubts: Sequence[str] = ()) -> Summary:
-    """Summary of frequency and damping over the amplitude of a mode."""
-    if is_traced(mode):
-        return Summary(f"{title}, traced", [])
-    columns = {
-        "modal displacement": mode.amplitude,
-        "frequency": mode.frequency,
-        "damping ratio": mode.damping,
-        "lost per cycle": mode.dissipation,
-        "joints move by": np.max(np.asarray(mode.joints), axis=-1, initial=0.0),
-    }
-    rows = [(name, ranged(np.asarray(column))) for name, column in columns.items()]
-    notes = [f"doubtful: {doubt}" for doubt in doubts]
-    return Summary(f"{title}, {np.size(mode.amplitude)} points", rows, notes)
 
 
 def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> ModalCurve:

@@ -9,6 +9,10 @@ Only the displacements of the joints are unknown in r_1.  The method is stable f
 loses no energy.  Its error is even in h: two runs with h and h/2 give (4 x_2 - x_1)/3, of the
 fourth order where nothing slips.  Steps are halved until such results agree.
 
+Solvers of differential equations meet the onset of slip as a jump of a slope, and do not see their
+error: for ten periods of three masses and 40 sliders diffrax's Tsit5 with a tolerance of 1e-7 is
+off by 2e-3 after .09 s, and by 4e-5 after .35 s with 1e-9; these steps are off by 3e-6 after .15 s.
+
 References
 ----------
 Newmark, N. M. (1959). A method of computation for structural dynamics. J. Eng. Mech. Div. ASCE 85,
@@ -18,7 +22,7 @@ Newmark, N. M. (1959). A method of computation for structural dynamics. J. Eng. 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -177,15 +181,18 @@ def shake(
     moves = force is not None or any(bool(np.any(values)) for values in start)
     require("force", force, moves, NO_MOTION)
     with jax.enable_x64(True):
-        motion, peaks = _converged(structure, start, force, (span, samples, tolerance, most_steps))
-    known = np.isfinite(motion.kinetic)
-    unknown = ""
+        columns, error = _converged(structure, start, force, (span, samples, tolerance, most_steps))
+    *columns, peaks = columns
+    known = np.isfinite(columns[0][:, 0])
+    times, unknown = np.linspace(0.0, span, samples), ""
     try:
-        structure.knows(peaks[known], f"the motion until t = {motion.reached:.6g}")
-    except InputError as error:
-        unknown = str(error)
-        within = np.all(np.asarray(structure.within_reach(peaks)), axis=1)
-        motion = _until(motion, known & within)
+        reached = float(times[known][-1])
+        structure.knows(peaks[known], f"the motion until t = {reached:.6g}")
+    except InputError as refusal:
+        unknown = str(refusal)
+        known &= np.all(np.asarray(structure.within_reach(peaks)), axis=1)
+    named = dict(zip(COLUMNS, [_only(column, known) for column in columns], strict=True))
+    motion = StructureMotion(times, **named, error=error, tolerance=tolerance)
     if throw and not motion.complete:
         ends = f"the motion ends at t = {motion.reached:.6g} of {span:.6g}: "
         ends += unknown or "take fewer samples, a larger tolerance or more steps (most_steps)"
@@ -194,54 +201,44 @@ def shake(
     return motion
 
 
-def _until(motion: StructureMotion, known: NDArray[np.bool_]) -> StructureMotion:
-    """Motion whose other times hold NaN."""
-    columns = {}
-    for name in COLUMNS:
-        column = getattr(motion, name)
-        seen = known.reshape(-1, *[1] * (column.ndim - 1))
-        columns[name] = np.where(seen, column, np.nan)
-    return motion.but(**columns)
-
-
 def _converged(
     structure: Structure,
     start: list[NDArray[np.float64]],
     force: Callable[[Array], Array] | None,
     settings: tuple[float, int, float, int],
-) -> tuple[StructureMotion, NDArray[np.float64]]:
-    """Motion whose steps are short enough, and largest displacements (T, J) of the joints."""
+) -> tuple[list[NDArray[np.float64]], float]:
+    """Columns (T, ...) of a motion whose steps are short enough, and its error.
+
+    The columns are those of `COLUMNS`, and the largest displacements (T, J) of the joints.
+    """
     span, samples, tolerance, most_steps = settings
     model = _model(structure)
     x, v = map(jnp.asarray, start)
     springs, limits = model.elements.springs, model.elements.limits
     sliders = jnp.clip(springs * (model.directions.T @ x)[:, None], -limits, limits)
     first = _State(x, v, sliders, jnp.zeros(3), jnp.abs(model.directions.T @ x))
-    times = np.linspace(0.0, span, samples)
+    spacing = span / (samples - 1)
     period = 1.0 / float(structure.modes(1).frequency[0])
-    parts = max(1, int(np.ceil(FIRST * times[1] / period)))
+    parts = max(1, int(np.ceil(FIRST * spacing / period)))
     count = min(samples, 1 + most_steps // (2 * parts))  # times that the second run reaches
-    coarse = _run(model, first, force, times[1], parts, count)
-    before: tuple[NDArray[np.float64], ...] | None = None
-    error = np.inf
+
+    def run(parts: int) -> list[NDArray[np.float64]]:
+        sizes = jnp.asarray(spacing), jnp.asarray(parts)  # so that they share a compiled program
+        return list(map(np.asarray, _marched(model, first, force, *sizes, count)))
+
+    coarse, before, error = run(parts), None, np.inf
     while not error <= tolerance and 2 * parts * (count - 1) <= most_steps:
         parts *= 2
-        fine = _run(model, first, force, times[1], parts, count)
-        better = tuple(f + (f - c) / 3.0 for f, c in zip(fine, coarse, strict=True))
+        fine = run(parts)
+        better = [f + (f - c) / 3.0 for f, c in zip(fine, coarse, strict=True)]
         moved = np.max(np.abs(better[0] - (fine if before is None else before)[0]))
         error = float(moved / max(np.max(np.abs(better[0])), np.finfo(float).tiny))
         coarse, before = fine, better
     assert before is not None
-    columns = [_padded(column, samples) for column in before]
-    named: Any = dict(zip(COLUMNS, columns[:-1], strict=True))
-    motion = StructureMotion(times, **named, error=error, tolerance=tolerance)
-    return _until(motion, np.isfinite(motion.kinetic)), columns[-1]
-
-
-def _padded(column: NDArray[np.float64], samples: int) -> NDArray[np.float64]:
-    """Column (T, ...) whose further times hold NaN."""
-    more = [(0, samples - column.shape[0])] + [(0, 0)] * (column.ndim - 1)
-    return np.pad(column, more, constant_values=np.nan)
+    later = samples - count  # times that no run reaches
+    return [
+        np.pad(a, [(0, later), *[(0, 0)] * (a.ndim - 1)], constant_values=np.nan) for a in before
+    ], error
 
 
 def _model(structure: Structure) -> _Model:
@@ -254,17 +251,9 @@ def _model(structure: Structure) -> _Model:
     return _Model(arrays[0], arrays[1], arrays[2], arrays[3], elements)
 
 
-def _run(
-    model: _Model,
-    first: _State,
-    force: Callable[[Array], Array] | None,
-    spacing: float,
-    parts: int,
-    samples: int,
-) -> tuple[NDArray[np.float64], ...]:
-    """Columns (T, ...) of a motion with some steps between its times."""
-    sizes = jnp.asarray(spacing), jnp.asarray(parts)  # so that they share a compiled program
-    return tuple(map(np.asarray, _marched(model, first, force, *sizes, samples)))
+def _only(column: NDArray[np.float64], known: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Column (T, ...) that holds NaN at other times."""
+    return np.where(known.reshape(-1, *[1] * (column.ndim - 1)), column, np.nan)
 
 
 @eqx.filter_jit

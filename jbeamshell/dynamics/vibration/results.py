@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.summary import Summary, ranged
-from jbeamshell.dynamics.frequencies import OverFrequency
-from jbeamshell.dynamics.structure.modal import summary_of_mode
+from jbeamshell.dynamics.frequencies import OverAmplitude, OverFrequency
 
 DOUBTED = 1e-3  # displacement in the next harmonic over that in the first
 PHASES = 720  # angles of a cycle at which largest values are looked for
@@ -105,39 +104,20 @@ class ForcedResponse(Balanced):
         return plotting.forced_response(self, axes=axes)
 
 
-class NonlinearMode(Balanced):
+class NonlinearMode(Balanced, OverAmplitude):
     """Frequency and damping of a mode over its amplitude, by harmonic balance, k points.
 
     Attributes
     ----------
-    amplitude : (k,) modal displacement q of the first harmonic
-    frequency : (k,) cycles per time; see `omega`
-    damping : (k,) damping ratio, of joints and structure
-    dissipation : (k,) energy lost in the elements per cycle
-    joints : (k, J) largest displacements of the elements
+    amplitude, frequency, damping, dissipation, joints : see `ModalCurve`
     harmonics : (H,) their numbers
     coefficients : (k, H, r) complex coefficients of the motion in ``basis``
     basis : (n, r) displacements of the degrees of freedom in it
     truncation : (k,) displacement of the elements in the next harmonic, over that in the first
     """
 
-    amplitude: Any
-    damping: Any
-    dissipation: Any
-    joints: Any
-
-    def __str__(self) -> str:
-        doubts = () if is_traced(self) else self.doubts
-        return summary_of_mode("nonlinear mode, by harmonic balance", self, doubts).as_text()
-
-    def __repr__(self) -> str:
-        return str(self)
-
-    def plot(self, axes: Any = None) -> Any:
-        """Draw frequency and damping over amplitude; see `jbeamshell.plotting.modal_curve`."""
-        from jbeamshell import plotting
-
-        return plotting.modal_curve(self, axes=axes, label="harmonic balance")
+    title = "nonlinear mode, by harmonic balance"
+    label = "harmonic balance"
 
 
 def over_a_cycle(coefficients: Any, harmonics: Any, xp: Any = np) -> Any:
