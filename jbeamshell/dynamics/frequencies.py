@@ -23,16 +23,7 @@ class OverFrequency(Tree):
 
 
 class OverAmplitude(OverFrequency):
-    """Frequency and damping of a mode of a structure over its amplitude, (k,) each.
-
-    Attributes
-    ----------
-    amplitude : modal displacement q, of the first harmonic
-    frequency : cycles per time; see `omega`
-    damping : damping ratio zeta of joints and structure
-    dissipation : energy lost in the joints per cycle
-    joints : (k, joints) largest displacements of the joints
-    """
+    """Frequency and damping of a mode of a structure over its amplitude; see `ModalCurve`."""
 
     title: ClassVar[str]
     label: ClassVar[str]  # of a picture

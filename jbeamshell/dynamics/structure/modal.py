@@ -53,6 +53,11 @@ class ModalCurve(OverAmplitude):
 
     Attributes
     ----------
+    amplitude : modal displacement q
+    frequency : cycles per time; see `omega`
+    damping : damping ratio zeta of joints and structure
+    dissipation : energy lost in the joints per cycle
+    joints : (k, joints) largest displacements of the joints
     frequency_error, damping_error : estimated errors of statics, relative
     """
 

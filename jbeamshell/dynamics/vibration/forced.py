@@ -22,7 +22,6 @@ from jbeamshell.dynamics.vibration.balance import (
     Point,
     Rows,
     dynamic_stiffness,
-    left_out,
     marched,
     polished,
 )
@@ -105,7 +104,8 @@ def forced_response(
             where = NOT_FOUND.format(first)
             raise UnconvergedError(f"{where}, where the curve begins: begin farther from resonance")
         found: Found = jax.tree.map(lambda *rows: np.stack(rows), *points)
-        response = _response(model, balance, found, basis, place, np)
+        columns = setup.columns(model, balance, found, basis, np)
+        response = ForcedResponse(frequency=found.point.p[:, 0] / TURN, place=place, **columns)
     warn_of_doubts(response.doubts)
     return response
 
@@ -146,7 +146,8 @@ def steady_response(
         found = _steady(model, balance, TURN * jnp.asarray(frequency), traced)
         if not traced:
             found = jax.tree.map(np.asarray, found)
-        response = _response(model, balance, found, basis, place, jnp if traced else np)
+        columns = setup.columns(model, balance, found, basis, jnp if traced else np)
+        response = ForcedResponse(frequency=frequency, place=place, **columns)
     if traced:
         sound = found.converged & structure.knows(response.joints, "")
         return response.but(coefficients=nan_unless(sound, response.coefficients))
@@ -155,24 +156,6 @@ def steady_response(
     structure.knows(response.joints, "the force")
     warn_of_doubts(response.doubts)
     return response
-
-
-def _response(
-    model: Reduced, balance: Balance, found: Found, basis: Any, place: int, xp: Any
-) -> ForcedResponse:
-    """Result of solutions (k, ...)."""
-    omega, directions = found.point.p[:, 0], xp.asarray(model.directions)
-    after = left_out(model, balance, omega, found.point.x @ directions, found.lost)
-    return ForcedResponse(
-        frequency=omega / TURN,
-        harmonics=np.array(balance.harmonics),
-        coefficients=found.point.x,
-        basis=basis,
-        truncation=xp.asarray(after),
-        place=place,
-        joints=setup.joint_peaks(found.point.x, directions, balance.harmonics, xp),
-        dissipation=setup.dissipation(found, directions, balance.harmonics, xp),
-    )
 
 
 @partial(jax.jit, static_argnums=(1, 3))

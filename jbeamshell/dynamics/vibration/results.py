@@ -17,11 +17,13 @@ PHASES = 720  # angles of a cycle at which largest values are looked for
 
 
 class Balanced(OverFrequency):
-    """Motions (k,) of harmonics that are in balance, as far as the next one is small."""
+    """Motions (k,) of harmonics that are in balance; see `ForcedResponse`."""
 
     harmonics: NDArray[np.int64]
     coefficients: Any
     basis: Any
+    joints: Any
+    dissipation: Any
     truncation: Any
 
     def at(self, place: int) -> Any:
@@ -48,19 +50,17 @@ class ForcedResponse(Balanced):
 
     Attributes
     ----------
+    place : degree of freedom that `amplitude` and `phase` are of
     frequency : (k,) of the force, cycles per time; see `omega`
     harmonics : (H,) their numbers
     coefficients : (k, H, r) complex coefficients of the motion in ``basis``
     basis : (n, r) displacements of the degrees of freedom in it
-    place : degree of freedom that `amplitude` and `phase` are of
-    joints : (k, J) largest displacements of the elements
-    dissipation : (k,) energy lost in the elements per cycle
-    truncation : (k,) displacement of the elements in the next harmonic, over that in the first
+    joints : (k, J) largest displacements of the joints
+    dissipation : (k,) energy lost in the joints per cycle
+    truncation : (k,) displacement of the joints in the next harmonic, over that in the first
     """
 
     place: int
-    joints: Any
-    dissipation: Any
 
     @property
     def harmonic_amplitudes(self) -> Any:
@@ -109,11 +109,9 @@ class NonlinearMode(Balanced, OverAmplitude):
 
     Attributes
     ----------
-    amplitude, frequency, damping, dissipation, joints : see `ModalCurve`
-    harmonics : (H,) their numbers
-    coefficients : (k, H, r) complex coefficients of the motion in ``basis``
-    basis : (n, r) displacements of the degrees of freedom in it
-    truncation : (k,) displacement of the elements in the next harmonic, over that in the first
+    amplitude : (k,) modal displacement q of the first harmonic
+    frequency, damping, dissipation, joints : see `ModalCurve`
+    harmonics, coefficients, basis, truncation : see `ForcedResponse`
     """
 
     title = "nonlinear mode, by harmonic balance"
