@@ -38,8 +38,6 @@ EXCEPTIONS: set[tuple[str, str]] = set()
 ROOT = {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
 HOMES = {
     "diffrax": "dynamics/",
-    "lineax": "dynamics/",
-    "optimistix": "dynamics/",
     "matplotlib": "plotting/",
     "jaxopt": "identify/search.py",
     "optax": "identify/search.py",

@@ -150,13 +150,11 @@ def oscillator() -> Floats:
     """Amplitude of a unit mass on a spring and a slider, below, at and above its resonance."""
     slider = dynamics.Attachment(laws.Jenkins(slip_force=0.3, stiffness=0.6), 0)
     structure = dynamics.Structure([[1.0]], [[1.0]], [slider], damping=[[0.02]])
+    ends = [(force, omega / (2.0 * np.pi)) for force, row in DRIVEN.items() for omega in row]
     return np.array(
         [
-            dynamics.level_response(
-                structure, [1.0], omega / (2.0 * np.pi), (0.02, force)
-            ).amplitude[-1]
-            for force, row in DRIVEN.items()
-            for omega in row
+            dynamics.forced_response(structure, [force], (0.98 * end, end)).amplitude[-1]
+            for force, end in ends
         ]
     )
 

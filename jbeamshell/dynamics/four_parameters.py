@@ -6,13 +6,15 @@ beta follow from the curves of displacement and dissipation, without a test.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require, require_number
 from jbeamshell.common.pytrees import Tree
-from jbeamshell.laws.four_parameters import exponents, iwan4_through
 from jbeamshell.laws.iwan4 import Iwan4
+from jbeamshell.laws.iwan4_fit import exponents, iwan4_through
 from jbeamshell.laws.law import Law
 from jbeamshell.scene.scene import Scene
 from jbeamshell.solving.steady_cycles import steady_cycles
@@ -88,8 +90,14 @@ def four_parameters(scene: Scene | Law, *, width: float = 1.0) -> FourParameters
     >>> print(jb.dynamics.four_parameters(jb.Scene().replace({"model.section": "plane"})))
     """
     require_number("width", width)
-    if isinstance(scene, Law):
-        return _of_law(scene, width)
+    found = _of_law(scene) if isinstance(scene, Law) else _of_scene(scene)
+    limit, stiffest, force, u, loss = found
+    f, d = width * force, width * loss
+    return FourParameters(iwan4_through(width * limit, width * stiffest, f, u, d), f, u, d)
+
+
+def _of_scene(scene: Scene) -> tuple[Any, ...]:
+    """Gross slip, largest stiffness, and curves of force, displacement and energy, per width."""
     force = scene.load.control == "force"
     require("load.control", scene.load.control, force, "must be 'force' for amplitudes of it")
     fix = "must be 'force': a moment has no gross slip"
@@ -98,31 +106,25 @@ def four_parameters(scene: Scene | Law, *, width: float = 1.0) -> FourParameters
     slips = limit > 0.0 and scene.contact.normal != "none"
     fix = "must have gross slip: give it friction and contact"
     require("contact.friction", scene.contact.friction, slips, fix)
-    sizes = limit * np.array([LITTLE, *FRACTIONS])
-    cycles = steady_cycles(scene, sizes)
-    u, d = np.asarray(cycles.displacement), width * np.asarray(cycles.dissipation)
-    f = width * sizes
-    stiffest = float(np.max(f / u))
+    f = limit * np.array([LITTLE, *FRACTIONS])
+    cycles = steady_cycles(scene, f)
+    u, d = np.asarray(cycles.displacement), np.asarray(cycles.dissipation)
     felt = d > LEAST * f * u
     felt[0] = False
     fix = "slips at too few amplitudes, if at all: the contact sticks, or take more model.nodes"
     require("scene", int(np.sum(felt)), int(np.sum(felt)) >= ENOUGH, fix)
-    law = iwan4_through(width * limit, stiffest, f[felt], u[felt], d[felt])
-    return FourParameters(law, f[felt], u[felt], d[felt])
+    return limit, float(np.max(f / u)), f[felt], u[felt], d[felt]
 
 
-def _of_law(law: Law, width: float) -> FourParameters:
-    """Model nearest to the loops of a law, as far as it is known below gross slip."""
+def _of_law(law: Law) -> tuple[Any, ...]:
+    """The same of the loops of a law, as far as it is known below gross slip."""
     capacity = float(law.capacity)
     fix = "has no gross slip that is known: take Joint.of(scene), or give capacity="
     require(f"{law.heading}.capacity", capacity, bool(np.isfinite(capacity)), fix)
-    sizes = capacity * np.array(FRACTIONS)
-    known = bool(np.isinf(law.reach))
-    top = capacity if known else float(law.backbone(law.reach))
-    sizes = sizes[sizes <= top]
+    top = capacity if np.isinf(law.reach) else float(law.backbone(law.reach))
+    f = capacity * np.array(FRACTIONS)
+    f = f[f <= top]
     fix = f"ends too far below gross slip, {capacity:.6g}: take Joint.of(scene) with more force"
-    require(f"{law.heading}.forces", top, sizes.size >= ENOUGH, fix)
-    u = np.asarray(law.displacement(sizes))
-    d = np.asarray(law.dissipation(u))
-    stiffest, f, d = width * float(law.stiffness), width * sizes, width * d
-    return FourParameters(iwan4_through(width * capacity, stiffest, f, u, d), f, u, d)
+    require(f"{law.heading}.forces", top, f.size >= ENOUGH, fix)
+    u = np.asarray(law.displacement(f))
+    return capacity, float(law.stiffness), f, u, np.asarray(law.dissipation(u))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from jbeamshell.common.checks import is_traced
 from jbeamshell.common.pytrees import Tree
+from jbeamshell.common.summary import Summary, ranged
 
 
 class OverFrequency(Tree):
@@ -18,6 +20,47 @@ class OverFrequency(Tree):
     def omega(self) -> Any:
         """Angular frequency, 2 pi `frequency`, in radians per time."""
         return 2.0 * np.pi * self.frequency
+
+
+class OverAmplitude(OverFrequency):
+    """Frequency and damping of a mode of a structure over its amplitude; see `ModalCurve`."""
+
+    title: ClassVar[str]
+    label: ClassVar[str]  # of a picture
+
+    amplitude: Any
+    damping: Any
+    dissipation: Any
+    joints: Any
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Sentences that say what may be wrong, and the fix."""
+        return ()
+
+    def __str__(self) -> str:
+        if is_traced(self):
+            return f"{self.title}, traced"
+        columns = {
+            "modal displacement": self.amplitude,
+            "frequency": self.frequency,
+            "damping ratio": self.damping,
+            "lost per cycle": self.dissipation,
+            "joints move by": np.max(np.asarray(self.joints), axis=-1, initial=0.0),
+        }
+        rows = [(name, ranged(np.asarray(column))) for name, column in columns.items()]
+        notes = [f"doubtful: {doubt}" for doubt in self.doubts]
+        title = f"{self.title}, {np.size(self.amplitude)} points"
+        return Summary(title, rows, notes).as_text()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Draw frequency and damping over amplitude; see `jbeamshell.plotting.modal_curve`."""
+        from jbeamshell import plotting
+
+        return plotting.modal_curve(self, axes=axes, label=self.label)
 
 
 class Modes(OverFrequency):

@@ -25,7 +25,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.contact_line.branches import ContactState
 from jbeamshell.contact_line.network import Network, Sliders
-from jbeamshell.dynamics.strip.motion import Ledger
+from jbeamshell.dynamics.strip.motion import EndMotion
 from jbeamshell.scene.scene import Scene
 
 
@@ -137,25 +137,21 @@ def _moment(network: Network, mass: Array, passed: Swing, time: Array) -> tuple[
     return end.displacement, velocity, network.stored(end), swing.work + work, swing.valid
 
 
-class LightMotion(Ledger):
+class LightMotion(EndMotion):
     """Motion of a mass on a strip without inertia.
 
     Attributes
     ----------
-    scene : of the strip
-    payload : mass per width
     swings : number of swings that were begun
     nested : True if the strip's slip zones were nested all the time; otherwise the motion is wrong
     """
 
-    scene: Scene
-    payload: float
     swings: int
     nested: bool
 
     def figures(self) -> dict[str, Any]:
         """Summary by name, in numbers and words that JSON takes."""
-        return super().figures() | {"swings": int(self.swings), "status": "complete"}
+        return super().figures() | {"swings": int(self.swings)}
 
 
 def ring(

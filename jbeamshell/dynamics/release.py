@@ -245,10 +245,8 @@ def on_contact_line(scene: Scene) -> Scene | None:
 
 def _strip_mass(scene: Scene, inertia: Inertia) -> float:
     """Mass of the strip per width."""
-    layers, length = scene.strip.layers, float(scene.strip.length)
-    whole = [length * float(scene.strip.height_ratio)]
-    thickness = whole if layers is None else np.asarray(layers)[:, 0]
-    return length * float(np.sum(np.asarray(inertia.density) * thickness))
+    _, weights = inertia.through_height(scene)
+    return float(scene.strip.length * np.sum(np.asarray(weights)))
 
 
 def _share(network: Network, inertia: Inertia, mass: float) -> float:
@@ -267,19 +265,17 @@ def _whole(
     progress: bool | None,
 ) -> Motion:
     """Motion of the whole strip, whose end force falls to zero within `RELEASE` periods."""
-    from jbeamshell.dynamics.strip.attached_masses import AttachedMasses
     from jbeamshell.dynamics.strip.excitation import Recorded
-    from jbeamshell.dynamics.strip.modes import first_period
+    from jbeamshell.dynamics.strip.modes import modes
     from jbeamshell.dynamics.strip.simulate import simulate
 
-    attached = AttachedMasses(payload=mass)
-    period = first_period(scene, inertia, attached)
+    period = 1.0 / float(modes(scene, inertia, payload=mass).frequency[0])
     return simulate(
         scene,
         cycles * period,
         Recorded([0.0, RELEASE * period], [force, 0.0]),
+        payload=mass,
         inertia=inertia,
-        attached=attached,
         released=force,
         samples=samples,
         step=period / per_cycle,

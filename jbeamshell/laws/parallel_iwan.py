@@ -98,7 +98,7 @@ class ParallelIwan(MasingLaw):
     @property
     def stiffness(self) -> Array:
         """Stiffness of the stuck joint."""
-        return self.spring + jnp.sum(self.springs)
+        return self.spring + jnp.sum(self.springs, axis=-1)
 
     @property
     def capacity(self) -> Array:

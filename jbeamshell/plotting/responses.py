@@ -11,22 +11,20 @@ from matplotlib.axes import Axes
 from jbeamshell.plotting.style import PALETTE, beside, looks, panels, style
 
 AMPLITUDE = "amplitude  [length]"
-FREQUENCY, LEVEL = "frequency  [1/time]", "level of the force"
+FREQUENCY = "frequency  [1/time]"
 DEPTH = 1e-6  # smallest superharmonic shown, over the largest amplitude
 
 
 def forced_response(response: Any, *, label: str = "", axes: Sequence[Axes] | None = None) -> Any:
-    """Draw the amplitude over frequency or level, and all harmonics beside it, on two axes.
+    """Draw the amplitude over frequency, and all harmonics beside it, on two axes.
 
     Parameters
     ----------
-    response : result of `jbeamshell.dynamics.forced_response` or `level_response`
+    response : result of `jbeamshell.dynamics.forced_response`
     label : words of the legend, such as the level of the force
     axes : two axes; a new figure when not given
     """
-    level, frequency = np.asarray(response.level), np.asarray(response.frequency)
-    over_level = np.ptp(frequency) == 0.0
-    x = level if over_level else frequency
+    x = np.asarray(response.frequency)
     amplitudes = np.asarray(response.harmonic_amplitudes)
     with style():
         pair = panels(1, 2)[0] if axes is None else axes
@@ -37,9 +35,8 @@ def forced_response(response: Any, *, label: str = "", axes: Sequence[Axes] | No
         for number, row, look in zip(response.harmonics, amplitudes.T, kinds, strict=True):
             pair[1].plot(x, row, **look, label=f"harmonic {number}")
         top = float(first.max())
-        along = LEVEL if over_level else FREQUENCY
-        pair[0].set(xlabel=along, ylabel=AMPLITUDE)
-        pair[1].set(xlabel=along, ylabel=AMPLITUDE, yscale="log", ylim=(DEPTH * top, 2.0 * top))
+        pair[0].set(xlabel=FREQUENCY, ylabel=AMPLITUDE)
+        pair[1].set(xlabel=FREQUENCY, ylabel=AMPLITUDE, yscale="log", ylim=(DEPTH * top, 2.0 * top))
         if label:
             pair[0].legend()
         if len(pair[1].get_lines()) == amplitudes.shape[1]:

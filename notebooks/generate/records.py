@@ -203,12 +203,11 @@ def identification(record: dict) -> str:
 
 
 def motion(record: dict) -> str:
-    """Cost and error of time steppers."""
+    """Cost and error of time steps."""
     rows = [
-        (row["method"], row["steps"], f"{row['seconds']:.2f} s", percent(row["error"]))
-        for row in record["solvers"]
+        (row["steps"], f"{row['seconds']:.2f} s", percent(row["error"])) for row in record["steps"]
     ]
-    return table(("method", "time steps", "time", "error of the motion"), rows)
+    return table(("time steps", "time", "error of the motion"), rows)
 
 
 def laws(record: dict) -> str:

@@ -40,7 +40,7 @@ def test_a_table_comes_back_to_the_last_digit(tmp_path, name):
 @pytest.mark.parametrize("capacity", [np.inf, 80.0, 45.5])
 def test_a_table_keeps_what_is_known_of_the_joint(tmp_path, name, capacity):
     sides = np.stack([0.98 * U, 1.02 * U])
-    joint = Joint(U, JOINT.forces, None, 30.0, 0.02, capacity, sides)
+    joint = Joint(U, JOINT.forces, None, 30.0, capacity, sides)
     back = Joint.read(joint.export("table", tmp_path / name))
     for one, other in zip(jax.tree.leaves(back), jax.tree.leaves(joint), strict=True):
         np.testing.assert_array_equal(one, other)
@@ -71,7 +71,7 @@ def test_the_sliders_of_a_module_follow_our_path(tmp_path, to):
 
 
 def test_a_strip_says_how_its_pull_and_push_differ(tmp_path):
-    lopsided = Joint(U, JOINT.forces, asymmetry=0.21)
+    lopsided = Joint(U, JOINT.forces, sides=[0.79 * U, 1.21 * U])
     with pytest.warns(DoubtfulWarning, match="pull and push differ by 21%"):
         path = lopsided.export("table", tmp_path / "joint.csv")
     assert "differs from it by up to 21 %" in path.read_text("utf-8")

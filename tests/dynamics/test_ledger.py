@@ -8,7 +8,7 @@ from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import dynamics
-from jbeamshell.dynamics.strip.motion import OPEN
+from jbeamshell.dynamics.ledger import OPEN
 
 LINEAR = {"model.nodes": 11, "model.kinematics": "linear"}
 SAMPLES = 101
@@ -27,13 +27,13 @@ def random_motion(random, between):
     friction, eta = log(0.05, 0.5), log(0.02, 0.4)
     values = {"contact.friction": friction, "strip.height_ratio": eta}
     scene = STRIP.replace(LINEAR | values | {"contact.stick_stiffness": log(20.0, 1e3)})
-    attached = dynamics.AttachedMasses(log(2.0, 200.0) * 4.0 * eta)
-    period = 1.0 / float(dynamics.modes(scene, attached=attached).frequency[0])
+    mass = log(2.0, 200.0) * 4.0 * eta
+    period = 1.0 / float(dynamics.modes(scene, payload=mass).frequency[0])
     step = period / log(2.0, 400.0)
     span, gross = (SAMPLES - 1) * between * step, 20.0 * friction
     times = np.sort(random.uniform(0.0, span, 9))
     force = dynamics.Recorded(times, gross * log(0.1, 5.0) * random.uniform(-1.0, 1.0, 9))
-    start = {"attached": attached, "released": random.uniform(-0.95, 0.95) * gross}
+    start = {"payload": mass, "released": random.uniform(-0.95, 0.95) * gross}
     return dynamics.simulate(
         scene, span, force, **start, samples=SAMPLES, step=step * (1.0 + 1e-9), throw=False
     )

@@ -158,7 +158,7 @@ class TestReach:
             BEYOND[name]()
 
     def test_a_motion_ends_where_the_joint_is_not_known(self):
-        with pytest.raises(dynamics.InterruptedShakingError, match=r"attachments\[0\]") as cut:
+        with pytest.raises(dynamics.InterruptedMotionError, match=r"attachments\[0\]") as cut:
             dynamics.shake(chain(joint=SHORT), 20.0, velocity=[9.0, 9.0])
         known = np.isfinite(cut.value.motion.kinetic)
         assert 0.0 < cut.value.motion.reached < 20.0
@@ -325,7 +325,7 @@ class TestTransient:
         assert float(begun.stored[0]) == pytest.approx(float(stored), rel=1e-9)
 
     def test_an_interrupted_motion_keeps_the_part_computed(self):
-        with pytest.raises(dynamics.InterruptedShakingError, match="ends at t") as cut:
+        with pytest.raises(dynamics.InterruptedMotionError, match="ends at t") as cut:
             dynamics.shake(chain(), 50.0, velocity=[1.0, 0.0], samples=2001, most_steps=200)
         assert 0.0 < cut.value.motion.reached < 50.0
 

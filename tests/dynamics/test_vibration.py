@@ -79,9 +79,14 @@ class TestForcedResponse:
 
     def test_a_growing_force_ends_on_the_curve(self, response):
         frequency = float(response.frequency[20])
-        over = dynamics.level_response(HELD, FORCE, frequency, (0.1, 1.0), **SETTING)
-        assert over.amplitude[-1] == pytest.approx(response.amplitude[20], rel=1e-9)
-        assert np.all(np.diff(over.level) > 0.0)
+        levels = [0.1, 0.5, 1.0]
+        over = [
+            dynamics.steady_response(HELD, np.multiply(level, FORCE), [frequency], **SETTING)
+            for level in levels
+        ]
+        amplitudes = np.array([found.amplitude[0] for found in over])
+        assert amplitudes[-1] == pytest.approx(response.amplitude[20], rel=1e-9)
+        assert np.all(np.diff(amplitudes) > 0.0)
 
     def test_it_is_drawn(self, response):
         left, right = response.plot()
@@ -172,7 +177,6 @@ REFUSED = {
     "force": (lambda: dynamics.forced_response(HELD, [1.0], (0.3, 1.0)), "force.*2 numbers"),
     "no force": (lambda: dynamics.forced_response(HELD, [0.0, 0.0], (0.3, 1.0)), "force.*zero"),
     "range": (lambda: dynamics.forced_response(HELD, FORCE, (0.3, -1.0)), "frequencies.*positive"),
-    "levels": (lambda: dynamics.level_response(HELD, FORCE, 0.5, (1.0, 1.0)), "levels"),
     "even": (lambda: dynamics.nonlinear_mode(HELD, [0.1], harmonics=4), "harmonics = 4.*odd"),
     "place": (lambda: dynamics.forced_response(HELD, FORCE, (0.3, 1.0), place=2), "place = 2"),
     "falling": (lambda: dynamics.nonlinear_mode(HELD, [0.2, 0.1]), "amplitudes.*rise"),
@@ -190,9 +194,3 @@ def test_bad_input_is_one_clear_line(name):
     with pytest.raises(jb.InputError, match=message) as refusal:
         call()
     assert "\n" not in str(refusal.value)
-
-
-def test_a_curve_that_stalls_keeps_its_part():
-    with pytest.raises(dynamics.StalledContinuationError, match="more than 9 points") as stalled:
-        dynamics.forced_response(HELD, FORCE, (0.3 / TURN, 1.2 / TURN), **SETTING, most_points=9)
-    assert stalled.value.response.frequency.size == 9

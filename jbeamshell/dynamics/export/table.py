@@ -17,7 +17,7 @@ from jbeamshell.measured.read_table import read_table
 
 COLUMNS = ("displacement", "force", "stiffness", "limit")
 SIDES = ("pull", "push")
-ABOUT = ("width", "asymmetry", "capacity")  # the same in all rows
+ABOUT = ("width", "capacity")  # the same in all rows
 
 
 def write(element: Element, draft: Path) -> None:
@@ -39,7 +39,7 @@ def write(element: Element, draft: Path) -> None:
     if element.sides is not None:
         columns |= dict(zip(SIDES, element.sides, strict=True))
     capacity = element.capacity if np.isfinite(element.capacity) else np.nan
-    for name, value in zip(ABOUT, (element.width, element.asymmetry, capacity), strict=True):
+    for name, value in zip(ABOUT, (element.width, capacity), strict=True):
         columns[name] = np.full(element.force.shape, value)
     if draft.suffix.lower() == ".mat":
         from scipy.io import savemat
@@ -60,7 +60,7 @@ def read(
 
     Returns
     -------
-    displacements and forces (k,), and a dictionary of width, asymmetry, capacity and sides, as far
+    displacements and forces (k,), and a dictionary of width, capacity and sides, as far
     as the table has them
 
     Raises

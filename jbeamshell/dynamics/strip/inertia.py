@@ -1,4 +1,4 @@
-"""Inertia constants of a strip: density, mass matrix, damping."""
+"""Inertia constants of a strip: density and damping."""
 
 from __future__ import annotations
 
@@ -11,32 +11,26 @@ import numpy as np
 from jax import Array
 from numpy.polynomial import legendre
 
-from jbeamshell.common.checks import NOT_NEGATIVE, POSITIVE, TINY, as_leaf, require, require_choice
+from jbeamshell.common.checks import NOT_NEGATIVE, TINY, as_leaf, require
 from jbeamshell.common.checks import require_number as number
 from jbeamshell.scene.scene import Scene
 
-THICKNESS_STRETCH = 12.0 / np.pi**2
-MASSES = ("lumped", "consistent")
 DENSITY = "give one positive number, or one for each of strip.layers from the bottom to the top"
 
 
 class Inertia(eqx.Module):
-    """Density, mass matrix and damping of a strip.
+    """Density and damping of a strip.
 
     Attributes
     ----------
     density : rho, mass per volume; with layers one number for all, or (layers,) from the bottom
-    squeeze_factor : factor of the squeeze strain's inertia (2/3) rho H^3 about mid-height.  With 1
-        the first thickness-stretch frequency is 10.3 % above the exact one, by sqrt(3)/(pi/2);
-        `THICKNESS_STRETCH` = 12/pi^2 corrects it (Mindlin's correction of the thickness mode)
-    mass : "lumped" or "consistent" mass matrix; the second one needs linear kinematics
     damping_mass, damping_stiffness : coefficients a, 1/time, and b, time, of Rayleigh damping
         C = a M + b K; both are 0 by default
 
     Raises
     ------
     InputError
-        for a density or factor that is not positive, negative damping or an unknown mass matrix
+        for a density that is not positive, or negative damping
 
     Examples
     --------
@@ -45,23 +39,14 @@ class Inertia(eqx.Module):
     """
 
     density: Array
-    squeeze_factor: Array
-    mass: str = eqx.field(static=True)
     damping_mass: Array
     damping_stiffness: Array
     damped: bool = eqx.field(static=True)
 
     def __init__(
-        self,
-        density: Any = 1.0,
-        squeeze_factor: Any = 1.0,
-        mass: str = "lumped",
-        damping_mass: Any = 0.0,
-        damping_stiffness: Any = 0.0,
+        self, density: Any = 1.0, damping_mass: Any = 0.0, damping_stiffness: Any = 0.0
     ) -> None:
         self.density = as_leaf(density, "inertia.density", DENSITY)
-        self.squeeze_factor = as_leaf(squeeze_factor, "inertia.squeeze_factor")
-        self.mass = mass
         self.damping_mass = as_leaf(damping_mass, "inertia.damping_mass")
         self.damping_stiffness = as_leaf(damping_stiffness, "inertia.damping_stiffness")
         coefficients = (self.damping_mass, self.damping_stiffness)
@@ -74,19 +59,14 @@ class Inertia(eqx.Module):
             shaped = known.ndim <= 1 and known.size > 0
             positive = shaped and bool(np.all(np.isfinite(known) & (known > 0.0)))
             require("inertia.density", self.density, positive, DENSITY)
-        number("inertia.squeeze_factor", self.squeeze_factor, POSITIVE)
-        require_choice("inertia.mass", self.mass, MASSES)
         number("inertia.damping_mass", self.damping_mass, NOT_NEGATIVE, low=-TINY)
         number("inertia.damping_stiffness", self.damping_stiffness, NOT_NEGATIVE, low=-TINY)
 
     def check(self, scene: Scene) -> None:
-        """Raise `InputError` for a scene with another number of layers, or exact kinematics."""
+        """Raise `InputError` for a scene with another number of layers."""
         layers = 1 if scene.strip.layers is None else scene.strip.layers.shape[0]
         fits = self.density.ndim == 0 or self.density.shape == (layers,)
         require("inertia.density", self.density, fits, DENSITY)
-        fix = "is constant with linear kinematics only: take model.kinematics = 'linear'"
-        constant = self.mass == "lumped" or scene.plan.kinematics == "linear"
-        require("inertia.mass", self.mass, constant, fix)
 
     def through_height(self, scene: Scene) -> tuple[Array, Array]:
         """Heights s above mid-height and weights rho ds of the integral over it, (points,) each."""
@@ -100,7 +80,3 @@ class Inertia(eqx.Module):
         heights = bottom[:, None] + 0.5 * thick[:, None] * (1.0 + points)
         masses = (0.5 * density * thick)[:, None] * weights
         return heights.ravel(), masses.ravel()
-
-    def mean_density(self, scene: Scene) -> Array:
-        """Mean of rho over the height."""
-        return jnp.sum(self.through_height(scene)[1]) / (2.0 * scene.strip.half_height)

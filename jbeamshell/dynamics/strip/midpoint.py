@@ -17,6 +17,10 @@ where t is the friction law's traction after the motion from q* of the last step
 under the cap mu R from elasticity and inertia at q*.  Sharp sliders need no smoothing.  The fields
 are the only unknowns, so a time step has the solver, the tangent and the derivatives of a load
 step.
+
+Solvers of differential equations need a friction law with a rate instead.  In four cycles of a
+strip of 49 nodes, 12,800 of these steps take 2.5 s to an error of 3e-4 of u(L); diffrax's Bosh3
+takes 5.4 s to 4e-4, Tsit5 24 s to 4e-3, and Kvaerno3 22 s to 1e-3.
 """
 
 from __future__ import annotations
@@ -28,28 +32,26 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from jbeamshell.dynamics.strip.chain import stretches
 from jbeamshell.dynamics.strip.equations import MotionState
-from jbeamshell.dynamics.strip.step_equations import StepEquations, StepForces, StepMatrices
-from jbeamshell.dynamics.strip.time_step import StepMemory, TimeStep
+from jbeamshell.dynamics.strip.step_equations import (
+    StepEquations,
+    StepForces,
+    StepMatrices,
+    StepMemory,
+    TimeStep,
+)
 from jbeamshell.load_steps.system import V
 from jbeamshell.load_steps.tangent import nodal
+from jbeamshell.mechanics.friction import coulomb_cap
 from jbeamshell.numerics.newton import Newton, Problem
 
-FILTERING = 0.1
+FILTERING = 0.1  # parameter g
 
 
 class Midpoint(diffrax.AbstractSolver):
-    """Solver of diffrax with steps of one size; ``args`` are `StepMatrices`.
-
-    Attributes
-    ----------
-    newton : settings of Newton's method
-    filtering : parameter g
-    """
+    """Solver of diffrax with steps of one size; ``args`` are `StepMatrices`, terms are not used."""
 
     newton: Newton = eqx.field(default_factory=Newton)
-    filtering: float = FILTERING
     term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar = diffrax.LocalLinearInterpolation
 
@@ -59,15 +61,15 @@ class Midpoint(diffrax.AbstractSolver):
 
     def init(self, terms: Any, t0: Any, t1: Any, y0: MotionState, args: StepMatrices) -> StepMemory:
         """Memory before the first step."""
-        equations = args.equations
-        n, cap = equations.n, equations.response(jnp.asarray(t0), y0).cap
-        zero = jnp.zeros_like(y0.q)
+        equations, zero = args.equations, jnp.zeros_like(y0.q)
+        _, reaction = equations.response(jnp.asarray(t0), y0)
+        cap = coulomb_cap(equations.system.foundation.friction, reaction)
         started = jnp.zeros_like(y0.work[0])
-        return StepMemory(equations.nodal(y0.q)[:, V], y0.t[:n], cap, zero, zero, started)
+        return StepMemory(equations.nodal(y0.q)[:, V], y0.t, cap, zero, zero, started)
 
-    def func(self, terms: Any, t0: Any, y0: MotionState, args: StepMatrices) -> MotionState:
-        """Rates of a state, which diffrax may need for a first step."""
-        return args.equations(t0, y0)
+    def func(self, terms: Any, t0: Any, y0: MotionState, args: StepMatrices) -> Any:
+        """Not needed, as no step depends on rates."""
+        raise NotImplementedError
 
     def step(
         self,
@@ -80,7 +82,7 @@ class Midpoint(diffrax.AbstractSolver):
         made_jump: Any,
     ) -> Any:
         """One step; it fails if Newton's method does not converge."""
-        step = TimeStep(t0, t1 - t0, 0.5 + self.filtering * solver_state.started)
+        step = TimeStep(t0, t1 - t0, 0.5 + FILTERING * solver_state.started)
         y1, memory, converged = take_step(args, step, y0, solver_state, self.newton)
         result = diffrax.RESULTS.where(
             converged, diffrax.RESULTS.successful, diffrax.RESULTS.nonlinear_divergence
@@ -92,19 +94,13 @@ def take_step(
     matrices: StepMatrices, step: TimeStep, state: MotionState, last: StepMemory, newton: Newton
 ) -> tuple[MotionState, StepMemory, Array]:
     """State and memory after a step, and True if Newton's method has converged."""
-    equations, system, n = matrices.equations, matrices.equations.system, matrices.equations.n
+    equations, system = matrices.equations, matrices.equations.system
     of_step = StepEquations.of(equations, step, state, last)
-    root, (_, error) = newton.solve(
-        Problem(of_step.evaluate, of_step.limit, of_step.tangent),
-        of_step.guess,
-        matrices.stiffness(step, of_step.chain.force_slope, of_step.q),
-    )
-    at = of_step.forces(root)
-    response = system.contact_response(at.contact, of_step.before, at.prescribed)
-    nodal_change = system.embed(nodal(system, root))
-    end_change = of_step.end_change(nodal_change)
-    chain_change = of_step.chain.change + of_step.chain.change_slope * end_change
-    change = equations.with_chain(nodal_change, chain_change)
+    problem = Problem(of_step.evaluate, of_step.limit, of_step.tangent)
+    root, (_, error) = newton.solve(problem, of_step.guess, matrices.stiffness(step))
+    at, prescribed = of_step.forces(root), of_step.prescribed
+    response = system.contact_response(at.contact, of_step.before, prescribed)
+    change = nodal(system, root)
     rate_change = step.increment(change / step.h, state.p, last.rate_change)
     memory = StepMemory(
         v=at.q[:, V],
@@ -116,41 +112,29 @@ def take_step(
     )
     # The tractions at the end of the step follow from the motion between q* and the end.
     middle = of_step.before._replace(q=at.q, traction=response.traction)
-    end = at.contact._replace(v=(of_step.q + nodal_change)[:, V])
-    traction = system.contact_response(end, middle, at.prescribed).traction
-    work = _work(of_step, at, state, change, (response.traction, traction))
-    after = MotionState(
-        state.q + change,
-        state.p + rate_change,
-        jnp.append(traction, state.t[n:]),
-        state.work + work,
-    )
+    moved = system.embed(change)
+    end = at.contact._replace(v=(of_step.q + moved)[:, V])
+    traction = system.contact_response(end, middle, prescribed).traction
+    work = _work(of_step, at, state.t, moved, (response.traction, traction))
+    after = MotionState(state.q + change, state.p + rate_change, traction, state.work + work)
     return after, memory, error <= newton.tolerance_for(system.x.dtype)
 
 
 def _work(
-    of_step: StepEquations,
-    at: StepForces,
-    state: MotionState,
-    change: Array,
-    tractions: tuple[Array, Array],
+    of_step: StepEquations, at: StepForces, begun: Array, moved: Array, tractions: tuple[Array, ...]
 ) -> Array:
     """External work and work lost by friction and by damping in a step, (3,).
 
     Parameters
     ----------
     of_step, at : equations of the step, and forces at its solution
-    state : state at its start
-    change : (b, a) increments of the active fields
+    begun : (n,) friction tractions at its start
+    moved : (n, m) increments of the fields
     tractions : (n,) friction tractions at q* and at the end of the step
     """
-    equations, system, step = of_step.equations, of_step.equations.system, of_step.step
-    attached, n = equations.attached, equations.n
-    nodal_change, chain_change = equations.nodal(change), change[n:, 0]
-    end_change = of_step.end_change(nodal_change)
-    external = of_step.force * end_change - jnp.sum(of_step.ground_forces * nodal_change)
-    external = external - of_step.ground * jnp.sum(attached.masses * chain_change)
-    stored = (tractions[1] ** 2 - state.t[:n] ** 2) / (2.0 * system.foundation.slip_stiffness)
-    friction = jnp.sum(system.tributary * (tractions[0] * nodal_change[:, V] - stored))
-    dashpots = jnp.sum(attached.dampers * stretches(end_change, chain_change) ** 2) / step.h
-    return jnp.stack([external, friction, jnp.sum(at.damping * nodal_change) + dashpots])
+    system, q = of_step.system, of_step.q
+    end_moved = system.end_displacement(q + moved) - system.end_displacement(q)
+    external = of_step.force * end_moved - jnp.sum(of_step.ground_forces * moved)
+    stored = (tractions[1] ** 2 - begun**2) / (2.0 * system.foundation.slip_stiffness)
+    friction = jnp.sum(system.tributary * (tractions[0] * moved[:, V] - stored))
+    return jnp.stack([external, friction, jnp.sum(at.damping * moved)])

@@ -1,8 +1,9 @@
-"""Equations of one time step of `jbeamshell.dynamics.strip.midpoint`, and their tangent."""
+r"""Equations of one time step of `jbeamshell.dynamics.strip.midpoint`, and their tangent."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -10,9 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.dynamics.strip.chain import ChainStep, chain_step
 from jbeamshell.dynamics.strip.equations import Equations, MotionState
-from jbeamshell.dynamics.strip.time_step import StepMemory, TimeStep
 from jbeamshell.load_steps.system import ContactInput, LoadLevel, Prescribed, System, V, W
 from jbeamshell.load_steps.tangent import (
     Stiffness,
@@ -27,6 +26,58 @@ from jbeamshell.load_steps.tangent import (
 )
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
+
+
+class StepMemory(NamedTuple):
+    """Quantities of a step that the next step needs.
+
+    Attributes
+    ----------
+    v, traction, cap : (n,) tangential displacement, friction traction and cap at q*
+    change, rate_change : (n, a) increments of the active fields and of their rates
+    started : 0 before the first step, else 1
+    """
+
+    v: Array
+    traction: Array
+    cap: Array
+    change: Array
+    rate_change: Array
+    started: Array
+
+
+class TimeStep(NamedTuple):
+    """Time step from z_0 to z_1, evaluated at z* = z_0 + c (z_1 - z_0) - g (z_0 - z_-1).
+
+    Attributes
+    ----------
+    time, h : start and size of the step
+    weight : c = g + 1/2
+    """
+
+    time: Array
+    h: Array
+    weight: Array
+
+    @property
+    def last_weight(self) -> Array:
+        """Weight g of the last increment."""
+        return self.weight - 0.5
+
+    def gauss_mean(self, history: Callable[[Array], Any]) -> Any:
+        """Mean of an excitation over the step, by three Gauss points, so that no blow is missed."""
+        points, weights = np.polynomial.legendre.leggauss(3)
+        times = self.time + 0.5 * (1.0 + points) * self.h
+        values = jax.vmap(history)(times)
+        return jax.tree.map(lambda v: jnp.sum(0.5 * weights * v), values)
+
+    def evaluated(self, start: Array, change: Array, last_change: Array) -> Array:
+        """Value z* from z_0, the increment and the last increment."""
+        return start + self.weight * change - self.last_weight * last_change
+
+    def increment(self, value: Array, start: Array, last_change: Array) -> Array:
+        """Increment z_1 - z_0 that has a value z*; the inverse of `evaluated`."""
+        return (value - start + self.last_weight * last_change) / self.weight
 
 
 class StepMatrices(eqx.Module):
@@ -49,47 +100,33 @@ class StepMatrices(eqx.Module):
         self.equations, system = equations, equations.system
         self.static = initial_stiffness(system, 1.0)
         like, q = zero_unknowns(system), system.unloaded().q
-        scales = _residual_scales(system)
+        scales = jnp.stack([system.residual_scale(field) for field in range(system.plan.width)])
 
         def inertia_forces(unknown: Array) -> Array:
             return equations.mass.momentum(q, system.embed(nodal(system, unknown)))
 
         def rows(unknown: Array) -> Array:
-            residual = (inertia_forces(unknown) * scales)[:, list(system.plan.active)]
+            residual = equations.active(inertia_forces(unknown) * scales)
             return in_blocks(jnp.where(equations.mass.free, residual, 0.0), like)
 
         self.mass = jnp.stack(block_tridiagonal.jacobian(rows, like))
         probes = jnp.asarray(block_tridiagonal.seeds(like))
-        block = block_of_node(system)
         along_w = jax.vmap(jax.vmap(lambda unit: inertia_forces(unit)[:, W]))(probes)
-        neighbours = block_tridiagonal.by_neighbour(along_w, block)
-        neighbours = neighbours.at[0, :, block == 0].set(0.0)
-        self.mass_along_w = neighbours.at[2, :, block == block[-1]].set(0.0)
+        self.mass_along_w = block_tridiagonal.by_neighbour(along_w, block_of_node(system))
 
-    def stiffness(self, step: TimeStep, end_slope: Array, q: Array) -> Stiffness:
-        """Part of the tangent without the foundation's response, at fields q (n, m).
-
-        Parameters
-        ----------
-        step : time step
-        end_slope : slope of the end force over u(L)
-        q : fields at the start of the step
-        """
-        equations, static, inertia = self.equations, self.static, self.equations.inertia
+    def stiffness(self, step: TimeStep) -> Stiffness:
+        """Part of the tangent without the foundation's response."""
+        static, inertia = self.static, self.equations.inertia
         elastic, massive = step.weight, 1.0 / (step.weight * jnp.square(step.h))
         if inertia.damped:
             elastic = elastic + inertia.damping_stiffness / step.h
             massive = massive + inertia.damping_mass / step.h
-        entries = elastic * static.entries + massive * self.mass
-        conjugate = equations.end_conjugate(q)
-        active = np.array(equations.system.plan.active)
-        end = end_slope * conjugate[active, None] * conjugate[active]
-        end = end * _residual_scales(equations.system)[active, None]
-        entries = entries.at[1, -active.size :, -active.size :, -1].add(-end)
-        lift_force = elastic * static.contact.lift_force + massive * self.mass_along_w
         contact = ContactInput(
-            lift_force, step.weight * static.contact.v, step.weight * static.contact.w
+            elastic * static.contact.lift_force + massive * self.mass_along_w,
+            step.weight * static.contact.v,
+            step.weight * static.contact.w,
         )
+        entries = elastic * static.entries + massive * self.mass
         return Stiffness(entries, contact, static.response)
 
 
@@ -101,14 +138,12 @@ class StepForces(NamedTuple):
     q : (n, m) fields q*
     forces, damping : (n, m) all forces but those of the foundation and the end; those of damping
     contact : input of the foundation
-    prescribed : end force, by which a load step's equations hold for a time step
     """
 
     q: Array
     forces: Array
     damping: Array
     contact: ContactInput
-    prescribed: Prescribed
 
 
 class StepEquations(NamedTuple):
@@ -119,101 +154,83 @@ class StepEquations(NamedTuple):
     equations : equations of motion
     step : time step
     q, p : (n, m) fields and rates at the start of the step
-    end : u(L) at the start of the step
     last_change, last_rate_change : (n, m) increments of fields and rates in the last step
     before : friction at q* of the last step
-    force, ground : means of the end force and of the foundation's acceleration along X
-    ground_forces : (n, m) inertia forces from the acceleration of the foundation
-    chain : response of the chain
+    force : mean of the end force
+    ground_forces : (n, m) inertia forces from the mean acceleration of the foundation
     """
 
     equations: Equations
     step: TimeStep
     q: Array
     p: Array
-    end: Array
     last_change: Array
     last_rate_change: Array
     before: LoadLevel
     force: Array
-    ground: Array
     ground_forces: Array
-    chain: ChainStep
 
     @classmethod
     def of(
         cls, equations: Equations, step: TimeStep, state: MotionState, last: StepMemory
     ) -> StepEquations:
         """Equations of a step from a state, with the memory of the last step."""
-        system, n = equations.system, equations.n
-        q, last_change = equations.nodal(state.q), equations.nodal(last.change)
-        ground = step.gauss_mean(equations.excitation.acceleration)
-        end = system.end_displacement(q)
-        moved = system.end_displacement(step.evaluated(q, jnp.zeros_like(q), last_change)) - end
-        chain = chain_step(
-            equations.attached,
-            step,
-            end + moved,
-            (state.q[n:, 0], state.p[n:, 0]),
-            (last.change[n:, 0], last.rate_change[n:, 0]),
-            ground[0],
-        )
+        q, excitation = equations.nodal(state.q), equations.excitation
         return cls(
             equations=equations,
             step=step,
             q=q,
             p=equations.nodal(state.p),
-            end=end,
-            last_change=last_change,
+            last_change=equations.nodal(last.change),
             last_rate_change=equations.nodal(last.rate_change),
             before=LoadLevel(
                 q.at[:, V].set(last.v), last.traction, last.cap, last.cap, last.cap[0]
             ),
-            force=step.gauss_mean(equations.excitation.force),
-            ground=ground[0],
-            ground_forces=equations.ground_forces(q, ground),
-            chain=chain,
+            force=step.gauss_mean(excitation.force),
+            ground_forces=equations.ground_forces(q, step.gauss_mean(excitation.acceleration)),
         )
+
+    @property
+    def system(self) -> System:
+        """Equations of equilibrium."""
+        return self.equations.system
+
+    @property
+    def prescribed(self) -> Prescribed:
+        """Load step under the end force, with all pressures and with friction."""
+        one = jnp.ones_like(self.force)
+        return Prescribed(self.force, one, jnp.zeros_like(self.force), one)
 
     @property
     def guess(self) -> Array:
         """Unknowns (blocks, size) of a motion at constant rates."""
-        system = self.equations.system
-        change = self.step.h * self.p[:, list(system.plan.active)]
-        return in_blocks(change, zero_unknowns(system))
-
-    def end_change(self, change: Array) -> Array:
-        """Increment of u(L) from increments (n, m) of the fields."""
-        return self.equations.system.end_displacement(self.q + change) - self.end
+        return in_blocks(self.step.h * self.equations.active(self.p), zero_unknowns(self.system))
 
     def forces(self, unknown: Array) -> StepForces:
         """Forces and contact of a step with unknowns (blocks, size)."""
-        equations, system, step = self.equations, self.equations.system, self.step
+        equations, system, step = self.equations, self.system, self.step
         change = system.embed(nodal(system, unknown))
         q, rate = step.evaluated(self.q, change, self.last_change), change / step.h
         rate_change = step.increment(rate, self.p, self.last_rate_change)
         inertia = equations.mass.step_forces(self.q, self.p, change, rate_change, q, step.h)
         damping = equations.damping(q, rate)
         forces = system.elastic_forces(q, 1.0) + inertia + damping + self.ground_forces
-        end_force = self.force + self.chain.force + self.chain.force_slope * self.end_change(change)
-        contact = ContactInput(forces[:, W], q[:, V], q[:, W])
-        return StepForces(q, forces, damping, contact, _prescribed(end_force))
+        return StepForces(q, forces, damping, ContactInput(forces[:, W], q[:, V], q[:, W]))
 
     def evaluate(self, unknown: Array) -> tuple[Array, ContactInput]:
         """Residual (blocks, size), and the input of the foundation."""
-        system, at = self.equations.system, self.forces(unknown)
-        response = system.contact_response(at.contact, self.before, at.prescribed)
-        residual = system.balance(at.forces, at.q, response, at.prescribed)[1]
+        system, at = self.system, self.forces(unknown)
+        response = system.contact_response(at.contact, self.before, self.prescribed)
+        residual = system.balance(at.forces, at.q, response, self.prescribed)[1]
         return residual_in_blocks(residual, unknown, self.step.weight), at.contact
 
     def tangent(self, contact: ContactInput, stiffness: Stiffness) -> BlockTridiagonal:
         """Matrix of the residual."""
-        prescribed = _prescribed(jnp.zeros_like(self.force))
-        return matrix(self.equations.system, stiffness, contact, self.before, prescribed)
+        return matrix(self.system, stiffness, contact, self.before, self.prescribed)
 
     def limit(self, old: Array, new: Array) -> Array:
         """Next iterate, with slips limited by the friction law; see `Foundation.limited_slip`."""
-        system, step = self.equations.system, self.step
+        system, step = self.system, self.step
         start = step.evaluated(self.q, jnp.zeros_like(self.q), self.last_change)[:, V]
         start = start - self.before.q[:, V]
         slip, old_slip = (start + step.weight * nodal(system, x)[:, V] for x in (new, old))
@@ -221,14 +238,3 @@ class StepEquations(NamedTuple):
             old_slip, slip, self.before.traction, self.before.cap
         )
         return with_v(system, new, nodal(system, new)[:, V] + (limited - slip) / step.weight)
-
-
-def _residual_scales(system: System) -> Array:
-    """Residual per force or moment (m,) of every field's balance."""
-    return jnp.stack([system.residual_scale(field) for field in range(system.plan.width)])
-
-
-def _prescribed(force: Array) -> Prescribed:
-    """Load step under an end force, with all pressures and with friction."""
-    one = jnp.ones_like(force)
-    return Prescribed(force, one, jnp.zeros_like(force), one)

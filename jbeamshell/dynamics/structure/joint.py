@@ -74,8 +74,6 @@ class Joint(ParallelIwan):
         the plateau of gross slip follows the given ones
     network : sliders of the strip behind it, per width; None for a backbone alone
     width : of the strip
-    asymmetry : largest difference of the strip's pull and push from the backbone, over the
-        displacement at one force
     capacity : force of gross slip; infinite if it is not known
     sides : (2, k) displacements of a pull and of a push at the forces; None if they are the
         backbone's
@@ -99,7 +97,6 @@ class Joint(ParallelIwan):
     forces: Any
     network: Network | None = None
     width: Any = 1.0
-    asymmetry: Any = 0.0
     capacity: Any = np.inf
     sides: Any = None
     scene: Scene | None = None
@@ -107,7 +104,7 @@ class Joint(ParallelIwan):
     def __post_init__(self) -> None:
         for name in ("displacements", "forces"):
             setattr(self, name, as_leaf(getattr(self, name), f"joint.{name}", BACKBONE))
-        for name in ("width", "asymmetry", "capacity"):
+        for name in ("width", "capacity"):
             setattr(self, name, as_leaf(getattr(self, name), f"joint.{name}"))
         if self.sides is not None:
             self.sides = as_leaf(self.sides, "joint.sides", SIDES)
@@ -173,7 +170,7 @@ class Joint(ParallelIwan):
         if isinstance(scene, Law):
             require_number("width", width)
             u, f = backbone_points(scene, force)
-            return cls(u, width * f, None, width, capacity=width * scene.capacity)
+            return cls(u, width * f, width=width, capacity=width * scene.capacity)
         force = largest_force(scene, force)
         if scene.load.control != "force":
             load = dataclasses.replace(scene.load, control="force", amplitude=as_leaf(force))
@@ -189,24 +186,24 @@ class Joint(ParallelIwan):
             inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
             line = slider_line if inside else slider_line_once
             network, found = line(scene, as_leaf(force, "force"))
-            u, sides, f, asymmetry, count = found if is_traced(found) else jax.device_get(found)
-            if is_traced(u):
-                return cls(u, width * f, network, width, asymmetry, capacity, sides)
-            if np.all(np.isfinite(u)):
-                kept = np.append(np.arange(u.size - 1) < int(count), True)
-                u, sides, f = (jnp.asarray(each[..., kept]) for each in (u, sides, f))
-                return cls(u, width * f, network, width, asymmetry, capacity, sides)
+            sides, f, count = found if is_traced(found) else jax.device_get(found)
+            if not is_traced(sides) and np.all(np.isfinite(sides)):
+                kept = np.append(np.arange(f.size - 1) < int(count), True)
+                sides, f = jnp.asarray(sides[:, kept]), jnp.asarray(f[kept])
+            if is_traced(sides) or np.all(np.isfinite(sides)):
+                mean = jnp.mean(sides, axis=0)
+                return cls(mean, width * f, network, width, capacity, sides)
         require("by", by, by != "sliders", UNLIKE)
-        u, f, asymmetry, ways = cycled_line(scene, as_leaf(force, "force"), width)
+        u, f, sides = cycled_line(scene, as_leaf(force, "force"))
         walked = scene if condensed and not traced else None
-        return cls(u, f, None, width, asymmetry, capacity, ways, walked)
+        return cls(u, width * f, None, width, capacity, sides, walked)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Joint:
         """Joint of a table, such as `export` writes: CSV or MATLAB.
 
-        Backbone, width, asymmetry and capacity come back; those that a table of another origin
-        does not say are 1, 0 and infinite.
+        Backbone, width, capacity, pull and push come back; a table of another origin that does not
+        say them has a width of 1 and no known capacity.
 
         Raises
         ------
@@ -239,8 +236,14 @@ class Joint(ParallelIwan):
         require_number("series stiffness", stiffness)
         more = self.forces / as_leaf(stiffness, "series stiffness")
         u, sides = self.displacements + more, None if self.sides is None else self.sides + more
-        asymmetry = jnp.max(self.asymmetry * self.displacements / u)
-        return Joint(u, self.forces, None, self.width, asymmetry, self.capacity, sides)
+        return Joint(u, self.forces, None, self.width, self.capacity, sides)
+
+    @property
+    def asymmetry(self) -> Array:
+        """Largest difference of pull and push from their mean at a force, over the mean."""
+        if self.sides is None:
+            return jnp.zeros(())
+        return jnp.max(jnp.abs(self.sides[0] - self.sides[1]) / (self.sides[0] + self.sides[1]))
 
     @property
     def springs(self) -> Array:

@@ -19,7 +19,6 @@ which is large where three times the frequency is that of another mode.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -33,10 +32,9 @@ from jbeamshell.common.checks import is_staged, is_traced, require
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
-from jbeamshell.common.summary import Summary, ranged
-from jbeamshell.dynamics.frequencies import OverFrequency
-from jbeamshell.dynamics.structure.joint import Joint
+from jbeamshell.dynamics.frequencies import OverAmplitude
 from jbeamshell.dynamics.structure.matrices import Structure
+from jbeamshell.dynamics.vibration.elements import Elements, elements_of
 from jbeamshell.dynamics.vibration.reduction import basis_of
 
 AMPLITUDES = "give rising positive modal displacements"
@@ -50,8 +48,8 @@ ROUNDING = 4e3  # residual over the rounding of a displacement, at which an equi
 LINEAR = "give a joint: a structure without any is linear, see its modes"
 
 
-class ModalCurve(OverFrequency):
-    """Frequency and damping of a mode over its amplitude, (k,) each.
+class ModalCurve(OverAmplitude):
+    """Frequency and damping of a mode over its amplitude by statics, (k,) each.
 
     Attributes
     ----------
@@ -59,14 +57,13 @@ class ModalCurve(OverFrequency):
     frequency : cycles per time; see `omega`
     damping : damping ratio zeta of joints and structure
     dissipation : energy lost in the joints per cycle
-    joints : (k, joints) amplitudes of the joints' displacements
+    joints : (k, joints) largest displacements of the joints
     frequency_error, damping_error : estimated errors of statics, relative
     """
 
-    amplitude: Any
-    damping: Any
-    dissipation: Any
-    joints: Any
+    title = "modal curve, by statics"
+    label = "quasi-static"
+
     frequency_error: Any
     damping_error: Any
 
@@ -83,34 +80,6 @@ class ModalCurve(OverFrequency):
             f"damping may be off by up to {worst[1]:.0%} and the frequency by {worst[0]:.1%}, as "
             "statics know no inertia and no shape of the loop: take nonlinear_mode there",
         )
-
-    def __str__(self) -> str:
-        return summary_of_mode("modal curve, by statics", self, self.doubts).as_text()
-
-    def __repr__(self) -> str:
-        return str(self)
-
-    def plot(self, axes: Any = None) -> Any:
-        """Draw frequency and damping over amplitude; see `jbeamshell.plotting.modal_curve`."""
-        from jbeamshell import plotting
-
-        return plotting.modal_curve(self, axes=axes)
-
-
-def summary_of_mode(title: str, mode: Any, doubts: Sequence[str] = ()) -> Summary:
-    """Summary of frequency and damping over the amplitude of a mode."""
-    if is_traced(mode):
-        return Summary(f"{title}, traced", [])
-    columns = {
-        "modal displacement": mode.amplitude,
-        "frequency": mode.frequency,
-        "damping ratio": mode.damping,
-        "lost per cycle": mode.dissipation,
-        "joints move by": np.max(np.asarray(mode.joints), axis=-1, initial=0.0),
-    }
-    rows = [(name, ranged(np.asarray(column))) for name, column in columns.items()]
-    notes = [f"doubtful: {doubt}" for doubt in doubts]
-    return Summary(f"{title}, {np.size(mode.amplitude)} points", rows, notes)
 
 
 def modal_curve(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> ModalCurve:
@@ -170,10 +139,8 @@ def by_statics(structure: Structure, amplitudes: ArrayLike, mode: int = 0) -> Mo
         directions.T @ displacements[:, 1:],
         structure.modal_damping(shape, modes.omega[mode], mode),
     )
-    backbones = tuple((joint.displacements, joint.forces) for joint in structure.joints)
-    curve, sound = _curve(
-        backbones, statics, _Modes.of(structure, load, mode), jnp.asarray(amplitude)
-    )
+    joints, modal = elements_of(structure.joints), _Modes.of(structure, load, mode)
+    curve, sound = _curve(joints, statics, modal, jnp.asarray(amplitude))
     if is_traced(curve):
         return nan_unless(sound & structure.knows(curve.joints, ""), curve)
     if not np.all(sound):
@@ -234,13 +201,9 @@ class _Modes(NamedTuple):
 @in_double
 @eqx.filter_jit
 def _curve(
-    backbones: tuple[tuple[Array, Array], ...],
-    statics: _Statics,
-    modes: _Modes,
-    amplitude: Array,
+    joints: Elements, statics: _Statics, modes: _Modes, amplitude: Array
 ) -> tuple[ModalCurve, Array]:
     """Curve, and whether each of its points converged."""
-    joints = _alike(backbones)
     known, found = lax.stop_gradient((joints, statics))
     levels = _refined(amplitude)
 
@@ -256,7 +219,7 @@ def _curve(
         _, matrix = _residual(known, found, q, u)
         u = u - jnp.linalg.solve(matrix, residual)
         force = _modal_force(joints, statics, q, u)
-        loss = jnp.sum(jax.vmap(Joint.loss)(joints, jnp.abs(u)))
+        loss = jnp.sum(joints.loss(jnp.abs(u)))
         omega = jnp.sqrt(force / q)
         zeta = loss / (2.0 * jnp.pi * force * q) + 0.5 * statics.damping / omega
         moved, lost, third = lax.stop_gradient(_harmonic(known, modes, q, jnp.abs(u)))
@@ -278,20 +241,7 @@ def _curve(
     return curve, jnp.cumprod(sound)[SUBSTEPS - 1 :: SUBSTEPS] > 0
 
 
-def _alike(backbones: tuple[tuple[Array, Array], ...]) -> Joint:
-    """Joints of equally many points, stacked; further ones lie on the last straight line."""
-    size = max(u.size for u, _ in backbones)
-    stacked = []
-    for u, f in backbones:
-        steps = jnp.arange(1, size + 1 - u.size)
-        slope = Joint(u, f).spring
-        further = u[-1] * (1.0 + steps)
-        longer = jnp.append(f, f[-1] + slope * (further - u[-1]))
-        stacked.append(Joint(jnp.append(u, further), longer))
-    return jax.tree.map(lambda *leaves: jnp.stack(leaves), *stacked)
-
-
-def _harmonic(joints: Joint, modes: _Modes, q: Array, u: Array) -> tuple[Array, Array, Array]:
+def _harmonic(joints: Elements, modes: _Modes, q: Array, u: Array) -> tuple[Array, Array, Array]:
     """Frequency of the first harmonics at a modal displacement, energy lost and third harmonic.
 
     The energy is over x^T K x, the third harmonic of the joints' displacements over the first.
@@ -299,7 +249,7 @@ def _harmonic(joints: Joint, modes: _Modes, q: Array, u: Array) -> tuple[Array, 
     stuck, directions, momentum = modes
 
     def slipping(u: Array) -> Array:
-        softer = jax.vmap(lambda joint, x: joint.harmonic(x) - joint.stiffness)(joints, u)
+        softer = joints.harmonic(u) - joints.stiffness
         return stuck + (directions * softer) @ directions.T
 
     def shape(u: Array) -> tuple[Array, Array]:
@@ -317,40 +267,38 @@ def _harmonic(joints: Joint, modes: _Modes, q: Array, u: Array) -> tuple[Array, 
 
     u, _, _ = lax.while_loop(left, improved, (u, jnp.full_like(q, jnp.inf), jnp.zeros((), int)))
     square, x = shape(u)
-    lost = jnp.sum(jax.vmap(Joint.loss)(joints, u))
+    lost = jnp.sum(joints.loss(u))
     # Third harmonic of the forces on the half cycle from a turn, and what it moves.
-    angle = jnp.pi * jnp.arange(PHASES) / PHASES
-
-    def third(joint: Joint, size: Array) -> Array:
-        branch = joint.line(size) - 2.0 * joint.line(0.5 * size * (1.0 - jnp.cos(angle)))
-        return 2.0 * jnp.mean(branch * jnp.exp(-3j * angle))
-
-    forces = jax.vmap(third)(joints, u)
+    angle = jnp.pi * jnp.arange(PHASES)[:, None] / PHASES
+    branch = joints.line(u) - 2.0 * joints.line(0.5 * u * (1.0 - jnp.cos(angle)))
+    forces = 2.0 * jnp.mean(branch * jnp.exp(-3j * angle), axis=0)
     matrix = slipping(u) - 9.0 * square * jnp.eye(x.size)
     moved = directions.T @ jnp.linalg.solve(matrix, directions @ forces)
     part = jnp.max(jnp.abs(moved) / jnp.where(u > 0.0, u, 1.0))
     return jnp.sqrt(square), lost / (square * (x @ x)), jnp.minimum(part, 1.0)
 
 
-def _lost(joints: Joint, u: Array) -> Array:
+def _lost(joints: Elements, u: Array) -> Array:
     """Forces (joints,) that the joints lose by slip."""
-    return jax.vmap(lambda joint, x: joint.stiffness * x - joint.line(x))(joints, u)
+    return joints.stiffness * u - joints.line(u)
 
 
-def _modal_force(joints: Joint, statics: _Statics, q: Array, u: Array) -> Array:
+def _modal_force(joints: Elements, statics: _Statics, q: Array, u: Array) -> Array:
     """Modal force alpha at a modal displacement."""
     return (q - statics.b @ _lost(joints, u)) / statics.a
 
 
-def _residual(joints: Joint, statics: _Statics, q: Array, u: Array) -> tuple[Array, Array]:
+def _residual(joints: Elements, statics: _Statics, q: Array, u: Array) -> tuple[Array, Array]:
     """Displacements of the joints less those of their forces, and the derivative."""
     a, b, compliance = statics[:3]
     residual = u - b * _modal_force(joints, statics, q, u) - compliance @ _lost(joints, u)
-    softer = jax.vmap(lambda joint, x: joint.stiffness - joint.tangent(x))(joints, u)
+    softer = joints.stiffness - joints.tangent(u)
     return residual, jnp.eye(u.size) + jnp.outer(b, b * softer) / a - compliance * softer
 
 
-def _equilibrium(joints: Joint, statics: _Statics, q: Array, guess: Array) -> tuple[Array, Array]:
+def _equilibrium(
+    joints: Elements, statics: _Statics, q: Array, guess: Array
+) -> tuple[Array, Array]:
     """Displacements of the joints at a modal displacement by Newton's method, and if it ended."""
     most = ROUNDING * jnp.finfo(guess.dtype).eps * jnp.max(jnp.abs(statics.b * q / statics.a))
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -25,20 +23,13 @@ ROUNDING = 10.0  # slope of the squares below which another entry is not tried, 
 BELOW = 1.0 - 1e-6  # thresholds nearer to the largest force are left out
 
 
-def mean_of(pull: Any, push: Any) -> tuple[Any, Any]:
-    """Mean of two displacements, and the largest difference from it over the mean."""
-    mean = 0.5 * (pull + push)
-    return mean, jnp.max(jnp.abs(0.5 * (pull - push) / mean))
-
-
 def slider_line(scene: Scene, force: Array) -> tuple[Network, tuple[Array, ...]]:
     """Network and backbone of a scene.
 
-    The backbone is the mean displacements (k + 1,), those (2, k + 1) of pull and push, the forces
-    (k + 1,), the asymmetry, and the count of points below the force.  The points are the means of
-    the thresholds, and the force; those beyond are laid evenly on the straight line from the last
-    one below it.  The displacements are NaN where the slip zones are not nested, and for a joint
-    with bearings.
+    The backbone is the displacements (2, k + 1) of pull and push, the forces (k + 1,), and the
+    count of points below the force.  The points are the means of the thresholds, and the force;
+    those beyond are laid evenly on the straight line from the last one below it.  The displacements
+    are NaN where the slip zones are not nested, and for a joint with bearings.
     """
     network = Network.of(scene)
     ways = jnp.asarray([1.0, -1.0])
@@ -60,15 +51,13 @@ def slider_line(scene: Scene, force: Array) -> tuple[Network, tuple[Array, ...]]
     nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
     rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
     series = scene.member.bearing_stiffness is None  # a bearing is no slider
-    sides = nan_unless(jnp.all(nested) & rising & series, u)
-    mean, asymmetry = mean_of(*sides)
-    return network, (mean, sides, f, asymmetry, count)
+    return network, (nan_unless(jnp.all(nested) & rising & series, u), f, count)
 
 
 slider_line_once = jax.jit(slider_line, compiler_options=ONCE)
 
 
-def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, Array, Array]:
+def cycled_line(scene: Scene, force: Array) -> tuple[Array, Array, Array]:
     """Backbone whose loops by Masing's rule are nearest to a scene's steady cycles.
 
     A slider in series with compliance c_i and threshold F_i adds c_i (F - F_i) to the displacement
@@ -77,8 +66,8 @@ def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, A
 
     Returns
     -------
-    (k,) displacements and forces, the asymmetry of first loading, and the displacements (2, k) of
-    pull and push in it; NaN where a traced scene has no equilibrium
+    (k,) displacements and forces, and the displacements (2, k) of a first pull and push; NaN where
+    a traced scene has no equilibrium
     """
     levels = force * jnp.asarray(AMPLITUDES)
     throw = not is_traced(scene, force, jnp.zeros(()))
@@ -94,7 +83,7 @@ def cycled_line(scene: Scene, force: Array, width: Any) -> tuple[Array, Array, A
     # Compiled twice, a largest number may differ by rounding from all, and its derivative is NaN.
     scale = lax.stop_gradient(jnp.max(rows, axis=0))
     parts = not_negative(rows / scale, jnp.append(jnp.ones(u.size), loss / d))
-    return beyond @ (parts / scale), width * levels, mean_of(*sides)[1], jnp.stack(sides)
+    return beyond @ (parts / scale), levels, jnp.stack(sides)
 
 
 def not_negative(matrix: Array, target: Array) -> Array:

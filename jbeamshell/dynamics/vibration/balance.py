@@ -87,7 +87,7 @@ def dynamic_stiffness(model: Reduced, omega: Any, xi: Any, harmonics: Any) -> Ar
 
 def lost_harmonics(model: Reduced, wave: Wave, u: Array) -> Array:
     """Harmonics (H + 1, J) of the force that elements lose in a motion u (H, J)."""
-    return wave.coefficients(lost_forces(model.laws, wave, *wave.samples(u)))
+    return wave.coefficients(lost_forces(model.elements, wave, *wave.samples(u)))
 
 
 def unbalanced(model: Reduced, balance: Balance, at: Point, lost: Array) -> Array:
@@ -121,7 +121,7 @@ def corrections(
     (omega, _, xi), (forces, short) = at.p, sides
     number = jnp.asarray(balance.harmonics)[:, None]
     count, joints = len(balance.harmonics), model.directions.shape[1]
-    shift = (model.directions * (SPLIT * model.laws.stuck)) @ model.directions.T
+    shift = (model.directions * (SPLIT * model.elements.stiffness)) @ model.directions.T
     matrices = dynamic_stiffness(model, omega, xi, balance.harmonics) + 1j * shift
     moved = at.x @ model.mass.T
     by_omega = 1j * number * (at.x @ model.damping.T - xi * moved) - 2.0 * number**2 * omega * moved
@@ -164,7 +164,7 @@ def slopes_of(model: Reduced, balance: Balance, at: Point) -> tuple[Array, Array
     def along(way: Array) -> tuple[Array, Array]:
         full = jnp.broadcast_to(way, u.shape).astype(u.dtype)
         lost, slope = jax.jvp(lambda part: lost_harmonics(model, wave, part), (u,), (full,))
-        return lost, slope[:-1] - 1j * SPLIT * model.laws.stuck * full
+        return lost, slope[:-1] - 1j * SPLIT * model.elements.stiffness * full
 
     lost, slopes = jax.vmap(along, out_axes=(None, 0))(basis)
     return lost, slopes
@@ -301,7 +301,7 @@ def left_out(model: Reduced, balance: Balance, omega: Any, u: Any, lost: Any) ->
     ----------
     omega, u, lost : (k,) frequencies, (k, H, J) displacements, (k, H + 1, J) lost forces
     """
-    shift = 1j * (model.directions * (SPLIT * model.laws.stuck)) @ model.directions.T
+    shift = 1j * (model.directions * (SPLIT * model.elements.stiffness)) @ model.directions.T
     after = jnp.asarray(balance.wave.harmonics[-1])
     rate = (1j * after * omega)[:, None, None]
     matrices = model.stiffness + shift + rate * model.damping + rate**2 * model.mass

@@ -1,4 +1,4 @@
-"""Forced responses of structures with joints: curves over frequency and over force."""
+"""Forced responses of structures with joints over the frequency of a force."""
 
 from __future__ import annotations
 
@@ -22,28 +22,16 @@ from jbeamshell.dynamics.vibration.balance import (
     Point,
     Rows,
     dynamic_stiffness,
-    left_out,
     marched,
     polished,
 )
-from jbeamshell.dynamics.vibration.continuation import (
-    EXCITATION,
-    LEVEL,
-    MOST_POINTS,
-    OMEGA,
-    Curve,
-    follow,
-)
+from jbeamshell.dynamics.vibration.continuation import ORDER, follow
 from jbeamshell.dynamics.vibration.reduction import Reduced, reduced
-from jbeamshell.dynamics.vibration.results import (
-    ForcedResponse,
-    StalledContinuationError,
-    SteadyResponse,
-    over_a_cycle,
-)
+from jbeamshell.dynamics.vibration.results import ForcedResponse
 
 TURN = 2.0 * np.pi
 SLIGHT = 1e-3  # part of a force at which a structure is nearly elastic
+NOT_FOUND = "no steady response is found at the frequency {:.6g}"
 
 
 def forced_response(
@@ -54,19 +42,17 @@ def forced_response(
     place: int | None = None,
     harmonics: int = setup.HARMONICS,
     samples: int | None = None,
-    most_points: int = MOST_POINTS,
 ) -> ForcedResponse:
-    """Steady response to a force cos(omega t) over its frequency.
+    """Steady response to a force cos(omega t) over its frequency, in steps that show its peaks.
 
     Parameters
     ----------
     structure : structure with its joints
     force : (n,) amplitudes of the force on the degrees of freedom
-    frequencies : cycles per time from which and to which the curve is followed
+    frequencies : cycles per time from which and to which the response is followed
     place : degree of freedom of ``amplitude`` and ``phase``; None is that of the largest force
     harmonics : highest harmonic; odd ones up to it are balanced
     samples : of a cycle; None is 16 for a period of the highest harmonic, 128 at least
-    most_points : largest number of points
 
     Raises
     ------
@@ -74,8 +60,8 @@ def forced_response(
         for a force of another size than n, frequencies that are not positive, an even number of
         harmonics, a place that does not exist, or a force that moves a joint of a strip beyond its
         backbone
-    StalledContinuationError
-        if the curve ends before the range; it carries the part that was found
+    UnconvergedError
+        if no response is found where it begins, or from some frequency on
 
     Warns
     -----
@@ -97,34 +83,31 @@ def forced_response(
     True
     """
     first, last = setup.checked_pair("frequencies", frequencies, setup.RANGE)
-    setting = (place, harmonics, samples, most_points)
-    return _followed(structure, force, (TURN * first, 1.0), OMEGA, TURN * last, setting)
+    balance = setup.checked_balance(harmonics, samples)
+    force = setup.checked_force(structure, force)
+    place = setup.checked_place(structure, place, force)
+    with setup.precise(traced=False):
+        model, basis = reduced(structure, force)
+        directions = np.asarray(model.directions)
 
+        def check(found: Found) -> None:
+            peaks = setup.joint_peaks(found.point.x[None], directions, balance.harmonics)
+            structure.knows(peaks, f"the force at the frequency {found.point.p[0] / TURN:.6g}")
 
-def level_response(
-    structure: Structure,
-    force: ArrayLike,
-    frequency: float,
-    levels: tuple[float, float],
-    *,
-    place: int | None = None,
-    harmonics: int = setup.HARMONICS,
-    samples: int | None = None,
-    most_points: int = MOST_POINTS,
-) -> ForcedResponse:
-    """Steady response at one frequency over the level of the force.
-
-    Parameters
-    ----------
-    frequency : of the force, cycles per time
-    levels : factors of ``force`` from which and to which the curve is followed
-    structure, force, place, harmonics, samples, most_points : see `forced_response`, also for
-        errors and doubts
-    """
-    setup.check_frequency(frequency)
-    first, last = setup.checked_pair("levels", levels, setup.LEVELS)
-    setting = (place, harmonics, samples, most_points)
-    return _followed(structure, force, (TURN * frequency, first), LEVEL, last, setting)
+        begin, end = _slight(model, balance, TURN * first, 1.0), TURN * last
+        points = follow(model, balance, begin, end, check)
+        if not points:  # far from elastic
+            grown = _steady(model, balance, jnp.array([TURN * first]), False).point
+            begin = jax.tree.map(lambda a: np.asarray(a[0]), grown)
+            points = follow(model, balance, begin, end, check)
+        if not points:
+            where = NOT_FOUND.format(first)
+            raise UnconvergedError(f"{where}, where the curve begins: begin farther from resonance")
+        found: Found = jax.tree.map(lambda *rows: np.stack(rows), *points)
+        columns = setup.columns(model, balance, found, basis, np)
+        response = ForcedResponse(frequency=found.point.p[:, 0] / TURN, place=place, **columns)
+    warn_of_doubts(response.doubts)
+    return response
 
 
 def steady_response(
@@ -135,12 +118,11 @@ def steady_response(
     place: int | None = None,
     harmonics: int = setup.HARMONICS,
     samples: int | None = None,
-) -> SteadyResponse:
+) -> ForcedResponse:
     """Steady responses at given frequencies, with derivatives to all numbers.
 
-    Each is found from a small force on; where several exist, it is the one that a growing force
-    reaches.  Numbers of matrices, joints, force and frequencies may be traced; motions that are
-    not found then hold NaN.
+    Each is found from a small force on.  Numbers of matrices, joints, force and frequencies may be
+    traced; motions that are not found then hold NaN.
 
     Parameters
     ----------
@@ -155,45 +137,31 @@ def steady_response(
         if a response is not found
     """
     frequency = setup.checked_rising("frequencies", frequencies, setup.RANGE, rising=False)
-    omega = TURN * frequency
     balance = setup.checked_balance(harmonics, samples)
     force = setup.checked_force(structure, force)
     place = setup.checked_place(structure, place, force)
-    traced = structure.traced or is_traced(force, omega)
+    traced = structure.traced or is_traced(force, frequency)
     with setup.precise(traced):
         model, basis = reduced(structure, force)
-        found = _steady(model, balance, jnp.asarray(omega), traced)
-        good, directions = found.converged, model.directions
-        peaks = setup.joint_peaks(found.point.x, directions, balance.harmonics, jnp)
-        if traced:
-            good = good & structure.knows(peaks, "")
-        x = nan_unless(good, found.point.x)
-        first = x[:, 0] @ basis[place]
-        after = left_out(model, balance, omega, x @ model.directions, found.lost)
-        result = SteadyResponse(
-            frequency=frequency,
-            amplitude=abs(first),
-            phase=jnp.angle(first),
-            harmonics=np.array(balance.harmonics),
-            coefficients=x,
-            basis=basis,
-            truncation=after,
-        )
-        if traced:
-            return result
-        result = jax.tree.map(np.asarray, result)
+        found = _steady(model, balance, TURN * jnp.asarray(frequency), traced)
+        if not traced:
+            found = jax.tree.map(np.asarray, found)
+        columns = setup.columns(model, balance, found, basis, jnp if traced else np)
+        response = ForcedResponse(frequency=frequency, place=place, **columns)
+    if traced:
+        sound = found.converged & structure.knows(response.joints, "")
+        return response.but(coefficients=nan_unless(sound, response.coefficients))
     if not np.all(found.converged):
-        lost = float(frequency[int(np.argmin(found.converged))])
-        raise UnconvergedError(f"no steady response is found at the frequency {lost:.6g}")
-    structure.knows(peaks, "the force")
-    warn_of_doubts(result.doubts)
-    return result
+        raise UnconvergedError(NOT_FOUND.format(frequency[int(np.argmin(found.converged))]))
+    structure.knows(response.joints, "the force")
+    warn_of_doubts(response.doubts)
+    return response
 
 
 @partial(jax.jit, static_argnums=(1, 3))
 def _steady(model: Reduced, balance: Balance, omegas: Array, differentiable: bool) -> Found:
     """Solutions (k, ...) at angular frequencies (k,) under the whole force."""
-    number = jnp.eye(3)[jnp.array([EXCITATION, OMEGA, LEVEL])]
+    number = jnp.eye(3)[jnp.array([ORDER[0], ORDER[2], ORDER[1]])]
     whole, fixed = jnp.ones(1), lax.stop_gradient(model)
 
     def one(omega: Array) -> Found:
@@ -213,80 +181,8 @@ def _steady(model: Reduced, balance: Balance, omegas: Array, differentiable: boo
 @partial(jax.jit, static_argnums=1)
 def _slight(model: Reduced, balance: Balance, omega: Any, level: Any) -> Point:
     """Elastic response at a level of the force, slightly damped at the joints."""
-    shift = (model.directions * (SLIGHT * model.laws.stuck)) @ model.directions.T
+    shift = (model.directions * (SLIGHT * model.elements.stiffness)) @ model.directions.T
     matrix = dynamic_stiffness(model, omega, jnp.zeros(()), (1,))[0] + 1j * shift
     first = jnp.linalg.solve(matrix, level * model.drive + 0j)
     x = jnp.zeros((len(balance.harmonics), first.size), first.dtype).at[0].set(first)
     return Point(x, jnp.stack([jnp.asarray(omega), jnp.asarray(level), jnp.zeros(())]))
-
-
-def _followed(
-    structure: Structure,
-    force: Any,
-    start: tuple[float, float],
-    along: int,
-    end: float,
-    setting: tuple[Any, Any, Any, int],
-) -> ForcedResponse:
-    """Curve over frequency or level from (omega, level)."""
-    balance = setup.checked_balance(*setting[1:3])
-    force = setup.checked_force(structure, force)
-    place = setup.checked_place(structure, setting[0], force)
-    with setup.precise(traced=False):
-        model, basis = reduced(structure, force)
-        directions = np.asarray(model.directions)
-
-        def check(found: Found) -> None:
-            omega, level, _ = found.point.p
-            what = f"the force times {level:.4g} at the frequency {omega / TURN:.6g}"
-            peaks = setup.joint_peaks(found.point.x[None], directions, balance.harmonics)
-            structure.knows(peaks, what)
-
-        omega, level = start
-        begin = _slight(model, balance, omega, level)
-        curve = follow(model, balance, begin, along, end, check, setting[3])
-        if not curve.points:  # far from elastic
-            begin = _grown(model, balance, omega, level)
-            curve = follow(model, balance, begin, along, end, check, setting[3])
-        if not curve.points:
-            raise UnconvergedError(
-                f"no steady response is found at the frequency {omega / TURN:.6g} and the level "
-                f"{level:.6g}, where the curve begins: begin farther from resonance"
-            )
-        response = _response(model, balance, curve, basis, place)
-    if curve.stalled:
-        raise StalledContinuationError(
-            f"the response ends at the frequency {response.frequency[-1]:.6g}, the level "
-            f"{response.level[-1]:.6g} and the amplitude {response.amplitude[-1]:.4g}: "
-            f"{curve.stalled}; take another range, more damping or more harmonics",
-            response,
-        )
-    warn_of_doubts(response.doubts, stacklevel=3)
-    return response
-
-
-def _grown(model: Reduced, balance: Balance, omega: float, level: float) -> Point:
-    """Response at a level that is reached from small ones."""
-    found = _steady(model._replace(drive=level * model.drive), balance, jnp.array([omega]), False)
-    x, p = (np.asarray(a[0]) for a in found.point)
-    return Point(x, p * np.array([1.0, level, 1.0]))  # type: ignore[arg-type]
-
-
-def _response(
-    model: Reduced, balance: Balance, curve: Curve, basis: Any, place: int
-) -> ForcedResponse:
-    """Result of a curve."""
-    found: Found = jax.tree.map(lambda *rows: np.stack(rows), *curve.points)
-    directions = np.asarray(model.directions)
-    omega, u = found.point.p[:, OMEGA], found.point.x @ directions
-    return ForcedResponse(
-        frequency=np.asarray(omega) / TURN,
-        level=np.asarray(found.point.p[:, LEVEL]),
-        harmonics=np.array(balance.harmonics),
-        coefficients=np.asarray(found.point.x),
-        basis=np.asarray(basis),
-        place=place,
-        joints=np.max(np.abs(over_a_cycle(u, balance.harmonics)), axis=1),
-        dissipation=np.asarray(setup.dissipation(found, directions, balance.harmonics)),
-        truncation=np.asarray(left_out(model, balance, omega, u, found.lost)),
-    )

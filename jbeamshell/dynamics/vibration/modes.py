@@ -10,11 +10,11 @@ import numpy as np
 from jax import lax
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import is_traced
+from jbeamshell.common.checks import is_traced, require_count
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.dynamics.structure.matrices import Structure
 from jbeamshell.dynamics.vibration import setup
-from jbeamshell.dynamics.vibration.balance import Point, Rows, left_out, marched, polished
+from jbeamshell.dynamics.vibration.balance import Point, Rows, marched, polished
 from jbeamshell.dynamics.vibration.reduction import Reduced, reduced
 from jbeamshell.dynamics.vibration.results import NonlinearMode
 
@@ -66,7 +66,7 @@ def nonlinear_mode(
     [0.16, 0.14]
     """
     amplitude = setup.checked_rising("amplitudes", amplitudes, setup.AMPLITUDES)
-    setup.check_mode(structure, mode)
+    require_count("mode", mode, 0, structure.size - 1)
     balance = setup.checked_balance(harmonics, samples)
     traced = structure.traced or is_traced(amplitude)
     xp: Any = jnp if traced else np
@@ -80,23 +80,17 @@ def nonlinear_mode(
         found = marched(fixed, balance, begin, held, still, small)
         if traced:
             found = polished(model, balance, found, rows, target)
-        directions = xp.asarray(model.directions)
         found = jax.tree.map(xp.asarray, found)
-        peaks = setup.joint_peaks(found.point.x, directions, balance.harmonics, xp)
+        columns = setup.columns(model, balance, found, basis, xp)
         good = found.converged
         if traced:
-            good = good & structure.knows(peaks, "")
-        omega, u = xp.where(good, found.point.p[:, 0], xp.nan), found.point.x @ directions
+            good = good & structure.knows(columns["joints"], "")
+        omega = xp.where(good, found.point.p[:, 0], xp.nan)
         result = NonlinearMode(
             amplitude=amplitude,
             frequency=omega / (2.0 * np.pi),
             damping=found.point.p[:, 2] / (2.0 * omega),
-            dissipation=setup.dissipation(found, directions, balance.harmonics, xp),
-            joints=peaks,
-            harmonics=np.array(balance.harmonics),
-            coefficients=found.point.x,
-            basis=basis,
-            truncation=xp.asarray(left_out(model, balance, omega, u, found.lost)),
+            **columns,
         )
     if traced:
         return result
@@ -106,7 +100,7 @@ def nonlinear_mode(
             f"no motion is found at the modal displacement {lost_at:.6g}: give more amplitudes "
             "below it, or fewer harmonics"
         )
-    structure.knows(peaks, f"the modal displacement {float(amplitude[-1]):.6g}")
+    structure.knows(result.joints, f"the modal displacement {float(amplitude[-1]):.6g}")
     warn_of_doubts(result.doubts)
     return result
 

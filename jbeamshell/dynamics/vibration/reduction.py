@@ -6,13 +6,12 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-import scipy.sparse
 from jax import Array, lax
 
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.precision import doubled
-from jbeamshell.dynamics.structure.matrices import Structure
-from jbeamshell.dynamics.vibration.elements import Laws, laws_of
+from jbeamshell.dynamics.structure.matrices import Structure, dense
+from jbeamshell.dynamics.vibration.elements import Elements, elements_of
 
 SMALL = 40  # largest number of degrees of freedom that are kept
 MODES = 24  # of a larger structure
@@ -27,7 +26,7 @@ class Reduced(NamedTuple):
     mass, damping, stiffness : (r, r); the stiffness is that with all elements stuck
     directions : (r, J) directions of the elements
     drive : (r,) forces
-    laws : force elements
+    elements : force elements
     """
 
     mass: Array
@@ -35,7 +34,7 @@ class Reduced(NamedTuple):
     stiffness: Array
     directions: Array
     drive: Array
-    laws: Laws
+    elements: Elements
 
 
 def reduced(structure: Structure, force: Any, mode: int = 0) -> tuple[Reduced, Any]:
@@ -52,16 +51,16 @@ def reduced(structure: Structure, force: Any, mode: int = 0) -> tuple[Reduced, A
     xp: Any = jnp if traced else np
     basis = basis_of(structure, xp.column_stack([own, force]), mode, xp)
     if structure.size <= SMALL:
-        projected = [jnp.asarray(_dense(matrix)) for matrix in matrices]
+        projected = [jnp.asarray(dense(matrix)) for matrix in matrices]
     else:
         projected = [jnp.asarray(basis.T @ (matrix @ basis)) for matrix in matrices]
     mass, damping, stiffness = projected
     unused = jnp.all(jnp.asarray(basis) == 0.0, axis=0)
     mass = mass + jnp.diag(jnp.where(unused, 1.0, 0.0))
     stiffness = stiffness + jnp.diag(jnp.where(unused, jnp.max(stiffness), 0.0))
-    laws = laws_of(structure.joints if traced else doubled(structure.joints))
+    elements = elements_of(structure.joints if traced else doubled(structure.joints))
     drive = jnp.asarray(basis.T @ force)
-    return Reduced(mass, damping, stiffness, jnp.asarray(basis.T @ own), drive, laws), basis
+    return Reduced(mass, damping, stiffness, jnp.asarray(basis.T @ own), drive, elements), basis
 
 
 def basis_of(structure: Structure, loads: Any, mode: int, xp: Any) -> Any:
@@ -83,7 +82,3 @@ def basis_of(structure: Structure, loads: Any, mode: int, xp: Any) -> Any:
     scale = xp.where(kept, 1.0 / xp.sqrt(xp.where(kept, values, 1.0)), 0.0)
     found = xp.column_stack([modes, static @ (vectors * scale)])
     return lax.stop_gradient(found) if xp is jnp else found
-
-
-def _dense(matrix: Any) -> Any:
-    return matrix.toarray() if scipy.sparse.issparse(matrix) else matrix

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import is_traced
-from jbeamshell.common.errors import UnconvergedError
-from jbeamshell.common.summary import Summary, ranged, with_unit
-from jbeamshell.dynamics.frequencies import OverFrequency
-from jbeamshell.dynamics.structure.modal import summary_of_mode
+from jbeamshell.common.summary import Summary, ranged
+from jbeamshell.dynamics.frequencies import OverAmplitude, OverFrequency
 
 DOUBTED = 1e-3  # displacement in the next harmonic over that in the first
 PHASES = 720  # angles of a cycle at which largest values are looked for
 
 
 class Balanced(OverFrequency):
-    """Motions (k,) of harmonics that are in balance, as far as the next one is small."""
+    """Motions (k,) of harmonics that are in balance; see `ForcedResponse`."""
 
     harmonics: NDArray[np.int64]
     coefficients: Any
     basis: Any
+    joints: Any
+    dissipation: Any
     truncation: Any
 
     def at(self, place: int) -> Any:
@@ -43,73 +44,58 @@ class Balanced(OverFrequency):
             f"{most:.2g} of the first one: give more harmonics",
         )
 
-    @property
-    def _remarks(self) -> list[str]:
-        """Doubts as a summary shows them."""
-        return [f"doubtful: {doubt}" for doubt in self.doubts]
-
 
 class ForcedResponse(Balanced):
-    """Steady responses of a structure along a curve of k points, in the order of the curve.
+    """Steady responses of a structure at k frequencies, which may be traced.
 
     Attributes
     ----------
+    place : degree of freedom that `amplitude` and `phase` are of
     frequency : (k,) of the force, cycles per time; see `omega`
-    level : (k,) factors of the force
     harmonics : (H,) their numbers
     coefficients : (k, H, r) complex coefficients of the motion in ``basis``
     basis : (n, r) displacements of the degrees of freedom in it
-    place : degree of freedom that `amplitude` and `phase` are of
-    joints : (k, J) largest displacements of the elements
-    dissipation : (k,) energy lost in the elements per cycle
-    truncation : (k,) displacement of the elements in the next harmonic, over that in the first
+    joints : (k, J) largest displacements of the joints
+    dissipation : (k,) energy lost in the joints per cycle
+    truncation : (k,) displacement of the joints in the next harmonic, over that in the first
     """
 
-    level: NDArray[np.float64]
     place: int
-    joints: NDArray[np.float64]
-    dissipation: NDArray[np.float64]
 
     @property
-    def harmonic_amplitudes(self) -> NDArray[np.float64]:
+    def harmonic_amplitudes(self) -> Any:
         """Amplitudes (k, H) of the harmonics at ``place``."""
-        return np.abs(self.at(self.place))
+        return abs(self.at(self.place))
 
     @property
-    def amplitude(self) -> NDArray[np.float64]:
+    def amplitude(self) -> Any:
         """Amplitude (k,) of the first harmonic at ``place``."""
         return self.harmonic_amplitudes[:, 0]
 
     @property
-    def phase(self) -> NDArray[np.float64]:
+    def phase(self) -> Any:
         """Phase (k,) of the first harmonic at ``place``, in radians; negative behind the force."""
-        return np.angle(self.at(self.place)[:, 0])
+        first = self.at(self.place)[:, 0]
+        return jnp.angle(first) if is_traced(first) else np.angle(first)
 
-    @property
-    def peak(self) -> NDArray[np.float64]:
-        """Largest displacement (k,) at ``place`` within a cycle."""
-        return np.max(np.abs(over_a_cycle(self.at(self.place), self.harmonics)), axis=1)
-
-    @property
-    def summary(self) -> Summary:
-        """Summary in a few lines."""
+    def __str__(self) -> str:
+        if is_traced(self):
+            return "forced response, traced"
         top = int(np.argmax(self.amplitude))
-        over = "level" if np.ptp(self.frequency) == 0.0 else "frequency"
         rows = [
-            (over, ranged(getattr(self, over))),
-            ("largest amplitude", f"{self.amplitude[top]:.4g} at {getattr(self, over)[top]:.4g}"),
+            ("frequency", ranged(np.asarray(self.frequency))),
+            ("largest amplitude", f"{self.amplitude[top]:.4g} at {self.frequency[top]:.4g}"),
             ("lost per cycle", f"{self.dissipation[top]:.4g} there"),
             ("joints", f"move by up to {np.max(self.joints, initial=0.0):.4g}"),
             ("left out", f"{np.max(self.truncation):.2g} of the first harmonic"),
         ]
-        title = f"forced response at degree of freedom {self.place}, {self.level.size} points"
-        return Summary(title, rows, self._remarks)
-
-    def __str__(self) -> str:
-        return self.summary.as_text()
+        title = (
+            f"forced response at degree of freedom {self.place}, {np.size(self.frequency)} points"
+        )
+        return Summary(title, rows, [f"doubtful: {doubt}" for doubt in self.doubts]).as_text()
 
     def __repr__(self) -> str:
-        return self.summary.as_text()
+        return str(self)
 
     def plot(self, axes: Any = None) -> Any:
         """Draw amplitude and harmonics; see `jbeamshell.plotting.forced_response`."""
@@ -118,79 +104,18 @@ class ForcedResponse(Balanced):
         return plotting.forced_response(self, axes=axes)
 
 
-class StalledContinuationError(UnconvergedError):
-    """Continuation that ended before its range; ``response`` is the part that was found."""
-
-    def __init__(self, message: str, response: ForcedResponse) -> None:
-        super().__init__(message)
-        self.response = response
-
-
-class NonlinearMode(Balanced):
+class NonlinearMode(Balanced, OverAmplitude):
     """Frequency and damping of a mode over its amplitude, by harmonic balance, k points.
 
     Attributes
     ----------
     amplitude : (k,) modal displacement q of the first harmonic
-    frequency : (k,) cycles per time; see `omega`
-    damping : (k,) damping ratio, of joints and structure
-    dissipation : (k,) energy lost in the elements per cycle
-    joints : (k, J) largest displacements of the elements
-    harmonics : (H,) their numbers
-    coefficients : (k, H, r) complex coefficients of the motion in ``basis``
-    basis : (n, r) displacements of the degrees of freedom in it
-    truncation : (k,) displacement of the elements in the next harmonic, over that in the first
+    frequency, damping, dissipation, joints : see `ModalCurve`
+    harmonics, coefficients, basis, truncation : see `ForcedResponse`
     """
 
-    amplitude: Any
-    damping: Any
-    dissipation: Any
-    joints: Any
-
-    def __str__(self) -> str:
-        doubts = () if is_traced(self) else self.doubts
-        return summary_of_mode("nonlinear mode, by harmonic balance", self, doubts).as_text()
-
-    def __repr__(self) -> str:
-        return str(self)
-
-    def plot(self, axes: Any = None) -> Any:
-        """Draw frequency and damping over amplitude; see `jbeamshell.plotting.modal_curve`."""
-        from jbeamshell import plotting
-
-        return plotting.modal_curve(self, axes=axes, label="harmonic balance")
-
-
-class SteadyResponse(Balanced):
-    """Steady responses at k frequencies, which may be traced.
-
-    Attributes
-    ----------
-    frequency : (k,) of the force, cycles per time; see `omega`
-    amplitude, phase : (k,) of the first harmonic at one degree of freedom
-    harmonics : (H,) their numbers
-    coefficients : (k, H, r) complex coefficients of the motion in ``basis``
-    basis : (n, r) displacements of the degrees of freedom in it
-    truncation : (k,) displacement of the elements in the next harmonic, over that in the first
-    """
-
-    amplitude: Any
-    phase: Any
-
-    def __str__(self) -> str:
-        if is_traced(self):
-            return "steady response, traced"
-        rows = [
-            ("frequency", ranged(np.asarray(self.frequency))),
-            ("amplitude", ranged(np.asarray(self.amplitude))),
-            ("left out", f"{with_unit(float(np.max(self.truncation)))} of the first harmonic"),
-        ]
-        return Summary(
-            f"steady response at {len(self.frequency)} frequencies", rows, self._remarks
-        ).as_text()
-
-    def __repr__(self) -> str:
-        return str(self)
+    title = "nonlinear mode, by harmonic balance"
+    label = "harmonic balance"
 
 
 def over_a_cycle(coefficients: Any, harmonics: Any, xp: Any = np) -> Any:

@@ -16,17 +16,16 @@ from jbeamshell.common.checks import (
     is_traced,
     require,
     require_count,
-    require_number,
 )
 from jbeamshell.dynamics.structure.matrices import Structure
-from jbeamshell.dynamics.vibration.balance import Balance, Found
+from jbeamshell.dynamics.vibration.balance import Balance, Found, left_out
+from jbeamshell.dynamics.vibration.reduction import Reduced
 from jbeamshell.dynamics.vibration.results import over_a_cycle
 
 HARMONICS = 9  # highest one, unless told otherwise
 PER_HARMONIC = 16  # samples of a period of the highest harmonic
 FEWEST = 128  # samples of a cycle
 RANGE = "give two different positive frequencies, (from, to), in cycles per time"
-LEVELS = "give two different positive factors of the force, (from, to)"
 AMPLITUDES = "give positive modal displacements that rise"
 
 
@@ -96,18 +95,19 @@ def joint_peaks(motion: Any, directions: Any, harmonics: Sequence[int], xp: Any 
     return abs(over_a_cycle(motion @ directions, np.array(harmonics), xp)).max(axis=1)
 
 
-def dissipation(found: Found, directions: Any, harmonics: Sequence[int], xp: Any = np) -> Any:
-    """Energy (k,) lost in the elements per cycle; ``xp`` is NumPy, or JAX for traced numbers."""
-    u = found.point.x @ directions
-    parts = xp.imag(found.lost[:, :-1] * xp.conj(u)) * np.array(harmonics)[:, None]
-    return np.pi * xp.sum(parts, axis=(-2, -1))
+def columns(model: Reduced, balance: Balance, found: Found, basis: Any, xp: Any) -> dict[str, Any]:
+    """Columns that all results of harmonic balance have, from solutions (k, ...).
 
-
-def check_mode(structure: Structure, mode: Any) -> None:
-    """Raise `InputError` unless a mode exists."""
-    require_count("mode", mode, 0, structure.size - 1)
-
-
-def check_frequency(frequency: Any) -> None:
-    """Raise `InputError` unless a frequency is positive."""
-    require_number("frequency", frequency, "must be a positive frequency, in cycles per time")
+    ``xp`` is NumPy, or JAX for traced numbers.
+    """
+    motion, omega, directions = found.point.x, found.point.p[:, 0], xp.asarray(model.directions)
+    u, number = motion @ directions, np.array(balance.harmonics)
+    lost = xp.imag(found.lost[:, :-1] * xp.conj(u)) * number[:, None]
+    return {
+        "harmonics": number,
+        "coefficients": motion,
+        "basis": basis,
+        "joints": joint_peaks(motion, directions, balance.harmonics, xp),
+        "dissipation": np.pi * xp.sum(lost, axis=(-2, -1)),
+        "truncation": xp.asarray(left_out(model, balance, omega, u, found.lost)),
+    }
