@@ -254,7 +254,7 @@ def _chosen(
     """Parameters that the data tell of a whole scene or of known values, and why."""
     reasons = chosen_free(scene, known, data, found)
     told = "; ".join(f"{key} ({reason})" for key, reason in reasons.items())
-    note = f"free is not given (--free on the command line), so fitted are: {told}"
+    note = f"Fitted: {told}; choose with free= (--free on the command line)"
     return as_parameters(list(reasons)), note
 
 

@@ -18,7 +18,7 @@ SLIDERS, PRESSURE, LENGTH = "contact.stick_stiffness", "contact.pressure", "stri
 
 def chosen(data, known=None):
     plan = planned(data, known or {})
-    (note,) = [note for note in plan.notes if note.startswith("free is not given")]
+    (note,) = [note for note in plan.notes if note.startswith("Fitted: ")]
     assert all(p.key in note for p in plan.free)
     return [p.key for p in plan.free]
 
