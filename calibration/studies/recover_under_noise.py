@@ -59,7 +59,7 @@ def noisy(loops: list[Loop], noise: float, seed: int) -> list[Loop]:
     """Loops with noise on the displacement, given as a part of its range."""
     random = np.random.default_rng(seed)
     return [
-        loop._replace(
+        loop.but(
             displacement=loop.displacement
             + noise * np.ptp(loop.displacement) * random.standard_normal(loop.displacement.size)
         )

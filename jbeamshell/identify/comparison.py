@@ -22,7 +22,8 @@ from jbeamshell.identify.plan import planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import Law, PowerLaw, law_named
-from jbeamshell.measured.curves import DissipationCurve, Measurement, StiffnessCurve
+from jbeamshell.measured.curves import DissipationCurve, StiffnessCurve
+from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.scene import Scene

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from jbeamshell.identify.specimens import Specimen
-from jbeamshell.measured.curves import ROUNDING
-from jbeamshell.measured.loops import Loop
+from jbeamshell.measured.form import Measurement
+from jbeamshell.measured.loops import ROUNDING, Loop
 from jbeamshell.measured.recordings import FEWEST_POINTS
 
 DISSIPATES = 1e-3  # work over that of the rectangle about a loop, below which the loop is a line
@@ -28,7 +27,7 @@ def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[st
     said: list[str] = []
     others: list[Any] = []
     for specimen in specimens:
-        if not all(hasattr(item, "form") for item in specimen.measurements):
+        if not all(isinstance(item, Measurement) for item in specimen.measurements):
             kept.append(specimen)  # no measurement, which the fit refuses
             continue
         single = [_one_cycle(item) for item in specimen.measurements]
@@ -40,7 +39,7 @@ def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[st
                 )
         own = [item for item, _ in single]
         weights = specimen.checked_weights()
-        fullest = sorted(range(len(own)), key=lambda place: -_columns(own[place])[0].size)
+        fullest = sorted(range(len(own)), key=lambda place: -own[place].columns[0].size)
         places: list[int] = []
         for place in fullest:
             copied = [(own[i].label, told) for i in places if (told := _copy(own[place], own[i]))]
@@ -64,17 +63,10 @@ def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[st
     return kept, said
 
 
-def _columns(item: Any) -> list[NDArray[np.float64]]:
-    """Columns (points,) of a measurement."""
-    return [getattr(item, name) for name in item.form.columns]
-
-
 def _copy(item: Any, other: Any) -> str:
     """Words on how a measurement copies another of as many points or more; empty if it does not."""
     if type(item) is not type(other) or not isinstance(item, Loop):
-        same = type(item) is type(other) and all(
-            map(np.array_equal, _columns(item), _columns(other))
-        )
+        same = type(item) is type(other) and all(map(np.array_equal, item.columns, other.columns))
         return "once more" if same else ""
     points, all_points = (one.force + 1j * one.displacement for one in (item, other))
     if bool(np.all(np.isin(points, all_points))):
@@ -82,7 +74,7 @@ def _copy(item: Any, other: Any) -> str:
     if points.size != all_points.size:
         return ""
     factors = []
-    for column, base in zip(_columns(item), _columns(other), strict=True):
+    for column, base in zip(item.columns, other.columns, strict=True):
         factor = float(column @ base / (base @ base))
         if np.max(np.abs(column - factor * base)) > ROUNDING * np.ptp(column):
             return ""
@@ -106,22 +98,20 @@ def _one_cycle(item: Any) -> tuple[Any, int]:
     """Measurement with one cycle of a loop that repeats it point by point, and their number."""
     if not isinstance(item, Loop):
         return item, 1
-    slack = [ROUNDING * float(np.ptp(column)) for column in _columns(item)]
+    slack = [ROUNDING * float(np.ptp(column)) for column in item.columns]
 
     def repeats(period: int) -> bool:
         return all(
             bool(np.all(np.abs(column[period:] - column[:-period]) <= allowed))
-            for column, allowed in zip(_columns(item), slack, strict=True)
+            for column, allowed in zip(item.columns, slack, strict=True)
         )
 
     size = item.force.size
-    back = np.all(
-        [np.abs(c - c[0]) <= a for c, a in zip(_columns(item), slack, strict=True)], axis=0
-    )
+    back = np.all([np.abs(c - c[0]) <= a for c, a in zip(item.columns, slack, strict=True)], axis=0)
     for period in np.flatnonzero(back).tolist():
         if FEWEST_POINTS <= period <= size // 2 and repeats(period):
             scatter = None if item.scatter is None else item.scatter[: period + 1]
-            force, displacement = (column[: period + 1] for column in _columns(item))
-            one = item._replace(force=force, displacement=displacement, scatter=scatter)
+            force, displacement = (column[: period + 1] for column in item.columns)
+            one = item.but(force=force, displacement=displacement, scatter=scatter)
             return one, round((size - 1) / period)
     return item, 1

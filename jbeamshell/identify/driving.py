@@ -20,7 +20,6 @@ from jbeamshell.measured.curves import (
     Backbone,
     DissipationCurve,
     StiffnessCurve,
-    noise_of,
 )
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.reversals import find_turns
@@ -65,7 +64,7 @@ def driven(
         law = law.started(*figures_of(measurements, control or "force"))
     pulls = [item for item in measurements if isinstance(item, Loop | Backbone)]
     by_force = [getattr(pull, "driver", None) == "force" for pull in pulls]
-    noisy = [noise_of(pull) is not None for pull in pulls]
+    noisy = [pull.deviations is not None for pull in pulls]
     backward = any(a and b for a, b in zip(by_force, noisy, strict=True))
     force = not pulls or (backward and isinstance(law, MasingLaw))
     return LawModel(law, control or ("force" if force else "displacement"))
@@ -155,7 +154,7 @@ def _asymmetry(loop: Loop) -> float:
     up = _over(x[: top + 1], force[: top + 1])
     down = _over(np.append(x[top:], x[0])[::-1], np.append(force[top:], force[0])[::-1])
     odd = up + down[::-1]
-    noise = noise_of(loop)
+    noise = loop.deviations
     own = 0.0 if noise is None else 2.0 * float(np.mean(noise)) ** 2
     return float(max(0.25 * float(np.var(odd)) - own, 0.0) ** 0.5 / np.ptp(force))
 

@@ -13,7 +13,7 @@ from jbeamshell.identify.plan import planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import Law
-from jbeamshell.measured.curves import Measurement
+from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.recordings import Recording
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.scene import Scene

@@ -33,7 +33,8 @@ from jbeamshell.identify.search_space import search_space
 from jbeamshell.identify.specimens import Specimen, inspected
 from jbeamshell.identify.starts import Estimate, check_starts, estimate, started
 from jbeamshell.laws import LAWS, Law, law_named
-from jbeamshell.measured.curves import AmplitudeCurve, Measurement
+from jbeamshell.measured.curves import AmplitudeCurve
+from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop, driver_of
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene import library
@@ -131,7 +132,7 @@ def planned(
 
 def _specimens(data: Any, scene: Any, weights: Sequence[float]) -> list[Specimen]:
     """Specimens from what `fit` was given, with labels if there are several."""
-    given = list(data) if isinstance(data, list | tuple) and not isinstance(data, Loop) else [data]
+    given = list(data) if isinstance(data, list | tuple) else [data]
     of_specimens = [isinstance(item, Specimen) for item in given]
     if not any(of_specimens):
         return [Specimen(scene, data, weights=weights)]

@@ -24,7 +24,7 @@ The command line makes such entries of its options; larger studies are written i
     label = "thin"
     data = ["thin-1.csv", "thin-2.csv"]
     kind = "loop"                      # or backbone, dissipation, stiffness, squeeze; of a
-                                       # structure frequency, damping
+                                       # structure frequency, damping, forced
     set = { "strip.length" = 12.0 }
     # or real dimensions, for data in units; a name is that of a TOML file with such entries
     # dimensions = { length = "120mm", thickness = "12mm", width = "50mm", modulus = "210GPa",

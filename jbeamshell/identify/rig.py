@@ -29,7 +29,8 @@ from jbeamshell.identify.observations import LoopObservation, Observation
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.rig_keys import PREFIX, RIG, check_rig
 from jbeamshell.identify.specimens import Specimen
-from jbeamshell.measured.curves import Backbone, Measurement
+from jbeamshell.measured.curves import Backbone
+from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.reversals import find_turns
 from jbeamshell.numerics.newton import Newton

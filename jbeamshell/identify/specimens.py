@@ -19,10 +19,11 @@ from jbeamshell.identify.models import Model, StripModel, as_model
 from jbeamshell.identify.parameters import is_number
 from jbeamshell.identify.rig_keys import PREFIX, check_rig
 from jbeamshell.measured.columns import QUANTITIES
-from jbeamshell.measured.curve_files import CURVES, read_curves
-from jbeamshell.measured.curves import Backbone, Measurement
+from jbeamshell.measured.curve_files import read_curves
+from jbeamshell.measured.curves import KINDS, Backbone
 from jbeamshell.measured.drift import DRIFTS
 from jbeamshell.measured.findings import DRIFT, OFF_CENTRE, OFF_ZERO
+from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop, loop_of
 from jbeamshell.measured.recordings import Recording, as_column, read_recordings
@@ -31,7 +32,6 @@ from jbeamshell.measured.steady import steady_loops
 from jbeamshell.scene.dimensions import Dimensions, dimensions_of
 from jbeamshell.scene.keys import CONTROLS, FAR_ENDS
 
-KINDS = ("loop", "backbone", *CURVES)
 CYCLES = ("auto", "steady", "recorded")
 WRONG_DRIVE = (
     "the displacement goes from turn to turn as a machine drives it, the force does not: if it "
@@ -94,7 +94,12 @@ class Specimen:
     dimensions: Mapping[str, Any] | str = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        words = {"kind": KINDS, "cycles": CYCLES, "drift": DRIFTS, "driver": (None, *CONTROLS)}
+        words = {
+            "kind": tuple(KINDS),
+            "cycles": CYCLES,
+            "drift": DRIFTS,
+            "driver": (None, *CONTROLS),
+        }
         words["reverse"] = (None, *QUANTITIES)
         for name, known in words.items():
             value = getattr(self, name)
@@ -126,8 +131,7 @@ class Specimen:
     @property
     def measurements(self) -> list[Any]:
         """Data as a list."""
-        # A Loop is a tuple itself.
-        one = isinstance(self.data, Loop | Recording | str) or not isinstance(self.data, Sequence)
+        one = isinstance(self.data, str) or not isinstance(self.data, Sequence)
         return [self.data] if one else list(self.data)
 
     def checked_weights(self) -> NDArray[np.float64]:
@@ -229,11 +233,11 @@ class Specimen:
             seen.check()
         if self.drift == "keep":  # which the mean loops do not show
             drifts = [f.text for view in seen.views for f in view.findings if f.name == DRIFT]
-            item = item._replace(notes=(*item.notes, *drifts))
+            item = item.but(notes=(*item.notes, *drifts))
         if driver == "force" and any(v.driver == "displacement" for v in seen.views):
-            item = item._replace(notes=(*item.notes, WRONG_DRIVE))
+            item = item.but(notes=(*item.notes, WRONG_DRIVE))
         if self.kind == "backbone":
-            yield Backbone(item.force, item.displacement, item.label), item.notes
+            yield Backbone(item.force, item.displacement, label=item.label), item.notes
         else:
             for loop in self._loops(item, driver):
                 yield self._centred(loop, keeps_zero)
@@ -252,7 +256,7 @@ class Specimen:
             return recording
         note = f"the sign of the {self.reverse} is turned"
         column = {self.reverse: -getattr(recording, self.reverse)}
-        return recording._replace(**column, notes=(*recording.notes, note))
+        return recording.but(**column, notes=(*recording.notes, note))
 
     def _loops(self, recording: Recording | Loop, driver: str | None) -> list[Loop]:
         whole = recording if isinstance(recording, Loop) else loop_of(recording)

@@ -463,7 +463,7 @@ def test_what_a_scene_cannot_answer(planted):
     too_much = make_loop(5.0 * force, displacement)
     with pytest.raises(jb.InputError, match="must stay below gross slip"):
         identify.fit(too_much, start, FREE)
-    noisy = Loop(np.asarray(force), np.asarray(displacement), "rig", noise=1.0)
+    noisy = Loop(np.asarray(force), np.asarray(displacement), label="rig", noise=1.0)
     with pytest.raises(jb.InputError, match="rig: noise = 1 is more than the range of disp"):
         identify.fit(noisy, start, FREE)
 

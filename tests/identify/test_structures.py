@@ -247,7 +247,10 @@ REFUSED = {
     "beyond": (lambda: Assembly(build, numbers=START.numbers, point=7).structure(), "from 0 to 1"),
     "reach": (lambda: plain(reach=1.2), "reach = 1.2"),
     "joint": (lambda: plain(joint=[None]), "joint"),
-    "forces": (lambda: ForcedCurve([1.0], [1.0], [1.0, 2.0]), "amplitude has shape"),
+    "forces": (
+        lambda: ForcedCurve([1.0], [1.0], [1.0, 2.0]),
+        "amplitude have 1 and 2 points",
+    ),
     "band": (
         lambda: dynamics.ring_down(np.arange(9.0), np.ones(9), band=(0.1, 3.0)),
         "band = .*below 0.5",
