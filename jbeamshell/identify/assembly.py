@@ -16,7 +16,7 @@ from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.dynamics.structure.modal import ModalCurve, by_statics
 from jbeamshell.identify.models import Model
-from jbeamshell.identify.rig_keys import OF_STRUCTURE
+from jbeamshell.identify.parameters import OF_STRUCTURE
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_to_toml
 

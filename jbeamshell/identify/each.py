@@ -197,7 +197,7 @@ def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
     Raises
     ------
     InputError
-        if the result was not made by `fit`, or has several specimens
+        if the result has several specimens, or a rig
 
     Examples
     --------
@@ -207,8 +207,6 @@ def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
     """
     require_count("copies", copies, 2)
     problem, uncertainty = result.problem, result.uncertainty
-    if problem is None or uncertainty is None:
-        raise InputError("bootstrap: this result was not made by fit")
     fix = "has several specimens: fit them one by one"
     require("result", len(result.scenes), len(result.scenes) == 1, fix)
     experiment, space = problem.experiment, uncertainty.space

@@ -24,8 +24,8 @@ from jbeamshell.common.small import Small
 from jbeamshell.contact_line.shared import Layout, Shared
 from jbeamshell.identify.models import FINER, Model
 from jbeamshell.identify.observations import Observation, observe
+from jbeamshell.identify.parameters import RIG
 from jbeamshell.identify.rig import rigged, with_rig
-from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop

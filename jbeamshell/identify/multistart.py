@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require, require_choice, require_count
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.progress import bar
+from jbeamshell.identify.doubts import doubts_of
 from jbeamshell.identify.models import LawModel
 from jbeamshell.identify.parameters import is_number
 from jbeamshell.identify.problem import Problem
-from jbeamshell.identify.results import Fit, fit_at
+from jbeamshell.identify.results import Fit
 from jbeamshell.identify.search import (
     SearchResult,
     StoppingRule,
@@ -27,6 +28,7 @@ from jbeamshell.identify.search import (
 )
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.settling import Settled, settle
+from jbeamshell.identify.uncertainty import uncertainty_at
 from jbeamshell.measured.recordings import FEWEST_POINTS
 from jbeamshell.numerics.newton import Newton
 
@@ -115,6 +117,7 @@ def found_by(
     options: Options,
     labels: Sequence[str],
     doubts: Sequence[str] = (),
+    notes: Sequence[str] = (),
     progress: Callable[[FitProgress], None] | None = None,
 ) -> Fit:
     """Fit of a problem.
@@ -124,7 +127,7 @@ def found_by(
     problem : least-squares problem
     options : settings
     labels : labels of the specimens
-    doubts : sentences on the data; where a fit fails, they may say why
+    doubts, notes : sentences on the data; where a fit fails, the doubts may say why
     progress : called after every step; None shows a bar where a person watches
     """
     space = problem.space
@@ -165,7 +168,20 @@ def found_by(
             f"the fit has not converged after {most} iterations, at {named}, cost "
             f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations{told}"
         )
-    return fit_at(problem, end, labels, status, minima)
+    uncertainty = uncertainty_at(problem, end.point, end.jacobian)
+    values = space.values(end.point)
+    models = [one.replace(space.of(values, i)) for i, one in enumerate(problem.experiment.models)]
+    fit = Fit(
+        problem,
+        uncertainty,
+        {label: model.own for label, model in zip(labels, models, strict=True)},
+        status,
+        problem.runs,
+        [(space.named(point), cost) for point, cost in minima],
+        notes=notes,
+    )
+    own = doubts_of(problem, uncertainty, end.jacobian, models, fit.left, [c for _, c in minima])
+    return dataclasses.replace(fit, doubts=[*own, *doubts])
 
 
 class _Monitor:

@@ -19,18 +19,17 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.threads import in_one_lapack_thread
 from jbeamshell.identify.choose_free import chosen_free
-from jbeamshell.identify.copies import counted_once
+from jbeamshell.identify.data_checks import counted_once, inspected
 from jbeamshell.identify.driving import driven
 from jbeamshell.identify.experiment import Experiment
 from jbeamshell.identify.models import LawModel, Model, StripModel
 from jbeamshell.identify.multistart import DEFAULTS, FitProgress, Options, found_by
-from jbeamshell.identify.parameters import Parameter, as_parameters
+from jbeamshell.identify.parameters import RIG, Parameter, as_parameters
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.rig import with_starts
-from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.search_space import search_space
-from jbeamshell.identify.specimens import Specimen, inspected
+from jbeamshell.identify.specimens import Specimen
 from jbeamshell.identify.starts import Estimate, check_starts, estimate, started
 from jbeamshell.laws import LAWS, Law, law_named
 from jbeamshell.measured.curves import AmplitudeCurve
@@ -93,8 +92,7 @@ class Plan:
         given = self.options
         experiment = Experiment(specimens, points=given.points, noise=given.noise, free=space.keys)
         problem = Problem(experiment, space, given.solver or Newton(), save)
-        fit = found_by(problem, given, list(models), doubts, progress)
-        return dataclasses.replace(fit, doubts=[*fit.doubts, *doubts], notes=self.notes)
+        return found_by(problem, given, list(models), doubts, self.notes, progress)
 
 
 def planned(

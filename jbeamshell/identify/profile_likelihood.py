@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import bar
-from jbeamshell.identify.bijection import FARTHEST
 from jbeamshell.identify.experiment import Evaluation
+from jbeamshell.identify.parameters import FARTHEST
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search import StoppingRule, minimise
 from jbeamshell.identify.uncertainty import Uncertainty, check_level

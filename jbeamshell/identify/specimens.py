@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml
-from jbeamshell.identify.driving import feature_doubts
 from jbeamshell.identify.models import Model, StripModel, as_model
-from jbeamshell.identify.parameters import is_number
-from jbeamshell.identify.rig_keys import PREFIX, check_rig
+from jbeamshell.identify.parameters import PREFIX, check_rig, is_number
 from jbeamshell.measured.columns import QUANTITIES
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.curves import KINDS, Backbone
@@ -299,37 +297,6 @@ def _forgets_zero(loop: Loop) -> bool:
     shape = levels[-1].shape
     slides = off["displacement"] and shape.kind == "gross slip"
     return slides or (off[answer] and not off[driver] and not shape.asymmetric)
-
-
-def inspected(
-    specimens: Sequence[Specimen], free: Sequence[str], unchecked: bool = False
-) -> list[str]:
-    """Doubts about the specimens' loops, see `jbeamshell.inspect`.
-
-    Parameters
-    ----------
-    specimens : strips and what was measured on them
-    free : keys to fit, which say nothing of the loops yet
-    unchecked : True to tell grave findings as doubts
-
-    Raises
-    ------
-    InputError
-        for a grave finding, such as negative work
-    """
-    doubts = []
-    for specimen in specimens:
-        loops = [item for item in specimen.measurements if isinstance(item, Loop)]
-        seen = (
-            inspect(loops, stiffness=plausible_stiffness(specimen.model, [*free, *specimen.rig]))
-            if loops
-            else None
-        )
-        if seen is not None and not unchecked:
-            seen.check()
-        doubts += [] if seen is None else seen.doubts()
-        doubts += feature_doubts(specimen.model, loops)
-    return doubts
 
 
 def plausible_stiffness(model: Model, free: Sequence[str]) -> tuple[float, float] | None:

@@ -3,13 +3,14 @@
 All follow from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where
 most parameters are logarithms.  The parameters' bijections map them to values.  Where the residuals
 are correlated, or more than measured noise, the model is wrong in some way: their variance is then
-that of the few independent points they are worth, see `jbeamshell.identify.model_error`.  What the
-model's own grid may leave adds to it.
+that of the few independent points they are worth: what a wrong model leaves is smooth along a
+curve.  What the model's own grid may leave adds to it.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.model_error import independent_points
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 
@@ -31,6 +31,10 @@ TOGETHER = 0.12  # interval of a product over that of one factor, below which on
 SIMPLE = 0.1  # difference of a power from 1 up to which it is named a product or a ratio
 TAKES_PART = 0.3  # component of a direction over its largest one, above which it is named
 STEP = 0.1  # relative change by which a direction is described
+SURE = 1.65  # standard errors beyond which a correlation is no chance; white noise is in 5 of 100
+LAGS = 1.3  # lags over the root of the points, over which slow correlation shows
+
+Vector = NDArray[np.float64]
 
 
 class FisherDirection(NamedTuple):
@@ -286,3 +290,53 @@ def band_widths(
     variance = np.einsum("ri,ij,rj->r", jacobian, uncertainty.covariance, jacobian)
     variance = np.maximum(variance, 0.0) + (0.0 if noise is None else noise**2)
     return uncertainty.quantile(level) * np.sqrt(variance)
+
+
+def independent_points(residuals: Sequence[Vector]) -> float:
+    """Number of independent points that residuals along several curves are worth.
+
+    n points of autocorrelation rho_k estimate a mean as well as n/(1 + 2 sum rho_k) independent
+    ones (Bayley and Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).  The sum takes the sizes of
+    rho_k: the second branch of a loop repeats the first with the other sign, and so do the
+    derivatives of the model.  What white noise adds to their squares is taken off.  Of slow noise,
+    this counts rather too few points than too many.
+
+    All points count where nothing tells the residuals from white noise: neither rho_1 nor
+    Bartlett's sum over a few lags (Newey and West, Econometrica 55, 1987; for their number Lazarus
+    et al., J. Bus. Econ. Stat. 36, 2018).
+
+    Parameters
+    ----------
+    residuals : residuals along each curve, over their noise
+    """
+    points = sum(own.size for own in residuals)
+    products = np.zeros(max(own.size for own in residuals))
+    pairs = np.zeros(products.size)
+    for own in residuals:
+        products[: own.size] += np.correlate(own, own, "full")[own.size - 1 :]
+        pairs[: own.size] += np.arange(own.size, 0, -1)
+    if products[0] == 0.0 or products.size < 2:
+        return float(points)
+    correlation, chance = products[1:] / products[0], np.sqrt(pairs[1:]) / points
+    few = min(int(np.ceil(LAGS * np.sqrt(points))), correlation.size)
+    bartlett = 1.0 - np.arange(1, few + 1) / (few + 1)
+    slow, by_chance = bartlett @ correlation[:few], np.linalg.norm(bartlett * chance[:few])
+    if correlation[0] < SURE * chance[0] and slow < SURE * by_chance:
+        return float(points)
+    size = np.sqrt(np.maximum(correlation**2 - chance**2, 0.0))
+    return points / (1.0 + 2.0 * float(np.sum(size)))
+
+
+def model_misfit(residual: Vector) -> float:
+    """Root mean square of the part of a residual along a curve that is no white noise."""
+    return float(np.sqrt(max(float(np.mean(residual**2)) - white_noise(residual) ** 2, 0.0)))
+
+
+def white_noise(residual: Vector) -> float:
+    """Size of the white noise of a residual along a curve, from the differences of neighbours.
+
+    See von Neumann, Ann. Math. Stat. 12, 1941.
+    """
+    if residual.size < 2:
+        return 0.0
+    return float(np.sqrt(np.mean(np.diff(residual) ** 2) / 2.0))

@@ -6,7 +6,7 @@ from identify.test_law_fits import NOISE, PLANTED, loops
 from toy import KEYS, readings, scene
 
 from jbeamshell import identify, laws
-from jbeamshell.identify.copies import counted_once
+from jbeamshell.identify.data_checks import counted_once
 from jbeamshell.identify.specimens import Specimen
 
 

@@ -5,10 +5,11 @@ import pytest
 
 from jbeamshell import identify, laws
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.driving import feature_doubts
+from jbeamshell.identify.data_checks import feature_doubts, inspected
 from jbeamshell.identify.models import LawModel, StripModel
-from jbeamshell.identify.specimens import Specimen, inspected
+from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene.library import standard
 
@@ -80,15 +81,16 @@ def test_asymmetry_and_memory_that_a_law_lacks_are_doubts():
     loop = loops(PLANTED["mindlin"], sizes=(0.03,))[0]
     lopsided = loop.but(force=loop.force + 0.15 * np.abs(loop.force))
     jenkins, dahl = LawModel(PLANTED["jenkins"]), LawModel(PLANTED["dahl"])
-    (text,) = feature_doubts(jenkins, [loop, lopsided])
+    (text,) = feature_doubts(jenkins, inspect([loop, lopsided]).views)
     assert "pull and push differ by" in text
     ends = ((1.0, -1.0), (-1.0, 0.4), (0.4, -0.4), (-0.4, 1.0))
     u = 0.01 * np.concatenate([np.linspace(a, b, 20)[1:] for a, b in ends])
     strip = StripModel(standard())
     nested = Loop(u.copy(), u, label="nested")
-    (text,) = feature_doubts(dahl, [nested])
+    views = inspect(nested).views
+    (text,) = feature_doubts(dahl, views)
     assert "dahl forgets where: its minor loops do not close" in text
-    assert feature_doubts(jenkins, [nested]) == feature_doubts(strip, [nested]) == []
+    assert feature_doubts(jenkins, views) == feature_doubts(strip, views) == []
     assert text in inspected([Specimen(dahl, [nested])], [], unchecked=True)
 
 

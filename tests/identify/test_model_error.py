@@ -5,8 +5,8 @@ import pytest
 from toy import KEYS, TRUTH, Readings, formula, scene
 
 from jbeamshell import identify
-from jbeamshell.identify.model_error import independent_points, model_misfit
 from jbeamshell.identify.starts import estimate
+from jbeamshell.identify.uncertainty import independent_points, model_misfit
 from jbeamshell.measured.loops import make_loop
 from tests import rig
 

@@ -12,8 +12,8 @@ from jbeamshell import identify
 from jbeamshell.identify import models, rig
 from jbeamshell.identify.models import as_model
 from jbeamshell.identify.observations import observe
+from jbeamshell.identify.parameters import RIG
 from jbeamshell.identify.plan import planned
-from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, DissipationCurve
 from jbeamshell.measured.loops import make_loop

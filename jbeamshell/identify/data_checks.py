@@ -1,4 +1,8 @@
-"""Measurements that are copies of others: they say nothing new, so each counts once."""
+"""What speaks against data before a fit: findings about loops, and measurements that are copies.
+
+A law is odd: it answers a push as a pull.  Laws without Masing's memory let minor loops drift.
+Loops that show otherwise are told as doubts, as no numbers of the law can follow them.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +12,70 @@ from typing import Any
 
 import numpy as np
 
-from jbeamshell.identify.specimens import Specimen
+from jbeamshell.identify.models import LawModel, Model
+from jbeamshell.identify.specimens import Specimen, plausible_stiffness
+from jbeamshell.laws import MasingLaw
+from jbeamshell.measured.closed_curve import PARTS
 from jbeamshell.measured.form import Measurement
+from jbeamshell.measured.inspection import View, inspect
 from jbeamshell.measured.loops import ROUNDING, Loop
 from jbeamshell.measured.recordings import FEWEST_POINTS
+from jbeamshell.measured.reversals import find_turns, noise_of
 
+ASYMMETRY = 0.035  # of the range, by which the branches of a law, being odd, do not differ
+SURE = 2.0  # standard errors by which noise may make them differ
 DISSIPATES = 1e-3  # work over that of the rectangle about a loop, below which the loop is a line
+
+
+def inspected(
+    specimens: Sequence[Specimen], free: Sequence[str], unchecked: bool = False
+) -> list[str]:
+    """Doubts about the specimens' loops, see `jbeamshell.inspect`.
+
+    Parameters
+    ----------
+    specimens : strips and what was measured on them
+    free : keys to fit, which say nothing of the loops yet
+    unchecked : True to tell grave findings as doubts
+
+    Raises
+    ------
+    InputError
+        for a grave finding, such as negative work
+    """
+    doubts = []
+    for specimen in specimens:
+        loops = [item for item in specimen.measurements if isinstance(item, Loop)]
+        if loops:
+            band = plausible_stiffness(specimen.model, [*free, *specimen.rig])
+            seen = inspect(loops, stiffness=band)
+            if not unchecked:
+                seen.check()
+            doubts += [*seen.doubts(), *feature_doubts(specimen.model, seen.views)]
+    return doubts
+
+
+def feature_doubts(model: Model, views: Sequence[View]) -> list[str]:
+    """Sentences on what inspected loops show and a law cannot follow; none for other models."""
+    if not isinstance(model, LawModel):
+        return []
+    name, doubts = model.law.heading, []
+    for recording, levels in ((view.recording, view.levels) for view in views):
+        nested = len(find_turns(recording.displacement)) > 2
+        own = noise_of(recording.force) / np.ptp(recording.force)
+        chance = SURE * own * np.sqrt(PARTS / recording.force.size)
+        missed = levels[-1].shape.asymmetry if levels and not nested else 0.0
+        if missed > np.hypot(ASYMMETRY, chance):
+            doubts.append(
+                f"{recording.label}: pull and push differ by {100.0 * missed:.2g} % of the range, "
+                f"and {name} answers both alike: it cannot follow that; take a strip"
+            )
+        if not isinstance(model.law, MasingLaw) and nested:
+            doubts.append(
+                f"{recording.label}: turns within a larger cycle, and {name} forgets where: its "
+                "minor loops do not close; take a law with memory, such as iwan4"
+            )
+    return doubts
 
 
 def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[str]]:
