@@ -51,7 +51,7 @@ def fitted(half_window: float, nodes: int, constants: str) -> tuple[dict[str, An
         "error": fit.errors["strip.kappa_s"],
         "rms_MPa": fit.misfit * float(np.ptp(curve.stress)),
         "decay_length_mm": float(decay),
-        "status": fit.status,
+        "status": fit.status.name.lower(),
         "model_runs": fit.model_runs,
     }, fit
 

@@ -74,7 +74,7 @@ def recovered(noise: float, seed: int) -> dict:
     fit = identify.fit(loops, scene, tuple(TRUTH), throw=False)
     figures = {
         "values": fit.values,
-        "status": fit.status,
+        "status": fit.status.name.lower(),
         "model_runs": fit.model_runs,
         "points": sum(loop.force.size for loop in fit.data),
         "log_errors": {key: fit.errors[key] / fit.values[key] for key in TRUTH},

@@ -268,7 +268,7 @@ def _fitted(
     law = found.law
     by_force = law.dissipation_at_force if drive == "force" else law.dissipation
     energy = np.asarray(eqx.filter_jit(by_force)(amplitude))
-    told = "" if found.status == "converged" else "the search has not converged"
+    told = "" if found.converged else "the search has not converged"
     if not found.describes:
         told = "; ".join(filter(None, (told, "does not describe these data")))
     return Compared(name, found, energy, found.misfit, _seconds(own, LawModel(law, drive)), told)

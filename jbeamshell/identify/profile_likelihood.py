@@ -100,7 +100,7 @@ def profile(
         if others.size:
             end = minimise(evaluate, whole[others], stopping)
             whole[others] = end.point
-            settled &= end.status == "converged"
+            settled &= end.converged
         points[step] = whole
         rise = max(evaluate(whole[others]).cost - least, 0.0)
         roots[step] = float(np.sqrt(rise) / uncertainty.sigma)

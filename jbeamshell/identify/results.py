@@ -8,13 +8,13 @@ import os
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require
-from jbeamshell.common.errors import InputError
+from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.summary import Summary
 from jbeamshell.identify.doubts import undescribed
@@ -23,9 +23,12 @@ from jbeamshell.identify.models import as_model
 from jbeamshell.identify.posterior import Posterior, posterior
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.profile_likelihood import MAX_ITERATIONS, TOLERANCE, Profile, profile
-from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, model_misfit
+from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, model_misfit
 from jbeamshell.laws import Law
 from jbeamshell.measured.form import by_form
+
+if TYPE_CHECKING:
+    from jbeamshell.identify.each import Fits
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -37,7 +40,7 @@ class Fit:
     problem : least-squares problem
     uncertainty : what the data do not determine, for other levels and noise
     scenes : scene, law or `Assembly` of every specimen by its label, with the fitted values
-    status : "converged" or "max_iterations"
+    status : `jbeamshell.Status` of the best search
     model_runs : number of model runs through all measurements, derivatives included
     minima : values and cost at the end of each search, the best first
     doubts : sentences on what to know before using the values
@@ -47,7 +50,7 @@ class Fit:
     problem: Problem
     uncertainty: Uncertainty
     scenes: Mapping[str, Any]
-    status: str
+    status: Status
     model_runs: int
     minima: Sequence[tuple[dict[str, float], float]]
     doubts: Sequence[str] = ()
@@ -140,6 +143,11 @@ class Fit:
         return [plain[own] for own in experiment.slices]
 
     @property
+    def converged(self) -> bool:
+        """True if the best search converged."""
+        return self.status == Status.CONVERGED
+
+    @property
     def law(self) -> Law:
         """Fitted law of a joint, of several specimens the first; raises for others."""
         require("law", "none", isinstance(self.scene, Law), "read scene instead")
@@ -150,7 +158,7 @@ class Fit:
     def _summary(self) -> Summary:
         rows = [(k, f"{value:.6g} +- {self.errors[k]:.2g}") for k, value in self.values.items()]
         misfit = f"misfit {100 * self.misfit:.3g} % of the range"
-        end = f"{self.status} after {self.model_runs} model runs"
+        end = f"{_word(self.status)} after {self.model_runs} model runs"
         return Summary("", rows, [misfit, end, *self.doubts, *self.notes])
 
     def __repr__(self) -> str:
@@ -177,7 +185,7 @@ class Fit:
             "misfit": self.misfit,
             "misfits": dict(zip(self.labels, self.misfits, strict=True)),
             "describes": self.describes,
-            "status": self.status,
+            "status": _word(self.status),
             "model_runs": self.model_runs,
             "doubts": list(self.doubts),
             "notes": list(self.notes),
@@ -185,11 +193,8 @@ class Fit:
             "independent_points": u.independent,
             "left_by_the_model": dict(zip(self.labels, self.left, strict=True)),
             "fisher": [
-                {
-                    "eigenvalue": direction.eigenvalue,
-                    "direction": dict(zip(self.values, direction.vector.tolist(), strict=True)),
-                }
-                for direction in u.directions()
+                {"eigenvalue": value, "direction": u.space.named(vector)}
+                for value, vector in u.directions()
             ],
             "minima": [{"values": values, "cost": cost} for values, cost in self.minima],
         }
@@ -211,12 +216,12 @@ class Fit:
         -------
         Lower and upper end for every measurement, each a measurement of the same kind
         """
-        best, experiment, uncertainty = self._best, self.problem.experiment, self.uncertainty
+        best, experiment, u = self._best, self.problem.experiment, self.uncertainty
         per_noise = 1.0 / experiment.weight
-        rows = experiment.weight.size
-        plain = best.jacobian[:rows] * (per_noise / experiment.emphasis)[:, None]
-        own = uncertainty.scatter * per_noise if noise else None
-        width = band_widths(uncertainty, plain, level, own)
+        jacobian = best.jacobian[: per_noise.size] * (per_noise / experiment.emphasis)[:, None]
+        variance = np.maximum(np.einsum("ri,ij,rj->r", jacobian, u.covariance, jacobian), 0.0)
+        variance += (u.scatter * per_noise) ** 2 * noise
+        width = u.quantile(level) * np.sqrt(variance)
         sides = (best.prediction + side * width for side in (-1.0, 1.0))
         return list(zip(*map(experiment.as_measurements, sides), strict=True))
 
@@ -284,6 +289,38 @@ class Fit:
             state = sampler.init(problem.start)
         """
         return posterior(self.problem, self.uncertainty)
+
+    def bootstrap(self, copies: int = 1000, *, seed: int = 0) -> Fits:
+        """Fit copies of the data, whose residuals are drawn anew.
+
+        Each copy is the fitted response with residuals that are drawn in blocks along the curve, so
+        that neighbours stay as correlated as they are (Kunsch, Ann. Stat. 17, 1989).  The spread of
+        the values holds what residuals make of them, and not what the model's grid may leave.
+
+        Parameters
+        ----------
+        copies : number of copies
+        seed : seed of the draws
+
+        Returns
+        -------
+        Fits
+            with ``intervals()``
+
+        Raises
+        ------
+        InputError
+            if the result has several specimens, or a rig
+
+        Examples
+        --------
+        ::
+
+            jb.fit(loops, scene, ["contact.friction"]).bootstrap().intervals()
+        """
+        from jbeamshell.identify.each import bootstrapped
+
+        return bootstrapped(self, copies, seed)
 
     @property
     def columns(self) -> list[str]:
@@ -382,6 +419,10 @@ class Fit:
             header = (form.heading, *form.columns, *(f"model_{name}" for name in form.answers))
             texts[f"{form.name}.csv"] = csv_text(header, rows)
         return texts
+
+
+def _word(status: Status) -> str:
+    return status.name.lower()
 
 
 def _finite(value: float) -> float | None:

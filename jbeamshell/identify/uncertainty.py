@@ -1,4 +1,4 @@
-"""Uncertainty of a fit: covariance, intervals, directions that the data do not fix, and bands.
+"""Uncertainty of a fit: covariance, intervals, and directions that the data do not fix.
 
 All follow from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where
 most parameters are logarithms.  The parameters' bijections map them to values.  Where the residuals
@@ -37,19 +37,6 @@ LAGS = 1.3  # lags over the root of the points, over which slow correlation show
 Vector = NDArray[np.float64]
 
 
-class FisherDirection(NamedTuple):
-    """Eigenvector of the Fisher information.
-
-    Attributes
-    ----------
-    eigenvalue : eigenvalue of the information; 1 over the variance along the vector
-    vector : (n,) vector of unit length in the search space
-    """
-
-    eigenvalue: float
-    vector: NDArray[np.float64]
-
-
 class Uncertainty(NamedTuple):
     """Gaussian uncertainty of a fit's parameters.
 
@@ -69,8 +56,8 @@ class Uncertainty(NamedTuple):
     """
 
     space: SearchSpace
-    point: NDArray[np.float64]
-    inverse: NDArray[np.float64]
+    point: Vector
+    inverse: Vector
     at_bound: NDArray[np.bool_]
     sigma: float
     scatter: float
@@ -79,23 +66,23 @@ class Uncertainty(NamedTuple):
     independent: float
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Vector:
         """Covariance (n, n) in the search space."""
         return self.sigma**2 * self.inverse
 
     @property
-    def errors(self) -> NDArray[np.float64]:
+    def errors(self) -> Vector:
         """Standard errors (n,) of the parameters; NaN for values at a bound."""
         errors = np.abs(self.space.slopes(self.point)) * self._spread
         return np.where(self.at_bound, np.nan, errors)
 
     @property
-    def correlation(self) -> NDArray[np.float64]:
+    def correlation(self) -> Vector:
         """Correlation (n, n) of the parameters in the search space."""
         spread = np.where(self.at_bound, 1.0, np.sqrt(np.diag(self.inverse)))
         return np.where(np.eye(spread.size) > 0.0, 1.0, self.inverse / np.outer(spread, spread))
 
-    def intervals(self, level: float = 0.95) -> NDArray[np.float64]:
+    def intervals(self, level: float = 0.95) -> Vector:
         """Confidence intervals (n, 2) of the parameters, within their bounds.
 
         They use Student's distribution if the noise was estimated, else the normal distribution.
@@ -119,14 +106,18 @@ class Uncertainty(NamedTuple):
         size = noise * self.scatter / self.noise
         return self._replace(sigma=size, scatter=size, noise=noise, freedom=None)
 
-    def directions(self) -> list[FisherDirection]:
-        """Eigenvectors of the Fisher information of parameters inside their bounds, worst first."""
+    def directions(self) -> list[tuple[float, Vector]]:
+        """Eigenvalues and vectors (n,) of the Fisher information inside the bounds, worst first.
+
+        An eigenvalue is 1 over the variance along its vector, which has unit length in the search
+        space.
+        """
         free = np.flatnonzero(~self.at_bound)
         variances, vectors = np.linalg.eigh(self.covariance[np.ix_(free, free)])
         whole = np.zeros((free.size, self.at_bound.size))
         whole[:, free] = vectors.T
         pairs = zip(variances[::-1], whole[::-1], strict=True)
-        return [FisherDirection(1.0 / max(v, np.finfo(float).tiny), vector) for v, vector in pairs]
+        return [(1.0 / max(v, np.finfo(float).tiny), vector) for v, vector in pairs]
 
     def limitations(self, level: float = 0.95) -> list[str]:
         """Sentences on what the data do not determine; none if they determine all parameters."""
@@ -143,7 +134,7 @@ class Uncertainty(NamedTuple):
         pairs = self._pairs(values, level)
         return sentences + list(pairs.values()) + self._trades(values, set(pairs))
 
-    def _pairs(self, values: NDArray[np.float64], level: float) -> dict[tuple[int, ...], str]:
+    def _pairs(self, values: Vector, level: float) -> dict[tuple[int, ...], str]:
         """Sentences on pairs of positive parameters of which one product is known far better."""
         scale = self.space.slopes(self.point) / self._sizes(values)
         relative = self.quantile(level) ** 2 * self.covariance * np.outer(scale, scale)
@@ -167,7 +158,7 @@ class Uncertainty(NamedTuple):
             )
         return sentences
 
-    def _trades(self, values: NDArray[np.float64], named: set[tuple[int, ...]]) -> list[str]:
+    def _trades(self, values: Vector, named: set[tuple[int, ...]]) -> list[str]:
         """Sentences on combinations of parameters that change the response less than the noise."""
         sizes, slopes = self._sizes(values), self.space.slopes(self.point)
         sentences = []
@@ -194,10 +185,10 @@ class Uncertainty(NamedTuple):
         return sentences
 
     @property
-    def _spread(self) -> NDArray[np.float64]:
+    def _spread(self) -> Vector:
         return np.sqrt(np.diag(self.covariance))
 
-    def _sizes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _sizes(self, values: Vector) -> Vector:
         """Sizes (n,) for relative errors: the values, or their starts if these are larger."""
         starts = np.array([bijection.start for bijection in self.space.bijections])
         logs = np.array([bijection.log for bijection in self.space.bijections])
@@ -205,9 +196,7 @@ class Uncertainty(NamedTuple):
         return np.where(sizes > 0.0, sizes, 1.0)
 
 
-def uncertainty_at(
-    problem: Problem, point: NDArray[np.float64], jacobian: NDArray[np.float64]
-) -> Uncertainty:
+def uncertainty_at(problem: Problem, point: Vector, jacobian: Vector) -> Uncertainty:
     """Uncertainty at the minimum of a problem.
 
     What the model's own grid may leave in a residual is smooth and alike in all curves, so that all
@@ -269,27 +258,6 @@ def check_level(level: float) -> None:
     """Raise `InputError` unless a confidence level lies between 0 and 1."""
     if not 0.0 < level < 1.0:
         raise InputError(f"level = {level}: give a number between 0 and 1, such as 0.95")
-
-
-def band_widths(
-    uncertainty: Uncertainty,
-    jacobian: NDArray[np.float64],
-    level: float,
-    noise: NDArray[np.float64] | None = None,
-) -> NDArray[np.float64]:
-    """Half widths (rows,) of the confidence band about a prediction.
-
-    Parameters
-    ----------
-    uncertainty : uncertainty of the parameters
-    jacobian : (rows, n) derivatives of the prediction with respect to the search space
-    level : confidence level
-    noise : (rows,) noise of a single measurement, which the band then covers as well; None for the
-        band of the model alone
-    """
-    variance = np.einsum("ri,ij,rj->r", jacobian, uncertainty.covariance, jacobian)
-    variance = np.maximum(variance, 0.0) + (0.0 if noise is None else noise**2)
-    return uncertainty.quantile(level) * np.sqrt(variance)
 
 
 def independent_points(residuals: Sequence[Vector]) -> float:

@@ -43,7 +43,7 @@ def test_kappa_s_of_the_finite_elements(measured, fitted):
     assert measured.x.size == 310
     assert fitted.values["strip.kappa_s"] == pytest.approx(0.441, abs=0.005)
     assert 0.6 < fitted.misfit * np.ptp(measured.stress) < 0.8  # MPa
-    assert fitted.status == "converged"
+    assert fitted.converged
     assert fitted.model[0].label == "squeeze"
     assert float(fitted.scene.strip.kappa_s) == fitted.values["strip.kappa_s"]
 
