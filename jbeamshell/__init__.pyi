@@ -31,7 +31,7 @@ from .contact_line.contact_file import read_contact as read_contact
 from .contact_line.stiffness_model import StiffnessModel as StiffnessModel
 from .contact_line.substructure import Substructure as Substructure
 from .explorer import explore as explore
-from .identify.fitting import fit as fit
+from .identify.plan import fit as fit
 from .history.contact_history import ContactHistory as ContactHistory
 from .history.face_history import FaceHistory as FaceHistory
 from .history.history import History as History

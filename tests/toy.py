@@ -1,6 +1,7 @@
 """The standard strip in load steps, and a measurement that a formula answers."""
 
-import equinox as eqx
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -23,14 +24,13 @@ def formula(x, mu, eta, kappa_s):
     return mu * (1.0 - jnp.exp(-x / eta)) + 0.2 * kappa_s * x
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class Readings(Curve):
+    kind = "toy"
     form = Form("toy", {"x": Column("x", ()), "y": Column("y", ())}, "x", "y", ("y",))
 
     x: np.ndarray
     y: np.ndarray
-    label: str = eqx.field(static=True, default="toy")
-    noise: np.ndarray | None = None
-    weight: float = eqx.field(static=True, default=1.0)
 
 
 class Formula(Observation):
@@ -56,4 +56,4 @@ def readings(noise=0.0, seed=0, known=False, label="toy", weight=1.0, **truth):
     """The formula at the truth, with Gaussian noise that the measurement knows or not."""
     y = np.asarray(formula(X, *(TRUTH | truth).values()))
     y = y + noise * np.random.default_rng(seed).standard_normal(X.size)
-    return Readings(X, y, label, noise if known else None, weight)
+    return Readings(X, y, label=label, noise=noise if known else None, weight=weight)

@@ -158,7 +158,7 @@ def cable(folder: Path) -> Figures:
     with (folder / "FLEXION_CARDINAL_H40kN_mu0.7_FOTI.csv").open(encoding="utf-8") as file:
         rows = np.array([[float(text) for text in row] for row in list(csv.reader(file))[1:]])
     curvature, moment = rows.T
-    known = Backbone(moment[1::2], curvature[1::2], "every other point")
+    known = Backbone(moment[1::2], curvature[1::2], label="every other point")
     found: Figures = {"models": {}}
     best = np.inf
     for name in MODELS:

@@ -149,8 +149,8 @@ def fitted(record: Mapping[str, Any]) -> Fit:
     curve = {name: np.array(column) for name, column in record["ring_down"].items()}
     size, frequency, damping = (curve[k] for k in ("amplitude", "frequency", "damping"))
     data = [
-        FrequencyCurve(size, frequency, "ring-down", noise=OFF[0]),
-        DampingCurve(size, damping, "ring-down", noise=OFF[1] * damping),
+        FrequencyCurve(size, frequency, label="ring-down", noise=OFF[0]),
+        DampingCurve(size, damping, label="ring-down", noise=OFF[1] * damping),
     ]
     free = [
         "structure.width",

@@ -38,7 +38,7 @@ def study(height_ratio: float, load: float, model: dict) -> dict[str, Any]:
         "interval_95": fit.intervals,
         "holds_truth": {key: _holds(fit.intervals[key], truth[key]) for key in FREE},
         "misfit": fit.misfit,
-        "status": fit.status,
+        "status": fit.status.name.lower(),
         "model_runs": fit.model_runs,
         "loop": {name: np.asarray(values).tolist() for name, values in drawn.items()},
     }

@@ -30,7 +30,7 @@ def squeezed_curve() -> SqueezeCurve:
     """Mean sigma_y of the squeezed strip by finite elements."""
     path = data_folder() / "squeeze" / "b2.csv"
     table = np.genfromtxt(path, delimiter=",", names=True)
-    return SqueezeCurve(table["x_mm"], table["sy_avg"], "finite elements")
+    return SqueezeCurve(table["x_mm"], table["sy_avg"], label="finite elements")
 
 
 def fitted(half_window: float, nodes: int, constants: str) -> tuple[dict[str, Any], identify.Fit]:
@@ -51,7 +51,7 @@ def fitted(half_window: float, nodes: int, constants: str) -> tuple[dict[str, An
         "error": fit.errors["strip.kappa_s"],
         "rms_MPa": fit.misfit * float(np.ptp(curve.stress)),
         "decay_length_mm": float(decay),
-        "status": fit.status,
+        "status": fit.status.name.lower(),
         "model_runs": fit.model_runs,
     }, fit
 
@@ -69,7 +69,7 @@ def measure() -> dict[str, Any]:
             if case[2] == "consistent":
                 wide = jb.solve(fit.scene.replace({"strip.kappa_s": 1.0}))
                 stress = np.asarray(wide.squeeze_stress[-1])
-                profiles["wide"] = _profile(SqueezeCurve(np.asarray(wide.middles), stress, ""))
+                profiles["wide"] = _profile(SqueezeCurve(np.asarray(wide.middles), stress))
     return {"squeeze": rows, "profiles": profiles}
 
 

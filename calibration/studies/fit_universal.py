@@ -36,7 +36,7 @@ def curve(height_ratio: float) -> tuple[DissipationCurve, np.ndarray]:
         if eta == height_ratio and amplitude >= LEAST_AMPLITUDE
     ]
     amplitude, dissipation, ratio = np.transpose(own)
-    return DissipationCurve(amplitude, dissipation, f"eta = {height_ratio:g}"), ratio
+    return DissipationCurve(amplitude, dissipation, label=f"eta = {height_ratio:g}"), ratio
 
 
 def specimen(height_ratio: float, values: dict[str, float]) -> identify.Specimen:

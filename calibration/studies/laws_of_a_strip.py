@@ -40,7 +40,7 @@ def figures(eta: float) -> dict[str, Any]:
             "median": float(np.median(error)),
             "worst": float(np.max(error)),
             "misfit": row.misfit,
-            "status": row.fit.status,
+            "status": row.fit.status.name.lower(),
         }
     return {"energy": found.energy.tolist(), "models": table}
 

@@ -59,7 +59,7 @@ def noisy(loops: list[Loop], noise: float, seed: int) -> list[Loop]:
     """Loops with noise on the displacement, given as a part of its range."""
     random = np.random.default_rng(seed)
     return [
-        loop._replace(
+        loop.but(
             displacement=loop.displacement
             + noise * np.ptp(loop.displacement) * random.standard_normal(loop.displacement.size)
         )
@@ -74,7 +74,7 @@ def recovered(noise: float, seed: int) -> dict:
     fit = identify.fit(loops, scene, tuple(TRUTH), throw=False)
     figures = {
         "values": fit.values,
-        "status": fit.status,
+        "status": fit.status.name.lower(),
         "model_runs": fit.model_runs,
         "points": sum(loop.force.size for loop in fit.data),
         "log_errors": {key: fit.errors[key] / fit.values[key] for key in TRUTH},

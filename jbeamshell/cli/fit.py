@@ -108,7 +108,6 @@ def add_to(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Fit, report and write; returns the exit code, `NOT_DESCRIBED` if the model is not theirs."""
     from jbeamshell.common import files
-    from jbeamshell.identify import report
     from jbeamshell.plotting.folder import check_folder
 
     plan = _plan(options)
@@ -130,7 +129,7 @@ def run(options: argparse.Namespace) -> int:
     lines = "".join(f"{part}\n" for part in (result, *profiles))
     put(files.as_json(figures) if options.json else lines)
     if folder is not None:
-        say_written(report.write_fit(folder, result, figures, profiles))
+        say_written(result.save(folder, profiles, figures))
     return 0 if result.describes else NOT_DESCRIBED
 
 

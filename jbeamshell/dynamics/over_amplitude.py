@@ -184,8 +184,8 @@ class RingDown:
         if self.numbers and self.frequency_interval is not None:
             scatter, spread = self._noise_of_bins(np.log(u))
         return (
-            FrequencyCurve(u, frequency, f"{label}, frequency", scatter),
-            DampingCurve(u, damping, f"{label}, damping", spread),
+            FrequencyCurve(u, frequency, label=f"{label}, frequency", noise=scatter),
+            DampingCurve(u, damping, label=f"{label}, damping", noise=spread),
         )
 
     def _noise_of_bins(self, size: Floats) -> list[Floats]:

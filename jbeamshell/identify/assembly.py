@@ -16,7 +16,7 @@ from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.dynamics.structure.modal import ModalCurve, by_statics
 from jbeamshell.identify.models import Model
-from jbeamshell.identify.rig_keys import OF_STRUCTURE
+from jbeamshell.identify.parameters import OF_STRUCTURE
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_to_toml
 
@@ -88,6 +88,67 @@ class Assembly(Model):
         self.build, self.scene = build, scene
         self.numbers = {name: as_leaf(value, name, NUMBERS) for name, value in given.items()}
         self.mode, self.point, self.driven = mode, point, driven
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        mass: ArrayLike,
+        stiffness: ArrayLike,
+        joint: Sequence[int | None] = (0, None),
+        *,
+        width: float = 1.0,
+        damping_ratio: float = 0.0,
+        series_stiffness: float | None = None,
+        reach: float = REACH,
+        mode: int = 0,
+        point: int | None = None,
+        driven: int | None = None,
+    ) -> Self:
+        """Structure with a strip as its joint, whose numbers a fit may change.
+
+        Its keys are those of the scene, and ``structure.mass`` and ``structure.stiffness``, factors
+        of the matrices that start from 1; ``structure.width``, ``structure.damping_ratio`` and
+        ``structure.series_stiffness``.
+
+        Parameters
+        ----------
+        scene : strip or lap joint
+        mass, stiffness : (n, n) matrices without the joint
+        joint : its two degrees of freedom; None is the ground
+        width : width of the strip
+        damping_ratio : of all modes, besides that of the joint
+        series_stiffness : stiffness of a spring in series with the joint; None is rigid
+        reach : force up to which the joint is computed, over its gross slip; a moment is the
+            scene's own
+        mode, point, driven : see `Assembly`
+
+        Raises
+        ------
+        InputError
+            for matrices that are no square ones, or numbers out of bounds
+
+        Examples
+        --------
+        >>> model = Assembly.of(jb.Scene(), [[2.0]], [[1e4]], point=0, damping_ratio=1e-3)
+        >>> float(model.get("structure.damping_ratio"))
+        0.001
+        """
+        require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
+        require_number("reach", reach, "give a part of gross slip, from 0 to 1", 0.0, 1.0)
+        pair = isinstance(joint, list | tuple) and 0 < len(joint) <= 2
+        require(
+            "joint", joint, pair, "give two degrees of freedom, or one that is held by the ground"
+        )
+        first, second = (*joint, None)[:2]
+        require("joint", joint, isinstance(first, int), "give a degree of freedom first")
+        assert isinstance(first, int)
+        numbers = {"mass": 1.0, "stiffness": 1.0, "width": width, "damping_ratio": damping_ratio}
+        if series_stiffness is not None:
+            numbers["series_stiffness"] = series_stiffness
+        matrices = as_leaf(mass, "mass"), as_leaf(stiffness, "stiffness")
+        plain = _Plain(*matrices, (first, second), float(reach))
+        return cls(plain, scene, numbers, mode=mode, point=point, driven=driven)
 
     @property
     def control(self) -> str:
@@ -164,7 +225,7 @@ class Assembly(Model):
 
 
 class _Plain(eqx.Module):
-    """Structure with one strip as its joint; see `jointed`."""
+    """Structure with one strip as its joint; see `Assembly.of`."""
 
     mass: Array
     stiffness: Array
@@ -184,61 +245,3 @@ class _Plain(eqx.Module):
             [Attachment(joint, *self.ends)],
             damping_ratio=numbers["damping_ratio"],
         )
-
-
-def jointed(
-    scene: Scene,
-    mass: ArrayLike,
-    stiffness: ArrayLike,
-    joint: Sequence[int | None] = (0, None),
-    *,
-    width: float = 1.0,
-    damping_ratio: float = 0.0,
-    series_stiffness: float | None = None,
-    reach: float = REACH,
-    mode: int = 0,
-    point: int | None = None,
-    driven: int | None = None,
-) -> Assembly:
-    """Structure with a strip as its joint, whose numbers a fit may change.
-
-    Its keys are those of the scene, and ``structure.mass`` and ``structure.stiffness``, factors of
-    the matrices that start from 1; ``structure.width``, ``structure.damping_ratio`` and
-    ``structure.series_stiffness``.
-
-    Parameters
-    ----------
-    scene : strip or lap joint
-    mass, stiffness : (n, n) matrices without the joint
-    joint : its two degrees of freedom; None is the ground
-    width : width of the strip
-    damping_ratio : of all modes, besides that of the joint
-    series_stiffness : stiffness of a spring in series with the joint; None is rigid
-    reach : force up to which the joint is computed, over its gross slip; a moment is the scene's
-        own
-    mode, point, driven : see `Assembly`
-
-    Raises
-    ------
-    InputError
-        for matrices that are no square ones, or numbers out of bounds
-
-    Examples
-    --------
-    >>> model = jointed(jb.Scene(), [[2.0]], [[1e4]], point=0, damping_ratio=1e-3)
-    >>> float(model.get("structure.damping_ratio"))
-    0.001
-    """
-    require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
-    require_number("reach", reach, "give a part of gross slip, from 0 to 1", 0.0, 1.0)
-    pair = isinstance(joint, list | tuple) and 0 < len(joint) <= 2
-    require("joint", joint, pair, "give two degrees of freedom, or one that is held by the ground")
-    first, second = (*joint, None)[:2]
-    require("joint", joint, isinstance(first, int), "give a degree of freedom first")
-    assert isinstance(first, int)
-    numbers = {"mass": 1.0, "stiffness": 1.0, "width": width, "damping_ratio": damping_ratio}
-    if series_stiffness is not None:
-        numbers["series_stiffness"] = series_stiffness
-    matrices = as_leaf(mass, "mass"), as_leaf(stiffness, "stiffness")
-    plain = _Plain(*matrices, (first, second), float(reach))
-    return Assembly(plain, scene, numbers, mode=mode, point=point, driven=driven)

@@ -22,7 +22,8 @@ from jbeamshell.identify.plan import planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import Law, PowerLaw, law_named
-from jbeamshell.measured.curves import DissipationCurve, Measurement, StiffnessCurve
+from jbeamshell.measured.curves import DissipationCurve, StiffnessCurve
+from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.scene import Scene
@@ -267,7 +268,7 @@ def _fitted(
     law = found.law
     by_force = law.dissipation_at_force if drive == "force" else law.dissipation
     energy = np.asarray(eqx.filter_jit(by_force)(amplitude))
-    told = "" if found.status == "converged" else "the search has not converged"
+    told = "" if found.converged else "the search has not converged"
     if not found.describes:
         told = "; ".join(filter(None, (told, "does not describe these data")))
     return Compared(name, found, energy, found.misfit, _seconds(own, LawModel(law, drive)), told)

@@ -1,4 +1,4 @@
-"""Many fits, each on its own: of the specimens of a series, or of bootstrap copies of one.
+"""Many fits, each on its own: of the specimens of a series, or of bootstrap copies of one fit.
 
 All measurements of one kind and length share one compiled run of the model, and searches run on all
 cores.
@@ -161,7 +161,7 @@ def _found(
         {key: np.array([fit.values[key] for fit in found]) for key in found[0].values},
         {key: np.array([fit.errors[key] for fit in found]) for key in found[0].values},
         np.array([fit.misfit for fit in found]),
-        np.array([fit.status == "converged" for fit in found]),
+        np.array([fit.converged for fit in found]),
         [fit.doubts for fit in found],
     )
 
@@ -176,39 +176,10 @@ def _naming(place: int, count: int) -> Iterator[None]:
 
 
 @on_one_core
-def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
-    """Fit copies of a fit's data, whose residuals are drawn anew.
-
-    Each copy is the fitted response with residuals that are drawn in blocks along the curve, so
-    that neighbours stay as correlated as they are (Kunsch, Ann. Stat. 17, 1989).  The spread of the
-    values holds what residuals make of them, and not what the model's grid may leave.
-
-    Parameters
-    ----------
-    result : result of `fit` for one strip, law or structure
-    copies : number of copies
-    seed : seed of the draws
-
-    Returns
-    -------
-    Fits
-        with ``intervals()``
-
-    Raises
-    ------
-    InputError
-        if the result was not made by `fit`, or has several specimens
-
-    Examples
-    --------
-    ::
-
-        jb.identify.bootstrap(jb.identify.fit(loops, scene, ["contact.friction"])).intervals()
-    """
+def bootstrapped(result: Fit, copies: int, seed: int) -> Fits:
+    """Fits of copies of a fit's data, whose residuals are drawn anew; see `Fit.bootstrap`."""
     require_count("copies", copies, 2)
     problem, uncertainty = result.problem, result.uncertainty
-    if problem is None or uncertainty is None:
-        raise InputError("bootstrap: this result was not made by fit")
     fix = "has several specimens: fit them one by one"
     require("result", len(result.scenes), len(result.scenes) == 1, fix)
     experiment, space = problem.experiment, uncertainty.space

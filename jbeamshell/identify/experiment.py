@@ -24,10 +24,10 @@ from jbeamshell.common.small import Small
 from jbeamshell.contact_line.shared import Layout, Shared
 from jbeamshell.identify.models import FINER, Model
 from jbeamshell.identify.observations import Observation, observe
+from jbeamshell.identify.parameters import RIG
 from jbeamshell.identify.rig import rigged, with_rig
-from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.specimens import Specimen
-from jbeamshell.measured.curves import Measurement, noise_of, weight_of
+from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
 
@@ -138,12 +138,12 @@ class Experiment:
         self.slices = [
             slice(int(end) - size, int(end)) for end, size in zip(ends, sizes, strict=True)
         ]
-        own = [weight_of(measurement) for measurement in self.measurements]
+        own = [measurement.weight for measurement in self.measurements]
         self.emphasis = np.repeat(np.multiply(own, weights), sizes)
         pairs = zip(self.observations, self._compared, strict=True)
         self.weight = np.concatenate([np.asarray(o.weight)[compared] for o, compared in pairs])
         spans = np.repeat([o.span for o in self.observations], sizes)
-        known = np.repeat([noise_of(m) is not None for m in self.measurements], sizes)
+        known = np.repeat([m.deviations is not None for m in self.measurements], sizes)
         self.relative = np.where(known, 1.0 / (self.weight * spans), noise or 1.0)
 
     @property
@@ -253,14 +253,14 @@ class Experiment:
         ):
             column = measurement.form.response(self.models[owner].control)
             values = observation.response_from(prediction[rows])
-            predicted.append(_with_column(measurement, column, values))
+            predicted.append(measurement.but(**{column: values}))
         return predicted
 
     def _with_noise(
         self, observations: Sequence[Observation], noise: float | None
     ) -> list[Observation]:
         """Observations whose weights are all relative to noise, or all relative to the range."""
-        known = [noise_of(measurement) is not None for measurement in self.measurements]
+        known = [measurement.deviations is not None for measurement in self.measurements]
         self.noisy = noise is not None or all(known)
         if any(known) and not self.noisy:
             without = self.labels[known.index(False)]
@@ -351,10 +351,6 @@ def _filled(observation: Observation) -> Observation:
         lambda leaf: jnp.pad(leaf, more, mode="edge") if leaf.ndim else leaf, observation
     )
     return eqx.tree_at(lambda o: o.weight, longer, jnp.pad(observation.weight, more))
-
-
-def _with_column(measurement: Any, column: str, values: NDArray[np.float64]) -> Any:
-    return eqx.tree_at(lambda m: getattr(m, column), measurement, values)
 
 
 def _distinct(names: Sequence[str]) -> list[str]:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require, require_choice, require_count
-from jbeamshell.common.errors import InputError, UnconvergedError
+from jbeamshell.common.errors import InputError, Status, UnconvergedError
 from jbeamshell.common.progress import bar
+from jbeamshell.identify.doubts import doubts_of
 from jbeamshell.identify.models import LawModel
 from jbeamshell.identify.parameters import is_number
 from jbeamshell.identify.problem import Problem
-from jbeamshell.identify.results import Fit, fit_at
+from jbeamshell.identify.results import Fit
 from jbeamshell.identify.search import (
     SearchResult,
     StoppingRule,
@@ -27,6 +30,7 @@ from jbeamshell.identify.search import (
 )
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.settling import Settled, settle
+from jbeamshell.identify.uncertainty import uncertainty_at
 from jbeamshell.measured.recordings import FEWEST_POINTS
 from jbeamshell.numerics.newton import Newton
 
@@ -88,7 +92,8 @@ class FitProgress(NamedTuple):
 
     Attributes
     ----------
-    search, searches : number of the search, 0 while starts are tried, and how many there are
+    search, searches : number of the search, 0 while starts are tried, and how many there are; what
+        follows them has larger numbers
     step : number of the step in the search, or of the start that is tried
     cost : sum of the squared residuals
     values : parameters by name
@@ -106,6 +111,7 @@ class FitProgress(NamedTuple):
 
     def __str__(self) -> str:
         at = f"search {self.search} of {self.searches}, step" if self.search else "start"
+        at = "last part, step" if self.search > self.searches else at
         values = ", ".join(f"{name} = {value:.6g}" for name, value in self.values.items())
         return f"{at} {self.step}, cost {self.cost:.4g}, at most {self.left:.0f} s left: {values}"
 
@@ -115,6 +121,7 @@ def found_by(
     options: Options,
     labels: Sequence[str],
     doubts: Sequence[str] = (),
+    notes: Sequence[str] = (),
     progress: Callable[[FitProgress], None] | None = None,
 ) -> Fit:
     """Fit of a problem.
@@ -124,7 +131,7 @@ def found_by(
     problem : least-squares problem
     options : settings
     labels : labels of the specimens
-    doubts : sentences on the data; where a fit fails, they may say why
+    doubts, notes : sentences on the data; where a fit fails, the doubts may say why
     progress : called after every step; None shows a bar where a person watches
     """
     space = problem.space
@@ -157,48 +164,42 @@ def found_by(
     except UnconvergedError as error:
         raise UnconvergedError(f"{error}{told}") from None
     minima = [(space.values(own.point), problem(own.point).cost) for own in ends]
-    status = ends[0].status
-    if options.throw and status != "converged":
+    converged = ends[0].converged
+    if options.throw and not converged:
         values, cost = minima[0]
         named = ", ".join(f"{name} = {value:.6g}" for name, value in space.named(values).items())
         raise UnconvergedError(
             f"the fit has not converged after {most} iterations, at {named}, cost "
             f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations{told}"
         )
-    return fit_at(problem, end, labels, status, minima)
+    uncertainty = uncertainty_at(problem, end.point, end.jacobian)
+    values = space.values(end.point)
+    models = [one.replace(space.of(values, i)) for i, one in enumerate(problem.experiment.models)]
+    fit = Fit(
+        problem,
+        uncertainty,
+        {label: model.own for label, model in zip(labels, models, strict=True)},
+        Status.CONVERGED if converged else Status.MAX_ITERATIONS,
+        problem.runs,
+        [(space.named(point), cost) for point, cost in minima],
+        notes=notes,
+    )
+    own = doubts_of(problem, uncertainty, end.jacobian, models, fit.left, [c for _, c in minima])
+    return dataclasses.replace(fit, doubts=[*own, *doubts])
 
 
-class _Monitor:
-    """Counter of the steps of a fit, which reports each with the time left."""
+def _reporter(
+    space: SearchSpace, searches: int, most: int, progress: Callable[[FitProgress], None]
+) -> Callable[[int, int, Vector, float], None]:
+    """Function that reports a search's number, its step, a point (n,) and its cost."""
+    begin, count = time.perf_counter(), itertools.count(1)
 
-    def __init__(
-        self,
-        space: SearchSpace,
-        searches: int,
-        most_steps: int,
-        progress: Callable[[FitProgress], None],
-    ) -> None:
-        self._space, self._searches, self._most = space, searches, most_steps
-        self._progress, self._steps, self._begin = progress, 0, time.perf_counter()
-        self._last = (0, 0)
+    def report(search: int, step: int, point: Vector, cost: float) -> None:
+        elapsed, done = time.perf_counter() - begin, next(count)
+        left, named = elapsed / done * max(most - done, 0), space.named(space.values(point))
+        progress(FitProgress(search, searches, step, cost, named, elapsed, left))
 
-    def __call__(self, search: int, step: int, values: Vector, cost: float) -> None:
-        """Count one step and report it."""
-        self._steps += 1
-        self._last = (search, step)
-        elapsed = time.perf_counter() - self._begin
-        left = elapsed / self._steps * max(self._most - self._steps, 0)
-        named = self._space.named(values)
-        self._progress(FitProgress(search, self._searches, step, cost, named, elapsed, left))
-
-    def of_search(self, number: int) -> Callable[[int, Vector, float], None]:
-        """Function that counts and reports a step of one search at a point (n,)."""
-        return lambda step, point, cost: self(number, step, self._space.values(point), cost)
-
-    def settling(self, point: Vector, cost: float) -> None:
-        """Count a step after the last search and report it."""
-        search, step = self._last
-        self(search, step + 1, self._space.values(point), cost)
+    return report
 
 
 def _search(
@@ -212,32 +213,32 @@ def _search(
     check_start(problem)
     space = problem.space
     tried = SCREENED * (starts - 1)
-    monitor = _Monitor(space, starts, tried + starts * stopping.max_iterations, progress)
+    report = _reporter(space, starts, tried + starts * stopping.max_iterations, progress)
 
     def cost(end: SearchResult) -> float:
         return problem(end.point).cost
 
     def search(number: int, start: Vector) -> SearchResult:
-        return minimise(problem, start, stopping, monitor.of_search(number))
+        return minimise(problem, start, stopping, partial(report, number))
 
     costs, points = [], _spread(space, tried)
     for number, point in enumerate(points, 1):
         costs.append(problem(point).cost)
-        monitor.of_search(0)(number, point, costs[-1])
+        report(0, number, point, costs[-1])
     best = [points[i] for i in np.argsort(costs, kind="stable")[: starts - 1]]
     first = np.zeros(len(space.names))
     ends = [search(number, start) for number, start in enumerate([first, *best], 1)]
     ends = sorted(ends, key=cost)
-    if rescue and ends[0].status != "converged":
+    if rescue and not ends[0].converged:
         many = [ends[0].point, first, *_spread(space, TOGETHER - 2)]
-        moved = together(problem, many, monitor.of_search(starts + 1))
+        moved = together(problem, many, partial(report, starts + 1))
         ends = sorted([*ends, search(starts + 2, moved)], key=cost)
     if _at_bound(space, ends[0].point):
         end = within_bounds(problem, ends[0].point, stopping)
-        ends[0] = SearchResult(min(ends[0], end, key=cost).point, ends[0].status)
-    settled = settle(problem, ends[0].point, monitor.settling)
-    status = ends[0].status if settled.settled else "max_iterations"
-    return settled, [SearchResult(settled.point, status), *ends[1:]]
+        ends[0] = ends[0]._replace(point=min(ends[0], end, key=cost).point)
+    settled = settle(problem, ends[0].point, partial(report, starts + 3))
+    first_end = SearchResult(settled.point, ends[0].converged and settled.settled)
+    return settled, [first_end, *ends[1:]]
 
 
 def _at_bound(space: SearchSpace, point: Vector) -> bool:

@@ -29,7 +29,6 @@ from jbeamshell.measured.curves import (
     ForcedCurve,
     FrequencyCurve,
     SqueezeCurve,
-    noise_of,
 )
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
@@ -146,7 +145,7 @@ class LoopObservation(Observation):
         path = np.concatenate([approach, run_in, drive])
         model.check_path(path)
         uncompared = np.zeros(path.size - drive.size)
-        noise = noise_of(measurement)
+        noise = measurement.deviations
         driver = getattr(measurement, "driver", None) or model.control
         if noise is not None and driver != model.control:
             raise InputError(

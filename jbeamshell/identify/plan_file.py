@@ -6,7 +6,7 @@ The command line makes such entries of its options; larger studies are written i
     model = "iwan4"                    # a law of a joint in place of a strip, without a scene
     noise = 0.01                       # over the range; leave it out if the data carry noise
 
-    [structure]                        # whose joint the scene is: see `jointed` for the entries
+    [structure]                        # whose joint the scene is: see `Assembly.of` for the entries
     mass = [[1.0]]
     stiffness = [[1e5]]
     point = 0
@@ -24,7 +24,7 @@ The command line makes such entries of its options; larger studies are written i
     label = "thin"
     data = ["thin-1.csv", "thin-2.csv"]
     kind = "loop"                      # or backbone, dissipation, stiffness, squeeze; of a
-                                       # structure frequency, damping
+                                       # structure frequency, damping, forced
     set = { "strip.length" = 12.0 }
     # or real dimensions, for data in units; a name is that of a TOML file with such entries
     # dimensions = { length = "120mm", thickness = "12mm", width = "50mm", modulus = "210GPa",
@@ -42,7 +42,7 @@ from typing import Any
 from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import as_path, read_toml
-from jbeamshell.identify.assembly import jointed
+from jbeamshell.identify.assembly import Assembly
 from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.plan import Plan, planned
@@ -51,7 +51,7 @@ from jbeamshell.laws import law_named
 from jbeamshell.scene import library
 from jbeamshell.scene.toml import overridden, scene_from_values
 
-OF_STRUCTURE = tuple(inspect.signature(jointed).parameters)[1:]
+OF_STRUCTURE = tuple(inspect.signature(Assembly.of).parameters)[1:]
 TABLES = ("set", "free", "specimen")
 OPTIONS = ("starts", "noise", "points", "max_iterations", "tolerance", "unchecked")
 ENTRIES = [field.name for field in dataclasses.fields(Specimen) if field.name != "scene"]
@@ -141,7 +141,7 @@ def _specimen(
         for name in ("mass", "stiffness"):
             require(f"structure.{name}", "missing", name in structure, "give a matrix")
         known = overridden(overridden(scene, own.known(folder).values), own.of_model)
-        scene = jointed(scene_from_values(known), **structure)
+        scene = Assembly.of(scene_from_values(known), **structure)
         own = dataclasses.replace(own, set=own.rig)
     return dataclasses.replace(own, scene=scene, set={**shared.rig, **own.set})
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import bar
-from jbeamshell.identify.bijection import FARTHEST
 from jbeamshell.identify.experiment import Evaluation
+from jbeamshell.identify.parameters import FARTHEST
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search import StoppingRule, minimise
 from jbeamshell.identify.uncertainty import Uncertainty, check_level
@@ -100,7 +100,7 @@ def profile(
         if others.size:
             end = minimise(evaluate, whole[others], stopping)
             whole[others] = end.point
-            settled &= end.status == "converged"
+            settled &= end.converged
         points[step] = whole
         rise = max(evaluate(whole[others]).cost - least, 0.0)
         roots[step] = float(np.sqrt(rise) / uncertainty.sigma)

@@ -1,33 +1,34 @@
-"""Result of a fit: values with their uncertainty, misfits, and warnings."""
+"""Result of a fit: values with their uncertainty, misfits, and doubts."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jbeamshell.common.checks import require
-from jbeamshell.common.errors import InputError
+from jbeamshell.common.errors import InputError, Status
+from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.summary import Summary
-from jbeamshell.identify.contradictions import contradiction
-from jbeamshell.identify.model_error import model_misfit
+from jbeamshell.identify.doubts import undescribed
+from jbeamshell.identify.experiment import Evaluation
+from jbeamshell.identify.models import as_model
 from jbeamshell.identify.posterior import Posterior, posterior
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.profile_likelihood import MAX_ITERATIONS, TOLERANCE, Profile, profile
-from jbeamshell.identify.settling import Settled
-from jbeamshell.identify.statics import doubt_of_statics
-from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, band_widths, uncertainty_at
-from jbeamshell.identify.verdict import undescribed
-from jbeamshell.identify.wrong_units import doubt_of_units
+from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, model_misfit
 from jbeamshell.laws import Law
+from jbeamshell.measured.form import by_form
 
-WRONG_MODEL = 2.0  # misfit over noise above which the model must be wrong
-WORTH_SAYING = 1e-3  # of the range, left by the model
+if TYPE_CHECKING:
+    from jbeamshell.identify.each import Fits
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -36,53 +37,115 @@ class Fit:
 
     Attributes
     ----------
-    scene : scene with the fitted values, ready to run, or the law, or the `Assembly`; of several
-        specimens the first
-    values, errors : fitted value and standard error (one sigma) by key, or by "key[specimen]" where
-        every specimen has its own.  They count what the model leaves as so many independent points
-        as its correlation along the curves allows
-    correlation : (n, n) correlation of the fitted values, in the order of ``values``
-    misfit : root mean square of the residual over the range of the response
-    misfits : the same for every measurement
-    left : the same without the part that is white noise: what the model does not describe
-    data, model : fitted measurements, loops thinned, and the model's at the same points
-    status : "converged" or "max_iterations"
-    model_runs : number of model runs through all measurements, derivatives included
-    labels : labels of the measurements, no two alike
-    scenes : scene of every specimen by its label, with the fitted values
-    intervals : 95 % confidence interval by key
-    doubts : sentences on what to know before using the values
-    controls : column that drives the model, for every measurement
-    notes : sentences on what was done to the data, and what was estimated and chosen by default
-    describes : False if the model leaves too much of a measurement, or misses the energy per cycle
-        or the secant stiffness of a loop, see `jbeamshell.identify.verdict`; its values then mean
-        little
-    minima : values and cost at the end of each search, the best first
-    uncertainty : what the data do not determine, for other levels and noise
     problem : least-squares problem
+    uncertainty : what the data do not determine, for other levels and noise
+    scenes : scene, law or `Assembly` of every specimen by its label, with the fitted values
+    status : `jbeamshell.Status` of the best search
+    model_runs : number of model runs through all measurements, derivatives included
+    minima : values and cost at the end of each search, the best first
+    doubts : sentences on what to know before using the values
+    notes : sentences on what was done to the data, and what was estimated and chosen by default
     """
 
-    scene: Any
-    values: dict[str, float]
-    errors: dict[str, float]
-    correlation: NDArray[np.float64]
-    misfit: float
-    misfits: list[float]
-    data: list[Any]
-    model: list[Any]
-    status: str
+    problem: Problem
+    uncertainty: Uncertainty
+    scenes: Mapping[str, Any]
+    status: Status
     model_runs: int
-    labels: Sequence[str] = ()
-    scenes: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    intervals: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    minima: Sequence[tuple[dict[str, float], float]]
     doubts: Sequence[str] = ()
-    left: Sequence[float] = ()
-    describes: bool = True
-    minima: Sequence[tuple[dict[str, float], float]] = ()
-    uncertainty: Uncertainty | None = None
-    problem: Problem | None = None
     notes: Sequence[str] = ()
-    controls: Sequence[str] = ()
+
+    @property
+    def scene(self) -> Any:
+        """Fitted scene, ready to run, or law, or `Assembly`; of several specimens the first."""
+        return next(iter(self.scenes.values()))
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """Fitted value by key, or by "key[specimen]" where every specimen has its own."""
+        space = self.uncertainty.space
+        return space.named(space.values(self.uncertainty.point))
+
+    @cached_property
+    def errors(self) -> dict[str, float]:
+        """Standard error (one sigma) of every value.
+
+        It counts what the model leaves as so many independent points as its correlation along the
+        curves allows.
+        """
+        return self.uncertainty.space.named(self.uncertainty.errors)
+
+    @property
+    def correlation(self) -> NDArray[np.float64]:
+        """Correlation (n, n) of the fitted values, in the order of ``values``."""
+        return self.uncertainty.correlation
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """95 % confidence interval of every value."""
+        return self.intervals_at()
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """Labels of the measurements, no two alike."""
+        return self.problem.experiment.labels
+
+    @property
+    def data(self) -> list[Any]:
+        """Fitted measurements, loops thinned."""
+        return self.problem.experiment.measurements
+
+    @cached_property
+    def model(self) -> list[Any]:
+        """Measurements as the model answers them."""
+        return self.problem.experiment.as_measurements(self._best.prediction)
+
+    @property
+    def controls(self) -> list[str]:
+        """Column that drives the model, for every measurement."""
+        experiment = self.problem.experiment
+        return [experiment.models[owner].control for owner in experiment.owners]
+
+    @property
+    def misfit(self) -> float:
+        """Root mean square of the residual over the range of the response."""
+        return float(np.sqrt(np.mean(np.concatenate(self._relative) ** 2)))
+
+    @property
+    def misfits(self) -> list[float]:
+        """The same for every measurement."""
+        return [float(np.sqrt(np.mean(own**2))) for own in self._relative]
+
+    @cached_property
+    def left(self) -> list[float]:
+        """Misfits without the part that is white noise: what the model does not describe."""
+        return [model_misfit(own) for own in self._relative]
+
+    @property
+    def describes(self) -> bool:
+        """False if values mean little: the model leaves too much of a measurement.
+
+        Or it misses the energy per cycle or the secant stiffness of a loop.
+        """
+        return not undescribed(self.problem.experiment, self.left, self._best.prediction)
+
+    @cached_property
+    def _best(self) -> Evaluation:
+        return self.problem(self.uncertainty.point)
+
+    @property
+    def _relative(self) -> list[NDArray[np.float64]]:
+        """Residuals of every measurement over its range."""
+        experiment, best = self.problem.experiment, self._best
+        rows = experiment.weight.size
+        plain = best.residual[:rows] / experiment.emphasis * experiment.relative
+        return [plain[own] for own in experiment.slices]
+
+    @property
+    def converged(self) -> bool:
+        """True if the best search converged."""
+        return self.status == Status.CONVERGED
 
     @property
     def law(self) -> Law:
@@ -95,7 +158,7 @@ class Fit:
     def _summary(self) -> Summary:
         rows = [(k, f"{value:.6g} +- {self.errors[k]:.2g}") for k, value in self.values.items()]
         misfit = f"misfit {100 * self.misfit:.3g} % of the range"
-        end = f"{self.status} after {self.model_runs} model runs"
+        end = f"{_word(self.status)} after {self.model_runs} model runs"
         return Summary("", rows, [misfit, end, *self.doubts, *self.notes])
 
     def __repr__(self) -> str:
@@ -108,43 +171,37 @@ class Fit:
 
     def figures(self) -> dict[str, Any]:
         """Result as plain numbers for JSON; an infinite end is None."""
-        labels = self.labels or [d.label for d in self.data]
         values: dict[str, dict[str, Any]] = {
             key: {"value": value, "error": _finite(self.errors[key])}
             for key, value in self.values.items()
         }
-        for level in LEVELS if self.uncertainty is not None else ():
+        for level in LEVELS:
             for key, ends in self.intervals_at(level).items():
                 values[key][f"interval_{100 * level:.0f}"] = [_finite(end) for end in ends]
-        figures = {
+        u = self.uncertainty
+        return {
             "values": values,
             "correlation": self.correlation.tolist(),
             "misfit": self.misfit,
-            "misfits": dict(zip(labels, self.misfits, strict=True)),
+            "misfits": dict(zip(self.labels, self.misfits, strict=True)),
             "describes": self.describes,
-            "status": self.status,
+            "status": _word(self.status),
             "model_runs": self.model_runs,
             "doubts": list(self.doubts),
             "notes": list(self.notes),
+            "noise": {"of_the_range": u.noise, "measured": u.freedom is None},
+            "independent_points": u.independent,
+            "left_by_the_model": dict(zip(self.labels, self.left, strict=True)),
+            "fisher": [
+                {"eigenvalue": value, "direction": u.space.named(vector)}
+                for value, vector in u.directions()
+            ],
+            "minima": [{"values": values, "cost": cost} for values, cost in self.minima],
         }
-        if self.uncertainty is not None:
-            u = self.uncertainty
-            figures["noise"] = {"of_the_range": u.noise, "measured": u.freedom is None}
-            figures["independent_points"] = u.independent
-            figures["left_by_the_model"] = dict(zip(labels, self.left, strict=True))
-            figures["fisher"] = [
-                {
-                    "eigenvalue": direction.eigenvalue,
-                    "direction": dict(zip(self.values, direction.vector.tolist(), strict=True)),
-                }
-                for direction in u.directions()
-            ]
-            figures["minima"] = [{"values": values, "cost": cost} for values, cost in self.minima]
-        return figures
 
     def intervals_at(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence interval of every value at a level between 0 and 1."""
-        ends = self._uncertainty.intervals(level).tolist()
+        ends = self.uncertainty.intervals(level).tolist()
         return {key: (low, high) for key, (low, high) in zip(self.values, ends, strict=True)}
 
     def bands(self, level: float = 0.95, *, noise: bool = False) -> list[tuple[Any, Any]]:
@@ -159,13 +216,12 @@ class Fit:
         -------
         Lower and upper end for every measurement, each a measurement of the same kind
         """
-        problem, uncertainty = self._problem, self._uncertainty
-        best, experiment = problem(uncertainty.point), problem.experiment
+        best, experiment, u = self._best, self.problem.experiment, self.uncertainty
         per_noise = 1.0 / experiment.weight
-        rows = experiment.weight.size
-        plain = best.jacobian[:rows] * (per_noise / experiment.emphasis)[:, None]
-        own = uncertainty.scatter * per_noise if noise else None
-        width = band_widths(uncertainty, plain, level, own)
+        jacobian = best.jacobian[: per_noise.size] * (per_noise / experiment.emphasis)[:, None]
+        variance = np.maximum(np.einsum("ri,ij,rj->r", jacobian, u.covariance, jacobian), 0.0)
+        variance += (u.scatter * per_noise) ** 2 * noise
+        width = u.quantile(level) * np.sqrt(variance)
         sides = (best.prediction + side * width for side in (-1.0, 1.0))
         return list(zip(*map(experiment.as_measurements, sides), strict=True))
 
@@ -208,7 +264,7 @@ class Fit:
         """
         fix = f"was not fitted; names are {', '.join(self.values)}"
         require("profile", name, name in self.values, fix)
-        return profile(self._problem, self._uncertainty, name, level, max_iterations, tolerance)
+        return profile(self.problem, self.uncertainty, name, level, max_iterations, tolerance)
 
     def posterior(self) -> Posterior:
         """Posterior density of the parameters, for samplers of other libraries.
@@ -232,7 +288,39 @@ class Fit:
             sampler = blackjax.nuts(problem.logdensity, 0.5, problem.covariance)
             state = sampler.init(problem.start)
         """
-        return posterior(self._problem, self._uncertainty)
+        return posterior(self.problem, self.uncertainty)
+
+    def bootstrap(self, copies: int = 1000, *, seed: int = 0) -> Fits:
+        """Fit copies of the data, whose residuals are drawn anew.
+
+        Each copy is the fitted response with residuals that are drawn in blocks along the curve, so
+        that neighbours stay as correlated as they are (Kunsch, Ann. Stat. 17, 1989).  The spread of
+        the values holds what residuals make of them, and not what the model's grid may leave.
+
+        Parameters
+        ----------
+        copies : number of copies
+        seed : seed of the draws
+
+        Returns
+        -------
+        Fits
+            with ``intervals()``
+
+        Raises
+        ------
+        InputError
+            if the result has several specimens, or a rig
+
+        Examples
+        --------
+        ::
+
+            jb.fit(loops, scene, ["contact.friction"]).bootstrap().intervals()
+        """
+        from jbeamshell.identify.each import bootstrapped
+
+        return bootstrapped(self, copies, seed)
 
     @property
     def columns(self) -> list[str]:
@@ -263,140 +351,78 @@ class Fit:
         drawn = plotting.residuals(self, axes)
         return drawn[0] if len(drawn) == 1 else drawn
 
-    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write tables, pictures, scenes and figures into a folder; returns the files' paths."""
-        from jbeamshell.identify import report
+    def save(
+        self,
+        folder: str | os.PathLike[str],
+        profiles: Sequence[Profile] = (),
+        figures: Mapping[str, Any] | None = None,
+    ) -> list[Path]:
+        """Write tables, fitted scenes, figures and pictures into a folder.
 
-        return report.write_fit(Path(folder), self, self.figures())
+        The files are a table for each form of measurement, such as overlay.csv of loops and
+        backbones or dissipation.csv; scene.toml, law.toml for a law, or scene_1.toml and so on for
+        several specimens; result.json, overlay.png and residuals.png. With profiles there are
+        profiles.csv and profiles.png too.
 
-    @property
-    def _uncertainty(self) -> Uncertainty:
-        if self.uncertainty is None:
-            raise InputError("uncertainty: this result was not made by fit and has none")
-        return self.uncertainty
+        Parameters
+        ----------
+        folder : folder to write to; it is made if it is not there
+        profiles : profile likelihoods
+        figures : content of result.json; None takes `figures`
 
-    @property
-    def _problem(self) -> Problem:
-        if self.problem is None:
-            raise InputError("problem: this result was not made by fit and has none")
-        return self.problem
+        Returns
+        -------
+        list of Path
+            paths of the files
 
+        Raises
+        ------
+        InputError
+            if the folder cannot be made, or a file cannot be written
+        """
+        from jbeamshell import plotting
+        from jbeamshell.plotting.folder import write_folder
 
-def fit_at(
-    problem: Problem,
-    end: Settled,
-    labels: Sequence[str],
-    status: str,
-    minima: Sequence[tuple[NDArray[np.float64], float]],
-) -> Fit:
-    """Result at the point where the search ended.
+        texts = self._tables()
+        for number, scene in enumerate(self.scenes.values(), 1):
+            kind = "law" if isinstance(scene, Law) else "scene"
+            name = f"{kind}.toml" if len(self.scenes) == 1 else f"{kind}_{number}.toml"
+            with contextlib.suppress(InputError):
+                if text := as_model(scene).as_toml():
+                    texts[name] = text
+        texts["result.json"] = as_json(self.figures() if figures is None else figures)
+        drawn = {"overlay": plotting.overlay(self), "residuals": plotting.residuals(self)}
+        if profiles:
+            rows = [
+                (profile.name, *pair)
+                for profile in profiles
+                for pair in zip(profile.values.tolist(), profile.rises.tolist(), strict=True)
+            ]
+            texts["profiles.csv"] = csv_text(("parameter", "value", "rise"), rows)
+            drawn["profiles"] = plotting.likelihoods(profiles)
+        pictures = {f"{name}.png": axes[0].figure for name, axes in drawn.items()}
+        return write_folder(Path(folder), texts, pictures)
 
-    Parameters
-    ----------
-    problem : least-squares problem
-    end : end of the best search
-    labels : labels of the specimens
-    status : status of the best search
-    minima : values and cost at the end of each search
-    """
-    space, experiment, point = problem.space, problem.experiment, end.point
-    best, values = problem(point), space.values(point)
-    uncertainty = uncertainty_at(problem, point, end.jacobian)
-    plain = best.residual[: experiment.weight.size] / experiment.emphasis
-    relative = plain * experiment.relative
-    left = [model_misfit(relative[own]) for own in experiment.slices]
-    unlike = undescribed(experiment, left, best.prediction)
-    models = {
-        label: model.replace(space.of(values, specimen))
-        for specimen, (label, model) in enumerate(zip(labels, experiment.models, strict=True))
-    }
-    scenes = {label: model.own for label, model in models.items()}
-    ends = uncertainty.intervals().tolist()
-    statics: list[str] = []
-    if best.converged:
-        statics = doubt_of_statics(experiment, list(models.values()), uncertainty, end.jacobian)
-    return Fit(
-        scene=next(iter(scenes.values())),
-        values=space.named(values),
-        errors=space.named(uncertainty.errors),
-        correlation=uncertainty.correlation,
-        misfit=float(np.sqrt(np.mean(relative**2))),
-        misfits=[float(np.sqrt(np.mean(relative[own] ** 2))) for own in experiment.slices],
-        data=experiment.measurements,
-        model=experiment.as_measurements(best.prediction),
-        status=status,
-        model_runs=problem.runs,
-        labels=experiment.labels,
-        scenes=scenes,
-        intervals={k: (low, high) for k, (low, high) in zip(space.names, ends, strict=True)},
-        doubts=[
-            *unlike,
-            *_contradiction(problem, point),
-            *doubt_of_units(space, values.tolist()),
-            *statics,
-            *_doubts(problem, uncertainty, values, left, minima),
-        ],
-        left=left,
-        describes=not unlike,
-        minima=[(space.named(own), cost) for own, cost in minima],
-        uncertainty=uncertainty,
-        problem=problem,
-        controls=[experiment.models[owner].control for owner in experiment.owners],
-    )
+    def _tables(self) -> dict[str, str]:
+        """CSV texts, one for each form: labels, measured columns, answers of the model."""
+        texts = {}
+        for form, places in by_form(self.data):
+            rows = [
+                (self.data[i].label, *values)
+                for i in places
+                for values in zip(
+                    *(column.tolist() for column in self.data[i].columns),
+                    *(getattr(self.model[i], name).tolist() for name in form.answers),
+                    strict=True,
+                )
+            ]
+            header = (form.heading, *form.columns, *(f"model_{name}" for name in form.answers))
+            texts[f"{form.name}.csv"] = csv_text(header, rows)
+        return texts
 
 
-def _contradiction(problem: Problem, point: NDArray[np.float64]) -> list[str]:
-    """Sentence on two measurements that contradict each other; none if they agree."""
-    experiment, best = problem.experiment, problem(point)
-    found = contradiction(best.residual, best.jacobian, experiment.slices)
-    if found is None:
-        return []
-    axis, *places = found[:3]
-    said = []
-    for place, step in zip(places, found[3:], strict=True):
-        moved = np.where(np.arange(point.size) == axis, point + step, point)
-        said.append(f"{experiment.labels[place]} about {problem.space.values(moved)[axis]:.3g}")
-    return [
-        f"the measurements contradict each other: alone, {' and '.join(said)} would have for "
-        f"{problem.space.names[axis]}, and each would be described at least twice as well: the "
-        "values lie between them and describe none; fit them apart"
-    ]
-
-
-def _doubts(
-    problem: Problem,
-    uncertainty: Uncertainty,
-    values: NDArray[np.float64],
-    left: Sequence[float],
-    minima: Sequence[tuple[NDArray[np.float64], float]],
-) -> list[str]:
-    space, doubts = uncertainty.space, []
-    for name, bijection, value in zip(space.names, space.bijections, values, strict=True):
-        bound = bijection.bound_at(float(value))
-        if bound is not None:
-            doubts.append(
-                f"{name} = {value:.6g} ends at its bound {bound:g}: it has no error, and the "
-                "errors of the others take it as fixed"
-            )
-    rows = problem.experiment.weight.size
-    if problem.experiment.noisy and uncertainty.scatter > WRONG_MODEL:
-        doubts.append(
-            f"the model leaves {uncertainty.scatter:.2g} times the measured noise "
-            "unexplained: it is wrong in some way, and the errors include what it leaves"
-        )
-    if uncertainty.independent < rows and max(left) > WORTH_SAYING:
-        doubts.append(
-            f"what the model leaves is correlated along the curve: the errors count {rows} points "
-            f"as {uncertainty.independent:.2g} independent ones"
-        )
-    costs = [cost for _, cost in minima]
-    others = [cost for cost in costs if cost > 1.01 * costs[0]]
-    if others:
-        doubts.append(
-            f"{len(others)} of {len(costs)} starts ended in worse minima (cost {others[0]:.4g} or "
-            f"more, against {costs[0]:.4g}): the problem has several minima"
-        )
-    return doubts + uncertainty.limitations()
+def _word(status: Status) -> str:
+    return status.name.lower()
 
 
 def _finite(value: float) -> float | None:

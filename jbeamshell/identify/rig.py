@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.models import Model
 from jbeamshell.identify.observations import LoopObservation, Observation
-from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.rig_keys import PREFIX, RIG, check_rig
+from jbeamshell.identify.parameters import PREFIX, RIG, Parameter, check_rig
 from jbeamshell.identify.specimens import Specimen
-from jbeamshell.measured.curves import Backbone, Measurement
+from jbeamshell.measured.curves import Backbone
+from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.reversals import find_turns
 from jbeamshell.numerics.newton import Newton

@@ -1,18 +1,16 @@
 """File of a fit's model runs, from which an interrupted fit continues.
 
-Its first line is JSON that names the fit; every further line holds one run and its check
-sum.  A run that was changed, or is of another fit, is left out and made again.
+Its first line is JSON that names the fit; every further line holds a check sum and one run as JSON.
+A run that was changed, or is of another fit, is left out and made again.
 """
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import json
 import os
 import re
 from collections.abc import Sequence
-from typing import Any
 
 import jax
 import numpy as np
@@ -24,7 +22,7 @@ from jbeamshell.identify.experiment import Evaluation, Experiment
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.numerics.newton import Newton
 
-FORMAT = "jbeamshell fit 3"
+FORMAT = "jbeamshell fit 4"
 LONGEST_HEADER = 1000  # characters
 FIX = "delete it, or save to another file"
 
@@ -48,7 +46,6 @@ class SavedRuns:
     ) -> None:
         """Name the file of the runs of an experiment over a search space, by a solver."""
         self.path = as_path(path)
-        self._sizes = experiment.weight.size, len(space.keys), len(space.names)
         mark = _fingerprint(experiment, space.keys, solver)
         self._header = json.dumps({"format": FORMAT, "fingerprint": mark})
 
@@ -94,37 +91,21 @@ class SavedRuns:
             raise InputError(f"save {self.path}: cannot be written ({reason})") from None
 
     def _line(self, values: NDArray[np.float64], run: Evaluation) -> str:
-        arrays = {"values": values} | {name: getattr(run, name) for name in Evaluation._fields[:3]}
-        packed: dict[str, Any] = {name: _packed(array) for name, array in arrays.items()}
-        packed["converged"] = bool(run.converged)
-        return json.dumps(packed | {"check_sum": self._check_sum(packed)}) + "\n"
+        *arrays, converged = values, *run
+        body = json.dumps([*(array.tolist() for array in arrays), bool(converged)])
+        return f"{self._check_sum(body)} {body}\n"
 
     def _run(self, line: str) -> Run | None:
         """Run in a line; None if the line is not as it was written."""
-        try:
-            packed = json.loads(line)
-            if packed.pop("check_sum") != self._check_sum(packed):
-                return None
-            rows, keys, axes = self._sizes
-            values = _unpacked(packed["values"]).reshape(axes)
-            residual, prediction = (
-                _unpacked(packed[name]).reshape(rows) for name in ("residual", "prediction")
-            )
-            jacobian = _unpacked(packed["jacobian"]).reshape(rows, keys)
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        mark, _, body = line.partition(" ")
+        if mark != self._check_sum(body):
             return None
-        return values, Evaluation(residual, jacobian, prediction, packed["converged"])
+        *lists, converged = json.loads(body)
+        values, residual, jacobian, prediction = map(np.array, lists)
+        return values, Evaluation(residual, jacobian, prediction, converged)
 
-    def _check_sum(self, packed: dict[str, Any]) -> str:
-        return hashlib.sha256((self._header + json.dumps(packed)).encode()).hexdigest()
-
-
-def _packed(array: NDArray[np.float64]) -> str:
-    return base64.b64encode(np.ascontiguousarray(array, "<f8").tobytes()).decode("ascii")
-
-
-def _unpacked(text: str) -> NDArray[np.float64]:
-    return np.frombuffer(base64.b64decode(text, validate=True), "<f8")
+    def _check_sum(self, body: str) -> str:
+        return hashlib.sha256((self._header + body).encode(errors="replace")).hexdigest()
 
 
 def _fingerprint(experiment: Experiment, keys: tuple[str, ...], solver: Newton) -> str:

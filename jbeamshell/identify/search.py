@@ -54,11 +54,11 @@ class SearchResult(NamedTuple):
     Attributes
     ----------
     point : (n,) coordinates in the unbounded search space
-    status : "converged" or "max_iterations"
+    converged : False if it ran out of iterations
     """
 
     point: Vector
-    status: str
+    converged: bool
 
 
 def minimise(
@@ -109,8 +109,8 @@ def minimise(
         flat = FLAT * max(before, 0.5 * stopping.noise_cost)
         kink = refused >= REFUSED and change < SHORT
         if change < stopping.tolerance or (taken and gain < flat) or kink:
-            return SearchResult(current, "converged")
-    return SearchResult(current, "max_iterations")
+            return SearchResult(current, True)
+    return SearchResult(current, False)
 
 
 def within_bounds(problem: Problem, start: Vector, stopping: StoppingRule) -> SearchResult:
@@ -141,7 +141,7 @@ def within_bounds(problem: Problem, start: Vector, stopping: StoppingRule) -> Se
     )
     params, state = method.run(jnp.asarray(first), bounds=tuple(map(jnp.asarray, box.T)))
     end = space.point(boxed.values(np.asarray(params)))
-    return SearchResult(end, "converged" if bool(state.success) else "max_iterations")
+    return SearchResult(end, bool(state.success))
 
 
 def together(

@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.bijection import Bijection
 from jbeamshell.identify.models import Model
-from jbeamshell.identify.parameters import Parameter
-from jbeamshell.identify.rig_keys import RIG
+from jbeamshell.identify.parameters import RIG, Bijection, Parameter
 
 
 class SearchSpace(NamedTuple):

@@ -47,7 +47,7 @@ class Settled(NamedTuple):
 def settle(
     problem: Problem,
     point: Vector,
-    report: Callable[[Vector, float], None] | None = None,
+    report: Callable[[int, Vector, float], None],
 ) -> Settled:
     """Go on from the end of a search along the weakest direction of J'J, as long as that gains.
 
@@ -55,11 +55,11 @@ def settle(
     ----------
     problem : least-squares problem
     point : (n,) end of the search
-    report : called after every move with the point and the cost
+    report : called after every move with its number, the point and the cost
     """
     here = problem(point)
     jacobian, rounding = here.jacobian, ROUNDING**2 * here.residual.size
-    for _ in range(ROUNDS):
+    for move in range(1, ROUNDS + 1):
         found = uncertainty_at(problem, point, jacobian)
         width = _width(found)
         jacobian, tried = _over_interval(problem, found, here, width)
@@ -73,8 +73,7 @@ def settle(
         there = problem(best)
         if there.cost < least and np.all(np.isfinite(there.jacobian)):
             point, here, jacobian = best, there, there.jacobian
-            if report:
-                report(point, here.cost)
+            report(move, point, here.cost)
         elif _width(uncertainty_at(problem, point, jacobian)) <= WIDER * width:
             return Settled(point, jacobian, True)
     return Settled(point, jacobian, False)
@@ -92,7 +91,7 @@ def _cheapest(problem: Problem, points: list[Vector]) -> Vector:
 
 def _width(found: Uncertainty) -> float:
     """Half width of the interval along the weakest direction, within bounds."""
-    weakest = (1.0 / np.sqrt(direction.eigenvalue) for direction in found.directions()[:1])
+    weakest = (1.0 / np.sqrt(eigenvalue) for eigenvalue, _ in found.directions()[:1])
     return float(np.clip(found.quantile(0.95) * sum(weakest), SHORTEST, LONGEST))
 
 
@@ -104,7 +103,7 @@ def _over_interval(
     Where the model finds no equilibrium at an end, such as beyond gross slip, the other side
     counts alone.  A derivative that holds over the interval is kept as it is.
     """
-    directions = [direction.vector for direction in found.directions()]
+    directions = [vector for _, vector in found.directions()]
     if not directions:
         return here.jacobian, []
     others = np.array(directions[1:]).reshape(-1, found.point.size).T

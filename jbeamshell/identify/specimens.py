@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require, shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml
-from jbeamshell.identify.driving import feature_doubts
 from jbeamshell.identify.models import Model, StripModel, as_model
-from jbeamshell.identify.parameters import is_number
-from jbeamshell.identify.rig_keys import PREFIX, check_rig
+from jbeamshell.identify.parameters import PREFIX, check_rig, is_number
 from jbeamshell.measured.columns import QUANTITIES
-from jbeamshell.measured.curve_files import CURVES, read_curves
-from jbeamshell.measured.curves import Backbone, Measurement
+from jbeamshell.measured.curve_files import read_curves
+from jbeamshell.measured.curves import KINDS, Backbone
 from jbeamshell.measured.drift import DRIFTS
 from jbeamshell.measured.findings import DRIFT, OFF_CENTRE, OFF_ZERO
+from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop, loop_of
 from jbeamshell.measured.recordings import Recording, as_column, read_recordings
@@ -31,7 +30,6 @@ from jbeamshell.measured.steady import steady_loops
 from jbeamshell.scene.dimensions import Dimensions, dimensions_of
 from jbeamshell.scene.keys import CONTROLS, FAR_ENDS
 
-KINDS = ("loop", "backbone", *CURVES)
 CYCLES = ("auto", "steady", "recorded")
 WRONG_DRIVE = (
     "the displacement goes from turn to turn as a machine drives it, the force does not: if it "
@@ -94,7 +92,12 @@ class Specimen:
     dimensions: Mapping[str, Any] | str = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        words = {"kind": KINDS, "cycles": CYCLES, "drift": DRIFTS, "driver": (None, *CONTROLS)}
+        words = {
+            "kind": tuple(KINDS),
+            "cycles": CYCLES,
+            "drift": DRIFTS,
+            "driver": (None, *CONTROLS),
+        }
         words["reverse"] = (None, *QUANTITIES)
         for name, known in words.items():
             value = getattr(self, name)
@@ -126,8 +129,7 @@ class Specimen:
     @property
     def measurements(self) -> list[Any]:
         """Data as a list."""
-        # A Loop is a tuple itself.
-        one = isinstance(self.data, Loop | Recording | str) or not isinstance(self.data, Sequence)
+        one = isinstance(self.data, str) or not isinstance(self.data, Sequence)
         return [self.data] if one else list(self.data)
 
     def checked_weights(self) -> NDArray[np.float64]:
@@ -229,11 +231,11 @@ class Specimen:
             seen.check()
         if self.drift == "keep":  # which the mean loops do not show
             drifts = [f.text for view in seen.views for f in view.findings if f.name == DRIFT]
-            item = item._replace(notes=(*item.notes, *drifts))
+            item = item.but(notes=(*item.notes, *drifts))
         if driver == "force" and any(v.driver == "displacement" for v in seen.views):
-            item = item._replace(notes=(*item.notes, WRONG_DRIVE))
+            item = item.but(notes=(*item.notes, WRONG_DRIVE))
         if self.kind == "backbone":
-            yield Backbone(item.force, item.displacement, item.label), item.notes
+            yield Backbone(item.force, item.displacement, label=item.label), item.notes
         else:
             for loop in self._loops(item, driver):
                 yield self._centred(loop, keeps_zero)
@@ -252,7 +254,7 @@ class Specimen:
             return recording
         note = f"the sign of the {self.reverse} is turned"
         column = {self.reverse: -getattr(recording, self.reverse)}
-        return recording._replace(**column, notes=(*recording.notes, note))
+        return recording.but(**column, notes=(*recording.notes, note))
 
     def _loops(self, recording: Recording | Loop, driver: str | None) -> list[Loop]:
         whole = recording if isinstance(recording, Loop) else loop_of(recording)
@@ -295,37 +297,6 @@ def _forgets_zero(loop: Loop) -> bool:
     shape = levels[-1].shape
     slides = off["displacement"] and shape.kind == "gross slip"
     return slides or (off[answer] and not off[driver] and not shape.asymmetric)
-
-
-def inspected(
-    specimens: Sequence[Specimen], free: Sequence[str], unchecked: bool = False
-) -> list[str]:
-    """Doubts about the specimens' loops, see `jbeamshell.inspect`.
-
-    Parameters
-    ----------
-    specimens : strips and what was measured on them
-    free : keys to fit, which say nothing of the loops yet
-    unchecked : True to tell grave findings as doubts
-
-    Raises
-    ------
-    InputError
-        for a grave finding, such as negative work
-    """
-    doubts = []
-    for specimen in specimens:
-        loops = [item for item in specimen.measurements if isinstance(item, Loop)]
-        seen = (
-            inspect(loops, stiffness=plausible_stiffness(specimen.model, [*free, *specimen.rig]))
-            if loops
-            else None
-        )
-        if seen is not None and not unchecked:
-            seen.check()
-        doubts += [] if seen is None else seen.doubts()
-        doubts += feature_doubts(specimen.model, loops)
-    return doubts
 
 
 def plausible_stiffness(model: Model, free: Sequence[str]) -> tuple[float, float] | None:

@@ -24,7 +24,6 @@ from jbeamshell.measured.findings import TOO_LARGE, TOO_SMALL, TOO_SOFT, TOO_STI
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene.domain import gross_slip_rule
-from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import overridden, scene_from_values
 
@@ -40,6 +39,8 @@ BELOW = 1.0 - 1e-6  # part of gross slip that a force may reach
 STRAIGHT = 0.875  # halfway over the way that work is short of; 1 if straight, .75 if a root
 STIFF = 3.0  # stretching stiffness over that of soft sliders, at the start
 STEEP = 0.02  # way to a plateau over the amplitude, at least
+AFTER_TURN = 0.15  # part of the range of the displacement in which the first slope is taken
+STIFFEST = 50.0  # largest stiffness after a turn over the secant
 STRAIN = 1e-3  # displacement over a length that nobody gave, at most
 FRICTIONS = (0.003, 3.0)  # friction that surfaces have, beyond which a unit is wrong
 MODULI = (5e8, 3e12)  # plane moduli [Pa] of the materials of joints, likewise
@@ -50,7 +51,7 @@ STIFFNESS = ("strip.axial_stiffness", "strip.youngs_modulus")
 
 
 class Estimate(NamedTuple):
-    """Figures of the largest loop or pull of some measurements.
+    """Figures of the largest loop or pull of some measurements, from which strips and laws start.
 
     Attributes
     ----------
@@ -60,6 +61,7 @@ class Estimate(NamedTuple):
     slides : True if the loop has a plateau
     halfway : displacement from a turn until half of the range of the force is gone; None without
         cycles
+    stiffness : slope right after a turn
     normal : mean normal force; None if it was not recorded
     si : True if the numbers are in SI
     """
@@ -70,6 +72,7 @@ class Estimate(NamedTuple):
     work: float | None
     slides: bool
     halfway: float | None
+    stiffness: float
     normal: float | None
     si: bool
 
@@ -100,13 +103,14 @@ def estimate(measurements: Sequence[Any]) -> Estimate | None:
         )
         told = level.shape.kind in ("micro-slip", "gross slip", "viscous")
         slides = level.shape.kind == "gross slip"
-        halfway = _halfway(level.loop)
+        halfway, slope = _halfway(level.loop), _after_turn(level.loop, force / displacement)
         work = level.work if told else None
-        return Estimate(force, displacement, peak, work, slides, halfway, normal, si)
+        return Estimate(force, displacement, peak, work, slides, halfway, slope, normal, si)
     force, displacement = (
         float(np.max(np.abs(column))) for column in (largest.force, largest.displacement)
     )
-    return Estimate(force, displacement, peak, None, False, None, normal, si)
+    slope = _after_turn(largest, force / displacement)
+    return Estimate(force, displacement, peak, None, False, None, slope, normal, si)
 
 
 def _halfway(loop: Loop) -> float:
@@ -114,6 +118,17 @@ def _halfway(loop: Loop) -> float:
     middle = 0.5 * float(np.max(loop.force) + np.min(loop.force))
     gone = int(np.argmax((loop.force - middle) * (loop.force[0] - middle) <= 0.0))
     return abs(float(loop.displacement[0] - loop.displacement[gone]))
+
+
+def _after_turn(pull: Loop | Backbone, secant: float) -> float:
+    """Slope right after the largest displacement of a loop, or at the begin of a backbone."""
+    u = pull.displacement
+    first = int(np.argmax(u)) if isinstance(pull, Loop) and pull.closed else 0
+    after = np.roll(np.arange(u.size), -first)
+    far = int(np.argmax(np.abs(u[after] - u[first]) > AFTER_TURN * np.ptp(u)))
+    near = after[: max(far, 3)]
+    slope = float(np.polyfit(u[near], pull.force[near], 1)[0]) if np.ptp(u[near]) > 0.0 else 0.0
+    return float(np.clip(slope, secant, STIFFEST * secant))
 
 
 def started(known: Mapping[str, Any], found: Estimate) -> tuple[dict[str, Any], list[str]]:
@@ -181,13 +196,14 @@ def _check_known(scene: Scene, values: Mapping[str, Any], found: Estimate, force
     """Raise `InputError` if the friction and the pressure that are known are too small."""
     if not (forced and "contact.friction" in values and "contact.pressure" in values):
         return
-    friction, pressing = float(scene.contact.friction), _pressing(scene)
-    if found.peak >= BELOW * friction * pressing:
-        _check_friction(found.peak / pressing, found, scene, values)
+    gross = float(scene.gross_slip)
+    if found.peak >= BELOW * gross:
+        needed = found.peak / _pressing(scene)
+        _check_friction(needed, found, scene, values)
         raise InputError(
-            f"contact.friction = {friction:.6g}: slides at mu F_N L = {friction * pressing:.4g}, "
-            f"but the measured force reaches {found.peak:.4g}: start it above "
-            f"{found.peak / pressing:.3g}, press more, or set load.control to 'displacement'"
+            f"contact.friction = {float(scene.contact.friction):.6g}: slides at mu F_N L = "
+            f"{gross:.4g}, but the measured force reaches {found.peak:.4g}: start it above "
+            f"{needed:.3g}, press more, or set load.control to 'displacement'"
         )
 
 
@@ -239,7 +255,7 @@ def check_starts(specimens: Sequence[Specimen], parameters: Sequence[Parameter])
         rule = gross_slip_rule(scene.load, scene.member, scene.number, found)
         if np.all(rule.holds):
             continue
-        gross = float(scene.contact.friction) * _pressing(scene)
+        gross = float(scene.gross_slip)
         for key in ("contact.friction", "contact.pressure"):
             if key in free:
                 start = float(scene.get(key))
@@ -270,7 +286,7 @@ def suits(known: Mapping[str, Any], found: Estimate) -> bool:
     found : figures of the measurements
     """
     scene, forced = _scene_of(known)
-    gross = float(scene.contact.friction) * _pressing(scene)
+    gross = float(scene.gross_slip)
     most = BELOW if forced else SIMILAR
     low, high = plausible_stiffness(StripModel(scene), ()) or (0.0, np.inf)
     stiffness = found.force / found.displacement
@@ -286,7 +302,7 @@ def _scene_of(known: Mapping[str, Any]) -> tuple[Scene, bool]:
 def _gross_slip(found: Estimate, scene: Scene, values: Mapping[str, Any], forced: bool) -> float:
     """Force of gross slip, mu F_N L."""
     if "contact.friction" in values and "contact.pressure" in values:
-        return float(scene.contact.friction) * _pressing(scene)
+        return float(scene.gross_slip)
     force, x = found.force, _x(found)
     least = found.peak / MOST if forced else force
     if found.slides:
@@ -331,9 +347,7 @@ def _beyond_bar(x: float) -> float:
 
 def _pressing(scene: Scene) -> float:
     """Resultant of the pressures, F_N L."""
-    contact, support = scene.contact, scene.member.support
-    force, _ = resultant(contact.pressure, contact.bottom_pressure, scene.strip.length, support)
-    return float(force)
+    return float(scene.replace({"contact.friction": 1.0}).gross_slip)
 
 
 def _length(found: Estimate) -> float:

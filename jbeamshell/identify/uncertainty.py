@@ -1,15 +1,16 @@
-"""Uncertainty of a fit: covariance, intervals, directions that the data do not fix, and bands.
+"""Uncertainty of a fit: covariance, intervals, and directions that the data do not fix.
 
 All follow from the Gauss-Newton Hessian J'J of the weighted residuals in the search space, where
 most parameters are logarithms.  The parameters' bijections map them to values.  Where the residuals
 are correlated, or more than measured noise, the model is wrong in some way: their variance is then
-that of the few independent points they are worth, see `jbeamshell.identify.model_error`.  What the
-model's own grid may leave adds to it.
+that of the few independent points they are worth: what a wrong model leaves is smooth along a
+curve.  What the model's own grid may leave adds to it.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.model_error import independent_points
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 
@@ -31,19 +31,10 @@ TOGETHER = 0.12  # interval of a product over that of one factor, below which on
 SIMPLE = 0.1  # difference of a power from 1 up to which it is named a product or a ratio
 TAKES_PART = 0.3  # component of a direction over its largest one, above which it is named
 STEP = 0.1  # relative change by which a direction is described
+SURE = 1.65  # standard errors beyond which a correlation is no chance; white noise is in 5 of 100
+LAGS = 1.3  # lags over the root of the points, over which slow correlation shows
 
-
-class FisherDirection(NamedTuple):
-    """Eigenvector of the Fisher information.
-
-    Attributes
-    ----------
-    eigenvalue : eigenvalue of the information; 1 over the variance along the vector
-    vector : (n,) vector of unit length in the search space
-    """
-
-    eigenvalue: float
-    vector: NDArray[np.float64]
+Vector = NDArray[np.float64]
 
 
 class Uncertainty(NamedTuple):
@@ -65,8 +56,8 @@ class Uncertainty(NamedTuple):
     """
 
     space: SearchSpace
-    point: NDArray[np.float64]
-    inverse: NDArray[np.float64]
+    point: Vector
+    inverse: Vector
     at_bound: NDArray[np.bool_]
     sigma: float
     scatter: float
@@ -75,23 +66,23 @@ class Uncertainty(NamedTuple):
     independent: float
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Vector:
         """Covariance (n, n) in the search space."""
         return self.sigma**2 * self.inverse
 
     @property
-    def errors(self) -> NDArray[np.float64]:
+    def errors(self) -> Vector:
         """Standard errors (n,) of the parameters; NaN for values at a bound."""
         errors = np.abs(self.space.slopes(self.point)) * self._spread
         return np.where(self.at_bound, np.nan, errors)
 
     @property
-    def correlation(self) -> NDArray[np.float64]:
+    def correlation(self) -> Vector:
         """Correlation (n, n) of the parameters in the search space."""
         spread = np.where(self.at_bound, 1.0, np.sqrt(np.diag(self.inverse)))
         return np.where(np.eye(spread.size) > 0.0, 1.0, self.inverse / np.outer(spread, spread))
 
-    def intervals(self, level: float = 0.95) -> NDArray[np.float64]:
+    def intervals(self, level: float = 0.95) -> Vector:
         """Confidence intervals (n, 2) of the parameters, within their bounds.
 
         They use Student's distribution if the noise was estimated, else the normal distribution.
@@ -115,14 +106,18 @@ class Uncertainty(NamedTuple):
         size = noise * self.scatter / self.noise
         return self._replace(sigma=size, scatter=size, noise=noise, freedom=None)
 
-    def directions(self) -> list[FisherDirection]:
-        """Eigenvectors of the Fisher information of parameters inside their bounds, worst first."""
+    def directions(self) -> list[tuple[float, Vector]]:
+        """Eigenvalues and vectors (n,) of the Fisher information inside the bounds, worst first.
+
+        An eigenvalue is 1 over the variance along its vector, which has unit length in the search
+        space.
+        """
         free = np.flatnonzero(~self.at_bound)
         variances, vectors = np.linalg.eigh(self.covariance[np.ix_(free, free)])
         whole = np.zeros((free.size, self.at_bound.size))
         whole[:, free] = vectors.T
         pairs = zip(variances[::-1], whole[::-1], strict=True)
-        return [FisherDirection(1.0 / max(v, np.finfo(float).tiny), vector) for v, vector in pairs]
+        return [(1.0 / max(v, np.finfo(float).tiny), vector) for v, vector in pairs]
 
     def limitations(self, level: float = 0.95) -> list[str]:
         """Sentences on what the data do not determine; none if they determine all parameters."""
@@ -139,7 +134,7 @@ class Uncertainty(NamedTuple):
         pairs = self._pairs(values, level)
         return sentences + list(pairs.values()) + self._trades(values, set(pairs))
 
-    def _pairs(self, values: NDArray[np.float64], level: float) -> dict[tuple[int, ...], str]:
+    def _pairs(self, values: Vector, level: float) -> dict[tuple[int, ...], str]:
         """Sentences on pairs of positive parameters of which one product is known far better."""
         scale = self.space.slopes(self.point) / self._sizes(values)
         relative = self.quantile(level) ** 2 * self.covariance * np.outer(scale, scale)
@@ -163,7 +158,7 @@ class Uncertainty(NamedTuple):
             )
         return sentences
 
-    def _trades(self, values: NDArray[np.float64], named: set[tuple[int, ...]]) -> list[str]:
+    def _trades(self, values: Vector, named: set[tuple[int, ...]]) -> list[str]:
         """Sentences on combinations of parameters that change the response less than the noise."""
         sizes, slopes = self._sizes(values), self.space.slopes(self.point)
         sentences = []
@@ -190,10 +185,10 @@ class Uncertainty(NamedTuple):
         return sentences
 
     @property
-    def _spread(self) -> NDArray[np.float64]:
+    def _spread(self) -> Vector:
         return np.sqrt(np.diag(self.covariance))
 
-    def _sizes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _sizes(self, values: Vector) -> Vector:
         """Sizes (n,) for relative errors: the values, or their starts if these are larger."""
         starts = np.array([bijection.start for bijection in self.space.bijections])
         logs = np.array([bijection.log for bijection in self.space.bijections])
@@ -201,9 +196,7 @@ class Uncertainty(NamedTuple):
         return np.where(sizes > 0.0, sizes, 1.0)
 
 
-def uncertainty_at(
-    problem: Problem, point: NDArray[np.float64], jacobian: NDArray[np.float64]
-) -> Uncertainty:
+def uncertainty_at(problem: Problem, point: Vector, jacobian: Vector) -> Uncertainty:
     """Uncertainty at the minimum of a problem.
 
     What the model's own grid may leave in a residual is smooth and alike in all curves, so that all
@@ -267,22 +260,51 @@ def check_level(level: float) -> None:
         raise InputError(f"level = {level}: give a number between 0 and 1, such as 0.95")
 
 
-def band_widths(
-    uncertainty: Uncertainty,
-    jacobian: NDArray[np.float64],
-    level: float,
-    noise: NDArray[np.float64] | None = None,
-) -> NDArray[np.float64]:
-    """Half widths (rows,) of the confidence band about a prediction.
+def independent_points(residuals: Sequence[Vector]) -> float:
+    """Number of independent points that residuals along several curves are worth.
+
+    n points of autocorrelation rho_k estimate a mean as well as n/(1 + 2 sum rho_k) independent
+    ones (Bayley and Hammersley, J. R. Stat. Soc. Suppl. 8, 1946).  The sum takes the sizes of
+    rho_k: the second branch of a loop repeats the first with the other sign, and so do the
+    derivatives of the model.  What white noise adds to their squares is taken off.  Of slow noise,
+    this counts rather too few points than too many.
+
+    All points count where nothing tells the residuals from white noise: neither rho_1 nor
+    Bartlett's sum over a few lags (Newey and West, Econometrica 55, 1987; for their number Lazarus
+    et al., J. Bus. Econ. Stat. 36, 2018).
 
     Parameters
     ----------
-    uncertainty : uncertainty of the parameters
-    jacobian : (rows, n) derivatives of the prediction with respect to the search space
-    level : confidence level
-    noise : (rows,) noise of a single measurement, which the band then covers as well; None for the
-        band of the model alone
+    residuals : residuals along each curve, over their noise
     """
-    variance = np.einsum("ri,ij,rj->r", jacobian, uncertainty.covariance, jacobian)
-    variance = np.maximum(variance, 0.0) + (0.0 if noise is None else noise**2)
-    return uncertainty.quantile(level) * np.sqrt(variance)
+    points = sum(own.size for own in residuals)
+    products = np.zeros(max(own.size for own in residuals))
+    pairs = np.zeros(products.size)
+    for own in residuals:
+        products[: own.size] += np.correlate(own, own, "full")[own.size - 1 :]
+        pairs[: own.size] += np.arange(own.size, 0, -1)
+    if products[0] == 0.0 or products.size < 2:
+        return float(points)
+    correlation, chance = products[1:] / products[0], np.sqrt(pairs[1:]) / points
+    few = min(int(np.ceil(LAGS * np.sqrt(points))), correlation.size)
+    bartlett = 1.0 - np.arange(1, few + 1) / (few + 1)
+    slow, by_chance = bartlett @ correlation[:few], np.linalg.norm(bartlett * chance[:few])
+    if correlation[0] < SURE * chance[0] and slow < SURE * by_chance:
+        return float(points)
+    size = np.sqrt(np.maximum(correlation**2 - chance**2, 0.0))
+    return points / (1.0 + 2.0 * float(np.sum(size)))
+
+
+def model_misfit(residual: Vector) -> float:
+    """Root mean square of the part of a residual along a curve that is no white noise."""
+    return float(np.sqrt(max(float(np.mean(residual**2)) - white_noise(residual) ** 2, 0.0)))
+
+
+def white_noise(residual: Vector) -> float:
+    """Size of the white noise of a residual along a curve, from the differences of neighbours.
+
+    See von Neumann, Ann. Math. Stat. 12, 1941.
+    """
+    if residual.size < 2:
+        return 0.0
+    return float(np.sqrt(np.mean(np.diff(residual) ** 2) / 2.0))

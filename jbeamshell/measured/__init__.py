@@ -13,9 +13,9 @@ from jbeamshell.measured.curves import DampingCurve as DampingCurve
 from jbeamshell.measured.curves import DissipationCurve as DissipationCurve
 from jbeamshell.measured.curves import ForcedCurve as ForcedCurve
 from jbeamshell.measured.curves import FrequencyCurve as FrequencyCurve
-from jbeamshell.measured.curves import Measurement as Measurement
 from jbeamshell.measured.curves import SqueezeCurve as SqueezeCurve
 from jbeamshell.measured.curves import StiffnessCurve as StiffnessCurve
+from jbeamshell.measured.form import Measurement as Measurement
 from jbeamshell.measured.inspection import Finding as Finding
 from jbeamshell.measured.inspection import Inspection as Inspection
 from jbeamshell.measured.inspection import inspect as inspect

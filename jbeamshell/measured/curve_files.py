@@ -25,14 +25,15 @@ def read_curves(
 ) -> list[tuple[Curve, tuple[str, ...]]]:
     """Read curves of one kind from files of the formats that `read_recordings` reads.
 
-    Columns are found by their names: "amplitude" and the kind, such as "dissipation", or "x" and
-    "stress", with units or without.  All forces are per width.  A column "noise" holds the
-    standard deviation of the second column, in its unit.
+    Columns are found by their names, with units or without: "amplitude" and the kind, such as
+    "dissipation"; "x" and "stress"; or "frequency", "force" and "amplitude".  All forces but that
+    of a forced response are per width.  A column "noise" holds the standard deviation of the second
+    column, in its unit.
 
     Parameters
     ----------
     paths : one file or several; the files' names are the labels
-    kind : "dissipation", "stiffness", "squeeze", "frequency" or "damping"
+    kind : "dissipation", "stiffness", "squeeze", "frequency", "damping" or "forced"
     columns : name of a column by quantity, such as {"stress": "sigma_y"}
     units : unit by quantity, such as {"x": "mm"}, which overrides the header
     decimal : decimal mark, "," or "."; None infers it from the numbers
@@ -103,8 +104,8 @@ def _read(
     notes: tuple[str, ...] = ()
     if not whole.all():
         notes = (f"{np.count_nonzero(~whole)} of {whole.size} rows lack a number: left out",)
-    noise = rows[:, 2] if rows.shape[1] > 2 else None
-    return curve(rows[:, 0], rows[:, 1], label, noise), notes
+    columns, noise = rows[:, : len(wanted)], rows[:, len(wanted) :]
+    return curve(*columns.T, label=label, noise=noise[:, 0] if noise.size else None), notes
 
 
 def _factors(

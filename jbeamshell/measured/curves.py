@@ -1,23 +1,19 @@
 """Measured curves that a model can be compared with, besides a `Loop`.
 
 Every curve may carry its noise, the standard deviation of the column that the model answers, in
-that column's units: one number, or one for each point. Its weight multiplies its residuals.
+that column's units: one number, or one for each point.
 
-A new kind of curve is a class with two columns and a `Form`; its entry in `CURVES` lets it be
-read from files.
+A new kind of curve is a class with columns and a `Form`; its place in `KINDS` lets it be read from
+files.
 """
 
 from __future__ import annotations
 
-import abc
 import dataclasses
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
-import equinox as eqx
 import numpy as np
-from numpy.typing import NDArray
 
-from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.form import (
     AMPLITUDE,
@@ -25,65 +21,47 @@ from jbeamshell.measured.form import (
     DISSIPATION,
     FREQUENCY,
     HARMONIC_FORCE,
+    HUGE,
     LOOP,
     POSITION,
+    RESPONSE,
     SECANT_STIFFNESS,
     SQUEEZE_STRESS,
     Column,
+    Floats,
     Form,
+    Measurement,
 )
-from jbeamshell.measured.loops import Loop
-from jbeamshell.measured.recordings import FEWEST_POINTS, HUGE, as_column
-
-ROUNDING = 1e-6  # of a column's range, below which cycles are the same numbers
-
-Floats = NDArray[np.float64]
+from jbeamshell.measured.loops import Loop, checked_noise
+from jbeamshell.measured.recordings import FEWEST_POINTS, as_column
 
 
-class Curve(eqx.Module):
-    """Measured curve: two columns of one length, their noise and weight.
+@dataclasses.dataclass(frozen=True, eq=False)
+class Curve(Measurement):
+    """Measured curve: columns of one length, and their noise.
 
     Attributes
     ----------
-    form : names, labels and units of its columns, the same for all curves of a class
-    fewest : fewest points that a curve of the class may have
-    label : name in pictures and messages
-    noise : (points,) standard deviations; None where they are not known
-    weight : factor of its residuals among those of other measurements
+    noise : (points,) standard deviations of the column that the model answers; None where they are
+        not known
+    label, weight : see `Measurement`
+
+    Raises
+    ------
+    InputError
+        for columns that are no arrays of one length, hold too few points or an infinite one
     """
 
-    form: ClassVar[Form]
-    fewest: ClassVar[int] = 1
-
-    @property
-    @abc.abstractmethod
-    def label(self) -> str: ...
-    @property
-    @abc.abstractmethod
-    def noise(self) -> Floats | None: ...
-    @property
-    @abc.abstractmethod
-    def weight(self) -> float: ...
+    noise: Any = dataclasses.field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Keep columns as arrays, the noise as one of their length."""
-        names = [field.name for field in dataclasses.fields(self)]
-        kept: dict[str, Any] = {
-            name: as_column(getattr(self, name), name, self.label)
-            for name in names
-            if name not in ("label", "noise", "weight")
+        super().__post_init__()
+        columns = {
+            name: as_column(getattr(self, name), name, self.label) for name in self.form.columns
         }
-        first = next(iter(kept.values()))
-        kept["noise"] = _noise(self.noise, first, self.label)
-        kept["weight"] = _weight(self.weight, self.label)
-        for name, value in kept.items():
-            setattr(self, name, value)
-
-    def __check_init__(self) -> None:
-        columns = {name: getattr(self, name) for name in self.form.columns}
         for name, column in columns.items():
-            if column.ndim != 1 or column.size < self.fewest:
-                fix = f"give {self.fewest} point{'s' * (self.fewest > 1)} or more"
+            if column.ndim != 1 or column.size < self.form.fewest:
+                fix = f"give {self.form.fewest} point{'s' * (self.form.fewest > 1)} or more"
                 raise InputError(f"{self.label}: {name} has shape {column.shape}: {fix}")
             bad = np.flatnonzero(~(np.abs(column) <= HUGE))
             if bad.size:
@@ -91,20 +69,27 @@ class Curve(eqx.Module):
                     f"{self.label}: {name} is {column[bad[0]]} at point {bad[0] + 1}: remove or "
                     "repair it"
                 )
-        (one, x), (other, y) = columns.items()
-        if x.size != y.size:
-            raise InputError(
-                f"{self.label}: {one} and {other} have {x.size} and {y.size} points: give pairs"
-            )
-        check_noise(self.label, self.noise, x.size)
-        if not (np.isfinite(self.weight) and self.weight > 0.0):
-            raise InputError(f"{self.label}: weight = {self.weight}: must be a positive number")
+        (one, x), *others = columns.items()
+        for other, y in others:
+            if x.size != y.size:
+                raise InputError(
+                    f"{self.label}: {one} and {other} have {x.size} and {y.size} points: give pairs"
+                )
+        kept = columns | {"noise": checked_noise(self.noise, x.size, self.label)}
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)
         self._check_columns(columns)
 
     def _check_columns(self, columns: dict[str, Floats]) -> None:
         """Raise `InputError` for numbers that a curve of this kind cannot have."""
 
+    @property
+    def deviations(self) -> Floats | None:
+        noise: Floats | None = self.noise
+        return noise
 
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class SqueezeCurve(Curve):
     """Mean of sigma_y over the height along a strip under its pressures, before any end load.
 
@@ -115,14 +100,18 @@ class SqueezeCurve(Curve):
     label, noise, weight : see `Curve`
     """
 
-    form = Form("squeeze", {"x": POSITION, "stress": SQUEEZE_STRESS}, "x", "stress", ("stress",))
-    fewest = FEWEST_POINTS
+    kind = "squeeze"
+    form = Form(
+        kind,
+        {"x": POSITION, "stress": SQUEEZE_STRESS},
+        "x",
+        "stress",
+        ("stress",),
+        fewest=FEWEST_POINTS,
+    )
 
     x: Floats
     stress: Floats
-    label: str = eqx.field(static=True, default="squeeze")
-    noise: Floats | None = None
-    weight: float = eqx.field(static=True, default=1.0)
 
     def _check_columns(self, columns: dict[str, Floats]) -> None:
         back = np.flatnonzero(np.diff(self.x) <= 0.0)
@@ -148,9 +137,10 @@ class SqueezeCurve(Curve):
         """Part of the curve with low < x < high."""
         inside = (self.x > low) & (self.x < high)
         noise = None if self.noise is None else self.noise[inside]
-        return dataclasses.replace(self, x=self.x[inside], stress=self.stress[inside], noise=noise)
+        return self.but(x=self.x[inside], stress=self.stress[inside], noise=noise)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class Backbone(Curve):
     """First loading from zero, up or down, without a reversal.
 
@@ -161,14 +151,11 @@ class Backbone(Curve):
     label, noise, weight : see `Curve`; the noise is that of the column that does not drive
     """
 
+    kind = "backbone"
     form = LOOP
-    fewest = 3
 
     force: Floats
     displacement: Floats
-    label: str = eqx.field(static=True, default="backbone")
-    noise: Floats | None = None
-    weight: float = eqx.field(static=True, default=1.0)
 
     def _check_columns(self, columns: dict[str, Floats]) -> None:
         for name, column in columns.items():
@@ -179,6 +166,7 @@ class Backbone(Curve):
                 )
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class AmplitudeCurve(Curve):
     """A figure of the steady cycle over its amplitude, compared by its logarithm."""
 
@@ -201,6 +189,7 @@ def _over_amplitude(name: str, column: Column) -> Form:
     return Form(name, columns, "amplitude", name, (name,), scale="log")
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class DissipationCurve(AmplitudeCurve):
     """Work dissipated per steady cycle over amplitude, compared by its logarithm.
 
@@ -211,15 +200,14 @@ class DissipationCurve(AmplitudeCurve):
     label, noise, weight : see `Curve`
     """
 
-    form = _over_amplitude("dissipation", DISSIPATION)
+    kind = "dissipation"
+    form = _over_amplitude(kind, DISSIPATION)
 
     amplitude: Floats
     dissipation: Floats
-    label: str = eqx.field(static=True, default="dissipation")
-    noise: Floats | None = None
-    weight: float = eqx.field(static=True, default=1.0)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class StiffnessCurve(AmplitudeCurve):
     """Secant stiffness of the steady cycle over amplitude, compared by its logarithm.
 
@@ -230,15 +218,14 @@ class StiffnessCurve(AmplitudeCurve):
     label, noise, weight : see `Curve`
     """
 
-    form = _over_amplitude("stiffness", SECANT_STIFFNESS)
+    kind = "stiffness"
+    form = _over_amplitude(kind, SECANT_STIFFNESS)
 
     amplitude: Floats
     stiffness: Floats
-    label: str = eqx.field(static=True, default="stiffness")
-    noise: Floats | None = None
-    weight: float = eqx.field(static=True, default=1.0)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class FrequencyCurve(AmplitudeCurve):
     """Frequency of a mode of a structure over its amplitude, compared by its logarithm.
 
@@ -249,15 +236,14 @@ class FrequencyCurve(AmplitudeCurve):
     label, noise, weight : see `Curve`
     """
 
-    form = _over_amplitude("frequency", FREQUENCY)
+    kind = "frequency"
+    form = _over_amplitude(kind, FREQUENCY)
 
     amplitude: Floats
     frequency: Floats
-    label: str = eqx.field(static=True, default="frequency")
-    noise: Floats | None = None
-    weight: float = eqx.field(static=True, default=1.0)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class DampingCurve(AmplitudeCurve):
     """Damping ratio of a mode of a structure over its amplitude, compared by its logarithm.
 
@@ -268,15 +254,14 @@ class DampingCurve(AmplitudeCurve):
     label, noise, weight : see `Curve`
     """
 
-    form = _over_amplitude("damping", DAMPING)
+    kind = "damping"
+    form = _over_amplitude(kind, DAMPING)
 
     amplitude: Floats
     damping: Floats
-    label: str = eqx.field(static=True, default="damping")
-    noise: Floats | None = None
-    weight: float = eqx.field(static=True, default=1.0)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class ForcedCurve(AmplitudeCurve):
     """Steady response of a structure to a harmonic force near the resonance of one mode.
 
@@ -291,9 +276,10 @@ class ForcedCurve(AmplitudeCurve):
     label, noise, weight : see `Curve`; the noise is that of the force
     """
 
+    kind = "forced"
     form = Form(
-        "forced",
-        {"frequency": FREQUENCY, "force": HARMONIC_FORCE},
+        kind,
+        {"frequency": FREQUENCY, "force": HARMONIC_FORCE, "amplitude": RESPONSE},
         "frequency",
         "force",
         ("force",),
@@ -303,78 +289,16 @@ class ForcedCurve(AmplitudeCurve):
     frequency: Floats
     force: Floats
     amplitude: Floats
-    label: str = eqx.field(static=True, default="forced response")
-    noise: Floats | None = None
-    weight: float = eqx.field(static=True, default=1.0)
-
-    def _check_columns(self, columns: dict[str, Floats]) -> None:
-        super()._check_columns(columns | {"amplitude": self.amplitude})
-        if self.amplitude.shape != self.force.shape:
-            raise InputError(
-                f"{self.label}: amplitude has shape {self.amplitude.shape}: give one for each of "
-                f"the {self.force.size} forces"
-            )
 
 
 CURVES: dict[str, type[Curve]] = {
-    kind.form.name: kind
-    for kind in (DissipationCurve, StiffnessCurve, SqueezeCurve, FrequencyCurve, DampingCurve)
+    each.kind: each
+    for each in (
+        *(DissipationCurve, StiffnessCurve, SqueezeCurve),
+        *(FrequencyCurve, DampingCurve, ForcedCurve),
+    )
 }
 """Kinds of curve that are read from files, by name."""
 
-Measurement = Loop | Curve
-
-
-def noise_of(measurement: Measurement) -> Floats | None:
-    """Standard deviations (points,) of the column that the model answers; None if unknown.
-
-    A loop that is the mean of several cycles has less noise than one cycle.
-    """
-    if isinstance(measurement, Curve):
-        return measurement.noise
-    error = measurement.standard_error
-    if error is None and measurement.noise is not None:
-        error = measurement.noise / np.sqrt(measurement.cycles)
-    if measurement.scatter is not None and measurement.driver is not None:
-        answer = getattr(measurement, LOOP.response(measurement.driver))
-        if error is not None and error <= ROUNDING * np.ptp(answer):
-            error = None  # copies of one cycle tell no noise
-    noise = _noise(error, measurement.force)
-    check_noise(measurement.label, noise, measurement.force.size)
-    return noise
-
-
-def weight_of(measurement: Measurement) -> float:
-    """Factor of the measurement's residuals; 1 for a loop."""
-    return measurement.weight if isinstance(measurement, Curve) else 1.0
-
-
-def check_noise(label: str, noise: Floats | None, points: int) -> None:
-    """Raise `InputError` unless the noise is positive, and one number or one for each point."""
-    if noise is None:
-        return
-    if noise.shape != (points,):
-        fix = f"give one number, or one for each of the {points} points"
-        raise InputError(f"{label}: noise has shape {noise.shape}: {fix}")
-    bad = np.flatnonzero(~(np.isfinite(noise) & (noise > 0.0)))
-    if bad.size:
-        raise InputError(
-            f"{label}: noise is {noise[bad[0]]:g} at point {bad[0] + 1}: give a positive standard "
-            "deviation, or none at all"
-        )
-
-
-def _weight(weight: Any, label: str) -> float:
-    """Weight as a number."""
-    number = isinstance(weight, int | float | np.floating | np.integer)
-    if number and not isinstance(weight, bool) and abs(weight) <= HUGE:
-        return float(weight)
-    raise InputError(f"{label}: weight = {shown(weight)}: must be a positive number")
-
-
-def _noise(noise: Any, column: Floats, label: str = "noise") -> Floats | None:
-    """Noise as an array of the column's shape, if it is one number."""
-    if noise is None:
-        return None
-    values = as_column(noise, "noise", label)
-    return np.full(column.shape, float(values)) if values.ndim == 0 else values
+KINDS: dict[str, type[Measurement]] = {"loop": Loop, "backbone": Backbone, **CURVES}
+"""All kinds of measurement."""

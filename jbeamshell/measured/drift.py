@@ -36,7 +36,7 @@ def without_drift(found: Cycles, drift: str, smallest: float) -> Cycles:
         straight[name] = column - wander
         told.append(f"{name} {float(np.ptp(wander)):.3g}")
     note = f"removed from the recording: a {drift} drift of {' and '.join(told)} in all"
-    recording = recording._replace(**straight, notes=(*recording.notes, note))
+    recording = recording.but(**straight, notes=(*recording.notes, note))
     return split_cycles(recording, found.driver, smallest=smallest)
 
 

@@ -6,8 +6,8 @@ towards its turn, a sensor is at the end of its range.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -45,7 +45,8 @@ CLIPPED, DRIFT = "clipped", "drift"
 FALLS = -0.5  # correlation of force and displacement of a first loading that leans backward
 
 
-class Finding(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Finding:
     """Finding about a recording.
 
     Attributes
@@ -60,7 +61,8 @@ class Finding(NamedTuple):
     grave: bool = False
 
 
-class Level(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Level:
     """Cycles of one amplitude.
 
     Attributes
@@ -122,7 +124,7 @@ def of_levels(
         where = f"cycles to {found.driver} = {_top(level, found, recording)}: " * several
         said = {finding.name for finding in (*before, *findings)}
         findings += [
-            finding._replace(text=where + finding.text)
+            dataclasses.replace(finding, text=where + finding.text)
             for finding in (
                 _of_work(level, recording),
                 _of_shape(level) if whole else None,  # a clipped turn looks like a clearance

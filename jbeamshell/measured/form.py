@@ -1,11 +1,22 @@
-"""Form of a measurement: its columns, and how they are drawn, tabulated and read from files."""
+"""Measurements: what all have, and the form of their columns in pictures, tables and files."""
 
 from __future__ import annotations
 
+import abc
+import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
+from jbeamshell.common.checks import shown
+from jbeamshell.common.errors import InputError
+
+HUGE = 1e100  # squares and quotients of smaller numbers are finite
 NUMBER = ("dimensionless",)
+
+Floats = NDArray[np.float64]
 
 
 class Column(NamedTuple):
@@ -29,13 +40,14 @@ class Form(NamedTuple):
 
     Attributes
     ----------
-    name : name of the table; of a curve also the name of its kind in plans of fits
-    columns : both columns by name, in the order of the table
+    name : name of the table
+    columns : columns by name, in the order of the table
     x, y : names of the columns drawn along and up
     answers : names of the columns that a model can answer
     scale : scale of both axes, "linear" or "log"; on "log", model and data are compared by their
         logarithms
     heading : heading of the table's first column, which holds the labels
+    fewest : fewest points of a curve
 
     Examples
     --------
@@ -50,6 +62,7 @@ class Form(NamedTuple):
     answers: tuple[str, ...]
     scale: str = "linear"
     heading: str = "curve"
+    fewest: int = 1
 
     def response(self, control: str) -> str:
         """Name of the column that the model answers.
@@ -70,6 +83,7 @@ DISSIPATION = Column("$D$, work per cycle  [force]", ("J/m",))
 SECANT_STIFFNESS = Column("secant stiffness  [force/width/length]", ("N/m^2",))
 FREQUENCY = Column("frequency  [1/time]", ("Hz",))
 DAMPING = Column(r"damping ratio $\zeta$", NUMBER)
+RESPONSE = Column("amplitude of $u$  [length]", ("m",))
 HARMONIC_FORCE = Column("amplitude of the force  [force]", ("N",))
 
 LOOP = Form(
@@ -79,7 +93,56 @@ LOOP = Form(
     y="force",
     answers=("force", "displacement"),
     heading="loop",
+    fewest=3,
 )
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Measurement(abc.ABC):
+    """Measured columns of one length that a model can be compared with.
+
+    Attributes
+    ----------
+    form : names, labels and units of its columns, the same for all of a class
+    kind : word for its class in files and plans of fits
+    label : name in pictures and messages; its kind where none is given
+    weight : factor of its residuals among those of other measurements
+
+    Raises
+    ------
+    InputError
+        for a weight that is no positive number
+    """
+
+    form: ClassVar[Form]
+    kind: ClassVar[str]
+
+    label: str = dataclasses.field(default="", kw_only=True)
+    weight: float = dataclasses.field(default=1.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "label", self.label or self.kind)
+        number = isinstance(self.weight, int | float | np.number)
+        if not (number and self.weight is not True and 0.0 < self.weight <= HUGE):
+            raise InputError(
+                f"{self.label}: weight = {shown(self.weight)}: must be a positive number"
+            )
+
+    @property
+    def columns(self) -> list[Floats]:
+        """Its columns (points,), in the order of its form."""
+        return [getattr(self, name) for name in self.form.columns]
+
+    @property
+    @abc.abstractmethod
+    def deviations(self) -> Floats | None:
+        """Standard deviations (points,) of the column that a model answers; None if unknown."""
+
+    def but(self, **values: Any) -> Self:
+        """Copy with other values of some fields, which are neither converted nor checked."""
+        copy = object.__new__(type(self))
+        vars(copy).update(vars(self) | values)
+        return copy
 
 
 def by_form(measurements: Sequence[Any]) -> list[tuple[Form, list[int]]]:

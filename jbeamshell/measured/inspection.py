@@ -5,8 +5,9 @@ A fit refuses data with a grave finding; other findings are doubts, which it rep
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,8 @@ from jbeamshell.measured.steady import steady_loops
 UNDO = "--unchecked (in Python unchecked=True) fits all the same"
 
 
-class View(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class View:
     """Content of one recording.
 
     Attributes
@@ -76,7 +78,7 @@ class View(NamedTuple):
                 }
                 for level in self.levels
             ],
-            "findings": [finding._asdict() for finding in self.findings],
+            "findings": [dataclasses.asdict(finding) for finding in self.findings],
         }
 
     def _of(self, level: Level) -> str:
@@ -91,7 +93,8 @@ class View(NamedTuple):
         )
 
 
-class Inspection(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Inspection:
     """Content of some files or arrays, one view for each recording; print it."""
 
     views: tuple[View, ...]
@@ -174,22 +177,13 @@ def inspect(
     else:
         paths: FilePath | Sequence[FilePath] = data  # type: ignore[assignment]
         items = list(read_recordings(paths, columns=columns, units=units, decimal=decimal))
-    views = [_view(_recording(item).per_width(width), stiffness, _averaged(item)) for item in items]
-    return Inspection(tuple(views))
+    return Inspection(tuple(_view(item, width, stiffness) for item in items))
 
 
-def _recording(item: Recording | Loop) -> Recording:
-    if isinstance(item, Recording):
-        return item
-    return Recording(item.force, item.displacement, item.label, notes=item.notes, units=item.units)
-
-
-def _averaged(item: Recording | Loop) -> int:
-    """Number of cycles of which an item is the mean."""
-    return item.cycles if isinstance(item, Loop) else 1
-
-
-def _view(recording: Recording, stiffness: tuple[float, float] | None, averaged: int) -> View:
+def _view(item: Recording | Loop, width: float, stiffness: tuple[float, float] | None) -> View:
+    recording = item.as_recording() if isinstance(item, Loop) else item
+    recording = recording.per_width(width)
+    averaged = item.cycles if isinstance(item, Loop) else 1
     findings = of_columns(recording)
     try:
         found = split_cycles(recording)

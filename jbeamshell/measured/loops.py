@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from jbeamshell.common.errors import InputError
 from jbeamshell.common.summary import Summary, ranged, with_unit
-from jbeamshell.measured.form import LOOP, Form
+from jbeamshell.measured.form import LOOP, Floats, Measurement
 from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
 from jbeamshell.measured.recordings import (
     NO_UNITS,
     FilePath,
     Recording,
+    as_column,
     read_recordings,
     recording_from_arrays,
 )
@@ -22,16 +25,18 @@ from jbeamshell.measured.reversals import find_driver, find_turns
 
 WORK: dict[str | None, str] = {"N": "J", "N/m": "J/m"}  # unit by that of the force
 CLOSED = 0.05  # part of the range within which the ends of a closed loop lie
+ROUNDING = 1e-6  # of a column's range, below which cycles are the same numbers
 
 
-class Loop(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Loop(Measurement):
     """One loop of force over displacement, or one pull.
 
     Attributes
     ----------
     force : (points,) end force per unit width
     displacement : (points,) displacement of the loaded end
-    label : name in pictures and messages
+    label, weight : see `Measurement`
     noise : standard deviation of a single sample of the responding column, from the scatter of
         repeated cycles; None without repeated cycles
     cycles : number of cycles of which this loop is the mean
@@ -45,13 +50,16 @@ class Loop(NamedTuple):
     normal_force : mean normal force, if it was recorded
     """
 
-    force: NDArray[np.float64]
-    displacement: NDArray[np.float64]
-    label: str
+    kind = "loop"
+    form = LOOP
+
+    force: Floats
+    displacement: Floats
+    _: dataclasses.KW_ONLY
     noise: float | None = None
     cycles: int = 1
     dropped: int = 0
-    scatter: NDArray[np.float64] | None = None
+    scatter: Floats | None = None
     notes: tuple[str, ...] = ()
     driver: str | None = None
     free_zero: bool = False
@@ -82,15 +90,9 @@ class Loop(NamedTuple):
         return float(np.sum(0.5 * (self.force[1:] + self.force[:-1]) * np.diff(self.displacement)))
 
     @property
-    def form(self) -> Form:
-        """Names, labels and units of its columns."""
-        return LOOP
-
-    @property
     def closed(self) -> bool:
         """True if the loop ends where it starts; a first loading does not."""
-        columns = (self.force, self.displacement)
-        return all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) for c in columns)
+        return all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) for c in self.columns)
 
     @property
     def standard_error(self) -> float | None:
@@ -101,6 +103,27 @@ class Loop(NamedTuple):
         if self.scatter is None:
             return None
         return float(np.sqrt(np.mean(self.scatter**2) / self.cycles))
+
+    @property
+    def deviations(self) -> Floats | None:
+        """Standard deviations (points,) of the responding column; None if unknown.
+
+        A loop that is the mean of several cycles has less noise than one cycle.
+        """
+        error = self.standard_error
+        if error is None and self.noise is not None:
+            error = self.noise / np.sqrt(self.cycles)
+        if error is not None and self.scatter is not None and self.driver is not None:
+            answer = getattr(self, LOOP.response(self.driver))
+            if error <= ROUNDING * np.ptp(answer):
+                error = None  # copies of one cycle tell no noise
+        return checked_noise(error, self.force.size, self.label)
+
+    def as_recording(self) -> Recording:
+        """Its points as a recording; those with NaN are left out."""
+        made = recording_from_arrays(self.force, self.displacement, self.label)
+        dropped, notes = self.dropped + made.dropped, (*self.notes, *made.notes)
+        return made.but(dropped=dropped, notes=notes, units=self.units)
 
     def zeros(self) -> dict[str, float]:
         """Numbers about which the columns swing, which are zero unless sensors have offsets.
@@ -130,7 +153,7 @@ class Loop(NamedTuple):
         told = " and ".join(f"{name} {zero:.3g}" for name, zero in zeros.items())
         shifted = {name: getattr(self, name) - zero for name, zero in zeros.items()}
         note = f"removed, zeros of the sensors: {told}"
-        return self._replace(**shifted, notes=(*self.notes, note), free_zero=True)
+        return self.but(**shifted, notes=(*self.notes, note), free_zero=True)
 
     def thinned(self, points: int, driver: str) -> Loop:
         """Loop with fewer points, spaced evenly along the driving column; turning points are kept.
@@ -147,7 +170,7 @@ class Loop(NamedTuple):
         even = np.searchsorted(travel, np.linspace(0.0, travel[-1], points))
         ends = [0, np.argmax(drive), np.argmin(drive), drive.size - 1]
         keep = np.unique([*ends, *even, *find_turns(drive)])
-        return self._replace(
+        return self.but(
             force=self.force[keep],
             displacement=self.displacement[keep],
             scatter=None if self.scatter is None else self.scatter[keep],
@@ -211,7 +234,7 @@ def loop_of(recording: Recording) -> Loop:
     return Loop(
         recording.force,
         recording.displacement,
-        recording.label,
+        label=recording.label,
         dropped=recording.dropped,
         notes=recording.notes,
         units=recording.units,
@@ -223,3 +246,27 @@ def driver_of(loops: Sequence[Loop]) -> str:
     """Column that drove most of the loops, "force" or "displacement"."""
     drivers = [loop.driver or find_driver(loop.force, loop.displacement) for loop in loops]
     return "displacement" if 2 * drivers.count("displacement") > len(drivers) else "force"
+
+
+def checked_noise(noise: Any, points: int, label: str) -> Floats | None:
+    """Standard deviations (points,) of one number or one for each point; None stays None.
+
+    Raises
+    ------
+    InputError
+        unless all are positive
+    """
+    if noise is None:
+        return None
+    values = as_column(noise, "noise", label)
+    values = np.full(points, float(values)) if values.ndim == 0 else values
+    if values.shape != (points,):
+        fix = f"give one number, or one for each of the {points} points"
+        raise InputError(f"{label}: noise has shape {values.shape}: {fix}")
+    bad = np.flatnonzero(~(np.isfinite(values) & (values > 0.0)))
+    if bad.size:
+        raise InputError(
+            f"{label}: noise is {values[bad[0]]:g} at point {bad[0] + 1}: give a positive standard "
+            "deviation, or none at all"
+        )
+    return values

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,16 +23,17 @@ from jbeamshell.measured.columns import (
     find_columns,
     is_header,
 )
+from jbeamshell.measured.form import HUGE
 from jbeamshell.measured.read_table import read_table
 
 FEWEST_POINTS = 8
 NO_UNITS = "without units: the numbers are taken in the scene's own"
-HUGE = 1e100  # squares and quotients of smaller numbers are finite
 
 FilePath = str | os.PathLike[str]
 
 
-class Recording(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Recording:
     """Force and displacement of a test in the order of time.
 
     Attributes
@@ -59,6 +61,10 @@ class Recording(NamedTuple):
 
     def __repr__(self) -> str:
         return self.summary().as_text()
+
+    def but(self, **values: Any) -> Recording:
+        """Copy with other values of some fields."""
+        return dataclasses.replace(self, **values)
 
     def unit(self, quantity: str) -> str:
         """Unit of a quantity; empty if it is the Scene's own."""
@@ -108,7 +114,7 @@ class Recording(NamedTuple):
                 continue
             columns[name] = column / width
             units |= {name: "N/m"} if name in units else {}
-        return self._replace(**columns, notes=notes, units=self.units and units)
+        return self.but(**columns, notes=notes, units=self.units and units)
 
 
 def recording_from_arrays(
@@ -315,7 +321,7 @@ def _read(
     }
     if "group" not in columns:
         everything = np.full(rows.shape[0], True)
-        return [_recording(arrays, everything, label or table.name)._replace(**told)]
+        return [_recording(arrays, everything, label or table.name).but(**told)]
     marks, title = rows[:, 2], table.titles[columns["group"]].strip()
     unmarked = np.flatnonzero(np.isnan(marks))
     if unmarked.size:
@@ -328,7 +334,7 @@ def _read(
         own = f"{title} = {mark:g}"
         try:
             one = _recording(arrays, marks == mark, f"{label}: {own}" if label else own)
-            found.append(one._replace(**told))
+            found.append(one.but(**told))
         except InputError as error:
             raise InputError(str(error) if label else f"{table.name}: {error}") from None
     return found
@@ -351,4 +357,4 @@ def _recording(
     }
     recording = recording_from_arrays(label=label, **kept)
     note = "the displacement is the acceleration, integrated twice: its zero is not known"
-    return recording._replace(notes=(*recording.notes, note))
+    return recording.but(notes=(*recording.notes, note))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import dataclasses
 
 import numpy as np
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.loops import CLOSED, Loop
-from jbeamshell.measured.recordings import Recording, recording_from_arrays
+from jbeamshell.measured.recordings import Recording
 from jbeamshell.measured.reversals import (
     SMALLEST,
     Floats,
@@ -25,7 +25,8 @@ MORE = 1.1  # ratio of points in whole cycles above which the other column is th
 COMPLETE = 0.02  # distance of an end from a turn over the branch, below which it is a turn
 
 
-class Cycle(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Cycle:
     """Cycle from a turn to the second next turn, which is at the same level or passes it.
 
     Attributes
@@ -53,7 +54,8 @@ class Cycle(NamedTuple):
         return max(0.5 * (self.levels[0] + self.levels[2]), self.levels[1])
 
 
-class Cycles(NamedTuple):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Cycles:
     """Recording split into cycles.
 
     Attributes
@@ -136,13 +138,7 @@ def split_cycles(
     if not 0.0 < smallest < 1.0:
         raise InputError(f"smallest = {smallest}: give a share of the range between 0 and 1")
     if isinstance(recording, Loop):
-        loop = recording
-        recording = recording_from_arrays(loop.force, loop.displacement, loop.label)
-        recording = recording._replace(
-            dropped=loop.dropped + recording.dropped,
-            notes=(*loop.notes, *recording.notes),
-            units=loop.units,
-        )
+        recording = recording.as_recording()
     driver = driver or _driver(recording, smallest)
     path = smoothed_path(getattr(recording, driver), smallest)
     turns, inner = _turns(path.smooth, path.band)
@@ -235,7 +231,9 @@ def _grouped(cycles: list[Cycle], noise: float) -> list[Cycle]:
         for own in _clusters(means[alike], ALIKE * ranges[alike] + 4.0 * noise):
             group[alike[own]] = number
             number += 1
-    return [cycle._replace(group=int(g)) for cycle, g in zip(cycles, group, strict=True)]
+    return [
+        dataclasses.replace(cycle, group=int(g)) for cycle, g in zip(cycles, group, strict=True)
+    ]
 
 
 def _clusters(values: Floats, gap: Floats) -> list[np.ndarray]:
@@ -256,7 +254,7 @@ def _rolled(recording: Recording, start: int) -> Recording:
     def rolled(column: Floats) -> Floats:
         return np.append(column[start:], column[1 : start + 1])
 
-    return recording._replace(
+    return recording.but(
         force=rolled(recording.force),
         displacement=rolled(recording.displacement),
         time=None,

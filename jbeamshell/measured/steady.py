@@ -71,7 +71,7 @@ def steady_loops(
         found = without_drift(found, drift, smallest)
     loops = [_mean_loop(found, number, steady, points) for number in range(found.groups)]
     # Removing a drift also removes the zeros of the columns.
-    return [loop._replace(free_zero=drift != "keep") for loop in loops]
+    return [loop.but(free_zero=drift != "keep") for loop in loops]
 
 
 def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:

@@ -29,7 +29,7 @@ EXTENSIONS = (  # what one's own laws, energies and readers build on, and format
     "jbeamshell.scene.dimensions",
     "jbeamshell.identify.plan_file",
     "jbeamshell.identify.rig",
-    "jbeamshell.identify.rig_keys",
+    "jbeamshell.identify.parameters",
     "jbeamshell.history.record",
 )
 

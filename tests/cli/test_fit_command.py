@@ -117,7 +117,7 @@ def test_python_and_the_command_line_are_one_door(cli, tmp_path):
     path = tmp_path / "rig.csv"
     np.savetxt(path, rows, delimiter=",", header="force [N/m],displacement [m]", comments="")
     code, out, _ = cli("fit", path, *options(DOOR), "--json")
-    loops = [loop._replace(label="rig.csv") for loop in read_loops(path)]
+    loops = [loop.but(label="rig.csv") for loop in read_loops(path)]
     fits = [jb.fit(given, DOOR) for given in (str(path), loops, read_recordings(path))]
     fits.append(jb.fit([jb.identify.Specimen(DOOR, [path])]))
     told = json.loads(out)

@@ -483,7 +483,7 @@ def test_planted_height_and_friction_are_found():
     for amplitude in (1.0, 1.5):
         force, u = map(np.asarray, jb.solve(true.replace({"load.amplitude": amplitude})).loop)
         noise = 2e-3 * np.ptp(u) * random.normal(size=u.size)
-        loops.append(jb.measured.Loop(force, u + noise, f"A = {amplitude}"))
+        loops.append(jb.measured.Loop(force, u + noise, label=f"A = {amplitude}"))
     start = true.replace({"member.height_ratio": 0.11, "contact.friction": 0.12})
     free = ["member.height_ratio", "contact.friction"]
     fit = jb.identify.fit(loops, start, free)

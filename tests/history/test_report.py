@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+import tomllib
 
 import jax
 import matplotlib.pyplot as plt
@@ -13,11 +14,10 @@ from matplotlib.figure import Figure
 from toy import STRIP
 
 import jbeamshell as jb
+from jbeamshell import identify, laws
 from jbeamshell.common import files
 from jbeamshell.common.errors import InputError
 from jbeamshell.history import report
-from jbeamshell.identify import report as fit_report
-from jbeamshell.identify.results import Fit
 from jbeamshell.measured.loops import Loop
 from jbeamshell.mechanics.homogeneous import Homogeneous
 from jbeamshell.plotting import folder
@@ -31,7 +31,7 @@ COARSE = {
 }
 TABLES = {"loop.csv", "profiles.csv", "sections.csv", "result.json", "scene.toml"}
 RUN_FILES = TABLES | {"loop.png", "profiles.png", "contact.png"}
-FIT_FILES = {"overlay.csv", "overlay.png", "residuals.png", "result.json", "scene.toml"}
+FIT_FILES = {"overlay.csv", "overlay.png", "residuals.png", "result.json", "law.toml"}
 
 
 @pytest.fixture(scope="module")
@@ -49,18 +49,18 @@ def pressed(history, steps, **values):
     return jb.History(**vars(history) | path | {"scene": scene, "cycles": ()})
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def result():
     """Fit of two loops with awkward names and numbers that decimals cannot hold."""
-    random = np.random.default_rng(3)
-    data, model = (
-        [Loop(*random.standard_normal((2, n)) * 1e-7, label) for n, label in sizes]
-        for sizes in [[(5, "A = 1, left"), (4, 'the "old" rig')]] * 2
-    )
-    scene = STRIP.replace({"contact.friction": 1.0 / 3.0})
-    values = {"contact.friction": 1.0 / 3.0}
-    told = np.eye(1), 0.1, [0.1, 0.2], data, model, "converged", 5
-    return Fit(scene, values, values, *told, controls=["force"] * 2)
+    law = laws.Jenkins(1.0 / 3.0, 7.0)
+    loops = [
+        Loop(np.asarray(law.path_forces(u)), u, label=label, driver="displacement")
+        for label, u in (
+            ("A = 1, left", 0.1 * np.array([1.0, 0.1, -0.4, -0.6, -1.0, 0.3, 0.5, 0.6, 1.0])),
+            ('the "old" rig', 0.2 * np.array([1.0, 0.4, -0.1, -1.0, -0.3, 0.2, 0.6, 1.0])),
+        )
+    ]
+    return identify.fit(loops, law, ["jenkins.slip_force"], starts=1, throw=False, unchecked=True)
 
 
 def rows_of(text):
@@ -230,27 +230,32 @@ def test_a_run_of_ones_own_energy_has_no_scene_file(history, tmp_path):
 def test_a_fit_in_a_folder(result, tmp_path):
     folder = tmp_path / "fit"
     open_figures = plt.get_fignums()
-    paths = fit_report.write_fit(folder, result, result.figures())
+    paths = result.save(folder)
     assert plt.get_fignums() == open_figures
     assert {path.name for path in paths} == names(folder) == FIT_FILES
     header, rows = rows_of((folder / "overlay.csv").read_text())
     assert header == ["loop", "force", "displacement", "model_force", "model_displacement"]
     for i, (data, model) in enumerate(zip(result.data, result.model, strict=True)):
         own = [row for row in rows if row[0] == data.label]
-        assert len(own) == (5, 4)[i]
+        assert len(own) == (9, 8)[i]
         table = np.array([row[1:] for row in own], dtype=float).T
-        np.testing.assert_array_equal(table, [*data[:2], *model[:2]])
-    assert jb.read_scene(folder / "scene.toml").contact.friction == 1.0 / 3.0
-    assert json.loads((folder / "result.json").read_text())["misfit"] == 0.1
+        np.testing.assert_array_equal(table, [*data.columns, *model.columns])
+    told = tomllib.loads((folder / "law.toml").read_text())["set"]
+    assert told["jenkins.slip_force"] == result.values["jenkins.slip_force"]
+    assert json.loads((folder / "result.json").read_text()) == result.figures()
     assert is_png(folder / "overlay.png")
     assert is_png(folder / "residuals.png")
 
 
 def test_what_cannot_be_written_leaves_nothing(history, result, tmp_path):
     folder = tmp_path / "out"
-    for write, what in ((report.write_run, history), (fit_report.write_fit, result)):
+    bad = {"loss_factor": np.nan}
+    for write in (
+        lambda: report.write_run(folder, history, bad),
+        lambda: result.save(folder, figures=bad),
+    ):
         with pytest.raises(ValueError, match="not JSON compliant"):
-            write(folder, what, {"loss_factor": np.nan})
+            write()
         assert not folder.exists()
 
 

@@ -18,7 +18,7 @@ SLIDERS, PRESSURE, LENGTH = "contact.stick_stiffness", "contact.pressure", "stri
 
 def chosen(data, known=None):
     plan = planned(data, known or {})
-    (note,) = [note for note in plan.notes if note.startswith("free is not given")]
+    (note,) = [note for note in plan.notes if note.startswith("Fitted: ")]
     assert all(p.key in note for p in plan.free)
     return [p.key for p in plan.free]
 
@@ -27,20 +27,20 @@ def sliding(reach):
     """Closed loop beyond gross slip of a slider behind a spring."""
     u = rig.path(cycles=1)
     force = 7.0 * rig.jenkins(u, reach) / reach
-    return make_loop(force[-201:], 1e-4 * u[-201:])._replace(units=SI, driver="displacement")
+    return make_loop(force[-201:], 1e-4 * u[-201:]).but(units=SI, driver="displacement")
 
 
 def root():
     """Closed loop beyond gross slip of a bar that slides from its end."""
     way = np.clip((1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, 201))) / 0.4, 0.0, None)
     down = 7.0 - 14.0 * np.sqrt(np.minimum(way[0] - way[:101], 1.0))
-    return make_loop(np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0))._replace(units=SI)
+    return make_loop(np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0)).but(units=SI)
 
 
 def in_si(amplitude=1.3):
     """A loop of finite elements below gross slip, in units that the standard strip has not."""
     (loop,) = example_loops(0.1126, (amplitude,))
-    return loop._replace(force=1e5 * loop.force, displacement=10.0 * loop.displacement, units=SI)
+    return loop.but(force=1e5 * loop.force, displacement=10.0 * loop.displacement, units=SI)
 
 
 def test_a_plateau_tells_friction_and_the_stiffness_before_it():
@@ -74,7 +74,7 @@ def test_the_numbers_of_a_whole_scene_are_starts():
 
 def test_a_line_tells_a_stiffness_and_no_friction():
     u = 1e-6 * np.sin(np.linspace(0.0, 6.0 * np.pi, 301))
-    line = make_loop(2e9 * u, u)._replace(units=SI)
+    line = make_loop(2e9 * u, u).but(units=SI)
     assert chosen([line]) == [STIFF]
 
 

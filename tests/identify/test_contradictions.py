@@ -5,7 +5,7 @@ import pytest
 from identify.test_law_fits import PLANTED, loops
 
 from jbeamshell import identify, laws
-from jbeamshell.identify.contradictions import contradiction
+from jbeamshell.identify.doubts import contradiction
 
 ROWS = [slice(0, 60), slice(60, 120), slice(120, 180)]
 

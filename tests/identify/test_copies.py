@@ -6,7 +6,7 @@ from identify.test_law_fits import NOISE, PLANTED, loops
 from toy import KEYS, readings, scene
 
 from jbeamshell import identify, laws
-from jbeamshell.identify.copies import counted_once
+from jbeamshell.identify.data_checks import counted_once
 from jbeamshell.identify.specimens import Specimen
 
 
@@ -34,16 +34,16 @@ def test_the_same_data_twice_have_the_errors_of_once():
 
 def test_copies_with_fewer_points_or_in_other_units_count_once(noisy):
     one, other = noisy
-    few = one._replace(force=one.force[::3], displacement=one.displacement[::3], label="few")
+    few = one.but(force=one.force[::3], displacement=one.displacement[::3], label="few")
     for data in ((few, one, other), (one, other, few)):
         whole, (told,) = kept(*data)
         assert [loop.label for loop in whole] == [one.label, other.label]
         assert told == f"few is {one.label} with fewer points: it counts once"
-    kilo = one._replace(force=1e-3 * one.force, label="kilo")
+    kilo = one.but(force=1e-3 * one.force, label="kilo")
     whole, (told,) = kept(one, other, kilo)
     assert len(whole) == 2
     assert "with force times 0.001 and displacement times 1" in told
-    larger = one._replace(force=1.1 * one.force, displacement=1.1 * one.displacement, label="more")
+    larger = one.but(force=1.1 * one.force, displacement=1.1 * one.displacement, label="more")
     assert len(kept(one, larger)[0]) == 1
 
 
@@ -56,12 +56,12 @@ def test_weights_stay_with_their_measurements(noisy):
 def test_a_cycle_that_is_repeated_point_by_point_counts_once(noisy):
     one = noisy[0]
     columns = (np.append(np.tile(c[:-1], 5), c[0]) for c in (one.force, one.displacement))
-    long = one._replace(**dict(zip(("force", "displacement"), columns, strict=True)))
+    long = one.but(**dict(zip(("force", "displacement"), columns, strict=True)))
     (single,), (told,) = kept(long)
     assert single.force.size == one.force.size
     assert "repeats one cycle 5 times, point by point: it counts once" in told
     noise = NOISE * np.random.default_rng(4).standard_normal(long.force.size)
-    assert kept(long._replace(force=long.force + noise))[1] == []
+    assert kept(long.but(force=long.force + noise))[1] == []
 
 
 def test_loops_that_a_law_makes_alike_are_no_copies(noisy):

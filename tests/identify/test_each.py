@@ -1,7 +1,5 @@
 """Many fits, each on its own: planted values, bootstrap copies beside intervals, bad input."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from identify.test_law_fits import loops as law_loops
@@ -67,7 +65,7 @@ def test_each_fit_has_the_defaults_of_a_fit():
 
 def test_bootstrap_copies_spread_as_the_standard_error_says(noisy):
     """Under white noise and a model that is right, both tell the same spread and the truth."""
-    copies = identify.bootstrap(noisy, 40)
+    copies = noisy.bootstrap(40)
     assert copies.converged.all()
     for key, truth in ((MU, 0.1), (ETA, 0.25)):
         spread = np.std(copies.values[key])
@@ -75,7 +73,7 @@ def test_bootstrap_copies_spread_as_the_standard_error_says(noisy):
         assert abs(noisy.values[key] - truth) < 4.0 * spread
         low, high = copies.intervals()[key]
         assert low < noisy.values[key] < high
-    again = identify.bootstrap(noisy, 3)
+    again = noisy.bootstrap(3)
     np.testing.assert_array_equal(again.values[MU], copies.values[MU][:3])
 
 
@@ -91,6 +89,4 @@ def test_bad_input_names_the_fit(noisy):
         none.intervals()
     assert str(none) == "2 fits, 0 converged"
     with pytest.raises(jb.InputError, match="copies"):
-        identify.bootstrap(noisy, 1)
-    with pytest.raises(jb.InputError, match="was not made by fit"):
-        identify.bootstrap(dataclasses.replace(noisy, problem=None), 5)
+        noisy.bootstrap(1)

@@ -55,7 +55,7 @@ def test_the_minimum_is_that_of_scipy():
     peer = scipy.optimize.least_squares(residual, list(START.values()), **tight)
     np.testing.assert_allclose(values_of(fit), peer.x, rtol=1e-6)
     assert fit.minima[0][1] == pytest.approx(2.0 * peer.cost, rel=1e-6)
-    assert fit.status == "converged"
+    assert fit.converged
 
 
 def test_specimens_share_some_values_and_have_others_of_their_own():
@@ -120,12 +120,12 @@ def test_starts_that_move_together_save_a_search_that_does_not_converge(monkeypa
     moved = []
     whole = multistart.together
     monkeypatch.setattr(multistart, "together", lambda *a: moved.append(whole(*a)) or moved[-1])
-    assert identify.fit(readings(1e-3), scene(), KEYS).status == "converged"
+    assert identify.fit(readings(1e-3), scene(), KEYS).converged
     assert not moved
     monkeypatch.setattr(multistart, "MAX_ITERATIONS", 6)
     far = scene(**{MU: 0.011, ETA: 0.03, KAPPA: 0.02})
     hasty = identify.fit(readings(1e-3), far, KEYS, max_iterations=6, throw=False)
-    assert hasty.status == "max_iterations"
+    assert hasty.status == jb.Status.MAX_ITERATIONS
     assert not moved
     fit = identify.fit(readings(1e-3), far, KEYS, throw=False)
     assert len(moved) == 1
@@ -282,7 +282,7 @@ def test_an_unfinished_fit_is_loud():
     with pytest.raises(jb.UnconvergedError, match="not converged after 2 iterations"):
         identify.fit(readings(), scene(), KEYS, max_iterations=2)
     fit = identify.fit(readings(), scene(), KEYS, max_iterations=2, throw=False)
-    assert fit.status == "max_iterations"
+    assert fit.status == jb.Status.MAX_ITERATIONS
 
 
 def test_filling_up_adds_nothing(monkeypatch):
@@ -463,7 +463,7 @@ def test_what_a_scene_cannot_answer(planted):
     too_much = make_loop(5.0 * force, displacement)
     with pytest.raises(jb.InputError, match="must stay below gross slip"):
         identify.fit(too_much, start, FREE)
-    noisy = Loop(np.asarray(force), np.asarray(displacement), "rig", noise=1.0)
+    noisy = Loop(np.asarray(force), np.asarray(displacement), label="rig", noise=1.0)
     with pytest.raises(jb.InputError, match="rig: noise = 1 is more than the range of disp"):
         identify.fit(noisy, start, FREE)
 

@@ -5,10 +5,11 @@ import pytest
 
 from jbeamshell import identify, laws
 from jbeamshell.common.errors import InputError
-from jbeamshell.identify.driving import feature_doubts
+from jbeamshell.identify.data_checks import feature_doubts, inspected
 from jbeamshell.identify.models import LawModel, StripModel
-from jbeamshell.identify.specimens import Specimen, inspected
+from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loops import Loop
 from jbeamshell.scene.library import standard
 
@@ -35,7 +36,7 @@ def loops(law, random=None, sizes=SIZES, points=64):
         force = np.asarray(law.path_forces(path))[-points - 1 :]
         if random is not None:
             force = force + NOISE * np.ptp(force) * random.normal(size=force.size)
-        found.append(Loop(force, size * way, f"U = {size:g}", driver="displacement"))
+        found.append(Loop(force, size * way, label=f"U = {size:g}", driver="displacement"))
     return found
 
 
@@ -88,17 +89,18 @@ def test_a_model_that_cannot_follow_the_data_says_so():
 
 def test_asymmetry_and_memory_that_a_law_lacks_are_doubts():
     loop = loops(PLANTED["mindlin"], sizes=(0.03,))[0]
-    lopsided = loop._replace(force=loop.force + 0.15 * np.abs(loop.force))
+    lopsided = loop.but(force=loop.force + 0.15 * np.abs(loop.force))
     jenkins, dahl = LawModel(PLANTED["jenkins"]), LawModel(PLANTED["dahl"])
-    (text,) = feature_doubts(jenkins, [loop, lopsided])
+    (text,) = feature_doubts(jenkins, inspect([loop, lopsided]).views)
     assert "pull and push differ by" in text
     ends = ((1.0, -1.0), (-1.0, 0.4), (0.4, -0.4), (-0.4, 1.0))
     u = 0.01 * np.concatenate([np.linspace(a, b, 20)[1:] for a, b in ends])
     strip = StripModel(standard())
-    nested = Loop(u.copy(), u, "nested")
-    (text,) = feature_doubts(dahl, [nested])
+    nested = Loop(u.copy(), u, label="nested")
+    views = inspect(nested).views
+    (text,) = feature_doubts(dahl, views)
     assert "dahl forgets where: its minor loops do not close" in text
-    assert feature_doubts(jenkins, [nested]) == feature_doubts(strip, [nested]) == []
+    assert feature_doubts(jenkins, views) == feature_doubts(strip, views) == []
     assert text in inspected([Specimen(dahl, [nested])], [], unchecked=True)
 
 
@@ -107,7 +109,7 @@ def test_a_law_is_driven_by_force_where_it_has_masings_memory():
     law = PLANTED["mindlin"]
     path = 0.8 * np.cos(np.pi * np.arange(65) / 32)
     u = np.asarray(law.path_displacements(np.append(np.linspace(0, 0.8, 9)[1:], path)))[-65:]
-    data = Loop(path, u, "by force")
+    data = Loop(path, u, label="by force")
     by_force = {"load.control": "force"}
     fit = identify.fit(Specimen(laws.Mindlin(1.2, 80.0), data, set=by_force))
     assert fit.values["mindlin.stiffness"] == pytest.approx(100.0, rel=1e-6)

@@ -5,8 +5,8 @@ import pytest
 from toy import KEYS, TRUTH, Readings, formula, scene
 
 from jbeamshell import identify
-from jbeamshell.identify.model_error import independent_points, model_misfit
 from jbeamshell.identify.starts import estimate
+from jbeamshell.identify.uncertainty import independent_points, model_misfit
 from jbeamshell.measured.loops import make_loop
 from tests import rig
 
@@ -125,7 +125,7 @@ def another_law(seed):
         force = rig.jenkins(u, reach) / reach
     noise = 2.0 * random.choice([0.002, 0.005, 0.01, 0.02])
     force = force[-161:] + noise * random.standard_normal(161)
-    return make_loop(force, u[-161:])._replace(driver="displacement")
+    return make_loop(force, u[-161:]).but(driver="displacement")
 
 
 @pytest.mark.slow

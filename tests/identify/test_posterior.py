@@ -122,7 +122,7 @@ def test_sampled_intervals_are_those_of_profiles():
     for loop in example_loops(0.1126, (0.5851, 1.6)):
         u = loop.displacement
         noise = 0.01 * np.ptp(u) * random.standard_normal(u.size)
-        loops.append(loop._replace(displacement=u + noise))
+        loops.append(loop.but(displacement=u + noise))
     coarse = {"model.nodes": 21, "model.kinematics": "linear", "contact.normal": "held"}
     fit = identify.fit(loops, jb.Scene().replace(coarse), [MU, ETA], points=48)
     problem = fit.posterior()

@@ -12,8 +12,8 @@ from jbeamshell import identify
 from jbeamshell.identify import models, rig
 from jbeamshell.identify.models import as_model
 from jbeamshell.identify.observations import observe
+from jbeamshell.identify.parameters import RIG
 from jbeamshell.identify.plan import planned
-from jbeamshell.identify.rig_keys import RIG
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.measured.curves import Backbone, DissipationCurve
 from jbeamshell.measured.loops import make_loop
@@ -73,7 +73,7 @@ def behind(amplitude, **values):
     phase = rising * np.sqrt(np.maximum(1.0 - off**2, 0.0))
     seen = np.asarray(bare)[-121:] + float(own.loss) * phase
     seen = seen + float(own.drift) * np.linspace(0.0, 1.0, 121)
-    return make_loop(seen, last)._replace(driver="displacement"), phase
+    return make_loop(seen, last).but(driver="displacement"), phase
 
 
 def seen_by(loop, scene=SCENE, **values):
@@ -108,7 +108,7 @@ def test_slopes_pass_through_the_spring(slid):
 def test_springs_zeros_and_damping_are_seen_in_closed_form(slid):
     values = {"stiffness": 0.4, "loss": 0.05, "force_zero": 0.2, "displacement_zero": -0.3}
     plain, phase = behind(1.0)
-    loop = plain._replace(
+    loop = plain.but(
         force=plain.force + 0.4 * plain.displacement + 0.05 * phase + 0.2,
         displacement=plain.displacement - 0.3,
     )
@@ -178,7 +178,7 @@ def test_friction_of_a_strip_behind_a_spring(amplitude, compliance):
     noise = 1e-3 * np.ptp(force) * np.random.default_rng(0).standard_normal(241)
     loop = make_loop(force[-241:] + noise, (path + compliance * force)[-241:])
     start = scene.replace({MU: 0.12})
-    specimen = Specimen(start, [loop._replace(driver="displacement")])
+    specimen = Specimen(start, [loop.but(driver="displacement")])
     fit = identify.fit([specimen], free=[MU, COMPLIANCE])
     assert fit.values[MU] == pytest.approx(0.1, rel=3e-3)
     assert fit.values[COMPLIANCE] == pytest.approx(compliance, rel=5e-3)

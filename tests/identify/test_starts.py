@@ -32,7 +32,7 @@ def in_units(loop, random, noise=0.0, seed=0):
         scale * np.tile(column[:-1], 3)
         for scale, column in ((force, loop.force), (displacement, loop.displacement))
     )
-    recording = rig.recorded(*columns, noise, "white", seed, "force")._replace(units=SI)
+    recording = rig.recorded(*columns, noise, "white", seed, "force").but(units=SI)
     truth = {
         MU: FRICTION,
         P: PRESSURE * LENGTH * force / length,
@@ -90,7 +90,7 @@ def test_a_plateau_tells_gross_slip_and_a_straight_way_to_it_soft_sliders():
     u = rig.path()
     force = 7.0 * rig.jenkins(u, 0.3) / 0.3
     made = rig.recorded(force, 1e-4 * u, 0.002, driver="displacement")
-    made = made._replace(units=SI, normal_force=np.full(u.size, 20.0))
+    made = made.but(units=SI, normal_force=np.full(u.size, 20.0))
     loops = steady_loops(made)
     assert loops[0].normal_force == pytest.approx(20.0)
     plan = planned(loops, None, [MU])
@@ -105,7 +105,7 @@ def test_a_plateau_tells_gross_slip_and_a_straight_way_to_it_soft_sliders():
     # A bar that slides from its end: the force is a root of the displacement.
     way = np.clip((1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, 201))) / 0.4, 0.0, None)
     down = 7.0 - 14.0 * np.sqrt(np.minimum(way[0] - way[:101], 1.0))
-    bar = make_loop(np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0))._replace(units=SI)
+    bar = make_loop(np.append(down, -down[1:]), 1e-4 * (0.4 * way - 1.0)).but(units=SI)
     root = planned([bar], None, [MU]).specimens[0].scene
     gross = float(root.contact.friction) * float(root.contact.pressure) * float(root.strip.length)
     assert gross == pytest.approx(7.0, rel=0.02)
@@ -116,7 +116,7 @@ def test_a_plateau_tells_gross_slip_and_a_straight_way_to_it_soft_sliders():
 
 def test_a_line_starts_where_hardly_anything_slips():
     u = rig.path(4)
-    loops = steady_loops(rig.recorded(7.0 * u, 1e-4 * u, 0.002)._replace(units=SI))
+    loops = steady_loops(rig.recorded(7.0 * u, 1e-4 * u, 0.002).but(units=SI))
     scene = planned(loops, None, [STIFF]).specimens[0].scene
     gross = float(scene.contact.friction * scene.contact.pressure * scene.strip.length)
     assert gross == pytest.approx(70.0, rel=0.02)
@@ -159,7 +159,7 @@ def test_fits_of_random_specimens_converge_from_the_file_alone(seed):
     free = [MU] if STIFF in known else [ETA, STIFF]
     coarse = {"model.nodes": 41, "model.kinematics": "linear"}
     fit = jb.fit(loops, known | coarse, free, points=48)
-    assert fit.status == "converged"
+    assert fit.converged
     assert fit.misfit < 0.02
 
 
@@ -180,9 +180,7 @@ def test_a_wrong_unit_is_named_where_no_surface_or_material_explains_it(factors,
     u = rig.path(4)
     made = rig.recorded(7.0e4 * rig.iwan(u), 1e-6 * u, 0.002, driver="displacement")
     right, wrong = (
-        steady_loops(
-            made._replace(force=f * made.force, displacement=d * made.displacement, units=SI)
-        )
+        steady_loops(made.but(force=f * made.force, displacement=d * made.displacement, units=SI))
         for f, d in ((1.0, 1.0), factors)
     )
     planned(right, known, [MU])

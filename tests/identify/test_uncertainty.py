@@ -101,10 +101,8 @@ def test_weights_count_and_their_errors_are_honest():
 
 
 def test_directions_are_those_of_the_information(quiet):
-    directions = quiet.uncertainty.directions()
-    eigenvalues = np.array([direction.eigenvalue for direction in directions])
+    eigenvalues, vectors = map(np.array, zip(*quiet.uncertainty.directions(), strict=True))
     assert np.all(np.diff(eigenvalues) >= 0.0)
-    vectors = np.array([direction.vector for direction in directions])
     information = vectors.T @ np.diag(eigenvalues) @ vectors
     residual = quiet.problem(quiet.uncertainty.point)
     expected = residual.jacobian.T @ residual.jacobian

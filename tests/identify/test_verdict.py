@@ -21,7 +21,7 @@ def test_noise_alone_is_no_fault_of_energy_or_stiffness(noise):
     random = np.random.default_rng(7)
     for _ in range(4):
         data = [
-            loop._replace(force=loop.force + noise * np.ptp(loop.force) * random.normal(size=65))
+            loop.but(force=loop.force + noise * np.ptp(loop.force) * random.normal(size=65))
             for loop in loops(PLANTED["iwan4"], sizes=(0.003, 0.012))
         ]
         fit = identify.fit(data, "iwan4", starts=1, throw=False)

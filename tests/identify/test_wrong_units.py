@@ -8,10 +8,10 @@ import pytest
 from toy import Formula, Readings, X, scene
 
 from jbeamshell import identify
+from jbeamshell.identify.doubts import doubt_of_units
 from jbeamshell.identify.observations import run_of
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.search_space import search_space
-from jbeamshell.identify.wrong_units import doubt_of_units
 
 STIFF, MU = "strip.axial_stiffness", "contact.friction"
 TRUE = 2.0e4

@@ -73,7 +73,7 @@ def area(loop):
 
 def planted_area(driver, amplitude=1.0):
     drive = driven([amplitude] * 2, 2000)
-    return area(Loop(answered(drive, driver)[-2001:], drive[-2001:], ""))
+    return area(Loop(answered(drive, driver)[-2001:], drive[-2001:]))
 
 
 def range_of(driver, amplitude=1.0):
@@ -252,7 +252,7 @@ def test_mean_loops_scatter_by_their_standard_error(points, cycles):
     means, errors, noises, areas = [], [], [], []
     for _ in range(50):
         noisy = clean.displacement + white * random.standard_normal(drive.size)
-        (loop,) = steady_loops(clean._replace(displacement=noisy), "force", points=100)
+        (loop,) = steady_loops(clean.but(displacement=noisy), "force", points=100)
         if loop.cycles == cycles:
             means.append(loop.displacement)
             errors.append(loop.standard_error)
@@ -293,7 +293,7 @@ def test_a_drift_that_turns_is_removed_cycle_by_cycle():
     recording = recorded(driven([1.0] * 10, 200), "force", 0.002)
     time = np.linspace(0.0, 1.0, recording.force.size)
     wander = 0.3 * np.sin(2.0 * np.pi * time)
-    recording = recording._replace(displacement=recording.displacement + wander, time=time)
+    recording = recording.but(displacement=recording.displacement + wander, time=time)
     (loop,) = steady_loops(recording, "force", "cycle")
     assert loop.cycles >= 8
     np.testing.assert_allclose(area(loop), planted_area("force"), rtol=0.02)
@@ -350,7 +350,7 @@ def test_bad_options_are_refused(options, told):
 
 
 def test_a_loop_built_by_hand_is_checked():
-    flat = Loop(np.zeros(20), np.linspace(0.0, 1.0, 20), "rig")
+    flat = Loop(np.zeros(20), np.linspace(0.0, 1.0, 20), label="rig")
     with pytest.raises(InputError, match=r"rig: force is constant \(0\): no loop to fit"):
         steady_loops(flat)
 

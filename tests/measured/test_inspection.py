@@ -12,7 +12,6 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import csv_text
 from jbeamshell.common.summary import ranged, with_unit
 from jbeamshell.measured.clipping import clipped
-from jbeamshell.measured.curves import noise_of
 from jbeamshell.measured.example import HEIGHT_RATIOS, example_loops
 from jbeamshell.measured.inspection import inspect
 from jbeamshell.measured.loop_shape import CONVEX
@@ -81,7 +80,7 @@ def test_a_clipped_column_is_refused(noisy, name):
         limit = random.uniform(0.6, 0.8) * np.max(column)
         turned = random.choice([-1.0, 1.0])  # at the top, or at the bottom
         cut = {name: turned * np.minimum(turned * column, limit)}
-        seen = inspect(recording._replace(**cut))
+        seen = inspect(recording.but(**cut))
         assert names(seen) == {"clipped"}
         (told,) = (f.text for f in seen.findings if f.name == "clipped")
         assert told.startswith(f"the {name} is clipped at {turned * limit:.4g}")
@@ -166,7 +165,7 @@ def test_a_mean_loop_is_as_asymmetric_as_its_cycles(cycles):
     (loop,) = jb.measured.steady_loops(rig.recorded(force, u, 0.005, driver="displacement"))
     assert loop.cycles >= 3
     assert names(inspect(loop), grave=False) == {"asymmetric"}
-    assert names(inspect(loop._replace(cycles=1)), grave=False) != {"asymmetric"}  # may be noise
+    assert names(inspect(loop.but(cycles=1)), grave=False) != {"asymmetric"}  # may be noise
 
 
 def test_millimetres_taken_for_metres_are_told_from_the_specimens_stiffness():
@@ -176,11 +175,11 @@ def test_millimetres_taken_for_metres_are_told_from_the_specimens_stiffness():
     band = (level.stiffness / 3.0, 30.0 * level.stiffness)
     assert not inspect(recording, stiffness=band).findings
     for factor, words in ((1e3, "millimetres for metres"), (1e-3, "metres for millimetres")):
-        wrong = recording._replace(displacement=factor * recording.displacement)
+        wrong = recording.but(displacement=factor * recording.displacement)
         seen = inspect(wrong, stiffness=band)
         assert names(seen) == {"stiffness"}
         assert words in seen.findings[0].text
-    rig_too = recording._replace(displacement=6.0 * recording.displacement)  # a soft rig is a doubt
+    rig_too = recording.but(displacement=6.0 * recording.displacement)  # a soft rig is a doubt
     assert names(inspect(rig_too, stiffness=band), grave=False) == {"stiffness"}
 
 
@@ -360,5 +359,5 @@ def test_copies_of_one_cycle_tell_no_noise(csv):
     columns = [np.tile(column[-161:-81], 4) for column in (rig.iwan(u), 0.02 * u)]
     whole = csv("rig.csv", *columns)
     loops = jb.measured.steady_loops(jb.measured.read_recordings(whole)[0])
-    assert noise_of(loops[0]) is None
-    assert noise_of(loops[0]._replace(scatter=None, noise=0.1)) is not None
+    assert loops[0].deviations is None
+    assert loops[0].but(scatter=None, noise=0.1).deviations is not None

@@ -38,7 +38,9 @@ def test_arrays_make_a_loop():
 
 
 def test_points_without_a_number_are_dropped_and_told():
-    loop = make_loop(np.where(np.isin(np.arange(13), (4, 6)), np.nan, FORCE), DISPLACEMENT, "rig")
+    loop = make_loop(
+        np.where(np.isin(np.arange(13), (4, 6)), np.nan, FORCE), DISPLACEMENT, label="rig"
+    )
     np.testing.assert_array_equal(loop.displacement, np.delete(DISPLACEMENT, (4, 6)))
     assert loop.dropped == 2
     assert loop.notes == ("2 of 13 rows lack a number: left out",)
@@ -46,32 +48,32 @@ def test_points_without_a_number_are_dropped_and_told():
 
 def test_bad_arrays_are_refused():
     with pytest.raises(InputError, match=r"rig: force is constant \(0\): no loop to fit"):
-        make_loop(np.zeros(13), DISPLACEMENT, "rig")
+        make_loop(np.zeros(13), DISPLACEMENT, label="rig")
 
 
 def test_a_standard_error_is_that_of_a_mean():
-    loop = Loop(FORCE, DISPLACEMENT, "", cycles=4, scatter=np.linspace(0.0, 0.6, 13))
+    loop = Loop(FORCE, DISPLACEMENT, cycles=4, scatter=np.linspace(0.0, 0.6, 13))
     expected = np.sqrt(np.mean(np.linspace(0.0, 0.6, 13) ** 2)) / 2.0
     np.testing.assert_allclose(loop.standard_error, expected, rtol=1e-14)
 
 
 def test_closed_loops_and_pulls():
-    assert Loop(FORCE, DISPLACEMENT, "").closed
-    assert not Loop(FORCE[:-1], DISPLACEMENT[:-1], "").closed
+    assert Loop(FORCE, DISPLACEMENT).closed
+    assert not Loop(FORCE[:-1], DISPLACEMENT[:-1]).closed
     drift = np.linspace(0.0, 1.0, FORCE.size)
     width = np.ptp(DISPLACEMENT)
-    assert Loop(FORCE, DISPLACEMENT + 0.04 * width * drift, "").closed
-    assert not Loop(FORCE, DISPLACEMENT + 0.07 * width * drift, "").closed
+    assert Loop(FORCE, DISPLACEMENT + 0.04 * width * drift).closed
+    assert not Loop(FORCE, DISPLACEMENT + 0.07 * width * drift).closed
 
 
 @pytest.mark.parametrize("driver", ["force", "displacement"])
 def test_thinned_loops_keep_their_turns_and_ends(driver):
     # Turns between the points that an even spacing would take.
     phase = np.linspace(0.4, 0.4 + 2.0 * np.pi, 1001)
-    loop = Loop(3.0 * np.cos(phase), 0.25 * np.cos(phase - 0.3), "rig", scatter=phase)
+    loop = Loop(3.0 * np.cos(phase), 0.25 * np.cos(phase - 0.3), label="rig", scatter=phase)
     thin = loop.thinned(40, driver)
     assert 40 <= thin.force.size <= 44
-    for whole, kept in zip(loop[:2], thin[:2], strict=True):
+    for whole, kept in zip(loop.columns, thin.columns, strict=True):
         assert (kept[0], kept[-1]) == (whole[0], whole[-1])
     whole, kept = getattr(loop, driver), getattr(thin, driver)
     assert (kept.max(), kept.min()) == (whole.max(), whole.min())
@@ -86,7 +88,7 @@ def test_thinned_loops_keep_their_turns_and_ends(driver):
 
 
 def test_short_loops_are_not_thinned():
-    loop = Loop(FORCE, DISPLACEMENT, "rig")
+    loop = Loop(FORCE, DISPLACEMENT, label="rig")
     assert loop.thinned(FORCE.size, "force") is loop
 
 
@@ -95,16 +97,16 @@ def test_the_driver_is_the_smoother_column():
     phase = np.linspace(0.0, 2.0 * np.pi, 200)
     force, displacement = 3.0 * np.cos(phase), 0.25 * np.cos(phase - 0.3)
     noise = 0.01 * random.standard_normal(phase.size)
-    assert driver_of([Loop(force, displacement, "")]) == "force"
-    assert driver_of([Loop(force, displacement + 0.5 * noise, "")]) == "force"
-    assert driver_of([Loop(force + 6.0 * noise, displacement, "")]) == "displacement"
+    assert driver_of([Loop(force, displacement)]) == "force"
+    assert driver_of([Loop(force, displacement + 0.5 * noise)]) == "force"
+    assert driver_of([Loop(force + 6.0 * noise, displacement)]) == "displacement"
     assert driver_of(example_loops()) == "force"
 
 
 def test_a_centred_loop_has_lost_its_zeros_and_nothing_else():
     phase = np.linspace(0.0, 2.0 * np.pi, 400)
     displacement, force = np.cos(phase), 3.0 * np.cos(phase + 0.4)
-    loop = make_loop(force + 0.7, displacement - 0.2)._replace(driver="displacement")
+    loop = make_loop(force + 0.7, displacement - 0.2).but(driver="displacement")
     centred = loop.centred()
     np.testing.assert_allclose(centred.displacement, displacement, atol=1e-4)
     np.testing.assert_allclose(centred.force, force, atol=1e-3)

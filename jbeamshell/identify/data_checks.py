@@ -1,4 +1,8 @@
-"""Measurements that are copies of others: they say nothing new, so each counts once."""
+"""What speaks against data before a fit: findings about loops, and measurements that are copies.
+
+A law is odd: it answers a push as a pull.  Laws without Masing's memory let minor loops drift.
+Loops that show otherwise are told as doubts, as no numbers of the law can follow them.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +11,71 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from jbeamshell.identify.specimens import Specimen
-from jbeamshell.measured.curves import ROUNDING
-from jbeamshell.measured.loops import Loop
+from jbeamshell.identify.models import LawModel, Model
+from jbeamshell.identify.specimens import Specimen, plausible_stiffness
+from jbeamshell.laws import MasingLaw
+from jbeamshell.measured.closed_curve import PARTS
+from jbeamshell.measured.form import Measurement
+from jbeamshell.measured.inspection import View, inspect
+from jbeamshell.measured.loops import ROUNDING, Loop
 from jbeamshell.measured.recordings import FEWEST_POINTS
+from jbeamshell.measured.reversals import find_turns, noise_of
 
+ASYMMETRY = 0.035  # of the range, by which the branches of a law, being odd, do not differ
+SURE = 2.0  # standard errors by which noise may make them differ
 DISSIPATES = 1e-3  # work over that of the rectangle about a loop, below which the loop is a line
+
+
+def inspected(
+    specimens: Sequence[Specimen], free: Sequence[str], unchecked: bool = False
+) -> list[str]:
+    """Doubts about the specimens' loops, see `jbeamshell.inspect`.
+
+    Parameters
+    ----------
+    specimens : strips and what was measured on them
+    free : keys to fit, which say nothing of the loops yet
+    unchecked : True to tell grave findings as doubts
+
+    Raises
+    ------
+    InputError
+        for a grave finding, such as negative work
+    """
+    doubts = []
+    for specimen in specimens:
+        loops = [item for item in specimen.measurements if isinstance(item, Loop)]
+        if loops:
+            band = plausible_stiffness(specimen.model, [*free, *specimen.rig])
+            seen = inspect(loops, stiffness=band)
+            if not unchecked:
+                seen.check()
+            doubts += [*seen.doubts(), *feature_doubts(specimen.model, seen.views)]
+    return doubts
+
+
+def feature_doubts(model: Model, views: Sequence[View]) -> list[str]:
+    """Sentences on what inspected loops show and a law cannot follow; none for other models."""
+    if not isinstance(model, LawModel):
+        return []
+    name, doubts = model.law.heading, []
+    for recording, levels in ((view.recording, view.levels) for view in views):
+        nested = len(find_turns(recording.displacement)) > 2
+        own = noise_of(recording.force) / np.ptp(recording.force)
+        chance = SURE * own * np.sqrt(PARTS / recording.force.size)
+        missed = levels[-1].shape.asymmetry if levels and not nested else 0.0
+        if missed > np.hypot(ASYMMETRY, chance):
+            doubts.append(
+                f"{recording.label}: pull and push differ by {100.0 * missed:.2g} % of the range, "
+                f"and {name} answers both alike: it cannot follow that; take a strip"
+            )
+        if not isinstance(model.law, MasingLaw) and nested:
+            doubts.append(
+                f"{recording.label}: turns within a larger cycle, and {name} forgets where: its "
+                "minor loops do not close; take a law with memory, such as iwan4"
+            )
+    return doubts
 
 
 def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[str]]:
@@ -28,7 +89,7 @@ def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[st
     said: list[str] = []
     others: list[Any] = []
     for specimen in specimens:
-        if not all(hasattr(item, "form") for item in specimen.measurements):
+        if not all(isinstance(item, Measurement) for item in specimen.measurements):
             kept.append(specimen)  # no measurement, which the fit refuses
             continue
         single = [_one_cycle(item) for item in specimen.measurements]
@@ -40,7 +101,7 @@ def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[st
                 )
         own = [item for item, _ in single]
         weights = specimen.checked_weights()
-        fullest = sorted(range(len(own)), key=lambda place: -_columns(own[place])[0].size)
+        fullest = sorted(range(len(own)), key=lambda place: -own[place].columns[0].size)
         places: list[int] = []
         for place in fullest:
             copied = [(own[i].label, told) for i in places if (told := _copy(own[place], own[i]))]
@@ -64,17 +125,10 @@ def counted_once(specimens: Sequence[Specimen]) -> tuple[list[Specimen], list[st
     return kept, said
 
 
-def _columns(item: Any) -> list[NDArray[np.float64]]:
-    """Columns (points,) of a measurement."""
-    return [getattr(item, name) for name in item.form.columns]
-
-
 def _copy(item: Any, other: Any) -> str:
     """Words on how a measurement copies another of as many points or more; empty if it does not."""
     if type(item) is not type(other) or not isinstance(item, Loop):
-        same = type(item) is type(other) and all(
-            map(np.array_equal, _columns(item), _columns(other))
-        )
+        same = type(item) is type(other) and all(map(np.array_equal, item.columns, other.columns))
         return "once more" if same else ""
     points, all_points = (one.force + 1j * one.displacement for one in (item, other))
     if bool(np.all(np.isin(points, all_points))):
@@ -82,7 +136,7 @@ def _copy(item: Any, other: Any) -> str:
     if points.size != all_points.size:
         return ""
     factors = []
-    for column, base in zip(_columns(item), _columns(other), strict=True):
+    for column, base in zip(item.columns, other.columns, strict=True):
         factor = float(column @ base / (base @ base))
         if np.max(np.abs(column - factor * base)) > ROUNDING * np.ptp(column):
             return ""
@@ -106,22 +160,20 @@ def _one_cycle(item: Any) -> tuple[Any, int]:
     """Measurement with one cycle of a loop that repeats it point by point, and their number."""
     if not isinstance(item, Loop):
         return item, 1
-    slack = [ROUNDING * float(np.ptp(column)) for column in _columns(item)]
+    slack = [ROUNDING * float(np.ptp(column)) for column in item.columns]
 
     def repeats(period: int) -> bool:
         return all(
             bool(np.all(np.abs(column[period:] - column[:-period]) <= allowed))
-            for column, allowed in zip(_columns(item), slack, strict=True)
+            for column, allowed in zip(item.columns, slack, strict=True)
         )
 
     size = item.force.size
-    back = np.all(
-        [np.abs(c - c[0]) <= a for c, a in zip(_columns(item), slack, strict=True)], axis=0
-    )
+    back = np.all([np.abs(c - c[0]) <= a for c, a in zip(item.columns, slack, strict=True)], axis=0)
     for period in np.flatnonzero(back).tolist():
         if FEWEST_POINTS <= period <= size // 2 and repeats(period):
             scatter = None if item.scatter is None else item.scatter[: period + 1]
-            force, displacement = (column[: period + 1] for column in _columns(item))
-            one = item._replace(force=force, displacement=displacement, scatter=scatter)
+            force, displacement = (column[: period + 1] for column in item.columns)
+            one = item.but(force=force, displacement=displacement, scatter=scatter)
             return one, round((size - 1) / period)
     return item, 1
