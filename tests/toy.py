@@ -1,4 +1,7 @@
-"""The standard strip in load steps, and a measurement that a formula answers."""
+"""Standard strips, rows of finite elements, and a measurement that a formula answers."""
+
+import csv
+from pathlib import Path
 
 import dataclasses
 
@@ -13,10 +16,33 @@ from jbeamshell.measured.form import Column, Form
 
 # What tests of the general solver change: load steps, 40 per half cycle, and exact rotations.
 STRIP = jb.Scene().replace({"model.kinematics": "exact"}).by_load_steps()
+DATA = Path(__file__).parents[1] / "calibration" / "data"
 X = np.linspace(0.05, 1.0, 20)
 TRUTH = {"contact.friction": 0.1, "strip.height_ratio": 0.2, "strip.kappa_s": 0.44}
 KEYS = tuple(TRUTH)
 START = {"contact.friction": 0.2, "strip.height_ratio": 0.1, "strip.kappa_s": 0.3}
+
+
+def plane_strip(eta, mu=0.1, nu=0.3, amplitude=1.0):
+    """Standard strip in plane elasticity with mu F_N = 1."""
+    return jb.Scene().replace(
+        {
+            "model.section": "plane",
+            "load.entry": "traction",
+            "strip.height_ratio": eta,
+            "strip.poisson_ratio": nu,
+            "contact.friction": mu,
+            "contact.pressure": 1.0 / mu,
+            "load.amplitude": amplitude,
+        }
+    )
+
+
+def rows_of(name, word=None):
+    """Rows of a table of finite elements as numbers, without the column of words."""
+    with (DATA / name).open(encoding="utf-8") as file:
+        rows = [(row.pop(word, None), row) for row in csv.DictReader(file)]
+    return [(of, {k: float(v or "nan") for k, v in row.items()}) for of, row in rows]
 
 
 def formula(x, mu, eta, kappa_s):

@@ -1,12 +1,10 @@
 """Steady cycles in closed form: a bar, finite elements, all branches of a load path, gradients."""
 
-import csv
-from pathlib import Path
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import plane_strip, rows_of
 
 import jbeamshell as jb
 from jbeamshell import contact_line
@@ -14,24 +12,9 @@ from jbeamshell.contact_line import branches, cycles, strip
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.dissipation import NODES
 
-DATA = Path(__file__).parents[2] / "calibration" / "data"
 TURNS = jnp.asarray([1.0, -1.0, 1.0, -1.0, 1.0])
 BODY = jax.jit(lambda scene: strip.condensed(scene, NODES).body)
 FACTORS = jax.jit(cycles.cycle_factors)
-
-
-def scene_of(eta, mu=0.1, nu=0.3):
-    """Standard strip with mu F_N = 1."""
-    return jb.Scene().replace(
-        {
-            "model.section": "plane",
-            "load.entry": "traction",
-            "strip.height_ratio": eta,
-            "strip.poisson_ratio": nu,
-            "contact.friction": mu,
-            "contact.pressure": 1.0 / mu,
-        }
-    )
 
 
 def bar(x, stiffness=3.4e4, load=1.0):
@@ -77,10 +60,9 @@ def test_a_bar_on_any_nodes_has_the_cubic_law():
 
 
 def test_converged_finite_elements():
-    with (DATA / "energy.csv").open(encoding="utf-8") as file:
-        rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+    rows = [row for _, row in rows_of("energy.csv")]
     for eta in sorted({row["eta"] for row in rows}):
-        kept = FACTORS(BODY(scene_of(eta)), 0.1)
+        kept = FACTORS(BODY(plane_strip(eta)), 0.1)
         for row in rows:
             if row["eta"] == eta and row["ratio"] > 1e-4:
                 error = abs(float(kept.dissipation([row["A"]])[0]) / row["D"] - 1.0)
@@ -89,7 +71,7 @@ def test_converged_finite_elements():
 
 def test_the_means_over_a_mesh_are_those_of_all_branches():
     # The nodes' own thresholds make steps, around which the spread ones lie.
-    body = BODY(scene_of(0.1126))
+    body = BODY(plane_strip(0.1126))
     amplitudes = jnp.geomspace(0.3, 1.6, 200)
     ratio = by_branches(body, 0.1, amplitudes) / FACTORS(body, 0.1).dissipation(amplitudes)
     assert np.abs(ratio - 1.0).max() < 0.05
@@ -97,7 +79,7 @@ def test_the_means_over_a_mesh_are_those_of_all_branches():
 
 
 def test_the_dissipation_has_no_steps_over_the_amplitude():
-    kept = FACTORS(BODY(scene_of(0.2358)), 0.1)
+    kept = FACTORS(BODY(plane_strip(0.2358)), 0.1)
     amplitudes = np.geomspace(0.4, 1.8, 1200)
     slopes = np.diff(np.log(kept.dissipation(amplitudes))) / np.diff(np.log(amplitudes))
     assert np.abs(np.diff(slopes)).max() < 0.03  # a node's own threshold alone makes steps of .3
@@ -105,7 +87,7 @@ def test_the_dissipation_has_no_steps_over_the_amplitude():
 
 
 def test_what_is_not_nested_is_none():
-    lifted = FACTORS(BODY(scene_of(0.1126, mu=0.5)), 0.5).dissipation([0.2, 1.0])
+    lifted = FACTORS(BODY(plane_strip(0.1126, mu=0.5)), 0.5).dissipation([0.2, 1.0])
     assert np.all(np.isnan(lifted))
     # A bar that is pulled at its twelfth node slips there first.
     body = bar(np.linspace(2.0, 0.0, 20))
@@ -114,7 +96,7 @@ def test_what_is_not_nested_is_none():
 
 
 def test_factors_are_kept_and_shared():
-    scene = scene_of(0.1126)
+    scene = plane_strip(0.1126)
     kept = contact_line.factors(scene, nodes=33)
     amplitudes = np.linspace(0.2, 1.6, 5)
     np.testing.assert_allclose(
@@ -131,7 +113,7 @@ def test_factors_are_kept_and_shared():
 
 
 def test_the_slope_in_the_amplitude_is_that_of_differences():
-    kept = FACTORS(BODY(scene_of(0.1126)), 0.1)
+    kept = FACTORS(BODY(plane_strip(0.1126)), 0.1)
     at = 1.0 + np.linspace(0.0, 0.2, 9)
     slopes = jax.jit(jax.vmap(jax.grad(lambda a: kept.dissipation(a[None])[0])))(jnp.asarray(at))
     step = 1e-5
@@ -140,7 +122,7 @@ def test_the_slope_in_the_amplitude_is_that_of_differences():
 
 
 def test_a_named_section_is_that_section_or_refused():
-    named = scene_of(0.3).replace({"model.section": "shell", "load.entry": "face"})
+    named = plane_strip(0.3).replace({"model.section": "shell", "load.entry": "face"})
     linear, exact, plane = (
         float(contact_line.dissipation(named.replace(change), [0.5], nodes=33)[0])
         for change in (

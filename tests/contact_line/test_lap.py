@@ -1,6 +1,5 @@
 """Lap joints: two members on their contact line, beside elements, closed forms and limits."""
 
-import csv
 import json
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from toy import rows_of
 
 import jbeamshell as jb
 from calibration.finite_elements import lap
@@ -20,7 +20,6 @@ from jbeamshell.mechanics.bar import lap_backbone, lap_cubic_law
 from jbeamshell.scene import library
 
 BOLTED = Path(lap.__file__).with_name("lap.json")
-ELEMENTS = Path(__file__).parents[2] / "calibration/data/lap_joints.csv"
 JOINT = {"strip.far_end": "free", "member.support": "rolling", "load.amplitude": 1.0}
 SQUEEZE = jb.Scene().replace(JOINT | {"model.section": "squeeze"})
 pytestmark = pytest.mark.doubtful("the section squeeze")  # which these joints name
@@ -28,9 +27,7 @@ BOLT = [[0.75, 0.0], [0.75, 40.0], [1.25, 40.0], [1.25, 0.0]]
 
 
 def elements(problem):
-    with ELEMENTS.open() as file:
-        rows = [row for row in csv.DictReader(file) if row.pop("problem") == problem]
-    return [{name: float(value) for name, value in row.items()} for row in rows]
+    return [row for of, row in rows_of("lap_joints.csv", "problem") if of == problem]
 
 
 def of_row(row):
@@ -239,21 +236,6 @@ class TestHoles:
         pressed = np.asarray(history.reaction @ history.tributary)
         np.testing.assert_allclose(pressed, 20.0, rtol=0.01)  # the ends' supports carry some
 
-    @pytest.mark.parametrize(
-        ("values", "said"),
-        [
-            ({"member.holes": [[1.0, 0.6]]}, r"holes\[0\] = .* lies in no bolt's patch"),
-            ({"member.holes": [[1.0, -0.1]]}, "must be positive"),
-            ({"member.holes": [[1.0, 0.2], [1.1, 0.2]]}, "overlap"),
-            ({"member.holes": [1.0, 0.2]}, "give rows"),
-            ({"member.holes": [[2.5, 0.2]], "contact.pressure": 10.0}, "off the overlap"),
-            ({"member.clearance": 1e-4}, "member.clearance = .* needs member.bearing"),
-        ],
-    )
-    def test_holes_that_make_no_sense_are_refused(self, values, said):
-        with pytest.raises(jb.InputError, match=said):
-            library.single_lap().replace(values)
-
 
 def moments(amplitude, **values):
     """Single lap under a moment on its end."""
@@ -369,25 +351,6 @@ class TestGap:
         errors = [abs(along(at + h * way)[0] - value - h * slope) for h in (4e-3, 2e-3)]
         assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.4)
 
-    @pytest.mark.parametrize(
-        ("values", "said"),
-        [
-            ({"member.gap": [[0.0, -1.0], [1.0, 0.0]]}, "member.gap = .* nowhere negative"),
-            ({"member.gap": 1.0, "member.support": "none"}, "member.gap = 1.0: needs a second"),
-            ({"contact.bolts": [[1.9, 8.0, 0.4]]}, "lies off the overlap, X from 0 to 2"),
-            ({"contact.bolts": [[0.5, 8.0, 0.4], [0.8, 8.0, 0.4]]}, "patches overlap"),
-            ({"contact.bolts": [[1.0, -8.0, 0.4]]}, "must be positive"),
-            (
-                {"contact.bolts": [[1.0, 8.0]]},
-                "give rows of numbers \\[X, force, width of the patch",
-            ),
-            ({"contact.bolts": [[1.0, 8.0, 0.4]], "contact.pressure": 3.0}, "say the same thing"),
-        ],
-    )
-    def test_gaps_and_bolts_that_make_no_sense_are_refused(self, values, said):
-        with pytest.raises(jb.InputError, match=said):
-            SQUEEZE.replace(values)
-
     def test_bolts_are_patches_of_pressure_on_both_faces(self):
         rows = [[0.5, 8.0, 0.4], [1.5, 6.0, 0.3]]
         lap = SQUEEZE.replace({"member.support": "clamped", "contact.bolts": rows})
@@ -424,47 +387,6 @@ def test_derivatives_have_slope_two():
     value, slope = along(at)
     errors = [abs(along(at + h * way)[0] - value - h * slope) for h in (4e-4, 2e-4)]
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
-
-
-@pytest.mark.slow
-def test_a_sweep_runs_over_both_heights():
-    sweep = jb.sweep(
-        SQUEEZE, {"strip.height_ratio": [0.05, 0.1], "member.height_ratio": [0.05, 0.2]}
-    )
-    assert np.all(np.isfinite(sweep["dissipation"]))
-
-
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ({"strip.far_end": "guided"}, "strip.far_end = 'guided': must be 'free' in a lap joint"),
-        ({"contact.normal": "compliant"}, "contact.normal"),
-        ({"model.kinematics": "exact"}, "model.kinematics = 'exact': must be linear in a lap"),
-        ({"contact.normal": "held"}, "contact.normal = 'held': must be 'rigid'"),
-        ({"model.section": "bar"}, "model.section = 'bar': is no section of a lap joint"),
-        ({"contact.bottom_pressure": 3.0}, "must be 0 on a symmetry plane"),
-        ({"strip.curvature": 0.1}, "strip.curvature"),
-        ({"member.support": "none", "member.height_ratio": 0.1}, "give member.support"),
-        ({"member.support": "none", "member.loaded_end": "level"}, "give member.support"),
-        ({"member.support": "none", "member.assembly": "frictional"}, "give member.support"),
-        ({"member.layers": [[0.1, 1e5, 0.3]]}, "member.layers"),
-        ({"load.amplitude": 2.5}, "gross slip"),
-        ({"member.support": "none", "member.overhang": 0.1}, "give member.support"),
-        ({"member.support": "none", "member.bolt_stiffness": 1e3}, "give member.support"),
-        ({"member.support": "none", "load.arm": 0.1}, "load.arm = 0.1: needs a second member"),
-        ({"load.kind": "moment"}, "give the amplitude of a moment under force control"),
-        ({"load.kind": "moment", "load.amplitude": 1.0, "load.arm": 0.1}, "load.arm"),
-    ],
-)
-def test_what_is_no_joint_is_refused(values, said):
-    with pytest.raises(jb.InputError, match=said.replace("(", "\\(")):
-        jb.solve(SQUEEZE.replace(values))
-
-
-def test_a_joint_knows_no_load_steps():
-    for refused in (SQUEEZE.by_load_steps, lambda: jb.solve(SQUEEZE, by="steps")):
-        with pytest.raises(jb.InputError, match=r"model\.by = 'steps': is no engine of a lap"):
-            refused()
 
 
 @pytest.mark.doubtful("few nodes")

@@ -13,7 +13,6 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from jbeamshell.cli import main
 from jbeamshell.history import error_estimates, reliability
 from jbeamshell.history.reliability import TOLERANCE
 from verification.outcomes import outcome
@@ -278,13 +277,15 @@ def test_elements_are_halved_until_the_tolerance_is_kept(load, nodes):
     assert run.scene.pinned().plan.nodes == nodes
 
 
-def test_a_given_grid_is_never_refined():
-    given = {"load.amplitude": 0.1, "model.nodes": 65, "model.tolerance": 0.1}
-    assert jb.solve(jb.Scene().replace(given)).change is None
-
-
-def test_without_friction_nothing_is_refined():
-    assert jb.solve(jb.Scene().replace({"contact.friction": 0.0}), throw=False).change is None
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"load.amplitude": 0.1, "model.nodes": 65, "model.tolerance": 0.1},
+        {"contact.friction": 0.0},
+    ],
+)
+def test_a_given_grid_and_a_strip_without_friction_are_never_refined(values):
+    assert jb.solve(jb.Scene().replace(values), throw=False).change is None
 
 
 def test_a_refined_run_that_misses_its_tolerance_is_doubted(tmp_path):
@@ -415,15 +416,6 @@ def test_an_open_loop_and_a_failed_run_are_doubted():
     assert any("does not close" in doubt for doubt in opened.doubts)
     failed = jb.History(**(vars(history) | {"status": history.status.at[-1].set(1)}))
     assert [doubt[:33] for doubt in failed.doubts] == ["a load step found no equilibrium:"]
-
-
-def test_the_command_line_passes_doubts_on(capsys):
-    options = [f"--set={key}={value}" for key, value in (COARSE | LITTLE).items()]
-    assert main.main(["run", *options, "--json"]) == 0
-    out, err = capsys.readouterr()
-    doubts = json.loads(out)["doubts"]
-    assert doubts
-    assert err.splitlines() == [f"jbeamshell: warning: {doubt}" for doubt in doubts]
 
 
 # --- many cycles, few digits ----------------------------------------------------------------------

@@ -132,19 +132,3 @@ def ratios(order):
 @pytest.mark.parametrize("order", [1, 3])
 def test_the_ladder_climbs_to_elasticity(order):
     np.testing.assert_allclose(ratios(order), LADDER[order], rtol=0.02)
-
-
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        ({"model.section": "p0"}, "model.section = 'p0': choose 'bar'"),
-        ({"model.section": "p13"}, "model.section = 'p13': choose 'bar'"),
-        (
-            {"model.section": "p2", "strip.layers": [[0.2252, 2.0, 0.3]]},
-            "is for a straight homogeneous strip",
-        ),
-    ],
-)
-def test_strips_that_it_cannot_be(change, told):
-    with pytest.raises(jb.InputError, match=told):
-        STRIP.replace(change)

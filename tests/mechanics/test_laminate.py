@@ -363,64 +363,6 @@ def test_gradients_with_respect_to_every_number(plane, constants):
 
 # --- layers that are refused ---------------------------------------------------------------------
 
-TABLE = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
-
-
-@pytest.mark.parametrize(
-    ("layers", "words"),
-    [
-        (0.3, TABLE),
-        ([1.0, 5.0, 0.3], TABLE),
-        ([[1.0, 5.0], [1.0, 5.0]], TABLE),
-        ([[1.0, 5.0, 0.3], [1.0, 5.0]], TABLE),
-        ([], TABLE),
-        (np.empty((0, 3)), TABLE),
-        ("steel", TABLE),
-        ([["1.0", "5.0", "0.3"]], TABLE),
-        ([[1.0, 5.0, None]], TABLE),
-        ([[0.0, 5.0, 0.3], [2.0, 5.0, 0.3]], "the thickness must be a positive number, not 0.0"),
-        ([[2.0, 5.0, 0.3], [-1.0, 5.0, 0.3]], "the thickness must be a positive number, not -1.0"),
-        ([[np.nan, 5.0, 0.3]], "the thickness must be a positive number, not nan"),
-        ([[np.inf, 5.0, 0.3]], "the thickness must be a positive number, not inf"),
-        ([[2.0, 0.0, 0.3]], "the E must be a positive number, not 0.0"),
-        ([[2.0, -5.0, 0.3]], "the E must be a positive number, not -5.0"),
-        ([[2.0, np.inf, 0.3]], "the E must be a positive number, not inf"),
-        ([[2.0, 5.0, np.nan]], "nu must lie between -1 and 0.5, not nan"),
-        ([[2.0, 5.0, -1.0]], "nu must lie between -1 and 0.5, not -1.0"),
-        ([[2.0, 5.0, 0.51]], "nu must lie between -1 and 0.5, not 0.51"),
-        ([[1.0, 5.0, 0.3], [0.9, 5.0, 0.3]], "add up to 1.9, but the height 2H is 2;"),
-        ([[1.0, 5.0, 0.3], [1.000004, 5.0, 0.3]], "add up to 2.000004, but the height 2H is 2;"),
-    ],
-)
-@pytest.mark.parametrize("plane", PLANES)
-def test_layers_that_make_no_section(layers, words, plane):
-    with pytest.raises(InputError) as refusal:
-        check_layers(layers, 2.0, plane)
-    message = str(refusal.value)
-    assert message.startswith("strip.layers = ")
-    assert words in message
-    assert "\n" not in message
-
-
-def test_the_layer_at_fault_is_named():
-    with pytest.raises(
-        InputError, match=r"= \[1\.0, -5\.0, 0\.3\] \(row 2 from the bottom\): the E"
-    ):
-        check_layers(jnp.array([[1.0, 5.0, 0.3], [1.0, -5.0, 0.3]]), 2.0, "strain")
-
-
-def test_incompressible_layers_are_for_plane_stress():
-    layers = [[2.0, 5.0, 0.5]]
-    with pytest.raises(InputError, match=r"incompressible.*give 0\.499 or choose plane stress"):
-        check_layers(layers, 2.0, "strain")
-    check_layers(layers, 2.0, "stress")
-    check_layers([[2.0, 5.0, 0.499]], 2.0, "strain")
-
-
-def test_layers_that_are_accepted():
-    check_layers([[1, 5, 0], [1, 500, 0]], jnp.asarray(2.0), "strain")
-    check_layers(np.full((10, 3), [0.1, 5.0, 0.3], dtype=np.float32), np.float32(1.0), "stress")
-
 
 def test_traced_layers_and_heights_are_left_unchecked():
     bad = jnp.array([[1.0, -5.0, 0.3]])

@@ -7,7 +7,6 @@ from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import reference
-from jbeamshell.scene.keys import FORMER, TABLE
 from jbeamshell.scene.plan import CLOSED, STEPS
 from jbeamshell.scene.sections import SECTIONS
 from jbeamshell.scene.toml import overridden, scene_from_values
@@ -28,52 +27,6 @@ def test_names_come_back(section, tmp_path):
     assert again.model == scene.model
     assert again.plan == scene.plan
     assert f"section {section} " in str(scene)
-
-
-@pytest.mark.parametrize("section", ["p0", "p13", "p-1", "p", "beam", "condensed-p2", "Bar", ""])
-def test_unknown_names_are_refused(section):
-    told = rf"model\.section = '{section}': choose 'bar' or 'shell' or 'squeeze'"
-    with pytest.raises(jb.InputError, match=told):
-        on(section)
-
-
-# A value of each former key, and what its message names in its place.
-OLD = {
-    "strip.deviation": (0.1, "leave it out"),
-    "model.fields": (["v", "w", "beta", "psi"], "model.section"),
-    "model.rung": ("condensed-squeeze", "model.section"),
-    "model.order": (2, "model.section"),
-    "model.solution": ("stepwise", "model.by = steps"),
-    "model.squeeze": ("assumed", "model.section = assumed"),
-    "model.end_size": (0.01, "model.nodes"),
-    "strip.loaded_end": ("level", "member.loaded_end"),
-    "contact.assembly": ("frictional", "member.assembly"),
-    **{
-        f"contact.{name}": (0.1, f"member.{name}")
-        for name in ("gap", "bolt_stiffness", "bearing_stiffness", "clearance", "holes")
-    },
-}
-
-
-@pytest.mark.parametrize("key", FORMER)
-def test_a_former_key_is_told_the_new_one(key, tmp_path):
-    value, new = OLD[key]
-    assert key not in TABLE
-    heading, name = key.split(".")
-    path = tmp_path / "scene.toml"
-    path.write_text(f"[{heading}]\n{name} = {value!r}\n[load]\nentry = 'face'\n", "utf-8")
-    asked = (
-        lambda: jb.Scene().replace({key: value}),
-        lambda: jb.Scene().get(key),
-        lambda: jb.read_scene(path),
-    )
-    for ask in asked:
-        with pytest.raises(jb.InputError) as caught:
-            ask()
-        told = str(caught.value)
-        assert told.startswith(f"{key}: is no key any more; ")
-        assert new in told
-        assert "\n" not in told
 
 
 def test_a_section_keeps_the_lift():
@@ -127,21 +80,6 @@ def test_gradients_pass_through_the_bar():
 
 
 LAYERS = {"strip.layers": [[0.1, 1e5, 0.3], [0.1252, 2e5, 0.3]]}
-
-
-@pytest.mark.parametrize(
-    ("section", "more", "message"),
-    [
-        ("p2", LAYERS, r"model\.section = 'p2': .*homogeneous.*: take squeeze or plane"),
-        ("assumed", LAYERS, r"model\.section = 'assumed': is for a homogeneous strip"),
-        ("bar", {"contact.friction": 0.0}, r"contact\.friction = 0\.0: the bar needs friction"),
-        ("bar", {"load.control": "displacement", "load.amplitude": 1e-3}, "bar's gross slip"),
-        ("bar", {"contact.normal": "compliant"}, "another model.section than bar"),
-    ],
-)
-def test_what_a_section_cannot_represent(section, more, message):
-    with pytest.raises(jb.InputError, match=message):
-        jb.solve(on(section, **more))
 
 
 @pytest.mark.parametrize(

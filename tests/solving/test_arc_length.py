@@ -46,10 +46,3 @@ def test_below_gross_slip_it_is_the_path_of_the_force():
         scene({"model.kinematics": "linear"}), np.asarray(history.force)[1:], throw=False
     )
     np.testing.assert_allclose(pulled.displacement, history.displacement, rtol=1e-7, atol=1e-13)
-
-
-def test_what_it_cannot_do_is_refused():
-    with pytest.raises(
-        jb.InputError, match=r"load\.amplitude = None: give the amplitude under arc"
-    ):
-        jb.Load("arc-length")
