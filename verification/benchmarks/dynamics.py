@@ -8,11 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
-import matplotlib.pyplot as plt
 import numpy as np
 
 import jbeamshell as jb
-from jbeamshell import dynamics, plotting
+from jbeamshell import dynamics
 from jbeamshell.dynamics.release import HEAVY
 
 CYCLES = 4
@@ -74,17 +73,3 @@ def measure() -> dict[str, Any]:
             }
         )
     return {"solvers": rows}
-
-
-def draw(record: dict[str, Any]) -> plt.Figure:
-    """Error over time."""
-    with plotting.style():
-        figure, axes = plt.subplots(figsize=(5.4, 4.0))
-        methods = dict.fromkeys(row["method"] for row in record["solvers"])
-        for method, colour in zip(methods, plotting.PALETTE, strict=False):
-            rows = [row for row in record["solvers"] if row["method"] == method]
-            seconds, errors = ([row[name] for row in rows] for name in ("seconds", "error"))
-            axes.loglog(seconds, errors, "o-", color=colour, label=method)
-        axes.set(xlabel="seconds of a warm run", ylabel="largest error of $u(L)$, relative")
-        axes.legend()
-    return figure
