@@ -1,6 +1,8 @@
 """The comparisons: each is whole, its record is of today's cases, and it keeps its bound."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +54,15 @@ def test_the_command_names_the_cases_that_there_are(capsys):
     with pytest.raises(SystemExit):
         main(["nothing of that kind"])
     assert "preloaded M12 bolt, energy" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_command_runs_a_case():
+    """In a process of its own, which no import may have started JAX before it is configured."""
+    words = [sys.executable, "-m", "calibration.comparisons", "Orion"]
+    done = subprocess.run(words, cwd=HERE.parents[1], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "1 within their bounds" in done.stdout
 
 
 def test_a_folder_without_the_files_leaves_the_record(tmp_path, capsys, monkeypatch):

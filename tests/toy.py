@@ -1,9 +1,8 @@
 """Standard strips, rows of finite elements, and a measurement that a formula answers."""
 
 import csv
-from pathlib import Path
-
 import dataclasses
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np

@@ -22,7 +22,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from tqdm import tqdm
@@ -33,7 +32,6 @@ from calibration.provenance import provenance
 from calibration.strip import changed
 from jbeamshell.common.files import write_text
 from jbeamshell.history.reliability import TOLERANCE
-from jbeamshell.plotting.style import style
 from verification.outcomes import OUTCOMES
 from verification.random_scenes import KINDS, Kind, Values
 
@@ -307,13 +305,3 @@ def draw_estimates(rows: list[Row], axes: Axes) -> Axes:
     axes.set(xscale="log", yscale="log", xlabel="estimate of the run  [1]", ylabel=OFF)
     axes.legend(fontsize=7)
     return axes
-
-
-def draw(record: Row) -> plt.Figure:
-    """Outcomes by kind, and errors against estimates."""
-    rows = read()
-    with style():
-        figure, panels = plt.subplots(1, 2, figsize=(10.0, 4.6), layout="constrained")
-        draw_outcomes(rows, panels[0])
-        draw_estimates(rows, panels[1])
-    return figure

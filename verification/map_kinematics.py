@@ -24,7 +24,6 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
@@ -32,7 +31,6 @@ from tqdm import tqdm
 
 import jbeamshell as jb
 from calibration.strip import changed, in_load_steps
-from jbeamshell import plotting
 from jbeamshell.scene.linearisation import BEAMSHELL, SECTIONS, bound
 
 STRAINS = np.logspace(-6.0, -0.5, 12)
@@ -53,12 +51,6 @@ MODELS: dict[str, dict[str, Any]] = {
 COLUMNS = ("strain", "eta", "gross", "mu", "nu", "dissipation", "stiffness", "rotation", "state")
 LANES = 16  # solved at once
 SETS = ("grid", "scattered", "p3", "lift")
-NAMES = {
-    "grid": "squeeze, grid",
-    "scattered": "squeeze, scattered",
-    "p3": "p3, scattered",
-    "lift": "squeeze with lift, scattered",
-}
 COVERED = 0.99  # aimed at by the fit
 LEAST = 1e-4  # a smaller difference is none
 
@@ -205,30 +197,3 @@ def tell(record: dict[str, Any]) -> str:
         best = ", ".join(f"{value:.3g}" for value in fitted(some, used))
         lines.append(f"constants in use: {used}; that fit best: {best}")
     return "\n".join(lines)
-
-
-# --- picture --------------------------------------------------------------------------------------
-
-
-def draw(record: dict[str, Any]) -> plt.Figure:
-    """Picture of the bound over the larger of the two differences."""
-    with plotting.style():
-        figure, axes = plt.subplots(figsize=(5.6, 4.8))
-        for name, colour in zip(SETS, plotting.colours(len(SETS)), strict=True):
-            c = columns(record[name])
-            size = 8.0 if name == "grid" else 16.0
-            axes.scatter(larger(c), limit(name, c), size, color=colour, label=NAMES[name], lw=0)
-        ends = np.array([1e-9, 10.0])
-        axes.plot(ends, ends, color=plotting.DATA, linewidth=1.0)
-        axes.plot(ends, 5.0 * ends, "--", color=plotting.FAINT, linewidth=1.0)
-        axes.set(
-            xscale="log",
-            yscale="log",
-            xlim=ends,
-            ylim=ends,
-            xlabel="measured difference, the larger of $D$ and secant stiffness  [1]",
-            ylabel="bound  [1]",
-            title="the closed-form bound: equal (line), fivefold (dashes)",
-        )
-        axes.legend(loc="lower right")
-    return figure

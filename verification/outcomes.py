@@ -16,7 +16,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from calibration.charts import Record
 from jbeamshell.common.errors import InputError
@@ -43,10 +42,6 @@ NAMES = {
     "nu": r"$\nu$",
     "kappa_s": r"$\kappa_s$",
     "alpha": r"$\alpha$",
-    "stiffness": r"$E'\,2H$",
-    "k_n": r"$k_n\,H/E'$",
-    "m": r"$m$",
-    "method": "",
 }
 
 
@@ -151,27 +146,12 @@ def scatter(record: Record, axes: Axes | None = None) -> Axes:
     return axes
 
 
-def sheets(record: Record) -> dict[str, Figure]:
-    """Sheet of all maps of the record, with a key to the colours, and the random strips."""
+def draw(record: Record) -> dict[str, Figure]:
+    """Picture of the random strips, by its name."""
     with style():
-        figures = {"maps": _sheet(record, list(maps(record)))}
-        figures["scenes"] = plt.subplots(figsize=(6.4, 5.2))[0]
-        scatter(record, figures["scenes"].axes[0])
-    return figures
-
-
-def _sheet(record: Record, names: Sequence[str]) -> Figure:
-    """Sheet with some maps."""
-    rows = -(-len(names) // 2)
-    figure, grid = plt.subplots(rows, 2, figsize=(13.0, 3.6 * rows), squeeze=False)
-    for axes in grid.flat[len(names) :]:
-        axes.set_axis_off()
-    for name, axes in zip(names, grid.flat, strict=False):
-        outcome_map(record, name, axes)
-    keys = [Patch(facecolor=c, edgecolor="0.4", label=kind) for kind, c in OUTCOMES.items()]
-    title = "in the cells: error of the dissipation [%]"
-    figure.legend(handles=keys, loc="outside upper center", ncols=len(keys), title=title)
-    return figure
+        figure = plt.subplots(figsize=(6.4, 5.2))[0]
+        scatter(record, figure.axes[0])
+    return {"scenes": figure}
 
 
 def _per_cent(error: float) -> str:

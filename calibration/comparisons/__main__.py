@@ -26,11 +26,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("name", nargs="*", help="words of the names of the cases (default: all)")
     parser.add_argument("--data", type=Path, help="folder of measurements, to take them again")
     options = parser.parse_args(arguments)
-    jb.configure()
     cases = all_cases()
     chosen = [c for c in cases if not options.name or any(word in c.name for word in options.name)]
     if not chosen:
         parser.error("no such case: choose among " + ", ".join(case.name for case in cases))
+    jb.configure()
     if options.data is not None:
         measurements.record(options.data)
     results = [case.run() for case in tqdm(chosen, disable=None, unit="case")]

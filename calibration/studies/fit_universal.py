@@ -8,14 +8,13 @@ little at any load.  A sixth strip that is not fitted checks the result.  Takes 
 
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from tqdm import tqdm
 
 import jbeamshell as jb
 from calibration.strip import in_load_steps
 from calibration.tables import energies
-from jbeamshell import identify, plotting
+from jbeamshell import identify
 from jbeamshell.measured.curves import DissipationCurve
 from jbeamshell.measured.example import HEIGHT_RATIOS
 
@@ -105,41 +104,3 @@ def tell(record: dict[str, Any]) -> str:
             f"{100 * one['rms_unseen']:.2f} %; {one['status']}"
         )
     return "\n".join(lines)
-
-
-def draw(record: dict[str, Any]) -> plt.Figure:
-    """Picture of the dissipation with one pair for all strips, and of the error by smoothing."""
-    fits = record["fits"]
-    (chosen,) = (one for one in fits if one["smoothing"] == record["chosen_smoothing"])
-    with plotting.style():
-        figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 4.2))
-        shades = plotting.colours(len(HEIGHT_RATIOS))
-        for eta, shade in zip(HEIGHT_RATIOS, shades, strict=True):
-            data, ratio = curve(eta)
-            model = ratio * np.exp(chosen["log_error"][f"{eta}"])
-            left.loglog(data.amplitude, ratio, **plotting.DOTS | {"markersize": 4.0})
-            left.loglog(data.amplitude, model, color=shade, label=rf"$\eta$ = {eta:g}")
-        kappa_s, alpha = (chosen["values"][key]["value"] for key in FREE)
-        left.set(
-            xlabel=r"amplitude  $A\,/\,\mu F_N a$  [1]",
-            ylabel=r"$D\,/\,(2/3)A^3$  [1]",
-            title=rf"one $\kappa_s$ = {kappa_s:.2f} and $\alpha$ = {alpha:.2f} "
-            f"for all strips ($m$ = {CHOSEN:g})",
-        )
-        left.legend()
-        places = [one["smoothing"] for one in fits]
-        for name, label, shade in (
-            ("rms_all", f"all cells, $A \\geq$ {LEAST_AMPLITUDE:g}", plotting.PALETTE[0]),
-            ("rms_strong", f"$D$ above {STRONG:g} of the cubic law", plotting.PALETTE[1]),
-        ):
-            right.loglog(places, [100 * one[name] for one in fits], "o-", color=shade, label=label)
-        right.set_xticks(places, [f"{m:g}" for m in places])
-        right.set_yticks((2, 5, 10, 20), ("2", "5", "10", "20"))
-        right.minorticks_off()
-        right.set(
-            xlabel="smoothing $m$ of Coulomb's law  [1]",
-            ylabel=r"rms error of $\log D$  [%]",
-            title="what is left after the fit",
-        )
-        right.legend()
-    return figure

@@ -16,14 +16,13 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any
 
 import jax
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy import stats
 from tqdm import tqdm
 
 import jbeamshell as jb
 from calibration.strip import in_load_steps
-from jbeamshell import identify, plotting
+from jbeamshell import identify
 from jbeamshell.measured.loops import Loop, make_loop
 
 TRUTH = {
@@ -32,7 +31,6 @@ TRUTH = {
     "strip.kappa_s": 0.44,
     "contact.stick_stiffness": 10.0,
 }
-SYMBOLS = (r"$\mu$", r"$\eta$", r"$\kappa_s$", r"$\alpha$")
 START = {
     "contact.friction": 0.12,
     "strip.height_ratio": 0.2,
@@ -170,27 +168,3 @@ def tell(record: dict[str, Any]) -> str:
                 f"{100 * told['likelihood_holds_95']:.0f} %"
             )
     return "\n".join(lines)
-
-
-def draw(record: dict[str, Any]) -> plt.Figure:
-    """Picture of the estimates over the true values, by noise: median, spread and its estimate."""
-    with plotting.style():
-        figure, panels = plt.subplots(1, len(TRUTH), figsize=(11.0, 3.6))
-        place = np.arange(len(NOISES))
-        for panel, (key, truth), symbol in zip(panels, TRUTH.items(), SYMBOLS, strict=True):
-            own = [noise[key] for noise in record["noises"]]
-            middle = np.array([one["median"] for one in own]) / truth
-            for shift, name, label in (
-                (-0.1, "spread", "spread of 50 fits"),
-                (0.1, "standard_error", "standard error that they tell"),
-            ):
-                size = np.array([one[name] for one in own])
-                bars = middle * np.stack([1.0 - np.exp(-size), np.exp(size) - 1.0])
-                look = {"fmt": "o", "markersize": 4.0, "capsize": 3.0, "label": label}
-                panel.errorbar(place + shift, middle, bars, **look)
-            panel.axhline(1.0, color=plotting.DATA, linewidth=1.0)
-            panel.set_xticks(place, [f"{100 * noise:g} %" for noise in NOISES])
-            panel.set(title=symbol, xlabel="noise over range  [1]")
-        panels[0].set_ylabel("fitted over true value  [1]")
-        panels[0].legend(loc="upper left", fontsize=7)
-    return figure

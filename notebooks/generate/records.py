@@ -51,8 +51,6 @@ def tables(root: Path) -> dict[str, str]:
         "table_campaign.md": campaign(read()),
         "table_defaults.md": defaults(read()),
         "table_balance.md": balance(_read(verification / "balance_in_time.json")),
-        "table_solvers.md": solvers(_read(verification / "methods.json")["solvers"]),
-        "table_friction.md": friction(_read(verification / "methods.json")["laws"]),
     }
 
 
@@ -299,32 +297,6 @@ def balance(record: dict) -> str:
     ]
     heads = ("frequency over the first natural one", "structures", "median", "largest")
     return table(heads, lines)
-
-
-def solvers(record: dict) -> str:
-    """Newton's methods on the same random strips."""
-    rows = [
-        (
-            row["method"],
-            percent(row["found"], 3),
-            percent(row["wrong"], 3),
-            f"{row['iterations']:.1f}",
-        )
-        for row in record["rows"]
-    ]
-    return table(("method", "strips solved", "wrong by more than 2 %", "iterations a step"), rows)
-
-
-def friction(record: dict) -> str:
-    """Dissipation of friction laws over the number of load steps."""
-    rows = [
-        (row["law"], *(f"{value:.4g}" for value in row["dissipation"]), f"{row['drift']:.1g}")
-        for row in record["rows"]
-        if row["scene"] == "standard"
-    ]
-    steps = next(row["steps"] for row in record["rows"] if row["scene"] == "standard")
-    heads = ("law", *(f"D, {count} steps" for count in steps), "creep of u per cycle")
-    return table(heads, rows)
 
 
 def table(heads: Sequence[str], rows: Rows) -> str:

@@ -20,28 +20,18 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 import jbeamshell as jb
 from calibration.running import read
 from calibration.tables import rows
 from jbeamshell import contact_line
 from jbeamshell.contact_line.dissipation import NODES, REFINED
-from jbeamshell.plotting.style import DATA, PALETTE, style
 from verification.benchmarks.speeds.machine import peak_gflops
 
 ETA, AMPLITUDE = 0.1126, 0.7855
 COUNTS = (17, 25, 33, 49, 65, 89, 129)
 BUDGET = 2.0  # seconds of a repeated call
-SINGLE = {  # rows of the record of speed, of another machine: label, colour and marker of each
-    "dissipation, 1 step": ("beamshell, 41 nodes", PALETTE[2], "^"),
-    "CalculiX, 4 steps": ("CalculiX", DATA, "P"),
-    "CalculiX, 20 steps": ("", DATA, "P"),
-}
-KINDS = (("kept_us", "matrices kept", "-"), ("built_us", "building included", "--"))
 WANTED = (0.01, 0.005, 0.002)
 MESHES = ((30, 3), (40, 4), (60, 6), (80, 8), (120, 12))
 STEPS = (10, 20, 40)  # per quarter cycle
@@ -197,35 +187,3 @@ def measure(peer: str = "") -> dict[str, Any]:
         "error": error(),
     }
     return found | {"peer": beside(peer) if peer else known.get("peer")}
-
-
-# --- chart ----------------------------------------------------------------------------------------
-
-
-def draw(record: dict[str, Any]) -> Figure:
-    """Draw errors of D against elasticity [%] over the time of a cycle [ms], both logarithmic."""
-    with style():
-        figure, axes = plt.subplots(figsize=(6.4, 4.8))
-        _draw(axes, record, read(Path(__file__).with_name("speed.json")))
-    return figure
-
-
-def _draw(axes: Axes, condensed: dict[str, Any], speeds: dict[str, Any]) -> None:
-    rivals = (("ours", "plane", PALETTE[0], "o"), ("theirs", "condensed elements", PALETTE[1], "s"))
-    for name, label, colour, marker in rivals:
-        rows = [r for r in condensed["peer"][name] if r.get("steps_per_quarter", 10) == 10]
-        error = [100.0 * abs(row["error"]) for row in rows]
-        for kind, how, dashes in KINDS:
-            times = [1e-3 * row[kind] for row in rows]
-            axes.plot(times, error, dashes, color=colour, marker=marker, label=f"{label}, {how}")
-    for row in speeds["one"]["rows"]:
-        if row["what"] in SINGLE:
-            label, colour, marker = SINGLE[row["what"]]
-            place = 1e-3 * row["best_us"], 100.0 * abs(row["error_to_elements"])
-            axes.plot(*place, linestyle="", color=colour, marker=marker, label=label or None)
-    axes.set(xscale="log", yscale="log", xlim=(1e-2, 1e5))
-    axes.set_xlabel("time of a cycle on one core  [ms]")
-    axes.set_ylabel("error of the dissipation to elasticity  [%]")
-    axes.legend(
-        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize=8, handlelength=3.5
-    )

@@ -8,11 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
-import matplotlib.pyplot as plt
 import numpy as np
 
 import jbeamshell as jb
-from jbeamshell import dynamics, plotting
+from jbeamshell import dynamics
 from jbeamshell.dynamics.release import HEAVY
 
 CYCLES = 4
@@ -63,13 +62,3 @@ def measure() -> dict[str, Any]:
             }
         )
     return {"steps": rows}
-
-
-def draw(record: dict[str, Any]) -> plt.Figure:
-    """Error over time."""
-    with plotting.style():
-        figure, axes = plt.subplots(figsize=(5.4, 4.0))
-        seconds, errors = ([row[name] for row in record["steps"]] for name in ("seconds", "error"))
-        axes.loglog(seconds, errors, "o-", color=plotting.PALETTE[0])
-        axes.set(xlabel="seconds of a warm run", ylabel="largest error of $u(L)$, relative")
-    return figure

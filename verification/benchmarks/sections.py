@@ -6,7 +6,6 @@ Times and errors side by side are those of work_precision.
 
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
@@ -25,7 +24,6 @@ NODES, STEPS = 81, 10  # load steps per half cycle
 CONTOURS = (1.0, 5.0, 20.0)  # per cent
 SMALLEST = 1e-3  # per cent, of errors drawn
 SHADES = (0.1, 100.0)  # per cent, of the lightest and the darkest colour
-DRAWN = ("bar", "shell", "squeeze", "p4")
 CELL = {"xlabel": "$\\eta = H/(L/2)$  [1]", "ylabel": "$A\\,/\\,(\\mu F_N L/2)$  [1]"}
 
 
@@ -78,18 +76,6 @@ def measure() -> dict[str, Any]:
 
 
 # --- chart ----------------------------------------------------------------------------------------
-
-
-def draw(record: Record) -> plt.Figure:
-    """Maps of some sections side by side."""
-    with style():
-        figure, panels = plt.subplots(1, len(DRAWN), figsize=(10.2, 2.8), sharex=True, sharey=True)
-        for axes, section in zip(panels, DRAWN, strict=True):
-            error_map(record, section, axes, colour_bar=False)
-            axes.label_outer()
-        label = "error of $D$  [%]"
-        figure.colorbar(panels[0].collections[0], ax=panels, extend="both", label=label)
-    return figure
 
 
 def error_map(
