@@ -95,6 +95,19 @@ def checked_softness(upper: FaceBody, softness: ArrayLike) -> Array:
     return jnp.broadcast_to(soft, (2,))[np.array([0, 0, 1])] / upper.areas[:, None]
 
 
+def checked_roughness(upper: FaceBody, roughness: ArrayLike) -> Array:
+    """Height h and force F_0 (n, 2) of the surfaces at each pair."""
+    rough = as_leaf(roughness, "roughness")
+    if rough.ndim == 0 and not is_traced(rough) and float(rough) == 0.0:
+        rough = jnp.array([0.0, 1.0])
+    require("roughness", roughness, rough.shape == (2,), "give 0, or a height and a pressure")
+    _require_not_negative("roughness", rough)
+    fix = "needs a pressure above 0: that at which surfaces are twice as stiff as at first touch"
+    require("roughness", roughness, is_traced(rough) or bool(rough[1] > 0.0), fix)
+    areas = upper.areas[:, None]
+    return jnp.broadcast_to(rough, (areas.size, 2)) * jnp.concatenate([areas**0, areas], axis=1)
+
+
 def _require_not_negative(key: str, value: Array) -> None:
     require_finite(key, value)
     fine = is_traced(value) or bool(np.all(np.asarray(value) >= 0.0))

@@ -13,7 +13,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import TINY, as_leaf, is_traced, require
 from jbeamshell.contact_face.body import RIGID, FaceBody
-from jbeamshell.contact_face.face_input import checked_distance, checked_softness
+from jbeamshell.contact_face.face_input import checked_distance, checked_roughness, checked_softness
 from jbeamshell.contact_face.pair import Pairs
 from jbeamshell.contact_face.step import Face
 from jbeamshell.contact_line.pair import together
@@ -52,6 +52,7 @@ def joined(
     friction: ArrayLike,
     gap: ArrayLike,
     softness: ArrayLike,
+    roughness: ArrayLike,
 ) -> Joined:
     """Bodies joined on their face."""
     n = upper.areas.size
@@ -68,7 +69,12 @@ def joined(
     own = jnp.diag(stiffness).reshape(n, 3)
     scale = jnp.stack([jnp.max(own[:, :2], axis=1), own[:, 2]], axis=1)
     scale = jnp.where(scale > 0.0, scale, jnp.max(own))  # of a pair that supports hold
-    pairs = Pairs(jnp.broadcast_to(as_leaf(friction), (n,)), distance, lax.stop_gradient(scale))
+    pairs = Pairs(
+        friction=jnp.broadcast_to(as_leaf(friction), (n,)),
+        gap=distance,
+        roughness=checked_roughness(upper, roughness),
+        scale=lax.stop_gradient(scale),
+    )
     return Joined(Face(stiffness, loads, jnp.asarray(held), pairs), rest, soft)
 
 

@@ -3,7 +3,9 @@
 With v = (v_1, v_2, v_n) the displacement of the upper node over the lower one, lambda the force
 that the contact puts on the upper node, and s the slip so far, the excess of a displacement is
 
-    e_t = v_t - s,      e_n = gap + v_n.
+    e_t = v_t - s,      e_n = gap + v_n + h log(1 + lambda_n / F_0),
+
+the last part for rough surfaces, whose heights are exponential (Greenwood and Williamson 1966).
 
 A step is in equilibrium where, for any rho > 0,
 
@@ -29,12 +31,14 @@ class Pairs(NamedTuple):
     ----------
     friction : (n,) Coulomb's coefficient mu
     gap : (n,) distance before anything presses
+    roughness : (n, 2) h and F_0 of the surfaces; an h of 0 is smooth
     scale : (n, 2) rho, stiffness of the bodies at the pair, tangential and normal: both tangents
         share one, or friction would not point against the slip
     """
 
     friction: Array
     gap: Array
+    roughness: Array
     scale: Array
 
 
@@ -50,7 +54,9 @@ def contact_force(force: Array, move: Array, slip: Array, pair: Pairs) -> Array:
     pair : numbers of this pair
     """
     rho_t, rho_n = pair.scale
-    normal = jnp.maximum(force[2] - rho_n * (pair.gap + move[2]), 0.0)
+    height, reference = pair.roughness
+    approach = height * jnp.log1p(jnp.maximum(force[2], 0.0) / reference)
+    normal = jnp.maximum(force[2] - rho_n * (pair.gap + move[2] + approach), 0.0)
     trial = force[:2] - rho_t * (move[:2] - slip)
     square, radius = jnp.sum(trial**2), pair.friction * normal
     slides = square > radius**2

@@ -60,12 +60,14 @@ def solve_faces(
     bolts: ArrayLike = 1.0,
     gap: ArrayLike = 0.0,
     softness: ArrayLike = 0.0,
+    roughness: ArrayLike = 0.0,
     assembly: str = "frictional",
     throw: bool = True,
 ) -> FaceHistory:
     """Press bodies together on a face, load them to and fro, and return the history.
 
-    All numbers may be traced: those of the bodies, friction, amplitude, bolts, gap and softness.
+    All numbers may be traced: those of the bodies, friction, amplitude,
+    bolts, gap, softness and roughness.
 
     Parameters
     ----------
@@ -81,6 +83,8 @@ def solve_faces(
     gap : distance of the nodes before anything presses, a number or (n,)
     softness : displacement per pressure of the surfaces themselves, tangential and normal, a
         number or (2,), length per stress; 0 is rigid contact
+    roughness : (2,) h and p_0 of rough surfaces, which approach each other by h log(1 + p / p_0)
+        under a pressure p (exponential heights, Greenwood and Williamson 1966); 0 is smooth
     assembly : "frictional", as bolts are tightened one with the other in several steps, or
         "frictionless", which locks no shear in; a body that friction alone holds needs the first
     throw : True raises for a load without equilibrium and warns of doubts; False returns NaN, and
@@ -108,7 +112,7 @@ def solve_faces(
     require_number("friction", jnp.min(as_leaf(friction)), NOT_NEGATIVE, low=-TINY)
     sizes = checked_bolts(upper, lower, bolts)
     loads = load_path(amplitude, cycles, steps_per_half_cycle, path, sizes)
-    bodies = joined(upper, lower, friction, gap, softness)
+    bodies = joined(upper, lower, friction, gap, softness, roughness)
     face = bodies.driven() if control == "displacement" else bodies.face
     half = steps_per_half_cycle if path is None and cycles is None else None
     frictional, most = assembly == "frictional", jnp.asarray(MOST_CYCLES)

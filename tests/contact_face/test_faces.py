@@ -73,6 +73,15 @@ class TestPoint:
             np.testing.assert_allclose(each, [*tangential, normal], atol=1e-10)
             slip = moved[:2] + soft[0] * tangential
 
+    def test_rough_surfaces_approach_as_exponential_heights_do(self):
+        height, pressure = 0.3, 0.2
+        loads = np.array([0.5, 1.0, 3.0, 0.7])
+        path = np.column_stack([0.0 * loads, 0.0 * loads, loads])
+        history = jb.solve_faces(point(), bolts=[0.0, 0.1], roughness=[height, pressure], path=path)
+        found, gap = history.reaction[1:, 0], -history.gap[1:, 0]
+        np.testing.assert_allclose(gap, height * np.log1p(found / pressure), rtol=1e-9)
+        np.testing.assert_allclose(found, loads - gap, rtol=1e-9)  # the rest is in the spring of 1
+
 
 def path_forces(path):
     pressing = np.array([[0.0, 0.0, 1.0]])
@@ -190,17 +199,17 @@ class TestBlock:
         )
         np.testing.assert_allclose(found.force, forces.force, atol=1e-5)
 
-    @pytest.mark.parametrize("key", ["friction", "bolts", "gap", "amplitude"])
+    @pytest.mark.parametrize("key", ["friction", "bolts", "gap", "softness", "roughness"])
     def test_derivatives_have_the_slope_of_taylor(self, key):
-        start = {"friction": 0.3, "bolts": 10.0, "gap": 1.0, "amplitude": 700.0}
-        options = {"cycles": 1, "steps_per_half_cycle": 8, "throw": False}
+        start = {"friction": 0.3, "bolts": 10.0, "gap": 1.0, "softness": 1e-6, "roughness": 1e-5}
+        options = {"amplitude": 700.0, "cycles": 1, "steps_per_half_cycle": 8, "throw": False}
 
         def work(value):
             inputs = start | {key: value}
             wedge = 1e-7 * (block().places[:, 0] - 20.0) ** 2
-            history = jb.solve_faces(
-                block(), **(inputs | {"gap": inputs["gap"] * wedge}), **options
-            )
+            inputs["gap"] *= wedge
+            inputs["roughness"] = inputs["roughness"] * jnp.array([1.0, 1e6])
+            history = jb.solve_faces(block(), **inputs, **options)
             return jnp.sum(history.slip_work)
 
         value = jnp.asarray(start[key])
@@ -224,6 +233,8 @@ class TestRefusals:
             ({"gap": -1.0}, "gap = -1"),
             ({"gap": [1.0, 2.0]}, "gap = "),
             ({"softness": [1.0, 2.0, 3.0]}, "softness = "),
+            ({"roughness": 0.3}, "roughness = 0.3"),
+            ({"roughness": [0.3, 0.0]}, "roughness = "),
             ({"path": np.zeros((2, 5))}, "path = "),
             ({"bolts": [1.0, 2.0]}, "bolts = "),
             ({"control": "speed"}, "control = 'speed'"),
