@@ -20,7 +20,7 @@ CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 def write(element: Element, draft: Path) -> None:
     """Write the cards of a joint between two reference nodes."""
-    reach, base, top = float(element.displacement[-1]), FIRST + 8, FIRST + 9
+    reach, base, top = element.reach, FIRST + 8, FIRST + 9
     side = 10.0 ** math.ceil(math.log10(reach / LARGEST_SHEAR))
     notes = [
         "In a model: *INCLUDE this file before the first step.  Degree of freedom 1 of node",

@@ -9,56 +9,50 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from jbeamshell.dynamics.four_parameters import FourParameters
+if TYPE_CHECKING:
+    from jbeamshell.dynamics.structure.joint import Joint
 
 NEGLIGIBLE = 1e-13  # stiffness of a slider that is left out, over that of all
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Element:
-    """Numbers of a joint, and what they mean.
+    """Joint that leaves, in Python's numbers.
 
     Attributes
     ----------
-    displacement, force : (k + 1,) points of the backbone
-    stiffness : (k,) of the sliders
-    limit : (k,) forces at which they slip
-    spring : stiffness of the spring beside them
-    width : width of the strip, with which forces are multiplied already
-    asymmetry : largest difference of pull and push from the backbone, over the displacement
-    capacity : force of gross slip; infinite if it is not known
+    joint : the joint
     units : names of the units of displacement and force
-    sides : (2, k + 1) displacements of pull and push at the forces; None if they do not differ
-    model : four-parameter Iwan model of the same joint, for targets that have one
     """
 
-    displacement: NDArray[np.float64]
-    force: NDArray[np.float64]
-    stiffness: NDArray[np.float64]
-    limit: NDArray[np.float64]
-    spring: float
-    width: float
-    asymmetry: float
-    capacity: float
+    joint: Joint
     units: tuple[str, str]
-    sides: NDArray[np.float64] | None = None
-    model: FourParameters | None = None
+
+    @property
+    def spring(self) -> float:
+        """Stiffness of the spring beside the sliders."""
+        return float(self.joint.spring)
+
+    @property
+    def reach(self) -> float:
+        """Displacement at the last point of the backbone."""
+        return float(self.joint.displacements[-1])
 
     @property
     def sliders(self) -> list[tuple[float, float]]:
         """Stiffness and limit of each slider that is not negligible."""
-        total = self.spring + float(np.sum(self.stiffness))
-        kept = self.stiffness > NEGLIGIBLE * total
-        return list(zip(self.stiffness[kept].tolist(), self.limit[kept].tolist(), strict=True))
+        stiffness, limit = (np.asarray(a, float) for a in (self.joint.springs, self.joint.limits))
+        kept = stiffness > NEGLIGIBLE * float(self.joint.stiffness)
+        return list(zip(stiffness[kept].tolist(), limit[kept].tolist(), strict=True))
 
     @property
     def slides(self) -> bool:
         """True if no spring remains at the last point, so that the force stays there."""
-        return self.spring <= NEGLIGIBLE * float(np.sum(self.stiffness))
+        return self.spring <= NEGLIGIBLE * (float(self.joint.stiffness) - self.spring)
 
     @property
     def title(self) -> str:
@@ -71,16 +65,16 @@ class Element:
     @property
     def facts(self) -> list[str]:
         """Units, sign, width, range and asymmetry, a line each."""
-        length, force = self.units
-        reach, top = float(self.displacement[-1]), float(self.force[-1])
+        (length, force), joint = self.units, self.joint
         beyond = "the joint slides at this force" if self.slides else "nothing is known"
+        top = f"{float(joint.forces[-1]):.6g}"
         return [
             f"Units: u in {length}, F in {force}, stiffness in {force}/{length}.",
-            f"Width: {self.width!r} {length}; forces are those of the whole width.",
+            f"Width: {float(joint.width)!r} {length}; forces are those of the whole width.",
             "Sign: positive in a pull.  F moves the end by u; -F acts on what pulls.",
-            f"Range: |F| <= {top:.6g}, |u| <= {reach:.6g}; beyond, {beyond}.",
+            f"Range: |F| <= {top}, |u| <= {self.reach:.6g}; beyond, {beyond}.",
             f"Pull and push: this is their mean; each differs from it by up to "
-            f"{100.0 * self.asymmetry:.2g} % of u at one F.",
+            f"{100.0 * float(joint.asymmetry):.2g} % of u at one F.",
         ]
 
     def comment(self, sign: str, more: Sequence[str]) -> str:

@@ -33,7 +33,7 @@ def write(element: Element, draft: Path) -> None:
         "about": " ".join([element.title, *element.facts]),
         "sliders": element.sliders,
         "spring": element.spring,
-        "reach": float(element.displacement[-1]),
+        "reach": element.reach,
         "units": element.units,
     }
     with tempfile.TemporaryDirectory() as name:

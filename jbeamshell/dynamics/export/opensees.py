@@ -68,7 +68,7 @@ def write(element: Element, draft: Path) -> None:
         + "\nimport openseespy.opensees as ops\n\n"
         + "# stiffness and slip force of each slider\nSLIDERS = "
         + rows(element.sliders)
-        + f"SPRING = {element.spring!r}\nREACH = {float(element.displacement[-1])!r}\n"
+        + f"SPRING = {element.spring!r}\nREACH = {element.reach!r}\n"
         + CODE,
         encoding="utf-8",
     )

@@ -30,17 +30,18 @@ def write(element: Element, draft: Path) -> None:
         "last row is the spring, which has no limit.  capacity: force of gross slip, if it is",
         "known.  pull, push: displacements of each way at the forces, if they differ.",
     ]
-    columns = {
-        "displacement": element.displacement,
-        "force": element.force,
-        "stiffness": np.append(element.stiffness, element.spring),
-        "limit": np.append(element.limit, np.nan),
+    joint = element.joint
+    capacity = joint.capacity if np.isfinite(joint.capacity) else np.nan
+    given = {
+        "displacement": joint.displacements,
+        "force": joint.forces,
+        "stiffness": np.append(joint.springs, joint.spring),
+        "limit": np.append(joint.limits, np.nan),
+        **({} if joint.sides is None else dict(zip(SIDES, joint.sides, strict=True))),
+        "width": np.full(joint.forces.shape, joint.width),
+        "capacity": np.full(joint.forces.shape, capacity),
     }
-    if element.sides is not None:
-        columns |= dict(zip(SIDES, element.sides, strict=True))
-    capacity = element.capacity if np.isfinite(element.capacity) else np.nan
-    for name, value in zip(ABOUT, (element.width, capacity), strict=True):
-        columns[name] = np.full(element.force.shape, value)
+    columns = {name: np.asarray(column, float) for name, column in given.items()}
     if draft.suffix.lower() == ".mat":
         from scipy.io import savemat
 

@@ -5,7 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from jbeamshell.dynamics.export.element import Element, rows
-from jbeamshell.dynamics.four_parameters import FourParameters
+from jbeamshell.dynamics.four_parameters import (
+    ENOUGH,
+    FRACTIONS,
+    FourParameters,
+    four_parameters,
+)
 
 SLIDERS = '''
 
@@ -37,14 +42,17 @@ def write(element: Element, draft: Path) -> None:
         "stiffness(Q, T) to K.  tmdsimpy samples the cycle: Nt = 2**10 gives the first harmonic",
         "within 1e-6.",
     ]
+    joint = element.joint
+    known = float(joint.forces[-1]) >= FRACTIONS[ENOUGH - 1] * float(joint.capacity)
+    model = four_parameters(joint) if known else None
     draft.write_text(
         element.comment("#", notes)
         + "\n# kt and Fs of each slider\nSLIDERS = "
         + rows(element.sliders)
         + f"SPRING = {element.spring!r}\n"
-        + _parameters(element.model)
+        + _parameters(model)
         + SLIDERS
-        + (IWAN4 if element.model is not None else ""),
+        + (IWAN4 if model is not None else ""),
         encoding="utf-8",
     )
 

@@ -39,11 +39,6 @@ from jbeamshell.contact_line.network import Network
 from jbeamshell.dynamics.export import table
 from jbeamshell.dynamics.export.element import Element
 from jbeamshell.dynamics.export.targets import write
-from jbeamshell.dynamics.four_parameters import (
-    ENOUGH,
-    FRACTIONS,
-    four_parameters,
-)
 from jbeamshell.dynamics.structure.strip_line import (
     cycled_line,
     network_forces,
@@ -386,22 +381,10 @@ class Joint(ParallelIwan):
         require("joint", "traced", not is_traced(self), "export it outside jit, grad and vmap")
         words = isinstance(units, tuple | list) and len(units) == 2 and all(map(_is_word, units))
         require("units", units, words, "name those of length and force, such as ('mm', 'N')")
-        element = Element(
-            np.asarray(self.displacements, float),
-            np.asarray(self.forces, float),
-            np.asarray(self.springs, float),
-            np.asarray(self.limits, float),
-            spring=float(self.spring),
-            width=float(self.width),
-            asymmetry=float(self.asymmetry),
-            capacity=float(self.capacity),
-            units=(units[0], units[1]),
-            sides=None if self.sides is None else np.asarray(self.sides, float),
-            model=four_parameters(self) if to == "tmdsimpy" and self._nears_slip else None,
-        )
-        written = write(element, to, path)
-        if element.asymmetry > DOUBTED_ASYMMETRY:
-            text = f"doubtful: pull and push differ by {element.asymmetry:.0%} of u from their mean"
+        written = write(Element(self, (units[0], units[1])), to, path)
+        if self.asymmetry > DOUBTED_ASYMMETRY:
+            apart = f"{float(self.asymmetry):.0%}"
+            text = f"doubtful: pull and push differ by {apart} of u from their mean"
             fix = "which is exported; joint.path_forces has each way exactly"
             warnings.warn(f"{text}, {fix}", DoubtfulWarning, stacklevel=2)
         return written
@@ -439,11 +422,6 @@ class Joint(ParallelIwan):
             return False
         rising = f.size == 1 or float(f[-1]) > float(f[-2])
         return rising and float(f[-1]) >= GROSS * float(self.capacity)
-
-    @property
-    def _nears_slip(self) -> bool:
-        """True if the backbone tells the four parameters."""
-        return float(self.forces[-1]) >= FRACTIONS[ENOUGH - 1] * float(self.capacity)
 
 
 def largest_force(scene: Scene, force: Any = None) -> Any:
