@@ -28,7 +28,7 @@ from jbeamshell.identify.experiment import Evaluation
 from jbeamshell.identify.plan_file import read_plan
 from jbeamshell.identify.saved_runs import SavedRuns
 from jbeamshell.measured.curve_files import read_curves
-from jbeamshell.measured.recordings import read_recordings
+from jbeamshell.measured.loop_files import read_loops
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.sweeping.runner import Block
 from jbeamshell.sweeping.store import Store
@@ -247,7 +247,7 @@ def _matrix(path):
 
 
 def _recording(path):
-    return [column for one in read_recordings(path) for column in (one.force, one.displacement)]
+    return [column for one in read_loops(path) for column in (one.force, one.displacement)]
 
 
 READERS = {

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from jbeamshell.measured.recordings import recording_from_arrays
+from jbeamshell.measured.loops import make_loop
 
 
 def path(cycles=4, points=200, amplitudes=(1.0,), shape="sine"):
@@ -165,7 +165,7 @@ def recorded(force, displacement, noise=0.0, kind="white", seed=0, driver=None, 
     shares = {"force": noise, "displacement": noise}
     if driver is not None:
         shares[driver] *= 0.1
-    return recording_from_arrays(
+    return make_loop(
         with_noise(force, shares["force"], kind, random),
         with_noise(displacement, shares["displacement"], kind, random),
         label,

@@ -24,7 +24,7 @@ from jbeamshell.common.errors import LONGEST
 from jbeamshell.identify import plan_file as plan
 from jbeamshell.load_steps import recovery
 from jbeamshell.measured import array_tables, curve_files, curves, loops, steady
-from jbeamshell.measured.recordings import read_recordings
+from jbeamshell.measured.loop_files import read_loops
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import KEYS, NUMBERS
 from jbeamshell.scene.toml import overridden, scene_from_values
@@ -171,10 +171,10 @@ ENTRIES = {
     "responses": lambda x: jb.response(SCENE, ["load.amplitude"], x),
     "advise": lambda x: jb.advise(x, 0.05),
     "of a part": lambda x: jb.advise(SCENE, x),
-    "recordings": lambda x: read_recordings(x),
-    "columns": lambda x: read_recordings("good.csv", columns=x),
-    "units": lambda x: read_recordings("good.csv", units=x),
-    "decimal": lambda x: read_recordings("good.csv", decimal=x),
+    "recordings": lambda x: read_loops(x),
+    "columns": lambda x: read_loops("good.csv", columns=x),
+    "units": lambda x: read_loops("good.csv", units=x),
+    "decimal": lambda x: read_loops("good.csv", decimal=x),
     "curves": lambda x: curve_files.read_curves(x, "squeeze"),
     "kind": lambda x: curve_files.read_curves("good.csv", x),
     "force": lambda x: loops.make_loop(x, RUN_IN),

@@ -33,9 +33,8 @@ from jbeamshell.measured import (
     DampingCurve,
     FrequencyCurve,
     Loop,
-    Recording,
-    read_recordings,
-    recording_from_arrays,
+    make_loop,
+    read_loops,
     split_cycles,
     steady_loops,
 )
@@ -88,7 +87,7 @@ def bolt_loops(folder: Path) -> list[Loop]:
     """Steady loops of the bolt, the narrowest first; m and N."""
     loops = []
     for name in ("0p03", "0p05", "0p1"):
-        (recording,) = read_recordings(
+        (recording,) = read_loops(
             [folder / f"rousseau2025_loop_steel_amp{name}.csv"],
             columns={"force": "Ftr_kN", "displacement": "delta_mm"},
             units={"force": "kN", "displacement": "mm"},
@@ -128,29 +127,22 @@ def damper(folder: Path, tension: int = 36) -> Figures:
         path = folder / f"0.5Hz{tension}lbtension{stroke}amplitude.json"
         rows = np.array(json.loads(path.read_text("utf-8"))["data"])[::10]
         time, displacement, force = rows[:, 0], rows[:, 1] * INCH, rows[:, 2] * KIP
-        recording = recording_from_arrays(force, displacement, path.stem, time=time)
+        recording = make_loop(force, displacement, path.stem, time=time)
         loops.append(steady_loops(recording, "displacement", points=200)[-1].centred())
     return study(loops[1:2], [loops[0], loops[2]])
 
 
 def contact(folder: Path) -> Figures:
     """Reciprocating contact: the steady mean of the first half of the cycles is fitted."""
-    (recording,) = read_recordings([folder / "reciprocating_contact_early.csv"])
+    (recording,) = read_loops([folder / "reciprocating_contact_early.csv"])
     found = split_cycles(recording, "displacement").cycles
     half = found[len(found) // 2].start
     parts = slice(0, half + 1), slice(half, found[-1].end + 1)
     head, tail = (
-        steady_loops(_part(recording, part), "displacement", points=200)[-1].centred()
+        steady_loops(recording.part(part), "displacement", points=200)[-1].centred()
         for part in parts
     )
     return study([head], [tail]) | {"cycles": len(found)}
-
-
-def _part(recording: Recording, own: slice) -> Recording:
-    """Part of a recording."""
-    return recording_from_arrays(
-        recording.force[own], recording.displacement[own], recording.label, time=recording.time[own]
-    )
 
 
 def cable(folder: Path) -> Figures:

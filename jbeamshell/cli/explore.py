@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> int:
     """Serve the page until it is interrupted; returns the exit code."""
     from jbeamshell.common.checks import require
     from jbeamshell.explorer import check_installed
-    from jbeamshell.measured.loops import read_loops
+    from jbeamshell.measured.loop_files import read_loops
     from jbeamshell.scene import library
 
     port = options.port

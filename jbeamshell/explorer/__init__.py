@@ -9,7 +9,7 @@ from typing import Any
 
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.loops import read_loops
+from jbeamshell.measured.loop_files import read_loops
 from jbeamshell.scene.scene import Scene
 
 

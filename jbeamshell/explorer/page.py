@@ -17,7 +17,8 @@ from jbeamshell.common.summary import in_words
 from jbeamshell.explorer.controls import controls_of, scene_at
 from jbeamshell.explorer.figures import Figures
 from jbeamshell.explorer.views import FIGURES, View, curve_of, drawable, view_of
-from jbeamshell.measured.loops import Loop, read_loops
+from jbeamshell.measured.loop_files import read_loops
+from jbeamshell.measured.loops import Loop
 from jbeamshell.scene import library
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_to_toml

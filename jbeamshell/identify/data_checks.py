@@ -16,10 +16,9 @@ from jbeamshell.identify.models import LawModel, Model
 from jbeamshell.identify.specimens import Specimen, plausible_stiffness
 from jbeamshell.laws import MasingLaw
 from jbeamshell.measured.closed_curve import PARTS
-from jbeamshell.measured.form import Measurement
+from jbeamshell.measured.form import FEWEST_POINTS, Measurement
 from jbeamshell.measured.inspection import View, inspect
 from jbeamshell.measured.loops import ROUNDING, Loop
-from jbeamshell.measured.recordings import FEWEST_POINTS
 from jbeamshell.measured.reversals import find_turns, noise_of
 
 ASYMMETRY = 0.035  # of the range, by which the branches of a law, being odd, do not differ
@@ -172,8 +171,5 @@ def _one_cycle(item: Any) -> tuple[Any, int]:
     back = np.all([np.abs(c - c[0]) <= a for c, a in zip(item.columns, slack, strict=True)], axis=0)
     for period in np.flatnonzero(back).tolist():
         if FEWEST_POINTS <= period <= size // 2 and repeats(period):
-            scatter = None if item.scatter is None else item.scatter[: period + 1]
-            force, displacement = (column[: period + 1] for column in item.columns)
-            one = item.but(force=force, displacement=displacement, scatter=scatter)
-            return one, round((size - 1) / period)
+            return item.part(slice(period + 1)), round((size - 1) / period)
     return item, 1

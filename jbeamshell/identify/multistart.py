@@ -31,7 +31,7 @@ from jbeamshell.identify.search import (
 from jbeamshell.identify.search_space import SearchSpace
 from jbeamshell.identify.settling import Settled, settle
 from jbeamshell.identify.uncertainty import uncertainty_at
-from jbeamshell.measured.recordings import FEWEST_POINTS
+from jbeamshell.measured.form import FEWEST_POINTS
 from jbeamshell.numerics.newton import Newton
 
 POINTS = 96  # points of a loop at which the model is run

@@ -37,14 +37,13 @@ from jbeamshell.laws import LAWS, Law, law_named
 from jbeamshell.measured.curves import AmplitudeCurve, Backbone
 from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop, driver_of
-from jbeamshell.measured.recordings import Recording
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene import library
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import overridden, scene_from_values
 
-Datum = Measurement | Recording | Specimen | str | os.PathLike[str]
+Datum = Measurement | Specimen | str | os.PathLike[str]
 
 KINDS = (
     "give a jbeamshell.Scene, values by dotted key, the name of a scene, a law such as "
@@ -127,10 +126,10 @@ def fit(
 
     Parameters
     ----------
-    data : a measurement, a recording or the name of a file, or a list of them, of one kind or
-        several; or one `Specimen` or several, which bring their own scenes.  Recordings, and loops
-        as they were recorded, are averaged over their cycles and centred where no joint has their
-        offset; the result's ``notes`` say so
+    data : a measurement or the name of a file, or a list of them, of one kind or several; or one
+        `Specimen` or several, which bring their own scenes.  Loops as they were recorded are
+        averaged over their cycles and centred where no joint has their offset; the result's
+        ``notes`` say so
     scene : scene with start values, and all values that stay fixed; or the values that are known,
         by dotted key, or the name or file of a scene, of which the rest is estimated from the data.
         None is a strip of which nothing is known.  Or a law of a joint in place of the strip: a

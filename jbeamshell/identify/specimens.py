@@ -21,10 +21,10 @@ from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.curves import KINDS, Backbone
 from jbeamshell.measured.drift import DRIFTS
 from jbeamshell.measured.findings import DRIFT, OFF_CENTRE, OFF_ZERO
-from jbeamshell.measured.form import Measurement
+from jbeamshell.measured.form import Measurement, as_column
 from jbeamshell.measured.inspection import inspect
-from jbeamshell.measured.loops import Loop, loop_of
-from jbeamshell.measured.recordings import Recording, as_column, read_recordings
+from jbeamshell.measured.loop_files import read_loops
+from jbeamshell.measured.loops import Loop
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
 from jbeamshell.scene.dimensions import Dimensions, dimensions_of
@@ -49,7 +49,7 @@ class Specimen:
     scene : scene, with start values and all values that stay fixed; values of a scene by dotted
         key, or its name or file, of which those that are not given are estimated; a law of a joint
         or its name; or a structure.  None is a strip of which nothing is known
-    data : a measurement or a recording, a file, or a list of them
+    data : a measurement, a file, or a list of them
     label : name in messages and in the names of the specimen's own values
     weights : factors of the measurements' residuals, besides the curves' own; all 1 if empty
     set : values by dotted key, of the scene or the rig (see `jbeamshell.identify.rig`)
@@ -62,9 +62,9 @@ class Specimen:
     centre : True to take the zeros of the sensors from the loops, see `Loop.centred`; None to do so
         where they can only be offsets
     reverse : "force" or "displacement" to turn the sign of that column
-    width : width of the specimen, by which forces of recordings are divided; those of loops are per
-        width already
-    columns, units, decimal : arguments of `read_recordings`
+    width : width of the specimen, by which forces as recorded are divided; those of mean loops are
+        per width already
+    columns, units, decimal : arguments of `read_loops`
     dimensions : dimensions of the specimen with units, see `jbeamshell.scene.dimension_table`; or
         the name of a TOML file that holds them
 
@@ -196,20 +196,19 @@ class Specimen:
                 fix = f"a {self.kind} curve is per unit width; leave width out"
                 require("width", width, width == 1.0, fix)
                 return list(read_curves(files, self.kind, **self._reading))
-            items = list(read_recordings(files, **self._reading))
+            items = list(read_loops(files, **self._reading))
         asked = self.driver or driver
         keeps_zero = bool(ZEROS & {*free, *self.set})
         found: list[tuple[Measurement, Sequence[str]]] = []
         for item in items:
-            if isinstance(item, Recording):
+            if isinstance(item, Loop) and item.as_recorded:
                 if known.values and item.units is None:
                     raise InputError(
                         f"{item.label}: its columns name no units, but the specimen's dimensions "
                         "do: give --unit force=N --unit displacement=mm, or what they are"
                     )
-                item = item.per_width(width)
-            if isinstance(item, Recording) or (isinstance(item, Loop) and _as_recorded(item)):
-                found += self._of_recording(item, asked, keeps_zero, unchecked)
+                recording = item.per_width(width)
+                found += self._of_recording(recording, asked, keeps_zero, unchecked)
             elif isinstance(item, Loop):
                 found.append(self._centred(item, keeps_zero))
             else:
@@ -222,7 +221,7 @@ class Specimen:
         return {"columns": self.columns, "units": self.units, "decimal": self.decimal}
 
     def _of_recording(
-        self, item: Recording | Loop, driver: str | None, keeps_zero: bool, unchecked: bool
+        self, item: Loop, driver: str | None, keeps_zero: bool, unchecked: bool
     ) -> Iterator[tuple[Measurement, Sequence[str]]]:
         """Measurements of one recording, or of a loop as it was recorded."""
         item = self._turned(item)
@@ -248,7 +247,7 @@ class Specimen:
         taken = loop.centred() if wanted else loop
         return taken, taken.notes
 
-    def _turned(self, recording: Any) -> Any:
+    def _turned(self, recording: Loop) -> Loop:
         """Recording with the sign of one column turned, if that was asked for."""
         if self.reverse is None:
             return recording
@@ -256,25 +255,18 @@ class Specimen:
         column = {self.reverse: -getattr(recording, self.reverse)}
         return recording.but(**column, notes=(*recording.notes, note))
 
-    def _loops(self, recording: Recording | Loop, driver: str | None) -> list[Loop]:
-        whole = recording if isinstance(recording, Loop) else loop_of(recording)
+    def _loops(self, recording: Loop, driver: str | None) -> list[Loop]:
         if self.cycles == "recorded" and self.drift == "keep":
-            return [whole]
+            return [recording]
         if self.cycles == "auto" and self.drift == "keep":
             try:
                 found = split_cycles(recording, driver)
             except InputError:  # a first loading, or an unsteady path
-                return [whole]
+                return [recording]
             noise = found.noise / np.ptp(found.path)
             if len(found.cycles) == 1 and noise < QUIET:
-                return [whole]
+                return [recording]
         return steady_loops(recording, driver, self.drift)
-
-
-def _as_recorded(loop: Loop) -> bool:
-    """True for a loop that nobody has averaged, centred or named a drive of."""
-    untouched = loop.noise is None and loop.scatter is None and loop.cycles == 1
-    return untouched and loop.driver is None and not loop.free_zero
 
 
 def _forgets_zero(loop: Loop) -> bool:

@@ -95,7 +95,7 @@ def estimate(measurements: Sequence[Any]) -> Estimate | None:
     largest = max(pulls, key=lambda item: float(np.ptp(item.force)))
     peak = max(float(np.max(np.abs(item.force))) for item in pulls)
     si = isinstance(largest, Loop) and largest.units is not None
-    normal = largest.normal_force if isinstance(largest, Loop) else None
+    normal = largest.mean_normal_force() if isinstance(largest, Loop) else None
     if isinstance(largest, Loop) and (levels := inspect(largest).views[0].levels):
         level = levels[-1]
         force, displacement = (

@@ -1,8 +1,8 @@
 """Measured data: recordings of many cycles, steady loops, curves, and their readers.
 
 `inspect` tells what a file holds, and what speaks against a fit of it.
-`read_loops` reads the loops of a file unchanged.  `read_recordings` and `steady_loops` average the
-cycles of a noisy recording.  `jbeamshell.identify` compares a strip or a law with a `Loop`,
+`read_loops` reads the loops of a file unchanged, and `steady_loops` averages the cycles of a noisy
+one.  `jbeamshell.identify` compares a strip or a law with a `Loop`,
 `Backbone`, `DissipationCurve`, `StiffnessCurve` or `SqueezeCurve`, and a structure with a
 `FrequencyCurve`, `DampingCurve` or `ForcedCurve`.
 """
@@ -19,11 +19,8 @@ from jbeamshell.measured.form import Measurement as Measurement
 from jbeamshell.measured.inspection import Finding as Finding
 from jbeamshell.measured.inspection import Inspection as Inspection
 from jbeamshell.measured.inspection import inspect as inspect
+from jbeamshell.measured.loop_files import read_loops as read_loops
 from jbeamshell.measured.loops import Loop as Loop
 from jbeamshell.measured.loops import make_loop as make_loop
-from jbeamshell.measured.loops import read_loops as read_loops
-from jbeamshell.measured.recordings import Recording as Recording
-from jbeamshell.measured.recordings import read_recordings as read_recordings
-from jbeamshell.measured.recordings import recording_from_arrays as recording_from_arrays
 from jbeamshell.measured.splitting import split_cycles as split_cycles
 from jbeamshell.measured.steady import steady_loops as steady_loops

@@ -11,8 +11,8 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.measured.columns import bare, choice, factor_of, no_header, unit_of
 from jbeamshell.measured.curves import CURVES, Curve
 from jbeamshell.measured.form import NUMBER
+from jbeamshell.measured.loop_files import FilePath, check_words_of, labels_of
 from jbeamshell.measured.read_table import read_table
-from jbeamshell.measured.recordings import FilePath, check_words_of, labels_of
 
 
 def read_curves(
@@ -23,7 +23,7 @@ def read_curves(
     units: Mapping[str, str] | None = None,
     decimal: str | None = None,
 ) -> list[tuple[Curve, tuple[str, ...]]]:
-    """Read curves of one kind from files of the formats that `read_recordings` reads.
+    """Read curves of one kind from files of the formats that `read_loops` reads.
 
     Columns are found by their names, with units or without: "amplitude" and the kind, such as
     "dissipation"; "x" and "stress"; or "frequency", "force" and "amplitude".  All forces but that

@@ -19,6 +19,7 @@ from jbeamshell.measured.form import (
     AMPLITUDE,
     DAMPING,
     DISSIPATION,
+    FEWEST_POINTS,
     FREQUENCY,
     HARMONIC_FORCE,
     HUGE,
@@ -31,9 +32,10 @@ from jbeamshell.measured.form import (
     Floats,
     Form,
     Measurement,
+    as_column,
+    checked_noise,
 )
-from jbeamshell.measured.loops import Loop, checked_noise
-from jbeamshell.measured.recordings import FEWEST_POINTS, as_column
+from jbeamshell.measured.loops import Loop
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -6,7 +6,8 @@ from importlib import resources
 from pathlib import Path
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.loops import Loop, read_loops
+from jbeamshell.measured.loop_files import read_loops
+from jbeamshell.measured.loops import Loop
 
 EXAMPLE_AMPLITUDES = (0.3247, 0.5851, 1.0, 1.6)
 HEIGHT_RATIOS = (0.0305, 0.0511, 0.1126, 0.2358, 0.4)

@@ -16,7 +16,6 @@ from jbeamshell.measured.clipping import clipped
 from jbeamshell.measured.columns import QUANTITIES, choice
 from jbeamshell.measured.loop_shape import LoopShape
 from jbeamshell.measured.loops import WORK, Loop
-from jbeamshell.measured.recordings import Recording
 from jbeamshell.measured.reversals import noise_of
 from jbeamshell.measured.splitting import Cycles
 
@@ -88,13 +87,13 @@ class Level:
         return float(self.shape.work * ranges)
 
 
-def of_columns(recording: Recording) -> list[Finding]:
+def of_columns(recording: Loop) -> list[Finding]:
     """Findings about the columns of a recording, each by itself."""
     clipping = [_clipping(recording, name) for name in QUANTITIES]
     return [finding for finding in clipping if finding]
 
 
-def of_loading(recording: Recording) -> list[Finding]:
+def of_loading(recording: Loop) -> list[Finding]:
     """Findings about a recording without cycles."""
     noisy = noise_of(recording.force) > 0.2 * np.ptp(recording.force)
     rising = float(np.corrcoef(recording.force, recording.displacement)[0, 1])
@@ -137,11 +136,11 @@ def of_levels(
     return findings
 
 
-def _top(level: Level, found: Cycles, recording: Recording) -> str:
+def _top(level: Level, found: Cycles, recording: Loop) -> str:
     return with_unit(float(np.max(getattr(level.loop, found.driver))), recording.unit(found.driver))
 
 
-def _clipping(recording: Recording, name: str) -> Finding | None:
+def _clipping(recording: Loop, name: str) -> Finding | None:
     other = "displacement" if name == "force" else "force"
     limit = clipped(getattr(recording, name), getattr(recording, other))
     if limit is None:
@@ -164,7 +163,7 @@ def _wrong_sign(further: str) -> Finding:
     )
 
 
-def _of_work(level: Level, recording: Recording) -> Finding | None:
+def _of_work(level: Level, recording: Loop) -> Finding | None:
     shape, kind = level.shape, level.shape.kind
     if kind == "backward":
         swapped = shape.work > 0.0 and shape.work > 4.0 * shape.work_error
@@ -253,7 +252,7 @@ def _of_drift(level: Level, number: int, found: Cycles) -> Finding | None:
     return None
 
 
-def _of_centre(level: Level, found: Cycles, recording: Recording) -> Finding | None:
+def _of_centre(level: Level, found: Cycles, recording: Loop) -> Finding | None:
     """Finding about a column that does not swing about zero, the driving one first."""
     loop, driver = level.loop, found.driver
     zeros = loop.zeros()

@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from jbeamshell.common.checks import shown
 from jbeamshell.common.errors import InputError
 
+FEWEST_POINTS = 8
 HUGE = 1e100  # squares and quotients of smaller numbers are finite
 NUMBER = ("dimensionless",)
 
@@ -151,3 +152,40 @@ def by_form(measurements: Sequence[Any]) -> list[tuple[Form, list[int]]]:
     for place, measurement in enumerate(measurements):
         places.setdefault(measurement.form.name, []).append(place)
     return [(measurements[some[0]].form, some) for some in places.values()]
+
+
+def as_column(values: ArrayLike, name: str, label: str) -> NDArray[np.float64]:
+    """Array of floats from real numbers, NaN for None and masked ones; raises `InputError` else."""
+    try:
+        if isinstance(values, np.ma.MaskedArray):
+            values = np.ma.filled(values.astype(float), np.nan)
+        given = np.asarray(values)
+        if given.dtype.kind in "iufO":
+            return given.astype(float)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InputError(f"{label}: {name} is no array of numbers: give a list of numbers")
+
+
+def checked_noise(noise: Any, points: int, label: str) -> Floats | None:
+    """Standard deviations (points,) of one number or one for each point; None stays None.
+
+    Raises
+    ------
+    InputError
+        unless all are positive
+    """
+    if noise is None:
+        return None
+    values = as_column(noise, "noise", label)
+    values = np.full(points, float(values)) if values.ndim == 0 else values
+    if values.shape != (points,):
+        fix = f"give one number, or one for each of the {points} points"
+        raise InputError(f"{label}: noise has shape {values.shape}: {fix}")
+    bad = np.flatnonzero(~(np.isfinite(values) & (values > 0.0)))
+    if bad.size:
+        raise InputError(
+            f"{label}: noise is {values[bad[0]]:g} at point {bad[0] + 1}: give a positive standard "
+            "deviation, or none at all"
+        )
+    return values

@@ -14,9 +14,9 @@ import numpy as np
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.summary import with_unit
 from jbeamshell.measured.findings import Finding, Level, of_columns, of_levels, of_loading
+from jbeamshell.measured.loop_files import FilePath, read_loops
 from jbeamshell.measured.loop_shape import KINDS, shape_of
 from jbeamshell.measured.loops import WORK, Loop
-from jbeamshell.measured.recordings import FilePath, Recording, read_recordings
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
 
@@ -36,7 +36,7 @@ class View:
     told : why there are no cycles; empty if there are
     """
 
-    recording: Recording
+    recording: Loop
     driver: str | None
     levels: tuple[Level, ...]
     findings: tuple[Finding, ...]
@@ -131,7 +131,7 @@ class Inspection:
 
 
 def inspect(
-    data: Recording | Loop | FilePath | Sequence[Recording | Loop] | Sequence[FilePath],
+    data: Loop | FilePath | Sequence[Loop] | Sequence[FilePath],
     *,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
@@ -146,8 +146,8 @@ def inspect(
 
     Parameters
     ----------
-    data : a recording or a loop, one file or several, or a list
-    columns, units, decimal : how files are read, see `jbeamshell.measured.read_recordings`
+    data : a loop, one file or several, or a list
+    columns, units, decimal : how files are read, see `jbeamshell.measured.read_loops`
     width : width of the specimen, by which forces are divided
     stiffness : least and largest plausible force per width over displacement, if known
 
@@ -169,21 +169,19 @@ def inspect(
         print(seen)
         seen.sound
     """
-    items: list[Recording | Loop]
-    if isinstance(data, Recording | Loop):
+    items: list[Loop]
+    if isinstance(data, Loop):
         items = [data]
-    elif isinstance(data, list | tuple) and all(isinstance(i, Recording | Loop) for i in data):
+    elif isinstance(data, list | tuple) and all(isinstance(i, Loop) for i in data):
         items = list(data)
     else:
         paths: FilePath | Sequence[FilePath] = data  # type: ignore[assignment]
-        items = list(read_recordings(paths, columns=columns, units=units, decimal=decimal))
+        items = list(read_loops(paths, columns=columns, units=units, decimal=decimal))
     return Inspection(tuple(_view(item, width, stiffness) for item in items))
 
 
-def _view(item: Recording | Loop, width: float, stiffness: tuple[float, float] | None) -> View:
-    recording = item.as_recording() if isinstance(item, Loop) else item
-    recording = recording.per_width(width)
-    averaged = item.cycles if isinstance(item, Loop) else 1
+def _view(given: Loop, width: float, stiffness: tuple[float, float] | None) -> View:
+    recording = given.per_width(width)
     findings = of_columns(recording)
     try:
         found = split_cycles(recording)
@@ -191,7 +189,7 @@ def _view(item: Recording | Loop, width: float, stiffness: tuple[float, float] |
         reason = str(error).removeprefix(f"{recording.label}: ")
         return View(recording, None, (), (*findings, *of_loading(recording)), reason)
     levels = tuple(
-        Level(loop, len(found.group(number)), shape_of(found, number, averaged))
+        Level(loop, len(found.group(number)), shape_of(found, number, given.cycles))
         for number, loop in enumerate(steady_loops(recording, found.driver))
     )
     findings += of_levels(levels, found, findings, stiffness)

@@ -1,4 +1,4 @@
-"""Loops of force over displacement, measured or computed."""
+"""Loops of force over displacement, as recorded, as means of cycles, or computed."""
 
 from __future__ import annotations
 
@@ -11,32 +11,35 @@ from numpy.typing import ArrayLike
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.summary import Summary, ranged, with_unit
-from jbeamshell.measured.form import LOOP, Floats, Measurement
-from jbeamshell.measured.recordings import FEWEST_POINTS as FEWEST_POINTS
-from jbeamshell.measured.recordings import (
-    NO_UNITS,
-    FilePath,
-    Recording,
+from jbeamshell.measured.columns import FURTHER, QUANTITIES
+from jbeamshell.measured.form import (
+    FEWEST_POINTS,
+    HUGE,
+    LOOP,
+    Floats,
+    Measurement,
     as_column,
-    read_recordings,
-    recording_from_arrays,
+    checked_noise,
 )
 from jbeamshell.measured.reversals import find_driver, find_turns
 
 WORK: dict[str | None, str] = {"N": "J", "N/m": "J/m"}  # unit by that of the force
 CLOSED = 0.05  # part of the range within which the ends of a closed loop lie
 ROUNDING = 1e-6  # of a column's range, below which cycles are the same numbers
+NO_UNITS = "without units: the numbers are taken in the scene's own"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Loop(Measurement):
-    """One loop of force over displacement, or one pull.
+    """Force over displacement in the order of time: a recording, a mean cycle of it, or one pull.
 
     Attributes
     ----------
-    force : (points,) end force per unit width
-    displacement : (points,) displacement of the loaded end
+    force : (points,) end force, per unit width in a fit [N or N/m, or the Scene's own unit]
+    displacement : (points,) displacement of the loaded end [m, or the Scene's own unit]
     label, weight : see `Measurement`
+    time : (points,) time [s], or None
+    normal_force : (points,) normal force [N or N/m], or None; of a mean loop its mean
     noise : standard deviation of a single sample of the responding column, from the scatter of
         repeated cycles; None without repeated cycles
     cycles : number of cycles of which this loop is the mean
@@ -46,8 +49,8 @@ class Loop(Measurement):
     notes : one line on each change made to the data
     driver : column that drove the test, "force" or "displacement"; None if unknown
     free_zero : True if the zero of the responding column is unknown, as after removing a drift
-    units : unit by quantity, "N", "N/m" or "m"; None if they are the Scene's own
-    normal_force : mean normal force, if it was recorded
+    units : unit by quantity, "N", "N/m", "m" or "s"; None if they are the Scene's own
+    titles : title of the file's column by quantity; None without a file
     """
 
     kind = "loop"
@@ -56,6 +59,8 @@ class Loop(Measurement):
     force: Floats
     displacement: Floats
     _: dataclasses.KW_ONLY
+    time: Floats | None = None
+    normal_force: Floats | None = None
     noise: float | None = None
     cycles: int = 1
     dropped: int = 0
@@ -64,25 +69,72 @@ class Loop(Measurement):
     driver: str | None = None
     free_zero: bool = False
     units: Mapping[str, str] | None = None
-    normal_force: float | None = None
+    titles: Mapping[str, str] | None = None
 
     def __repr__(self) -> str:
         return self.summary().as_text()
 
+    def unit(self, quantity: str) -> str:
+        """Unit of a quantity; empty if it is the Scene's own."""
+        return (self.units or {}).get(quantity, "")
+
     def summary(self) -> Summary:
-        """Ranges of the columns, and work of a cycle, for texts and notebooks."""
-        units = self.units or {}
-        rows = [(name, ranged(getattr(self, name), units.get(name, ""))) for name in LOOP.columns]
-        if self.closed:
-            rows.append(("work of a cycle", with_unit(self.work, WORK.get(units.get("force"), ""))))
-        if self.noise is not None and self.driver is not None:
-            answer = LOOP.response(self.driver)
-            rows.append(("noise", with_unit(self.noise, units.get(answer, "")) + f" of {answer}"))
+        """Columns with their ranges and units, and work of a cycle, for texts and notebooks."""
+        rows = []
+        for name in (*QUANTITIES, *FURTHER):
+            column = getattr(self, name)
+            if column is not None:
+                told = ranged(column, self.unit(name))
+                if name == "time" and (rate := self.rate) is not None:
+                    told += f", {rate:.4g} {'Hz' if self.unit('time') else 'per unit of time'}"
+                title = (self.titles or {}).get(name, name)
+                rows.append((name, told if title == name else f"{told}, column {title!r}"))
+        if self.titles is None and self.closed and len(find_turns(self.displacement)) <= 2:
+            work = with_unit(self.work, WORK.get(self.unit("force"), ""))
+            rows.append(("work of a cycle", work))
         if self.driver is not None:
+            answer = LOOP.response(self.driver)
+            if self.noise is not None:
+                rows.append(("noise", f"{with_unit(self.noise, self.unit(answer))} of {answer}"))
             rows.append(("driven by", self.driver))
-        kind = "closed loop" if self.closed else "open path"
         notes = self.notes if self.units else (*self.notes, NO_UNITS)
-        return Summary(f"{self.label}: {kind} of {self.force.size} points", rows, notes)
+        return Summary(f"{self.label}: {self.force.size} points", rows, notes)
+
+    @property
+    def as_recorded(self) -> bool:
+        """True if nobody has averaged, centred or named a drive of it."""
+        untouched = self.noise is None and self.scatter is None and self.cycles == 1
+        return untouched and self.driver is None and not self.free_zero
+
+    @property
+    def rate(self) -> float | None:
+        """Points per time; None if there is no time, or if it does not rise."""
+        step = 0.0 if self.time is None else float(np.median(np.diff(self.time)))
+        return 1.0 / step if step > 0.0 else None
+
+    def mean_normal_force(self, first: int = 0, last: int | None = None) -> float | None:
+        """Mean normal force between two points; None if it was not recorded there."""
+        if self.normal_force is None:
+            return None
+        mean = float(np.mean(self.normal_force[first:last]))
+        return mean if np.isfinite(mean) else None
+
+    def per_width(self, width: float) -> Loop:
+        """Loop of forces per unit width; those that are so by their unit stay as they are."""
+        if width == 1.0:
+            return self
+        units, columns, notes = dict(self.units or {}), dict[str, Any](), list(self.notes)
+        for name in ("force", "normal_force"):
+            if units.get(name) == "N/m":
+                told = f"the {name} is per width already, so the width does not divide it"
+                notes += [told] * (getattr(self, name) is not None)
+                continue
+            of_force = ["noise", "scatter"] if name == "force" and self.driver != "force" else []
+            for own in (name, *of_force):
+                if (value := getattr(self, own)) is not None:
+                    columns[own] = value / width
+            units |= {name: "N/m"} if name in units else {}
+        return self.but(**columns, notes=tuple(notes), units=self.units and units)
 
     @property
     def work(self) -> float:
@@ -98,32 +150,21 @@ class Loop(Measurement):
     def standard_error(self) -> float | None:
         """Standard error of a point of the responding column; None without repeated cycles.
 
-        It is the scatter of the cycles over the root of their number.
+        It is the scatter, or the noise, of the cycles over the root of their number: a mean has
+        less noise than one cycle.
         """
-        if self.scatter is None:
-            return None
-        return float(np.sqrt(np.mean(self.scatter**2) / self.cycles))
+        noise = self.noise if self.scatter is None else np.sqrt(np.mean(self.scatter**2))
+        return None if noise is None else float(noise / np.sqrt(self.cycles))
 
     @property
     def deviations(self) -> Floats | None:
-        """Standard deviations (points,) of the responding column; None if unknown.
-
-        A loop that is the mean of several cycles has less noise than one cycle.
-        """
+        """Standard errors (points,) of the responding column; None without repeated cycles."""
         error = self.standard_error
-        if error is None and self.noise is not None:
-            error = self.noise / np.sqrt(self.cycles)
         if error is not None and self.scatter is not None and self.driver is not None:
             answer = getattr(self, LOOP.response(self.driver))
             if error <= ROUNDING * np.ptp(answer):
-                error = None  # copies of one cycle tell no noise
+                return None  # copies of one cycle tell no noise
         return checked_noise(error, self.force.size, self.label)
-
-    def as_recording(self) -> Recording:
-        """Its points as a recording; those with NaN are left out."""
-        made = recording_from_arrays(self.force, self.displacement, self.label)
-        dropped, notes = self.dropped + made.dropped, (*self.notes, *made.notes)
-        return made.but(dropped=dropped, notes=notes, units=self.units)
 
     def zeros(self) -> dict[str, float]:
         """Numbers about which the columns swing, which are zero unless sensors have offsets.
@@ -170,27 +211,36 @@ class Loop(Measurement):
         even = np.searchsorted(travel, np.linspace(0.0, travel[-1], points))
         ends = [0, np.argmax(drive), np.argmin(drive), drive.size - 1]
         keep = np.unique([*ends, *even, *find_turns(drive)])
-        return self.but(
-            force=self.force[keep],
-            displacement=self.displacement[keep],
-            scatter=None if self.scatter is None else self.scatter[keep],
-        )
+        return self.part(keep)
+
+    def part(self, points: Any) -> Loop:
+        """Loop of some of its points, by a mask, indices or a slice."""
+        names = ("force", "displacement", "time", "normal_force", "scatter")
+        columns = {name: getattr(self, name) for name in names}
+        kept = {name: column[points] for name, column in columns.items() if column is not None}
+        return self.but(**kept)
 
 
-def make_loop(force: ArrayLike, displacement: ArrayLike, label: str = "loop") -> Loop:
-    """Loop of two arrays, checked; points with NaN are left out and counted.
+def make_loop(
+    force: ArrayLike,
+    displacement: ArrayLike,
+    label: str = "loop",
+    *,
+    time: ArrayLike | None = None,
+    normal_force: ArrayLike | None = None,
+) -> Loop:
+    """Loop of arrays, checked; points without force or displacement are left out and counted.
 
     Parameters
     ----------
-    force : (points,) end force per unit width
-    displacement : (points,) displacement of the loaded end
+    force, displacement : (points,) numbers in one system of units; NaN marks a missing one
     label : name in pictures and messages
+    time, normal_force : (points,) numbers, if they were recorded
 
     Raises
     ------
     InputError
-        for arrays that are no columns of one length, hold too few points or an infinite one, or are
-        constant
+        if the arrays differ in length, hold fewer than 8 points or an infinite one, or are constant
 
     Examples
     --------
@@ -198,75 +248,48 @@ def make_loop(force: ArrayLike, displacement: ArrayLike, label: str = "loop") ->
     >>> make_loop(np.cos(phase), 1e-5 * np.cos(phase - 0.2)).closed
     True
     """
-    return loop_of(recording_from_arrays(force, displacement, label))
-
-
-def read_loops(
-    paths: FilePath | Sequence[FilePath],
-    *,
-    columns: Mapping[str, str] | None = None,
-    units: Mapping[str, str] | None = None,
-    decimal: str | None = None,
-) -> list[Loop]:
-    """Loops of one file or several, as recorded; see `read_recordings` for the formats.
-
-    A recording of many noisy cycles makes one long loop; `steady_loops` makes one mean loop per
-    amplitude instead.
-
-    Parameters
-    ----------
-    paths : file, or several
-    columns : titles of the columns by "force" and "displacement", if the titles alone do not tell
-    units : units by "force" and "displacement", such as {"force": "kN"}; they override the header
-    decimal : decimal sign, "," or ".", if the numbers alone do not tell
-
-    Raises
-    ------
-    InputError
-        naming the file, the line or column, and the fix
-    """
-    recordings = read_recordings(paths, columns=columns, units=units, decimal=decimal)
-    return [loop_of(recording) for recording in recordings]
-
-
-def loop_of(recording: Recording) -> Loop:
-    """Loop of all points of a recording, as they stand."""
-    return Loop(
-        recording.force,
-        recording.displacement,
-        label=recording.label,
-        dropped=recording.dropped,
-        notes=recording.notes,
-        units=recording.units,
-        normal_force=recording.mean_normal_force(),
-    )
+    given = {"force": force, "displacement": displacement}
+    given |= {"time": time} if time is not None else {}
+    given |= {"normal_force": normal_force} if normal_force is not None else {}
+    columns: dict[str, Any] = {}
+    for name, values in given.items():
+        columns[name] = as_column(values, name, label)
+        if columns[name].ndim != 1 or columns[name].size < FEWEST_POINTS:
+            raise InputError(
+                f"{label}: {name} has shape {columns[name].shape}: give {FEWEST_POINTS} points or "
+                "more"
+            )
+        if columns[name].size != columns["force"].size:
+            raise InputError(f"{label}: force and {name} differ in length: give pairs of points")
+        infinite = np.flatnonzero(np.abs(columns[name]) > HUGE)
+        if infinite.size:
+            raise InputError(
+                f"{label}: {name} is infinite or above {HUGE:g} at {infinite.size} of "
+                f"{columns[name].size} points (first at point {infinite[0] + 1}): correct them"
+            )
+    whole = ~(np.isnan(columns["force"]) | np.isnan(columns["displacement"]))
+    dropped = int(whole.size - np.count_nonzero(whole))
+    if 2 * dropped > whole.size:
+        raise InputError(
+            f"{label}: {dropped} of {whole.size} rows lack a number for force or displacement: "
+            "record or export them again"
+        )
+    columns = {name: column[whole] for name, column in columns.items()}
+    for name in QUANTITIES:
+        column = columns[name]
+        if column.size < FEWEST_POINTS:
+            raise InputError(
+                f"{label}: {column.size} rows are left without the {dropped} that lack a number: "
+                f"give {FEWEST_POINTS} or more"
+            )
+        if np.ptp(column) < 1.0 / HUGE:
+            fix = "no loop to fit; give a column that varies"
+            raise InputError(f"{label}: {name} is constant ({column[0]:g}): {fix}")
+    notes = () if not dropped else (f"{dropped} of {whole.size} rows lack a number: left out",)
+    return Loop(**columns, label=label, dropped=dropped, notes=notes)
 
 
 def driver_of(loops: Sequence[Loop]) -> str:
     """Column that drove most of the loops, "force" or "displacement"."""
     drivers = [loop.driver or find_driver(loop.force, loop.displacement) for loop in loops]
     return "displacement" if 2 * drivers.count("displacement") > len(drivers) else "force"
-
-
-def checked_noise(noise: Any, points: int, label: str) -> Floats | None:
-    """Standard deviations (points,) of one number or one for each point; None stays None.
-
-    Raises
-    ------
-    InputError
-        unless all are positive
-    """
-    if noise is None:
-        return None
-    values = as_column(noise, "noise", label)
-    values = np.full(points, float(values)) if values.ndim == 0 else values
-    if values.shape != (points,):
-        fix = f"give one number, or one for each of the {points} points"
-        raise InputError(f"{label}: noise has shape {values.shape}: {fix}")
-    bad = np.flatnonzero(~(np.isfinite(values) & (values > 0.0)))
-    if bad.size:
-        raise InputError(
-            f"{label}: noise is {values[bad[0]]:g} at point {bad[0] + 1}: give a positive standard "
-            "deviation, or none at all"
-        )
-    return values

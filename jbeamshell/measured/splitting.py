@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.loops import CLOSED, Loop
-from jbeamshell.measured.recordings import Recording
+from jbeamshell.measured.loops import CLOSED, Loop, make_loop
 from jbeamshell.measured.reversals import (
     SMALLEST,
     Floats,
@@ -72,7 +71,7 @@ class Cycles:
         loading, and after the last, such as an incomplete cycle
     """
 
-    recording: Recording
+    recording: Loop
     driver: str
     path: Floats
     noise: float
@@ -103,7 +102,7 @@ class Cycles:
 
 
 def split_cycles(
-    recording: Recording | Loop, driver: str | None = None, *, smallest: float = SMALLEST
+    recording: Loop, driver: str | None = None, *, smallest: float = SMALLEST
 ) -> Cycles:
     """Find the cycles of a recording.
 
@@ -130,15 +129,17 @@ def split_cycles(
     InputError
         if there is no reversal or no whole cycle, or if an argument is out of range
     """
-    if not isinstance(recording, Recording | Loop):
-        kind = type(recording).__name__
-        raise InputError(f"recording: a {kind} is no recording: give a Recording or a Loop")
+    if not isinstance(recording, Loop):
+        raise InputError(f"recording: a {type(recording).__name__} is no recording: give a Loop")
     if not (driver is None or (isinstance(driver, str) and driver in ("force", "displacement"))):
         raise InputError(f"driver = {driver!r}: give 'force' or 'displacement'")
     if not 0.0 < smallest < 1.0:
         raise InputError(f"smallest = {smallest}: give a share of the range between 0 and 1")
-    if isinstance(recording, Loop):
-        recording = recording.as_recording()
+    # Raises for one that was made by hand.
+    whole = make_loop(recording.force, recording.displacement, recording.label)
+    if whole.dropped:
+        notes = (*recording.notes, *whole.notes)
+        recording = whole.but(dropped=recording.dropped + whole.dropped, notes=notes)
     driver = driver or _driver(recording, smallest)
     path = smoothed_path(getattr(recording, driver), smallest)
     turns, inner = _turns(path.smooth, path.band)
@@ -163,7 +164,7 @@ def split_cycles(
     )
 
 
-def _driver(recording: Recording, smallest: float) -> str:
+def _driver(recording: Loop, smallest: float) -> str:
     columns = recording.force, recording.displacement
     if has_plateau(*columns):
         return "displacement"
@@ -243,14 +244,14 @@ def _clusters(values: Floats, gap: Floats) -> list[np.ndarray]:
     return [np.sort(own) for own in np.split(order, splits)]
 
 
-def _once_round(recording: Recording, inner: list[int]) -> int | None:
+def _once_round(recording: Loop, inner: list[int]) -> int | None:
     """Turn to start from if the recording is one cycle that starts between its turns, else None."""
     columns = (recording.force, recording.displacement)
     once = all(abs(c[-1] - c[0]) <= CLOSED * np.ptp(c) + 4.0 * noise_of(c) for c in columns)
     return inner[0] if once and len(inner) == 2 else None
 
 
-def _rolled(recording: Recording, start: int) -> Recording:
+def _rolled(recording: Loop, start: int) -> Loop:
     def rolled(column: Floats) -> Floats:
         return np.append(column[start:], column[1 : start + 1])
 

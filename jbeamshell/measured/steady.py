@@ -8,7 +8,6 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.measured.closed_curve import FEWEST_KNOTS, PARTS, ClosedCurve, phases_of
 from jbeamshell.measured.drift import DRIFTS, without_drift
 from jbeamshell.measured.loops import Loop
-from jbeamshell.measured.recordings import Recording
 from jbeamshell.measured.reversals import SMALLEST, Floats, median_slope, noise_of
 from jbeamshell.measured.splitting import Cycles, split_cycles
 
@@ -17,7 +16,7 @@ POINTS = 200  # most points of a mean loop
 
 
 def steady_loops(
-    recording: Recording | Loop,
+    recording: Loop,
     driver: str | None = None,
     drift: str = "keep",
     *,
@@ -56,7 +55,7 @@ def steady_loops(
     --------
     ::
 
-        (recording,) = jb.measured.read_recordings("rig.csv")
+        (recording,) = jb.measured.read_loops("rig.csv")
         loops = jb.measured.steady_loops(recording, drift="linear")
         loops[0].noise, loops[0].notes
     """
@@ -99,6 +98,7 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
     columns = {found.driver: drive, found.responding: np.append(mean, mean[0])}
     recording = found.recording
     label = recording.label
+    pressing = recording.mean_normal_force(cycles[own[0]].start, cycles[own[-1]].end)
     if found.groups > 1:
         label = f"{label}: {found.driver} {low:.4g} to {high:.4g}"
     return Loop(
@@ -110,7 +110,7 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
         notes=(*recording.notes, *_notes(found, number, curve, heights, repeats, limit)),
         driver=found.driver,
         units=recording.units,
-        normal_force=recording.mean_normal_force(cycles[own[0]].start, cycles[own[-1]].end),
+        normal_force=None if pressing is None else np.full(drive.size, pressing),
         force=columns["force"],
         displacement=columns["displacement"],
     )

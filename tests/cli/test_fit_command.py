@@ -1,7 +1,6 @@
 """`jbeamshell fit`: what it finds, what it is asked, and the data and words that it refuses."""
 
 import csv
-import dataclasses
 import json
 import re
 
@@ -13,8 +12,7 @@ from jbeamshell import laws
 from jbeamshell.cli import main
 from jbeamshell.identify import multistart
 from jbeamshell.identify.plan import Plan
-from jbeamshell.measured.loops import read_loops
-from jbeamshell.measured.recordings import read_recordings
+from jbeamshell.measured.loop_files import read_loops
 from tests import rig
 from tests.command import BASE, COARSE, is_png, names, options
 
@@ -118,7 +116,7 @@ def test_python_and_the_command_line_are_one_door(cli, tmp_path):
     np.savetxt(path, rows, delimiter=",", header="force [N/m],displacement [m]", comments="")
     code, out, _ = cli("fit", path, *options(DOOR), "--json")
     loops = [loop.but(label="rig.csv") for loop in read_loops(path)]
-    fits = [jb.fit(given, DOOR) for given in (str(path), loops, read_recordings(path))]
+    fits = [jb.fit(given, DOOR) for given in (str(path), loops)]
     fits.append(jb.fit([jb.identify.Specimen(DOOR, [path])]))
     told = json.loads(out)
     told.pop("wall_s")
@@ -131,12 +129,7 @@ def test_python_and_the_command_line_are_one_door(cli, tmp_path):
 
 
 def test_data_of_another_law_end_with_code_3(cli, planted, monkeypatch):
-    whole = Plan.run
-
-    def run(*given, **options):
-        return dataclasses.replace(whole(*given, **options), describes=False)
-
-    monkeypatch.setattr(Plan, "run", run)
+    monkeypatch.setattr(jb.identify.Fit, "describes", False)
     code, out, _ = cli("fit", planted, *FIT, "--json")
     assert code == 3
     assert json.loads(out)["describes"] is False

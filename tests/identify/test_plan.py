@@ -8,8 +8,8 @@ from jbeamshell.identify import Specimen
 from jbeamshell.identify.plan_file import plan_from_values, read_plan
 from jbeamshell.measured.curve_files import read_curves
 from jbeamshell.measured.curves import Backbone, DissipationCurve, SqueezeCurve, StiffnessCurve
+from jbeamshell.measured.loop_files import read_loops
 from jbeamshell.measured.loops import Loop
-from jbeamshell.measured.recordings import read_recordings
 from tests import rig
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 101)
@@ -98,7 +98,7 @@ def test_cycles_are_averaged_unless_told_otherwise(folder, cycles, points):
 
 
 def test_recordings_at_hand_are_read_as_files_are(folder):
-    (recording,) = read_recordings(folder / "cycles.csv")
+    (recording,) = read_loops(folder / "cycles.csv")
     ((loop, notes),) = Specimen(data=recording, width=2.0).read(folder)
     ((other, others),) = Specimen(data="cycles.csv", width=2.0).read(folder)
     np.testing.assert_array_equal(loop.force, other.force)

@@ -10,7 +10,6 @@ from jbeamshell.identify.plan import planned
 from jbeamshell.identify.starts import _beyond_bar, _x, estimate, started
 from jbeamshell.measured.example import HEIGHT_RATIOS, example_loops
 from jbeamshell.measured.loops import make_loop
-from jbeamshell.measured.recordings import recording_from_arrays
 from jbeamshell.measured.steady import steady_loops
 from tests import rig
 
@@ -144,7 +143,7 @@ def test_friction_and_pressure_that_cannot_resist_are_refused_by_their_names():
 
 def test_a_first_loading_has_a_start_too():
     force = np.linspace(0.0, 4e3, 40)
-    pull = recording_from_arrays(force, 1e-13 * force**2, "pull")
+    pull = make_loop(force, 1e-13 * force**2, "pull")
     scene = planned([make_loop(pull.force, pull.displacement)], None, [MU]).specimens[0].scene
     gross = (
         float(scene.contact.friction) * float(scene.contact.pressure) * float(scene.strip.length)

@@ -5,7 +5,7 @@ import pytest
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.accelerations import displacement_of
-from jbeamshell.measured.recordings import read_recordings
+from jbeamshell.measured.loop_files import read_loops
 from jbeamshell.measured.steady import steady_loops
 from tests import rig
 
@@ -37,7 +37,7 @@ def test_a_file_of_accelerations_gives_the_loop(tmp_path):
     path = tmp_path / "rig.csv"
     head = "Zeit [s];Kraft [N];Beschleunigung [g]"
     np.savetxt(path, rows, delimiter=";", header=head, comments="", encoding="utf-8")
-    (recording,) = read_recordings(path)
+    (recording,) = read_loops(path)
     assert recording.units == {"force": "N", "displacement": "m", "time": "s"}
     assert "integrated twice" in recording.notes[-1]
     cut = (u.size - recording.force.size) // 2

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.drift import _through
-from jbeamshell.measured.loops import Loop, make_loop, read_loops
-from jbeamshell.measured.recordings import recording_from_arrays
+from jbeamshell.measured.loop_files import read_loops
+from jbeamshell.measured.loops import Loop, make_loop
 from jbeamshell.measured.reversals import find_driver, find_turns, has_plateau
 from jbeamshell.measured.splitting import split_cycles
 from jbeamshell.measured.steady import steady_loops
@@ -53,7 +53,7 @@ def recorded(drive, driver, noise=0.0, seed=0, drive_noise=0.0, drifts=(0.0, 0.0
         white = own * random.standard_normal(drive.size)
         made.append(column + np.ptp(column) * (white + drift * time))
     force, displacement = made if driver == "displacement" else made[::-1]
-    return recording_from_arrays(force, displacement, "rig")
+    return make_loop(force, displacement, "rig")
 
 
 def with_slips(drive, points, depth, places):
@@ -395,7 +395,7 @@ def test_anything_gives_closed_finite_loops_or_one_clear_line(
 ):
     size = min(len(force), len(displacement))
     try:
-        recording = recording_from_arrays(force[:size], displacement[:size], "rig")
+        recording = make_loop(force[:size], displacement[:size], "rig")
         loops, refused = steady_loops(recording, driver, drift, smallest=smallest), "rig: "
     except InputError as error:
         loops, refused = [], str(error)
@@ -437,7 +437,7 @@ def test_offset_and_one_sided_cycles_are_found(driver, centre):
     drive = np.append(np.linspace(0.0, drive[0], 40), drive[1:])
     answer = answered(drive, driver)
     columns = (answer, drive) if driver == "displacement" else (drive, answer)
-    (loop,) = steady_loops(recording_from_arrays(*columns), driver)
+    (loop,) = steady_loops(make_loop(*columns), driver)
     assert np.ptp(getattr(loop, driver)) == pytest.approx(2.0, rel=0.01)
     np.testing.assert_allclose(area(loop), planted_area(driver), rtol=0.02)
 

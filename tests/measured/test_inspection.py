@@ -232,7 +232,7 @@ def csv(tmp_path):
 
 def test_a_recording_and_a_loop_are_printed_short_with_units(csv):
     u = rig.path()
-    (recording,) = jb.measured.read_recordings(csv("rig.csv", 12.0 * rig.iwan(u), 0.02 * u))
+    (recording,) = jb.measured.read_loops(csv("rig.csv", 12.0 * rig.iwan(u), 0.02 * u))
     assert str(recording).splitlines() == [
         "rig.csv: 851 points",
         "  force                -13.16 to 13.16 kN, column 'Load [kN]'",
@@ -358,6 +358,6 @@ def test_copies_of_one_cycle_tell_no_noise(csv):
     u = rig.path(3, 80)
     columns = [np.tile(column[-161:-81], 4) for column in (rig.iwan(u), 0.02 * u)]
     whole = csv("rig.csv", *columns)
-    loops = jb.measured.steady_loops(jb.measured.read_recordings(whole)[0])
+    loops = jb.measured.steady_loops(jb.measured.read_loops(whole)[0])
     assert loops[0].deviations is None
     assert loops[0].but(scatter=None, noise=0.1).deviations is not None

@@ -8,7 +8,7 @@ import pytest
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured import laboratory
-from jbeamshell.measured.recordings import read_recordings
+from jbeamshell.measured.loop_files import read_loops
 from tests import rig
 
 U = rig.path(2, 40)
@@ -91,7 +91,7 @@ WRITERS = {
 def test_columns_units_and_time_are_read(tmp_path, name):
     path = tmp_path / name
     WRITERS[name](path)
-    (got,) = read_recordings(path)
+    (got,) = read_loops(path)
     assert got.units is not None
     np.testing.assert_allclose(got.force, 1e3 * COLUMNS["force"], rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(got.displacement, 1e-3 * COLUMNS["displacement"], 1e-6, 1e-12)
@@ -107,7 +107,7 @@ def test_a_library_that_is_missing_is_named(tmp_path, monkeypatch, name, module,
     (tmp_path / name).write_bytes(b"\x89HDF\r\n\x1a\n")
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(InputError) as caught:
-        read_recordings(tmp_path / name)
+        read_loops(tmp_path / name)
     assert str(caught.value) == (
         f"{name}: needs {package}, which is not installed: pip install {package}, or "
         "'jbeamshell[formats]'"
@@ -119,7 +119,7 @@ def test_a_library_that_is_missing_is_named(tmp_path, monkeypatch, name, module,
 def test_broken_files_are_refused_in_one_line(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=rf"^{name}: [^\n]+$"):
-        read_recordings(tmp_path / name)
+        read_loops(tmp_path / name)
 
 
 LANGUAGES = {
@@ -146,7 +146,7 @@ def table_of(titles, delimiter):
 def test_titles_in_four_languages_below_lines_of_a_test_rig(tmp_path, language, delimiter):
     path = tmp_path / "rig.txt"
     path.write_text(table_of(LANGUAGES[language], delimiter), "utf-8")
-    (got,) = read_recordings(path)
+    (got,) = read_loops(path)
     np.testing.assert_allclose(got.force, 1e3 * COLUMNS["force"])
     np.testing.assert_allclose(got.displacement, 1e-3 * COLUMNS["displacement"])
     assert got.rate == pytest.approx(1.0 / STEP)
@@ -156,7 +156,7 @@ def test_titles_in_four_languages_below_lines_of_a_test_rig(tmp_path, language, 
 def test_columns_between_blanks(tmp_path):
     path = tmp_path / "rig.txt"
     path.write_text(table_of(("t", "Load (kN)", "Stroke (mm)", "Fn (kN)"), "   "), "utf-8")
-    (got,) = read_recordings(path)
+    (got,) = read_loops(path)
     np.testing.assert_allclose(got.force, 1e3 * COLUMNS["force"])
     np.testing.assert_allclose(got.displacement, 1e-3 * COLUMNS["displacement"])
 
@@ -165,7 +165,7 @@ def test_a_rate_or_a_count_in_any_language_is_no_column(tmp_path):
     path = tmp_path / "rig.csv"
     path.write_text("Lastwechsel;Zyklus Last;Kraft [kN];Weg [mm]\n" + "1;2;3;4\n" * 9, "utf-8")
     with pytest.raises(InputError, match="force is constant"):
-        read_recordings(path)
+        read_loops(path)
 
 
 def test_a_matrix_of_matlab_has_its_own_rows_and_columns():

@@ -5,8 +5,8 @@ import pytest
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.example import EXAMPLE_AMPLITUDES, HEIGHT_RATIOS, example_loops
+from jbeamshell.measured.form import FEWEST_POINTS
 from jbeamshell.measured.loops import Loop, driver_of, make_loop
-from jbeamshell.measured.recordings import FEWEST_POINTS
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 13)
 FORCE, DISPLACEMENT = 3.0 * np.cos(PHASE), 0.25 * np.cos(PHASE - 0.3)
@@ -55,6 +55,17 @@ def test_a_standard_error_is_that_of_a_mean():
     loop = Loop(FORCE, DISPLACEMENT, cycles=4, scatter=np.linspace(0.0, 0.6, 13))
     expected = np.sqrt(np.mean(np.linspace(0.0, 0.6, 13) ** 2)) / 2.0
     np.testing.assert_allclose(loop.standard_error, expected, rtol=1e-14)
+
+
+def test_noise_of_the_force_is_per_width_too():
+    loop = Loop(
+        FORCE, DISPLACEMENT, noise=0.1, cycles=4, driver="displacement", units={"force": "N"}
+    )
+    wide = loop.per_width(0.5)
+    np.testing.assert_allclose(wide.force, 2.0 * FORCE)
+    np.testing.assert_allclose(wide.deviations, 0.1)
+    assert wide.unit("force") == "N/m"
+    assert loop.but(driver="force").per_width(0.5).noise == 0.1
 
 
 def test_closed_loops_and_pulls():

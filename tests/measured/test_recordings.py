@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.recordings import FEWEST_POINTS, read_recordings, recording_from_arrays
+from jbeamshell.measured.form import FEWEST_POINTS
+from jbeamshell.measured.loop_files import read_loops
+from jbeamshell.measured.loops import make_loop
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 13)
 FORCE, DISPLACEMENT = 3.0 * np.cos(PHASE), 0.25 * np.cos(PHASE - 0.3)
@@ -67,7 +69,7 @@ CHOSEN = {
 
 @pytest.mark.parametrize("name", FILES)
 def test_files_of_named_vectors(tmp_path, name):
-    (got,) = read_recordings(written(tmp_path / name, FILES[name]))
+    (got,) = read_loops(written(tmp_path / name, FILES[name]))
     scale = 8.0 if "integers" in name else 1.0
     close = 1e-6 if "single" in name else 0.5 if "integers" in name else 1e-14
     np.testing.assert_allclose(got.force, scale * FORCE, rtol=close, atol=close)
@@ -80,10 +82,10 @@ def test_columns_of_matrices_are_chosen(tmp_path, name):
     variables, force, displacement = CHOSEN[name]
     path = written(tmp_path / name, variables)
     with pytest.raises(InputError, match=r"needs one column named '\w+' in its variables"):
-        read_recordings(path)
+        read_loops(path)
     chosen = {"force": force, "displacement": displacement}
     units = {"force": "kN", "displacement": "mm"}
-    (got,) = read_recordings(path, columns=chosen, units=units)
+    (got,) = read_loops(path, columns=chosen, units=units)
     np.testing.assert_allclose(got.force, 1e3 * FORCE, rtol=1e-14)
     np.testing.assert_allclose(got.displacement, 1e-3 * DISPLACEMENT, rtol=1e-14)
 
@@ -91,13 +93,13 @@ def test_columns_of_matrices_are_chosen(tmp_path, name):
 def test_numpy_files_tell_missing_and_infinite_points(tmp_path):
     force = np.where(TIME == 4, np.nan, FORCE)
     path = written(tmp_path / "a.npz", {"force": force, "displacement": DISPLACEMENT})
-    (got,) = read_recordings(path)
+    (got,) = read_loops(path)
     assert (got.dropped, got.force.size) == (1, 12)
     written(path, {"force": np.where(TIME == 4, np.inf, FORCE), "displacement": DISPLACEMENT})
     with pytest.raises(
         InputError, match=r"a\.npz: 'force' is infinite at element 5: give a finite"
     ):
-        read_recordings(path)
+        read_loops(path)
 
 
 def zip_of(content):
@@ -132,7 +134,7 @@ def test_bad_files_are_refused(tmp_path, name):
     content, told = BAD[name]
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError) as caught:
-        read_recordings(tmp_path / name)
+        read_loops(tmp_path / name)
     assert str(caught.value).startswith(name)
     assert told in str(caught.value)
 
@@ -144,7 +146,7 @@ def test_a_byte_that_kills_scipys_reader_does_not_kill_the_process(tmp_path):
     content[184] = 0xD4  # a type that is none
     path.write_bytes(content)
     with pytest.raises(InputError, match=r"damaged\.mat: .*it is damaged"):
-        read_recordings(path)
+        read_loops(path)
 
 
 @pytest.mark.parametrize(
@@ -158,7 +160,7 @@ def test_a_byte_that_kills_scipys_reader_does_not_kill_the_process(tmp_path):
 )
 def test_variables_that_make_no_recording(tmp_path, variables, told):
     with pytest.raises(InputError) as caught:
-        read_recordings(written(tmp_path / "a.mat", variables))
+        read_loops(written(tmp_path / "a.mat", variables))
     assert told in str(caught.value)
 
 
@@ -188,7 +190,7 @@ def test_broken_files_give_recordings_or_one_clear_line(
     path = tmp_path_factory.getbasetemp() / f"broken{suffix}"
     path.write_bytes((good[:at] + new + good[at + length :])[:cut])
     try:
-        found, refused = read_recordings(path), path.name
+        found, refused = read_loops(path), path.name
     except InputError as error:
         found, refused = [], str(error)
     assert path.name in refused
@@ -204,22 +206,22 @@ def test_several_files_keep_their_order_and_tell_their_folders_where_names_are_a
     for i, name in enumerate(("b/run.npz", "a/run.npz", "a/slow.npz")):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         paths.append(written(tmp_path / name, BOTH | {"force": (i + 1) * FORCE}))
-    found = read_recordings(paths)
+    found = read_loops(paths)
     assert [r.label for r in found] == ["b/run.npz", "a/run.npz", "a/slow.npz"]
-    assert [r.label for r in read_recordings(paths[1:])] == ["run.npz", "slow.npz"]
+    assert [r.label for r in read_loops(paths[1:])] == ["run.npz", "slow.npz"]
     for i, recording in enumerate(found):
         np.testing.assert_array_equal(recording.force, (i + 1) * FORCE)
     with pytest.raises(InputError, match=r"a/run\.npz: is given twice: it would count double"):
-        read_recordings([*paths, str(paths[1])])
+        read_loops([*paths, str(paths[1])])
     with pytest.raises(InputError, match="no file given: name at least one"):
-        read_recordings([])
+        read_loops([])
 
 
 def test_groups_of_several_files_are_labelled_by_both(tmp_path):
     marks = np.repeat([1.0, 2.0], 13)
     twice = {name: np.tile(column, 2) for name, column in BOTH.items()}
     paths = [written(tmp_path / name, twice | {"A": marks}) for name in ("x.npz", "y.npz")]
-    labels = [recording.label for recording in read_recordings(paths)]
+    labels = [recording.label for recording in read_loops(paths)]
     assert labels == ["x.npz: A = 1", "x.npz: A = 2", "y.npz: A = 1", "y.npz: A = 2"]
 
 
@@ -229,7 +231,7 @@ def test_groups_of_several_files_are_labelled_by_both(tmp_path):
 def test_points_without_a_number_are_dropped_and_counted():
     force = np.where(np.isin(TIME, (4, 6)), np.nan, FORCE)
     displacement = np.where(np.isin(TIME, (6, 12)), np.nan, DISPLACEMENT)
-    got = recording_from_arrays(force, displacement, "rig", time=TIME, normal_force=TIME * np.nan)
+    got = make_loop(force, displacement, "rig", time=TIME, normal_force=TIME * np.nan)
     kept = ~np.isin(TIME, (4, 6, 12))
     np.testing.assert_array_equal(got.force, FORCE[kept])
     np.testing.assert_array_equal(got.displacement, DISPLACEMENT[kept])
@@ -240,7 +242,7 @@ def test_points_without_a_number_are_dropped_and_counted():
 
 def test_arrays_of_any_kind():
     assert FEWEST_POINTS == 8
-    got = recording_from_arrays(list(FORCE[:8]), tuple(DISPLACEMENT[:8]), "rig")
+    got = make_loop(list(FORCE[:8]), tuple(DISPLACEMENT[:8]), "rig")
     np.testing.assert_array_equal(got.force, FORCE[:8])
     assert (got.label, got.time, got.dropped, got.notes) == ("rig", None, 0, ())
 
@@ -272,4 +274,4 @@ NAN = np.where(TIME < 7, np.nan, FORCE)
 )
 def test_bad_arrays_are_refused(force, displacement, told):
     with pytest.raises(InputError, match=told):
-        recording_from_arrays(force, displacement, "rig")
+        make_loop(force, displacement, "rig")

@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jbeamshell.common.errors import InputError
-from jbeamshell.measured.loops import read_loops
-from jbeamshell.measured.recordings import read_recordings
+from jbeamshell.measured.loop_files import read_loops
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 13)
 FORCE, DISPLACEMENT = 3.0 * np.cos(PHASE), 0.25 * np.cos(PHASE - 0.3)
@@ -104,7 +103,7 @@ def test_every_dialect_reads_back_to_the_last_bit(
         lines[0] = "# " + lines[0]
     path = tmp_path_factory.getbasetemp() / "dialect.txt"
     path.write_bytes(end.join([*preamble, *lines, ""]).encode(encoding))
-    (got,) = read_recordings(path, decimal=decimal if random.random() < 0.5 else None)
+    (got,) = read_loops(path, decimal=decimal if random.random() < 0.5 else None)
     kept = np.array([row not in missing for row in range(24)])
     newtons, metres = (1.0, 1.0) if units == "none" else (1e3, 1e-6)
     np.testing.assert_allclose(got.force, newtons * values["force"][kept], rtol=1e-15)
@@ -232,7 +231,7 @@ def test_columns_of_a_table_without_a_header_have_numbers(read, delimiter, decim
 
 def test_forces_per_width_are_not_divided_again(tmp_path):
     (tmp_path / "data.csv").write_text(text(["force [N/mm]", "displacement [mm]"]))
-    (recording,) = read_recordings(tmp_path / "data.csv")
+    (recording,) = read_loops(tmp_path / "data.csv")
     again = recording.per_width(0.05)
     np.testing.assert_array_equal(again.force, recording.force)
     assert "the force is per width already, so the width does not divide it" in again.notes
@@ -481,7 +480,7 @@ def test_anything_gives_finite_recordings_or_one_clear_line(tmp_path_factory, co
     path = tmp_path_factory.getbasetemp() / "anything.csv"
     path.write_bytes(content)
     try:
-        found, refused = read_recordings(path, decimal=decimal), "anything.csv"
+        found, refused = read_loops(path, decimal=decimal), "anything.csv"
     except InputError as error:
         found, refused = [], str(error)
     assert "anything.csv" in refused
