@@ -9,6 +9,7 @@ factor (quasi-static modal analysis: Festjens, Chevallier and Dion 2013; Allen, 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -153,7 +154,7 @@ class FaceCurve(eqx.Module):
     frequency : cycles per time
     damping : damping ratio zeta of the friction on the face
     dissipation : energy lost per cycle
-    doubts : reasons to doubt a point, the amplitude first
+    doubts : reasons to doubt a point, the first amplitude before each
     """
 
     amplitude: Array
@@ -236,14 +237,18 @@ def face_curve(
                 f"amplitude {size:.6g}: a step has no equilibrium; take more steps"
             )
         loops.append(loop)
-    said = [] if is_traced(loops) else list(zip(sizes, loops, strict=True))
+    said: dict[str, list[str]] = {}  # alike but for their size
+    for size, loop in [] if is_traced(loops) else zip(sizes, loops, strict=True):
+        for doubt in loop.doubts:
+            said.setdefault(re.split("[:;]", doubt)[-1], []).append(f"at {size:.4g}: {doubt}")
+    more = {fix: f" (and at {len(words) - 1} more)" for fix, words in said.items() if words[1:]}
     stiffness = jnp.stack([loop.secant_stiffness for loop in loops])
     curve = FaceCurve(
         amplitude=sizes,
         frequency=jnp.sqrt(stiffness) / (2.0 * np.pi),
         damping=0.5 * jnp.stack([loop.loss_factor for loop in loops]),
         dissipation=jnp.stack([loop.dissipation for loop in loops]),
-        doubts=tuple(f"at {size:.4g}: {doubt}" for size, loop in said for doubt in loop.doubts),
+        doubts=tuple(words[0] + more.get(fix, "") for fix, words in said.items()),
     )
     if throw:
         warn_of_doubts(curve.doubts, stacklevel=2)

@@ -13,6 +13,7 @@ from matplotlib.tri import Triangulation
 from jbeamshell.plotting.style import FAINT, PALETTE, panels, style
 
 STATES = ("open", "sticks", "slips")
+WIDE = 0.75  # of the figure's width, that two panels take
 SLIVER = 1e-3  # of the largest triangle, below which one on the rim is left out
 
 
@@ -28,7 +29,7 @@ def face_map(history: Any, step: int = -1) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    x, y = _flat(np.asarray(history.places), np.asarray(history.normals))
+    (x, y), names = _flat(np.asarray(history.places), np.asarray(history.normals))
     area, touching = np.asarray(history.tributary), np.asarray(history.touching)[step]
     state = np.where(touching, 1 + np.asarray(history.slipping)[step].astype(int), 0)
     fields = {
@@ -38,18 +39,24 @@ def face_map(history: Any, step: int = -1) -> Figure:
     }
     with style():
         grid = panels(2, 2).ravel()
+        width = grid[0].figure.get_figwidth()
+        tall = float(np.ptp(y) / max(np.ptp(x), np.finfo(float).tiny))
+        grid[0].figure.set_figheight(width * np.clip(WIDE * tall + 0.25, 0.3, 1.2))
         colours = ListedColormap([FAINT, PALETTE[0], PALETTE[1]])
         grid[0].scatter(x, y, c=state, cmap=colours, vmin=0, vmax=2, s=36, edgecolor="0.4", lw=0.4)
         for k, name in enumerate(STATES):
             grid[0].plot([], [], "o", color=colours(k), markeredgecolor="0.4", label=name)
-        grid[0].legend(loc="upper center", bbox_to_anchor=(0.5, -0.3), ncols=3)
+        keys, words = grid[0].get_legend_handles_labels()
+        grid[0].figure.legend(keys, words, loc="upper left", bbox_to_anchor=(0.1, 1.0), ncols=3)
         grid[0].set_title(f"load {float(history.force[step]):.4g}")
         for panel, (name, values) in zip(grid[1:], fields.items(), strict=True):
             _field(panel, x, y, values)
             panel.set_title(name)
         for panel in grid:
+            panel.set(xlabel=names[0], ylabel=names[1])
             panel.set_aspect("equal")
             panel.grid(False)
+            panel.label_outer()
     return grid[0].figure
 
 
@@ -64,8 +71,8 @@ def _field(panel: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> Non
     panel.figure.colorbar(shown, ax=panel, shrink=0.5)
 
 
-def _flat(places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates of nodes along two axes of the plane that lies nearest to the face."""
+def _flat(places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """Coordinates (2, n) of nodes in the plane that lies nearest to the face, and their names."""
     away = int(np.argmax(np.abs(np.sum(normals, axis=0))))
     along = [axis for axis in range(3) if axis != away]
-    return places[:, along[0]], places[:, along[1]]
+    return places[:, along].T, [f"${'XYZ'[axis]}$" for axis in along]
