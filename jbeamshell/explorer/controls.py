@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.plotting.shapes import round_down
 from jbeamshell.scene.keys import unit_of
 from jbeamshell.scene.scene import Scene
 
@@ -71,7 +72,7 @@ def _load(scene: Scene) -> Control:
     if scene.load.control != "force" or not math.isfinite(limit):
         return _around(key, label, amplitude)
     low, high = 0.02 * limit, NEAR_GROSS_SLIP * limit
-    return Control(key, label, amplitude, low, max(high, amplitude), _nice(limit / STEPS))
+    return Control(key, label, amplitude, low, max(high, amplitude), round_down(limit / STEPS))
 
 
 def _pressure(scene: Scene) -> Iterator[Control]:
@@ -86,7 +87,7 @@ def _pressure(scene: Scene) -> Iterator[Control]:
             low, high = 0.5 * width, length - 0.5 * width
             if scene.member.holes is None and high > low:  # holes stay where they are
                 label = f"{name}: place X [length]"
-                step = _nice((high - low) / STEPS)
+                step = round_down((high - low) / STEPS)
                 yield Control(BOLT.format(number, "place"), label, place, low, high, step)
     elif contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0:
         label = "Pressure F_N [stress]"
@@ -147,12 +148,6 @@ def _scaled(pressure: np.ndarray, factor: float) -> np.ndarray:
 def _around(name: str, label: str, value: float) -> Control:
     """Control of a positive number around the scene's own."""
     size = abs(value)
-    step = _nice((ABOVE - BELOW) * size / STEPS)
+    step = round_down((ABOVE - BELOW) * size / STEPS)
     low, high = (step * max(round(part * size / step), 1) for part in (BELOW, ABOVE))
     return Control(name, label, value, low, high, step)
-
-
-def _nice(value: float) -> float:
-    """Largest of 1, 2 and 5 times a power of ten that is no larger."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return float(max(part for part in (1.0, 2.0, 5.0) if part * power <= value) * power)

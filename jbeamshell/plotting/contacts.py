@@ -26,6 +26,7 @@ from jbeamshell.plotting.style import (
     SQUEEZE,
     STICKS,
     below,
+    given_axes,
     looks,
     panels,
     single,
@@ -60,7 +61,7 @@ def contact(
     Parameters
     ----------
     history : jbeamshell.History
-        Solved load path, such as a `jbeamshell.History`.
+        Solved load path.
     steps : sequence of int, optional
         Indices into the path. When not given: the pressed strip and the turning points of the last
         cycle; the end of a path without a cycle; four steps if only the pressure grows.
@@ -100,11 +101,8 @@ def contact(
     founded = history.scene.contact.normal != "none"
     squeezed, sign = ("reaction", 1.0) if founded else ("squeeze_stress", -1.0)
     with style():
-        grid = _many(len(names)) if axes is None else np.asarray(axes, dtype=object)
-        if grid.size != len(names):
-            raise InputError(
-                f"axes: {', '.join(names)} need {len(names)}, not {grid.size}: give one for each"
-            )
+        new = axes is None
+        grid = _many(len(names)) if new else given_axes(axes, len(names), ", ".join(names))
         for name, panel in zip(names, grid.ravel(), strict=True):
             title, label = PROFILES[name]
             if name == "gap" and not founded:
@@ -138,7 +136,7 @@ def contact(
         if reference:
             keys.append((reference_label, DOTS))
         handles = [Line2D([], [], label=label, **look) for label, look in keys]
-        if axes is None:  # below the panels, where it covers nothing
+        if new:  # below the panels, where it covers nothing
             place = {"loc": "outside lower center", "ncols": len(handles)}
             grid.ravel()[0].figure.legend(handles=handles, **place)
         else:
@@ -154,7 +152,7 @@ def contact_map(
     Parameters
     ----------
     history : jbeamshell.History
-        Solved load path, such as a `jbeamshell.History`.
+        Solved load path.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
     xlim : (float, float), optional

@@ -115,7 +115,7 @@ def animate(
     Parameters
     ----------
     history : jbeamshell.History or jbeamshell.ContactHistory
-        Solved load path, such as a `jbeamshell.History` or a `jbeamshell.ContactHistory`.
+        Solved load path.
     steps : sequence of int, optional
         Steps of the path, one for each frame; up to 48 of the last cycle when not given, or of the
         whole path if it has none.

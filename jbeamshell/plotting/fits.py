@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from jbeamshell.common.errors import InputError
 from jbeamshell.measured.form import Form, by_form
 from jbeamshell.plotting.style import (
     DOTS,
@@ -18,6 +17,7 @@ from jbeamshell.plotting.style import (
     PALETTE,
     below,
     colours,
+    given_axes,
     looks,
     mark_decades,
     panels,
@@ -129,7 +129,7 @@ def _xy(form: Form, measurement: Any) -> tuple[np.ndarray, np.ndarray]:
 def _panels(fit: Any, axes: Any) -> list[tuple[Form, list[int], Axes]]:
     """Forms, the places of their measurements, and the axes of each."""
     forms = by_form(fit.data)
-    drawn = _checked_axes(len(forms), axes)
+    drawn = _checked_axes(len(forms), axes, "forms of measurement")
     return [(form, places, panel) for (form, places), panel in zip(forms, drawn, strict=True)]
 
 
@@ -147,7 +147,7 @@ def likelihoods(profiles: Sequence[Any], axes: Any = None) -> list[Axes]:
         one for each profile; dotted lines mark the ends of its interval
     """
     with style():
-        drawn = _checked_axes(len(profiles), axes)
+        drawn = _checked_axes(len(profiles), axes, "profiles")
         for profile, panel in zip(profiles, drawn, strict=True):
             # The root of the rise is nearly straight on either side of the minimum.
             side = np.sign(profile.values - profile.values[np.argmin(profile.rises)])
@@ -164,11 +164,6 @@ def likelihoods(profiles: Sequence[Any], axes: Any = None) -> list[Axes]:
     return drawn
 
 
-def _checked_axes(count: int, axes: Any) -> list[Axes]:
+def _checked_axes(count: int, axes: Any, what: str) -> list[Axes]:
     """Axes as given if there are as many, or new ones."""
-    if axes is None:
-        return list(panels(1, count)[0])
-    drawn = list(np.ravel(axes))
-    if len(drawn) != count:
-        raise InputError(f"axes: there are {count} to draw, not {len(drawn)}: give one for each")
-    return drawn
+    return list(panels(1, count)[0] if axes is None else given_axes(axes, count, what).ravel())

@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import EngFormatter
 
-from jbeamshell.common.errors import InputError
-from jbeamshell.plotting.style import FAINT, PALETTE, PANEL, looks, style
+from jbeamshell.plotting.style import FAINT, PALETTE, PANEL, given_axes, looks, style
 
 LAYOUT: Any = [["loop", "force"], ["loop", "displacement"]]
 MOST_NAMED = 6  # loops in a legend
@@ -30,7 +29,11 @@ def inspection(seen: Any, axes: Any = None) -> list[Axes]:
         the three axes
     """
     with style():
-        panels = _three(axes)
+        if axes is None:
+            axes = list(
+                plt.subplot_mosaic(LAYOUT, figsize=(2.2 * PANEL[0], 1.3 * PANEL[1]))[1].values()
+            )
+        panels = list(given_axes(axes, 3, "an inspection's pictures").ravel())
         loops, *courses = panels
         levels = [level for view in seen.views for level in view.levels]
         own = iter(looks(len(levels)))
@@ -79,14 +82,3 @@ def _title(seen: Any) -> str:
     words = [f"refused: {', '.join(grave)}"] if grave else []
     words += [f"doubts: {', '.join(doubts)}"] if doubts else []
     return "\n".join([label, *words])
-
-
-def _three(axes: Any) -> list[Axes]:
-    """Three axes, new ones unless given."""
-    if axes is None:
-        grid = plt.subplot_mosaic(LAYOUT, figsize=(2.2 * PANEL[0], 1.3 * PANEL[1]))[1]
-        return [grid["loop"], grid["force"], grid["displacement"]]
-    drawn = list(np.ravel(axes))
-    if len(drawn) != 3:
-        raise InputError(f"axes: an inspection needs three, not {len(drawn)}: give three")
-    return drawn

@@ -33,7 +33,7 @@ def deformed(
     Parameters
     ----------
     history : jbeamshell.History
-        Solved load path of a strip or of a lap joint, such as a `jbeamshell.History`.
+        Solved load path of a strip or of a lap joint.
     step : int, optional
         Index into the path; the end of the last cycle when not given.
     axes : matplotlib.axes.Axes, optional

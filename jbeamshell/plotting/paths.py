@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
-from jbeamshell.common.errors import InputError
 from jbeamshell.plotting.steps import checked_steps, default_steps, load_label
 from jbeamshell.plotting.style import (
     DATA,
@@ -22,11 +21,14 @@ from jbeamshell.plotting.style import (
     PALETTE,
     POSITION,
     ROTATION,
+    given_axes,
     looks,
     panels,
     single,
     style,
 )
+
+SLIPPED: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 3.2}
 
 
 def loop(history: Any, axes: Axes | None = None, *, moment: bool = False) -> Axes:
@@ -35,7 +37,7 @@ def loop(history: Any, axes: Axes | None = None, *, moment: bool = False) -> Axe
     Parameters
     ----------
     history : jbeamshell.History or jbeamshell.ContactHistory
-        Solved load path, such as a `jbeamshell.History`.
+        Solved load path.
     axes : matplotlib.axes.Axes, optional
         Where to draw; new axes when not given.
     moment : bool
@@ -74,7 +76,7 @@ def profiles(
     Parameters
     ----------
     history : jbeamshell.History
-        Solved load path, such as a `jbeamshell.History`.
+        Solved load path.
     steps : sequence of int, optional
         Indices into the path: 0 is its first step, -1 its end. When not given: the zero crossings
         and turning points of the last cycle, or four steps of a path without a cycle.
@@ -102,7 +104,7 @@ def profiles(
     cap = float(contact.friction) * pressure
     squeezes = "psi" in history.scene.plan.fields
     with style():
-        grid = _four(axes)
+        grid = panels(2, 2, sharex=True) if axes is None else given_axes(axes, 4, "profiles")
         slip, rotation, traction, reaction = grid.ravel()
         x = np.asarray(history.x)
         for step, look in zip(chosen, looks(len(chosen)), strict=True):
@@ -114,7 +116,7 @@ def profiles(
             moving, share = np.asarray(history.slipping[step]), np.asarray(history.traction[step])
             share = share / cap if cap > 0.0 else share
             traction.plot(x, share, **look, label=load_label(history, step))
-            traction.plot(x[moving], share[moving], "o", color=look["color"], markersize=3.2)
+            traction.plot(x[moving], share[moving], **SLIPPED, color=look["color"])
             reaction.plot(x, np.asarray(history.reaction[step]) / pressure, **look)
         varies = contact.pressure.ndim > 0
         over = r"\max F_N" if varies else "F_N"
@@ -130,9 +132,7 @@ def profiles(
             rotation.legend(kinds, [r"$\beta$", r"$\psi - \psi_p$"], loc="best")
         for panel in grid.ravel():
             panel.set(xlabel=POSITION)
-        dot = Line2D([], [], color=DATA, marker="o", linestyle="", markersize=3.2)
-        handles, labels = traction.get_legend_handles_labels()
-        traction.legend([*handles, dot], [*labels, "slips"], loc="best")
+        _name_dots(traction)
     return grid
 
 
@@ -144,7 +144,7 @@ def contact_lines(
     Parameters
     ----------
     history : jbeamshell.ContactHistory
-        Contact between substructures, such as a `jbeamshell.ContactHistory`.
+        Contact between substructures.
     steps : sequence of int, optional
         Indices into the path. When not given: the pressing and the turns of the last cycle.
     axes : array_like of matplotlib.axes.Axes, optional
@@ -166,7 +166,7 @@ def contact_lines(
     names = {"slip": "slip  [length]", "gap": "gap  [length]"}
     names |= {"traction": "friction traction  [stress]", "reaction": "normal reaction  [stress]"}
     with style():
-        grid = _four(axes)
+        grid = panels(2, 2, sharex=True) if axes is None else given_axes(axes, 4, "profiles")
         for panel, (name, title) in zip(grid.ravel(), names.items(), strict=True):
             values = np.asarray(getattr(history, name))
             for step, look in zip(chosen, looks(len(chosen)), strict=True):
@@ -174,21 +174,14 @@ def contact_lines(
                 panel.plot(x, values[step], **look, label=label)
                 moving = np.asarray(history.slipping[step])
                 if name == "traction":
-                    panel.plot(
-                        x[moving], values[step][moving], "o", color=look["color"], markersize=3.2
-                    )
+                    panel.plot(x[moving], values[step][moving], **SLIPPED, color=look["color"])
             panel.set(title=title, xlabel=POSITION)
-        dot = Line2D([], [], color=DATA, marker="o", linestyle="", markersize=3.2)
-        handles, labels = grid.ravel()[2].get_legend_handles_labels()
-        grid.ravel()[2].legend([*handles, dot], [*labels, "slips"], loc="best")
+        _name_dots(grid.ravel()[2])
     return grid
 
 
-def _four(axes: ArrayLike | None) -> np.ndarray:
-    """Four axes, new ones unless given."""
-    if axes is None:
-        return panels(2, 2, sharex=True)
-    grid = np.asarray(axes, dtype=object)
-    if grid.size != 4:
-        raise InputError(f"axes: profiles need four, not {grid.size}: give four")
-    return grid
+def _name_dots(panel: Axes) -> None:
+    """Legend of the lines of a panel, and of the dots of what slips."""
+    handles, labels = panel.get_legend_handles_labels()
+    dot = Line2D([], [], color=DATA, **SLIPPED)
+    panel.legend([*handles, dot], [*labels, "slips"], loc="best")

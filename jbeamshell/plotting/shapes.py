@@ -197,7 +197,7 @@ def _slope(w: float, slope: float, t: NDArray[np.float64]) -> NDArray[np.float64
 def _visible(paths: list[tuple[NDArray[np.float64], NDArray[np.float64]]], height: float) -> float:
     """Factor with which the largest displacement of a path is seen."""
     largest = max(float(np.nanmax(np.abs(np.stack(path)))) for path in paths)
-    return _rounded(SHARE * 0.5 * height / largest) if largest > 0.0 else 1.0
+    return round_down(SHARE * 0.5 * height / largest) if largest > 0.0 else 1.0
 
 
 def _moved(
@@ -207,7 +207,7 @@ def _moved(
     return np.stack([x, np.full_like(x, height)], axis=1) + factor * moves
 
 
-def _rounded(value: float) -> float:
+def round_down(value: float) -> float:
     """Largest of 1, 2 and 5 times a power of ten that is no larger."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(part for part in (1.0, 2.0, 5.0) if part * power <= value) * power)

@@ -190,6 +190,14 @@ def panels(rows: int, columns: int, **options: Any) -> np.ndarray:
     return np.asarray(plt.subplots(rows, columns, figsize=size, squeeze=False, **options)[1])
 
 
+def given_axes(axes: Any, count: int, what: str) -> np.ndarray:
+    """Axes as given, in their shape; raises `InputError` unless there is one for each of what."""
+    drawn = np.asarray(axes, dtype=object)
+    if drawn.size != count:
+        raise InputError(f"axes: {what} need {count}, not {drawn.size}: give one for each")
+    return drawn
+
+
 def below(axes: Axes, keys: Sequence[Any]) -> None:
     """Put a legend below the axes, where it covers nothing."""
     columns = len(keys) if len(keys) <= 3 else 2

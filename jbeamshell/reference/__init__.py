@@ -31,7 +31,6 @@ from jbeamshell.reference.layered_beam import layered_beam_slip_force as layered
 from jbeamshell.reference.masing import bar_hysteresis as bar_hysteresis
 from jbeamshell.reference.masing import masing_dissipation as masing_dissipation
 from jbeamshell.reference.masing import masing_loop as masing_loop
-from jbeamshell.reference.masing import masing_pull_push as masing_pull_push
 from jbeamshell.reference.micro_slip import energy_exponent as energy_exponent
 from jbeamshell.reference.micro_slip import height_factor as height_factor
 from jbeamshell.reference.micro_slip import slip_energy as slip_energy
@@ -47,10 +46,7 @@ from jbeamshell.reference.squeeze import best_decay_ratio as best_decay_ratio
 from jbeamshell.reference.squeeze import best_kappa_s as best_kappa_s
 from jbeamshell.reference.squeeze import reaction_jump as reaction_jump
 from jbeamshell.reference.squeeze import squeeze_decay_length as squeeze_decay_length
-from jbeamshell.reference.squeeze import squeeze_kappa_s as squeeze_kappa_s
 from jbeamshell.reference.squeeze import squeeze_step as squeeze_step
-from jbeamshell.reference.squeeze import squeeze_symbol as squeeze_symbol
 from jbeamshell.reference.stuck import first_slip_force as first_slip_force
-from jbeamshell.reference.stuck import gross_slip_force as gross_slip_force
 from jbeamshell.reference.stuck import stuck_decay_rate as stuck_decay_rate
 from jbeamshell.reference.stuck import stuck_rotation as stuck_rotation

@@ -20,9 +20,6 @@ from jax.typing import ArrayLike
 
 from jbeamshell.mechanics.bar import bar_backbone
 
-BackbonePoints = tuple[ArrayLike, ArrayLike]
-"""Force and displacement of a monotonic loading, both of shape (n,), starting at the origin."""
-
 
 def bar_hysteresis(
     amplitude: ArrayLike,
@@ -123,31 +120,6 @@ def masing_dissipation(force: ArrayLike, displacement: ArrayLike) -> Array:
     )
     integral = jnp.sum((left + right) / 6 * parabola)
     return 4 * force[-1] * displacement[-1] - 8 * integral
-
-
-def masing_pull_push(pull: BackbonePoints, push: BackbonePoints) -> Array:
-    """Mean of the two Masing dissipations of a joint, ``D = (D_pull + D_push) / 2``.
-
-    A pull and a push differ where the strip has height: they change the normal reaction, and with
-    it the friction, in opposite ways.
-
-    Parameters
-    ----------
-    pull : tuple of array_like, each of shape (n,)
-        Force and displacement of the monotonic pull, as in `masing_dissipation`.
-    push : tuple of array_like, each of shape (m,)
-        The same of the push; both columns negative, or both as magnitudes.
-
-    Returns
-    -------
-    Array, scalar
-        D per full cycle [force length].
-
-    Notes
-    -----
-    Exact when pull and push coincide and Masing's rule (Masing 1926) holds; otherwise an estimate.
-    """
-    return (masing_dissipation(*pull) + masing_dissipation(*push)) / 2
 
 
 def _table(force: ArrayLike, displacement: ArrayLike) -> tuple[Array, Array]:

@@ -21,29 +21,6 @@ from scipy.optimize import brentq
 from jbeamshell.reference.filon import filon_average, gauss_legendre
 
 
-def squeeze_symbol(wavenumber: ArrayLike, decay_ratio: ArrayLike) -> Array:
-    """Mean of -sigma_y / p under ``p cos(alpha x)``, ``1 / (1 + lambda^2 alpha^2)``, psi model.
-
-    Parameters
-    ----------
-    wavenumber : array_like, shape (...)
-        ``m = alpha H`` of the pressure on both faces [1].
-    decay_ratio : array_like, shape (...)
-        ``lambda / H``, from `squeeze_decay_length` [1].
-
-    Returns
-    -------
-    Array, shape (...)
-        Amplitude of ``chi / (2 H p)`` [1].
-
-    Notes
-    -----
-    From ``xi' - chi + 2 H p_z = 0`` with ``xi = (2/3) kappa_s G H^3 psi'`` and
-    ``chi = 2 H E' psi`` at N = 0. Brink 2015, chapter IV.
-    """
-    return 1 / (1 + jnp.square(jnp.multiply(wavenumber, decay_ratio)))
-
-
 def squeeze_decay_length(
     half_height: ArrayLike, kappa_s: ArrayLike, poisson_ratio: ArrayLike
 ) -> Array:
@@ -70,28 +47,6 @@ def squeeze_decay_length(
     """
     ratio = jnp.sqrt(jnp.multiply(kappa_s, 1 - jnp.asarray(poisson_ratio)) / 6)
     return jnp.asarray(half_height) * ratio
-
-
-def squeeze_kappa_s(
-    decay_length: ArrayLike, half_height: ArrayLike, poisson_ratio: ArrayLike
-) -> Array:
-    """Squeeze-shear factor of a decay length, ``kappa_s = 6 (lambda / H)^2 / (1 - nu)``.
-
-    Parameters
-    ----------
-    decay_length : array_like, shape (...)
-        lambda [length].
-    half_height : array_like, shape (...)
-        H [length].
-    poisson_ratio : array_like, shape (...)
-        nu [1].
-
-    Returns
-    -------
-    Array, shape (...)
-        kappa_s [1]: the inverse of `squeeze_decay_length`.
-    """
-    return 6 * jnp.square(jnp.divide(decay_length, half_height)) / (1 - jnp.asarray(poisson_ratio))
 
 
 def squeeze_step(distance: ArrayLike, decay_ratio: ArrayLike) -> Array:
@@ -185,7 +140,7 @@ def best_kappa_s(poisson_ratio: ArrayLike, match: str = "step") -> Array:
     ValueError
         If `match` is not one of the choices.
     """
-    return squeeze_kappa_s(best_decay_ratio(match), 1.0, poisson_ratio)
+    return 6.0 * best_decay_ratio(match) ** 2 / (1.0 - jnp.asarray(poisson_ratio))
 
 
 def reaction_jump(

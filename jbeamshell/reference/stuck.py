@@ -173,30 +173,6 @@ def first_slip_force(
     return jnp.multiply(friction, pressure) * half_height / (end_share * (shear + relief))
 
 
-def gross_slip_force(friction: ArrayLike, mean_pressure: ArrayLike, length: ArrayLike) -> Array:
-    """End force at which the whole contact slides, ``F = mu p L``.
-
-    Parameters
-    ----------
-    friction : array_like, shape (...)
-        Friction coefficient mu [1].
-    mean_pressure : array_like, shape (...)
-        Mean p of the pressure on the contact [stress].
-    length : array_like, shape (...)
-        L [length].
-
-    Returns
-    -------
-    Array, shape (...)
-        F per width [force / length].
-
-    Notes
-    -----
-    Global balance under Coulomb friction; Brink 2015, eq. 3.12 with the whole length slipping.
-    """
-    return jnp.multiply(friction, mean_pressure) * length
-
-
 def _stuck_stiffness(
     half_height: ArrayLike, youngs_plane_strain: ArrayLike, bending_stiffness: ArrayLike | None
 ) -> Array:

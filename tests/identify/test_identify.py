@@ -414,7 +414,7 @@ def test_a_mixture_of_everything(tmp_path):
     plt.close("all")
     names = {path.name for path in fit.save(tmp_path)}
     assert {"overlay.csv", "squeeze.csv", "dissipation.csv", "stiffness.csv"} < names
-    with pytest.raises(jb.InputError, match="there are 4 to draw, not 1"):
+    with pytest.raises(jb.InputError, match="forms of measurement need 4, not 1"):
         fit.plot(plt.figure().subplots())
     plt.close("all")
 

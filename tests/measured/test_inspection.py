@@ -307,7 +307,7 @@ def test_the_picture_shows_the_recording_and_its_mean_loops():
     assert means[1].get_label() == "3 cycles: micro-slip"
     assert force.get_ylabel() == "force  [scene]"
     assert displacement.get_xlabel() == "time  [scene]"
-    with pytest.raises(InputError, match="needs three"):
+    with pytest.raises(InputError, match="need 3, not"):
         inspection(seen, [loops])
     plt.close("all")
 

@@ -390,7 +390,7 @@ class TestSave:
 
 REFUSED = {
     "steps": (lambda h, _: plotting.profiles(h, [19]), "steps: 19 is not on the path, whose"),
-    "axes": (lambda h, _: plotting.profiles(h, axes=plt.subplots(1, 3)[1]), "four"),
+    "axes": (lambda h, _: plotting.profiles(h, axes=plt.subplots(1, 3)[1]), "profiles need 4"),
     "panels": (lambda h, _: plotting.contact(h, panels=["heat"]), "there is no 'heat' in reaction"),
     "reference": (
         lambda h, _: plotting.contact(h, reference={"w": ([0.0], [0.0])}),
@@ -404,7 +404,7 @@ REFUSED = {
     ),
     "likelihoods": (
         lambda *_: plotting.likelihoods(TestLikelihoods.PROFILES, plt.subplots()[1]),
-        "there are 2 to draw, not 1",
+        "need 2, not 1",
     ),
     "film": (lambda h, folder: h.animate([0]).save(folder / "a.mp4"), r"end the name in \.gif"),
     "no suffix": (

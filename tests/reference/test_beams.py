@@ -52,9 +52,7 @@ def test_slip_profile_balances_forces(force):
 
 
 def test_gross_slip_is_the_slip_zone_reaching_the_held_end():
-    limit = reference.gross_slip_force(0.1, 10.0, LENGTH)
-    np.testing.assert_allclose(limit, 2.0)
-    np.testing.assert_allclose(reference.bar_slip_length(limit, 0.1 * 10.0), LENGTH)
+    np.testing.assert_allclose(reference.bar_slip_length(0.1 * 10.0 * LENGTH, 0.1 * 10.0), LENGTH)
 
 
 @pytest.mark.parametrize("amplitude", [0.1, 1.9])
@@ -107,18 +105,6 @@ def test_masing_loop_is_what_sliders_in_parallel_do():
     force, displacement = reference.masing_loop(np.array(stepped[:25]), first)
     np.testing.assert_allclose(displacement, path[24::2], atol=1e-14)
     np.testing.assert_allclose(force, stepped[24::2], atol=1e-13)
-
-
-def test_masing_pull_push_is_the_mean_and_ignores_the_sign_of_the_push():
-    force = jnp.linspace(0, 1.2, 21)
-    pull, push = (
-        (force, reference.bar_backbone(force, EA, 0.8)),
-        (force, reference.bar_backbone(force, EA, 1.2)),
-    )
-    mean = (reference.cubic_law(1.2, EA, 0.8) + reference.cubic_law(1.2, EA, 1.2)) / 2
-    np.testing.assert_allclose(reference.masing_pull_push(pull, push), mean, rtol=1e-13)
-    signed = (-push[0], -push[1])
-    np.testing.assert_allclose(reference.masing_pull_push(pull, signed), mean, rtol=1e-13)
 
 
 def test_backbone_tables_that_cannot_be_meant_are_refused():
