@@ -24,7 +24,7 @@ from jbeamshell.cli.main import _parser
 
 ROOT = Path(__file__).parent.parent
 SITE = ROOT / "notebooks"
-PAGES = [ROOT / "README.md", *sorted((SITE / "pages").glob("*.md"))]
+PAGES = [ROOT / "README.md", SITE / "index.md", *sorted((SITE / "pages").glob("*.md"))]
 BLOCK = re.compile(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", re.DOTALL)
 SHELL = re.compile(r"```sh\n(.*?)```", re.DOTALL)
 COMMAND = re.compile(r"(?:^|&& )(?:\.venv/bin/)?jbeamshell (.+)$", re.MULTILINE)

@@ -212,6 +212,7 @@ def first_results() -> None:
     names = {"length": "mm", "force/width": "N/mm"}
     plotting.in_units(axes, names)
     axes.figure.savefig(FOLDER / "first_loop.png", dpi=110)
+    jb.solve(jb.Scene()).plot().figure.savefig(FOLDER / "standard_loop.png", dpi=110)
     axes = jb.solve(jb.library.single_lap()).plot_deformed()
     axes.figure.savefig(FOLDER / "first_lap_joint.png", dpi=110)
 
