@@ -33,8 +33,8 @@ from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
 from jbeamshell.dynamics.frequencies import OverAmplitude
+from jbeamshell.dynamics.structure.elements import Elements, elements_of
 from jbeamshell.dynamics.structure.matrices import Structure
-from jbeamshell.dynamics.vibration.elements import Elements, elements_of
 from jbeamshell.dynamics.vibration.reduction import basis_of
 
 AMPLITUDES = "give rising positive modal displacements"

@@ -10,8 +10,8 @@ from jax import Array, lax
 
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.precision import doubled
+from jbeamshell.dynamics.structure.elements import Elements, elements_of
 from jbeamshell.dynamics.structure.matrices import Structure, dense
-from jbeamshell.dynamics.vibration.elements import Elements, elements_of
 
 SMALL = 40  # largest number of degrees of freedom that are kept
 MODES = 24  # of a larger structure
