@@ -41,13 +41,15 @@ def extrema(time: ArrayLike, values: ArrayLike) -> tuple[Floats, ...]:
 
     Ripples much shorter than the period are left out.
     """
+    from scipy.signal import find_peaks  # slow to import
+
     times, signal = np.asarray(time, float), np.asarray(values, float)
     spectrum = np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(signal.size)))
     main_frequency = max(int(np.argmax(spectrum)), 1) / (signal.size * (times[1] - times[0]))
     apart = max(1, int(SHORTEST / main_frequency / (times[1] - times[0])))
     picked = []
     for sign in (1.0, -1.0):
-        picked += [(peak, sign) for peak in _peaks(sign * signal, 2 * apart)]
+        picked += [(peak, sign) for peak in find_peaks(sign * signal, distance=2 * apart)[0]]
     picked.sort()
     kept: list[tuple[int, float]] = []
     for peak, sign in picked:
@@ -61,19 +63,6 @@ def extrema(time: ArrayLike, values: ArrayLike) -> tuple[Floats, ...]:
     bend = before - 2.0 * here + after
     shift = np.where(bend != 0.0, 0.5 * (before - after) / np.where(bend != 0.0, bend, 1.0), 0.0)
     return times[index] + shift * (times[1] - times[0]), here - 0.25 * (before - after) * shift
-
-
-def _peaks(signal: Floats, apart: int) -> list[int]:
-    """Places of maxima; of those nearer to each other than some samples only the highest."""
-    inner = signal[1:-1]
-    tops = 1 + np.flatnonzero((inner > signal[:-2]) & (inner >= signal[2:]))
-    free = np.ones(signal.size, bool)
-    found = []
-    for top in tops[np.argsort(-signal[tops], kind="stable")].tolist():
-        if free[top]:
-            free[max(0, top - apart + 1) : top + apart] = False
-            found.append(top)
-    return found
 
 
 def from_swings(at: Floats, reached: Floats) -> Envelope:

@@ -9,12 +9,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from jbeamshell.dynamics.structure.joint import Joint
 
 NEGLIGIBLE = 1e-13  # stiffness of a slider that is left out, over that of all
 
@@ -25,11 +22,11 @@ class Element:
 
     Attributes
     ----------
-    joint : the joint
+    joint : the `jbeamshell.dynamics.Joint`
     units : names of the units of displacement and force
     """
 
-    joint: Joint
+    joint: Any
     units: tuple[str, str]
 
     @property

@@ -32,6 +32,7 @@ from jbeamshell.solving.solve import run
 PER_PERIOD = 200  # default number of steps in the first period of the stuck strip
 MOST_STEPS = 10_000_000
 RELEASE_STEPS = 8  # load steps to the force that is released, so that the reaction is followed
+NO_TERM = diffrax.ODETerm(lambda time, state, args: state)  # the solver's equations are its args
 NO_MOTION = "nothing happens: give an excitation, or a force to let go of in released="
 
 
@@ -160,9 +161,7 @@ def _run(
     equations, times = Equations(*parts), steps[::between]
     fields, traction, pressed = start
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(
-            lambda time, state, _: state
-        ),  # not used: the steps are their own equations
+        NO_TERM,
         Midpoint(),
         0.0,
         steps[-1],

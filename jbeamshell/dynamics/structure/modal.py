@@ -33,9 +33,9 @@ from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.precision import in_double
 from jbeamshell.dynamics.frequencies import OverAmplitude
+from jbeamshell.dynamics.structure.elements import Elements, elements_of
 from jbeamshell.dynamics.structure.matrices import Structure
-from jbeamshell.dynamics.vibration.elements import Elements, elements_of
-from jbeamshell.dynamics.vibration.reduction import basis_of
+from jbeamshell.dynamics.vibration.reduction import basis_of, projected
 
 AMPLITUDES = "give rising positive modal displacements"
 SHAPE = 1e-4  # change of displacements at which a shape is found
@@ -188,13 +188,10 @@ class _Modes(NamedTuple):
         """Coordinates of a structure, for the load M phi of a mode."""
         xp: Any = jnp if structure.traced else np
         basis = basis_of(structure, structure.directions, mode, xp)
-        mass, stiffness = (
-            xp.asarray(basis.T @ (a @ basis)) for a in (structure.mass, structure.stuck_stiffness)
-        )
-        unused = xp.diag(xp.where(xp.all(xp.asarray(basis) == 0.0, axis=0), 1.0, 0.0))
-        root = xp.linalg.inv(xp.linalg.cholesky(mass + unused))
+        mass, stiffness = projected(structure, basis, xp)
+        root = xp.linalg.inv(xp.linalg.cholesky(mass))
         turned = root @ basis.T
-        stiffness = root @ (stiffness + unused * xp.max(stiffness)) @ root.T
+        stiffness = root @ stiffness @ root.T
         return cls(stiffness, turned @ structure.directions, turned @ load)
 
 

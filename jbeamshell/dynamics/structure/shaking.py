@@ -37,8 +37,8 @@ from jbeamshell.common.errors import InputError, warn_of_doubts
 from jbeamshell.common.precision import doubled
 from jbeamshell.common.summary import Summary, with_unit
 from jbeamshell.dynamics.ledger import InterruptedMotionError, Ledger
+from jbeamshell.dynamics.structure.elements import Elements, elements_of
 from jbeamshell.dynamics.structure.matrices import Structure, dense
-from jbeamshell.dynamics.vibration.elements import Elements, elements_of
 
 FIRST = 50  # steps of the longest period of the first run, or more
 TOLERANCE = 1e-4

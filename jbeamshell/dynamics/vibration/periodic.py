@@ -23,7 +23,7 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
-from jbeamshell.dynamics.vibration.elements import Elements
+from jbeamshell.dynamics.structure.elements import Elements
 
 
 class Wave:

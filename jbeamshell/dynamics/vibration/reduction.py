@@ -10,8 +10,8 @@ from jax import Array, lax
 
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.precision import doubled
-from jbeamshell.dynamics.structure.matrices import Structure, dense
-from jbeamshell.dynamics.vibration.elements import Elements, elements_of
+from jbeamshell.dynamics.structure.elements import Elements, elements_of
+from jbeamshell.dynamics.structure.matrices import Structure
 
 SMALL = 40  # largest number of degrees of freedom that are kept
 MODES = 24  # of a larger structure
@@ -45,22 +45,23 @@ def reduced(structure: Structure, force: Any, mode: int = 0) -> tuple[Reduced, A
     exact to the fourth power of the frequency over that of the next mode.  The basis of traced
     structures is held fixed in their derivatives.  The modes go beyond the given one.
     """
-    own = structure.directions
-    matrices = (structure.mass, structure.damping, structure.stuck_stiffness)
-    traced = structure.traced or is_traced(force)
+    own, traced = structure.directions, structure.traced or is_traced(force)
     xp: Any = jnp if traced else np
     basis = basis_of(structure, xp.column_stack([own, force]), mode, xp)
-    if structure.size <= SMALL:
-        projected = [jnp.asarray(dense(matrix)) for matrix in matrices]
-    else:
-        projected = [jnp.asarray(basis.T @ (matrix @ basis)) for matrix in matrices]
-    mass, damping, stiffness = projected
-    unused = jnp.all(jnp.asarray(basis) == 0.0, axis=0)
-    mass = mass + jnp.diag(jnp.where(unused, 1.0, 0.0))
-    stiffness = stiffness + jnp.diag(jnp.where(unused, jnp.max(stiffness), 0.0))
+    mass, stiffness = map(jnp.asarray, projected(structure, basis, xp))
+    damping = jnp.asarray(basis.T @ (structure.damping @ basis))
     elements = elements_of(structure.joints if traced else doubled(structure.joints))
     drive = jnp.asarray(basis.T @ force)
     return Reduced(mass, damping, stiffness, jnp.asarray(basis.T @ own), drive, elements), basis
+
+
+def projected(structure: Structure, basis: Any, xp: Any) -> tuple[Any, Any]:
+    """Mass and stuck stiffness (r, r) in a basis (n, r), whose zero columns do not move."""
+    mass, stiffness = (
+        xp.asarray(basis.T @ (a @ basis)) for a in (structure.mass, structure.stuck_stiffness)
+    )
+    unused = xp.diag(xp.where(xp.all(xp.asarray(basis) == 0.0, axis=0), 1.0, 0.0))
+    return mass + unused, stiffness + unused * xp.max(stiffness)
 
 
 def basis_of(structure: Structure, loads: Any, mode: int, xp: Any) -> Any:
