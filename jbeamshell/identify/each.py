@@ -176,8 +176,35 @@ def _naming(place: int, count: int) -> Iterator[None]:
 
 
 @on_one_core
-def bootstrapped(result: Fit, copies: int, seed: int) -> Fits:
-    """Fits of copies of a fit's data, whose residuals are drawn anew; see `Fit.bootstrap`."""
+def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
+    """Fit copies of a fit's data, whose residuals are drawn anew.
+
+    Each copy is the fitted response with residuals that are drawn in blocks along the curve, so
+    that neighbours stay as correlated as they are (Kunsch, Ann. Stat. 17, 1989).  The spread of the
+    values holds what residuals make of them, and not what the model's grid may leave.
+
+    Parameters
+    ----------
+    result : result of `fit` for one strip, law or structure
+    copies : number of copies
+    seed : seed of the draws
+
+    Returns
+    -------
+    Fits
+        with ``intervals()``
+
+    Raises
+    ------
+    InputError
+        if the result has several specimens, or a rig
+
+    Examples
+    --------
+    ::
+
+        jb.identify.bootstrap(jb.fit(loops, scene, ["contact.friction"])).intervals()
+    """
     require_count("copies", copies, 2)
     problem, uncertainty = result.problem, result.uncertainty
     fix = "has several specimens: fit them one by one"

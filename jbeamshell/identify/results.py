@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,6 @@ from jbeamshell.identify.profile_likelihood import MAX_ITERATIONS, TOLERANCE, Pr
 from jbeamshell.identify.uncertainty import LEVELS, Uncertainty, model_misfit
 from jbeamshell.laws import Law
 from jbeamshell.measured.form import by_form
-
-if TYPE_CHECKING:
-    from jbeamshell.identify.each import Fits
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -289,38 +286,6 @@ class Fit:
             state = sampler.init(problem.start)
         """
         return posterior(self.problem, self.uncertainty)
-
-    def bootstrap(self, copies: int = 1000, *, seed: int = 0) -> Fits:
-        """Fit copies of the data, whose residuals are drawn anew.
-
-        Each copy is the fitted response with residuals that are drawn in blocks along the curve, so
-        that neighbours stay as correlated as they are (Kunsch, Ann. Stat. 17, 1989).  The spread of
-        the values holds what residuals make of them, and not what the model's grid may leave.
-
-        Parameters
-        ----------
-        copies : number of copies
-        seed : seed of the draws
-
-        Returns
-        -------
-        Fits
-            with ``intervals()``
-
-        Raises
-        ------
-        InputError
-            if the result has several specimens, or a rig
-
-        Examples
-        --------
-        ::
-
-            jb.fit(loops, scene, ["contact.friction"]).bootstrap().intervals()
-        """
-        from jbeamshell.identify.each import bootstrapped
-
-        return bootstrapped(self, copies, seed)
 
     @property
     def columns(self) -> list[str]:

@@ -62,8 +62,8 @@ class Specimen:
     centre : True to take the zeros of the sensors from the loops, see `Loop.centred`; None to do so
         where they can only be offsets
     reverse : "force" or "displacement" to turn the sign of that column
-    width : width of the specimen, by which forces as recorded are divided; those of mean loops are
-        per width already
+    width : width of the specimen, by which forces that were read from a file are divided; those of
+        arrays and of mean loops are per width already, see `Loop.per_width`
     columns, units, decimal : arguments of `read_loops`
     dimensions : dimensions of the specimen with units, see `jbeamshell.scene.dimension_table`; or
         the name of a TOML file that holds them
@@ -201,14 +201,15 @@ class Specimen:
         keeps_zero = bool(ZEROS & {*free, *self.set})
         found: list[tuple[Measurement, Sequence[str]]] = []
         for item in items:
-            if isinstance(item, Loop) and item.as_recorded:
+            if isinstance(item, Loop) and item.titles is not None:
                 if known.values and item.units is None:
                     raise InputError(
                         f"{item.label}: its columns name no units, but the specimen's dimensions "
                         "do: give --unit force=N --unit displacement=mm, or what they are"
                     )
-                recording = item.per_width(width)
-                found += self._of_recording(recording, asked, keeps_zero, unchecked)
+                item = item.per_width(width)
+            if isinstance(item, Loop) and item.as_recorded:
+                found += self._of_recording(item, asked, keeps_zero, unchecked)
             elif isinstance(item, Loop):
                 found.append(self._centred(item, keeps_zero))
             else:

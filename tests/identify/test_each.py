@@ -65,7 +65,7 @@ def test_each_fit_has_the_defaults_of_a_fit():
 
 def test_bootstrap_copies_spread_as_the_standard_error_says(noisy):
     """Under white noise and a model that is right, both tell the same spread and the truth."""
-    copies = noisy.bootstrap(40)
+    copies = identify.bootstrap(noisy, 40)
     assert copies.converged.all()
     for key, truth in ((MU, 0.1), (ETA, 0.25)):
         spread = np.std(copies.values[key])
@@ -73,7 +73,7 @@ def test_bootstrap_copies_spread_as_the_standard_error_says(noisy):
         assert abs(noisy.values[key] - truth) < 4.0 * spread
         low, high = copies.intervals()[key]
         assert low < noisy.values[key] < high
-    again = noisy.bootstrap(3)
+    again = identify.bootstrap(noisy, 3)
     np.testing.assert_array_equal(again.values[MU], copies.values[MU][:3])
 
 
@@ -89,4 +89,4 @@ def test_bad_input_names_the_fit(noisy):
         none.intervals()
     assert str(none) == "2 fits, 0 converged"
     with pytest.raises(jb.InputError, match="copies"):
-        noisy.bootstrap(1)
+        identify.bootstrap(noisy, 1)
