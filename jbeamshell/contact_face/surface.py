@@ -149,13 +149,15 @@ def matched(upper: ArrayLike, lower: ArrayLike) -> NDArray[np.float64]:
 
 def _rows(elements: Iterable[ArrayLike]) -> list[tuple[int, list[int]]]:
     """Number and nodes of each element; a node that follows itself counts once."""
-    found = []
+    found, known = [], dict[tuple[int, ...], int]()
     for k, given in enumerate(elements):
         key = f"elements[{k}]"
         row = whole_numbers(key, np.ravel(np.asarray(given))).tolist()
         row = [node for i, node in enumerate(row) if node != row[i - 1]]
         require(key, row, len(row) not in (6, 8, 9), QUADRATIC)
         require(key, row, len(set(row)) == len(row) in (3, 4), ELEMENTS)
+        first = known.setdefault(tuple(sorted(row)), k)
+        require(key, row, first == k, f"is elements[{first}] again: name each once")
         found.append((k, row))
     require("elements", len(found), bool(found), ELEMENTS)
     return found

@@ -10,6 +10,8 @@ import jbeamshell as jb
 from calibration.finite_elements.bolted_lap import decks
 from calibration.finite_elements.bricks import run
 from jbeamshell.measured.example import data_folder
+from tests.contact_face.bricks import box
+from tests.damaged import damage
 
 LAP = data_folder() / "bolted_lap"
 NODES = """
@@ -124,6 +126,46 @@ class TestGrammar:
             deck.surface("A")
 
 
+class TestTables:
+    def test_bodies_without_decks_are_paired_by_their_places(self, tmp_path):
+        sides, tables = {"upper": 0.0, "lower": -1.0}, {}
+        draw = np.random.default_rng(0)
+        for name, z in sides.items():
+            model, places = box((3, 2, 1), (3.0, 2.0, 1.0), at=(0.0, 0.0, z))
+            matrices = {"stiffness": model.matrix.toarray(), "mass": model.mass.toarray()}
+            np.savez(tmp_path / f"{name}.npz", dofs=model.dofs, **matrices)
+            nodes = 1 + draw.permutation(np.flatnonzero(places[:, 2] == 0.0))
+            tables[name] = np.column_stack([nodes, places[nodes - 1]])
+        np.savetxt(tmp_path / "face.csv", tables["upper"], delimiter=",", header="node,x,y,z")
+        number = np.arange(1, 25, 2).reshape(4, 3)
+        quads = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]])
+        text = f"""
+        bolts = 2.0
+        [upper]
+        file = "upper.npz"
+        mass = "upper.npz"
+        face = "face.csv"
+        elements = {quads.reshape(4, -1).T.tolist()}
+        pull = [[2, 1, 1.0]]
+        press = [[[2, 3, -1.0]]]
+        [lower]
+        file = "lower.npz"
+        mass = "lower.npz"
+        face = {tables["lower"].tolist()}
+        held = [[1, 1], [1, 2], [1, 3]]
+        press = [[[3, 3, 1.0]]]
+        """
+        (tmp_path / "joint.toml").write_text(text)
+        upper, lower, options = jb.read_parts(tmp_path / "joint.toml")
+        assert options == {"bolts": 2.0}
+        np.testing.assert_array_equal(upper.nodes[:, 1:], lower.nodes[:, 1:])
+        above = upper.body()
+        assert float(np.sum(above.areas)) == pytest.approx(6.0)
+        np.testing.assert_allclose(lower.areas, above.areas)
+        assert upper.model.mass is not None
+        assert len(lower.model.dofs) == 3 * 24 - 3
+
+
 class TestLap:
     def test_its_parts_have_the_areas_and_the_resultants_of_its_surfaces(self):
         upper, lower, options = jb.read_parts(LAP / "joint.toml")
@@ -154,3 +196,16 @@ class TestLap:
         lines = run(with_modes, tmp_path, "modes").splitlines()
         rows = [line.split() for line in lines if len(line.split()) == 5][:4]
         np.testing.assert_allclose(fresh, [float(row[1]) for row in rows], rtol=1e-6)
+
+    def test_a_damaged_deck_is_refused_or_read(self, tmp_path):
+        good, path = (LAP / "upper.inp").read_bytes(), tmp_path / "deck.inp"
+        refused = 0
+        for seed in range(100):
+            path.write_bytes(damage(good, [b"*NODE\n1, 2"], np.random.default_rng(seed))[1])
+            try:
+                deck = jb.Deck.read(path)
+                for name in ("FACE", "BOLT_1", "BOLT_2", "END"):
+                    jb.face_surface(*deck.surface(name))
+            except jb.InputError:
+                refused += 1
+        assert refused > 50  # the others changed what none of these surfaces has

@@ -125,6 +125,7 @@ class TestRefusals:
             ([[1, 2, 3], [1, 4, 3]], "node 1': has elements that face to opposite sides"),
             ([[1, 2, 3, 4, 5, 6]], "linear elements"),
             ([[1, 2, 3, 4.5]], "whole numbers"),
+            ([[1, 2, 3, 4], [2, 1, 4, 3]], "elements\\[1\\] = .* is elements\\[0\\] again"),
         ],
     )
     def test_elements_that_are_no_mesh_are_refused(self, elements, words):
