@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import ArrayLike
 
-from jbeamshell.common.errors import InputError
-from jbeamshell.plotting.style import colours, single, style
+from jbeamshell.plotting.style import colours, style
 
 Record = Mapping[str, Any]
 
@@ -43,9 +42,6 @@ class Curve(NamedTuple):
     look: Mapping[str, Any] = {}
 
 
-Words = str | Callable[[Any], str]  # fixed, or a function of the section
-
-
 class Chart(NamedTuple):
     """One chart of a section of a record.
 
@@ -55,103 +51,48 @@ class Chart(NamedTuple):
     xlabel, ylabel, title : words at the axes
     curves : function of the section that gives its curves
     log : names of the logarithmic axes, such as "xy"
-    ticks : function of the section that gives the only marks of the x axis
     extra : function of the axes and the section that draws anything else
     """
 
     section: str
-    xlabel: Words
-    ylabel: Words
-    title: Words = ""
-    curves: Callable[[Any], Iterable[Curve]] = lambda section: ()
+    xlabel: str
+    ylabel: str
+    title: str
+    curves: Callable[[Any], Iterable[Curve]]
     log: str = ""
-    ticks: Callable[[Any], Iterable[float]] | None = None
     extra: Callable[[Axes, Any], None] | None = None
 
 
-def draw(charts: Mapping[str, Chart], record: Record, name: str, axes: Axes | None = None) -> Axes:
-    """Draw one chart of a table.
-
-    Parameters
-    ----------
-    charts : table of charts by name
-    record : record that the table is of
-    name : name of the chart
-    axes : where to draw; new ones when not given
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        the axes drawn into
-
-    Raises
-    ------
-    InputError
-        if there is no chart of that name, or the record does not have its section
-    """
-    if name not in charts:
-        raise InputError(f"name = {name!r}: choose one of {', '.join(charts)}")
-    chart = charts[name]
-    if chart.section not in record:
-        known = ", ".join(record) or "nothing"
-        raise InputError(f"record: has no section {chart.section!r}, but {known}")
-    section = record[chart.section]
-    with style():
-        axes = single(axes)
-        axes.set(**{f"{axis}scale": "log" for axis in chart.log})
-        for name in ("xlabel", "ylabel", "title"):
-            words = getattr(chart, name)
-            axes.set(**{name: words(section) if callable(words) else words})
-        curves = list(chart.curves(section))
-        for curve, colour in zip(curves, colours(len(curves)), strict=True):
-            _plot(axes, curve, colour)
-        if chart.extra is not None:
-            chart.extra(axes, section)
-        if chart.ticks is not None:
-            ticks = list(chart.ticks(section))
-            axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-            axes.set_xticks([], minor=True)
-        if axes.get_legend() is None and axes.get_legend_handles_labels()[1]:
-            axes.legend(fontsize=7)
-    return axes
-
-
 def sheet(charts: Mapping[str, Chart], record: Record) -> Figure:
-    """Draw all charts of a table of which the record has the section.
+    """Draw all charts of a table, a panel for each.
 
     Parameters
     ----------
     charts : table of charts by name
     record : record that the table is of
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        the sheet, a panel for each chart
-
-    Raises
-    ------
-    InputError
-        if the record has the section of none
     """
-    names = [name for name, chart in charts.items() if chart.section in record]
-    if not names:
-        sections = ", ".join(dict.fromkeys(chart.section for chart in charts.values()))
-        raise InputError(f"record: has nothing to draw: give one with a section of {sections}")
-    columns = min(COLUMNS, len(names))
-    rows = -(-len(names) // columns)
+    columns = min(COLUMNS, len(charts))
+    rows = -(-len(charts) // columns)
     with style():
-        figure, grid = plt.subplots(
-            rows,
-            columns,
-            figsize=(5.0 * columns, 4.3 * rows),
-            squeeze=False,
-        )
-    for axes in grid.flat[len(names) :]:
-        axes.set_axis_off()
-    for name, axes in zip(names, grid.flat, strict=False):
-        draw(charts, record, name, axes)
+        size = (5.0 * columns, 4.3 * rows)
+        figure, grid = plt.subplots(rows, columns, figsize=size, squeeze=False)
+        for axes in grid.flat[len(charts) :]:
+            axes.set_axis_off()
+        for chart, axes in zip(charts.values(), grid.flat, strict=False):
+            _draw(chart, record[chart.section], axes)
     return figure
+
+
+def _draw(chart: Chart, section: Any, axes: Axes) -> None:
+    axes.set(**{f"{axis}scale": "log" for axis in chart.log})
+    axes.set(xlabel=chart.xlabel, ylabel=chart.ylabel, title=chart.title)
+    curves = list(chart.curves(section))
+    for curve, colour in zip(curves, colours(len(curves)), strict=True):
+        _plot(axes, curve, colour)
+    if chart.extra is not None:
+        chart.extra(axes, section)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(fontsize=7)
 
 
 def sizes(values: ArrayLike) -> np.ndarray:
@@ -165,11 +106,6 @@ def plain_numbers(*axes_of_one: Any) -> None:
     for axis in axes_of_one:
         axis.set_major_formatter(PLAIN)
         axis.set_minor_formatter(NullFormatter())
-
-
-def column(rows: Iterable[Mapping[str, Any]], name: str) -> np.ndarray:
-    """One column of a record's rows, (rows,); NaN where there is None."""
-    return np.array([row[name] for row in rows], dtype=float)
 
 
 def _plot(axes: Axes, curve: Curve, colour: Any) -> None:

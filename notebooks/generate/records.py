@@ -23,7 +23,6 @@ NAMES = {  # of programs in the record of the speed
     "m = 16": "jbeamshell, smooth friction",
     "History": "jbeamshell, whole history",
     "patterns in NumPy": "guessed slip patterns in NumPy",
-    "peer 40 x 4": "condensed finite elements of another group",
     "Iwan's network": "Iwan's network, fitted before",
 }
 

@@ -6,10 +6,6 @@ and against finite elements.  The parts are
 - one: a run of the standard strip by all variants and rivals, interleaved;
 - gradient: gradients in four parameters beside a run;
 - start: fresh processes, with and without compiled programs at hand.
-
-peer=SCRIPT times condensed finite elements of your own beside the rest: called with ETA A NX NY
-STEPS_PER_QUARTER it prints a JSON line with "ratio" (to the cubic law), "build_s" and
-"run_s_2_cycles".
 """
 
 from typing import Any

@@ -1,10 +1,7 @@
 """One run: every variant and rival side by side, and over nodes."""
 
 import functools
-import json
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -15,7 +12,7 @@ from tqdm import tqdm
 import jbeamshell as jb
 from calibration import finite_elements
 from calibration.running import read
-from verification.benchmarks.rivals import condensed_elements, cubic_law, iwan, patterns_numpy
+from verification.benchmarks.rivals import condensed_elements, iwan, patterns_numpy
 
 from . import machine
 from .common import (
@@ -111,7 +108,7 @@ def own_variants() -> list[Variant]:
     return found
 
 
-def rival_variants(peer: str) -> list[Variant]:
+def rival_variants() -> list[Variant]:
     """Everything else."""
     found = []
     for size, steps in (((40, 4), 1), ((40, 4), 4), ((60, 6), 1)):
@@ -133,8 +130,6 @@ def rival_variants(peer: str) -> list[Variant]:
     row["returns"] = "loop; the cycle alone, of a network fitted to jbeamshell's backbone before"
     call = functools.partial(iwan.cycle, network, AMPLITUDE, 20)
     found.append(of_call(row, call, lambda answer: answer["dissipation"], fine()))
-    if peer:
-        found += [_peer(peer, steps) for steps in (2, 4)]
     if shutil.which("ccx"):
         found += [_calculix(steps) for steps in (4, 20)]
     else:
@@ -160,24 +155,6 @@ def _backbone() -> tuple[np.ndarray, np.ndarray]:
     return 0.5 * (pull + push), BACKBONE
 
 
-def _peer(script: str, steps: int) -> Variant:
-    """The peer's two cycles and a quarter, as one cycle and a quarter."""
-
-    def run() -> dict[str, float]:
-        words = [str(word) for word in (ETA, AMPLITUDE, 40, 4, steps // 2)]
-        command = [sys.executable, script, *words]
-        answer = subprocess.run(command, capture_output=True, text=True, check=True)
-        return json.loads(answer.stdout.splitlines()[-1])
-
-    def timed(_: float) -> list[float]:
-        said = run()
-        return [said["build_s"] + said["run_s_2_cycles"] * 1.25 / 2.25]
-
-    row = {"what": f"peer 40 x 4, {steps} steps", "by": "peer", "steps": steps}
-    row["returns"] = "dissipation; building and cycle, 1.25/2.25 of its two cycles' time"
-    return Variant(row, timed, run()["ratio"] * cubic_law(AMPLITUDE), truth())
-
-
 def _calculix(steps: int) -> Variant:
     here = scene({STEPS: steps})
     call = functools.partial(finite_elements.solve, here)
@@ -199,9 +176,9 @@ def _calculix_recorded() -> Variant:
     return Variant(row, lambda _: [loop["wall_s"]], loop["D"], truth(), 1)
 
 
-def one(rounds: int = ROUNDS, peer: str = "") -> dict[str, Any]:
+def one(rounds: int = ROUNDS) -> dict[str, Any]:
     """All variants of one run, interleaved."""
-    variants = own_variants() + rival_variants(peer)
+    variants = own_variants() + rival_variants()
     seconds: list[list[float]] = [[] for _ in variants]
     for number in tqdm(range(rounds), disable=None, unit="round", desc="one"):
         for own, variant in zip(seconds, variants, strict=True):
