@@ -10,7 +10,13 @@ from jbeamshell.cli.arguments import add_folder, add_json
 from jbeamshell.cli.terminal import put, say_written, warn
 from jbeamshell.common.errors import DoubtfulWarning
 
-OF_CURVE = ("softness", "assembly", "cycles", "steps_per_half_cycle")  # keys that a mode takes too
+OF_CURVE = (
+    "softness",
+    "roughness",
+    "assembly",
+    "cycles",
+    "steps_per_half_cycle",
+)  # keys that a mode takes too
 
 
 def add_to(commands: Any) -> None:

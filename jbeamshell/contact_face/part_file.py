@@ -64,7 +64,7 @@ def read_parts(
     >>> history = jb.solve_faces(upper.body(), lower.body(), **options)
     """
     values = read_toml(path)
-    options = check_keys(path, values, more=("softness",))
+    options = check_keys(path, values, more=("softness", "roughness"))
     here = Path(path).parent
     upper = _part("upper", values["upper"], here)
     if "lower" not in values:
