@@ -122,9 +122,10 @@ def solve_faces(
         last = 1 + unit_path(int(count), half).size
     history = _history(upper, bodies, _first(levels, last), control, assembly)
     if path is None and not is_traced(history) and history.converged:
-        every_second = None if half is None else half // 2
-        levels, _ = _walk(face, loads[::2], frictional, every_second, count)
-        coarse = _history(upper, bodies, _first(levels, last // 2 + 1), control, assembly)
+        every_second = loads.at[1::2].set(loads[:-1:2])  # rests between them: one program for both
+        levels, _ = _walk(face, every_second, frictional, half, count)
+        levels = jax.tree.map(lambda a: a[:last:2], levels)
+        coarse = _history(upper, bodies, levels, control, assembly)
         apart = history.dissipation - coarse.dissipation
         history = eqx.tree_at(lambda h: h.change, history, apart)
     if path is None and is_traced(history):  # its loads are known but for their size
@@ -209,12 +210,14 @@ def _steps(face: Face, start: Array, loads: Array) -> Levels:
     def step(carry: tuple[Array, Array, Array], load: Array) -> tuple[Any, Levels]:
         before, moved, last = carry
         further = load - last[0]
+        rests = jnp.all(further == 0.0)
         goes_on = jnp.sum(further * last[1]) / jnp.maximum(jnp.sum(last[1] ** 2), TINY)
         guess = before + jnp.clip(goes_on, 0.0, 1.0) * moved
         found = take_step(face, before, load, guess)
         force = face.reaction(found.v, load)
         level = Levels(load, found.v, force, found.error, found.iterations)
-        return (found.v, found.v - before, jnp.stack([load, further])), level
+        moved = jnp.where(rests, moved, found.v - before)
+        return (found.v, moved, jnp.stack([load, jnp.where(rests, last[1], further)])), level
 
     still = jnp.zeros((2, loads.shape[1]))
     return lax.scan(step, (start, jnp.zeros_like(start), still), loads)[1]
