@@ -218,7 +218,9 @@ def test_a_solver_of_differential_equations_finds_the_same_motion():
         rtol=1e-5,
         atol=1e-11,
     )
-    fields = jax.vmap(equations.nodal)(other.y[: begun[0].size].T.reshape(101, *begun[0].shape))
+    fields = jax.vmap(equations.system.embed)(
+        other.y[: begun[0].size].T.reshape(101, *begun[0].shape)
+    )
     end = jax.vmap(equations.system.end_displacement)(fields)
     off = (end - end[0]) - (one.displacement - one.displacement[0])
     assert float(jnp.max(jnp.abs(off))) < 5e-3 * float(jnp.max(jnp.abs(one.displacement)))

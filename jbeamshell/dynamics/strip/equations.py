@@ -73,10 +73,6 @@ class Equations(eqx.Module):
         self.mass = MassMatrix(scene, self.system, inertia, payload)
         self.inertia, self.excitation = inertia, excitation
 
-    def nodal(self, active: Array) -> Array:
-        """All fields (n, m) from the active ones (n, a)."""
-        return self.system.embed(active)
-
     def active(self, nodal: Array) -> Array:
         """Active fields (n, a) of all fields (n, m)."""
         return nodal[:, list(self.system.plan.active)]
@@ -91,7 +87,7 @@ class Equations(eqx.Module):
     def response(self, time: Array, state: MotionState) -> tuple[Array, Array]:
         """Accelerations (n, m) and normal reaction (n,) in a state at a time."""
         system, foundation = self.system, self.system.foundation
-        q, p = self.nodal(state.q), self.nodal(state.p)
+        q, p = system.embed(state.q), system.embed(state.p)
         inner = system.elastic_forces(q, 1.0).at[:, V].add(system.tributary * state.t)
         inner = inner + self.damping(q, p) + self.mass.velocity_forces(q, p)
         inner = inner + self.ground_forces(q, self.excitation.acceleration(time))
@@ -108,10 +104,10 @@ class Equations(eqx.Module):
 
     def energies(self, state: MotionState) -> tuple[Array, Array]:
         """Kinetic energy, and stored energy of strip, contact and pressures, per width."""
-        system, q = self.system, self.nodal(state.q)
+        system, q = self.system, self.system.embed(state.q)
         layer = system.foundation.stored_energy(system.gap(q), state.t)
         stored = system.potential(q, 1.0) + jnp.sum(system.tributary * layer)
-        return self.mass.energy(q, self.nodal(state.p)), stored
+        return self.mass.energy(q, system.embed(state.p)), stored
 
     def damping(self, q: Array, p: Array) -> Array:
         """Forces C p (n, m) of Rayleigh damping."""

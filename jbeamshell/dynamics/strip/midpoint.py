@@ -65,7 +65,7 @@ class Midpoint(diffrax.AbstractSolver):
         _, reaction = equations.response(jnp.asarray(t0), y0)
         cap = coulomb_cap(equations.system.foundation.friction, reaction)
         started = jnp.zeros_like(y0.work[0])
-        return StepMemory(equations.nodal(y0.q)[:, V], y0.t, cap, zero, zero, started)
+        return StepMemory(equations.system.embed(y0.q)[:, V], y0.t, cap, zero, zero, started)
 
     def func(self, terms: Any, t0: Any, y0: MotionState, args: StepMatrices) -> Any:
         """Not needed, as no step depends on rates."""

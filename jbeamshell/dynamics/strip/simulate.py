@@ -181,7 +181,7 @@ def _run(
 
     def quantities(at: tuple[Array, Any]) -> tuple[Array, ...]:
         _, reaction = equations.response(*at)
-        q, p = equations.nodal(at[1].q), equations.nodal(at[1].p)
+        q, p = system.embed(at[1].q), system.embed(at[1].p)
         velocity = jnp.sum(equations.end_conjugate(q) * p[-1])
         displacement = system.end_displacement(q) - pressed
         return (q, p, reaction, displacement, velocity, *equations.energies(at[1]))

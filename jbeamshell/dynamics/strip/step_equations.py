@@ -175,14 +175,15 @@ class StepEquations(NamedTuple):
         cls, equations: Equations, step: TimeStep, state: MotionState, last: StepMemory
     ) -> StepEquations:
         """Equations of a step from a state, with the memory of the last step."""
-        q, excitation = equations.nodal(state.q), equations.excitation
+        embed, excitation = equations.system.embed, equations.excitation
+        q = embed(state.q)
         return cls(
             equations=equations,
             step=step,
             q=q,
-            p=equations.nodal(state.p),
-            last_change=equations.nodal(last.change),
-            last_rate_change=equations.nodal(last.rate_change),
+            p=embed(state.p),
+            last_change=embed(last.change),
+            last_rate_change=embed(last.rate_change),
             before=LoadLevel(
                 q.at[:, V].set(last.v), last.traction, last.cap, last.cap, last.cap[0]
             ),
