@@ -101,8 +101,6 @@ def plan_from_values(
         if an entry is unknown or of the wrong kind, or if a file cannot be read
     """
     _check_table("plan", values)
-    if "method" in values:
-        raise InputError("entry: 'method' is no choice any more: one search serves; leave it out")
     _check_names("entry", values, ("scene", "model", "structure", *TABLES, *OPTIONS))
     given = values.get("specimen", []) if data is None else [{"data": data}]
     if not (isinstance(given, list) and given and all(isinstance(s, dict) for s in given)):

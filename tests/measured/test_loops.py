@@ -5,7 +5,6 @@ import pytest
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.measured.example import EXAMPLE_AMPLITUDES, HEIGHT_RATIOS, example_loops
-from jbeamshell.measured.form import FEWEST_POINTS
 from jbeamshell.measured.loops import Loop, driver_of, make_loop
 
 PHASE = np.linspace(0.0, 2.0 * np.pi, 13)
@@ -27,28 +26,6 @@ def test_example_loops_that_do_not_exist():
         example_loops(0.2)
     with pytest.raises(InputError, match=r"amplitudes: there is no A = 0\.33; there are A = 0\.1,"):
         example_loops(amplitudes=(1.0, 0.33))
-
-
-def test_arrays_make_a_loop():
-    assert FEWEST_POINTS == 8
-    loop = make_loop(list(FORCE[:8]), tuple(DISPLACEMENT[:8]), "rig")
-    np.testing.assert_array_equal(loop.force, FORCE[:8])
-    assert (loop.label, loop.cycles, loop.dropped, loop.noise) == ("rig", 1, 0, None)
-    assert loop.standard_error is None
-
-
-def test_points_without_a_number_are_dropped_and_told():
-    loop = make_loop(
-        np.where(np.isin(np.arange(13), (4, 6)), np.nan, FORCE), DISPLACEMENT, label="rig"
-    )
-    np.testing.assert_array_equal(loop.displacement, np.delete(DISPLACEMENT, (4, 6)))
-    assert loop.dropped == 2
-    assert loop.notes == ("2 of 13 rows lack a number: left out",)
-
-
-def test_bad_arrays_are_refused():
-    with pytest.raises(InputError, match=r"rig: force is constant \(0\): no loop to fit"):
-        make_loop(np.zeros(13), DISPLACEMENT, label="rig")
 
 
 def test_a_standard_error_is_that_of_a_mean():

@@ -245,6 +245,7 @@ def test_arrays_of_any_kind():
     got = make_loop(list(FORCE[:8]), tuple(DISPLACEMENT[:8]), "rig")
     np.testing.assert_array_equal(got.force, FORCE[:8])
     assert (got.label, got.time, got.dropped, got.notes) == ("rig", None, 0, ())
+    assert (got.cycles, got.noise, got.standard_error) == (1, None, None)
 
 
 NAN = np.where(TIME < 7, np.nan, FORCE)
