@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import functools
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
 import jbeamshell as jb
 from calibration.comparisons.case import Case, Floats, Source
+from calibration.running import read
 from jbeamshell.measured.example import data_folder
 
 OWN = Source(
@@ -20,10 +22,11 @@ OWN = Source(
 )
 CALCULIX = Source(
     "G. Dhondt and K. Wittig, CalculiX 2.20, penalty contact face to face; decks and figures of "
-    "this project's studies (checked.json, lap.json)",
+    "this project's studies (check.json, lap.json, flange.json in calibration/finite_elements)",
     "own decks, MIT",
 )
 EVEN = "plane strain; even traction on the loaded face; no stick compliance"
+FLANGE = Path(__file__).parents[1] / "finite_elements" / "flange.json"
 Row = dict[str, str]
 AMPLITUDES = (0.4359, 0.7855, 1.3)
 BOLTS = [[0.6, 10.0, 0.3], [1.4, 10.0, 0.3]]  # X, force and width of the patch
@@ -45,6 +48,12 @@ def column(picked: tuple[Row, ...], name: str) -> Floats:
 def solved(scene: Callable[[], jb.Scene], values: tuple[tuple[str, object], ...]) -> jb.History:
     """History of a scene with other values, by a plain call."""
     return jb.solve(scene().replace(dict(values)))
+
+
+def flange(side: str) -> Floats:
+    """Figures of the bolted flange of one side of the record."""
+    found = read(FLANGE)[side]
+    return np.array([found[key] for key in ("dissipation", "secant_stiffness", "open_area_turn")])
 
 
 def strip(row: Row) -> jb.History:
@@ -402,6 +411,17 @@ CASES = (
         [1.276347552167655e-06, 17834.716913322172],
         lambda: bolted("member"),
         0.01,
+    ),
+    Case(
+        "bolted flange of CalculiX",
+        "finite elements",
+        CALCULIX,
+        "energy lost in a cycle, secant stiffness, and open area at the turn",
+        "two plates of bricks on 171 pairs of nodes, two washers; same bricks and softness of the "
+        "contact; both of a study's record, as it takes CalculiX",
+        functools.partial(flange, "calculix"),
+        functools.partial(flange, "here"),
+        0.002,
     ),
     Case(
         "a body of CalculiX's matrices",

@@ -195,7 +195,7 @@ def identification(record: dict) -> str:
         if "model_runs" in found
     ]
     return table(("model", "search", "runs of the model", "time, compiled"), rows) + machine(
-        record["about"]["scenes"]
+        record["about"]
     )
 
 

@@ -4,7 +4,7 @@ The loops are the model's own with noise of a
 thousandth of their range; every search starts from the same values, off by a third to a half, and
 counts as done when its cost is within 1 % of the least.  Differential evolution searches between a
 quarter and four times the start, and is stopped after CAP runs.  Times are warm, compile time
-apart; the peers run the model without derivatives, which is cheaper, and `ratios` say how much.
+apart; the peers run the model without derivatives, which is cheaper.
 """
 
 import contextlib
@@ -19,7 +19,6 @@ from scipy.optimize import differential_evolution, minimize
 
 import jbeamshell as jb
 from jbeamshell import identify
-from jbeamshell.identify.experiment import Experiment
 from jbeamshell.measured.loops import Loop, make_loop
 
 HELD = {"model.kinematics": "exact", "contact.normal": "held"}
@@ -151,66 +150,12 @@ def peers(fit: identify.Fit) -> dict:
     return record
 
 
-def runs_to_target(fit: identify.Fit, scene: jb.Scene, loops: list[Loop]) -> int:
-    """Runs with derivatives until the fit is as good as its peers have to be."""
-    costs = []
-    whole = Experiment.__call__
-
-    def watched(self, *arguments):
-        answer = whole(self, *arguments)
-        costs.append(float(answer.residual @ answer.residual))
-        return answer
-
-    Experiment.__call__ = watched
-    try:
-        identify.fit(loops, scene, tuple(START), starts=1)
-    finally:
-        Experiment.__call__ = whole
-    return int(np.argmax(np.array(costs) <= TARGET * fit.minima[0][1])) + 1
-
-
-def at_the_defaults() -> dict:
-    """A fit with all settings left open, cold and warm, with the time of the processors."""
-    scene = jb.library.standard().replace(TRUTH)
-    loops, seconds = planted(scene), []
-    for _ in range(1 + ROUNDS):
-        begin = time.process_time()
-        result, wall = timed(identify.fit, loops, scene.replace(START), tuple(START), starts=1)
-        seconds.append((time.process_time() - begin, wall))
-    warm = min(seconds[1:])
-    return {
-        "cold_cpu_s": seconds[0][0],
-        "warm_cpu_s": warm[0],
-        "cold_s": seconds[0][1],
-        "warm_s": warm[1],
-        "model_runs": result.model_runs,
-        "values": result.values,
-        "errors": result.errors,
-    }
-
-
-def fits() -> dict[str, Any]:
+def measure() -> dict[str, Any]:
     """Fits of all models, and of one its peers."""
     record: dict[str, Any] = {}
     for name, keys in SCENES.items():
         print(name, flush=True)
         fit, record[name] = fitted(keys)
-        if name != COMPARED:
-            continue
-        truth = jb.library.standard().replace(HELD | TRUTH | keys)
-        ours = record[name]["levenberg-marquardt"]
-        ours["runs_to_target"] = runs_to_target(fit, truth.replace(START), planted(truth))
-        record[name] |= (others := peers(fit))
-        record[name]["ratios"] = {
-            peer: {
-                "runs_over_ours": own["model_runs"] / ours["runs_to_target"],
-                "runs_over_our_whole_fit": own["model_runs"] / ours["model_runs"],
-                "wall_over_our_whole_fit": own["wall_s"] / ours["wall_s"],
-                "run_over_ours": own["run_ms"] / ours["run_ms"],
-            }
-            for peer, own in others.items()
-        }
-    return record
-
-
-PARTS = {"scenes": fits, "defaults": at_the_defaults}
+        if name == COMPARED:
+            record[name] |= peers(fit)
+    return {"scenes": record}
