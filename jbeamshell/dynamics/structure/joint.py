@@ -132,7 +132,8 @@ class Joint(ParallelIwan):
         Scenes that are solved on their contact line give the sliders of their contact where slip
         zones are nested.  Lap joints and members that go on open, and are no network.  Their
         sliders, and those of other scenes, are those whose loops are nearest to the scene's own
-        steady cycles.
+        steady cycles.  A scene that leaves its section open is plane elasticity, which alone is
+        close at all amplitudes.
 
         A law of Masing's rule gives its sliders, or those on 160 points of its backbone, within
         1 % of its energy, see `jbeamshell.laws.parallel_iwan.backbone_points`.
@@ -170,6 +171,7 @@ class Joint(ParallelIwan):
         if scene.load.control != "force":
             load = dataclasses.replace(scene.load, control="force", amplitude=as_leaf(force))
             scene = dataclasses.replace(scene, load=load)
+        scene = scene.serving(("load.amplitude",))
         require_number("width", width)
         require_choice("by", by, (None, *BY))
         bolted = scene.member.bolt_stiffness is not None  # which holds beyond
