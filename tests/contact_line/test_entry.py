@@ -127,10 +127,10 @@ class TestSections:
     @pytest.mark.parametrize(
         ("name", "section"),
         [
-            ("face", "p3"),
-            ("guided", "squeeze"),
-            pytest.param("face", "squeeze", marks=pytest.mark.slow),
-            pytest.param("guided", "p3", marks=pytest.mark.slow),
+            ("face", "squeeze"),
+            ("guided", "p3"),
+            pytest.param("face", "p3", marks=pytest.mark.slow),
+            pytest.param("guided", "squeeze", marks=pytest.mark.slow),
         ],
     )
     def test_load_steps_and_the_contact_line_agree(self, name, section):
