@@ -25,7 +25,8 @@ CACHE = "JAX_COMPILATION_CACHE_DIR"
 OWNER = CACHE not in os.environ
 if OWNER:
     os.environ[CACHE] = tempfile.mkdtemp(prefix="jbeamshell-tests-")
-    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0.5"
+    # Small programs too: reading one takes a tenth of the time that compiling it takes.
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
 # The tests compile more than they run: a third of the time for code that is slower by half.
 os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = "true"  # for children; for this process below
 FLAGS = "--xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
@@ -36,11 +37,10 @@ if OWNER and "XLA_FLAGS" not in os.environ:
     if known.returncode == 0:
         os.environ["XLA_FLAGS"] = FLAGS
 jax.config.update("jax_compilation_cache_dir", os.environ[CACHE])
-jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 jax.config.update("jax_disable_most_optimizations", True)
 jax.config.update("jax_traceback_in_locations_limit", 0)  # no program carries its lines of Python
 jax.config.update("jax_enable_x64", True)
-MOST_MEMORY = 2.5e9  # bytes of a worker beyond which it forgets after every module
 gc.set_threshold(100_000, 20, 20)  # tracing makes millions of objects that live on
 
 hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
@@ -100,13 +100,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
-    """Forget compiled programs after a folder, or after a module if they take much memory.
+    """Forget compiled programs after a module where they take much memory.
 
-    The modules of a folder share programs; those of all folders would take many gigabytes.
+    Modules share programs, and forgetting takes seconds; all of them would take many gigabytes.
     """
-    if nextitem is not None and nextitem.path == item.path:
-        return
-    if nextitem is None or nextitem.path.parent != item.path.parent or memory_used() > MOST_MEMORY:
+    if nextitem is not None and nextitem.path != item.path and memory_used() > most_memory():
         forget()
 
 
@@ -125,6 +123,12 @@ def memory_used() -> float:
     except OSError:
         return math.inf
     return float(pages * os.sysconf("SC_PAGE_SIZE"))
+
+
+def most_memory() -> float:
+    """Bytes that a worker may hold: a third of the machine shared by all, and 4 GB at most."""
+    machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return min(4e9, machine / 3.0 / int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -62,7 +62,13 @@ BODIES = {
 
 
 class TestBody:
-    @pytest.mark.parametrize("name", BODIES)
+    @pytest.mark.parametrize(
+        "name",
+        [
+            pytest.param(name, marks=pytest.mark.slow if name in ("p2", "guided") else [])
+            for name in BODIES
+        ],
+    )
     def test_it_is_the_strip_of_the_load_steps_without_its_inner_fields(self, name):
         """Elimination station by station is that of the whole potential's second derivatives."""
         scene = BODIES[name].replace({"model.nodes": 5})

@@ -177,7 +177,7 @@ class TestPath:
 @pytest.mark.parametrize(
     ("scene", "load"),
     [
-        (SCENE.replace({"contact.friction": 0.1}), 0.2),
+        pytest.param(SCENE.replace({"contact.friction": 0.1}), 0.2, marks=pytest.mark.slow),
         (jb.library.single_lap().replace({"model.nodes": 33}), 0.1),
     ],
     ids=["strip", "lap joint"],

@@ -20,7 +20,13 @@ FIGURES = ("dissipation", "secant_stiffness", "peak_displacement", "reaction_min
 TABLE = {"contact.pressure": [[0.0, 0.5], [1.0, 2.0], [2.0, 1.0]]}
 
 
-@pytest.mark.parametrize("entry", ENTRIES)
+@pytest.mark.parametrize(
+    "entry",
+    [
+        "member",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ENTRIES if name != "member"),
+    ],
+)
 def test_interpolated_strips_are_condensed_ones(entry):
     scene = PLANE.replace({"load.entry": entry})
     random = np.random.default_rng(3)
@@ -71,7 +77,9 @@ def test_heights_that_were_not_built_are_condensed_or_unconverged():
     assert np.isnan(inside["dissipation"])
 
 
-@pytest.mark.parametrize("scene", [PLANE.replace(TABLE), jb.library.single_lap()], ids=str)
+@pytest.mark.parametrize(
+    "scene", [PLANE.replace(TABLE), jb.library.single_lap().replace({"model.nodes": 33})], ids=str
+)
 def test_one_strip_serves_all_loads(scene):
     ask = jb.response(scene, [LOAD, FRICTION])
     size = 0.7 * float(scene.load.amplitude)

@@ -110,6 +110,7 @@ def test_own_energy_takes_the_place_of_the_homogeneous_one():
     assert (soft.displacement[1:3] > 1.05 * expected.displacement[1:3]).all()
 
 
+@pytest.mark.slow
 def test_a_plain_function_is_an_energy_as_a_module_is():
     standard = Scene(model=Model(nodes=9, **BY_STEPS), load=Load(steps_per_half_cycle=2))
     section = standard.strain_energy()

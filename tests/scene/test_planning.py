@@ -400,7 +400,10 @@ def test_a_pinned_scene_keeps_its_plan(scene, tmp_path_factory):
         assert jb.read_scene(path).plan == scene.plan
 
 
-@pytest.mark.parametrize("section", ["shell", "squeeze", "p2"])
+@pytest.mark.parametrize(
+    "section",
+    ["shell", *(pytest.param(name, marks=pytest.mark.slow) for name in ("squeeze", "p2"))],
+)
 @pytest.mark.doubtful("the section")
 def test_load_steps_dissipate_as_the_contact_line_does(section):
     """The two engines share the section and the base, not the grid nor the solver."""

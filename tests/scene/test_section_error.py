@@ -25,7 +25,10 @@ def test_every_kind_has_curves_that_rise_with_less_slip():
                 assert np.all(np.abs(curve["typical"]) <= curve["largest"])
 
 
-@pytest.mark.parametrize("entry", ENTRIES)
+@pytest.mark.parametrize(
+    "entry",
+    ["member", "guided", *(pytest.param(n, marks=pytest.mark.slow) for n in ("face", "traction"))],
+)
 def test_a_strip_is_as_far_off_as_its_curve_says(entry):
     """A strip that the study did not draw, from a twentieth to half of gross slip."""
     errors = []
@@ -50,7 +53,10 @@ def test_it_is_told_in_words():
     assert "load.entry" not in str(jb.solve(library.receding()))
 
 
-@pytest.mark.parametrize("section", ["bar", "shell", "squeeze", "p3"])
+@pytest.mark.parametrize(
+    "section",
+    [*(pytest.param(name, marks=pytest.mark.slow) for name in ("bar", "shell")), "squeeze", "p3"],
+)
 def test_a_section_that_the_user_names_is_doubted_where_slip_is_short(section):
     """The doubt says the size and the fix, which leaves none; much slip is never doubted."""
     little, much = (

@@ -160,7 +160,10 @@ def test_the_assumed_squeeze_strain_is_what_it_says():
     assert 1010.0 < float(history.reaction_max[0]) < 1040.0  # rises before the load falls
 
 
-@pytest.fixture(scope="module", params=[{}, {"contact.friction": 0.5, "load.amplitude": 1500.0}])
+ROUGH = {"contact.friction": 0.5, "load.amplitude": 1500.0}
+
+
+@pytest.fixture(scope="module", params=[pytest.param({}, marks=pytest.mark.slow), ROUGH])
 def clamped(request):
     return jb.solve(library.receding_rough().replace(request.param))
 

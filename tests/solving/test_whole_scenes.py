@@ -11,12 +11,15 @@ FEW = {"model.nodes": 17, "load.steps_per_half_cycle": 2, "load.cycles": 1}
 SQUEEZE = FEW | {"model.section": "squeeze"}
 JOINT = {"strip.far_end": "free", "member.support": "rolling"}
 KINDS = {
-    "default": FEW,
     "plane": FEW | {"model.section": "plane"},
     "contact line": SQUEEZE,
-    "elastic sliders": SQUEEZE | {"contact.stick_stiffness": 50.0},
-    "lap joint": FEW | JOINT | {"load.amplitude": 1.5},
-    "displacement": SQUEEZE | {"load.control": "displacement", "load.amplitude": 2e-5},
+    "elastic sliders that are moved": SQUEEZE
+    | {
+        "contact.stick_stiffness": 50.0,
+        "load.control": "displacement",
+        "load.amplitude": 2e-5,
+    },
+    "lap joint": SQUEEZE | JOINT | {"load.amplitude": 1.5},
     "exact rotations": SQUEEZE | {"model.kinematics": "exact"},
 }
 STEP = 1e-5  # of every number, for differences

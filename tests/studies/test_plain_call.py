@@ -9,7 +9,8 @@ from calibration.running import read
 from verification import plain_call
 
 RECORD = read(Path(plain_call.__file__).with_suffix(".json"))
-AGAIN = ("standard", "member", "guided", "double-shear")
+AGAIN = ("standard", "double-shear")
+AGAIN_SLOWLY = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("member", "guided")]
 
 
 def test_nearly_all_are_within_the_tolerance_and_none_far_off_is_silent():
@@ -20,7 +21,7 @@ def test_nearly_all_are_within_the_tolerance_and_none_far_off_is_silent():
     assert 0.2 < found["elasticity"] < 0.9  # neither section serves all
 
 
-@pytest.mark.parametrize("kind", AGAIN)
+@pytest.mark.parametrize("kind", [*AGAIN, *AGAIN_SLOWLY])
 def test_a_scene_of_the_record(kind):
     pairs = zip(RECORD["rows"], plain_call.scenes(), strict=True)
     own = [(row, scene) for row, scene in pairs if row["kind"] == kind]
