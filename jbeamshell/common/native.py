@@ -14,7 +14,7 @@ from jax.flatten_util import ravel_pytree
 
 from jbeamshell.common.checks import is_staged, is_traced
 from jbeamshell.common.small import SOONEST, known_options, quick_options
-from jbeamshell.common.threads import on_one_core
+from jbeamshell.common.threads import on_one_core, on_processor
 
 # The compiler's mark for a call that becomes one function; compilers that do not know it ignore it.
 MARK = {"inlineable": "false", "xla_cpu_small_call": "true"}
@@ -78,7 +78,7 @@ class Program:
         arrays = [leaf for leaf in leaves if _is_array(leaf)]
         static = tuple(None if _is_array(leaf) else leaf for leaf in leaves)
         kind = tree, static, tuple((array.shape, array.dtype) for array in arrays)
-        if native and kind not in self._refused and jax.default_backend() == "cpu":
+        if native and kind not in self._refused and on_processor():
             try:
                 return self._compiled[True](arrays, tree, static)
             except jax.errors.JaxRuntimeError:  # the compiler refuses an operation
@@ -156,7 +156,7 @@ class Native:
 
 def _may_fit(whole: Any, given: tuple[Any, ...]) -> bool:
     """True if the program runs on a CPU and needs no runtime."""
-    if jax.default_backend() != "cpu":
+    if not on_processor():
         return False
     text = whole.lower(*given).as_text()
     return not any(word in text for word in REFUSED)

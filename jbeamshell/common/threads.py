@@ -41,11 +41,19 @@ def on_one_core(function: Callable[P, R]) -> Callable[P, R]:
     return limited
 
 
+def on_processor() -> bool:
+    """True if new arrays lie on the processor."""
+    config: Any = jax.config
+    device = config.jax_default_device
+    name = getattr(device, "platform", device) or jax.default_backend()  # a device may be its name
+    return str(name).startswith("cpu")
+
+
 def _processor() -> contextlib.AbstractContextManager[object]:
     """Context in which new arrays lie on the processor, unless the user chose a device."""
     config: Any = jax.config
     chosen = config.jax_default_device is not None or PLATFORMS in os.environ
-    if chosen or jax.default_backend() == "cpu":
+    if chosen or on_processor():
         return contextlib.nullcontext()
     return jax.default_device(jax.local_devices(backend="cpu")[0])
 

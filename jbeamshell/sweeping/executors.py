@@ -23,7 +23,7 @@ import numpy as np
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.common.jax_options import FAST_LOOPS, configure, started
-from jbeamshell.common.threads import on_one_core
+from jbeamshell.common.threads import on_one_core, on_processor
 from jbeamshell.common.workers import without_main
 from jbeamshell.sweeping.job import Job, runner_of
 from jbeamshell.sweeping.runner import KEPT, Block, Runner
@@ -87,7 +87,7 @@ def blocks_of(job: Job, numbers: Sequence[int], executor: Executor | None) -> Bl
     if executor is None:
         runner = job.runner()
         runner.compile()
-        cores = _cores() if jax.default_backend() == "cpu" else 1
+        cores = _cores() if on_processor() else 1
         with ThreadPoolExecutor(cores) as threads:
             yield from _finished(job, numbers, threads, functools.partial(_run, runner))
         return

@@ -15,6 +15,7 @@ from jax import Array, lax
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import quick_options
+from jbeamshell.common.threads import on_processor
 from jbeamshell.contact_line.entry import goes_on
 from jbeamshell.contact_line.interpolation import Range
 from jbeamshell.contact_line.shared import Layout, shared
@@ -75,7 +76,7 @@ def width_of_chunks(scene: Scene, alike: np.ndarray) -> int:
         widths = 2 ** np.arange(ABREAST.bit_length())
         costs = [np.sum(-(-alike // width)) * (BODY + width) for width in widths]
         return int(widths[np.argmin(costs)])
-    return 1 if jax.default_backend() == "cpu" else BLOCK
+    return 1 if on_processor() else BLOCK
 
 
 def shared_keys(scene: Scene, keys: Sequence[str]) -> list[int]:
