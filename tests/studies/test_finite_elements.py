@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +11,7 @@ import pytest
 from toy import STRIP
 
 import jbeamshell as jb
+from calibration.finite_elements import sides
 from jbeamshell.measured.example import data_folder, example_loops
 
 # Dissipation over that of finite elements by section: eta, then A = .3247, .5851, 1.0, 1.6, from an
@@ -29,6 +31,17 @@ PROTOTYPE = {
         0.4: (108, 11, 1.78, 1.065),
     },
 }
+
+
+def test_a_strip_of_three_dimensions_is_in_plane_strain_or_plane_stress():
+    rows = json.loads(Path(sides.__file__).with_suffix(".json").read_text())
+    for row in rows["rows"]:
+        if row["width"] > 4.0:
+            continue
+        kind = "strain" if row["sides"] == "held" else "stress"
+        found = sides.plane(kind, row["load"])
+        assert float(found.dissipation) == pytest.approx(row["dissipation"], rel=0.01)
+        assert float(found.secant_stiffness) == pytest.approx(row["secant_stiffness"], rel=0.03)
 
 
 def reference() -> dict[tuple[float, float], float]:
