@@ -87,7 +87,7 @@ def four_parameters(scene: Scene | Law, *, width: float = 1.0) -> FourParameters
 
     Examples
     --------
-    >>> print(jb.dynamics.four_parameters(jb.Scene().replace({"model.section": "plane"})))
+    >>> print(jb.dynamics.four_parameters(jb.Scene()))
     """
     require_number("width", width)
     found = _of_law(scene) if isinstance(scene, Law) else _of_scene(scene)
