@@ -16,9 +16,9 @@ from jbeamshell.common.checks import (
     require_number,
 )
 from jbeamshell.contact_face.body import FaceBody
+from jbeamshell.contact_face.surface import MATCH
 from jbeamshell.scene.parts import unit_path
 
-MATCH = 1e-6  # of the face's extent, within which nodes match
 MOST_CYCLES = 16  # until the loop is steady
 
 
