@@ -117,16 +117,17 @@ def test_the_number_of_load_steps_hardly_matters_and_holding_the_load_not_at_all
 @few
 @given(strips)
 def test_the_energy_of_every_step_balances(values):
-    """The error is round-off where nothing slips, else of second order in the load step."""
+    """The error is round-off where nothing slips, and of second order where many steps slip."""
 
     def left(history):
         return np.abs(np.diff(np.asarray(history.energy_imbalance))) / size(history)
 
     fine, coarse = left(run(values)), left(run(values, COARSE))
-    elastic = np.asarray(run(values).slip_work)[1:] == 0.0
-    assert np.max(fine[elastic], initial=0.0) < 1e-10
+    work = np.asarray(run(values).slip_work)[1:]
+    assert np.max(fine[work == 0.0], initial=0.0) < 1e-10
+    often = np.mean(work > 1e-3 * np.max(work)) > 0.4  # else a coarse step holds all of a slip
     order = np.log(np.sum(coarse) / max(np.sum(fine), 1e-300)) / np.log(FINE / COARSE)
-    assert order > 1.5 or np.sum(coarse) < 1e-9
+    assert order > 1.5 or not often or np.sum(coarse) < 1e-9
 
 
 @few
