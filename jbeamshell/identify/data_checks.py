@@ -1,4 +1,4 @@
-"""What speaks against data before a fit: findings about loops, and measurements that are copies.
+"""Checks of data before a fit: findings about loops, and measurements that are copies.
 
 A law is odd: it answers a push as a pull.  Laws without Masing's memory let minor loops drift.
 Loops that show otherwise are told as doubts, as no numbers of the law can follow them.

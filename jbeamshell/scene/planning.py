@@ -185,9 +185,11 @@ def may_be_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
         return False
     if is_traced(kappa_s):
         return scene.plan is not None and has_contact_line(scene)
+    default = TABLE[KAPPA_S].default
+    in_either_precision = default, float(np.float32(default))
     factors = (numbers or scene.number)(KAPPA_S)
     solvable = has_contact_line(scene) or only_pressed(scene)
-    return bool(np.all(factors == TABLE[KAPPA_S].default)) and solvable
+    return bool(np.all(np.isin(factors, in_either_precision))) and solvable
 
 
 def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:

@@ -37,6 +37,14 @@ class TestSinglePrecision:
         assert history.force.dtype == np.float32
         assert float(history.dissipation) == pytest.approx(expected, rel=2e-6)
 
+    @pytest.mark.parametrize("amplitude", [0.1, 0.7855])
+    def test_the_plan_is_that_of_double_precision(self, single: None, amplitude: float) -> None:
+        def planned() -> tuple[str, str, int]:
+            plan = jb.Scene().replace({"load.amplitude": amplitude}).plan
+            return plan.section, plan.kinematics, plan.nodes
+
+        assert planned() == in_double(planned)
+
     @pytest.mark.slow
     def test_so_are_a_response_and_a_sweep(self, single: None) -> None:
         expected = in_double(lambda: float(jb.solve(fine()).dissipation))

@@ -71,3 +71,14 @@ def test_a_law_that_rises_for_ever_needs_a_force():
     with pytest.raises(jb.InputError, match=r"^law = 'series-iwan': rises for ever"):
         Joint.of(held)
     assert float(Joint.of(held, 3.0).forces[-1]) == pytest.approx(3.0)
+
+
+def test_the_joint_of_a_plain_scene_loses_what_a_plain_call_does_at_small_amplitudes():
+    # The squeeze section, which serves the scene's own amplitude, loses 18 times as much at .1.
+    scene = jb.Scene()
+    joint = Joint.of(scene)
+    for force in (0.1, 0.3, 0.6):
+        lost = jb.solve(scene.replace({"load.amplitude": force})).dissipation
+        assert float(joint.dissipation(joint.displacement(force))) == pytest.approx(
+            float(lost), rel=0.1
+        )

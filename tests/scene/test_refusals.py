@@ -1,4 +1,4 @@
-"""What makes no scene is refused in one line that names the key, the value and the fix."""
+"""Refusals of scenes: one line names the key, the value and the fix."""
 
 import tomllib
 from pathlib import Path
