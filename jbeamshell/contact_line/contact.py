@@ -37,10 +37,9 @@ from jbeamshell.contact_line.contact_input import (
     held_nodes,
 )
 from jbeamshell.contact_line.drives import driven_by_displacement, exchanged
-from jbeamshell.contact_line.events import walk
 from jbeamshell.contact_line.pair import together
 from jbeamshell.contact_line.pressing import press
-from jbeamshell.contact_line.stretch import SLIDES, Level
+from jbeamshell.contact_line.walk import SLIDES, Level, walk
 from jbeamshell.contact_line.substructure import Substructure, potential
 from jbeamshell.contact_line.turns import turns_of
 from jbeamshell.history.contact_history import ContactHistory

@@ -19,8 +19,8 @@ from jax import Array, lax
 
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.branches import ContactState
-from jbeamshell.contact_line.events import walk
-from jbeamshell.contact_line.stretch import Level
+from jbeamshell.contact_line.walk import walk
+from jbeamshell.contact_line.walk import Level
 
 
 class Press(NamedTuple):
