@@ -39,7 +39,7 @@ from jbeamshell.contact_line.contact_input import (
 from jbeamshell.contact_line.drives import driven_by_displacement, exchanged
 from jbeamshell.contact_line.pair import together
 from jbeamshell.contact_line.pressing import press
-from jbeamshell.contact_line.walk import SLIDES, Level, walk
+from jbeamshell.contact_line.walk import SLIDES, Contact, Level, walk, walk_on
 from jbeamshell.contact_line.substructure import Substructure, potential
 from jbeamshell.contact_line.turns import turns_of
 from jbeamshell.history.contact_history import ContactHistory
@@ -300,25 +300,24 @@ def _until_steady(
     paths = loads, jnp.asarray(turning), jnp.arange(MOST_CYCLES + 1) > 0
 
     def go(
-        carry: tuple[Level, Array, Array], to: tuple[Array, Array, Array]
-    ) -> tuple[tuple[Level, Array, Array], tuple[Level, Array]]:
-        before, last_drift, copied = carry
+        carry: tuple[Level, Contact, Array, Array], to: tuple[Array, Array, Array]
+    ) -> tuple[tuple[Level, Contact, Array, Array], tuple[Level, Array]]:
+        before, at, last_drift, copied = carry
         loads, turns, closes = to
-        state, at = jax.tree.map(lambda a: a[-1], (before.state, before.lift))
-        levels = walk(body, friction, state, loads, turns, at, ~copied)
-        levels = levels._replace(settled=levels.settled & before.settled[-1])
-        now = jax.tree.map(lambda old, new: jnp.where(copied, old, new), before, levels)
+        state = at.state
+        walked = walk_on(body, friction, at, loads, turns, ~copied)
+        now, at = jax.tree.map(lambda old, new: jnp.where(copied, old, new), (before, at), walked)
         slip = lax.stop_gradient(jnp.concatenate([state.v[None], now.state.v]))
         none = NOISE * jnp.max(jnp.abs(state.r_t)) / jnp.max(jnp.abs(body.K_tt))
         drift = slip[-1] - slip[0]
         leftover = jnp.minimum(*(jnp.max(jnp.abs(way)) for way in (drift, drift - last_drift)))
         repeats = leftover <= REPEATS * jnp.max(jnp.ptp(slip, axis=0)) + none
         steady = copied | (closes & repeats) | ~now.settled[-1]
-        return (now, drift, steady), (now, copied)
+        return (now, at, drift, steady), (now, copied)
 
     first = Level(start, lift, body.c, start.v > 0.0, jnp.asarray(True))
     first = jax.tree.map(lambda a: jnp.broadcast_to(a, (2 * half, *a.shape)), first)
-    at_start = first, jnp.zeros_like(start.v), jnp.asarray(False)
+    at_start = first, Contact.of(start, lift), jnp.zeros_like(start.v), jnp.asarray(False)
     _, (levels, copied) = lax.scan(go, at_start, paths)
     places = np.arange(loads.size)
     places = np.append(places[:rise], places[2 * half :])

@@ -5,7 +5,8 @@ With P the part of the pressures that acts, a body's equations are
     r_t = K_tt v + K_tn w - f_t F - g_t P,    u = c F + f_t.v + f_n.w + h P,
 
 and likewise for r_n.  A straight step in F and P is a load path of its own: one number s drives it,
-with f dF + g dP in place of f.  So a step is walked event by event, and is exact.
+with f dF + g dP in place of f.  Steps of one way are one branch, which goes event by event; where the
+way changes, another one begins.
 """
 
 from __future__ import annotations
@@ -19,8 +20,17 @@ from jax import Array, lax
 
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.branches import ContactState
-from jbeamshell.contact_line.walk import walk
-from jbeamshell.contact_line.walk import Level
+from jbeamshell.contact_line.walk import (
+    Contact,
+    Course,
+    Drive,
+    Level,
+    arrived,
+    departed,
+    levels_of,
+)
+
+SAME = 1e-9  # difference of two ways that are one
 
 
 class Press(NamedTuple):
@@ -75,27 +85,73 @@ def walk_with_pressures(
     loads, parts : (levels,) end loads, or what drives the body, and parts of the pressures
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    once = jnp.ones(1, bool)
+    steps = jnp.diff(loads, prepend=start.force), jnp.diff(parts, prepend=jnp.ones_like(parts[0]))
+    sizes, ways = jax.vmap(_direction)(*steps)
+    before = tuple(jnp.concatenate([jnp.zeros_like(way[:1]), way[:-1]]) for way in ways)
+    turns = ~_alike(ways, before).at[0].set(False)
+    back = _alike(ways, tuple(-way for way in before))
+    ends = jnp.where(jnp.append(turns[1:], True), jnp.arange(turns.size), turns.size - 1)
+    ends = lax.cummin(ends, reverse=True)  # last step of each branch
+    whole = jnp.cumsum(sizes)
+    begins = lax.cummax(jnp.where(turns, jnp.append(0.0, whole[:-1]), 0.0))
+    reaches = whole - begins  # a path of its own for each straight part of the path
+
+    def depart(contact: Contact, step: _Step) -> tuple[Course, Array]:
+        load, part = step.way
+        pull_t, pull_n = load * body.f_t + part * press.g_t, load * body.f_n + part * press.g_n
+        moving = eqx.tree_at(lambda b: (b.f_t, b.f_n, b.c), body, (pull_t, pull_n, load**2 * body.c))
+        origin = contact.state._replace(force=jnp.zeros_like(step.reach))
+        memory = contact.memory
+        memory = memory._replace(sense=jnp.where(step.back, memory.sense, 0.0))
+        sense = jnp.where(jnp.where(load == 0.0, part, load) < 0.0, -1.0, 1.0).astype(load.dtype)
+        drive = Drive(jnp.concatenate([pull_t, pull_n]), sense)
+        at = contact._replace(state=origin, memory=memory)
+        course = departed(moving, friction, at, drive, sense * step.end)
+        return course, jnp.zeros_like(step.reach)
 
     def go(
-        now: tuple[ContactState, Array, Array], steps: tuple[Array, Array]
-    ) -> tuple[tuple[ContactState, Array, Array], Level]:
-        state, lift, settled = now
-        size, (load, part) = _direction(*steps)
-        pull_t, pull_n = load * body.f_t + part * press.g_t, load * body.f_n + part * press.g_n
-        along = eqx.tree_at(lambda b: (b.f_t, b.f_n, b.c), body, (pull_t, pull_n, load**2 * body.c))
-        origin = state._replace(force=jnp.zeros_like(size))
-        level = walk(along, friction, origin, size[None], once, lift)
-        level = jax.tree.map(lambda a: a[0], level)
-        level = level._replace(settled=level.settled & settled)
-        return (level.state, level.lift, level.settled), level
+        carry: tuple[Contact, tuple[Course, Array]], step: _Step
+    ) -> tuple[tuple[Contact, tuple[Course, Array]], Level]:
+        now, way = carry
+        course, worked = lax.cond(step.turns, lambda: depart(now, step), lambda: way)
+        levels = levels_of(body, course, (course.drive.sense * step.reach)[None])
+        level = jax.tree.map(lambda a: a[0], levels)
+        work = level.slip_work
+        level = level._replace(slip_work=work - worked)
+        return (arrived(levels, course), (course, work)), level
 
-    steps = jnp.diff(loads, prepend=start.force), jnp.diff(parts, prepend=jnp.ones_like(parts[0]))
-    levels: Level = lax.scan(go, (start, lift, jnp.asarray(True)), steps)[1]
+    each = _Step(ways, turns, back, reaches, reaches[ends])
+    begin = Contact.of(start, lift)
+    unknown = jax.eval_shape(depart, begin, jax.tree.map(lambda a: a[0], each))
+    nowhere = jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), unknown)
+    levels: Level = lax.scan(go, (begin, nowhere), each)[1]
     slip, rise = levels.state.v - start.v, levels.lift - lift
     u = body.c * (loads - start.force) + slip @ body.f_t + rise @ body.f_n
     u = start.displacement + u + press.h * (parts - 1.0)
     return levels._replace(state=levels.state._replace(force=loads, displacement=u))
+
+
+class _Step(NamedTuple):
+    """Step of a path, and what is known of its branch, the straight part that it belongs to.
+
+    Attributes
+    ----------
+    way : change of the load and of the pressures along the branch, the larger one of size 1
+    turns, back : True if the branch begins here, and if it goes back on the branch before
+    reach, end : length of the branch up to here, and its whole length
+    """
+
+    way: tuple[Array, Array]
+    turns: Array
+    back: Array
+    reach: Array
+    end: Array
+
+
+def _alike(ways: tuple[Array, ...], others: tuple[Array, ...]) -> Array:
+    """True for ways (steps,) that are the same but for rounding."""
+    same = [jnp.abs(a - b) <= SAME for a, b in zip(ways, others, strict=True)]
+    return same[0] & same[1]
 
 
 def _direction(load: Array, part: Array) -> tuple[Array, tuple[Array, Array]]:

@@ -99,10 +99,11 @@ def _abstract(*arrays: Any, rule: _Along) -> list[Any]:
 def _transpose(cotangents: Sequence[Any], *arrays: Any, rule: _Along) -> list[Any]:
     """Cotangents of the linear arguments; the points have none."""
     points, linear = arrays[: rule.count], arrays[rule.count :]
-    assert all(map(ad.is_undefined_primal, linear))
     full = [ad.instantiate_zeros(c) for c in cotangents]
     back = _linear.bind(*points, *full, rule=dataclasses.replace(rule, back=not rule.back))
-    return [None] * rule.count + list(back)
+    # A tangent that is known, such as a zero, has no cotangent.
+    back = [b if ad.is_undefined_primal(a) else None for a, b in zip(linear, back, strict=True)]
+    return [None] * rule.count + back
 
 
 def _batch(arrays: Sequence[Array], axes: Sequence[Any], *, rule: _Along) -> tuple[Any, Any]:

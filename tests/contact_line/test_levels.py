@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line import branches, drives, events, strip
+from jbeamshell.contact_line import branches, drives, strip, walk
 from jbeamshell.contact_line.turns import known_turns, turns_of
 
 NODES = 21
@@ -37,7 +37,7 @@ def path(body, friction, amplitude):
     start = branches.pressed(body)
     lift = jnp.where(body.r_0 > 0.0, 0.0, 1e-5 * body.x)
     # Gross slip of the standard pressure is at 20 mu.
-    return events.walk(body, friction, start, 20.0 * amplitude * TURNS, TURNED, lift)
+    return walk.walk(body, friction, start, 20.0 * amplitude * TURNS, TURNED, lift)
 
 
 def figures(body, friction, amplitude):
@@ -90,7 +90,7 @@ class TestSlopes:
         @jax.jit
         def works(friction):
             path = 2.3e-4 * TURNS
-            return events.walk(body, friction, start, path, TURNED).slip_work
+            return walk.walk(body, friction, start, path, TURNED).slip_work
 
         slope = jax.jit(jax.jacfwd(works))(0.4)
         assert np.all(np.isfinite(slope))
