@@ -25,9 +25,8 @@ from jbeamshell.contact_line.walk import (
     Course,
     Drive,
     Level,
-    arrived,
     departed,
-    levels_of,
+    level_by_level,
 )
 
 SAME = 1e-9  # difference of two ways that are one
@@ -85,46 +84,31 @@ def walk_with_pressures(
     loads, parts : (levels,) end loads, or what drives the body, and parts of the pressures
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    steps = jnp.diff(loads, prepend=start.force), jnp.diff(parts, prepend=jnp.ones_like(parts[0]))
-    sizes, ways = jax.vmap(_direction)(*steps)
+    rises = jnp.diff(loads, prepend=start.force), jnp.diff(parts, prepend=jnp.ones_like(parts[0]))
+    sizes, ways = jax.vmap(_direction)(*rises)
     before = tuple(jnp.concatenate([jnp.zeros_like(way[:1]), way[:-1]]) for way in ways)
     turns = ~_alike(ways, before).at[0].set(False)
     back = _alike(ways, tuple(-way for way in before))
-    ends = jnp.where(jnp.append(turns[1:], True), jnp.arange(turns.size), turns.size - 1)
-    ends = lax.cummin(ends, reverse=True)  # last step of each branch
     whole = jnp.cumsum(sizes)
-    begins = lax.cummax(jnp.where(turns, jnp.append(0.0, whole[:-1]), 0.0))
-    reaches = whole - begins  # a path of its own for each straight part of the path
+    begins = lax.cummax(jnp.where(turns, whole - sizes, 0.0))
+    load, part = ways
+    senses = jnp.where(jnp.where(load == 0.0, part, load) < 0.0, -1.0, 1.0)
+    along = senses * (whole - begins)  # of the branch, a straight part of the path
 
-    def depart(contact: Contact, step: _Step) -> tuple[Course, Array]:
+    def depart(contact: Contact, step: _Step, first: Array) -> Course:
         load, part = step.way
         pull_t, pull_n = load * body.f_t + part * press.g_t, load * body.f_n + part * press.g_n
         moving = eqx.tree_at(lambda b: (b.f_t, b.f_n, b.c), body, (pull_t, pull_n, load**2 * body.c))
-        origin = contact.state._replace(force=jnp.zeros_like(step.reach))
-        memory = contact.memory
-        memory = memory._replace(sense=jnp.where(step.back, memory.sense, 0.0))
-        sense = jnp.where(jnp.where(load == 0.0, part, load) < 0.0, -1.0, 1.0).astype(load.dtype)
-        drive = Drive(jnp.concatenate([pull_t, pull_n]), sense)
-        at = contact._replace(state=origin, memory=memory)
-        course = departed(moving, friction, at, drive, sense * step.end)
-        return course, jnp.zeros_like(step.reach)
+        state, memory = contact.state, contact.memory
+        force = jnp.where(first, 0.0, state.force)
+        sense = jnp.where(first & ~step.back, 0.0, memory.sense)
+        memory = memory._replace(sense=sense)
+        at = contact._replace(state=state._replace(force=force), memory=memory)
+        drive = Drive(jnp.concatenate([pull_t, pull_n]), step.sense)
+        return departed(moving, friction, at, drive, step.along)
 
-    def go(
-        carry: tuple[Contact, tuple[Course, Array]], step: _Step
-    ) -> tuple[tuple[Contact, tuple[Course, Array]], Level]:
-        now, way = carry
-        course, worked = lax.cond(step.turns, lambda: depart(now, step), lambda: way)
-        levels = levels_of(body, course, (course.drive.sense * step.reach)[None])
-        level = jax.tree.map(lambda a: a[0], levels)
-        work = level.slip_work
-        level = level._replace(slip_work=work - worked)
-        return (arrived(levels, course), (course, work)), level
-
-    each = _Step(ways, turns, back, reaches, reaches[ends])
-    begin = Contact.of(start, lift)
-    unknown = jax.eval_shape(depart, begin, jax.tree.map(lambda a: a[0], each))
-    nowhere = jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), unknown)
-    levels: Level = lax.scan(go, (begin, nowhere), each)[1]
+    steps = _Step(ways, senses, along, back)
+    levels, _ = level_by_level(body, depart, Contact.of(start, lift), along, turns, steps)
     slip, rise = levels.state.v - start.v, levels.lift - lift
     u = body.c * (loads - start.force) + slip @ body.f_t + rise @ body.f_n
     u = start.displacement + u + press.h * (parts - 1.0)
@@ -132,20 +116,20 @@ def walk_with_pressures(
 
 
 class _Step(NamedTuple):
-    """Step of a path, and what is known of its branch, the straight part that it belongs to.
+    """Step of a path, and what is known of the branch, a straight part of the path, that it is on.
 
     Attributes
     ----------
     way : change of the load and of the pressures along the branch, the larger one of size 1
-    turns, back : True if the branch begins here, and if it goes back on the branch before
-    reach, end : length of the branch up to here, and its whole length
+    sense : 1 or -1 where the load, or else the pressures, rise or fall
+    along : length of the branch up to here times the sense
+    back : True if the branch goes back on the one before
     """
 
     way: tuple[Array, Array]
-    turns: Array
+    sense: Array
+    along: Array
     back: Array
-    reach: Array
-    end: Array
 
 
 def _alike(ways: tuple[Array, ...], others: tuple[Array, ...]) -> Array:

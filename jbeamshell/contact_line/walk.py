@@ -7,6 +7,7 @@ levels only say where a path is looked at, and every answer is a smooth function
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -14,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 from jax.typing import ArrayLike
+from jaxtyping import PyTree
 
 from jbeamshell.contact_line.body import Body, local_compliance
 from jbeamshell.contact_line.branches import ContactState
@@ -57,6 +59,7 @@ class Memory(NamedTuple):
     free : (k,) True for nodes that were open or came to stick again
     sense : 1 or -1 where the load rose or fell; 0 before the first branch
     length : load from its begin to its end
+    turned : True if it had turned back on another branch
     closed : how many branches in a row ended where the one before had begun
     extra, extra_before : (2, k) extra friction of the branch and of the one before, see `Search`
     """
@@ -65,6 +68,7 @@ class Memory(NamedTuple):
     free: Array
     sense: Array
     length: Array
+    turned: Array
     closed: Array
     extra: Array
     extra_before: Array
@@ -73,8 +77,8 @@ class Memory(NamedTuple):
     def none(cls, state: ContactState) -> Memory:
         """Memory of a contact that was only pressed."""
         zero, still = jnp.zeros_like(state.force), jnp.zeros_like(state.v)
-        extra = jnp.stack([still, still])
-        return cls(still, still > 0.0, zero, zero, zero, extra, extra)
+        extra, no = jnp.stack([still, still]), still > 0.0
+        return cls(still, no, zero, zero, zero > 0.0, zero, extra, extra)
 
 
 class Contact(NamedTuple):
@@ -105,14 +109,18 @@ class Drive(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Branch that a path is on, from the contact where it began.
+    """Branch that a path is on, or a part of it, from the contact where it began.
+
+    A branch that goes beyond the load where the one before began has two parts.  The first one
+    closes a loop there; the second one goes on.
 
     Attributes
     ----------
     contact : contact where it began
     drive, branch, search : what drives it, its equations, and how its events are found
     vertices, slip : its polygon and the slip of the nodes
-    closes : True if it ends where the branch before began
+    end : load at its end
+    turns, closes : True if it turns back, and if it ends where the branch before began
     """
 
     contact: Contact
@@ -121,6 +129,8 @@ class Course(NamedTuple):
     search: Search
     vertices: Polygon
     slip: Slip
+    end: Array
+    turns: Array
     closes: Array
 
 
@@ -190,44 +200,111 @@ def _in_branches(
     longest = int(np.max(ends - begins))
     places = np.minimum(begins[:, None] + np.arange(longest), ends[:, None] - 1)
 
+    def part(contact: Contact, targets: Array) -> tuple[Contact, Level]:
+        """Part of a branch, seen at its end and at all levels of the branch."""
+        drive = along(body, contact, targets[-1])
+        course = departed(body, friction, contact, drive, targets[-1])
+        levels = levels_of(body, course, jnp.append(course.end, targets))
+        return arrived(jax.tree.map(lambda a: a[0], levels), course), levels
+
     def go(contact: Contact, targets: Array) -> tuple[Contact, Level]:
-        course = departed(body, friction, contact, along(body, contact, targets[-1]), targets[-1])
-        levels = levels_of(body, course, targets)
-        return arrived(levels, course), levels
+        def further(now: Contact, number: Array) -> tuple[Contact, Level]:
+            arrives = (number > 0) & (now.state.force == targets[-1])
+            return lax.cond(arrives, stay, part, now, targets)
+
+        end, parts = lax.scan(further, contact, np.arange(2))
+        return end, _joined(parts, targets, end.memory.sense)
+
+    def stay(now: Contact, targets: Array) -> tuple[Contact, Level]:
+        shapes = jax.eval_shape(part, now, targets)[1]
+        return now, jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), shapes)
 
     end, levels = lax.scan(go, start, forces[places])
-    inside = places.ravel()[np.diff(places.ravel(), prepend=-1) > 0]
-    rows = np.searchsorted(places.ravel(), inside)
+    rows = np.flatnonzero(np.diff(places.ravel(), prepend=-1) > 0)
     return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[rows], levels), end
+
+
+def _joined(parts: Level, targets: Array, sense: Array) -> Level:
+    """Levels of a branch from those of its two parts, which hold the level of their end first."""
+    end = jax.tree.map(lambda a: a[0, 0], parts)
+    first, second = (jax.tree.map(lambda a, i=i: a[i, 1:], parts) for i in range(2))
+    inside = sense * (targets - end.state.force) <= 0.0
+
+    def chosen(one: Array, other: Array) -> Array:
+        return jnp.where(inside.reshape(-1, *[1] * (one.ndim - 1)), one, other)
+
+    levels = jax.tree.map(chosen, first, second)
+    work = jnp.where(inside, levels.slip_work, levels.slip_work + end.slip_work)
+    return levels._replace(slip_work=jnp.diff(work, prepend=0.0))
 
 
 def _in_levels(
     body: Body, friction: Array, start: Contact, forces: Array, turns: Array
 ) -> tuple[Level, Contact]:
     """Levels of a path whose turns are not known beforehand, one after the other."""
-    last = turns.size - 1
-    ends = jnp.where(jnp.append(turns[1:], True), jnp.arange(turns.size), last)
-    ends = lax.cummin(ends, reverse=True)  # last level of each branch
 
-    def depart(contact: Contact, target: Array) -> tuple[Course, Array]:
-        drive = along(body, contact, target)
-        return departed(body, friction, contact, drive, target), jnp.zeros_like(target)
+    def depart(contact: Contact, target: Array, _: Array) -> Course:
+        return departed(body, friction, contact, along(body, contact, target), target)
+
+    return level_by_level(body, depart, start, forces, turns, forces)
+
+
+def level_by_level(
+    body: Body,
+    depart: Callable[[Contact, PyTree, Array], Course],
+    start: Contact,
+    loads: Array,
+    turns: Array,
+    steps: PyTree,
+) -> tuple[Level, Contact]:
+    """Levels of a path, one after the other, and the contact at its end.
+
+    Parameters
+    ----------
+    body : n contact nodes
+    depart : function of a contact, of the last step of the branch that goes on from it, and of True
+        where the branch begins
+    start : contact where the path begins
+    loads, turns : (levels,) loads, as `Course.end` has them, and True where a branch begins
+    steps : what ``depart`` needs to know of each level, (levels, ...)
+    """
+    numbers = jnp.arange(turns.size)
+    ends = lax.cummin(jnp.where(jnp.append(turns[1:], True), numbers, numbers[-1]), reverse=True)
+    lasts = jax.tree.map(lambda a: a[ends], steps)
+
+    def level(course: Course, load: Array) -> Level:
+        return jax.tree.map(lambda a: a[0], levels_of(body, course, load[None]))
 
     def go(
-        carry: tuple[Contact, tuple[Course, Array]], to: tuple[Array, Array, Array]
-    ) -> tuple[tuple[Contact, tuple[Course, Array]], Level]:
-        now, way = carry
-        force, turned, target = to
-        course, before = lax.cond(turned, lambda: depart(now, target), lambda: way)
-        levels = levels_of(body, course, force[None])
-        level = jax.tree.map(lambda a: a[0], levels)
-        work = level.slip_work
-        level = level._replace(slip_work=work - before)
-        return (arrived(levels, course), (course, work)), level
+        carry: tuple[Contact, Course, Array, Array], to: tuple[Array, Array, PyTree]
+    ) -> tuple[tuple[Contact, Course, Array, Array], Level]:
+        now, course, done, work = carry
+        load, turned, last = to
 
-    unknown = jax.eval_shape(depart, start, forces[0])
+        def part(way: tuple[Course, Array], first: Array) -> tuple[tuple[Course, Array], None]:
+            course, done = way
+            at_end = level(course, course.end)
+            goes_on = arrived(at_end, course), done + at_end.slip_work
+            contact, worked = jax.tree.map(
+                lambda a, b: jnp.where(first, a, b), (now, jnp.zeros_like(done)), goes_on
+            )
+            beyond = course.drive.sense * (load - course.end) > 0.0
+            begins = jnp.where(first, turned, beyond)
+            return lax.cond(
+                begins, lambda: (depart(contact, last, first), worked), lambda: way
+            ), None
+
+        (course, done), _ = lax.scan(part, (course, done), jnp.array([True, False]))
+        found = level(course, load)
+        total = done + found.slip_work
+        step = found._replace(slip_work=total - jnp.where(turned, 0.0, work))
+        return (arrived(found, course), course, done, total), step
+
+    first = jax.tree.map(lambda a: a[0], lasts)
+    unknown = jax.eval_shape(depart, start, first, turns[0])
     nowhere = jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), unknown)
-    (end, _), levels = lax.scan(go, (start, nowhere), (forces, turns, forces[ends]))
+    none = jnp.zeros_like(start.state.force)
+    (end, *_), levels = lax.scan(go, (start, nowhere, none, none), (loads, turns, lasts))
     return levels, end
 
 
@@ -240,37 +317,45 @@ def along(body: Body, contact: Contact, target: Array) -> Drive:
 def departed(
     body: Body, friction: Array, contact: Contact, drive: Drive, target: Array
 ) -> Course:
-    """Branch that begins with a contact, with its polygon up to a load and a little beyond."""
+    """Course that begins with a contact, with its polygon up to its end and a little beyond.
+
+    It ends at a target, or before that at the load where the branch before began.
+    """
     state, memory = contact.state, contact.memory
     matrix = jnp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
     forces = jnp.concatenate([state.r_t, state.r_n])
     branch = Branch(matrix, drive.pull, friction, forces, contact.lift)
-    reach = lax.stop_gradient(jnp.abs(target - state.force))
-    turns_back = drive.sense * memory.sense < 0.0
-    closes = turns_back & (memory.length >= reach * (1.0 - SAME))
+    reach = jnp.abs(target - state.force)
+    turns = drive.sense * memory.sense < 0.0
+    closes = turns & (memory.length >= reach * (1.0 - SAME))
+    splits = turns & memory.turned & ~closes
+    end = jnp.where(splits, state.force + drive.sense * memory.length, target)
+    closes = closes | splits
+    reach = lax.stop_gradient(jnp.abs(end - state.force))
     # In cycles the extra friction is that of the cycle before: so a partly slipped node settles.
     again = closes & (memory.closed >= 2.0)
-    extra = jnp.where(again, memory.extra_before, _extra(contact, drive, friction))
-    back = jnp.where(turns_back, memory.length, 0.0)
-    back = jnp.where(closes, NEVER * jnp.maximum(reach, memory.length), back)
+    extra = jnp.where(again, memory.extra_before, _extra(contact, drive, friction, turns))
+    ends = turns & ~closes  # the extra friction, before the branch does
+    back = jnp.where(ends, memory.length, NEVER * jnp.maximum(reach, memory.length))
     search = Search(extra, back)
     sliding = SLIDES_ON * _slides(body)
     vertices, slip = polygon(branch, search, contact.lift > 0.0, reach, sliding)
-    return Course(contact, drive, branch, search, vertices, slip, closes)
+    return Course(contact, drive, branch, search, vertices, slip, end, turns, closes)
 
 
-def _extra(contact: Contact, drive: Drive, friction: Array) -> Array:
-    """Extra friction (2, k) of a branch that turns back, see `polygon`.
+def _extra(contact: Contact, drive: Drive, friction: Array, turns: Array) -> Array:
+    """Extra friction (2, k) of a branch, see `polygon`.
 
-    It puts the friction of a node at its limit on the side of its last slip.  A node that stuck is
-    expected to slip the way the load goes, and its friction that way has the whole range.
+    It puts the friction of a node at its limit on the side of its last slip.  If the load turns
+    back, a node that stuck is expected to slip the way the load goes, and its friction that way has
+    the whole range.
     """
     state, memory = contact.state, contact.memory
     slipped_before = memory.side != 0.0
     limit = jnp.where(slipped_before, -memory.side, drive.sense)
     extra = limit * friction * state.r_n[: limit.size] - state.r_t
     extra = jnp.stack([extra, -extra])
-    ahead = drive.sense * jnp.array([[1.0], [-1.0]], extra.dtype) > 0.0
+    ahead = turns & (drive.sense * jnp.array([[1.0], [-1.0]], extra.dtype) > 0.0)
     return jnp.where((slipped_before | ahead) & ~memory.free, extra, 0.0)
 
 
@@ -282,7 +367,7 @@ def _slides(body: Body) -> Array:
 
 
 def levels_of(body: Body, course: Course, targets: Array) -> Level:
-    """Levels (levels,) of a branch at end loads, each with the work since the level before."""
+    """Levels (levels,) of a course at end loads, each with the work since it began."""
     contact, drive = course.contact, course.drive
     start, k = contact.state, contact.state.v.size
     tau = drive.sense * (targets - start.force)
@@ -303,27 +388,27 @@ def levels_of(body: Body, course: Course, targets: Array) -> Level:
     return Level(
         state=state,
         lift=lift,
-        slip_work=jnp.diff(found.work, prepend=0.0),
+        slip_work=found.work,
         slipping=found.slipping & (lift[:, :k] <= 0.0),
         settled=contact.settled & course.slip.ended & ~found.slides,
     )
 
 
-def arrived(levels: Level, course: Course) -> Contact:
-    """Contact at the last level of a branch."""
-    memory = course.contact.memory
-    state, lift, settled = jax.tree.map(
-        lambda a: a[-1], (levels.state, levels.lift, levels.settled)
-    )
-    length = lax.stop_gradient(jnp.abs(state.force - course.contact.state.force))
+def arrived(level: Level, course: Course) -> Contact:
+    """Contact at a level of a course."""
+    before = course.contact.memory
+    goes_on = course.drive.sense * before.sense > 0.0  # of the branch that it is a part of
+    length = lax.stop_gradient(jnp.abs(level.state.force - course.contact.state.force))
     side, stuck = slipped(course.vertices, course.slip, length)
+    free = stuck | course.slip.opened
     now = Memory(
-        side=lax.stop_gradient(side),
-        free=stuck | course.slip.opened,
+        side=lax.stop_gradient(jnp.where(goes_on & (side == 0.0) & ~free, before.side, side)),
+        free=free | (goes_on & before.free & (side == 0.0)),
         sense=course.drive.sense,
-        length=length,
-        closed=jnp.where(course.closes, memory.closed + 1.0, 0.0),
-        extra=course.search.extra,
-        extra_before=memory.extra,
+        length=jnp.where(goes_on, before.length + length, length),
+        turned=jnp.where(goes_on, before.turned, course.turns),
+        closed=jnp.where(course.closes, before.closed + 1.0, 0.0),
+        extra=jnp.where(goes_on, before.extra, course.search.extra),
+        extra_before=jnp.where(goes_on, before.extra_before, before.extra),
     )
-    return Contact(state, lift, settled, now)
+    return Contact(level.state, level.lift, level.settled, now)

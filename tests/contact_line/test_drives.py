@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line import branches, drives, events, strip
+from jbeamshell.contact_line import branches, drives, strip, walk
 from jbeamshell.contact_line.body import Body
 
 NODES = 33
 MU = 0.3
 TURNS = jnp.asarray([1.0, -1.0, 1.0, -1.0, 1.0])
 ALL = jnp.ones(TURNS.size, bool)
-WALK = jax.jit(events.walk)
+WALK = jax.jit(walk.walk)
 STRIP = jax.jit(lambda scene: strip.condensed(scene, NODES))
 
 

@@ -114,7 +114,7 @@ class TestLevels:
             return branches.path(body, branches.factorise(body, friction), friction, start, turns)
 
         fast = nested(body)
-        slow = jax.jit(events.walk)(body, friction, start, turns, jnp.ones(3, bool))
+        slow = jax.jit(walk.walk)(body, friction, start, turns, jnp.ones(3, bool))
         assert np.all(fast.valid)
         np.testing.assert_allclose(fast.slip_work, slow.slip_work, rtol=1e-9)
         np.testing.assert_allclose(fast.at.v, slow.state.v, atol=1e-12 * fast.at.v.max())
@@ -152,8 +152,8 @@ class TestTurns:
     def test_traced_turns_are_walked_as_known_ones(self):
         body = strip_body(0.1)
         given = body, 0.1, branches.pressed(body), 1.2 * TURNS
-        known = jax.jit(events.walk, static_argnums=4)(*given, TURNED)
-        traced = jax.jit(events.walk)(*given, jnp.asarray(TURNED))
+        known = jax.jit(walk.walk, static_argnums=4)(*given, TURNED)
+        traced = jax.jit(walk.walk)(*given, jnp.asarray(TURNED))
         np.testing.assert_allclose(traced.slip_work, known.slip_work, rtol=1e-9)
         np.testing.assert_allclose(traced.state.displacement, known.state.displacement, rtol=1e-9)
 

@@ -8,7 +8,7 @@ from toy import plane_strip, rows_of
 
 import jbeamshell as jb
 from jbeamshell import contact_line
-from jbeamshell.contact_line import branches, events, strip
+from jbeamshell.contact_line import branches, strip, walk
 from jbeamshell.contact_line.ends import end_section
 from jbeamshell.mechanics.layered import Material, layered_form
 from jbeamshell.scene.planning import PLANE_NODES
@@ -31,7 +31,7 @@ def by_factors(body, friction, amplitude):
 @jax.jit
 def by_events(body, friction, amplitude):
     start, turned = branches.pressed(body), jnp.ones(TURNS.size, bool)
-    return events.walk(body, friction, start, amplitude * TURNS, turned)
+    return walk.walk(body, friction, start, amplitude * TURNS, turned)
 
 
 def two_layers():

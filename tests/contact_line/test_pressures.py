@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line import branches, drives, events, strip
+from jbeamshell.contact_line import branches, drives, strip, walk
 from jbeamshell.contact_line.assembly import press_roughly
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.pressures import Press, walk_with_pressures
@@ -97,7 +97,7 @@ def test_a_bar_slips_where_less_pressure_no_longer_holds_it():
     # Nothing turned: the end is that of a pull under half the pressure.
     half, _ = bar(120, 0.5 * pressure)
     one = jnp.ones(1, bool)
-    pull = events.walk(half, friction, branches.pressed(half), jnp.asarray([force]), one)
+    pull = walk.walk(half, friction, branches.pressed(half), jnp.asarray([force]), one)
     np.testing.assert_allclose(found.state.v[1], pull.state.v[0], atol=1e-12 * by_hand)
 
 
