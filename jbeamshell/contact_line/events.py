@@ -21,7 +21,7 @@ class Search(NamedTuple):
     ----------
     extra : (2, k) friction that nodes have to go beside their own, before they slip along and
         against v
-    back : tau at which the branch before began; there the extra friction ends
+    back : tau at which the extra friction ends
     """
 
     extra: Array

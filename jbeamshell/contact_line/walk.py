@@ -142,6 +142,7 @@ def walk(
     turns: ArrayLike | tuple[bool, ...],
     lift: Array | None = None,
     needed: Array | None = None,
+    rounded: bool = True,
 ) -> Level:
     """Levels of a load path, stacked along the first axis.
 
@@ -156,6 +157,7 @@ def walk(
     turns : (levels,) True where the load has turned since the level before; so is the first
     lift : (n,) lift at the start; None is none
     needed : False to leave out the walk at no cost; its levels mean nothing then.  None is True
+    rounded : False reads the polygon of the events itself, whose nodes slip one after the other
 
     Returns
     -------
@@ -163,7 +165,7 @@ def walk(
         with the axis of the levels first
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    return walk_on(body, friction, Contact.of(start, lift), forces, turns, needed)[0]
+    return walk_on(body, friction, Contact.of(start, lift), forces, turns, needed, rounded)[0]
 
 
 def walk_on(
@@ -173,14 +175,15 @@ def walk_on(
     forces: Array,
     turns: ArrayLike | tuple[bool, ...],
     needed: Array | None = None,
+    rounded: bool = True,
 ) -> tuple[Level, Contact]:
     """Levels of a load path, and the contact at its end; see `walk`."""
     friction = jnp.asarray(friction, forces.dtype)
 
     def path() -> tuple[Level, Contact]:
         if isinstance(turns, tuple):
-            return _in_branches(body, friction, start, forces, turns)
-        return _in_levels(body, friction, start, forces, jnp.asarray(turns))
+            return _in_branches(body, friction, start, forces, turns, rounded)
+        return _in_levels(body, friction, start, forces, jnp.asarray(turns), rounded)
 
     if needed is None:
         return path()
@@ -192,7 +195,12 @@ def walk_on(
 
 
 def _in_branches(
-    body: Body, friction: Array, start: Contact, forces: Array, turns: tuple[bool, ...]
+    body: Body,
+    friction: Array,
+    start: Contact,
+    forces: Array,
+    turns: tuple[bool, ...],
+    rounded: bool,
 ) -> tuple[Level, Contact]:
     """Levels of a path whose turns are known: each branch is read at all its levels at once."""
     begins = np.flatnonzero(turns)
@@ -203,7 +211,7 @@ def _in_branches(
     def part(contact: Contact, targets: Array) -> tuple[Contact, Level]:
         """Part of a branch, seen at its end and at all levels of the branch."""
         drive = along(body, contact, targets[-1])
-        course = departed(body, friction, contact, drive, targets[-1])
+        course = departed(body, friction, contact, drive, targets[-1], rounded)
         levels = levels_of(body, course, jnp.append(course.end, targets))
         return arrived(jax.tree.map(lambda a: a[0], levels), course), levels
 
@@ -239,12 +247,12 @@ def _joined(parts: Level, targets: Array, sense: Array) -> Level:
 
 
 def _in_levels(
-    body: Body, friction: Array, start: Contact, forces: Array, turns: Array
+    body: Body, friction: Array, start: Contact, forces: Array, turns: Array, rounded: bool
 ) -> tuple[Level, Contact]:
     """Levels of a path whose turns are not known beforehand, one after the other."""
 
     def depart(contact: Contact, target: Array, _: Array) -> Course:
-        return departed(body, friction, contact, along(body, contact, target), target)
+        return departed(body, friction, contact, along(body, contact, target), target, rounded)
 
     return level_by_level(body, depart, start, forces, turns, forces)
 
@@ -315,31 +323,46 @@ def along(body: Body, contact: Contact, target: Array) -> Drive:
 
 
 def departed(
-    body: Body, friction: Array, contact: Contact, drive: Drive, target: Array
+    body: Body,
+    friction: Array,
+    contact: Contact,
+    drive: Drive,
+    target: Array,
+    rounded: bool = True,
 ) -> Course:
     """Course that begins with a contact, with its polygon up to its end and a little beyond.
 
-    It ends at a target, or before that at the load where the branch before began.
+    It ends at a target, or before that where it closes a loop, at the load where the branch before
+    began.
+
+    Parameters
+    ----------
+    rounded : False reads the polygon itself, whose nodes slip one after the other
     """
     state, memory = contact.state, contact.memory
     matrix = jnp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
     forces = jnp.concatenate([state.r_t, state.r_n])
     branch = Branch(matrix, drive.pull, friction, forces, contact.lift)
-    reach = jnp.abs(target - state.force)
     turns = drive.sense * memory.sense < 0.0
-    closes = turns & (memory.length >= reach * (1.0 - SAME))
-    splits = turns & memory.turned & ~closes
+    reach = jnp.abs(target - state.force)
+    loops = turns & memory.turned  # and so it comes back to where the branch before began
+    splits = loops & (reach * (1.0 - SAME) > memory.length)
     end = jnp.where(splits, state.force + drive.sense * memory.length, target)
-    closes = closes | splits
+    closes = loops & (reach * (1.0 + SAME) >= memory.length)
     reach = lax.stop_gradient(jnp.abs(end - state.force))
     # In cycles the extra friction is that of the cycle before: so a partly slipped node settles.
     again = closes & (memory.closed >= 2.0)
     extra = jnp.where(again, memory.extra_before, _extra(contact, drive, friction, turns))
-    ends = turns & ~closes  # the extra friction, before the branch does
-    back = jnp.where(ends, memory.length, NEVER * jnp.maximum(reach, memory.length))
-    search = Search(extra, back)
+    # After a first loading it ends where that began.
+    first = turns & ~memory.turned
+    never = NEVER * jnp.maximum(reach, memory.length)
+    search = Search(extra, jnp.where(first, memory.length, never))
+    if not rounded:
+        search = Search(jnp.zeros_like(extra), search.back)
     sliding = SLIDES_ON * _slides(body)
     vertices, slip = polygon(branch, search, contact.lift > 0.0, reach, sliding)
+    if not rounded:
+        vertices = vertices._replace(before=jnp.arange(vertices.tau.size))
     return Course(contact, drive, branch, search, vertices, slip, end, turns, closes)
 
 
