@@ -10,6 +10,7 @@ from jax import Array, lax
 from jbeamshell.contact_line.tableau import AGAINST, CLOSE, KINDS, STICK, Branch, Tableau
 
 END = KINDS  # of a branch, which is no event
+LATE = 1e-9  # of the largest friction, by which a node is beyond its own where it slips at once
 MOST_VERTICES = 8  # of a branch, times the nodes
 BY_ROW, AT_ONCE, AT_RETURN, FIXED = range(4)  # what an event's load follows from
 
@@ -21,7 +22,7 @@ class Search(NamedTuple):
     ----------
     extra : (2, k) friction that nodes have to go beside their own, before they slip along and
         against v
-    back : tau at which the extra friction ends
+    back : tau at which the extra friction ends; infinite if it does not
     """
 
     extra: Array
@@ -75,6 +76,7 @@ def next_event(branch: Branch, search: Search, at: Tableau) -> Event:
     normal, normal_rate = answer[k:], rate[k:]
     sticks = (at.sigma == 0.0) & ~at.opened[:k]
     slips = (at.sigma != 0.0) & ~at.opened[:k]
+    cap, cap_rate = friction * normal[:k], friction * normal_rate[:k]
     rest = search.back - at.tau  # until the extra friction ends
 
     def until(room: Array, change: Array, counts: Array) -> Array:
@@ -83,17 +85,19 @@ def next_event(branch: Branch, search: Search, at: Tableau) -> Event:
         return jnp.where(falling, wait, jnp.inf)
 
     def until_slip(side: float, extra: Array) -> tuple[Array, Array]:
-        room = friction * normal[:k] + side * force
-        change = friction * normal_rate[:k] + side * force_rate
+        room = cap + side * force
+        change = cap_rate + side * force_rate
         wait, own = until(room + extra, change, sticks), until(room, change, sticks)
         ends = wait >= rest
-        return jnp.where(ends, jnp.maximum(own, rest), wait), ends & (own < rest)
+        late = jnp.where(ends, room, room + extra) < -LATE * jnp.max(cap)
+        wait = jnp.where(ends, jnp.maximum(own, rest), wait)
+        return wait, jnp.where(ends & (own < rest), AT_RETURN, jnp.where(late, AT_ONCE, BY_ROW))
 
     def to_nodes(wait: Array) -> Array:
         return jnp.pad(wait, (0, n - k), constant_values=jnp.inf)
 
-    along, along_at_return = until_slip(1.0, search.extra[0])
-    against, against_at_return = until_slip(-1.0, search.extra[1])
+    along, along_cause = until_slip(1.0, search.extra[0])
+    against, against_cause = until_slip(-1.0, search.extra[1])
     turns_back = jnp.where(slips & (at.sigma * force_rate < 0.0), 0.0, jnp.inf)
     loose = ~at.opened & jnp.append(at.sigma != 0.0, jnp.ones(n - k, bool))
     # A node that still has a reaction closes where it is, if it would open further.
@@ -107,9 +111,10 @@ def next_event(branch: Branch, search: Search, at: Tableau) -> Event:
             jnp.where(rises, 0.0, until(branch.lift + normal, normal_rate, at.opened)),
         ]
     )
-    at_return = jnp.stack([along_at_return, against_at_return])
-    returns = at_return[jnp.minimum(kind, AGAINST), jnp.minimum(node, k - 1)] & (kind < STICK)
-    cause = jnp.where(wait <= 0.0, AT_ONCE, jnp.where(returns, AT_RETURN, BY_ROW))
+    causes = jnp.stack([along_cause, against_cause])
+    slips = causes[jnp.minimum(kind, AGAINST), jnp.minimum(node, k - 1)]
+    others = jnp.where((kind == STICK) | rises[node], AT_ONCE, BY_ROW)
+    cause = jnp.where(kind < STICK, slips, others)
     return Event(at.tau + wait, kind, node, cause)
 
 

@@ -195,8 +195,10 @@ def _walked(branch: Branch, search: Search, opened: Array, reach: Array, slides:
 
     end = lax.while_loop(unfinished, go, walk)
     # A vertex at the next event, or anywhere beyond, ends the last edge.
-    event, comes = end.event, jnp.isfinite(end.event.tau)
-    anywhere = 2.0 * jnp.maximum(reach, end.at.tau) + jnp.finfo(dtype).tiny
+    event = end.event
+    reached = jnp.maximum(reach, end.at.tau)
+    anywhere = 2.0 * reached + jnp.finfo(dtype).tiny
+    comes = (event.tau - end.at.tau > MERGED * reached) & (event.tau < anywhere)
     tau = jnp.where(comes, event.tau, anywhere)
     found, at = end.polygon, end.at.at(tau)
     place = found.count

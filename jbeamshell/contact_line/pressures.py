@@ -105,7 +105,7 @@ def walk_with_pressures(
         memory = memory._replace(sense=sense)
         at = contact._replace(state=state._replace(force=force), memory=memory)
         drive = Drive(jnp.concatenate([pull_t, pull_n]), step.sense)
-        return departed(moving, friction, at, drive, step.along)
+        return departed(moving, friction, at, drive, step.along, rounded=False)
 
     steps = _Step(ways, senses, along, back)
     levels, _ = level_by_level(body, depart, Contact.of(start, lift), along, turns, steps)

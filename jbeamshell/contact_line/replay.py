@@ -115,6 +115,7 @@ def _after(branch: Branch, search: Search, now: Replay, events: Array, load: Arr
     answer = at.matrix @ _without_value(now.held - holds)
     change = found + jnp.where(at.moving, answer, _without_value(now.held - holds))
     # What makes the event: a row that vanishes, or the load of something else.
+    back = jnp.where(jnp.isfinite(search.back), search.back, 0.0)
     extra = jnp.where(
         load < search.back,
         jnp.where(side > 0.0, search.extra[0, tangential], search.extra[1, tangential]),
@@ -139,7 +140,7 @@ def _after(branch: Branch, search: Search, now: Replay, events: Array, load: Arr
         jnp.where(
             cause == AT_ONCE,
             _without_value(now.tau),
-            jnp.where(cause == AT_RETURN, _without_value(search.back), 0.0),
+            jnp.where(cause == AT_RETURN, _without_value(back), 0.0),
         ),
     )
     change = change + at.velocity * _without_value(tau)

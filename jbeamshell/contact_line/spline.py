@@ -60,7 +60,8 @@ def read(branch: Branch, polygon: Polygon, tau: Array, slides: Array) -> Reading
     # Work of friction: the load's on the fields, int tau d(pull.q), less what the body stores.
     pulled, rise = polygon.change @ branch.pull, rates @ branch.pull
     steps = jnp.diff(polygon.tau, append=polygon.tau[-1:])
-    whole = jnp.cumsum(steps * (pulled + 0.5 * rise * steps)) - steps * (pulled + 0.5 * rise * steps)
+    below = steps * (pulled + 0.5 * rise * steps)
+    whole = jnp.append(0.0, jnp.cumsum(below[:-1]))
     under = whole[edge] + since * (pulled[edge] + 0.5 * rise[edge] * since)
     under = under + area @ (kinks @ branch.pull)
     push = change @ branch.matrix

@@ -28,7 +28,6 @@ SLIDES = 1e6  # compliance over that of the clamped contact from which on a body
 SLIDES_ON = 1e-2  # of it, from which on a corner of the polygon stays sharp
 TOUCHES = 1e-9  # of the largest reaction, below which an open node has none
 SAME = 1e-9  # of a branch, within which it ends where the branch before began
-NEVER = 1e100  # times a branch, from where on nothing comes any more
 
 
 class Level(NamedTuple):
@@ -352,11 +351,10 @@ def departed(
     reach = lax.stop_gradient(jnp.abs(end - state.force))
     # In cycles the extra friction is that of the cycle before: so a partly slipped node settles.
     again = closes & (memory.closed >= 2.0)
-    extra = jnp.where(again, memory.extra_before, _extra(contact, drive, friction, turns))
+    extra = jnp.where(again, memory.extra_before, _extra(contact, friction, turns))
     # After a first loading it ends where that began.
     first = turns & ~memory.turned
-    never = NEVER * jnp.maximum(reach, memory.length)
-    search = Search(extra, jnp.where(first, memory.length, never))
+    search = Search(extra, jnp.where(first, memory.length, jnp.inf))
     if not rounded:
         search = Search(jnp.zeros_like(extra), search.back)
     sliding = SLIDES_ON * _slides(body)
@@ -366,20 +364,18 @@ def departed(
     return Course(contact, drive, branch, search, vertices, slip, end, turns, closes)
 
 
-def _extra(contact: Contact, drive: Drive, friction: Array, turns: Array) -> Array:
+def _extra(contact: Contact, friction: Array, turns: Array) -> Array:
     """Extra friction (2, k) of a branch, see `polygon`.
 
     It puts the friction of a node at its limit on the side of its last slip.  If the load turns
-    back, a node that stuck is expected to slip the way the load goes, and its friction that way has
-    the whole range.
+    back, that of a node that stuck has the whole range on both sides.
     """
     state, memory = contact.state, contact.memory
+    cap = friction * state.r_n[: memory.side.size]
     slipped_before = memory.side != 0.0
-    limit = jnp.where(slipped_before, -memory.side, drive.sense)
-    extra = limit * friction * state.r_n[: limit.size] - state.r_t
-    extra = jnp.stack([extra, -extra])
-    ahead = turns & (drive.sense * jnp.array([[1.0], [-1.0]], extra.dtype) > 0.0)
-    return jnp.where((slipped_before | ahead) & ~memory.free, extra, 0.0)
+    limit = jnp.where(slipped_before, -memory.side, jnp.array([[1.0], [-1.0]], cap.dtype))
+    extra = jnp.array([[1.0], [-1.0]], cap.dtype) * (limit * cap - state.r_t)
+    return jnp.where((slipped_before | turns) & ~memory.free, extra, 0.0)
 
 
 def _slides(body: Body) -> Array:
