@@ -39,9 +39,9 @@ from jbeamshell.contact_line.contact_input import (
 from jbeamshell.contact_line.drives import driven_by_displacement, exchanged
 from jbeamshell.contact_line.pair import together
 from jbeamshell.contact_line.pressing import press
-from jbeamshell.contact_line.walk import SLIDES, Contact, Level, walk, walk_on
 from jbeamshell.contact_line.substructure import Substructure, potential
 from jbeamshell.contact_line.turns import turns_of
+from jbeamshell.contact_line.walk import SLIDES, Contact, Level, walk, walk_on
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.keys import ASSEMBLIES, CONTROLS

@@ -45,12 +45,12 @@ class Record(NamedTuple):
     ----------
     events : (most, 5) kind, node, cause, vertex, and 1 for nodes that keep reaction or lift
     tau : (most,)
-    count : number of them
+    number : of them
     """
 
     events: Array
     tau: Array
-    count: Array
+    number: Array
 
 
 def keeps(at: Tableau, event: Event) -> Array:
@@ -62,9 +62,9 @@ def recorded(record: Record, event: Event, vertex: Array, keep: Array) -> Record
     """Record with one more event."""
     row = jnp.stack([event.kind, event.node, event.cause, vertex, keep.astype(int)])
     return Record(
-        record.events.at[record.count].set(row.astype(record.events.dtype)),
-        record.tau.at[record.count].set(event.tau),
-        record.count + 1,
+        record.events.at[record.number].set(row.astype(record.events.dtype)),
+        record.tau.at[record.number].set(event.tau),
+        record.number + 1,
     )
 
 

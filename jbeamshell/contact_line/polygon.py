@@ -55,7 +55,7 @@ UNEVEN = 3.0  # largest ratio of the two parts of a rounded corner
 
 
 class Polygon(NamedTuple):
-    """Vertices of a branch, of which the first is its begin; others than ``count`` mean nothing.
+    """Vertices of a branch, of which the first is its begin; others than ``number`` mean nothing.
 
     Attributes
     ----------
@@ -63,14 +63,14 @@ class Polygon(NamedTuple):
     change : (most, k + n) change q of the fields since then
     before, after : (most,) vertex at which the node beside had the same kind of event: the last
         one, and the next one; 0 for none
-    count : number of vertices
+    number : of vertices
     """
 
     tau: Array
     change: Array
     before: Array
     after: Array
-    count: Array
+    number: Array
 
 
 class Slip(NamedTuple):
@@ -178,7 +178,7 @@ def _walked(branch: Branch, search: Search, opened: Array, reach: Array, slides:
 
     def unfinished(now: Walk) -> Array:
         needed = now.event.tau <= horizon(now.polygon, reach)
-        room = (now.record.count < most_events - 1) & (now.polygon.count < most - 2)
+        room = (now.record.number < most_events - 1) & (now.polygon.number < most - 2)
         gone = (now.at.tau >= reach) & (jnp.abs(branch.pull @ now.at.velocity) > slides)
         return needed & room & ~gone
 
@@ -188,7 +188,7 @@ def _walked(branch: Branch, search: Search, opened: Array, reach: Array, slides:
         keep = keeps(at, event)
         corners, vertex = with_vertex(now.polygon, at, reach)
         record = recorded(now.record, event, vertex, keep)
-        corners, last = with_neighbours(corners, now.last, event, vertex)
+        corners, last = with_neighbours(corners, now.last, event, vertex, k)
         at = changed(branch, at, event.kind, event.node, keep)
         slip = with_slip(now.slip, event, vertex, reach)
         return Walk(at, next_event(branch, search, at), corners, slip, record, last)
@@ -201,25 +201,25 @@ def _walked(branch: Branch, search: Search, opened: Array, reach: Array, slides:
     comes = (event.tau - end.at.tau > MERGED * reached) & (event.tau < anywhere)
     tau = jnp.where(comes, event.tau, anywhere)
     found, at = end.polygon, end.at.at(tau)
-    place = found.count
+    place = found.number
     found = found._replace(
         tau=found.tau.at[place].set(tau),
         change=found.change.at[place].set(at.change),
-        count=place + 1,
+        number=place + 1,
     )
     cause = jnp.where(comes, event.cause, FIXED)
     final = Event(tau, jnp.where(comes, event.kind, END), event.node, cause)
     record = recorded(end.record, final, place, jnp.asarray(False))
     ended = (tau > reach) | (reach == 0.0)
     slip = end.slip._replace(ended=ended)
-    return (found.tau, found.change), (found.before, found.after, found.count), slip, record
+    return (found.tau, found.change), (found.before, found.after, found.number), slip, record
 
 
 def horizon(polygon: Polygon, reach: Array) -> Array:
     """Load up to which events are needed: those that may round a corner at the branch's end."""
     rows = jnp.arange(polygon.tau.size)
     half = 0.5 * (polygon.tau - polygon.tau[polygon.before])
-    open_end = (rows > 0) & (rows < polygon.count) & (polygon.after == 0)
+    open_end = (rows > 0) & (rows < polygon.number) & (polygon.after == 0)
     open_end &= polygon.tau - half < reach
     beyond = jnp.maximum(
         polygon.tau + 2.0 * UNEVEN * half,
@@ -231,8 +231,8 @@ def horizon(polygon: Polygon, reach: Array) -> Array:
 def with_vertex(polygon: Polygon, at: Tableau, reach: Array) -> tuple[Polygon, Array]:
     """Polygon with the vertex of an event, which close events share, and its number."""
     n = at.opened.size
-    last = polygon.count - 1
-    dense = polygon.count > DENSE * n
+    last = polygon.number - 1
+    dense = polygon.number > DENSE * n
     close = jnp.where(dense, 0.5 / n, MERGED) * reach
     new = at.tau - polygon.tau[last] > close
     place = jnp.where(new, last + 1, last)
@@ -240,14 +240,17 @@ def with_vertex(polygon: Polygon, at: Tableau, reach: Array) -> tuple[Polygon, A
     return polygon._replace(
         tau=polygon.tau.at[place].set(jnp.where(first, 0.0, at.tau)),
         change=polygon.change.at[place].set(jnp.where(first, 0.0, at.change)),
-        count=place + 1,
+        number=place + 1,
     ), place
 
 
 def with_neighbours(
-    polygon: Polygon, last: Array, event: Event, vertex: Array
+    polygon: Polygon, last: Array, event: Event, vertex: Array, k: int
 ) -> tuple[Polygon, Array]:
-    """Polygon that knows at which vertices the node beside had the same kind of event."""
+    """Polygon that knows at which vertices the node beside had the same kind of event.
+
+    Nodes that cannot slip, such as bearings, have none beside them.
+    """
     n = last.shape[1]
     kind = jnp.minimum(event.kind, KINDS - 1)
     row = last[kind]
@@ -258,14 +261,14 @@ def with_neighbours(
         return jnp.where(a < vertex, a, -1)
 
     found = jnp.maximum(earlier(below), earlier(above))
-    counts = (kind != STICK) & (found > 0)
+    counts = (kind != STICK) & (found > 0) & (event.node < k)
     first = counts & (polygon.before[vertex] == 0)
     before = polygon.before.at[vertex].set(jnp.where(first, found, polygon.before[vertex]))
     place = jnp.where(counts, found, 0)
     follows = jnp.where(counts & (polygon.after[place] == 0), vertex, polygon.after[place])
-    return polygon._replace(
-        before=before, after=polygon.after.at[place].set(follows)
-    ), last.at[kind, event.node].set(vertex)
+    return polygon._replace(before=before, after=polygon.after.at[place].set(follows)), last.at[
+        kind, event.node
+    ].set(vertex)
 
 
 def with_slip(slip: Slip, event: Event, vertex: Array, reach: Array) -> Slip:

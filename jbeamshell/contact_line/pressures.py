@@ -5,8 +5,9 @@ With P the part of the pressures that acts, a body's equations are
     r_t = K_tt v + K_tn w - f_t F - g_t P,    u = c F + f_t.v + f_n.w + h P,
 
 and likewise for r_n.  A straight step in F and P is a load path of its own: one number s drives it,
-with f dF + g dP in place of f.  Steps of one way are one branch, which goes event by event; where the
-way changes, another one begins.
+with f dF + g dP in place of f.  Steps of one way are one branch, which goes event by event; where
+the way changes, another one begins.  Where ways change from step to step a branch is shorter than
+the steps in which nodes slip.  So these paths are read on the polygon of their events.
 """
 
 from __future__ import annotations
@@ -98,7 +99,9 @@ def walk_with_pressures(
     def depart(contact: Contact, step: _Step, first: Array) -> Course:
         load, part = step.way
         pull_t, pull_n = load * body.f_t + part * press.g_t, load * body.f_n + part * press.g_n
-        moving = eqx.tree_at(lambda b: (b.f_t, b.f_n, b.c), body, (pull_t, pull_n, load**2 * body.c))
+        moving = eqx.tree_at(
+            lambda b: (b.f_t, b.f_n, b.c), body, (pull_t, pull_n, load**2 * body.c)
+        )
         state, memory = contact.state, contact.memory
         force = jnp.where(first, 0.0, state.force)
         sense = jnp.where(first & ~step.back, 0.0, memory.sense)

@@ -88,10 +88,8 @@ def vertices(given: tuple[Branch, Search], known: tuple[Array, Record]) -> tuple
     def chunk(now: Replay, rows: tuple[Array, Array, Array]) -> tuple[Replay, None]:
         return lax.cond(rows[2][0], some, lambda now, _: now, now, rows), None
 
-    here = jnp.arange(record.tau.size) < record.count
-    rows = jax.tree.map(
-        lambda a: a.reshape(-1, n, *a.shape[1:]), (record.events, record.tau, here)
-    )
+    here = jnp.arange(record.tau.size) < record.number
+    rows = jax.tree.map(lambda a: a.reshape(-1, n, *a.shape[1:]), (record.events, record.tau, here))
     end = lax.scan(chunk, begin, rows)[0]
     return end.vertices, end.changes
 

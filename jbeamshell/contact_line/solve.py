@@ -23,9 +23,9 @@ from jbeamshell.contact_line.drives import (
 )
 from jbeamshell.contact_line.kept import kept
 from jbeamshell.contact_line.pressures import Press, walk_with_pressures
-from jbeamshell.contact_line.walk import Level, walk
 from jbeamshell.contact_line.strip import Strip, condensed, spring_stiffness, stays_flat
 from jbeamshell.contact_line.turns import Turns, known_turns, turns_of, turns_of_cycles
+from jbeamshell.contact_line.walk import Level, walk
 from jbeamshell.history.history import History
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene

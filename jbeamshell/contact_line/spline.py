@@ -1,15 +1,16 @@
 r"""Branch read on the spline of its events.
 
 The contact at the events is a polygon over the load, y(tau) = y_0 + sum kappa_e (tau - tau_e)_+,
-with the change kappa_e of the rate at event e.  Its corners come from the mesh: nodes slip, open and
-close one after the other, where a front moves steadily.  So each corner is rounded by a parabola,
-from half way to the event of the node before to half way to that of the node behind.  With t from 0
-to 1 and the two parts a and b of a corner,
+with the change kappa_e of the rate at event e.  Its corners come from the mesh: nodes slip, open
+and close one after the other, where a front moves steadily.  So each corner is rounded by a
+parabola, from half way to the event of the node before to half way to that of the node behind.
+With t from 0 to 1 and the two parts a and b of a corner,
 
     tau - tau_e = -a + 2 a t + (b - a) t^2,    (tau - tau_e)_+  becomes  b t^2.
 
 Where one front moves alone that is the quadratic B-spline of the polygon.  Of several fronts each
-is rounded over its own steps.  A bar on even elements is exact.
+is rounded over its own steps.  A bar on even elements is exact.  A corner that no front makes stays
+sharp, as where a whole body slips at once or a bolt comes to bear.
 
 All equations that are linear hold exactly on the spline: balance, and u = c F + f.q.  Coulomb's and
 Signorini's conditions hold as far as convexity goes: a node that opens or closes within a rounded
@@ -49,6 +50,7 @@ class Reading(NamedTuple):
 
 def read(branch: Branch, polygon: Polygon, tau: Array, slides: Array) -> Reading:
     """Contact at loads tau (levels,) of a branch; ``slides`` is that of `polygon.polygon`."""
+    k = branch.pull.size - branch.lift.size
     rates, edge = _rates(polygon), _edge(polygon, tau)
     sliding = jnp.abs(rates @ branch.pull) > slides
     before, behind = _corners(polygon, sliding)
@@ -70,13 +72,13 @@ def read(branch: Branch, polygon: Polygon, tau: Array, slides: Array) -> Reading
         change=change,
         r=branch.r_0 + push - tau[:, None] * branch.pull,
         work=tau * (change @ branch.pull) - under - stored,
-        slipping=rates[edge][:, : branch.pull.size - branch.lift.size] != 0.0,
+        slipping=((rates[edge] != 0.0) | (rounding @ jnp.abs(kinks) > 0.0))[:, :k],
         slides=sliding[edge],
     )
 
 
 def slipped(polygon: Polygon, slip: Slip, reach: Array) -> tuple[Array, Array]:
-    """Side (k,) on which nodes slipped in a branch up to its end, and True for those that stuck again.
+    """Side (k,) on which nodes slipped up to a branch's end, and True for those that stuck again.
 
     A node whose corner is rounded at the end has slipped by a part.
     """
@@ -89,7 +91,7 @@ def slipped(polygon: Polygon, slip: Slip, reach: Array) -> tuple[Array, Array]:
 def _rates(polygon: Polygon) -> Array:
     """Rates (most, k + n) along the edges that begin at the vertices, zero beyond the last."""
     ahead = jnp.diff(polygon.tau, append=0.0)
-    known = jnp.arange(polygon.tau.size) < polygon.count - 1
+    known = jnp.arange(polygon.tau.size) < polygon.number - 1
     steps = jnp.roll(polygon.change, -1, axis=0) - polygon.change
     inverse = jnp.where(known, 1.0 / jnp.where(known, ahead, 1.0), 0.0)
     return jnp.where(known[:, None], steps * inverse[:, None], 0.0)
@@ -97,22 +99,21 @@ def _rates(polygon: Polygon) -> Array:
 
 def _edge(polygon: Polygon, tau: Array) -> Array:
     """Numbers (levels,) of the edges on which loads lie."""
-    known = jnp.arange(polygon.tau.size) < polygon.count
+    known = jnp.arange(polygon.tau.size) < polygon.number
     loads = jnp.where(known, polygon.tau, jnp.inf)
     edge = jnp.searchsorted(loads, tau, side="left") - 1
-    return jnp.clip(edge, 0, polygon.count - 2)
+    return jnp.clip(edge, 0, polygon.number - 2)
 
 
 def _corners(polygon: Polygon, sliding: Array) -> tuple[Array, Array]:
     """Parts (most,) of the rounded corners before and behind each vertex; zero for sharp ones."""
     rows = jnp.arange(polygon.tau.size)
     half = 0.5 * (polygon.tau - polygon.tau[polygon.before])
-    half = jnp.where(
-        polygon.before > 0, jnp.minimum(half, UNEVEN * half[polygon.before]), half
-    )
+    half = jnp.where(polygon.before > 0, jnp.minimum(half, UNEVEN * half[polygon.before]), half)
     ahead = 0.5 * (polygon.tau[polygon.after] - polygon.tau)
     ahead = jnp.where(polygon.after > 0, ahead, half)
-    round_ones = (rows > 0) & (rows < polygon.count - 1) & ~sliding & ~jnp.roll(sliding, 1)
+    alone = (polygon.before == 0) & (polygon.after == 0)  # a corner that is no front's
+    round_ones = (rows < polygon.number - 1) & ~alone & ~sliding & ~jnp.roll(sliding, 1)
     before = jnp.where(round_ones, jnp.minimum(half, UNEVEN * ahead), 0.0)
     behind = jnp.where(round_ones, jnp.minimum(ahead, UNEVEN * half), 0.0)
     return before, behind

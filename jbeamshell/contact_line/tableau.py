@@ -158,6 +158,8 @@ def places(at: Tableau, kind: Array, node: Array) -> tuple[Array, Array, Array]:
     k = at.sigma.size
     tangential, normal = jnp.minimum(node, k - 1), k + node
     return tangential, normal, jnp.where(kind < OPEN, tangential, normal)
+
+
 class Lines(NamedTuple):
     """Matrix (rows, columns) and those of its lines that an exchange is made of.
 

@@ -219,7 +219,7 @@ def _in_branches(
             arrives = (number > 0) & (now.state.force == targets[-1])
             return lax.cond(arrives, stay, part, now, targets)
 
-        end, parts = lax.scan(further, contact, np.arange(2))
+        end, parts = lax.scan(further, contact, jnp.arange(2))
         return end, _joined(parts, targets, end.memory.sense)
 
     def stay(now: Contact, targets: Array) -> tuple[Contact, Level]:

@@ -26,8 +26,8 @@ def pushforward(function: Function, at: PyTree, beside: PyTree, change: PyTree) 
 
     Parameters
     ----------
-    function : function of two pytrees of arrays, the first of which holds real numbers; it must have
-        derivatives of both modes, and be the same object from call to call
+    function : function of two pytrees of arrays, the first of which holds real numbers; it has
+        derivatives of both modes, and is the same object from call to call
     at, beside : its arguments
     change : change of ``at``
     """
