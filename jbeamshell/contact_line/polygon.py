@@ -134,14 +134,21 @@ def _no_slope(a: Array) -> Array | np.ndarray:
 
 
 class Walk(NamedTuple):
-    """Walk along a branch: where it is, what comes next, and what was found."""
+    """Walk along a branch.
+
+    Attributes
+    ----------
+    at, event : where it is, and what comes next
+    polygon, slip, record : what was found
+    last : (KINDS, n) vertex at which each node had each kind of event, or -1
+    """
 
     at: Tableau
     event: Event
     polygon: Polygon
     slip: Slip
     record: Record
-    last: Array  # (KINDS, n) vertex at which each node had each kind of event, or -1
+    last: Array
 
 
 Found = tuple[tuple[Array, Array], tuple[Array, Array, Array], Slip, Record]
@@ -210,8 +217,7 @@ def _walked(branch: Branch, search: Search, opened: Array, reach: Array, slides:
     cause = jnp.where(comes, event.cause, FIXED)
     final = Event(tau, jnp.where(comes, event.kind, END), event.node, cause)
     record = recorded(end.record, final, place, jnp.asarray(False))
-    ended = (tau > reach) | (reach == 0.0)
-    slip = end.slip._replace(ended=ended)
+    slip = end.slip._replace(ended=(event.tau > reach) | (end.at.tau >= reach))
     return (found.tau, found.change), (found.before, found.after, found.number), slip, record
 
 
