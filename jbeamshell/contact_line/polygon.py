@@ -204,7 +204,7 @@ def _walked(branch: Branch, search: Search, opened: Array, reach: Array, slides:
     # A vertex at the next event, or anywhere beyond, ends the last edge.
     event = end.event
     reached = jnp.maximum(reach, end.at.tau)
-    anywhere = 2.0 * reached + jnp.finfo(dtype).tiny
+    anywhere = jnp.where(reached > 0.0, 2.0 * reached, 1.0)  # a rest has no size
     comes = (event.tau - end.at.tau > MERGED * reached) & (event.tau < anywhere)
     tau = jnp.where(comes, event.tau, anywhere)
     found, at = end.polygon, end.at.at(tau)
