@@ -37,7 +37,7 @@ class Reading(NamedTuple):
     change : (levels, k + n) change q of the fields since the branch began
     r : (levels, k + n) forces of the base
     work : (levels,) work of friction since then
-    slipping : (levels, k) True for nodes whose slip changes
+    slipping : (levels, k) True for nodes that slip by more than the part of a rounded corner
     slides : (levels,) True where the body slides as a whole
     """
 
@@ -72,7 +72,7 @@ def read(branch: Branch, polygon: Polygon, tau: Array, slides: Array) -> Reading
         change=change,
         r=branch.r_0 + push - tau[:, None] * branch.pull,
         work=tau * (change @ branch.pull) - under - stored,
-        slipping=((rates[edge] != 0.0) | (rounding @ jnp.abs(kinks) > 0.0))[:, :k],
+        slipping=rates[edge][:, :k] != 0.0,
         slides=sliding[edge],
     )
 
