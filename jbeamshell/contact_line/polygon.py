@@ -4,13 +4,15 @@ Between two events everything is linear in the load (see `tableau`).  So the con
 the vertices, says all about a branch; `spline` reads it at a load.
 
 A branch begins with a contact that was read between two vertices.  One node has slipped by a part
-there, and its friction is below its limit.  For a load that turns back three rules find the events:
+there, and its friction is below its limit.  All nodes have the friction that they have, but where
+the load turns back some have more to go before they slip back:
 
-* A node that slipped in the branch before, also by a part, starts with its friction at the limit,
-  and so slips back after the full range, as Masing's rule has it.
-* A node that stuck slips no sooner than at the load where the branch before began.  There the
-  contact has closed its loop, and beyond it all nodes have the friction that they have.
-* A node that was open or came to stick again has the friction that it has.
+* A node that slipped in the branch before, also by a part, slips back after the full range, twice
+  its limit, as Masing's rule has it.
+* So does a node that was about to slip.  One that had little friction has little more to go, so
+  that what follows is continuous.  Where the branch before began the contact has closed its loop,
+  and beyond it no node has more to go.
+* A node that was open or came to stick again has no more to go.
 
 The forces themselves always follow from balance.
 """

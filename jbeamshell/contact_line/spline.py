@@ -3,14 +3,16 @@ r"""Branch read on the spline of its events.
 The contact at the events is a polygon over the load, y(tau) = y_0 + sum kappa_e (tau - tau_e)_+,
 with the change kappa_e of the rate at event e.  Its corners come from the mesh: nodes slip, open
 and close one after the other, where a front moves steadily.  So each corner is rounded by a
-parabola, from half way to the event of the node before to half way to that of the node behind.
-With t from 0 to 1 and the two parts a and b of a corner,
+parabola, between the loads at which the front comes to this node and to the next one.  A node slips
+when the front has passed half of the element behind it, as in a bar.  So an element's share of the
+step from event to event tells when the front is at a node.  With t from 0 to 1 and the two parts a
+and b of a corner,
 
     tau - tau_e = -a + 2 a t + (b - a) t^2,    (tau - tau_e)_+  becomes  b t^2.
 
-Where one front moves alone that is the quadratic B-spline of the polygon.  Of several fronts each
-is rounded over its own steps.  A bar on even elements is exact.  A corner that no front makes stays
-sharp, as where a whole body slips at once or a bolt comes to bear.
+Where one front moves alone on even elements that is the quadratic B-spline of the polygon.  Of
+several fronts each is rounded over its own steps.  A bar is exact, whatever its elements.  A corner
+that no front makes stays sharp, as where a whole body slips at once or a bolt comes to bear.
 
 All equations that are linear hold exactly on the spline: balance, and u = c F + f.q.  Coulomb's and
 Signorini's conditions hold as far as convexity goes: a node that opens or closes within a rounded

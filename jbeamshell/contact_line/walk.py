@@ -26,6 +26,7 @@ from jbeamshell.contact_line.tableau import Branch
 
 SLIDES = 1e6  # compliance over that of the clamped contact from which on a body slides as a whole
 SLIDES_ON = 1e-2  # of it, from which on a corner of the polygon stays sharp
+ABOUT = 2.0  # of its friction, how much more a node that stuck has to go before it slips back
 TOUCHES = 1e-9  # of the largest reaction, below which an open node has none
 SAME = 1e-9  # of a branch, within which it ends where the branch before began
 
@@ -374,7 +375,8 @@ def _extra(contact: Contact, friction: Array, turns: Array) -> Array:
     side = jnp.where(slipped_before, memory.side, jnp.where(state.r_t > 0.0, -1.0, 1.0))
     used = -side * state.r_t  # of the friction on that side
     left = cap - used
-    extra = jnp.where(slipped_before, left, jnp.maximum(jnp.minimum(left, used), 0.0))
+    beside = jnp.maximum(jnp.minimum(left, ABOUT * used), 0.0)
+    extra = jnp.where(slipped_before, left, beside)
     extra = jnp.where(turns & ~memory.free, extra, 0.0)
     return jnp.where(side * jnp.array([[1.0], [-1.0]], cap.dtype) < 0.0, extra, 0.0)
 
