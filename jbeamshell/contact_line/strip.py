@@ -22,9 +22,9 @@ from jbeamshell.scene.keys import FAR_ENDS
 from jbeamshell.scene.parts import Load
 from jbeamshell.scene.scene import Scene
 
-PLANE_END_SIZE = 1e-3  # of H, the element at the loaded end
-PLANE_GROWTH = 0.2  # of the element size over the distance from there, also of small elements
-PLANE_FAR_SIZE = 0.05  # of L, elements away from it
+PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
+PLANE_GROWTH = 0.3  # of the element size over the distance from there, also of small elements
+PLANE_FAR_SIZE = 0.07  # of L, elements away from it
 HOLE_DEPTH = 0.1  # of H, a gap that nothing closes
 STEP_SIZE = 0.05  # of H, elements at a step of the pressure
 RULE = elements.element_rule("finite-difference")

@@ -142,8 +142,9 @@ class TestSections:
         assert line.scene.plan.on_contact_line
         assert not steps.scene.plan.on_contact_line
         assert float(steps.dissipation) == pytest.approx(float(line.dissipation), rel=0.02)
+        # Slip spreads evenly on the contact line; in load steps nodes slip whole.
         assert float(steps.secant_stiffness) == pytest.approx(
-            float(line.secant_stiffness), rel=5e-3
+            float(line.secant_stiffness), rel=1e-2
         )
 
     @pytest.mark.parametrize("name", QUICK[:1] + SLOW[1:])
