@@ -287,8 +287,8 @@ def with_neighbours(
     place = jnp.where(counts, found, 0)
     follows = jnp.where(counts & (polygon.after[place] == 0), vertex, polygon.after[place])
     after = polygon.after.at[place].set(follows)
-    found = polygon._replace(before=before, after=after, node=node, way=way)
-    return found, last.at[kind, event.node].set(vertex)
+    corners = polygon._replace(before=before, after=after, node=node, way=way)
+    return corners, last.at[kind, event.node].set(vertex)
 
 
 def with_slip(slip: Slip, event: Event, vertex: Array, reach: Array) -> Slip:

@@ -119,7 +119,9 @@ def _corners(polygon: Polygon, x: Array, sliding: Array) -> tuple[Array, Array]:
     starts, ends = polygon.before == 0, polygon.after == 0
     ahead = (tau[polygon.after] - tau) * (1.0 - share[polygon.after])
     half = (tau - tau[polygon.before]) * share
-    half = jnp.where(starts, jnp.minimum(tau, ahead), jnp.minimum(half, UNEVEN * half[polygon.before]))
+    half = jnp.where(
+        starts, jnp.minimum(tau, ahead), jnp.minimum(half, UNEVEN * half[polygon.before])
+    )
     ahead = jnp.where(ends, half, ahead)
     round_ones = (rows < polygon.number - 1) & ~(starts & ends) & ~sliding & ~jnp.roll(sliding, 1)
     before = jnp.where(round_ones, jnp.minimum(half, UNEVEN * ahead), 0.0)
