@@ -397,12 +397,13 @@ def levels_of(body: Body, course: Course, targets: Array) -> Level:
     lift = contact.lift + found.change[:, k:]
     r_t, r_n = found.r[:, :k], found.r[:, k:]
     # Rounding leaves open nodes a little reaction.
-    touches = r_n > TOUCHES * jnp.max(r_n, axis=1, keepdims=True)
+    least = TOUCHES * jnp.max(r_n, axis=1, keepdims=True)
+    touches = r_n > least
     apart = (lift > 0.0) & ~touches
     moved = drive.sense * (found.change @ drive.pull)
     state = ContactState(
         v=start.v + found.change[:, :k],
-        r_t=jnp.where(apart[:, :k], 0.0, r_t),
+        r_t=jnp.where(apart[:, :k] & (jnp.abs(r_t) <= least), 0.0, r_t),
         r_n=jnp.where(apart, 0.0, r_n),
         force=targets,
         displacement=start.displacement + body.c * (targets - start.force) + moved,
