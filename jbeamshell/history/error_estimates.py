@@ -21,7 +21,7 @@ from jbeamshell.scene.scene import Scene
 
 NEGLIGIBLE = 1e-9  # slip over the sticking range, taken as zero
 SAFETY = 1.2  # factor on the estimated errors of the corner, and of a lap joint's grid
-SPREAD = 0.4  # the same of a strip's grid in plane elasticity: measured .01 to .13, member to .4
+SPREAD = 0.3  # the same of a strip's grid in plane elasticity: measured .01 to .13, member to .4
 SINGULAR = 1.0  # error by a singular corner over its element per slip zone: measured .05 to .7
 BEYOND = 4.0  # the same under a member that goes on by few elements: measured .8 to 3.2
 STEPS = 1.5  # factor on the estimated error of a grid that steps of the pressure share

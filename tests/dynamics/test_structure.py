@@ -72,7 +72,7 @@ class TestJoint:
         force = joint.forces / 3.0
         mean = 0.5 * (pull.displacement_after(force) + push.displacement_after(force))
         np.testing.assert_allclose(joint.displacements, mean, rtol=1e-12)
-        np.testing.assert_allclose(joint.stiffness * joint.network.body.c, 3.0, rtol=1e-4)
+        np.testing.assert_allclose(joint.stiffness * joint.network.body.c, 3.0, rtol=1e-6)
 
     def test_a_spring_in_series_adds_its_displacement(self):
         springy = JOINT.in_series(2.0)
