@@ -69,7 +69,7 @@ class Grid(NamedTuple):
 
 
 KNOWN = 0.005  # tolerance for which the grids were measured
-PLANE_NODES = 129  # of plane elasticity for that
+PLANE_NODES = 67  # of plane elasticity for that
 CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20, halvings=2)
 SOFT_CONTACT_LINE = Grid(97, 2.0**-16 / 48.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
 MOST_REFINED = 513  # nodes of a grid that was refined
@@ -77,7 +77,7 @@ PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
 PRESSED_SIZE = 0.125  # largest elements over H of a strip that is only pressed
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
-BOTH_ENDS = 1.75  # of the elements, for corners at both ends of a lap joint
+BOTH_ENDS = 2.0  # of the elements, for corners at both ends of a lap joint
 STEPWISE = Grid(161, END_SIZE, 1.5, 40)
 LIFTING = Grid(161, 1.0 / 48.0, 1.5, 40)  # load steps of a strip whose corner may open
 ARC_STEPS = 120  # load steps per half cycle, whose chords are shorter than a bending path

@@ -161,7 +161,10 @@ class TestHistory:
         exact = jb.solve(scene)
         assert float(exact.gap.max()) > 1e-7
         steps = jb.solve(beside(scene, **{"load.steps_per_half_cycle": 160}))
-        check_against_load_steps(exact, steps)
+        # Slip spreads evenly from node to node on the contact line; in load steps nodes slip whole.
+        scale = float(steps.force.max())
+        np.testing.assert_allclose(exact.force, steps.force[::80], atol=5e-3 * scale)
+        assert float(exact.dissipation) == pytest.approx(float(steps.dissipation), rel=0.02)
 
 
 class TestFigures:
