@@ -21,8 +21,9 @@ import jbeamshell as jb
 from calibration.finite_elements.cards import card, node_set
 from calibration.finite_elements.mesh import weights
 from calibration.finite_elements.program import find_program
-from jbeamshell.contact_line.strip import stations
+from jbeamshell.mechanics.elements import vertices
 
+GRADING = 1e-4, None, 0.3, 0.15, 0.3  # of the elements along the contact, see `vertices`
 ROWS = 17  # of nodes over the height
 RISE = 1e3  # of the element height from the contact to the top
 
@@ -46,7 +47,7 @@ class Slice(NamedTuple):
 def strip_slice(scene: jb.Scene, nodes: int, rows: int = ROWS) -> Slice:
     """Slice of a strip under an even pressure, held at X = 0, pulled evenly, of graded bricks."""
     strip, height = scene.strip, 2.0 * float(scene.strip.half_height)
-    x = np.asarray(stations(scene.replace({"model.section": "plane"}), nodes))
+    x = np.asarray(vertices(nodes - 1, strip.length, strip.half_height, *GRADING))
     y = height * np.expm1(np.linspace(0.0, np.log1p(RISE), rows)) / RISE
     front = np.arange(1, x.size * rows + 1).reshape(x.size, rows)
     both = np.stack([front, front + front.size])

@@ -17,7 +17,7 @@ from jax import Array
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.branches import pressed
-from jbeamshell.contact_line.events import walk
+from jbeamshell.contact_line.walk import walk
 
 FIRST = 1e-6  # part of the mean reaction from which the pressures grow
 

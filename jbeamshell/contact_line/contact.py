@@ -37,12 +37,11 @@ from jbeamshell.contact_line.contact_input import (
     held_nodes,
 )
 from jbeamshell.contact_line.drives import driven_by_displacement, exchanged
-from jbeamshell.contact_line.events import walk
 from jbeamshell.contact_line.pair import together
 from jbeamshell.contact_line.pressing import press
-from jbeamshell.contact_line.stretch import SLIDES, Level
 from jbeamshell.contact_line.substructure import Substructure, potential
 from jbeamshell.contact_line.turns import turns_of
+from jbeamshell.contact_line.walk import SLIDES, Contact, Level, walk, walk_on
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.keys import ASSEMBLIES, CONTROLS
@@ -70,6 +69,7 @@ def solve_contact(
     bolts: ArrayLike = 1.0,
     gap: ArrayLike = 0.0,
     assembly: str = "frictionless",
+    points: bool = False,
     throw: bool = True,
 ) -> ContactHistory:
     """Press bodies together, load them to and fro, and return the history of their contact.
@@ -91,6 +91,8 @@ def solve_contact(
         it grows together with the pressures
     assembly : "frictionless", which locks no shear in, as in a scene, or "frictional", as bolts are
         tightened one with the other
+    points : True if the nodes are contacts of their own, such as pins, each of which slips as a
+        whole; False if they are a mesh of a line, along which slip spreads evenly
     throw : True raises for a load without equilibrium and warns of doubts; False returns NaN, and
         leaves both to ``history.settled`` and ``history.doubts``
 
@@ -133,7 +135,7 @@ def solve_contact(
     flat = not is_traced(gaps) and not np.any(np.asarray(gaps))
     distance = None if flat else jnp.broadcast_to(gaps, upper.x.shape)
     until_steady = path is None and cycles is None
-    settings = control, assembly, steps_per_half_cycle if until_steady else None
+    settings = control, assembly, steps_per_half_cycle if until_steady else None, points
     levels, count, error = _levels((contact, distance, targets), held, settings)
     if until_steady and not is_traced(levels):
         targets = targets[: unit_path(int(count), steps_per_half_cycle).size]
@@ -143,7 +145,7 @@ def solve_contact(
     unit = unit_path(MOST_CYCLES if cycles is None else cycles, steps_per_half_cycle)
     loads = unit[: targets.size] if path is None else targets
     history = _history(
-        upper, levels, held, error, _cycles(loads), as_leaf(friction), control, assembly
+        upper, levels, held, error, _cycles(loads), as_leaf(friction), control, assembly, points
     )
     if not is_traced(levels) and throw:
         warn_of_doubts(history.doubts, stacklevel=2)
@@ -203,21 +205,24 @@ def _check_push(hessian: Array, held: tuple[bool, ...], slides: Array) -> None:
 def _levels(
     inputs: tuple[tuple[Array, ...], Array | None, Array],
     held: tuple[bool, ...],
-    settings: tuple[str, str, int | None],
+    settings: tuple[str, str, int | None, bool],
 ) -> tuple[Level, Array, Array]:
     """Levels of the path, the number of cycles until it is steady, and the `_errors`.
 
-    The pressed contact comes first.  Nodes are as `_order` has them.  The last setting is the steps
-    per half cycle of a path that goes on until it is steady, see `_until_steady`.
+    The pressed contact comes first.  Nodes are as `_order` has them.  The settings are control,
+    assembly, the steps per half cycle of a path that goes on until it is steady, else None, and
+    True for nodes that are contacts of their own.
     """
-    (contact, gap, targets), (control, assembly, half) = inputs, settings
+    (contact, gap, targets), (control, assembly, half, points) = inputs, settings
     body, lift = _pressed_body(contact, gap, held, assembly)
     friction, start = contact[3], pressed(body)
     driven = driven_by_displacement(body) if control == "displacement" else body
     if half is None:
-        levels, count = walk(driven, friction, start, targets, turns_of(targets), lift), targets
+        turns = turns_of(targets)
+        levels = walk(driven, friction, start, targets, turns, lift, rounded=not points)
+        count = targets
     else:
-        levels, count = _until_steady(driven, friction, start, targets, lift, half)
+        levels, count = _until_steady(driven, friction, start, targets, lift, half, points)
     state = jax.vmap(exchanged)(levels.state) if control == "displacement" else levels.state
     sound = jnp.all(jnp.isfinite(lift))
     first = Level(start, lift, jnp.zeros_like(body.c), jnp.zeros_like(start.v, bool), sound)
@@ -286,7 +291,13 @@ def _errors(body: Body, friction: Array, levels: Level) -> Array:
 
 
 def _until_steady(
-    body: Body, friction: Array, start: ContactState, targets: Array, lift: Array, half: int
+    body: Body,
+    friction: Array,
+    start: ContactState,
+    targets: Array,
+    lift: Array,
+    half: int,
+    points: bool,
 ) -> tuple[Level, Array]:
     """Levels of the first loading and of all cycles, and the number of those that were walked.
 
@@ -301,25 +312,24 @@ def _until_steady(
     paths = loads, jnp.asarray(turning), jnp.arange(MOST_CYCLES + 1) > 0
 
     def go(
-        carry: tuple[Level, Array, Array], to: tuple[Array, Array, Array]
-    ) -> tuple[tuple[Level, Array, Array], tuple[Level, Array]]:
-        before, last_drift, copied = carry
+        carry: tuple[Level, Contact, Array, Array], to: tuple[Array, Array, Array]
+    ) -> tuple[tuple[Level, Contact, Array, Array], tuple[Level, Array]]:
+        before, at, last_drift, copied = carry
         loads, turns, closes = to
-        state, at = jax.tree.map(lambda a: a[-1], (before.state, before.lift))
-        levels = walk(body, friction, state, loads, turns, at, ~copied)
-        levels = levels._replace(settled=levels.settled & before.settled[-1])
-        now = jax.tree.map(lambda old, new: jnp.where(copied, old, new), before, levels)
+        state = at.state
+        walked = walk_on(body, friction, at, loads, turns, ~copied, not points)
+        now, at = jax.tree.map(lambda old, new: jnp.where(copied, old, new), (before, at), walked)
         slip = lax.stop_gradient(jnp.concatenate([state.v[None], now.state.v]))
         none = NOISE * jnp.max(jnp.abs(state.r_t)) / jnp.max(jnp.abs(body.K_tt))
         drift = slip[-1] - slip[0]
         leftover = jnp.minimum(*(jnp.max(jnp.abs(way)) for way in (drift, drift - last_drift)))
         repeats = leftover <= REPEATS * jnp.max(jnp.ptp(slip, axis=0)) + none
         steady = copied | (closes & repeats) | ~now.settled[-1]
-        return (now, drift, steady), (now, copied)
+        return (now, at, drift, steady), (now, copied)
 
     first = Level(start, lift, body.c, start.v > 0.0, jnp.asarray(True))
     first = jax.tree.map(lambda a: jnp.broadcast_to(a, (2 * half, *a.shape)), first)
-    at_start = first, jnp.zeros_like(start.v), jnp.asarray(False)
+    at_start = first, Contact.of(start, lift), jnp.zeros_like(start.v), jnp.asarray(False)
     _, (levels, copied) = lax.scan(go, at_start, paths)
     places = np.arange(loads.size)
     places = np.append(places[:rise], places[2 * half :])
@@ -363,6 +373,7 @@ def _history(
     friction: Array,
     control: str,
     assembly: str,
+    points: bool,
 ) -> ContactHistory:
     """History of levels, its nodes along X."""
     order, _ = _order(held)
@@ -393,4 +404,5 @@ def _history(
         cycles=cycles,
         control=control,
         assembly=assembly,
+        points=points,
     )

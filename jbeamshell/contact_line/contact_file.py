@@ -46,6 +46,7 @@ NUMBERS = (
     "bolts",
     "gap",
     "assembly",
+    "points",
 )
 TABLES = ("contact", "pull", "held")
 OF_BODY = ("file", *TABLES, "press", "tangential", "normal", "directions")

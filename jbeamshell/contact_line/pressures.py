@@ -5,7 +5,9 @@ With P the part of the pressures that acts, a body's equations are
     r_t = K_tt v + K_tn w - f_t F - g_t P,    u = c F + f_t.v + f_n.w + h P,
 
 and likewise for r_n.  A straight step in F and P is a load path of its own: one number s drives it,
-with f dF + g dP in place of f.  So a step is walked event by event, and is exact.
+with f dF + g dP in place of f.  Steps of one way are one branch, which goes event by event; where
+the way changes, another one begins.  Where ways change from step to step a branch is shorter than
+the steps in which nodes slip.  So these paths are read on the polygon of their events.
 """
 
 from __future__ import annotations
@@ -19,8 +21,16 @@ from jax import Array, lax
 
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.branches import ContactState
-from jbeamshell.contact_line.events import walk
-from jbeamshell.contact_line.stretch import Level
+from jbeamshell.contact_line.walk import (
+    Contact,
+    Course,
+    Drive,
+    Level,
+    departed,
+    level_by_level,
+)
+
+SAME = 1e-9  # difference of two ways that are one
 
 
 class Press(NamedTuple):
@@ -75,27 +85,60 @@ def walk_with_pressures(
     loads, parts : (levels,) end loads, or what drives the body, and parts of the pressures
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    once = jnp.ones(1, bool)
+    rises = jnp.diff(loads, prepend=start.force), jnp.diff(parts, prepend=jnp.ones_like(parts[0]))
+    sizes, ways = jax.vmap(_direction)(*rises)
+    before = tuple(jnp.concatenate([jnp.zeros_like(way[:1]), way[:-1]]) for way in ways)
+    turns = ~_alike(ways, before).at[0].set(False)
+    back = _alike(ways, tuple(-way for way in before))
+    whole = jnp.cumsum(sizes)
+    begins = lax.cummax(jnp.where(turns, whole - sizes, 0.0))
+    load, part = ways
+    senses = jnp.where(jnp.where(load == 0.0, part, load) < 0.0, -1.0, 1.0)
+    along = senses * (whole - begins)  # of the branch, a straight part of the path
 
-    def go(
-        now: tuple[ContactState, Array, Array], steps: tuple[Array, Array]
-    ) -> tuple[tuple[ContactState, Array, Array], Level]:
-        state, lift, settled = now
-        size, (load, part) = _direction(*steps)
+    def depart(contact: Contact, step: _Step, first: Array) -> Course:
+        load, part = step.way
         pull_t, pull_n = load * body.f_t + part * press.g_t, load * body.f_n + part * press.g_n
-        along = eqx.tree_at(lambda b: (b.f_t, b.f_n, b.c), body, (pull_t, pull_n, load**2 * body.c))
-        origin = state._replace(force=jnp.zeros_like(size))
-        level = walk(along, friction, origin, size[None], once, lift)
-        level = jax.tree.map(lambda a: a[0], level)
-        level = level._replace(settled=level.settled & settled)
-        return (level.state, level.lift, level.settled), level
+        moving = eqx.tree_at(
+            lambda b: (b.f_t, b.f_n, b.c), body, (pull_t, pull_n, load**2 * body.c)
+        )
+        state, memory = contact.state, contact.memory
+        force = jnp.where(first, 0.0, state.force)
+        sense = jnp.where(first & ~step.back, 0.0, memory.sense)
+        memory = memory._replace(sense=sense)
+        at = contact._replace(state=state._replace(force=force), memory=memory)
+        drive = Drive(jnp.concatenate([pull_t, pull_n]), step.sense)
+        return departed(moving, friction, at, drive, step.along, rounded=False)
 
-    steps = jnp.diff(loads, prepend=start.force), jnp.diff(parts, prepend=jnp.ones_like(parts[0]))
-    levels: Level = lax.scan(go, (start, lift, jnp.asarray(True)), steps)[1]
+    steps = _Step(ways, senses, along, back)
+    levels, _ = level_by_level(body, depart, Contact.of(start, lift), along, turns, steps)
     slip, rise = levels.state.v - start.v, levels.lift - lift
     u = body.c * (loads - start.force) + slip @ body.f_t + rise @ body.f_n
     u = start.displacement + u + press.h * (parts - 1.0)
     return levels._replace(state=levels.state._replace(force=loads, displacement=u))
+
+
+class _Step(NamedTuple):
+    """Step of a path, and what is known of the branch, a straight part of the path, that it is on.
+
+    Attributes
+    ----------
+    way : change of the load and of the pressures along the branch, the larger one of size 1
+    sense : 1 or -1 where the load, or else the pressures, rise or fall
+    along : length of the branch up to here times the sense
+    back : True if the branch goes back on the one before
+    """
+
+    way: tuple[Array, Array]
+    sense: Array
+    along: Array
+    back: Array
+
+
+def _alike(ways: tuple[Array, ...], others: tuple[Array, ...]) -> Array:
+    """True for ways (steps,) that are the same but for rounding."""
+    same = [jnp.abs(a - b) <= SAME for a, b in zip(ways, others, strict=True)]
+    return same[0] & same[1]
 
 
 def _direction(load: Array, part: Array) -> tuple[Array, tuple[Array, Array]]:

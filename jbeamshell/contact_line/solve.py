@@ -21,13 +21,11 @@ from jbeamshell.contact_line.drives import (
     spring_energy,
     with_springs,
 )
-from jbeamshell.contact_line.entry import goes_on
-from jbeamshell.contact_line.events import walk
 from jbeamshell.contact_line.kept import kept
 from jbeamshell.contact_line.pressures import Press, walk_with_pressures
-from jbeamshell.contact_line.stretch import Level
 from jbeamshell.contact_line.strip import Strip, condensed, spring_stiffness, stays_flat
 from jbeamshell.contact_line.turns import Turns, known_turns, turns_of, turns_of_cycles
+from jbeamshell.contact_line.walk import Level, walk
 from jbeamshell.history.history import History
 from jbeamshell.scene.load_path import LoadPath
 from jbeamshell.scene.scene import Scene
@@ -182,8 +180,7 @@ def _levels(scene: Scene, strip: Strip, targets: Array, parts: Array | None, tur
     elif parts is not None:
         levels = walk_with_pressures(body, press, friction, start, targets, parts, flat)
     else:
-        alike = not goes_on(scene)  # the edge of the contact opens at other events at each load
-        levels = walk(body, friction, start, targets, turns, flat, alike=alike)
+        levels = walk(body, friction, start, targets, turns, flat)
     sound = jnp.all(jnp.isfinite(strip.lift))
     state = levels.state
     if scene.load.control == "displacement":

@@ -24,7 +24,7 @@ from jbeamshell.scene.scene import Scene
 
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
 PLANE_GROWTH = 0.3  # of the element size over the distance from there, also of small elements
-PLANE_FAR_SIZE = 0.15  # of L, elements away from it
+PLANE_FAR_SIZE = 0.07  # of L, elements away from it
 HOLE_DEPTH = 0.1  # of H, a gap that nothing closes
 STEP_SIZE = 0.05  # of H, elements at a step of the pressure
 RULE = elements.element_rule("finite-difference")

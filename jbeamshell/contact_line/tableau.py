@@ -1,14 +1,16 @@
 """Tableau of a contact between two events, and its change at an event.
 
-Between two events all changes are linear in the load.  A tableau holds what answers, row by row,
+Along a branch of a load path, with q = (v, w) the change of the contact fields since the branch
+began and tau the load since then,
 
-    answer = value + rate tau + sum over what is held (matrix . held),
+    r = r_0 + matrix q - pull tau
 
-with tau the load since the last reversal.  A node that sticks holds its slip and answers with its
-tangential force r_t; one that slips holds r_t + sigma mu r_n at zero and answers with its slip.  A
-closed node holds its lift and answers with its reaction r_n; an open one the reverse.  At an event
-one row and one column are exchanged (a principal pivot, as in parametric complementarity: Cottle,
-Pang & Stone 1992, chapter 4), so that an event costs a product of two vectors.
+are the forces of the base.  A tableau holds, row by row, what answers to what is held: a node that
+sticks holds its slip and answers with its tangential force r_t; one that slips holds r_t + sigma mu
+r_n and answers with its slip.  A closed node holds its lift and answers with its reaction r_n; an
+open one the reverse.  Between two events all answers are linear in tau.  At an event one row and
+one column are exchanged (a principal pivot, as in parametric complementarity: Cottle, Pang & Stone
+1992, chapter 4), so that an event costs a product of two vectors.
 """
 
 from __future__ import annotations
@@ -18,147 +20,144 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array, lax
 
-from jbeamshell.contact_line.branches import ContactState
-
 KINDS = 5  # of events
 ALONG, AGAINST, STICK, OPEN, CLOSE = range(KINDS)
 
 
-class System(NamedTuple):
-    """Equations of a body with q = (v, w): r = reference + matrix q - pull F, u = c F + pull.q.
+class Branch(NamedTuple):
+    """Equations of a branch, r = r_0 + matrix q - pull tau, for k of n nodes that may slip.
 
     Attributes
     ----------
     matrix : (k + n, k + n) stiffness
-    pull : (k + n,) part of the load that each clamped contact field carries
-    c : displacement per load with a clamped contact
+    pull : (k + n,) part of the load that each clamped contact field carries, along the branch
     friction : mu
-    reference : (k + n,) forces of the base at q = 0 without a load
+    r_0 : (k + n,) forces of the base where the branch begins
+    lift : (n,) lift there
     """
 
     matrix: Array
     pull: Array
-    c: Array
     friction: Array
-    reference: Array
+    r_0: Array
+    lift: Array
 
 
 class Tableau(NamedTuple):
-    """Contact between two events; k of n nodes may slip.
-
-    Rows are the k tangential and the n normal ones, and the displacement of the loaded end.
-    Columns are the tangential and the normal ones.  Loads of one body that have met the same
-    events share all but the value, what is held, tau and the work, which then have one more axis,
-    the last.
+    """Contact between two events; rows and columns are the k tangential and the n normal ones.
 
     Attributes
     ----------
-    matrix : (k + n + 1, k + n)
-    value, rate : (k + n + 1,) answers at tau = 0, and their rates over tau
+    matrix : (k + n, k + n) answers to what is held
+    answer, rate : (k + n,) answers at tau, and their rates over it
+    held : (k + n,) what is held
     sigma : (k,) 1 and -1 for nodes that slip along and against v, 0 for those that stick
     opened : (n,) True for open nodes
-    held : (k,) slip at which sticking nodes are held, since the reversal
-    tau : load since the reversal, positive
-    work : work of friction since the reversal
-    events : count since the reversal
+    tau : load since the branch began, positive
     """
 
     matrix: Array
-    value: Array
+    answer: Array
     rate: Array
+    held: Array
     sigma: Array
     opened: Array
-    held: Array
     tau: Array
-    work: Array
-    events: Array
 
-    def at(self, tau: Array) -> Array:
-        """All answers at a tau of this stretch; (rows, loads) at those of many loads."""
-        return self.value + jnp.multiply.outer(self.rate, tau)
+    @property
+    def moving(self) -> Array:
+        """True for fields (k + n,) that answer, False for those that are held."""
+        return jnp.concatenate([self.sigma != 0.0, self.opened])
 
-    def fields(self, tau: Array, origin: Array) -> tuple[Array, Array]:
-        """Fields q = (v, w) and reactions r_n at a tau; ``origin`` is v at the reversal."""
-        k, n = self.sigma.size, self.opened.size
-        answer = self.at(tau)
-        slip = jnp.where(self.sigma == 0.0, self.held, answer[:k])
-        normal = answer[k : k + n]
-        lift = jnp.where(self.opened, normal, 0.0)
-        return jnp.concatenate([origin + slip, lift]), jnp.where(self.opened, 0.0, normal)
+    @property
+    def change(self) -> Array:
+        """Change q (k + n,) of the fields since the branch began."""
+        return jnp.where(self.moving, self.answer, self.held)
+
+    @property
+    def velocity(self) -> Array:
+        """Rate (k + n,) of q over tau."""
+        return jnp.where(self.moving, self.rate, 0.0)
+
+    def at(self, tau: Array) -> Tableau:
+        """Tableau at a later tau without an event between."""
+        return self._replace(answer=self.answer + self.rate * (tau - self.tau), tau=tau)
 
 
-def empty(k: int, n: int) -> Tableau:
-    """Tableau of no contact, to be filled at the first reversal."""
-    zero, rows = jnp.zeros(()), jnp.zeros(k + n + 1)
-    return Tableau(
-        matrix=jnp.zeros((k + n + 1, k + n)),
-        value=rows,
-        rate=rows,
-        sigma=jnp.zeros(k),
+def begun(branch: Branch, opened: Array) -> Tableau:
+    """Tableau where a branch begins: the nodes ``opened`` (n,) stay open, all others stick.
+
+    An open node may still have a reaction, where the branch before ended while it opened or closed.
+    It keeps that, with the friction that goes with it, until it closes.
+    """
+    n = branch.lift.size
+    k = branch.pull.size - n
+    start = Tableau(
+        matrix=branch.matrix,
+        answer=branch.r_0,
+        rate=-branch.pull,
+        held=jnp.zeros_like(branch.pull),
+        sigma=jnp.zeros(k, branch.pull.dtype),
         opened=jnp.zeros(n, bool),
-        held=jnp.zeros(k),
-        tau=zero,
-        work=zero,
-        events=jnp.asarray(0),
-    )
-
-
-def reversed_at(
-    system: System, state: ContactState, lift: Array, opened: Array, sense: Array
-) -> Tableau:
-    """Tableau at a reversal: the nodes ``opened`` (n,) stay open, all others stick."""
-    k, n = state.v.size, lift.size
-    start = empty(k, n)._replace(
-        matrix=jnp.concatenate([system.matrix, system.pull[None]]),
-        value=jnp.concatenate([state.r_t, state.r_n, state.displacement[None]]),
-        rate=sense * jnp.append(-system.pull, system.c),
+        tau=jnp.zeros_like(branch.friction),
     )
 
     def open_next(at: Tableau) -> Tableau:
         i = jnp.argmax(opened & ~at.opened)
         sticks = (i < k) & (at.sigma[jnp.minimum(i, k - 1)] == 0.0)  # it slips before it opens
-        return changed(at, jnp.where(sticks, ALONG, OPEN), i, system.friction)
+        way = jnp.where(at.answer[jnp.minimum(i, k - 1)] > 0.0, AGAINST, ALONG)
+        return changed(branch, at, jnp.where(sticks, way, OPEN), i, keeps=True)
 
-    end = lax.while_loop(lambda at: jnp.any(opened & ~at.opened), open_next, start)
-    value = end.value.at[k : k + n].add(jnp.where(opened, lift, 0.0))
-    return end._replace(value=value, events=jnp.asarray(0))
+    return lax.while_loop(lambda at: jnp.any(opened & ~at.opened), open_next, start)
 
 
-def changed(at: Tableau, kind: Array | int, node: Array, friction: Array) -> Tableau:
-    """Tableau after an event of a kind at a node."""
+def changed(
+    branch: Branch, at: Tableau, kind: Array | int, node: Array, keeps: Array | bool = False
+) -> Tableau:
+    """Tableau after an event of a kind at a node.
+
+    Parameters
+    ----------
+    keeps : True for a node that opens with the reaction it has, or closes with its lift
+    """
+    friction = branch.friction
     kind = jnp.asarray(kind)
-    k = at.sigma.size
-    tangential, normal = jnp.minimum(node, k - 1), k + node
+    tangential, normal, i = places(at, kind, node)
     slips, sticks = kind < STICK, kind == STICK
-    i = jnp.where(kind < OPEN, tangential, normal)
     # A slipping node holds r_t + sigma mu r_n: before it slips its row becomes that sum, and after
-    # it sticks again the sum is taken apart.  Slip is counted from where the node was held.
+    # it sticks again the sum is taken apart.
     sigma = jnp.where(kind == ALONG, 1.0, -1.0)
-    slip = at.value[tangential] + at.rate[tangential] * at.tau
-    held = at.held[tangential]
     added = jnp.where(slips, sigma * friction, 0.0)
     rest = jnp.where(sticks, -at.sigma[tangential] * friction, 0.0)
     lines = lines_of(at.matrix, i, normal, added)
     pivot = lines.row[i]
     share = lines.column / pivot
+    entry = at.rate[i] + added * at.rate[normal]
+    beside = at.rate[normal] - share[normal] * entry
+    rate = (at.rate - share * entry).at[i].set(rest * beside - entry / pivot)
 
-    def column(old: Array, less: Array | float, more: Array | float) -> Array:
-        entry = old[i] + added * old[normal] - less
-        beside = old[normal] - share[normal] * entry
-        swept = old - jnp.multiply.outer(share, entry)
-        return swept.at[i].set(rest * beside - entry / pivot + more)
-
+    # What answered is held from now on, and the reverse.
+    answer, held = at.answer[i], at.held[i]
+    with_reaction = answer + added * at.answer[normal]
+    apart = jnp.where(kind == CLOSE, -branch.lift[node], 0.0)  # neither lift nor reaction
     now = jnp.where(slips, sigma, jnp.where(sticks, 0.0, at.sigma[tangential]))
     opened = jnp.where(kind < OPEN, at.opened[node], kind == OPEN)
-    return at._replace(
+    return Tableau(
         matrix=exchanged(lines, i, normal, rest),
-        value=column(at.value, jnp.where(sticks, slip, 0.0), jnp.where(slips, held, 0.0)),
-        rate=column(at.rate, 0.0, 0.0),
+        answer=at.answer.at[i].set(held + rest * at.answer[normal]),
+        rate=rate,
+        held=at.held.at[i].set(jnp.where((kind <= STICK) | keeps, with_reaction, apart)),
         sigma=at.sigma.at[tangential].set(now),
         opened=at.opened.at[node].set(opened),
-        held=at.held.at[tangential].set(jnp.where(sticks, slip, jnp.where(slips, 0.0, held))),
-        events=at.events + 1,
+        tau=at.tau,
     )
+
+
+def places(at: Tableau, kind: Array, node: Array) -> tuple[Array, Array, Array]:
+    """Rows of a node: the tangential, the normal, and the one that an event of a kind exchanges."""
+    k = at.sigma.size
+    tangential, normal = jnp.minimum(node, k - 1), k + node
+    return tangential, normal, jnp.where(kind < OPEN, tangential, normal)
 
 
 class Lines(NamedTuple):

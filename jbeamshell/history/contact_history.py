@@ -52,6 +52,7 @@ class ContactHistory(LoopFigures, eqx.Module):
     cycles : steps at the start, the turn and the end of each closed cycle
     control : "force" or "displacement", what the amplitude is of
     assembly : "frictionless" or "frictional", how the bodies were pressed together
+    points : True if the nodes are contacts of their own and no mesh, which may not be too coarse
 
     Examples
     --------
@@ -75,6 +76,7 @@ class ContactHistory(LoopFigures, eqx.Module):
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
     control: str = eqx.field(static=True)
     assembly: str = eqx.field(static=True)
+    points: bool = eqx.field(static=True)
 
     @property
     def converged(self) -> bool:
@@ -129,7 +131,8 @@ class ContactHistory(LoopFigures, eqx.Module):
             )
         if not self.cycles or not float(self.friction) > 0.0:
             return ()
-        return *self._unsteady, *doubts_of_mesh(float(self.dissipation_error))
+        mesh = () if self.points else doubts_of_mesh(float(self.dissipation_error))
+        return *self._unsteady, *mesh
 
     @property
     def _unsteady(self) -> tuple[str, ...]:

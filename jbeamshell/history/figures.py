@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from jbeamshell.history.error_estimates import SlipCycle, estimates
@@ -63,9 +66,13 @@ class CycleFigures(Record, LoopFigures):
 
     @property
     def slip_cycle(self) -> SlipCycle:
-        """Slip, traction and reaction of the contact in the last cycle."""
-        start, _, stop = self._last
-        cycle = slice(start, stop + 1)
+        """Slip, traction and reaction of the contact in the last cycle.
+
+        On the contact line they are those of the turning points, of which every call knows.
+        """
+        start, turn, stop = self._last
+        line = self.scene.plan.on_contact_line
+        cycle: Any = np.array([start, turn, stop]) if line else slice(start, stop + 1)
         work = self.slip_work[start + 1 : stop + 1].sum()  # of NumPy or of JAX
         return SlipCycle(
             x=self.x,
@@ -76,7 +83,7 @@ class CycleFigures(Record, LoopFigures):
             friction=self.scene.contact.friction,
             slip_stiffness=self.scene.slip_stiffness(self.tributary),
             half_height=self.scene.strip.half_height,
-            dissipation=work if self.scene.plan.on_contact_line else None,
+            dissipation=work if line else None,
         )
 
     @property

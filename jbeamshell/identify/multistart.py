@@ -131,7 +131,7 @@ def found_by(
     problem : least-squares problem
     options : settings
     labels : labels of the specimens
-    doubts, notes : sentences on the data; where a fit fails, the doubts may say why
+    doubts, notes : sentences on the data; where a fit fails, they may say why
     progress : called after every step; None shows a bar where a person watches
     """
     space = problem.space
@@ -144,7 +144,7 @@ def found_by(
     rescue = options.max_iterations is None
     noise_cost = problem.experiment.weight.size if problem.experiment.noisy else 0
     stopping = StoppingRule(most, options.tolerance, noise_cost)
-    told = "".join(f"; {doubt}" for doubt in doubts)
+    told = "".join(f"; {sentence}" for sentence in (*doubts, *notes))
     try:
         watched: Any = bar("fit") if progress is None else contextlib.nullcontext()
         with watched as shown:

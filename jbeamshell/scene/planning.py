@@ -69,15 +69,15 @@ class Grid(NamedTuple):
 
 
 KNOWN = 0.005  # tolerance for which the grids were measured
-PLANE_NODES = 129  # of plane elasticity for that
+PLANE_NODES = 67  # of plane elasticity for that
 CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20, halvings=2)
 SOFT_CONTACT_LINE = Grid(97, 2.0**-16 / 48.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
 MOST_REFINED = 513  # nodes of a grid that was refined
-PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20)
+PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20, halvings=1)
 PRESSED_SIZE = 0.125  # largest elements over H of a strip that is only pressed
 MOST_JUMPS = 4  # of the pressure that add nodes
 PER_STEP = 0.5  # of the elements, for each step of the pressure inside the strip
-BOTH_ENDS = 1.75  # of the elements, for corners at both ends of a lap joint
+BOTH_ENDS = 3.0  # of the elements, for corners at both ends of a lap joint and bolts between
 STEPWISE = Grid(161, END_SIZE, 1.5, 40)
 LIFTING = Grid(161, 1.0 / 48.0, 1.5, 40)  # load steps of a strip whose corner may open
 ARC_STEPS = 120  # load steps per half cycle, whose chords are shorter than a bending path
@@ -262,12 +262,12 @@ def _nodes(grid: Grid, scene: Parts, numbers: Numbers | None = None) -> int:
 def refinements(scene: Parts) -> int:
     """Number of times that a scene's elements may be halved to keep its tolerance.
 
-    The grid must be open and the contact line a section's: a finer one of plane elasticity takes
-    longer than what it leaves is worth.
+    The grid must be open.  That of a lap joint in plane elasticity stays: a finer one takes longer
+    than what it leaves is worth.
     """
-    if scene.model.nodes != AUTO:
-        return 0
     plan = scene.plan
+    if scene.model.nodes != AUTO or (plan.elastic and scene.member.support != "none"):
+        return 0
     opens = plan.lifts and scene.strip.curvature is None
     grid = _grid(plan.section, plan.engine, opens, _is_soft(scene, None))
     halvings = range(1, grid.halvings + 1)

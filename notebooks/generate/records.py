@@ -47,6 +47,7 @@ def tables(root: Path) -> dict[str, str]:
         "table_squeeze.md": squeeze(_read(verification / "squeezed_sections.json")),
         "table_random.md": random_strips(_read(verification / "failure_map.json")),
         "table_derivatives.md": derivatives(_read(verification / "gradients.json")),
+        "table_smooth_slopes.md": smooth_slopes(_read(verification / "smooth_slopes.json")),
         "table_campaign.md": campaign(read()),
         "table_defaults.md": defaults(read()),
         "table_balance.md": balance(_read(verification / "balance_in_time.json")),
@@ -62,6 +63,17 @@ def single(record: dict) -> str:
     )  # fmt: skip
     heads = ("what", "steps per half cycle", "time", "error of D", "to elements", "returns")
     return table(heads, rows) + machine(record["about"]["one"])
+
+
+def smooth_slopes(record: dict) -> str:
+    """Errors of D and of its slopes over the number of nodes."""
+    rows = [
+        (name, *(percent(row[key] / 100.0) for key in
+                 ("D_largest_percent", "slope_median_percent", "slope_largest_percent")))
+        for name, row in record["summary"].items()
+    ]  # fmt: skip
+    heads = ("read on", "error of D, largest", "of slopes, median", "of slopes, largest")
+    return table(heads, rows) + machine(record["about"])
 
 
 def sweeps(record: dict) -> str:

@@ -1,12 +1,15 @@
 """Beamshells, laminates, sections of order p and a Phi of the user's own on their contact line."""
 
+import sys
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line import strip
+from jbeamshell.contact_line import strip, walk
 from jbeamshell.dynamics.structure.joint import Joint
 from jbeamshell.load_steps.elastic_strip import ElasticStrip, V, W
 from jbeamshell.load_steps.system import System
@@ -127,6 +130,16 @@ def check_against_load_steps(exact, steps, tolerance=1e-9):
     assert steps.dissipation == pytest.approx(float(exact.dissipation), rel=2e-5)
 
 
+@pytest.fixture
+def polygon(monkeypatch):
+    """Paths are read on the polygon of their events, whose nodes slip whole as in load steps."""
+    jax.clear_caches()
+    exact = partial(walk.walk, rounded=False)
+    monkeypatch.setattr(sys.modules["jbeamshell.contact_line.solve"], "walk", exact)
+    yield
+    jax.clear_caches()
+
+
 class TestHistory:
     """Many load steps of the same section on the same nodes come to the same states."""
 
@@ -136,6 +149,7 @@ class TestHistory:
         monkeypatch.setattr("jbeamshell.scene.plan.CONTACT_LINE_FAR_SIZE", FAR_SIZE)
 
     @pytest.mark.slow
+    @pytest.mark.usefixtures("polygon")
     @pytest.mark.parametrize("name", ["face", "guided"])
     def test_a_rigid_face(self, name):
         scene = BODIES[name].replace(SOFT | {"load.amplitude": 0.4})
@@ -143,6 +157,7 @@ class TestHistory:
         check_against_load_steps(jb.solve(scene), steps)
 
     @pytest.mark.slow
+    @pytest.mark.usefixtures("polygon")
     def test_a_section_of_order_two(self, tmp_path):
         scene = BODIES["p2"].replace(SOFT)
         exact = jb.solve(scene)
@@ -161,7 +176,10 @@ class TestHistory:
         exact = jb.solve(scene)
         assert float(exact.gap.max()) > 1e-7
         steps = jb.solve(beside(scene, **{"load.steps_per_half_cycle": 160}))
-        check_against_load_steps(exact, steps)
+        # Slip spreads evenly from node to node on the contact line; in load steps nodes slip whole.
+        scale = float(steps.force.max())
+        np.testing.assert_allclose(exact.force, steps.force[::80], atol=5e-3 * scale)
+        assert float(exact.dissipation) == pytest.approx(float(steps.dissipation), rel=0.02)
 
 
 class TestFigures:
@@ -187,15 +205,16 @@ class TestFigures:
         table = jb.sweep(scene, {"load.amplitude": [0.5, AMPLITUDE]})
         assert np.all(table.status == 0)
         works = jb.contact_line.dissipation(scene, [0.5, AMPLITUDE])
-        # The steady cycles also follow the edge of the slip zone within an element.
-        np.testing.assert_allclose(table["dissipation"], works, rtol=0.04)
+        # Steady cycles follow the edge of the slip zone within an element in their own way.
+        np.testing.assert_allclose(table["dissipation"], works, rtol=5e-3)
         history = jb.solve(scene)
         np.testing.assert_allclose(table["dissipation"][1], history.dissipation, rtol=1e-10)
         joint = Joint.of(scene, 1.2)
         assert joint.network is not None
         moved = history.displacement - history.displacement[history.pressed]
         steps = slice(history.pressed + 1, None)
-        np.testing.assert_allclose(joint.path_forces(moved[steps]), history.force[steps], atol=1e-9)
+        # On 17 nodes: a joint is driven by displacements.
+        np.testing.assert_allclose(joint.path_forces(moved[steps]), history.force[steps], rtol=4e-3)
 
 
 class TestEngine:

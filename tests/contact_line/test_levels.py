@@ -1,6 +1,7 @@
 """Levels of load paths: events beside factors, in batches, and their slopes; turns of loads."""
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line import branches, drives, events, strip
+from jbeamshell.contact_line import branches, drives, strip, walk
 from jbeamshell.contact_line.turns import known_turns, turns_of
 
 NODES = 21
@@ -37,7 +38,7 @@ def path(body, friction, amplitude):
     start = branches.pressed(body)
     lift = jnp.where(body.r_0 > 0.0, 0.0, 1e-5 * body.x)
     # Gross slip of the standard pressure is at 20 mu.
-    return events.walk(body, friction, start, 20.0 * amplitude * TURNS, TURNED, lift)
+    return walk.walk(body, friction, start, 20.0 * amplitude * TURNS, TURNED, lift)
 
 
 def figures(body, friction, amplitude):
@@ -90,7 +91,7 @@ class TestSlopes:
         @jax.jit
         def works(friction):
             path = 2.3e-4 * TURNS
-            return events.walk(body, friction, start, path, TURNED).slip_work
+            return walk.walk(body, friction, start, path, TURNED).slip_work
 
         slope = jax.jit(jax.jacfwd(works))(0.4)
         assert np.all(np.isfinite(slope))
@@ -114,7 +115,8 @@ class TestLevels:
             return branches.path(body, branches.factorise(body, friction), friction, start, turns)
 
         fast = nested(body)
-        slow = jax.jit(events.walk)(body, friction, start, turns, jnp.ones(3, bool))
+        polygon = functools.partial(walk.walk, rounded=False)
+        slow = jax.jit(polygon)(body, friction, start, turns, jnp.ones(3, bool))
         assert np.all(fast.valid)
         np.testing.assert_allclose(fast.slip_work, slow.slip_work, rtol=1e-9)
         np.testing.assert_allclose(fast.at.v, slow.state.v, atol=1e-12 * fast.at.v.max())
@@ -152,8 +154,8 @@ class TestTurns:
     def test_traced_turns_are_walked_as_known_ones(self):
         body = strip_body(0.1)
         given = body, 0.1, branches.pressed(body), 1.2 * TURNS
-        known = jax.jit(events.walk, static_argnums=4)(*given, TURNED)
-        traced = jax.jit(events.walk)(*given, jnp.asarray(TURNED))
+        known = jax.jit(walk.walk, static_argnums=4)(*given, TURNED)
+        traced = jax.jit(walk.walk)(*given, jnp.asarray(TURNED))
         np.testing.assert_allclose(traced.slip_work, known.slip_work, rtol=1e-9)
         np.testing.assert_allclose(traced.state.displacement, known.state.displacement, rtol=1e-9)
 

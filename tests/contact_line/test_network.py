@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line.branches import factorise
+from jbeamshell.contact_line.branches import factorise, pressed
 from jbeamshell.contact_line.network import Network
+from jbeamshell.contact_line.turns import known_turns
+from jbeamshell.contact_line.walk import walk
 
 PLANE = {"model.section": "plane", "model.nodes": 33}
 SCENE = jb.library.standard().replace(PLANE)
@@ -32,17 +34,21 @@ def network():
 
 class TestNetwork:
     def test_loops_of_nested_reversals_are_those_of_the_strip(self, network):
-        history = jb.solve(SCENE, NESTED)
-        steps = slice(-len(NESTED), None)
-        u = history.displacement - history.displacement[history.pressed]
-        found = along(network, u[steps])
+        body, turns = network.body, known_turns(np.asarray(NESTED))
+
+        @jax.jit
+        def polygon(body):
+            start, loads = pressed(body), jnp.asarray(NESTED)
+            return walk(body, network.friction, start, loads, turns, rounded=False)
+
+        levels = polygon(body)
+        found = along(network, levels.state.displacement)
         assert np.all(found.valid)
         np.testing.assert_allclose(found.state.force, NESTED, atol=1e-10)
         work = np.diff(np.asarray(found.slip_work), prepend=0.0)
-        np.testing.assert_allclose(work, history.slip_work[steps], atol=1e-10 * work.max())
-        traction = -np.asarray(found.state.r_t)[:, ::-1] / np.asarray(history.tributary)[1:]
-        scale = np.abs(traction).max()
-        np.testing.assert_allclose(traction, history.traction[steps, 1:], atol=1e-10 * scale)
+        np.testing.assert_allclose(work, levels.slip_work, atol=1e-10 * work.max())
+        scale = np.abs(levels.state.r_t).max()
+        np.testing.assert_allclose(found.state.r_t, levels.state.r_t, atol=1e-10 * scale)
 
     def test_decaying_paths_conserve_energy(self, network):
         random = np.random.default_rng(3)

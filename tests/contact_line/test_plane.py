@@ -1,5 +1,7 @@
 """Plane elasticity on its contact line: sections, elimination, branches, events, histories."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,7 +10,7 @@ from toy import plane_strip, rows_of
 
 import jbeamshell as jb
 from jbeamshell import contact_line
-from jbeamshell.contact_line import branches, events, strip
+from jbeamshell.contact_line import branches, strip, walk
 from jbeamshell.contact_line.ends import end_section
 from jbeamshell.mechanics.layered import Material, layered_form
 from jbeamshell.scene.planning import PLANE_NODES
@@ -28,10 +30,10 @@ def by_factors(body, friction, amplitude):
     return branches.path(body, factors, friction, branches.pressed(body), amplitude * TURNS)
 
 
-@jax.jit
-def by_events(body, friction, amplitude):
+@partial(jax.jit, static_argnames="rounded")
+def by_events(body, friction, amplitude, rounded=True):
     start, turned = branches.pressed(body), jnp.ones(TURNS.size, bool)
-    return events.walk(body, friction, start, amplitude * TURNS, turned)
+    return walk.walk(body, friction, start, amplitude * TURNS, turned, rounded=rounded)
 
 
 def two_layers():
@@ -106,7 +108,8 @@ class TestBranches:
     @pytest.mark.parametrize("amplitude", [0.4, 1.0, 1.9])
     def test_branches_are_what_events_find(self, amplitude):
         body = STRIP(plane_strip(0.1126)).body
-        fast, slow = by_factors(body, 0.1, amplitude), by_events(body, 0.1, amplitude)
+        fast = by_factors(body, 0.1, amplitude)
+        slow = by_events(body, 0.1, amplitude, rounded=False)
         assert np.all(fast.valid)
         assert np.all(slow.settled)
         np.testing.assert_allclose(fast.at.v, slow.state.v, atol=1e-12 * np.abs(fast.at.v).max())
@@ -185,7 +188,8 @@ class TestEvents:
 
     def test_contact_conditions_hold(self):
         mu = 0.5
-        found = by_events(STRIP(plane_strip(0.2358, mu)).body, mu, 1.3)
+        body = STRIP(plane_strip(0.2358, mu)).body
+        found = by_events(body, mu, 1.3, rounded=False)
         state, lift = found.state, np.asarray(found.lift)
         most = float(jnp.max(state.r_n))
         assert lift.max() > 0.0
@@ -194,13 +198,19 @@ class TestEvents:
         np.testing.assert_allclose(lift * state.r_n, 0.0, atol=1e-12)
         cap = mu * np.asarray(state.r_n)[:, : state.r_t.shape[1]]
         assert np.all(np.abs(state.r_t) <= cap + 1e-10 * most)
+        # Within a rounded corner a node has a little more or less than its friction.
+        state = by_events(body, mu, 1.3).state
+        cap = mu * np.asarray(state.r_n)[:, : state.r_t.shape[1]]
+        excess = np.max(np.abs(state.r_t) - cap) / most
+        assert excess < 2e-3, excess
 
 
 class TestHistory:
     def test_energy_balances_and_the_loop_closes(self):
         history = plane(plane_strip(0.2358, 0.5, amplitude=1.3))
         assert history.converged
-        assert abs(float(history.closure)) < 1e-9
+        # A node that slips by a part settles within a few cycles.
+        assert abs(float(history.closure)) < 1e-4
         assert float(history.dissipation_loop / history.dissipation) == pytest.approx(1.0, abs=2e-3)
         imbalance = np.abs(history.energy_imbalance).max() / float(history.dissipation)
         assert imbalance < 0.01  # trapezoids of the work over 40 steps a branch
@@ -266,7 +276,8 @@ class TestScene:
         control = {"load.control": "displacement", "load.amplitude": force.displacement[1]}
         driven = plane_strip(0.1126).replace({"model.section": "plane"} | few | control)
         moved = jb.solve(driven, force.displacement[1:])
-        np.testing.assert_allclose(moved.force, force.force, atol=1e-9)
+        # Corners are rounded over displacements here and over forces there, on 33 nodes.
+        np.testing.assert_allclose(moved.force, force.force, atol=2e-4)
         np.testing.assert_allclose(moved.target, moved.displacement, rtol=1e-12)
         loose = {"load.amplitude": 1e-3, "strip.far_end": "free"}  # nothing but friction holds it
         beyond = plane(plane_strip(0.1126), **few, **control | loose)

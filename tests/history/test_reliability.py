@@ -199,7 +199,7 @@ def test_the_corner_of_plane_elasticity_counts_its_element_over_the_slip_zone():
     grid, corner, *_ = error_estimates.estimates(plane, gathered)
     assert corner == error_estimates.singular_corner_error(plane, gathered)
     assert grid == pytest.approx(
-        error_estimates.SAFETY * error_estimates.dissipation_errors(gathered)[0]
+        error_estimates.SPREAD * error_estimates.dissipation_errors(gathered)[0]
     )
     assert error_estimates.estimates(plane, even)[1] == 0.0  # no reaction gathers
 
