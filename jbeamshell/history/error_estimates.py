@@ -22,11 +22,11 @@ from jbeamshell.scene.scene import Scene
 NEGLIGIBLE = 1e-9  # slip over the sticking range, taken as zero
 SAFETY = 1.2  # factor on the estimated error of the corner
 SPREAD = 0.3  # the same of a strip's grid in plane elasticity: measured .18 and less in 95 %
-JOINT = 0.6  # the same of a lap joint's grid: measured 0 to .4
+JOINT = 0.6  # the same with a second member or steps of the pressure: measured 0 to .5
 MOMENT = 5.0  # the same of one under a moment: measured .1 to 4.5
 SINGULAR = 1.0  # error by a singular corner over its element per slip zone: measured .05 to .7
 BEYOND = 4.0  # the same under a member that goes on by few elements: measured .8 to 3.2
-STEPS = 1.5  # factor on the estimated error of a grid that steps of the pressure share
+STEPS = 1.5  # the same of a beamshell's grid that steps of the pressure share
 REFINED = 0.15  # least error of a refined grid, over that of the rule: measured .02 to .13
 RESTING = 2.0  # error of the dissipation over the part of the load that single sliders hold
 WITHIN_STEPS = 0.1  # error of the dissipation over the work of caps that change within load steps
@@ -213,12 +213,8 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
     grid, corner = dissipation_errors(cycle)
     numbers: Any = np if isinstance(cycle.v, np.ndarray) else jax.numpy
     plane = scene.plan.elastic
-    if change is not None:
-        grid = numbers.maximum(change, REFINED * grid)
-    elif scene.contact.jumps + scene.member.jumps > 1:
-        grid = STEPS * grid
-    elif plane:
-        grid = _factor(scene) * grid
+    rule = _factor(scene) * grid
+    grid = rule if change is None else numbers.maximum(change, REFINED * grid)
     soft = scene.contact.stick_stiffness is not None
     if plane:
         corner = numbers.minimum(corner, singular_corner_error(scene, cycle))
@@ -230,7 +226,10 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
 
 
 def _factor(scene: Scene) -> float:
-    """Factor on the rule for the grid's error, in plane elasticity."""
-    if scene.member.support == "none":
-        return SPREAD
-    return MOMENT if scene.load.kind == "moment" else JOINT
+    """Factor on the rule for the grid's error."""
+    stepped = scene.contact.jumps + scene.member.jumps > 1
+    if not scene.plan.elastic:
+        return STEPS if stepped else 1.0
+    if scene.load.kind == "moment":
+        return MOMENT
+    return JOINT if stepped or scene.member.support != "none" else SPREAD

@@ -230,8 +230,15 @@ def test_the_dissipation_of_a_nearly_incompressible_strip_is_as_recorded():
 
 def test_the_error_of_the_grid_is_larger_where_the_pressure_has_steps():
     even, part = even_cycle(64), [[0.0, 0.0], [0.5, 0.0], [0.5, 9.0], [2.0, 9.0]]
-    stepped = error_estimates.estimates(jb.Scene().replace({"contact.pressure": part}), even)
-    assert stepped[0] == pytest.approx(error_estimates.STEPS * 64**-1.5)
+    scene, steps = jb.Scene(), {"contact.pressure": part}
+    for section, smooth, stepped in (
+        ("squeeze", 1.0, error_estimates.STEPS),
+        ("plane", error_estimates.SPREAD, error_estimates.JOINT),
+    ):
+        its = scene.replace({"model.section": section})
+        for values, factor in (({}, smooth), (steps, stepped)):
+            grid = error_estimates.estimates(its.replace(values), even)[0]
+            assert grid == pytest.approx(factor * 64**-1.5)
 
 
 @pytest.mark.doubtful("in the corner", "the section squeeze")
