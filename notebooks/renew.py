@@ -70,7 +70,7 @@ def renew_notebook(path: Path) -> None:
 def main(words: list[str]) -> None:
     """Renew the files whose names hold one of the words."""
     os.environ |= {"TQDM_DISABLE": "1", "PYTHONPATH": str(ROOT)}
-    pages = [ROOT / "README.md", *sorted((SITE / "pages").glob("*.md"))]
+    pages = [ROOT / "README.md", SITE / "index.md", *sorted((SITE / "pages").glob("*.md"))]
     for path in [*pages, *sorted(SITE.glob("*.ipynb"))]:
         if not words or any(word in path.name for word in words):
             (renew_notebook if path.suffix == ".ipynb" else renew_page)(path)
