@@ -28,6 +28,7 @@ SLIDES = 1e6  # compliance over that of the clamped contact from which on a body
 SLIDES_ON = 1e-2  # of it, from which on a corner of the polygon stays sharp
 ABOUT = 2.0  # of its friction, how much more a node that stuck has to go before it slips back
 TOUCHES = 1e-9  # of the largest reaction, below which an open node has none
+NOISE = 32.0 * 2.0**-52  # of a node's stiffness times its change, rounding of its force
 SAME = 1e-9  # of a branch, within which it ends where the branch before began
 
 
@@ -396,14 +397,15 @@ def levels_of(body: Body, course: Course, targets: Array) -> Level:
     found = read(course.branch, course.vertices, body.x, tau, _slides(body))
     lift = contact.lift + found.change[:, k:]
     r_t, r_n = found.r[:, :k], found.r[:, k:]
-    # Rounding leaves open nodes a little reaction.
-    least = TOUCHES * jnp.max(r_n, axis=1, keepdims=True)
-    touches = r_n > least
+    # Rounding leaves open nodes a little force, of which tiny elements make more.
+    noise = NOISE * jnp.diagonal(course.branch.matrix) * jnp.abs(found.change)
+    least = jnp.maximum(TOUCHES * jnp.max(r_n, axis=1, keepdims=True), noise)
+    touches = r_n > least[:, k:]
     apart = (lift > 0.0) & ~touches
     moved = drive.sense * (found.change @ drive.pull)
     state = ContactState(
         v=start.v + found.change[:, :k],
-        r_t=jnp.where(apart[:, :k] & (jnp.abs(r_t) <= least), 0.0, r_t),
+        r_t=jnp.where(apart[:, :k] & (jnp.abs(r_t) <= least[:, :k]), 0.0, r_t),
         r_n=jnp.where(apart, 0.0, r_n),
         force=targets,
         displacement=start.displacement + body.c * (targets - start.force) + moved,

@@ -208,3 +208,28 @@ def test_corners_are_those_of_a_fine_grid(name):
     np.testing.assert_allclose(slopes, corner.slopes, rtol=1.2e-2)
     if name == "loops within loops":  # what was within them is forgotten
         assert float(moved[ONCE_CLOSED] / moved[0]) == pytest.approx(1.0, abs=5e-4)
+
+
+def test_no_rounding_holds_an_open_node_on_tiny_elements():
+    """Elements of 1e-9 are so stiff that rounding outweighs the friction that they may have."""
+    layers = [
+        [0.008843692744165172, 18929.023811156632, 0.22822190687946475],
+        [0.009833669784082727, 209376.2096260786, 0.1443383618823308],
+        [0.012643791908010462, 390803.14173045184, 0.029434832991553368],
+    ]
+    scene = jb.Scene().replace(
+        {
+            "strip.height_ratio": 0.01566057721812918,
+            "strip.kappa_s": 0.9731842659357712,
+            "strip.layers": layers,
+            "contact.friction": 0.29929430543647734,
+            "contact.stick_stiffness": 28.790999832402193,
+            "load.amplitude": 2.3813836887702666,
+            "model.tolerance": 0.005,
+            "model.section": "squeeze",
+        }
+    )
+    coarse = jb.solve(scene, throw=False)
+    assert coarse.scene.plan.nodes == 97
+    fine = jb.solve(scene.on_grid(193, 0.5 * coarse.scene.plan.end_size), throw=False)
+    assert float(coarse.dissipation) == pytest.approx(float(fine.dissipation), rel=2e-3)
