@@ -68,11 +68,13 @@ class CycleFigures(Record, LoopFigures):
     def slip_cycle(self) -> SlipCycle:
         """Slip, traction and reaction of the contact in the last cycle.
 
-        On the contact line they are those of the turning points, of which every call knows.
+        Those of a strip on its contact line are the turning points, of which every call knows.
+        Members of a joint lift so far that turning points alone would doubt it in vain.
         """
         start, turn, stop = self._last
         line = self.scene.plan.on_contact_line
-        cycle: Any = np.array([start, turn, stop]) if line else slice(start, stop + 1)
+        turns = line and self.scene.member.support == "none"
+        cycle: Any = np.array([start, turn, stop]) if turns else slice(start, stop + 1)
         work = self.slip_work[start + 1 : stop + 1].sum()  # of NumPy or of JAX
         return SlipCycle(
             x=self.x,
