@@ -16,7 +16,7 @@ BY_ROW, AT_ONCE, AT_RETURN, FIXED = range(4)  # what an event's load follows fro
 
 
 class Search(NamedTuple):
-    """What the search for events knows beside the equations.
+    """Extra friction of a branch, which the search for events takes beside the equations.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ SLIDES = 1e6  # compliance over that of the clamped contact from which on a body
 SLIDES_ON = 1e-2  # of it, from which on a corner of the polygon stays sharp
 ABOUT = 2.0  # of its friction, how much more a node that stuck has to go before it slips back
 TOUCHES = 1e-9  # of the largest reaction, below which an open node has none
-NOISE = 32.0 * 2.0**-52  # of a node's stiffness times its change, rounding of its force
+ROUNDING = 32.0 * 2.0**-52  # of a node's stiffness times its change, the error of its force
 SAME = 1e-9  # of a branch, within which it ends where the branch before began
 
 
@@ -52,7 +52,7 @@ class Level(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What a contact remembers of the branch that led to it.
+    """Memory of a contact: the branch that led to it.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Contact(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What drives a branch: tau grows from 0, and the load is ``sense`` times tau.
+    """Drive of a branch: tau grows from 0, and the load is ``sense`` times tau.
 
     Attributes
     ----------
@@ -364,7 +364,8 @@ def departed(
     sliding = SLIDES_ON * _slides(body)
     vertices, slip = polygon(branch, search, contact.lift > 0.0, reach, sliding)
     if not rounded:
-        vertices = vertices._replace(before=jnp.arange(vertices.tau.size))
+        own = jnp.arange(vertices.tau.size)  # with no step before it a corner stays sharp
+        vertices = vertices._replace(before=own)
     return Course(body.x, contact, drive, branch, search, vertices, slip, end, turns, closes)
 
 
@@ -397,9 +398,9 @@ def levels_of(body: Body, course: Course, targets: Array) -> Level:
     found = read(course.branch, course.vertices, body.x, tau, _slides(body))
     lift = contact.lift + found.change[:, k:]
     r_t, r_n = found.r[:, :k], found.r[:, k:]
-    # Rounding leaves open nodes a little force, of which tiny elements make more.
-    noise = NOISE * jnp.diagonal(course.branch.matrix) * jnp.abs(found.change)
-    least = jnp.maximum(TOUCHES * jnp.max(r_n, axis=1, keepdims=True), noise)
+    # Rounding leaves open nodes a little force: the shorter the elements, the more.
+    rounding = ROUNDING * jnp.diagonal(course.branch.matrix) * jnp.abs(found.change)
+    least = jnp.maximum(TOUCHES * jnp.max(r_n, axis=1, keepdims=True), rounding)
     touches = r_n > least[:, k:]
     apart = (lift > 0.0) & ~touches
     moved = drive.sense * (found.change @ drive.pull)

@@ -22,8 +22,9 @@ from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import doubt_of_section
 
 NEGLIGIBLE = 1e-9  # tension over the pressure, taken as zero
-CLOSES = 5e-3  # distance between the ends of a steady loop, over its width: a node that slips by a
-# part settles within a few cycles, which changes the dissipation by 1e-5
+# Distance between the ends of a steady loop, over its width.  A node that slips by a part settles
+# within a few cycles, which changes the dissipation by 1e-5.
+CLOSES = 5e-3
 TOLERANCE = 0.02  # relative error of the dissipation below which there is never a doubt
 OVERSHOOT = 1.0  # error under arc-length control, times the load steps per half cycle
 FINER = "take more model.nodes"
