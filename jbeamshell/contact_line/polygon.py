@@ -100,8 +100,31 @@ class Slip(NamedTuple):
     ended: Array
 
 
+class Corners(NamedTuple):
+    """What a polygon has beside its vertices, see `Polygon`."""
+
+    before: Array
+    after: Array
+    node: Array
+    way: Array
+    number: Array
+
+
+class Known(NamedTuple):
+    """What a walk has found of a branch."""
+
+    corners: Corners
+    slip: Slip
+    record: Record
+
+
 def polygon(
-    branch: Branch, search: Search, opened: Array, reach: Array, slides: Array
+    branch: Branch,
+    search: Search,
+    opened: Array,
+    reach: Array,
+    slides: Array,
+    known: Known | None = None,
 ) -> tuple[Polygon, Slip]:
     """Polygon of a branch; the derivatives of its vertices are exact, forward and reverse.
 
@@ -112,7 +135,11 @@ def polygon(
     opened : (n,) True for nodes that are open where it begins
     reach : tau of its end; vertices beyond it are found as far as `spline` needs them
     slides : change of pull.q per load from which on a body slides as a whole
+    known : what was found of the branch before; None finds it
     """
+    if known is not None:
+        tau, change = replay.vertices((branch, search), (opened, known.record))
+        return Polygon(tau, change, *known.corners), known.slip
     tau, change, corners, slip = _vertices(branch, search, opened, reach, slides)
     return Polygon(tau, change, *corners), slip
 
