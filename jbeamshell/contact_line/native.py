@@ -20,6 +20,7 @@ from jax.typing import ArrayLike
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.branches import ContactState
 from jbeamshell.contact_line.events import MOST_VERTICES, Record
+from jbeamshell.contact_line.native_replay import BACKWARD, FORWARD
 from jbeamshell.contact_line.polygon import MOST_EVENTS, Corners, Known, Slip
 
 TARGET = "jbeamshell_walk"
@@ -57,8 +58,9 @@ def serves() -> bool:
         return False
     jax.devices("cpu")  # a target that is refused before JAX has started ends it
     try:
-        handler = jax.ffi.pycapsule(found.jbeamshell_walk)
-        jax.ffi.register_ffi_target(TARGET, handler, platform="cpu")
+        for target in (TARGET, FORWARD, BACKWARD):
+            handler = jax.ffi.pycapsule(getattr(found, target))
+            jax.ffi.register_ffi_target(target, handler, platform="cpu")
     except Exception:
         return False
     return True
@@ -88,17 +90,23 @@ def recorded(
     n, m = given[2].size, given[1].size
     k, parts = m - n, 2 * sum(turns)
     events, vertices = MOST_EVENTS * n, MOST_VERTICES * n
-    whole = [(parts, events, 5), (parts, events), (parts, 3), (parts, vertices, 4), (parts, k, 5)]
-    kinds = jnp.int32, float, jnp.int32, jnp.int32, jnp.int32
-    more = [jax.ShapeDtypeStruct(a, kind) for a, kind in zip(whole, kinds, strict=True)]
+    rows, corners, slips = (events, 5), (vertices, 4), (k, 5)
+    sizes = rows, (events,), (3,), corners, slips, (vertices,), (vertices, m), (n,)
+    kinds = jnp.int32, float, jnp.int32, jnp.int32, jnp.int32, float, float, jnp.int32
+    more = [
+        jax.ShapeDtypeStruct((parts, *size), kind) for size, kind in zip(sizes, kinds, strict=True)
+    ]
     found = _called(given, turns, rounded, [*_shapes(given), *more])
-    rows, tau, counts, corners, slip = (
+    rows, tau, counts, corners, slip, at, change, lifted = (
         a.reshape(-1, 2, *a.shape[1:]) for a in found[len(Levels._fields) :]
     )
     number, count, ended = jnp.moveaxis(counts, -1, 0)
     before, after, node, way = jnp.moveaxis(corners, -1, 0)
     side, stuck, opened, later, later_side = jnp.moveaxis(slip, -1, 0)
     known = Known(
+        at,
+        change,
+        lifted != 0,
         Corners(before, after, node, way != 0, count),
         Slip(
             side.astype(float),

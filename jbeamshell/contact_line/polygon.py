@@ -26,7 +26,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from jbeamshell.contact_line import replay
+from jbeamshell.contact_line import native_replay, replay
 from jbeamshell.contact_line.events import (
     END,
     FIXED,
@@ -111,8 +111,14 @@ class Corners(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What a walk has found of a branch."""
+    """What the walk in C has found of a branch, see `Polygon`.
 
+    Its own open nodes (n,) count: another rounding of a lift would be another contact.
+    """
+
+    tau: Array
+    change: Array
+    lifted: Array
     corners: Corners
     slip: Slip
     record: Record
@@ -138,7 +144,7 @@ def polygon(
     known : what was found of the branch before; None finds it
     """
     if known is not None:
-        tau, change = replay.vertices((branch, search), (opened, known.record))
+        tau, change = _known_vertices((branch, search), known)
         return Polygon(tau, change, *known.corners), known.slip
     tau, change, corners, slip = _vertices(branch, search, opened, reach, slides)
     return Polygon(tau, change, *corners), slip
@@ -160,6 +166,18 @@ def _vertices_jvp(primals, tangents):  # type: ignore[no-untyped-def]
     slopes = pushforward(replay.vertices, (branch, search), known, tangents[:2])
     none = jax.tree.map(_no_slope, (corners, slip))
     return (tau, change, corners, slip), (*slopes, *none)
+
+
+@jax.custom_jvp
+def _known_vertices(at: tuple[Branch, Search], known: Known) -> tuple[Array, Array]:
+    return known.tau, known.change
+
+
+@_known_vertices.defjvp
+def _known_vertices_jvp(primals, tangents):  # type: ignore[no-untyped-def]
+    at, known = jax.tree.map(lax.stop_gradient, primals)
+    beside = known.lifted, known.record
+    return (known.tau, known.change), pushforward(native_replay.RULE, at, beside, tangents[0])
 
 
 def _no_slope(a: Array) -> Array | np.ndarray:

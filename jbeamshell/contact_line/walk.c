@@ -7,9 +7,10 @@
    A path has no global state and calls nothing but the C library.  Numbers are doubles. */
 
 #include <math.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "xla.h"
 
 #define R restrict /* vectors that do not overlap */
 
@@ -73,7 +74,8 @@ typedef struct {
 /* Record of a part of a branch, for derivatives. */
 typedef struct {
     int32_t *events, *counts, *corners, *slip; /* (events, 5), (3,), (vertices, 4), (k, 5) */
-    double *tau;                               /* (events,) */
+    int32_t *lifted;                           /* (n,) */
+    double *tau, *at, *change; /* (events,), (vertices,), (vertices, m) */
 } Record;
 
 typedef struct { double wait, tau; int kind, node, cause; } Event;
@@ -269,11 +271,13 @@ static void write(const Record *record, const Event *event, int vertex, int keep
 static void write_corners(const Record *record, const Walk *w) {
     if (record == NULL) return;
     record->counts[1] = w->number, record->counts[2] = w->ended;
-    memset(record->corners, 0, (size_t)w->vertices * 4 * sizeof(int32_t));
+    memcpy(record->at, w->at, w->number * sizeof(double));
+    memcpy(record->change, w->change, (size_t)w->number * w->m * sizeof(double));
     for (int j = 0; j < w->number; ++j) {
         int32_t *row = record->corners + 4 * (size_t)j;
         row[0] = w->before[j], row[1] = w->after[j], row[2] = w->node[j], row[3] = w->way[j];
     }
+    for (int i = 0; i < w->n; ++i) record->lifted[i] = w->lifted[i];
     for (int i = 0; i < w->k; ++i) {
         int32_t *row = record->slip + 5 * (size_t)i;
         row[0] = (int32_t)w->side[i], row[1] = w->stuck[i], row[2] = w->opened[i];
@@ -638,12 +642,6 @@ static void run(Desk *desk, const Given *given, int same_body, int levels, Level
     path(w, from, from + 1, given->f, levels, given->loads, given->turn, *given->rounded, out, records, desk->change, desk->flags);
 }
 
-#if defined(_WIN32)
-#define API __declspec(dllexport)
-#else
-#define API __attribute__((visibility("default")))
-#endif
-
 /* One path for arrays of NumPy; the arguments of native.py, then the levels.  1 if it ran. */
 API int jbeamshell_path(int k, int n, int levels, const void *const *in, void *const *out) {
     Desk desk;
@@ -654,49 +652,19 @@ API int jbeamshell_path(int k, int n, int levels, const void *const *in, void *c
     return 1;
 }
 
-/* --- foreign function interface of XLA --------------------------------------------------------- */
+/* --- handler for XLA ---------------------------------------------------------------------------- */
 
-/* What of its C interface (version 0.1) a handler on the processor needs. */
-typedef struct Extension { size_t size; int type; struct Extension *next; } Extension;
-typedef struct { size_t size; Extension *extension; int major, minor; } Version;
-typedef struct { size_t size; Version version; } Metadata;
-typedef struct { Extension base; Metadata *metadata; } MetadataExtension;
-typedef struct { size_t size; Extension *extension; int type; void *data; int64_t rank, *dims; } Buffer;
-typedef struct { size_t size; Extension *extension; int64_t count; int *types; Buffer **buffers; } Buffers;
-typedef struct {
-    size_t size;
-    Extension *extension;
-    const void *api;
-    void *context;
-    int stage;
-    Buffers args, rets;
-} CallFrame;
-
-enum { ARGUMENTS = 12, RESULTS = 8, MOST_AXES = 8 };
+enum { ARGUMENTS = 12, RESULTS = 8 };
 static const int ARGUMENT_RANKS[ARGUMENTS] = {2, 1, 1, 0, 0, 1, 1, 1, 1, 1, 1, 0};
-
-/* Number of an array in a buffer for one lane; axes of length 1 serve all lanes. */
-static int64_t number_in(const Buffer *b, int rank, int64_t lane, const Buffer *first) {
-    int64_t axes = b->rank - rank, index[MOST_AXES], number = 0;
-    for (int64_t d = axes - 1; d >= 0; --d) index[d] = lane % first->dims[d], lane /= first->dims[d];
-    for (int64_t d = 0; d < axes; ++d) number = number * b->dims[d] + (b->dims[d] == 1 ? 0 : index[d]);
-    return number;
-}
-
-static int64_t product_of(const int64_t *dims, int64_t count) {
-    int64_t product = 1;
-    for (int64_t d = 0; d < count; ++d) product *= dims[d];
-    return product;
-}
 
 /* Paths of many lanes, one after the other; lanes of one body share its columns. */
 API void *jbeamshell_walk(CallFrame *frame) {
-    if (frame->extension != NULL && frame->extension->type == 1) {
-        Metadata *metadata = ((MetadataExtension *)frame->extension)->metadata;
-        metadata->version.major = 0, metadata->version.minor = 1;
-        return NULL;
-    }
+    if (asks_version(frame)) return NULL;
     Buffer **in = frame->args.buffers, **out = frame->rets.buffers;
+    for (int64_t i = RESULTS; i < frame->rets.count; ++i) { /* what is not reached is zero */
+        int64_t bytes = i == 9 || i == 13 || i == 14 ? 8 : 4;
+        memset(out[i]->data, 0, (size_t)(product_of(out[i]->dims, out[i]->rank) * bytes));
+    }
     int64_t axes = in[0]->rank - 2;
     int m = (int)in[1]->dims[axes], n = (int)in[2]->dims[axes], k = m - n, levels = (int)in[9]->dims[axes];
     int64_t lanes = product_of(out[0]->dims, axes), body = -1;
@@ -727,7 +695,9 @@ API void *jbeamshell_walk(CallFrame *frame) {
             records[p].counts = (int32_t *)out[10]->data + place * 3;
             records[p].corners = (int32_t *)out[11]->data + place * desk.walk.vertices * 4;
             records[p].slip = (int32_t *)out[12]->data + place * k * 5;
-            memset(records[p].counts, 0, 3 * sizeof(int32_t));
+            records[p].at = (double *)out[13]->data + place * desk.walk.vertices;
+            records[p].change = (double *)out[14]->data + place * desk.walk.vertices * m;
+            records[p].lifted = (int32_t *)out[15]->data + place * n;
         }
         Given given = {at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8], at[9], at[10], at[11]};
         int64_t own = numbers[0] * product_of(in[3]->dims, axes) + numbers[3]; /* of body and friction */

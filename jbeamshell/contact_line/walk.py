@@ -25,7 +25,6 @@ from jbeamshell.contact_line.events import Search
 from jbeamshell.contact_line.polygon import Known, Polygon, Slip, polygon
 from jbeamshell.contact_line.spline import read, slipped
 from jbeamshell.contact_line.tableau import Branch
-from jbeamshell.numerics.pushforward import pushforward
 
 SLIDES = 1e6  # compliance over that of the clamped contact from which on a body slides as a whole
 SLIDES_ON = 1e-2  # of it, from which on a corner of the polygon stays sharp
@@ -198,22 +197,19 @@ def _native_jvp(turns, rounded, primals, tangents):  # type: ignore[no-untyped-d
     numbers = jax.tree.map(lax.stop_gradient, primals[0])
     found, known = native.recorded(native.arguments(*numbers), turns, rounded)
     level = _level(found, numbers.forces)
-    slopes = pushforward(_again(turns, rounded), numbers, known, tangents[0])
+    again = functools.partial(_again, turns, rounded, known)
     none = (np.zeros(a.shape, jax.dtypes.float0) for a in (level.slipping, level.settled))
-    return level, Level(*slopes, *none)
+    return level, Level(*jax.jvp(again, (numbers,), tangents)[1], *none)
 
 
-@functools.cache
-def _again(turns: tuple[bool, ...], rounded: bool) -> Callable[[_Numbers, Known], tuple]:
+def _again(
+    turns: tuple[bool, ...], rounded: bool, known: Known, numbers: _Numbers
+) -> tuple[ContactState, Array, Array]:
     """What has derivatives of the levels of a path whose events are known."""
-
-    def walked(numbers: _Numbers, known: Known) -> tuple[ContactState, Array, Array]:
-        body, friction, start, forces, lift = numbers
-        contact = Contact.of(start, lift)
-        levels = _in_branches(body, friction, contact, forces, turns, rounded, known)[0]
-        return levels.state, levels.lift, levels.slip_work
-
-    return walked
+    body, friction, start, forces, lift = numbers
+    contact = Contact.of(start, lift)
+    levels = _in_branches(body, friction, contact, forces, turns, rounded, known)[0]
+    return levels.state, levels.lift, levels.slip_work
 
 
 def _level(found: native.Levels, forces: Array) -> Level:
