@@ -18,7 +18,7 @@ from jax.typing import ArrayLike
 from jaxtyping import PyTree
 
 from jbeamshell.contact_line.body import Body, local_compliance
-from jbeamshell.contact_line.branches import ContactState
+from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.contact_line.events import Search
 from jbeamshell.contact_line.polygon import Polygon, Slip, polygon
 from jbeamshell.contact_line.spline import read, slipped
