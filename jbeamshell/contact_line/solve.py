@@ -14,7 +14,7 @@ from jbeamshell.common.precision import in_double, is_single
 from jbeamshell.common.small import Small
 from jbeamshell.contact_line.above import Movement, Unread
 from jbeamshell.contact_line.bearings import bearing_energy, with_bearings, with_gaps
-from jbeamshell.contact_line.branches import ContactState, pressed
+from jbeamshell.contact_line.contact_state import ContactState, pressed
 from jbeamshell.contact_line.drives import (
     driven_by_displacement,
     exchanged,

@@ -20,7 +20,7 @@ from jaxtyping import PyTree
 
 from jbeamshell.contact_line import native
 from jbeamshell.contact_line.body import Body, local_compliance
-from jbeamshell.contact_line.branches import ContactState
+from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.contact_line.events import Search
 from jbeamshell.contact_line.polygon import Known, Polygon, Slip, polygon
 from jbeamshell.contact_line.spline import read, slipped
