@@ -18,7 +18,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.contact_line.body import Body
-from jbeamshell.contact_line.branches import ContactState
+from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.contact_line.events import MOST_VERTICES, Record
 from jbeamshell.contact_line.native_replay import BACKWARD, FORWARD
 from jbeamshell.contact_line.polygon import MOST_EVENTS, Corners, Known, Slip
