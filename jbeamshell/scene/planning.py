@@ -248,8 +248,7 @@ def _nodes(grid: Grid, scene: Parts, numbers: Numbers | None = None) -> int:
         return scene.plan.nodes
     elements = (grid.nodes - 1) * (KNOWN / scene.model.tolerance) ** (1.0 / grid.order)
     if grid in (CONTACT_LINE, SOFT_CONTACT_LINE):
-        jumps = scene.contact.jumps + scene.member.jumps
-        elements *= 1.0 + PER_STEP * min(jumps, MOST_JUMPS)
+        elements *= 1.0 + PER_STEP * min(scene.contact.jumps, MOST_JUMPS)
     elif grid is PLANE and scene.member.support != "none":
         elements *= BOTH_ENDS
     elif grid is PLANE and only_pressed(scene) and not is_traced(scene.strip):

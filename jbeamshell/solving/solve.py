@@ -32,7 +32,6 @@ from jbeamshell.contact_line.strip import Strip
 from jbeamshell.history.history import History
 from jbeamshell.history.reliability import change_of, misses_tolerance
 from jbeamshell.load_steps.closed_bar import bar_cycles
-from jbeamshell.load_steps.continuation import further_path, with_end
 from jbeamshell.load_steps.outcome import ADVICE, check_solver, history_of, raise_if_failed
 from jbeamshell.load_steps.path_state import StepResults, initial_state
 from jbeamshell.load_steps.recovery import recover
@@ -178,8 +177,7 @@ def _walked(
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
 
     def walked(scene: Scene, strip: Strip | None = None) -> History:
-        history = walk(scene, path, cycles, own=own, strip=strip)
-        return history.but(end=WholePath())
+        return walk(scene, path, cycles, own=own, strip=strip)
 
     history = walked(scene, strip)
     if traced:
@@ -214,7 +212,7 @@ def _marched(
             steps = recover(scene, steps, path, solver, initial_state(scene, touching))
         if throw:
             raise_if_failed(scene, steps, path)
-        history = with_end(history_of(scene, steps, path.pressure), steps)
+        history = history_of(scene, steps, path.pressure)
     return history
 
 
@@ -233,7 +231,7 @@ def _stepped(
         steps = bar_cycles(scene, path)
     else:
         steps = march(scene, start, path, solver, native)
-    return steps, with_end(history_of(scene, steps, path.pressure), steps)
+    return steps, history_of(scene, steps, path.pressure)
 
 
 def _refined(history: History, walked: Callable[[Scene], History]) -> History:
@@ -267,26 +265,6 @@ def _precise(scene: Scene) -> bool:
     """True if a transformation's precision is enough for a scene on its contact line."""
     few = scene.plan.nodes <= SINGLE_NODES and not scene.plan.elastic
     return few or not is_single(scene)
-
-
-class WholePath(eqx.Module):
-    """End of a path on the contact line: to go on, the whole path is walked anew."""
-
-    def continued(
-        self,
-        history: History,
-        path: ArrayLike | None = None,
-        *,
-        solver: Newton | None = None,
-        throw: bool = True,
-    ) -> History:
-        """History with further loads; see `PathEnd.continued`."""
-        scene, first = history.scene, history.pressed + 1
-        loads, parts = (np.asarray(a)[first:] for a in (history.target, history.pressure))
-        further = further_path(scene, float(loads[-1]) if loads.size else 0.0, path)
-        loads, parts = np.append(loads, further.target), np.append(parts, further.pressure)
-        whole = loads if np.all(parts == 1.0) else np.stack([loads, parts], axis=1)
-        return run(scene, whole, solver=solver, throw=throw)
 
 
 def compile_for(

@@ -200,13 +200,6 @@ def test_works_of_the_load_and_of_the_pressures_are_kept_or_taken_by_friction(sc
     assert left[1] < 0.01 * float(np.sum(many.slip_work))
 
 
-def test_a_path_of_pressures_goes_on():
-    scene, path = SCENE.replace({"contact.friction": 0.1}), finer(PATH * [0.2, 1.0], 4)
-    further = jb.solve(scene, path, throw=False).continued([[0.3, 0.9]], throw=False)
-    whole = jb.solve(scene, np.append(path, [[0.3, 0.9]], axis=0), throw=False)
-    np.testing.assert_array_equal(further.displacement, whole.displacement)
-
-
 def test_a_cycle_of_the_load_is_none_where_the_pressures_do_not_close():
     loads = [[1.0, 1.0], [-1.0, 0.9], [1.0, 1.0]]
     assert len(whole_path(SCENE, loads)[1]) == 1

@@ -332,15 +332,6 @@ def test_pressures_that_change_beside_elastic_sliders_take_load_steps():
         jb.solve(soft.replace({"model.section": "plane"}), path)
 
 
-def test_a_history_on_the_contact_line_goes_on():
-    scene = jb.Scene().replace({"model.nodes": 33, "load.cycles": 1})
-    begun = jb.solve(scene)
-    further = begun.continued([0.5, -0.2])
-    whole = jb.solve(scene, np.append(np.asarray(begun.target)[begun.pressed + 1 :], [0.5, -0.2]))
-    np.testing.assert_array_equal(further.displacement, whole.displacement)
-    assert further.force.size == begun.force.size + 2
-
-
 def test_a_plan_does_not_depend_on_the_plan_before():
     little = {"strip.height_ratio": 0.3, "strip.kappa_s": 0.6, "load.amplitude": 0.02}
     strip = jb.Scene().replace({"load.entry": "traction"})
