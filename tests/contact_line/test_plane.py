@@ -105,7 +105,7 @@ class TestBranches:
         body = STRIP(plane_strip(0.1126)).body
         found = by_events(body, 0.1, amplitude, rounded=False)
         assert np.all(found.settled)
-        for i, turn in enumerate(nested(body, 0.1, amplitude * TURNS)):
+        for i, turn in enumerate(nested(body, 0.1, amplitude * np.asarray(TURNS))):
             np.testing.assert_allclose(found.state.v[i], turn.v, atol=1e-11 * np.abs(turn.v).max())
             np.testing.assert_allclose(found.state.r_n[i], turn.r_n, rtol=1e-8, atol=1e-10)
             assert float(found.slip_work[i]) == pytest.approx(turn.work, rel=1e-9)
