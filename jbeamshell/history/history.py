@@ -9,7 +9,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
@@ -150,12 +149,8 @@ class History(Profiles, ContactLine, CycleFigures):
         Raises
         ------
         InputError
-            if it was not solved step by step, if its last step found no equilibrium, or if the
-            path makes no sense
+            if its last step found no equilibrium, or if the path makes no sense
         """
-        fix = "keeps no state of the contact from which to go on: take jb.solve(..., by='steps')"
-        plan = self.scene.plan
-        require("model.section", f"{plan.section} in {plan.engine}", plan.walks_any_path, fix)
         if self.end is None:
             raise InputError("history: was made by hand and has no end to continue: solve it")
         further: History = self.end.continued(self, path, **options)

@@ -68,7 +68,7 @@ class Record(Tree):
         along X as those of the strip; None on a rigid base
     change : relative change of the dissipation or the secant stiffness, the larger one, when the
         elements were last halved; None for a grid that was not refined
-    end : end of the path, for `continued`; None for the bar in closed form
+    end : end of the path, for `continued`; None for a history that was made by hand
     """
 
     scene: Scene

@@ -23,7 +23,6 @@ from jbeamshell.history.saved import FORMAT, named_arrays, without_scene
 from jbeamshell.load_steps.continuation import PathEnd
 from jbeamshell.load_steps.path_state import initial_state
 from jbeamshell.mechanics.kinematics import Strains
-from jbeamshell.scene.plan import STEPS
 from jbeamshell.scene.toml import scene_from_values
 from jbeamshell.solving.solve import WholePath
 
@@ -103,8 +102,7 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     if "change" in arrays:
         shapes["change"] = number(())
     cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])
-    stepwise = scene.plan.engine == STEPS
-    end: Any = PathEnd(eqx.filter_eval_shape(initial_state, scene)) if stepwise else None
-    if scene.plan.on_contact_line:
-        end = WholePath()
+    end: Any = WholePath()
+    if not scene.plan.on_contact_line:
+        end = PathEnd(eqx.filter_eval_shape(initial_state, scene))
     return History(scene=scene, cycles=cycles, end=end, **shapes)

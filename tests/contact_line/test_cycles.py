@@ -138,5 +138,5 @@ def test_a_named_section_is_that_section_or_refused():
     )
     assert exact == linear
     assert abs(plane / linear - 1.0) > 0.05
-    with pytest.raises(jb.InputError, match=r"model\.section = 'bar': has no contact line"):
-        contact_line.dissipation(named.replace({"model.section": "bar"}), [0.5])
+    with pytest.raises(jb.InputError, match=r"model\.section = 'assumed': has no contact line"):
+        contact_line.dissipation(named.replace({"model.section": "assumed"}), [0.5])

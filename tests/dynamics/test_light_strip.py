@@ -78,7 +78,7 @@ class TestLetGo:
 
     @pytest.mark.parametrize(
         ("section", "found"),
-        [("auto", "plane"), ("plane", "plane"), ("squeeze", "squeeze"), ("bar", None)],
+        [("auto", "plane"), ("plane", "plane"), ("squeeze", "squeeze"), ("bar", "bar")],
     )
     def test_the_network_is_that_of_the_named_section_or_of_plane_elasticity(self, section, found):
         line = on_contact_line(jb.Scene().replace({"model.section": section}))

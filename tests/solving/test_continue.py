@@ -102,9 +102,6 @@ def test_what_cannot_go_on_says_why(begun):
             begun.continued(path)
     with pytest.raises(jb.InputError, match="must stay below gross slip"):
         begun.continued([2.5])
-    closed = jb.Scene().replace({"model.section": "bar"})
-    with pytest.raises(jb.InputError, match=r"bar in closed form.*by='steps'"):
-        dataclasses.replace(begun, scene=closed).continued()
     with pytest.raises(jb.InputError, match="was made by hand"):
         dataclasses.replace(begun, end=None).continued(MORE)
     lost = PathEnd(begun.end.state._replace(converged=np.array(False)))
