@@ -22,9 +22,9 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, warn_of_doubts
-from jbeamshell.common.native import Program
 from jbeamshell.common.precision import in_double, is_single
 from jbeamshell.common.progress import patience
+from jbeamshell.common.small import Small
 from jbeamshell.common.threads import on_one_core
 from jbeamshell.contact_line.solve import Cycles, walks_pressures
 from jbeamshell.contact_line.solve import solve as walk
@@ -35,7 +35,7 @@ from jbeamshell.load_steps.continuation import further_path, with_end
 from jbeamshell.load_steps.outcome import ADVICE, check_solver, history_of, raise_if_failed
 from jbeamshell.load_steps.path_state import StepResults, initial_state
 from jbeamshell.load_steps.recovery import recover
-from jbeamshell.load_steps.stepping import fits_native, march
+from jbeamshell.load_steps.stepping import march
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
 from jbeamshell.scene.planning import may_be_elastic, refinements
@@ -201,8 +201,7 @@ def _marched(
     scene: Scene, path: LoadPath, touching: np.ndarray | None, solver: Newton, throw: bool
 ) -> History:
     """History in load steps; a failed step is taken again in pieces."""
-    native, enabled = fits_native(scene), np.asarray(True)
-    steps, history = _stepped(scene, touching, path, enabled, solver, native=native)
+    steps, history = _stepped((scene, touching, path, np.asarray(True)), solver)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
@@ -215,18 +214,14 @@ def _marched(
     return history
 
 
-@Program
+@Small
 def _stepped(
-    scene: Scene,
-    touching: np.ndarray | None,
-    path: LoadPath,
-    enabled: ArrayLike,
-    solver: Newton,
-    native: bool,
+    given: tuple[Scene, np.ndarray | None, LoadPath, np.ndarray], solver: Newton
 ) -> tuple[StepResults, History]:
     """Results and history of a load path, from the nodes in contact and True to follow it."""
+    scene, touching, path, enabled = given
     start = initial_state(scene, touching)._replace(converged=jnp.asarray(enabled))
-    steps = march(scene, start, path, solver, native)
+    steps = march(scene, start, path, solver)
     return steps, with_end(history_of(scene, steps, path.pressure), steps)
 
 
@@ -292,5 +287,5 @@ def compile_for(
     if scene.plan.on_contact_line:
         _walked(scene, whole, cycles, False, path is None)
         return
-    given = scene, None, whole, np.asarray(False), solver or Newton()
-    jax.block_until_ready(_stepped(*given, native=fits_native(scene)))
+    given = scene, None, whole, np.asarray(False)
+    jax.block_until_ready(_stepped(given, solver or Newton()))
