@@ -235,8 +235,10 @@ def is_pressed_evenly(scene: Scene) -> bool:
 def stays_flat(scene: Scene) -> bool:
     """True if the pressures squeeze the strip evenly onto a foundation, so that it does not bend.
 
-    Layers and a Phi of the user's own may bend.
+    Layers and a Phi of the user's own may bend.  A bar never does.
     """
+    if scene.plan.section == "bar":
+        return True
     homogeneous = scene.strip.layers is None and scene.energy is None
     alone = homogeneous and scene.member.support == "none"
     return is_pressed_evenly(scene) and alone and scene.contact.normal == "rigid"

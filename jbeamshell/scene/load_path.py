@@ -14,7 +14,7 @@ from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.jax_options import memory
 from jbeamshell.numerics.cycles import closed_cycles
-from jbeamshell.scene.domain import bar_rule, gross_slip_rule, stays_below
+from jbeamshell.scene.domain import gross_slip_rule, stays_below
 from jbeamshell.scene.parts import unit_path
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
@@ -32,7 +32,6 @@ def check(
         _check_size(scene, loads)
         parts = scene.load, scene.member, scene.number
         gross_slip_rule(*parts, loads.target, loads.pressure).demand()
-        bar_rule(scene.load, scene.plan, scene.number).demand()
     return loads, cycles
 
 

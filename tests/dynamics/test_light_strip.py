@@ -77,7 +77,7 @@ class TestLetGo:
 
     @pytest.mark.parametrize(
         ("section", "found"),
-        [("auto", "plane"), ("plane", "plane"), ("squeeze", "squeeze"), ("bar", None)],
+        [("auto", "plane"), ("plane", "plane"), ("squeeze", "squeeze"), ("bar", "bar")],
     )
     def test_the_sliders_are_those_of_the_section_or_of_plane_elasticity(self, section, found):
         line = on_contact_line(jb.Scene().replace({"model.section": section}))

@@ -122,7 +122,7 @@ class TestJoint:
 
     @pytest.mark.slow
     def test_a_bar_of_load_steps_has_goodmans_energy(self):
-        bar = STRIP.replace({"model.section": "bar", "model.nodes": 101})
+        bar = STRIP.replace({"model.section": "bar", "model.nodes": 101}).by_load_steps()
         joint = Joint.of(bar, 1.2)
         u = 0.5 * float(joint.displacements[-1])
         force = float(joint.backbone(u))

@@ -81,7 +81,7 @@ BAR = jb.Scene().replace({"model.section": "bar"})
 
 
 @pytest.mark.parametrize(
-    "scene", [BAR, pytest.param(STRIP, marks=pytest.mark.slow)], ids=["closed form", "load steps"]
+    "scene", [BAR, pytest.param(STRIP, marks=pytest.mark.slow)], ids=["contact line", "load steps"]
 )
 def test_a_traced_force_beyond_gross_slip_has_no_result(scene):
     few = {"model.nodes": 9, "model.kinematics": "linear", "load.steps_per_half_cycle": 2}
