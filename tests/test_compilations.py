@@ -63,7 +63,7 @@ def test_sweeps_share_a_program_whatever_the_scene_s_other_numbers(compiled):
 def test_a_response_is_compiled_as_a_whole(compiled):
     """Not operation by operation, also of constants, which took 180 programs."""
     own = {"model.section": "bar", "load.steps_per_half_cycle": 14}  # of no other test
-    ask = jb.response(jb.Scene().replace(own), ["load.amplitude"])
+    ask = jb.response(jb.Scene().replace(own).by_load_steps(), ["load.amplitude"])
     compiled()
     first = float(ask(0.5)["dissipation"])
     assert "jit(figures_of)" in (names := compiled())

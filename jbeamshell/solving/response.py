@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import inspect
 from collections.abc import Callable, Sequence
@@ -12,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import check_words, is_traced, require, require_choice
+from jbeamshell.common.checks import check_words, is_staged, is_traced, require, require_choice
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.precision import doubled, in_double, is_single
 from jbeamshell.common.small import Small
@@ -171,8 +172,9 @@ def _programs(template: Template, asked: _Asked, layout: Layout | None = None) -
 
     @on_one_core
     def now(given: tuple[Any, ...]) -> dict[str, Array]:
-        # While another function is traced, numbers would become a part of its program.
-        with jax.ensure_compile_time_eval():
+        # While another function is traced, numbers would become a part of its program.  Elsewhere
+        # each operation on constants would be compiled and run by itself.
+        with jax.ensure_compile_time_eval() if is_staged() else contextlib.nullcontext():
             found: dict[str, Array] = jax.block_until_ready(figures_of(given))
         return found
 

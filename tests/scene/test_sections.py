@@ -8,6 +8,7 @@ from toy import STRIP
 
 import jbeamshell as jb
 from jbeamshell import reference
+from jbeamshell.history.reliability import doubts_of_scene
 from jbeamshell.scene.plan import LINE, STEPS
 from jbeamshell.scene.sections import SECTIONS
 from jbeamshell.scene.toml import overridden, scene_from_values
@@ -42,6 +43,7 @@ def test_a_section_keeps_the_lift():
 
 
 BAR = jb.Scene().replace({"model.section": "bar"})
+EVEN = BAR.on_grid(41, 2.0 / 15.0 / 0.1126)  # the smallest elements are as long as the largest
 STRETCH, RESISTANCE = 3.4e4, 1.0  # E' 2H and mu p of the standard strip, whose gross slip is 2
 
 
@@ -73,14 +75,13 @@ def test_on_even_elements_the_bar_is_exact():
     Where a load turns between two events the next branch begins within a corner of the spline.
     Loads such as 1.54 leave some millionths of D by that, and ten times as much of u.
     """
-    even = BAR.on_grid(41, 2.0 / 15.0 / 0.1126)
     force = np.linspace(0.02, 1.9, 95)
-    first = jb.solve(even, force)
+    first = jb.solve(EVEN, force)
     np.testing.assert_allclose(np.diff(first.x), 0.05, rtol=1e-12)
     expected = reference.bar_backbone(force, STRETCH, RESISTANCE)
     np.testing.assert_allclose(first.displacement[-force.size :], expected, rtol=1e-12)
     for amplitude, error in ((1.0, 1e-12), (1.54, 1e-5)):
-        history = jb.solve(even.replace({"load.amplitude": amplitude}))
+        history = jb.solve(EVEN.replace({"load.amplitude": amplitude}))
         exact = float(reference.cubic_law(amplitude, STRETCH, RESISTANCE))
         assert float(history.dissipation) == pytest.approx(exact, rel=error)
     loop = reference.bar_hysteresis(1.54, STRETCH, RESISTANCE, history.scene.plan.steps + 1)
@@ -118,20 +119,28 @@ def test_the_bar_is_the_limit_of_load_steps(more):
     np.testing.assert_allclose(stepped.force, line.force, atol=8e-3 * size)
     moved = float(jnp.max(jnp.abs(line.displacement)))
     np.testing.assert_allclose(stepped.displacement, line.displacement, atol=8e-3 * moved)
-    for one, other in zip(line.sections, stepped.sections, strict=True):
-        assert np.all(np.asarray(one) == 0.0) == np.all(np.asarray(other) == 0.0)
+    pull, *others = line.sections
+    assert not any(np.any(other) for other in others)  # a bar has a normal force alone
+    profiles = [
+        (line.x, line.v, stepped.x, stepped.v),
+        (line.middles, pull, stepped.middles, stepped.sections[0]),
+    ]
+    for at, values, there, expected in profiles:
+        found = np.interp(there, at, values[-1])
+        np.testing.assert_allclose(found, expected[-1], atol=0.03 * float(np.max(np.abs(found))))
 
 
-@pytest.mark.doubtful("the section bar")
+@pytest.mark.doubtful("the section bar", "few nodes")
 def test_gradients_pass_through_the_bar():
-    def dissipation(mu):
-        return jb.solve(on("bar", **{"contact.friction": mu})).dissipation
+    """D falls as 1/mu; on even elements it does so exactly, between corners of the spline."""
 
-    slope, step = jax.jacfwd(dissipation)(0.1), 1e-5
+    def dissipation(mu):
+        return jb.solve(EVEN.replace({"contact.friction": mu, "load.amplitude": 1.0})).dissipation
+
+    slope, step = jax.jacfwd(dissipation)(0.1), 1e-7
     differences = (dissipation(0.1 + step) - dissipation(0.1 - step)) / (2.0 * step)
     assert float(slope) == pytest.approx(float(differences), rel=1e-5)
-    # D falls as 1/mu; 41 nodes leave D some thousandths, and its slope some more.
-    assert float(slope) == pytest.approx(-float(dissipation(0.1)) / 0.1, rel=1e-2)
+    assert float(slope) == pytest.approx(-float(dissipation(0.1)) / 0.1, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -152,8 +161,8 @@ def test_a_bar_without_a_contact_line_takes_load_steps(more):
 
 def test_a_bar_never_turns():
     """Linear kinematics are no doubt of a bar, however much presses."""
-    much = {"contact.pressure": 500.0, "load.amplitude": 40.0}
-    bar, shell = (jb.solve(on(section, **much), throw=False).doubts for section in ("bar", "shell"))
+    much = {"contact.pressure": 5e3, "load.amplitude": 200.0}
+    bar, shell = (doubts_of_scene(on(section, **much)) for section in ("bar", "shell"))
     assert not any("kinematics are linear" in doubt for doubt in bar)
     assert any("kinematics are linear" in doubt for doubt in shell)
 

@@ -44,7 +44,8 @@ def test_known_numbers_are_answered_now_while_another_function_is_traced(name):
     assert float(jax.grad(twice)(3.0)) == float(alone)
     many = jax.vmap(twice)(jnp.array([1.0, 2.0]))
     np.testing.assert_array_equal(many, [alone, 2.0 * alone])
-    assert len(jax.make_jaxpr(twice)(1.0).eqns) == 1
+    operations = {equation.primitive.name for equation in jax.make_jaxpr(twice)(1.0).eqns}
+    assert operations <= {"mul", "convert_element_type"}
 
 
 @pytest.mark.parametrize("name", SCENES)
