@@ -41,7 +41,8 @@ def test_a_strip_is_as_far_off_as_its_curve_says(entry):
         assert abs(off) <= 1.1 * told.largest
         errors.append((off, told.typical))
     off, typical = np.transpose(errors)
-    np.testing.assert_allclose(off, typical, rtol=0.6, atol=0.02)
+    # .02 before the spline: the record of the curves is of nodes that slip one after the other.
+    np.testing.assert_allclose(off, typical, rtol=0.6, atol=0.04)
 
 
 def test_it_is_told_in_words():
