@@ -270,7 +270,7 @@ def lap(random: Random) -> Values:
 
 
 def bolted(random: Random) -> Values:
-    """Lap joints with two bolts: shanks, bearings, holes, gaps, overhangs and moments."""
+    """Lap joints with two bolts: shanks, bearings, gaps, overhangs and moments."""
     found = lap(random)
     for key in ("contact.pressure", "contact.bottom_pressure", "member.assembly"):
         found.pop(key, None)
@@ -278,14 +278,12 @@ def bolted(random: Random) -> Values:
     bolts = [[x, force, width] for x, force, width in zip((0.6, 1.4), forces, widths, strict=True)]
     gross = found["contact.friction"] * np.sum(forces)
     found |= {"contact.bolts": bolts, "load.amplitude": random.uniform(0.1, 0.9) * gross}
-    extra = random.choice(["shanks", "bearings", "holes", "overhang", "arm", "moment"])
+    extra = random.choice(["shanks", "bearings", "overhang", "arm", "moment"])
     if extra == "shanks":
         found["member.bolt_stiffness"] = _log(random, 1e2, 1e4)
     elif extra == "bearings":
         found["member.bearing_stiffness"] = _log(random, 1e3, 1e5)
         found["member.clearance"] = gross / 3.4e4 * random.uniform(0.05, 1.0)
-    elif extra == "holes":
-        found["member.holes"] = [[row[0], row[2] * random.uniform(0.1, 0.6)] for row in bolts]
     elif extra == "overhang":
         found |= {
             "strip.overhang": random.uniform(0.1, 1.0),
@@ -333,7 +331,7 @@ KINDS = {
     "few steps": Kind(few_steps, MANY_STEPS, 20),
     "given settings": Kind(given, FINE, 40),
     "lap joints": Kind(lap, None, 20),
-    "bolts, bearings, holes": Kind(bolted, None, 20),
+    "bolts, bearings": Kind(bolted, None, 20),
     "higher sections": Kind(higher, STEPS, 12),
     "smooth friction": Kind(smooth, None, 20),
     "compliant": Kind(compliant, None, 20),

@@ -32,9 +32,9 @@ def configure(
     Parameters
     ----------
     fast_loops : True to compile every loop on a CPU to one native function, instead of a call for
-        each of its operations.  Loops then run several times faster, and compile a little slower.
-        `jbeamshell.solve` does this by itself for the load steps of most scenes.  The option is the
-        compiler's and holds for everything the process compiles.
+        each of its operations.  Loops then run several times faster, load steps above all, and
+        compile a little slower.  The option is the compiler's and holds for everything the process
+        compiles.
     asynchronous : True to compute calls on a CPU in another thread, which is JAX's own default.
         Handing over to that thread takes as long as a cycle of a small strip.
     cache : folder in which compiled programs are kept, so that the next process need not compile

@@ -29,13 +29,13 @@ from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.small import Small
 from jbeamshell.contact_line.assembly import press_roughly
 from jbeamshell.contact_line.body import Body, local_compliance
-from jbeamshell.contact_line.branches import ContactState, pressed
 from jbeamshell.contact_line.contact_input import (
     check_bodies,
     checked_bolts,
     checked_gap,
     held_nodes,
 )
+from jbeamshell.contact_line.contact_state import ContactState, pressed
 from jbeamshell.contact_line.drives import driven_by_displacement, exchanged
 from jbeamshell.contact_line.pair import together
 from jbeamshell.contact_line.pressing import press

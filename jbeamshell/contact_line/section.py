@@ -1,4 +1,8 @@
-"""Section of a scene as a quadratic form: plane elasticity, beamshell, or section of order p."""
+"""Section of a scene as a quadratic form: plane elasticity, beamshell, bar, or section of order p.
+
+A bar is a section that stretches and shears but does not turn.  Its w is a field of the form, as
+the contact's equations need one, and stays zero: the pressures go straight to the base.
+"""
 
 from __future__ import annotations
 
@@ -42,14 +46,14 @@ def _plane(scene: Scene) -> SectionForm:
 
 
 def _beam(scene: Scene) -> SectionForm:
-    """Section of the beamshell (homogeneous, layered, or of a quadratic Phi), or of order p.
+    """Section of the beamshell (homogeneous, layered, of a quadratic Phi), of a bar or of order p.
 
     The elements are those of the finite differences of `jbeamshell.mechanics.elements`.
     """
     plan, half_height = scene.plan, scene.strip.half_height
     section, phi = scene.hierarchic_section(), scene.strain_energy()
     still = jnp.zeros(plan.width, half_height.dtype)
-    active = np.array(plan.active)
+    active = np.union1d(plan.active, [V, W])
 
     def energy(fields: Section, slopes: Section) -> Array:
         if section is not None:
@@ -78,6 +82,7 @@ def _beam(scene: Scene) -> SectionForm:
     modes = jnp.zeros((5, 2, still.size), still.dtype)
     modes = modes.at[[0, 1, 2, 3, 4], [1, 1, 1, 0, 1], [V, W, BETA, PSI, PSI]].set(1.0)
     modes = modes.at[2, 1, V].set(half_height).at[4, 1, W].set(-half_height)
+    modes = jnp.where(np.isin([V, W, BETA, PSI, PSI], active)[:, None, None], modes, 0.0)
 
     thickness = thicknesses(scene)
     points, weights = np.polynomial.legendre.leggauss(max(plan.order, 1) + 1)

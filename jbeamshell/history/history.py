@@ -9,8 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import require
-from jbeamshell.common.errors import InputError, Status
+from jbeamshell.common.errors import Status
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
 from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
@@ -139,27 +138,6 @@ class History(Profiles, ContactLine, CycleFigures):
         from jbeamshell import plotting
 
         return self._summary.as_html(plotting.thumbnail(self.plot()))
-
-    def continued(self, path: Any = None, **options: Any) -> History:
-        """History with further load steps.
-
-        Parameters
-        ----------
-        path, options : see `jbeamshell.load_steps.continuation.PathEnd.continued`
-
-        Raises
-        ------
-        InputError
-            if it was not solved step by step, if its last step found no equilibrium, or if the
-            path makes no sense
-        """
-        fix = "keeps no state of the contact from which to go on: take jb.solve(..., by='steps')"
-        plan = self.scene.plan
-        require("model.section", f"{plan.section} in {plan.engine}", plan.walks_any_path, fix)
-        if self.end is None:
-            raise InputError("history: was made by hand and has no end to continue: solve it")
-        further: History = self.end.continued(self, path, **options)
-        return further
 
     def table(self) -> dict[str, np.ndarray]:
         """Columns (steps+1,) of the load path by name.

@@ -68,7 +68,6 @@ class Record(Tree):
         along X as those of the strip; None on a rigid base
     change : relative change of the dissipation or the secant stiffness, the larger one, when the
         elements were last halved; None for a grid that was not refined
-    end : end of the path, for `continued`; None for the bar in closed form
     """
 
     scene: Scene
@@ -93,7 +92,6 @@ class Record(Tree):
     status: Array
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
     target: Array | None = None
-    end: Any = None
     change: Array | None = None
 
     @property

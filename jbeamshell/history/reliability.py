@@ -16,7 +16,6 @@ from jbeamshell.history.error_estimates import SlipCycle, estimates
 from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.linearisation import linear_error
-from jbeamshell.scene.plan import CLOSED
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import doubt_of_section
@@ -88,8 +87,6 @@ def doubts_of_run(history: Run) -> tuple[str, ...]:
     if not plain.converged:
         return ("a load step found no equilibrium: that step and all after it hold NaN",)
     scene = plain.scene
-    if scene.plan.engine == CLOSED:
-        return _section(plain)
     if scene.contact.normal == "none":
         return _buckling(scene)
     if not plain.cycles:
@@ -102,7 +99,7 @@ def doubts_of_run(history: Run) -> tuple[str, ...]:
 def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
     allowed, found = doubted_from(scene.model.tolerance), []
-    linear = scene.plan.kinematics == "linear"
+    linear = scene.plan.kinematics == "linear" and scene.plan.section != "bar"  # which never turns
     error = linear_error(scene) + sway(scene) if linear else 0.0
     if error > allowed:
         found.append(f"{_off(error)}: kinematics are linear; {_exact(scene)}")

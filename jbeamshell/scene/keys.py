@@ -39,7 +39,6 @@ FINEST, COARSEST = 1e-4, 0.1  # tolerance: below, the finest mesh may not reach 
 LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 PRESSURE = "give a number or a table of [X, pressure] rows"
 BOLTS = "give rows of numbers [X, force, width of the patch]"
-HOLES = "give rows of numbers [X, diameter]"
 GAP = "give a number or a table of [X, gap] rows"
 WIDTH = 96  # characters of a line of the printed table
 
@@ -303,13 +302,6 @@ class MemberKeys(Part):
         unit="length",
         closed=True,
     )
-    holes: Array | None = number(
-        None,
-        "Rows [X, diameter] of holes, in which the members do not touch; none is none.",
-        unit="length",
-        table=True,
-        fix=HOLES,
-    )
 
 
 # Keys that are no field of their own: they set, or read, a field in another form.
@@ -367,6 +359,7 @@ KEYS = tuple(TABLE)
 NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
 # Keys of old files, with what is to be done about them.
 _SECTION = "say model.section: bar, shell, squeeze, p1 to p12 or plane"
+_HOLE = "say contact.pressure, a table that is zero over the hole"
 FORMER = {
     "strip.deviation": "a laminate's shear is split at mid-height: leave it out",
     "strip.loaded_end": "say member.loaded_end",
@@ -376,8 +369,10 @@ FORMER = {
     "model.solution": "leave it out, or say model.by = steps",
     "model.squeeze": "say model.section = assumed",
     "model.end_size": "elements follow from model.nodes: leave it out",
+    "member.holes": _HOLE,
+    "contact.holes": _HOLE,
 }
-_OF_JOINT = ("assembly", "gap", "bolt_stiffness", "bearing_stiffness", "clearance", "holes")
+_OF_JOINT = ("assembly", "gap", "bolt_stiffness", "bearing_stiffness", "clearance")
 FORMER |= {f"contact.{name}": f"say member.{name}" for name in _OF_JOINT}
 
 

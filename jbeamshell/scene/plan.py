@@ -16,7 +16,6 @@ from jbeamshell.scene.sections import ORDERS, fields_of
 
 LINE = "contact line"  # event by event, exact in time
 STEPS = "load steps"  # Newton's method
-CLOSED = "closed form"  # Goodman's bar
 
 
 class Plan(NamedTuple):
@@ -26,7 +25,7 @@ class Plan(NamedTuple):
     ----------
     section : name of the section, see `jbeamshell.scene.sections`
     kinematics : rotations, "exact" or "linear"
-    engine : "contact line", "load steps" or "closed form"
+    engine : "contact line" or "load steps"
     lifts : True if the strip may lift off
     nodes : number of nodes along X
     end_size : smallest elements in units of H, before the number of nodes scales all of them; below
@@ -46,11 +45,6 @@ class Plan(NamedTuple):
     def on_contact_line(self) -> bool:
         """True if the strip is solved on its contact line, exactly in time."""
         return self.engine == LINE
-
-    @property
-    def walks_any_path(self) -> bool:
-        """True if the engine follows any path of loads."""
-        return self.engine != CLOSED
 
     @property
     def elastic(self) -> bool:
@@ -94,8 +88,7 @@ class Plan(NamedTuple):
 
     def __str__(self) -> str:
         held = "" if self.lifts or self.section == "bar" else " held down"
-        by = {LINE: "on its contact line", STEPS: "in load steps", CLOSED: "in closed form"}
+        by = "on its contact line" if self.on_contact_line else "in load steps"
         return (
-            f"section {self.section}{held} {by[self.engine]}, {self.kinematics} kinematics, "
-            f"{self.nodes} nodes"
+            f"section {self.section}{held} {by}, {self.kinematics} kinematics, {self.nodes} nodes"
         )

@@ -11,8 +11,7 @@ rules were measured (verification/campaign.py, verification/default_settings.py)
   squeeze strain through its height it lifts off too near to the edge of a pressure.
 * A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
   in time; its strain energy may be a quadratic one of the user's own.  So are plane elasticity and
-  lap joints.  A bar under an even pressure has a closed form.  Any other strip is solved in load
-  steps.
+  lap joints.  Any other strip is solved in load steps.
 * A strip that bends may lift off.  Where strips that lift were held down, their dissipation was off
   by 1 to 10 %.
 * Where the corner may open, elements are smaller at the loaded end.  In load steps this is so only
@@ -38,7 +37,7 @@ from jbeamshell.scene.buckling import weakest_column
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS, KAPPA_S, TABLE
 from jbeamshell.scene.linearisation import Parts, linear_errors
-from jbeamshell.scene.plan import CLOSED, LINE, STEPS, Plan
+from jbeamshell.scene.plan import LINE, STEPS, Plan
 from jbeamshell.scene.quadratic import is_quadratic
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.section_error import known_beforehand
@@ -71,6 +70,7 @@ class Grid(NamedTuple):
 KNOWN = 0.005  # tolerance for which the grids were measured
 PLANE_NODES = 67  # of plane elasticity for that
 CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20, halvings=2)
+BAR = Grid(97, 1.0 / 16.0, 2.0, 20, halvings=2)  # D within a tenth of the tolerance
 SOFT_CONTACT_LINE = Grid(97, 2.0**-16 / 48.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
 MOST_REFINED = 513  # nodes of a grid that was refined
 PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20, halvings=1)
@@ -118,35 +118,26 @@ def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
 
 
 def _engine(scene: Parts, section: str, kinematics: str) -> str:
-    """Engine of a section: the contact line or the closed form where they can stand for it."""
+    """Engine of a section: the contact line where it can stand for it."""
     if scene.model.by == "steps":
         return STEPS
     if section == "plane" or scene.member.support != "none":
         return LINE
-    if section == "bar":
-        return CLOSED if _has_closed_form(scene) else STEPS
     line = kinematics == "linear" and section != "assumed" and has_contact_line(scene)
     return LINE if line and _is_linear(scene, section) else STEPS
 
 
 def _is_linear(scene: Parts, section: str) -> bool:
-    """True if a strain energy of the user's own, if there is one, makes a linear section."""
+    """True if a strain energy of the user's own, if there is one, makes a linear section.
+
+    It could bend a bar, which is held down then.
+    """
     energy, half_height = scene.energy, scene.strip.half_height
-    if energy is None:
-        return True
+    if energy is None or section == "bar":
+        return energy is None
     if is_traced(energy, half_height):
         return scene.plan is not None and scene.plan.on_contact_line
     return is_quadratic(energy, half_height, section != "shell")
-
-
-def _has_closed_form(scene: Parts) -> bool:
-    """True if a bar is Goodman's: homogeneous, straight, under even pressures and whole cycles."""
-    strip, contact, load = scene.strip, scene.contact, scene.load
-    plain = scene.energy is None and strip.layers is None and strip.curvature is None
-    even = contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0
-    base = contact.normal in ("rigid", "held") and isinstance(contact.law, SharpSlip)
-    halves = load.steps_per_half_cycle == AUTO or load.steps_per_half_cycle % 2 == 0
-    return plain and even and base and halves and load.control in CONTROLS and load.cycles > 0
 
 
 def has_contact_line(scene: Parts) -> bool:
@@ -204,7 +195,7 @@ def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:
 def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown."""
     strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
-    if scene.member.support != "none" or model.section == "plane":
+    if scene.member.support != "none" or model.section in ("plane", "bar"):
         return "linear"
     if is_traced(strip, contact, load):
         return "exact" if scene.plan is None else scene.plan.kinematics
@@ -230,6 +221,8 @@ def _grid(section: str, engine: str, opens: bool, soft: bool) -> Grid:
     """Grid of a kind of strip for the tolerance `KNOWN`."""
     if section == "plane":
         return PLANE
+    if engine == LINE and section == "bar":
+        return BAR
     if engine == LINE:
         return SOFT_CONTACT_LINE if soft else CONTACT_LINE
     return LIFTING if opens and not soft else STEPWISE
@@ -247,9 +240,8 @@ def _nodes(grid: Grid, scene: Parts, numbers: Numbers | None = None) -> int:
     if grid is PLANE and only_pressed(scene) and is_traced(scene.strip) and scene.plan is not None:
         return scene.plan.nodes
     elements = (grid.nodes - 1) * (KNOWN / scene.model.tolerance) ** (1.0 / grid.order)
-    if grid in (CONTACT_LINE, SOFT_CONTACT_LINE):
-        jumps = scene.contact.jumps + scene.member.jumps
-        elements *= 1.0 + PER_STEP * min(jumps, MOST_JUMPS)
+    if grid in (CONTACT_LINE, SOFT_CONTACT_LINE, BAR):
+        elements *= 1.0 + PER_STEP * min(scene.contact.jumps, MOST_JUMPS)
     elif grid is PLANE and scene.member.support != "none":
         elements *= BOTH_ENDS
     elif grid is PLANE and only_pressed(scene) and not is_traced(scene.strip):

@@ -141,7 +141,7 @@ def condensed(record: dict) -> str:
         for row in record["error"]
     ]  # fmt: skip
     heads = ("contact nodes", "largest error of D where D exceeds .1 of the bar's",
-             "1e-4 of the bar's", "a cycle, factors kept", "a cycle, all built")  # fmt: skip
+             "1e-4 of the bar's", "cycles, body kept", "cycles, new body")  # fmt: skip
     return table(heads, rows) + machine(record["about"])
 
 

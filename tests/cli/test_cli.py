@@ -99,7 +99,7 @@ REFUSED = [
     (f"ringdown {FEW} --payload 0", "payload = 0.0"),
     (f"ringdown {FEW} --cycles 0", "cycles = 0.0"),
     (f"ringdown {FEW} --strip whole --set model.section=plane", "model.section = 'plane'"),
-    (f"ringdown {FEW} --strip sliders --set contact.smoothing=8", "no network"),
+    (f"ringdown {FEW} --strip sliders --set contact.smoothing=8", "no sliders"),
     ("sweep --over contact.law=1", "no single number"),
     (f"sweep {OVER} --paired --over contact.friction=0.1,0.2", "equally many"),
     (f"sweep {OVER} --figures nonsense", "choose"),

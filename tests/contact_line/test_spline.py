@@ -10,7 +10,7 @@ import pytest
 import jbeamshell as jb
 from jbeamshell.contact_line import strip
 from jbeamshell.contact_line.body import Body
-from jbeamshell.contact_line.branches import pressed
+from jbeamshell.contact_line.contact_state import pressed
 from jbeamshell.contact_line.walk import walk
 
 LENGTHS = {

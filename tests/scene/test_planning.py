@@ -10,14 +10,16 @@ from hypothesis import strategies as st
 
 import jbeamshell as jb
 from jbeamshell.scene.keys import ENTRIES
-from jbeamshell.scene.plan import CLOSED, LINE, STEPS
+from jbeamshell.scene.plan import LINE, STEPS
 from jbeamshell.scene.planning import (
+    BAR,
     CONTACT_LINE,
     KNOWN,
     LIFTING,
     PLANE,
     SOFT_CONTACT_LINE,
     STEPWISE,
+    refinements,
 )
 
 FINE = {"model.tolerance": KNOWN}  # for which grids were measured
@@ -99,18 +101,30 @@ def test_the_contact_line_takes_any_number_of_nodes():
 @pytest.mark.parametrize(
     ("values", "engine"),
     [
-        ({}, CLOSED),
-        ({"load.steps_per_half_cycle": 1}, STEPS),
+        ({}, LINE),
+        ({"load.steps_per_half_cycle": 1}, LINE),
+        ({"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]}, LINE),
+        ({"load.amplitude": 1.9, "strip.height_ratio": 0.5, "contact.pressure": 1e3}, LINE),
         ({"load.cycles": 0}, STEPS),
         ({"contact.smoothing": 8.0}, STEPS),
-        ({"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]}, STEPS),
+        ({"contact.normal": "held"}, STEPS),
+        ({"model.kinematics": "exact"}, STEPS),
     ],
     ids=str,
 )
-def test_a_bar_has_a_closed_form_where_it_is_goodmans(values, engine):
+def test_a_bar_is_on_its_contact_line_like_any_section_that_does_not_turn(values, engine):
     bar = jb.Scene().replace({"model.section": "bar"} | values)
     assert (bar.plan.engine, bar.plan.fields) == (engine, ("v",))
     assert bar.by_load_steps().plan.engine == STEPS
+
+
+def test_a_bar_has_a_grid_of_its_own():
+    bar = jb.Scene().replace({"model.section": "bar"})
+    assert (bar.plan.nodes, bar.plan.end_size) == (69, BAR.end_size)
+    assert bar.replace(FINE).plan.nodes == BAR.nodes
+    assert refinements(bar) == BAR.halvings
+    phi = jb.Scene(energy=lambda e, g, k, psi, dpsi: 1e4 * (e**2 + e * g + g**2 + k**2 + psi**2))
+    assert phi.replace({"model.section": "bar"}).plan.engine == STEPS
 
 
 def test_a_strip_that_is_pressed_unevenly_alone_is_plane_elasticity():
@@ -330,15 +344,6 @@ def test_pressures_that_change_beside_elastic_sliders_take_load_steps():
     assert history.scene.plan.engine == STEPS
     with pytest.raises(jb.InputError, match="must act wholly beside elastic sliders"):
         jb.solve(soft.replace({"model.section": "plane"}), path)
-
-
-def test_a_history_on_the_contact_line_goes_on():
-    scene = jb.Scene().replace({"model.nodes": 33, "load.cycles": 1})
-    begun = jb.solve(scene)
-    further = begun.continued([0.5, -0.2])
-    whole = jb.solve(scene, np.append(np.asarray(begun.target)[begun.pressed + 1 :], [0.5, -0.2]))
-    np.testing.assert_array_equal(further.displacement, whole.displacement)
-    assert further.force.size == begun.force.size + 2
 
 
 def test_a_plan_does_not_depend_on_the_plan_before():

@@ -49,7 +49,7 @@ def modelled(strip: tuple[float, float], section: str) -> jb.Scene:
         )
         .on_grid(NODES, 1.0 / 12.0 if section.startswith("p") else 1.0 / 6.0)
     )
-    return scene if section == "bar" else scene.by_load_steps()
+    return scene.by_load_steps()
 
 
 def ratio(history: jb.History, strip: tuple[float, float]) -> float:
