@@ -90,8 +90,10 @@ def recorded(
     n, m = given[2].size, given[1].size
     k, parts = m - n, 2 * sum(turns)
     events, vertices = MOST_EVENTS * n, MOST_VERTICES * n
-    rows, corners, slips = (events, 5), (vertices, 4), (k, 5)
-    sizes = rows, (events,), (3,), corners, slips, (vertices,), (vertices, m), (n,)
+    sizes = (
+        *((events, 5), (events,), (3,), (vertices, 4), (k, 5)),
+        *((vertices,), (vertices, m), (n,)),
+    )
     kinds = jnp.int32, float, jnp.int32, jnp.int32, jnp.int32, float, float, jnp.int32
     more = [
         jax.ShapeDtypeStruct((parts, *size), kind) for size, kind in zip(sizes, kinds, strict=True)
