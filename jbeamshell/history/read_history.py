@@ -19,7 +19,7 @@ from jbeamshell.common.files import as_path, check_regular
 from jbeamshell.history.history import History
 from jbeamshell.history.record import Above
 from jbeamshell.history.saved import FORMAT, named_arrays, without_scene
-from jbeamshell.mechanics.kinematics import Strains
+from jbeamshell.mechanics.kinematics import FIELDS, Strains
 from jbeamshell.scene.toml import scene_from_values
 
 # Names of a history's arrays, by what their axes run along.
@@ -81,7 +81,7 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     count = functools.partial(jax.ShapeDtypeStruct, dtype=jnp.result_type(int))
     steps, elements = len(arrays["force"]), len(arrays["middles"])
     sections: list[Any] = [number((steps, elements))] * len(Strains._fields)
-    nodes, width = scene.plan.nodes, scene.plan.width
+    nodes, width = scene.plan.nodes, len(FIELDS)
     fields: Any = number((steps, nodes, width))
     shapes: dict[str, Any] = {name: number((steps,)) for name in ALONG_PATH}
     shapes |= {name: count((steps,)) for name in COUNTS}

@@ -48,7 +48,7 @@ def check_joint(scene: Parts) -> None:
     require("model.by", by, by == AUTO, fix)
     fix = "must be linear in a lap joint, which is solved on its contact line: leave it out"
     require("model.kinematics", plan.kinematics, plan.kinematics == "linear", fix)
-    fix = "is no section of a lap joint: take plane, squeeze, shell or p1 to p12"
+    fix = "is no section of a lap joint: take plane, squeeze or shell"
     bends = plan.section not in ("bar", "assumed")
     require("model.section", plan.section, bends, fix)
     grid, sharp = scene.model.grid, isinstance(contact.law, SharpSlip)
@@ -70,9 +70,6 @@ def check_joint(scene: Parts) -> None:
     turned = load.kind == "moment" or load.arm is not None
     fix = "may not turn: take member, face or traction, or a force without load.arm"
     require("load.entry", load.entry, load.entry != "guided" or not turned, fix)
-    plain = member.layers is None and strip.layers is None
-    fix = "is for homogeneous members: take plane, squeeze or shell"
-    require("model.section", plan.section, plan.order == 0 or plain, fix)
     if member.support != "rolling":
         return
     bottom = contact.bottom_pressure

@@ -195,8 +195,8 @@ class ModelKeys(Part):
     section: str = word(
         AUTO,
         SECTIONS,
-        "Section: bar, shell, squeeze, assumed (its squeeze strain from the pressures), p1 to p12 "
-        "(displacements of that order) or plane (elasticity).",
+        "Section: bar, shell, squeeze, assumed (its squeeze strain from the pressures) or plane "
+        "(elasticity).",
     )
     kinematics: str = word(AUTO, KINEMATICS, "Rotations: exact or linear.")
     by: str = word(AUTO, ("steps",), "Engine: steps are load steps, also where others would do.")
@@ -358,7 +358,7 @@ DERIVED = {row.name: row.through for row in INDIRECT if row.through}
 KEYS = tuple(TABLE)
 NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
 # Keys of old files, with what is to be done about them.
-_SECTION = "say model.section: bar, shell, squeeze, p1 to p12 or plane"
+_SECTION = "say model.section: bar, shell, squeeze or plane"
 _HOLE = "say contact.pressure, a table that is zero over the hole"
 FORMER = {
     "strip.deviation": "a laminate's shear is split at mid-height: leave it out",

@@ -13,6 +13,7 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.jax_options import memory
+from jbeamshell.mechanics.kinematics import FIELDS
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.domain import gross_slip_rule, stays_below
 from jbeamshell.scene.parts import unit_path
@@ -40,8 +41,6 @@ def whole_path(
 ) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
     """Path of the pressing and of some loads, None for the scene's, and its closed cycles."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
-    if path is not None or scene.load.cycles > 0:
-        scene.check_entry()
     numbers: Any = jnp if is_traced(scene.load.amplitude, path) else np  # NumPy is faster
     amplitude = numbers.asarray(scene.load.amplitude)
     if path is None:
@@ -116,7 +115,7 @@ def check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:
 def _check_size(scene: Scene, path: LoadPath) -> None:
     """Raise `InputError` for a path whose results would fill this machine's memory."""
     levels, nodes = path.target.size, scene.plan.nodes
-    need, most = 8.0 * levels * nodes * (2 * scene.plan.width + NUMBERS_PER_NODE), memory()
+    need, most = 8.0 * levels * nodes * (2 * len(FIELDS) + NUMBERS_PER_NODE), memory()
     fix = f"and {levels} load steps take {need:.2g} bytes of memory, this machine has {most:.2g}"
     require("model.nodes", nodes, need < most, f"{fix}: take fewer")
 

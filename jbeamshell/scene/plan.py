@@ -12,7 +12,7 @@ from jbeamshell.mechanics.elements import (
     TINY,
 )
 from jbeamshell.mechanics.kinematics import FIELDS
-from jbeamshell.scene.sections import ORDERS, fields_of
+from jbeamshell.scene.sections import fields_of
 
 LINE = "contact line"  # event by event, exact in time
 STEPS = "load steps"  # Newton's method
@@ -52,29 +52,14 @@ class Plan(NamedTuple):
         return self.section == "plane"
 
     @property
-    def order(self) -> int:
-        """Order p of the displacements through the height; 0 for the beamshell and elasticity."""
-        return ORDERS.get(self.section, 0)
-
-    @property
     def fields(self) -> tuple[str, ...]:
         """Fields of a section among v, w, beta and psi."""
         return fields_of(self.section, self.lifts)
 
     @property
-    def width(self) -> int:
-        """Number of fields of a section, active or not."""
-        return len(FIELDS) + 2 * max(self.order - 1, 0)
-
-    @property
     def active(self) -> tuple[int, ...]:
-        """Positions of the active fields among (v, w, beta, psi, and a section's further ones)."""
-        return (*(FIELDS.index(f) for f in self.fields), *range(len(FIELDS), self.width))
-
-    @property
-    def warps(self) -> bool:
-        """True if a section may warp, so that its end is no rigid face by nature."""
-        return self.elastic or self.order > 1
+        """Positions of the active fields among v, w, beta and psi."""
+        return tuple(FIELDS.index(f) for f in self.fields)
 
     @property
     def far_size(self) -> float:

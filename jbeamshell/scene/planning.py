@@ -3,12 +3,13 @@
 A setting that is `AUTO` is decided here, when a scene is made, for its ``model.tolerance``.  The
 rules were measured (verification/campaign.py, verification/default_settings.py).
 
-* Rotations are linear where the bound on what that leaves out is a small part of the tolerance,
+* A strip is plane elasticity wherever that can stand for it, whatever its numbers are.  Else it is
+  the beamshell with its squeeze strain.
+* Plane elasticity has linear rotations.  Where these are known to be far off, or a part without
+  pressure comes near to buckling, the beamshell with exact rotations takes its place.  The
+  beamshell has linear ones where the bound on what they leave out is a small part of the tolerance,
   see `jbeamshell.scene.linearisation`.
-* The section is the beamshell's with its squeeze strain, or plane elasticity where that is known to
-  be needed, see `jbeamshell.scene.section_error`.
-* A strip that is only pressed, and unevenly, is plane elasticity on small elements: with one
-  squeeze strain through its height it lifts off too near to the edge of a pressure.
+* A strip that is only pressed, and unevenly, is plane elasticity on small elements.
 * A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
   in time; its strain energy may be a quadratic one of the user's own.  So are plane elasticity and
   lap joints.  Any other strip is solved in load steps.
@@ -40,11 +41,9 @@ from jbeamshell.scene.linearisation import Parts, linear_errors
 from jbeamshell.scene.plan import LINE, STEPS, Plan
 from jbeamshell.scene.quadratic import is_quadratic
 from jbeamshell.scene.rows import AUTO
-from jbeamshell.scene.section_error import known_beforehand
-from jbeamshell.scene.sections import ORDERS
 
-LINEAR_PART = 0.2  # of the tolerance that linear rotations may take
-SECTION_PART = 0.8  # of the tolerance that the section may take
+LINEAR_PART = 0.2  # of the tolerance that the beamshell's linear rotations may take
+ROTATES = 0.05  # error of linear rotations from which on exact ones are worth the plainer section
 FEW_STEPS = 1  # load steps per half cycle where only figures of a cycle are asked of exact events
 
 
@@ -99,8 +98,7 @@ def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
         kinematics = _kinematics(scene, numbers)
     if section == AUTO:
         elastic = kinematics == "linear" and may_be_elastic(scene, numbers)
-        off = only_pressed(scene) or _squeeze_error(scene, numbers) > SECTION_PART * model.tolerance
-        section = "plane" if elastic and off else "squeeze"
+        section = "plane" if elastic else "squeeze"
     engine = _engine(scene, section, kinematics)
     lifts = section != "bar" and contact.normal != "held"
     opens = lifts and scene.strip.curvature is None
@@ -183,36 +181,24 @@ def may_be_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
     return bool(np.all(np.isin(factors, in_either_precision))) and solvable
 
 
-def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:
-    """Error of the squeeze section beside plane elasticity; infinite where it is not known."""
-    if is_traced(scene.strip, scene.contact, scene.load):
-        return float(np.inf)
-    with jax.ensure_compile_time_eval():
-        error = known_beforehand(scene, "squeeze", numbers or scene.number)
-    return float(np.inf) if error is None else error.largest
-
-
 def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown."""
     strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
     if scene.member.support != "none" or model.section in ("plane", "bar"):
         return "linear"
+    may_be = may_be_elastic(scene, numbers)
     if is_traced(strip, contact, load):
-        return "exact" if scene.plan is None else scene.plan.kinematics
+        unknown = "linear" if may_be else "exact"
+        return unknown if scene.plan is None else scene.plan.kinematics
     bounded = strip.curvature is None and contact.normal in ("rigid", "held")
     if not bounded or scene.energy is not None or load.control not in CONTROLS:
         return "exact"
-    may_be = may_be_elastic(scene, numbers)
     # Numbers stay numbers within a caller's jit; the largest there are may overflow.
     with jax.ensure_compile_time_eval(), np.errstate(all="ignore"):
-        errors = linear_errors(
-            strip, load, model.section in ORDERS or may_be, numbers or scene.number
-        )
+        errors = linear_errors(strip, load, may_be, numbers or scene.number)
         column = weakest_column(scene, numbers)
     errors = errors[np.isfinite(errors)]  # lanes of a sweep outside the domain have none
-    allowance = LINEAR_PART * model.tolerance
-    if may_be:  # better linear than a section that is further off
-        allowance = max(allowance, _squeeze_error(scene, numbers))
+    allowance = ROTATES if may_be else LINEAR_PART * model.tolerance
     small = errors.size > 0 and np.max(errors) <= allowance
     return "linear" if small and not column.near else "exact"
 
@@ -271,19 +257,6 @@ def finer(scene: Parts) -> Plan:
     plan = scene.plan
     end_size = 0.5 * plan.end_size if scene.model.end_size == AUTO else plan.end_size
     return plan._replace(nodes=2 * plan.nodes - 1, end_size=end_size)
-
-
-def elasticity(scene: Parts) -> Plan:
-    """Plan of a scene as plane elasticity, on a grid of its own."""
-    plan, model = scene.plan, scene.model
-    return plan._replace(
-        section="plane",
-        kinematics="linear",
-        engine=LINE,
-        lifts=True,
-        nodes=_nodes(PLANE, scene) if model.nodes == AUTO else plan.nodes,
-        end_size=PLANE.end_size if model.end_size == AUTO else plan.end_size,
-    )
 
 
 def in_words(scene: Parts) -> str:

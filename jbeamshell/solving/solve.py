@@ -4,8 +4,7 @@
    path needs load steps.
 2. `_walked` follows the path on the contact line, exactly in time (`jbeamshell.contact_line`);
    `_marched` takes load steps by Newton's method.
-3. `_refined` halves the elements while the estimated error exceeds the tolerance, and plane
-   elasticity takes the place of a section that is further off.
+3. `_refined` halves the elements while the estimated error exceeds the tolerance.
 4. What may still be wrong is a doubt, see `jbeamshell.history.reliability`.
 """
 
@@ -37,9 +36,8 @@ from jbeamshell.load_steps.recovery import recover
 from jbeamshell.load_steps.stepping import march
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
-from jbeamshell.scene.planning import may_be_elastic, refinements
+from jbeamshell.scene.planning import refinements
 from jbeamshell.scene.scene import Scene
-from jbeamshell.scene.section_error import section_error
 from jbeamshell.solving.advice import within
 
 NO_END = (
@@ -169,7 +167,7 @@ def _walked(
     own: bool,
     strip: Strip | None = None,
 ) -> History:
-    """History on the contact line, on a grid and a section that keep the tolerance."""
+    """History on the contact line, on a grid that keeps the tolerance."""
     traced = is_traced(scene, path) or is_staged()
     if traced and not _precise(scene):
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
@@ -183,8 +181,6 @@ def _walked(
         return eqx.error_if(history, failed, f"a load step has {NO_END}") if throw else history
     if cycles and history.converged:
         history = _refined(history, walked)
-        if _needs_elasticity(history):
-            history = walked(scene.as_elasticity())
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
         load = float(path.target[step])
@@ -239,15 +235,6 @@ def _refined(history: History, walked: Callable[[Scene], History]) -> History:
             break
         history = finer.but(change=change_of(history, finer))
     return history
-
-
-def _needs_elasticity(history: History) -> bool:
-    """True if a section that was left open is further off than the tolerance, by its own slip."""
-    scene = history.scene
-    if scene.plan.elastic or not may_be_elastic(scene):
-        return False
-    own = section_error(scene, float(history.slip_length))
-    return own is None or own.largest > scene.model.tolerance
 
 
 def _precise(scene: Scene) -> bool:

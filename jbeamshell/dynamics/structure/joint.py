@@ -151,7 +151,6 @@ class Joint(ParallelIwan):
         if scene.load.control != "force":
             load = dataclasses.replace(scene.load, control="force", amplitude=as_leaf(force))
             scene = dataclasses.replace(scene, load=load)
-        scene = scene.serving(("load.amplitude",))
         require_number("width", width)
         bolted = scene.member.bolt_stiffness is not None  # which holds beyond
         capacity = np.inf if bolted else width * scene.gross_slip
