@@ -87,7 +87,7 @@ def recorded(
     given: tuple[Array, ...], turns: tuple[bool, ...], rounded: bool
 ) -> tuple[Levels, Known]:
     """Levels of a path, and what was found of each of the two parts (branches, 2) of a branch."""
-    n, m = given[2].size, given[1].size
+    n, m = given[7].size, given[1].size
     k, parts = m - n, 2 * sum(turns)
     events, vertices = MOST_EVENTS * n, MOST_VERTICES * n
     sizes = (
@@ -124,7 +124,7 @@ def recorded(
 
 
 def _shapes(given: tuple[Array, ...]) -> list[jax.ShapeDtypeStruct]:
-    n, m, count = given[2].size, given[1].size, given[9].size
+    n, m, count = given[7].size, given[1].size, given[9].size
     k = m - n
     reals = (count, k), (count, k), (count, n), (count,), (count, n), (count,)
     flags = (count, k), (count,)

@@ -61,8 +61,8 @@ def solve(
     Returns
     -------
     History
-        fields v, w, beta and psi, and those of a section of order p; of plane elasticity beta and
-        psi are means over the height; NaN from the first step on whose events come to no end
+        fields v, w, beta and psi; of plane elasticity beta and psi are means over the height; NaN
+        from the first step on whose events come to no end
 
     Raises
     ------

@@ -53,7 +53,8 @@ static void column(const double *K, const Product *p, int m, int j, double *R a)
 
 typedef struct {
     int n, k, m, vertices;             /* nodes, those that may slip, fields, room */
-    const double *K, *x;               /* (m, m) symmetric, (n,) */
+    int places;                        /* nodes with a position: bearings have none */
+    const double *K, *x;               /* (m, m) symmetric, (places,) */
     double mu, c, slides;
     Product product[2], *now;          /* one for each sense of the load */
     /* branch: equations, tableau */
@@ -349,7 +350,7 @@ static void corners(Walk *w, int rounded) {
     for (int j = 0; j <= last; ++j) {
         int i = w->node[j];
         double part = 0.5; /* of its step that is nearer to a vertex than to the one before */
-        if (i > 0 && i < w->n - 1) {
+        if (i > 0 && i < w->places - 1) {
             double a = fabs(x[i] - x[i - 1]), b = fabs(x[i + 1] - x[i]);
             part = a + b > 0.0 ? b / (a + b) : 0.5;
         }
@@ -602,7 +603,7 @@ typedef struct {
     const unsigned char *turn, *rounded;
 } Given;
 
-/* Room for paths of k of n nodes; NULL where there is no memory. */
+/* Room for paths of n nodes, of which k may slip; without memory opening it fails. */
 typedef struct {
     Walk walk;
     Contact contacts[3];
@@ -611,10 +612,10 @@ typedef struct {
     void *memory;
 } Desk;
 
-static int open_desk(Desk *desk, int k, int n) {
+static int open_desk(Desk *desk, int k, int n, int places) {
     Room whole = {NULL, 0}, *room = &whole;
     Walk *w = &desk->walk;
-    w->n = n, w->k = k, w->m = k + n, w->vertices = MOST_VERTICES * n;
+    w->n = n, w->k = k, w->m = k + n, w->places = places, w->vertices = MOST_VERTICES * n;
     for (int pass = 0; pass < 2; ++pass) { /* counts first, and then takes */
         walk_in(room, w);
         for (int i = 0; i < 3; ++i) desk->contacts[i] = contact_in(room, k, n);
@@ -643,9 +644,9 @@ static void run(Desk *desk, const Given *given, int same_body, int levels, Level
 }
 
 /* One path for arrays of NumPy; the arguments of native.py, then the levels.  1 if it ran. */
-API int jbeamshell_path(int k, int n, int levels, const void *const *in, void *const *out) {
+API int jbeamshell_path(int k, int n, int places, int levels, const void *const *in, void *const *out) {
     Desk desk;
-    if (!open_desk(&desk, k, n)) return 0;
+    if (!open_desk(&desk, k, n, places)) return 0;
     Given given = {in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11]};
     run(&desk, &given, 0, levels, (Levels){out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7]}, NULL);
     free(desk.memory);
@@ -666,12 +667,12 @@ API void *jbeamshell_walk(CallFrame *frame) {
         memset(out[i]->data, 0, (size_t)(product_of(out[i]->dims, out[i]->rank) * bytes));
     }
     int64_t axes = in[0]->rank - 2;
-    int m = (int)in[1]->dims[axes], n = (int)in[2]->dims[axes], k = m - n, levels = (int)in[9]->dims[axes];
+    int m = (int)in[1]->dims[axes], n = (int)in[7]->dims[axes], k = m - n, levels = (int)in[9]->dims[axes];
     int64_t lanes = product_of(out[0]->dims, axes), body = -1;
     int parts = frame->rets.count > RESULTS ? (int)out[8]->dims[axes] : 0, events = MOST_EVENTS * n;
     Record *records = parts > 0 ? calloc((size_t)parts, sizeof(Record)) : NULL;
     Desk desk;
-    int opened = open_desk(&desk, k, n) && (parts == 0 || records != NULL);
+    int opened = open_desk(&desk, k, n, (int)in[2]->dims[axes]) && (parts == 0 || records != NULL);
     for (int64_t lane = 0; lane < lanes; ++lane) {
         const void *at[ARGUMENTS];
         int64_t numbers[ARGUMENTS];

@@ -66,7 +66,8 @@ class Curve(NamedTuple):
 def drawable(scene: Scene) -> Scene:
     """Scene whose settings stay as they are chosen now, so that nothing is compiled again.
 
-    Plane elasticity gets as many nodes as can be drawn while a slider moves, unless the scene says how many.
+    Plane elasticity gets as many nodes as can be drawn while a slider moves, unless the scene says
+    how many.
     """
     found = scene.pinned()
     if found.plan.elastic and scene.model.nodes == AUTO:

@@ -48,7 +48,7 @@ class Record(Tree):
     contact_v : (steps+1, n) tangential displacement of the contact, relative to the second member
         if there is one
     above : `Above`, or what has one as ``found``, when somebody reads a field
-    fields : (steps+1, n, m) v, w, beta, psi, and those of a hierarchic section
+    fields : (steps+1, n, 4) v, w, beta and psi
     gap : (steps+1, n) height of the strip's bottom face over what it lies on
     sections : (steps+1, elements) section forces N, Q, M, chi and xi in the places of e, g, k, psi
         and psi'
@@ -101,7 +101,7 @@ class Record(Tree):
 
     @property
     def fields(self) -> Array:
-        """Fields v, w, beta, psi, and those of a hierarchic section, (steps+1, n, m)."""
+        """Fields v, w, beta and psi, (steps+1, n, 4)."""
         fields: Array = self.above.found.fields
         return fields
 

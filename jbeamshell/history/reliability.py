@@ -117,7 +117,7 @@ def _exact(scene: Scene) -> str:
     """Fix that makes a scene's kinematics exact."""
     if scene.member.support != "none":
         return "a lap joint knows no others: take a smaller load.amplitude"
-    section = "model.section = p6 with " if scene.plan.elastic else ""
+    section = "model.section = squeeze with " if scene.plan.elastic else ""
     return f"take {section}model.kinematics = exact"
 
 

@@ -32,7 +32,7 @@ class LoadLevel(NamedTuple):
 
     Attributes
     ----------
-    q : (n, m) nodal fields v, w, beta and psi, and those of a section of order p
+    q : (n, 4) nodal fields v, w, beta and psi
     traction : (n,) friction traction t, positive along v (on the foundation)
     cap : (n,) Coulomb cap mu R
     reaction : (n,) normal reaction R

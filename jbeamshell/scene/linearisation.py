@@ -84,8 +84,7 @@ def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> 
     Plane elasticity has other constants.  They were fitted to displacements of third order through
     the height, of St. Venant and Kirchhoff's material.  The bound was measured for loads up to
     E' 2H/10 and pressures up to E'/3 (verification/map_kinematics.json).  Beyond, and for a strip
-    that is curved or on a compliant
-    foundation, it is a guess.
+    that is curved or on a compliant foundation, it is a guess.
 
     Parameters
     ----------

@@ -182,7 +182,11 @@ def may_be_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
 
 
 def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
-    """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown."""
+    """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown.
+
+    Strips of a sweep that may be plane elasticity are so together; `turning` says which need exact
+    rotations and have a plan of their own.
+    """
     strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
     if scene.member.support != "none" or model.section in ("plane", "bar"):
         return "linear"
@@ -193,14 +197,45 @@ def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
     bounded = strip.curvature is None and contact.normal in ("rigid", "held")
     if not bounded or scene.energy is not None or load.control not in CONTROLS:
         return "exact"
+    allowance = ROTATES if may_be else LINEAR_PART * model.tolerance
+    errors, near = _errors_of_rotations(scene, numbers, may_be)
+    known = np.isfinite(errors)  # lanes of a sweep outside the domain have none
+    turns = ((errors > allowance) | near)[known]
+    exact = np.all(turns) if may_be else np.any(turns)
+    return "exact" if exact else "linear"
+
+
+def turning(scene: Parts, numbers: Numbers) -> np.ndarray:
+    """True for strips of a sweep that need exact rotations while the others are plane elasticity.
+
+    Parameters
+    ----------
+    scene : scene with all that is not varied, whose settings are open
+    numbers : values by dotted key of the strips
+
+    Returns
+    -------
+    array of bool
+        of the shape that the numbers broadcast to
+    """
+    if scene.model.kinematics != AUTO or scene.member.support != "none":
+        return np.zeros((), bool)
+    if not may_be_elastic(scene, numbers):
+        return np.zeros((), bool)
+    errors, near = _errors_of_rotations(scene, numbers, True)
+    return np.isfinite(errors) & ((errors > ROTATES) | near)
+
+
+def _errors_of_rotations(
+    scene: Parts, numbers: Numbers | None, elastic: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of linear rotations, and True where a part without pressure may buckle."""
     # Numbers stay numbers within a caller's jit; the largest there are may overflow.
     with jax.ensure_compile_time_eval(), np.errstate(all="ignore"):
-        errors = linear_errors(strip, load, may_be, numbers or scene.number)
-        column = weakest_column(scene, numbers)
-    errors = errors[np.isfinite(errors)]  # lanes of a sweep outside the domain have none
-    allowance = ROTATES if may_be else LINEAR_PART * model.tolerance
-    small = errors.size > 0 and np.max(errors) <= allowance
-    return "linear" if small and not column.near else "exact"
+        errors = linear_errors(scene.strip, scene.load, elastic, numbers or scene.number)
+        near = weakest_column(scene, numbers).near
+    errors, near = np.broadcast_arrays(errors, near)
+    return errors, near
 
 
 def _grid(section: str, engine: str, opens: bool, soft: bool) -> Grid:
@@ -268,5 +303,4 @@ def in_words(scene: Parts) -> str:
 
 def reference(scene: Parts) -> str:
     """Words for what a scene's tolerance is relative to."""
-    elastic = scene.plan.elastic or may_be_elastic(scene)
-    return "plane elasticity" if elastic else "its own fine mesh"
+    return "plane elasticity" if scene.plan.elastic else "its own fine mesh"

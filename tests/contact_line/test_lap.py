@@ -72,16 +72,6 @@ class TestElements:
         for name in ("open_at_pull", "open_at_push"):
             assert found[name] == pytest.approx(elements[name], rel=0.03)
 
-    @pytest.mark.slow
-    def test_sections_of_higher_order_climb_to_them(self):
-        (row,) = (r for r in elements("double-shear") if (r["A"], r["H2"]) == (1.0, 0.2358))
-        errors = []
-        for section in ("squeeze", "p2", "p4", "p6"):
-            history = jb.solve(SQUEEZE.replace({"model.section": section} | of_row(row)))
-            errors.append(float(history.dissipation) / row["D"] - 1.0)
-        assert np.all(np.diff(errors) < 0.0)
-        assert errors[-1] > 0.0
-
 
 class TestLimits:
     @pytest.mark.slow
@@ -252,7 +242,7 @@ def moments(amplitude, **values):
 
 class TestMoments:
     @pytest.mark.parametrize(
-        "section", ["squeeze", *(pytest.param(r, marks=pytest.mark.slow) for r in ("p3", "plane"))]
+        "section", ["squeeze", "shell", pytest.param("plane", marks=pytest.mark.slow)]
     )
     def test_an_arm_adds_the_rotation_of_the_end(self, section):
         scene = library.single_lap().replace({"model.section": section, "model.nodes": 25})

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line import drives, native, strip
+from jbeamshell.contact_line import bearings, drives, native, strip
 from jbeamshell.contact_line.contact_state import pressed
 from jbeamshell.contact_line.walk import Contact, walk, walk_on
 
@@ -38,11 +38,12 @@ def random_body(seed):
 
 
 @functools.partial(jax.jit, static_argnames=("in_c", "rounded"))
-def levels(body, friction, loads, in_c, rounded=True):
+def levels(body, friction, loads, in_c, rounded=True, lift=None):
     start = pressed(body)
+    lift = jnp.zeros_like(start.r_n) if lift is None else lift
     if in_c:
-        return walk(body, friction, start, loads, TURNS, rounded=rounded)
-    contact = Contact.of(start, jnp.zeros_like(start.r_n))
+        return walk(body, friction, start, loads, TURNS, lift, rounded=rounded)
+    contact = Contact.of(start, lift)
     return walk_on(body, friction, contact, loads, TURNS, rounded=rounded)[0]
 
 
@@ -76,6 +77,18 @@ def test_a_body_driven_by_displacement_is_walked_as_well():
     reach = levels(body, friction, size * LOADS, False).state.displacement
     driven = drives.driven_by_displacement(body)
     own, other = (levels(driven, friction, reach, way) for way in (True, False))
+    np.testing.assert_allclose(own.slip_work, other.slip_work, rtol=1e-7)
+
+
+def test_bearings_are_nodes_without_a_place():
+    body, friction, size = random_body(1)
+    slip = np.asarray(levels(body, friction, size * LOADS, False).state.v)
+    share = jnp.full(slip.shape[1], 1.0 / slip.shape[1])
+    held = bearings.with_bearings(body, jnp.asarray(2e4), share)
+    lift = bearings.with_gaps(jnp.zeros(NODES), 0.3 * np.abs(slip.mean(axis=1)).max())
+    own, other = (levels(held, friction, size * LOADS, way, lift=lift) for way in (True, False))
+    assert np.any(np.asarray(other.state.r_n)[:, -2:] > 0.0)
+    np.testing.assert_allclose(own.state.r_n, other.state.r_n, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(own.slip_work, other.slip_work, rtol=1e-7)
 
 
