@@ -23,7 +23,8 @@ from jbeamshell.scene.parts import Load
 from jbeamshell.scene.scene import Scene
 
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
-PLANE_GROWTH = 0.3  # of the element size over the distance from there, also of small elements
+PLANE_GROWTH = 0.2  # of the element size over the distance from there
+PLANE_SMALL_GROWTH = 0.5  # the same near the corner, where stresses are singular
 PLANE_FAR_SIZE = 0.07  # of L, elements away from it
 STEP_SIZE = 0.05  # of H, elements at a step of the pressure
 RULE = elements.element_rule("finite-difference")
@@ -284,8 +285,8 @@ def _joint_stations(scene: Scene, nodes: int) -> Array:
 def _plane_vertices(
     scene: Scene, nodes: int, sizes: Array | float, foci: Array | None, growths: Array | float
 ) -> Array:
-    """Stations of plane elasticity: small elements grow slowly too, as stresses are singular."""
-    grading = (sizes, foci, growths, PLANE_FAR_SIZE, PLANE_GROWTH)
+    """Stations of plane elasticity, which has small elements in singular corners."""
+    grading = (sizes, foci, growths, PLANE_FAR_SIZE, PLANE_SMALL_GROWTH)
     length, half_height = scene.strip.length, scene.strip.half_height
     return elements.vertices(nodes - 1, length, half_height, *grading)
 

@@ -187,6 +187,12 @@ class LoadKeys(Part):
     pressure_steps: int = count(1, 1, "Equal steps in which the pressure is applied.")
 
 
+HIERARCHIC = (
+    tuple(f"p{order}" for order in range(1, 13)),
+    "take plane, or squeeze with model.kinematics = exact",
+)
+
+
 class ModelKeys(Part):
     """Extent and resolution of the model, section ``[model]``."""
 
@@ -197,6 +203,7 @@ class ModelKeys(Part):
         SECTIONS,
         "Section: bar, shell, squeeze, assumed (its squeeze strain from the pressures) or plane "
         "(elasticity).",
+        former=HIERARCHIC,
     )
     kinematics: str = word(AUTO, KINEMATICS, "Rotations: exact or linear.")
     by: str = word(AUTO, ("steps",), "Engine: steps are load steps, also where others would do.")

@@ -52,7 +52,8 @@ def test_bound_covers_the_record_closely(name, section, every):
     c = {key: column[::every] for key, column in cells(name).items()}
     strips = zip(*(c[key] for key in ("strain", "eta", "gross", "mu", "nu")), strict=True)
     scenes = (
-        scene_of(*map(float, strip), section=section, kinematics="linear") for strip in strips
+        scene_of(*map(float, strip), section=section, kinematics="linear", by="auto")
+        for strip in strips
     )
     bound = np.array([linear_error(scene) for scene in scenes])
     measured = np.maximum(np.abs(c["dissipation"]), np.abs(c["stiffness"]))
