@@ -15,7 +15,7 @@ from jbeamshell.solving.steady_cycles import steady_cycles
 
 # Amplitudes of steady cycles, over the largest: a chord between two of them adds .4 % to D at most
 AMPLITUDES = np.append(np.geomspace(0.02, 0.4, 36), np.linspace(0.4, 1.0, 19)[1:])
-LEAST = 1e-7  # energy of a cycle that matters, over F u
+LEAST = 1e-12  # energy of a cycle that matters, over F u
 ROUNDING = 10.0  # slope of the squares below which another entry is not tried, over rounding
 
 
