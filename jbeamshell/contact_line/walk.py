@@ -146,7 +146,6 @@ def walk(
     forces: Array,
     turns: ArrayLike | tuple[bool, ...],
     lift: Array | None = None,
-    needed: Array | None = None,
     rounded: bool = True,
 ) -> Level:
     """Levels of a load path, stacked along the first axis.
@@ -161,7 +160,6 @@ def walk(
     forces : (levels,) end loads
     turns : (levels,) True where the load has turned since the level before; so is the first
     lift : (n,) lift at the start; None is none
-    needed : False to leave out the walk at no cost; its levels mean nothing then.  None is True
     rounded : False reads the polygon of the events itself, whose nodes slip one after the other
 
     Returns
@@ -170,10 +168,10 @@ def walk(
         with the axis of the levels first
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    if needed is None and isinstance(turns, tuple) and forces.dtype == float and native.serves():
+    if isinstance(turns, tuple) and forces.dtype == float and native.serves():
         numbers = _Numbers(body, jnp.asarray(friction, float), start, forces, lift)
         return _native(turns, rounded, numbers)
-    return walk_on(body, friction, Contact.of(start, lift), forces, turns, needed, rounded)[0]
+    return walk_on(body, friction, Contact.of(start, lift), forces, turns, rounded)[0]
 
 
 class _Numbers(NamedTuple):
@@ -223,24 +221,13 @@ def walk_on(
     start: Contact,
     forces: Array,
     turns: ArrayLike | tuple[bool, ...],
-    needed: Array | None = None,
     rounded: bool = True,
 ) -> tuple[Level, Contact]:
     """Levels of a load path, and the contact at its end; see `walk`."""
     friction = jnp.asarray(friction, forces.dtype)
-
-    def path() -> tuple[Level, Contact]:
-        if isinstance(turns, tuple):
-            return _in_branches(body, friction, start, forces, turns, rounded)
-        return _in_levels(body, friction, start, forces, jnp.asarray(turns), rounded)
-
-    if needed is None:
-        return path()
-
-    def nothing() -> tuple[Level, Contact]:
-        return jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), jax.eval_shape(path))
-
-    return lax.cond(needed, path, nothing)
+    if isinstance(turns, tuple):
+        return _in_branches(body, friction, start, forces, turns, rounded)
+    return _in_levels(body, friction, start, forces, jnp.asarray(turns), rounded)
 
 
 def _in_branches(

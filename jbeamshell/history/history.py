@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+from typing import Any, Self
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -62,10 +64,16 @@ class History(Profiles, ContactLine, CycleFigures):
         """True if every step found its equilibrium."""
         return bool(np.all(np.asarray(self.status) == Status.CONVERGED))
 
-    @property
+    @functools.cached_property
+    def plain(self) -> Self:
+        """The same in arrays of NumPy, which are quicker where nothing is compiled."""
+        plain: Self = jax.tree.map(np.asarray, self.but(above=None))
+        return plain
+
+    @functools.cached_property
     def doubts(self) -> tuple[str, ...]:
         """Reasons to doubt this run, each a sentence with the size of the error and the remedy."""
-        return doubts_of_run(self)
+        return doubts_of_run(self.plain)
 
     def figures(self) -> dict[str, Any]:
         """Figures of the last cycle and of the contact at the last step, as plain numbers.

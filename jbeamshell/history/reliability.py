@@ -6,13 +6,12 @@ of `jbeamshell.history.error_estimates`.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, Self
 
 import jax
 import numpy as np
 from jax import Array
 
-from jbeamshell.history.error_estimates import SlipCycle, estimates
 from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.linearisation import linear_error
@@ -49,7 +48,9 @@ class Run(Protocol):
     @property
     def slip_length(self) -> Array: ...
     @property
-    def slip_cycle(self) -> SlipCycle: ...
+    def errors(self) -> tuple[Array, ...]: ...
+    @property
+    def plain(self) -> Self: ...
 
 
 def doubted_from(tolerance: float) -> float:
@@ -73,17 +74,14 @@ def change_of(coarse: Run, fine: Run) -> Array:
 
 def misses_tolerance(history: Run) -> bool:
     """True if the estimated error of a run exceeds its tolerance; never without friction."""
-    plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
+    plain = history.plain
     if not plain.scene.contact.friction > 0.0:
         return False
-    with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
-        errors = estimates(plain.scene, plain.slip_cycle, plain.change)
-    return bool(max(errors) > plain.scene.model.tolerance)
+    return bool(max(plain.errors) > plain.scene.model.tolerance)
 
 
-def doubts_of_run(history: Run) -> tuple[str, ...]:
-    """Doubts about a run that was solved."""
-    plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
+def doubts_of_run(plain: Run) -> tuple[str, ...]:
+    """Doubts about a run that was solved, in arrays of NumPy."""
     if not plain.converged:
         return ("a load step found no equilibrium: that step and all after it hold NaN",)
     scene = plain.scene
@@ -150,10 +148,7 @@ def _unsteady(history: Run) -> tuple[str, ...]:
 
 def _resolution(history: Run) -> tuple[str, ...]:
     """Doubts about the slip zone's resolution by the grid."""
-    with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
-        cycle = jax.tree.map(np.asarray, history.slip_cycle)
-        errors = estimates(history.scene, cycle, history.change)
-        grid, corner, slider, steps = map(float, errors)
+    grid, corner, slider, steps = map(float, history.errors)
     finer = finer_grid(history.scene)
     if np.isinf(grid):
         return (
