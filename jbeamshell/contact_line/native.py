@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from jbeamshell.common.jax_options import WALK
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.contact_line.events import MOST_VERTICES, Record
@@ -43,11 +45,25 @@ class Levels(NamedTuple):
 
 @functools.cache
 def library() -> ctypes.CDLL | None:
-    """Library of the walk in C; None if it was not built or cannot be loaded."""
+    """Library of the walk in C; None if it was not built, cannot be loaded or is not wanted."""
+    if os.environ.get(WALK) == "jax":
+        return None
     try:
         return ctypes.CDLL(str(LIBRARY))
     except OSError:
         return None
+
+
+def in_words() -> str:
+    """Line that says where this process walks load paths, and why, without starting JAX."""
+    if library() is not None:
+        return "load paths are walked in C"
+    reason = f"{LIBRARY.name} cannot be loaded: install jbeamshell anew"
+    if not LIBRARY.exists():
+        reason = "there was no C compiler when jbeamshell was installed"
+    if os.environ.get(WALK) == "jax":
+        reason = f"{WALK} = jax"
+    return f"load paths are walked in JAX, more slowly ({reason})"
 
 
 @functools.cache

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
+from jbeamshell.common import jax_options
 from jbeamshell.contact_line import bearings, drives, native, strip
 from jbeamshell.contact_line.contact_state import pressed
 from jbeamshell.contact_line.walk import Contact, walk, walk_on
@@ -57,6 +58,25 @@ def figures(body, friction, loads, in_c):
 
 SLOPES = jax.jit(jax.jacfwd(figures, argnums=(1, 2)), static_argnums=3)
 BACK = jax.jit(jax.grad(lambda *at: figures(*at)[15], argnums=(0, 1, 2)), static_argnums=3)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [(None, "no C compiler"), (b"no library", "libwalk.so cannot be loaded: install")],
+)
+def test_a_library_that_is_not_there_leaves_the_walk_to_jax(tmp_path, monkeypatch, content, says):
+    monkeypatch.delenv(jax_options.WALK, raising=False)
+    monkeypatch.setattr(native, "LIBRARY", tmp_path / "libwalk.so")
+    if content is not None:
+        native.LIBRARY.write_bytes(content)
+    for known in (native.library, native.serves):
+        known.cache_clear()
+    try:
+        assert not native.serves()
+        assert says in native.in_words()
+    finally:
+        for known in (native.library, native.serves):
+            known.cache_clear()
 
 
 @pytest.mark.parametrize("rounded", [True, False])
