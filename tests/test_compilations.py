@@ -34,6 +34,7 @@ def test_solve_compiles_once_for_all_numbers_of_a_scene(compiled):
     compiled()
     varied = {key: np.asarray(scene.get(key)) for key in NUMBERS if scene.get(key) is not None}
     varied = {key: float(value) for key, value in varied.items() if value.ndim == 0 and value > 0.0}
+    del varied["strip.kappa_s"]  # which only the beamshell has
     assert len(varied) >= 10
     for key, value in varied.items():
         history = jb.solve(scene.replace({key: 1.03 * value}))

@@ -19,7 +19,7 @@ enum { BY_ROW, AT_ONCE, AT_RETURN, FIXED };
 
 static const double SLIDES = 1e6, SLIDES_ON = 1e-2, ABOUT = 2.0, TOUCHES = 1e-9, SAME = 1e-9;
 static const double ROUNDING = 32.0 * 2.220446049250313e-16;
-static const double LATE = 1e-9, MERGED = 1e-9, MOST_PART = 0.6, UNEVEN = 3.0;
+static const double LATE = 1e-9, MERGED = 1e-9, MOST_PART = 0.6, UNEVEN = 3.0, STARTS = 0.25;
 enum { MOST_VERTICES = 8, MOST_EVENTS = 40, DENSE = 3, PRODUCT = 3 };  /* times the nodes */
 
 /* --- product form of the inverse --------------------------------------------------------------- */
@@ -248,7 +248,12 @@ static double horizon(const Walk *w, double reach) {
     double most = reach;
     for (int j = 1; j < w->number; ++j) {
         double step = w->at[j] - w->at[w->before[j]];
-        if (w->after[j] != 0 || w->at[j] - MOST_PART * step >= reach) continue;
+        int starts = w->before[j] == 0 && j > 1;
+        if (w->after[j] != 0 || w->at[j] - (starts ? STARTS : MOST_PART) * step >= reach) continue;
+        if (starts) {
+            most = fmax(most, w->at[j] + STARTS / (1.0 - MOST_PART) * step);
+            continue;
+        }
         most = fmax(most, w->at[j] + UNEVEN * MOST_PART / (1.0 - MOST_PART) * step);
         if (w->before[j] > 0) most = fmax(most, reach + UNEVEN * MOST_PART * step);
     }
@@ -345,8 +350,9 @@ static void prepare(Walk *w) {
 
 /* Parts of the rounded corners before and behind each vertex; zero for sharp ones. */
 static void corners(Walk *w, int rounded) {
-    int last = w->number - 1;
+    int last = w->number - 1, first = 1; /* vertex at which the first front starts */
     const double *x = w->x;
+    while (first < last && (w->before[first] != 0 || w->after[first] == 0)) ++first;
     for (int j = 0; j <= last; ++j) {
         int i = w->node[j];
         double part = 0.5; /* of its step that is nearer to a vertex than to the one before */
@@ -366,7 +372,8 @@ static void corners(Walk *w, int rounded) {
     for (int j = 0; j <= last; ++j) {
         int starts = w->before[j] == 0, ends = w->after[j] == 0;
         double ahead = w->part_behind[j];
-        double half = starts ? fmin(w->at[j], ahead) : fmin(w->whole[j], UNEVEN * w->whole[w->before[j]]);
+        double room = j == first ? w->at[j] : STARTS * w->at[j];
+        double half = starts ? fmin(room, ahead) : fmin(w->whole[j], UNEVEN * w->whole[w->before[j]]);
         if (ends) ahead = half;
         int is_round = rounded && j < last && !(starts && ends);
         w->part_before[j] = is_round ? fmin(half, UNEVEN * ahead) : 0.0;
