@@ -55,6 +55,7 @@ DENSE = 3  # vertices, times the nodes, from which on close ones are merged
 MERGED = 1e-9  # of the branch: vertices that are closer are one
 MOST_PART = 0.6  # of a step of a front, that rounds one of its corners; see `spline`
 UNEVEN = 3.0  # largest ratio of the two parts of a rounded corner
+STARTS = 0.25  # of the load at which a later front starts, by which its first corner is rounded
 
 
 class Polygon(NamedTuple):
@@ -234,14 +235,16 @@ def _walked(branch: Branch, search: Search, opened: Array, reach: Array, slides:
 
 def horizon(polygon: Polygon, reach: Array) -> Array:
     """Load up to which events are needed: those that may round a corner at the branch's end."""
-    rows = jnp.arange(polygon.tau.size)
-    step = polygon.tau - polygon.tau[polygon.before]
+    tau, rows = polygon.tau, jnp.arange(polygon.tau.size)
+    step = tau - tau[polygon.before]
+    starts = (polygon.before == 0) & (rows > 1)
     open_end = (rows > 0) & (rows < polygon.number) & (polygon.after == 0)
-    open_end &= polygon.tau - MOST_PART * step < reach
+    open_end &= tau - jnp.where(starts, STARTS, MOST_PART) * step < reach
     beyond = jnp.maximum(
-        polygon.tau + UNEVEN * MOST_PART / (1.0 - MOST_PART) * step,
+        tau + UNEVEN * MOST_PART / (1.0 - MOST_PART) * step,
         jnp.where(polygon.before > 0, reach + UNEVEN * MOST_PART * step, 0.0),
     )
+    beyond = jnp.where(starts, tau + STARTS / (1.0 - MOST_PART) * step, beyond)
     return jnp.maximum(jnp.max(jnp.where(open_end, beyond, 0.0)), reach)
 
 

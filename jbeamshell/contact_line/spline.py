@@ -11,9 +11,10 @@ and b of a corner,
     tau - tau_e = -a + 2 a t + (b - a) t^2,    (tau - tau_e)_+  becomes  b t^2.
 
 Where one front moves alone on even elements that is the quadratic B-spline of the polygon.  Of
-several fronts each is rounded over its own steps.  The first loading of a bar is exact, whatever
-its elements.  A corner that no front makes stays sharp, as where a whole body slips at once or a
-bolt comes to bear.
+several fronts each is rounded over its own steps.  The first front starts with the branch; one that
+starts later does so within a quarter of its load, however far its next step is.  The first loading
+of a bar is exact, whatever its elements.  A corner that no front makes stays sharp, as where a
+whole body slips at once or a bolt comes to bear.
 
 All equations that are linear hold exactly on the spline: balance, and u = c F + f.q.  Coulomb's and
 Signorini's conditions hold as far as convexity goes: a node that opens or closes within a rounded
@@ -28,7 +29,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from jbeamshell.contact_line.polygon import MOST_PART, UNEVEN, Polygon, Slip
+from jbeamshell.contact_line.polygon import MOST_PART, STARTS, UNEVEN, Polygon, Slip
 from jbeamshell.contact_line.tableau import Branch
 
 
@@ -120,8 +121,10 @@ def _corners(polygon: Polygon, x: Array, sliding: Array) -> tuple[Array, Array]:
     starts, ends = polygon.before == 0, polygon.after == 0
     ahead = (tau[polygon.after] - tau) * (1.0 - share[polygon.after])
     half = (tau - tau[polygon.before]) * share
+    first = jnp.argmax(starts & ~ends & (rows > 0))
+    room = jnp.where(rows == first, tau, STARTS * tau)
     half = jnp.where(
-        starts, jnp.minimum(tau, ahead), jnp.minimum(half, UNEVEN * half[polygon.before])
+        starts, jnp.minimum(room, ahead), jnp.minimum(half, UNEVEN * half[polygon.before])
     )
     ahead = jnp.where(ends, half, ahead)
     round_ones = (rows < polygon.number - 1) & ~(starts & ends) & ~sliding & ~jnp.roll(sliding, 1)
