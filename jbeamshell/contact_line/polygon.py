@@ -55,7 +55,7 @@ DENSE = 3  # vertices, times the nodes, from which on close ones are merged
 MERGED = 1e-9  # of the branch: vertices that are closer are one
 MOST_PART = 0.6  # of a step of a front, that rounds one of its corners; see `spline`
 UNEVEN = 3.0  # largest ratio of the two parts of a rounded corner
-STARTS = 0.25  # of the load at which a later front starts, by which its first corner is rounded
+STARTS = 0.25  # of its load: most that the corner where a later front starts reaches back
 
 
 class Polygon(NamedTuple):

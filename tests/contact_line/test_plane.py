@@ -171,9 +171,9 @@ class TestEvents:
             assert work == pytest.approx(dissipated, rel=0.01), (eta, amplitude)
 
     def test_nodes_that_open_far_beyond_a_branch_do_not_round_it(self):
-        """Alternate nodes lifted so, and up to a third of the dissipation was missing or too much.
+        """Every other node lifted then, and this strip lost a third too much.
 
-        The truth is that of 257 nodes.
+        The truth is that of 257 nodes, and the bound is the tolerance of a plain call.
         """
         values = {"strip.height_ratio": 0.2905963758435436, "contact.friction": 0.3319990517492375}
         values |= {"strip.poisson_ratio": 0.16426678960623065, "strip.far_end": "pinned"}
