@@ -11,9 +11,9 @@ and b of a corner,
     tau - tau_e = -a + 2 a t + (b - a) t^2,    (tau - tau_e)_+  becomes  b t^2.
 
 Where one front moves alone on even elements that is the quadratic B-spline of the polygon.  Of
-several fronts each is rounded over its own steps.  The corner where the first front starts may reach
-back to the begin of the branch.  That of a later front reaches back by a quarter of its load at
-most: its next step may be far away, beyond the end of the branch.  The first loading of a bar is
+several fronts each is rounded over its own steps.  The corner where the first front starts may
+reach back to the begin of the branch.  That of a later front reaches back by a quarter of its load
+at most: its next step may be far away, beyond the end of the branch.  The first loading of a bar is
 exact, whatever its elements.  A corner that no front makes stays sharp, as where a whole body slips
 at once or a bolt comes to bear.
 
