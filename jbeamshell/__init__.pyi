@@ -35,11 +35,11 @@ from .identify.plan import fit as fit
 from .history.contact_history import ContactHistory as ContactHistory
 from .history.face_history import FaceHistory as FaceHistory
 from .history.history import History as History
+from .history.read_history import read_history as read_history
 from .solving.advice import Advice as Advice, advise as advise
 from .solving.solve import solve as solve
 from .measured.inspection import Inspection as Inspection, inspect as inspect
 from .numerics.newton import Newton as Newton
-from .solving.read_history import read_history as read_history
 from .solving.response import response as response
 from .scene import library as library
 from .scene.parts import (

@@ -6,7 +6,6 @@ makes a good file of each format and damages them in turn, in ways drawn at rand
 line of JSON for each: file, damage, outcome and seconds of the processor, children's included.
 """
 
-import importlib.util
 import json
 import os
 import shutil
@@ -127,10 +126,6 @@ def _bodies(folder):
     scipy.sparse.save_npz(folder / "matrix.npz", sparse)
     scipy.io.savemat(folder / "matrix.mat", {"K": sparse})
     scipy.io.mmwrite(folder / "matrix.mtx", sparse)
-    if importlib.util.find_spec("pyyeti"):
-        from pyyeti.nastran import op4
-
-        op4.write(str(folder / "matrix.op4"), {"KAA": stiffness})
     np.savetxt(folder / "contact.csv", [[4, 0.0], [5, 0.1], [6, 0.2]], delimiter=",")
 
 

@@ -110,7 +110,7 @@ def errors_of(values: Values, found: jb.History, other: Values | None) -> Row:
         errors["refined"] = off(float(found.dissipation), float(fine.dissipation))
         errors["loop"] = loop_error(found, fine)
         errors["stiffness"] = off(float(found.secant_stiffness), float(fine.secant_stiffness))
-    if other is not None and not scene.plan.elastic:
+    if other is not None:
         unlike = by_the_other(values, scene, other)
         beside = solved(unlike)
         if beside is not None and beside.doubts and differs(found, beside):

@@ -7,6 +7,7 @@ Values = dict[str, Any]
 FEW = {"model.nodes": 17, "load.steps_per_half_cycle": 4, "load.cycles": 1}
 STEPS = FEW | {"by": "steps", "model.kinematics": "linear", "contact.normal": "held"}
 EXACT = STEPS | {"model.kinematics": "exact"}
+LINE = FEW | {"model.section": "squeeze", "model.kinematics": "linear"}
 LIFT = {"contact.normal": "rigid"}
 SMOOTH = {"contact.smoothing": 8.0}
 SOFT = {"contact.stick_stiffness": 100.0}
@@ -37,11 +38,10 @@ SINGLE = DOUBLE | {
 }
 BOLTS = {"contact.bolts": [[0.5, 5.0, 0.4], [1.4, 6.0, 0.5]], "load.amplitude": 0.3}
 SETTINGS: dict[str, Values] = {
-    "contact line, squeeze": FEW,
+    "contact line, squeeze": LINE,
     "contact line, shell": FEW | {"model.section": "shell", "model.kinematics": "linear"},
-    "contact line, p2": FEW | {"model.section": "p2", "model.kinematics": "linear"},
-    "contact line, soft sliders": FEW | SOFT,
-    "contact line, displacement": FEW | DISPLACED,
+    "contact line, soft sliders": LINE | SOFT,
+    "contact line, displacement": LINE | DISPLACED,
     "contact line, steps of pressure": FEW | TABLE_OF_STEPS,
     "contact line, both faces": FEW | BOTH_FACES | SOFT,
     "contact line, layers": FEW | LAYERS | SOFT,
@@ -62,8 +62,6 @@ SETTINGS: dict[str, Values] = {
     "exact, layers": EXACT | LAYERS,
     "load steps, displacement": STEPS | DISPLACED,
     "exact, arc length": EXACT | DISPLACED | {"load.control": "arc-length"},
-    "load steps, p2": STEPS | {"model.section": "p2", "load.entry": "guided"},
-    "load steps, p3, exact": EXACT | {"model.section": "p3", "load.entry": "face"},
     "collocation": EXACT | {"model.grid": "collocation"},
     "assumed squeeze": EXACT | LIFT | {"model.section": "assumed"},
     "printed constants": STEPS | {"model.constants": "printed"},

@@ -73,8 +73,6 @@ def numbers_of(scene: jb.Scene, given: Values) -> Walk:
     """Every number that a scene holds, each entry of its tables a direction of its own."""
     keys, values, directions = [], [], []
     for key in NUMBERS:
-        if key == "member.holes":
-            continue
         if TABLE[key].through and key != "contact.bolts":
             continue
         if key == "contact.bolts" and key not in given:

@@ -70,7 +70,7 @@ def copied(folder: Path) -> Path:
     """Copy of the project in a folder, as far as tests read it."""
     for name in ("jbeamshell", "tests", "calibration", "verification"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "README.md"):
+    for name in ("pyproject.toml", "README.md", "hatch_build.py"):
         shutil.copy(ROOT / name, folder)
     return folder
 
@@ -80,6 +80,7 @@ def killed(fault: Fault, project: Path) -> str:
     place, text = project / "jbeamshell" / fault.file, text_of(fault, project)
     assert fault.right in text, f"{fault.name}: is not in the file any more"
     place.write_text(text.replace(fault.right, fault.wrong), encoding="utf-8")
+    _built(place)
     command = [sys.executable, "-m", "pytest", *OPTIONS, *fault.tests]
     path = {"PYTHONPATH": str(project), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
@@ -96,11 +97,20 @@ def killed(fault: Fault, project: Path) -> str:
         return "never ends"
     finally:
         place.write_text(text, encoding="utf-8")
+        _built(place)
     for line in done.stdout.splitlines():
         if line.startswith(("FAILED ", "ERROR ")):
             return line.split()[1]
     assert done.returncode == 0, done.stdout + done.stderr
     return ""
+
+
+def _built(place: Path) -> None:
+    """Build the library of a source in C anew."""
+    if place.suffix == ".c":
+        code = "import hatch_build as h, pathlib; h.built(pathlib.Path(h.FOLDER), [])"
+        project = place.parents[2]
+        subprocess.run([sys.executable, "-c", code], cwd=project, check=True)
 
 
 def measure(word: str = "", again: bool = False) -> None:

@@ -35,9 +35,8 @@ BINS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 
 BINS += (8.0, 10.0, 14.0, 20.0, 60.0)  # of the slip length over H
 ENOUGH = 3  # rows that make a point of a curve
 LITTLE = 1e-4  # of the bar's dissipation, below which rows count for no curve
-SHOWN = ("shell", "squeeze", "p2", "p4", "p6")  # sections that are drawn
 EDGES, LEAST = np.geomspace(0.1, 60.0, 15), 0.02  # bins, and lower end in per cent, of the charts
-WARPING = ("shell", "squeeze", "p2", "p3", "p4", "p6")
+SHELLS = ("shell", "squeeze")  # sections that any scene may have
 Values = dict[str, Any]
 Random = np.random.Generator
 
@@ -138,9 +137,7 @@ def runs(scenes: list[Values], gross: np.ndarray, model: Values) -> np.ndarray:
 
 def sections(kind: str) -> tuple[str, ...]:
     """Sections that a kind of scenes may have; a bar is known under an even pressure alone."""
-    if kind == "laminate":
-        return "shell", "squeeze"
-    return ("bar", *WARPING) if kind == "even" else WARPING
+    return ("bar", *SHELLS) if kind == "even" else SHELLS
 
 
 def beside_elasticity(kind: str, entry: str) -> Values:
@@ -233,7 +230,7 @@ def draw(record: Values) -> plt.Figure:
             2, len(entries), figsize=(10.2, 5.4), sharex=True, sharey=True, layout="constrained"
         )
         for entry, above, below in zip(entries, *panels, strict=True):
-            for section, colour in zip(SHOWN, PALETTE, strict=False):
+            for section, colour in zip(SHELLS, PALETTE, strict=False):
                 rows = entries[entry][section]
                 _draw(above, rows, colour, section, dots=section == "squeeze")
             for kind, colour in zip([k for k in KINDS if k != "even"], PALETTE, strict=False):

@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 import jbeamshell as jb
 from calibration.running import as_text
 from jbeamshell.contact_line.body import Body
-from jbeamshell.contact_line.branches import pressed
+from jbeamshell.contact_line.contact_state import pressed
 from jbeamshell.contact_line.solve import strip_of
 from jbeamshell.contact_line.walk import walk
 from jbeamshell.plotting.style import style

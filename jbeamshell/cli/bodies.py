@@ -28,7 +28,7 @@ def add_to(commands: Any) -> None:
         "and report the hysteresis loop. They are pressed without friction unless the file says "
         "assembly, and loaded until the loop is steady unless it says cycles.",
         epilog="The file says friction, amplitude, cycles, bolts, gap, ... and, in [upper] and "
-        "[lower], the file of each stiffness matrix (.sti of CalculiX, .mtx, .mat, .npz, .op4) "
+        "[lower], the file of each stiffness matrix (.sti of CalculiX, .mtx, .mat, .npz) "
         "with the tables contact (node, X), pull and press (node, direction, force).  With face in "
         "place of contact the bodies touch on a face; deck = FILE.inp then names a deck of "
         "CalculiX, whose surfaces are the face and bear the loads.",

@@ -12,6 +12,7 @@ import threading
 from collections.abc import Sequence
 from importlib.metadata import version
 from types import FrameType
+from typing import Any
 
 import jax
 
@@ -28,7 +29,7 @@ from jbeamshell.cli import (
     scenes,
     sweep,
 )
-from jbeamshell.cli.terminal import BAD_INPUT, INTERRUPTED, UNCONVERGED, complain, warn
+from jbeamshell.cli.terminal import BAD_INPUT, INTERRUPTED, UNCONVERGED, complain, put, warn
 from jbeamshell.common import jax_options
 from jbeamshell.common.errors import InputError, UnconvergedError
 
@@ -81,6 +82,16 @@ def _interrupt(_: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+class _Version(argparse.Action):
+    """Prints the version, and where load paths are walked."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from jbeamshell.contact_line import native
+
+        put(f"jbeamshell {version('jbeamshell')}: {native.in_words()}\n")
+        parser.exit()
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="jbeamshell",
@@ -91,7 +102,7 @@ def _parser() -> argparse.ArgumentParser:
         "scene, a command takes the standard strip.",
     )
     parser.add_argument(
-        "--version", action="version", version=f"jbeamshell {version('jbeamshell')}"
+        "--version", action=_Version, nargs=0, help="say the version, and where paths are walked"
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for command in COMMANDS:

@@ -9,10 +9,12 @@ from typing import Any
 
 import jax
 
+from jbeamshell.common.checks import require_choice
 from jbeamshell.common.errors import InputError
 
 EXTRA = "--xla_backend_extra_options="
 FAST_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
+WALK = "JBEAMSHELL_WALK"  # variable that names the walk of this process and of those it starts
 ASYNCHRONOUS = "jax_cpu_enable_async_dispatch"
 ONCE = {"xla_backend_optimization_level": 0}  # compiler options for a program that runs few times
 WORTH_KEEPING = 0.02  # seconds of compilation, from which on a program is kept in the cache
@@ -23,23 +25,27 @@ def configure(
     fast_loops: bool = True,
     asynchronous: bool = False,
     cache: str | os.PathLike[str] | bool = True,
+    walk: str | None = None,
 ) -> None:
     """Choose how JAX compiles and calls in this process.
 
     LAPACK gets one thread, unless OPENBLAS_NUM_THREADS says otherwise.  Processes that this one
-    starts inherit that and ``fast_loops``, not the other options.
+    starts inherit that, ``fast_loops`` and ``walk``, not the other options.
 
     Parameters
     ----------
     fast_loops : True to compile every loop on a CPU to one native function, instead of a call for
-        each of its operations.  Loops then run several times faster, and compile a little slower.
-        `jbeamshell.solve` does this by itself for the load steps of most scenes.  The option is the
-        compiler's and holds for everything the process compiles.
+        each of its operations.  Loops then run several times faster, load steps above all, and
+        compile a little slower.  The option is the compiler's and holds for everything the process
+        compiles.
     asynchronous : True to compute calls on a CPU in another thread, which is JAX's own default.
         Handing over to that thread takes as long as a cycle of a small strip.
     cache : folder in which compiled programs are kept, so that the next process need not compile
         them again; True is ``~/.cache/jbeamshell``, or JAX's own folder if it has one; False
         leaves JAX's setting as it is
+    walk : "jax" to walk load paths in JAX, which says the same more slowly, or "c" to walk them in
+        C where jbeamshell was installed with a C compiler; None leaves it to the variable `WALK`,
+        and takes C without it.  ``jbeamshell --version`` says which
 
     Raises
     ------
@@ -58,6 +64,10 @@ def configure(
 
         jb.configure()  # before anything is computed
     """
+    if walk is not None and walk != os.environ.get(WALK, "c"):
+        require_choice("walk", walk, ("c", "jax"))
+        _check_not_started(f"walk = {walk!r}")
+        os.environ[WALK] = walk
     # Matrices here are small: threads of LAPACK would wait for each other longer than they work.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # SciPy reads it when JAX first needs it
     folder = _default_cache() if cache is True else cache

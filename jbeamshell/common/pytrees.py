@@ -18,7 +18,10 @@ class Tree(eqx.Module):
     __getattribute__ = object.__getattribute__
 
     def but(self, **values: Any) -> Self:
-        """Copy with other values of some fields, which are neither converted nor checked."""
-        copy = object.__new__(type(self))
-        vars(copy).update(vars(self) | values)
+        """Copy with other values of some fields, which are neither converted nor checked.
+
+        What the object has found of itself and kept is not copied.
+        """
+        copy, fields = object.__new__(type(self)), self.__dataclass_fields__
+        vars(copy).update({k: v for k, v in vars(self).items() if k in fields} | values)
         return copy

@@ -14,7 +14,6 @@ from jbeamshell.common.checks import is_staged
 
 QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
 VECTORS = "xla_backend_optimization_level"  # option without which loops stay vectorised
-SOONEST = QUICK | {VECTORS: 0}  # for native loops, which run well as they are
 
 
 @functools.cache
@@ -29,20 +28,13 @@ def quick_options(*, vectors: bool = False) -> dict[str, Any] | None:
     Returns
     -------
     dict, or None
-        see `known_options`
-    """
-    wanted = {name: value for name, value in QUICK.items() if not (vectors and name == VECTORS)}
-    return known_options(wanted)
-
-
-def known_options(wanted: dict[str, Any]) -> dict[str, Any] | None:
-    """Compiler options without those that this release of JAX does not know.
-
-    None where the whole process compiles with fewer optimisations anyway.
+        options that this release of JAX knows; None where the whole process compiles with fewer
+        optimisations anyway
     """
     config: Any = jax.config
     if config.values["jax_disable_most_optimizations"]:
         return None
+    wanted = {name: value for name, value in QUICK.items() if not (vectors and name == VECTORS)}
     return {name: value for name, value in wanted.items() if _is_known(name, value)}
 
 

@@ -16,7 +16,7 @@ from jax import Array
 
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.contact_line.body import Body
-from jbeamshell.contact_line.branches import pressed
+from jbeamshell.contact_line.contact_state import pressed
 from jbeamshell.contact_line.walk import walk
 
 FIRST = 1e-6  # part of the mean reaction from which the pressures grow

@@ -29,19 +29,19 @@ from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.small import Small
 from jbeamshell.contact_line.assembly import press_roughly
 from jbeamshell.contact_line.body import Body, local_compliance
-from jbeamshell.contact_line.branches import ContactState, pressed
 from jbeamshell.contact_line.contact_input import (
     check_bodies,
     checked_bolts,
     checked_gap,
     held_nodes,
 )
+from jbeamshell.contact_line.contact_state import ContactState, pressed
 from jbeamshell.contact_line.drives import driven_by_displacement, exchanged
 from jbeamshell.contact_line.pair import together
 from jbeamshell.contact_line.pressing import press
 from jbeamshell.contact_line.substructure import Substructure, potential
-from jbeamshell.contact_line.turns import turns_of
-from jbeamshell.contact_line.walk import SLIDES, Contact, Level, walk, walk_on
+from jbeamshell.contact_line.turns import known_turns, turns_of, turns_of_cycles
+from jbeamshell.contact_line.walk import SLIDES, Level, walk
 from jbeamshell.history.contact_history import ContactHistory
 from jbeamshell.numerics.cycles import closed_cycles
 from jbeamshell.scene.keys import ASSEMBLIES, CONTROLS
@@ -135,7 +135,9 @@ def solve_contact(
     flat = not is_traced(gaps) and not np.any(np.asarray(gaps))
     distance = None if flat else jnp.broadcast_to(gaps, upper.x.shape)
     until_steady = path is None and cycles is None
-    settings = control, assembly, steps_per_half_cycle if until_steady else None, points
+    turns = _turns(targets, cycles, steps_per_half_cycle, path is None)
+    half = steps_per_half_cycle if until_steady else None
+    settings = control, assembly, half, points, turns
     levels, count, error = _levels((contact, distance, targets), held, settings)
     if until_steady and not is_traced(levels):
         targets = targets[: unit_path(int(count), steps_per_half_cycle).size]
@@ -167,6 +169,13 @@ def _targets(
     require("path", loads.shape, loads.ndim == 1 and loads.size > 0, "give (levels,) loads")
     require_finite("path", loads)
     return loads
+
+
+def _turns(targets: Array, cycles: int | None, steps: int, own: bool) -> tuple[bool, ...] | None:
+    """Turns of a path of cycles (``own``) or of given loads; None where they are not known yet."""
+    if own:
+        return None if cycles is None else turns_of_cycles(cycles, steps)
+    return None if is_traced(targets) else known_turns(np.asarray(targets))
 
 
 @jax.jit
@@ -205,21 +214,21 @@ def _check_push(hessian: Array, held: tuple[bool, ...], slides: Array) -> None:
 def _levels(
     inputs: tuple[tuple[Array, ...], Array | None, Array],
     held: tuple[bool, ...],
-    settings: tuple[str, str, int | None, bool],
+    settings: tuple[str, str, int | None, bool, tuple[bool, ...] | None],
 ) -> tuple[Level, Array, Array]:
     """Levels of the path, the number of cycles until it is steady, and the `_errors`.
 
     The pressed contact comes first.  Nodes are as `_order` has them.  The settings are control,
-    assembly, the steps per half cycle of a path that goes on until it is steady, else None, and
-    True for nodes that are contacts of their own.
+    assembly, the steps per half cycle of a path that goes on until it is steady, else None, True
+    for nodes that are contacts of their own, and the turns of the path if they are known.
     """
-    (contact, gap, targets), (control, assembly, half, points) = inputs, settings
+    (contact, gap, targets), (control, assembly, half, points, turns) = inputs, settings
     body, lift = _pressed_body(contact, gap, held, assembly)
     friction, start = contact[3], pressed(body)
     driven = driven_by_displacement(body) if control == "displacement" else body
     if half is None:
-        turns = turns_of(targets)
-        levels = walk(driven, friction, start, targets, turns, lift, rounded=not points)
+        known = turns_of(targets) if turns is None else turns
+        levels = walk(driven, friction, start, targets, known, lift, rounded=not points)
         count = targets
     else:
         levels, count = _until_steady(driven, friction, start, targets, lift, half, points)
@@ -299,42 +308,37 @@ def _until_steady(
     half: int,
     points: bool,
 ) -> tuple[Level, Array]:
-    """Levels of the first loading and of all cycles, and the number of those that were walked.
+    """Levels of the first loading and of all cycles, and the number of those up to a steady one.
 
     A cycle is steady if its slip ends where it began, or has moved on as far as in the cycle
     before: a body may walk.  The cycles after it are copies.
     """
-    rise = targets.size - 2 * half * MOST_CYCLES
+    rise, k = targets.size - 2 * half * MOST_CYCLES, start.v.size
     rest = jnp.full(2 * half - rise, targets[rise - 1])  # the load rests until the first cycle
-    loads = jnp.concatenate([targets[:rise], rest, targets[rise:]]).reshape(-1, 2 * half)
-    turning = np.zeros(loads.shape, bool)
+    loads = jnp.concatenate([targets[:rise], rest, targets[rise:]])
+    turning = np.zeros((MOST_CYCLES + 1, 2 * half), bool)
     turning[:, 0] = turning[1:, half] = True
-    paths = loads, jnp.asarray(turning), jnp.arange(MOST_CYCLES + 1) > 0
+    turns = tuple(turning.ravel().tolist())
+    walked = walk(body, friction, start, loads, turns, lift, rounded=not points)
 
-    def go(
-        carry: tuple[Level, Contact, Array, Array], to: tuple[Array, Array, Array]
-    ) -> tuple[tuple[Level, Contact, Array, Array], tuple[Level, Array]]:
-        before, at, last_drift, copied = carry
-        loads, turns, closes = to
-        state = at.state
-        walked = walk_on(body, friction, at, loads, turns, ~copied, not points)
-        now, at = jax.tree.map(lambda old, new: jnp.where(copied, old, new), (before, at), walked)
-        slip = lax.stop_gradient(jnp.concatenate([state.v[None], now.state.v]))
-        none = NOISE * jnp.max(jnp.abs(state.r_t)) / jnp.max(jnp.abs(body.K_tt))
-        drift = slip[-1] - slip[0]
-        leftover = jnp.minimum(*(jnp.max(jnp.abs(way)) for way in (drift, drift - last_drift)))
-        repeats = leftover <= REPEATS * jnp.max(jnp.ptp(slip, axis=0)) + none
-        steady = copied | (closes & repeats) | ~now.settled[-1]
-        return (now, at, drift, steady), (now, copied)
-
-    first = Level(start, lift, body.c, start.v > 0.0, jnp.asarray(True))
-    first = jax.tree.map(lambda a: jnp.broadcast_to(a, (2 * half, *a.shape)), first)
-    at_start = first, Contact.of(start, lift), jnp.zeros_like(start.v), jnp.asarray(False)
-    _, (levels, copied) = lax.scan(go, at_start, paths)
-    places = np.arange(loads.size)
-    places = np.append(places[:rise], places[2 * half :])
-    flat = jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[places], levels)
-    return flat, jnp.maximum(jnp.sum(~copied) - 1, 1)
+    v, r_t = (lax.stop_gradient(a).reshape(-1, 2 * half, k) for a in walked.state[:2])
+    before, tractions = (
+        jnp.concatenate([first[None], each[:-1, -1]])
+        for first, each in ((start.v, v), (start.r_t, r_t))
+    )
+    drift = v[:, -1] - before
+    apart = drift, jnp.diff(drift, axis=0, prepend=0.0)
+    leftover = jnp.minimum(*(jnp.max(jnp.abs(way), axis=1) for way in apart))
+    slips = jnp.ptp(jnp.concatenate([before[:, None], v], axis=1), axis=1)
+    none = NOISE * jnp.max(jnp.abs(tractions), axis=1) / jnp.max(jnp.abs(body.K_tt))
+    repeats = leftover <= REPEATS * jnp.max(slips, axis=1) + none
+    closes, settled = np.arange(MOST_CYCLES + 1) > 0, walked.settled[2 * half - 1 :: 2 * half]
+    steady = (closes & repeats) | ~settled
+    last = jnp.where(jnp.any(steady), jnp.argmax(steady), MOST_CYCLES)
+    numbers = np.append(np.arange(rise), np.arange(2 * half, loads.size))
+    copied = jnp.minimum(numbers // (2 * half), last) * 2 * half + numbers % (2 * half)
+    levels = jax.tree.map(lambda a: a[copied], walked)
+    return levels, jnp.maximum(last, 1)
 
 
 def _order(held: tuple[bool, ...]) -> tuple[np.ndarray, int]:

@@ -8,7 +8,7 @@
     assembly = "frictionless"    # or "frictional"; this, and a steady cycle, if left out
 
     [upper]
-    file = "upper.sti"           # or .npz, .mat, .mtx, .op4; paths are those beside this file
+    file = "upper.sti"           # or .npz, .mat, .mtx; paths are those beside this file
     contact = "contact.csv"      # rows of node and X
     pull = "pull.csv"            # rows of node, direction and force
     press = ["bolt_1.csv", "bolt_2.csv"]

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jbeamshell.contact_line.body import Body, local_compliance
-from jbeamshell.contact_line.branches import ContactState
+from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.numerics.factors import inverse_cholesky
 
 STIFF = 1e7  # rounding leaves nine digits beside it

@@ -81,7 +81,7 @@ def end_section(
         columns.append(unit[0])
     if on_contact or not level:
         columns.append(unit[1])
-    if along == "face":
+    if along == "face" and size > 2:  # v and w alone do not turn
         columns.append(turn - turn[0] * shift)
     places = np.arange(size)
     kept = (form.held & (along == "free")) | (~form.held & (not level))

@@ -12,7 +12,7 @@ the contact and whose ends are free.  What lies beyond is tied to them without s
 edge of a base would press into a member that goes on, an even pressure would have a singular
 reaction there, and nothing would slip at small loads.
 
-Sections that stay straight (the beamshell, p1) have a rigid face at X = L by nature.  They are
+Sections that stay straight (the beamshell) have a rigid face at X = L by nature.  They are
 nearer to a member that goes on as they are than if they were continued.
 """
 
@@ -47,7 +47,7 @@ class Held(NamedTuple):
 
 def goes_on(scene: Scene) -> bool:
     """True if members go on beyond the contact by a length that is not given."""
-    return scene.load.entry == "member" and scene.plan.warps
+    return scene.load.entry == "member" and scene.plan.elastic
 
 
 def states(scene: Scene) -> tuple[bool, ...]:

@@ -1,4 +1,4 @@
-"""Matrices of stiffness and mass in files: NumPy, MATLAB, Matrix Market, CalculiX and Nastran.
+"""Matrices of stiffness and mass in files: NumPy, MATLAB, Matrix Market and CalculiX.
 
 | suffix | content |
 |---|---|
@@ -6,7 +6,6 @@
 | ``.mat`` | square matrices, dense or sparse: ``stiffness`` or ``K``, ``mass`` or ``M`` |
 | ``.mtx`` | Matrix Market, or what CalculiX and Abaqus write for ``*SUBSTRUCTURE GENERATE`` |
 | ``.sti``, ``.mas`` | CalculiX's ``*FREQUENCY, SOLVER=MATRIXSTORAGE``, with the ``.dof`` beside |
-| ``.op4`` | Nastran's OUTPUT4, read by pyyeti; its names begin with K and M |
 
 One file may hold both matrices, but for those of CalculiX and Matrix Market.
 """
@@ -31,6 +30,7 @@ from jbeamshell.measured.tables import LARGEST, read_bytes
 
 # Names of a matrix, where a file holds several.
 NAMES = {"stiffness": ("stiffness", "K", "k"), "mass": ("mass", "M", "m")}
+ANEW = "write the matrix anew, by scipy.io.mmwrite (.mtx) or scipy.sparse.save_npz (.npz)"
 ARRAYS = "give an archive of scipy.sparse.save_npz, or of numpy.savez with stiffness= and dofs="
 
 
@@ -62,7 +62,8 @@ def read_matrix(path: str | os.PathLike[str], what: str = "stiffness") -> Rows:
     """
     name, suffix = Path(path).name, Path(path).suffix.lower()
     if suffix not in READERS:
-        raise InputError(f"{name}: is no file of a matrix: it must end in {', '.join(READERS)}")
+        fix = f"it must end in {', '.join(READERS)}; {ANEW}"
+        raise InputError(f"{name}: is no file of a matrix: {fix}")
     data = read_bytes(path)
     try:
         rows = READERS[suffix](data, Path(path), what)
@@ -215,25 +216,10 @@ def _stored(data: bytes, path: Path, _: str) -> Rows:
     return Rows(_placed(row - 1, column - 1, value, len(dofs), True), dofs)
 
 
-def _nastran(_: bytes, path: Path, what: str) -> Rows:
-    try:
-        from pyyeti.nastran import op4
-    except ImportError:
-        raise InputError("needs pyyeti: pip install 'jbeamshell[nastran]'") from None
-    names, matrices, *_ = op4.load(str(path), into="list", sparse=True)
-    begins = {"k": "stiffness", "m": "mass"}
-    variables = {
-        begins.get(name[:1].lower(), name): scipy.sparse.csc_array(matrix)
-        for name, matrix in zip(names, matrices, strict=True)
-    }
-    return Rows(_the_matrix(variables, what, "give one square matrix, or name it KAA or MAA"))
-
-
 READERS: dict[str, Callable[[bytes, Path, str], Rows]] = {
     ".npz": _archive,
     ".mat": _matlab,
     ".mtx": _text,
     ".sti": _stored,
     ".mas": _stored,
-    ".op4": _nastran,
 }

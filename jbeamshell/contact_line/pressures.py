@@ -20,7 +20,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from jbeamshell.contact_line.body import Body
-from jbeamshell.contact_line.branches import ContactState
+from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.contact_line.walk import (
     Contact,
     Course,

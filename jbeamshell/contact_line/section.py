@@ -1,4 +1,8 @@
-"""Section of a scene as a quadratic form: plane elasticity, beamshell, or section of order p."""
+"""Section of a scene as a quadratic form: plane elasticity, beamshell or bar.
+
+A bar is a section that stretches and shears but does not turn.  Its w is a field of the form, as
+the contact's equations need one, and stays zero: the pressures go straight to the base.
+"""
 
 from __future__ import annotations
 
@@ -42,45 +46,36 @@ def _plane(scene: Scene) -> SectionForm:
 
 
 def _beam(scene: Scene) -> SectionForm:
-    """Section of the beamshell (homogeneous, layered, or of a quadratic Phi), or of order p.
+    """Section of the beamshell (homogeneous, layered, of a quadratic Phi) or of a bar.
 
     The elements are those of the finite differences of `jbeamshell.mechanics.elements`.
     """
     plan, half_height = scene.plan, scene.strip.half_height
-    section, phi = scene.hierarchic_section(), scene.strain_energy()
-    still = jnp.zeros(plan.width, half_height.dtype)
-    active = np.array(plan.active)
+    phi, still = scene.strain_energy(), jnp.zeros(len(FIELDS), half_height.dtype)
+    active = np.union1d(plan.active, [V, W])
 
     def energy(fields: Section, slopes: Section) -> Array:
-        if section is not None:
-            return section.energy(fields, slopes)
-        return phi(*linear_strains(fields[: len(FIELDS)], slopes[: len(FIELDS)], half_height))
+        return phi(*linear_strains(fields, slopes, half_height))
 
     def moved(fields: Array, height: Array) -> Array:
-        if section is not None:
-            return jnp.stack(section.displacement(fields, height))
-        position = KINEMATICS["linear"].position
-        return jnp.stack(position(fields[: len(FIELDS)], half_height, height))
+        return jnp.stack(KINEMATICS["linear"].position(fields, half_height, height))
 
     def along(fields: Array) -> Array:  # conjugate to the end load
-        return (
-            moved(fields, 0.0 * half_height)[0]
-            if section is None
-            else section.mean_displacement(fields)
-        )
+        return moved(fields, 0.0 * half_height)[0]
 
     parts = jax.jacfwd(moved)  # (2, m) displacements of a material point per field
     stiffness = section_stiffness(energy, still)
-    free = squeeze_at_even_force(stiffness) if section is None else 0.0
+    free = squeeze_at_even_force(stiffness)
     # The squares of psi at an element's nodes have another mean than the square of its mean.
     spread = jnp.zeros((still.size, still.size), still.dtype).at[PSI, PSI].set(0.25 * free)
-    held = np.isin(np.arange(still.size), [V, BETA, *range(len(FIELDS), still.size, 2)])
+    held = np.isin(np.arange(still.size), [V, BETA])
     modes = jnp.zeros((5, 2, still.size), still.dtype)
     modes = modes.at[[0, 1, 2, 3, 4], [1, 1, 1, 0, 1], [V, W, BETA, PSI, PSI]].set(1.0)
     modes = modes.at[2, 1, V].set(half_height).at[4, 1, W].set(-half_height)
+    modes = jnp.where(np.isin([V, W, BETA, PSI, PSI], active)[:, None, None], modes, 0.0)
 
     thickness = thicknesses(scene)
-    points, weights = np.polynomial.legendre.leggauss(max(plan.order, 1) + 1)
+    points, weights = np.polynomial.legendre.leggauss(2)
     bottom = jnp.cumsum(thickness) - thickness - half_height
     heights = bottom[:, None] + 0.5 * thickness[:, None] * (1.0 + points)
     shapes = jax.vmap(jax.vmap(lambda height: parts(still, height)))(heights)

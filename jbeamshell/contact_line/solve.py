@@ -14,7 +14,7 @@ from jbeamshell.common.precision import in_double, is_single
 from jbeamshell.common.small import Small
 from jbeamshell.contact_line.above import Movement, Unread
 from jbeamshell.contact_line.bearings import bearing_energy, with_bearings, with_gaps
-from jbeamshell.contact_line.branches import ContactState, pressed
+from jbeamshell.contact_line.contact_state import ContactState, pressed
 from jbeamshell.contact_line.drives import (
     driven_by_displacement,
     exchanged,
@@ -61,14 +61,14 @@ def solve(
     Returns
     -------
     History
-        fields v, w, beta and psi, and those of a section of order p; of plane elasticity beta and
-        psi are means over the height; NaN from the first step on whose events come to no end
+        fields v, w, beta and psi; of plane elasticity beta and psi are means over the height; NaN
+        from the first step on whose events come to no end
 
     Raises
     ------
     InputError
-        if the pressures lift the strip, or change along the path beside elastic sliders, a gap or
-        holes, or if loads act on a strip without a foundation
+        if the pressures lift the strip, or change along the path beside elastic sliders or a
+        gap, or if loads act on a strip without a foundation
     """
     now = is_traced(scene, path, strip) or is_staged() or is_single(scene)
     return _solved(scene, path, cycles, own, strip, now)
@@ -77,10 +77,9 @@ def solve(
 def walks_pressures(scene: Scene) -> bool:
     """True if pressures that change along a path are walked on the contact line.
 
-    Elastic sliders and what holds two members apart would have to move with them.
+    Elastic sliders and a gap between two members would have to move with them.
     """
-    joint = scene.member.gap is None and scene.member.holes is None
-    return joint and scene.contact.stick_stiffness is None
+    return scene.member.gap is None and scene.contact.stick_stiffness is None
 
 
 @in_double
@@ -96,8 +95,8 @@ def _solved(
     before = scene.load.pressure_steps
     targets, parts = path.target[before:], path.pressure[before:]
     whole = not is_traced(parts) and bool(np.all(np.asarray(parts) == 1.0))
-    fix = "must act wholly beside elastic sliders, a gap or holes: leave these out, or take load "
-    fix += "steps (by='steps') of another section than plane"
+    fix = "must act wholly beside elastic sliders or a gap: leave these out, or take load steps "
+    fix += "(by='steps') of another section than plane"
     require("path", "pressures", whole or walks_pressures(scene), fix)
     base = scene.contact.normal == "rigid" or not targets.size
     fix = "leaves plane elasticity nothing but the pressures: set load.cycles = 0, or take another "

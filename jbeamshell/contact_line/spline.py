@@ -30,7 +30,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from jbeamshell.contact_line.polygon import MOST_PART, STARTS, UNEVEN, Polygon, Slip
+from jbeamshell.contact_line.polygon import MOST_PART, STARTS, UNEVEN, Polygon, Slip, starts_late
 from jbeamshell.contact_line.tableau import Branch
 
 
@@ -122,8 +122,7 @@ def _corners(polygon: Polygon, x: Array, sliding: Array) -> tuple[Array, Array]:
     starts, ends = polygon.before == 0, polygon.after == 0
     ahead = (tau[polygon.after] - tau) * (1.0 - share[polygon.after])
     half = (tau - tau[polygon.before]) * share
-    first = jnp.argmax(starts & ~ends & (rows > 0))
-    room = jnp.where(rows == first, tau, STARTS * tau)
+    room = jnp.where(starts_late(polygon), STARTS * tau, tau)
     half = jnp.where(
         starts, jnp.minimum(room, ahead), jnp.minimum(half, UNEVEN * half[polygon.before])
     )

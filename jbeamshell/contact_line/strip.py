@@ -23,9 +23,9 @@ from jbeamshell.scene.parts import Load
 from jbeamshell.scene.scene import Scene
 
 PLANE_END_SIZE = 1e-4  # of H, the element at the loaded end
-PLANE_GROWTH = 0.3  # of the element size over the distance from there, also of small elements
+PLANE_GROWTH = 0.2  # of the element size over the distance from there
+PLANE_SMALL_GROWTH = 0.5  # the same near the corner, where stresses are singular
 PLANE_FAR_SIZE = 0.07  # of L, elements away from it
-HOLE_DEPTH = 0.1  # of H, a gap that nothing closes
 STEP_SIZE = 0.05  # of H, elements at a step of the pressure
 RULE = elements.element_rule("finite-difference")
 
@@ -208,23 +208,10 @@ def over_gap(members: Members, gap: Array) -> Members:
 
 
 def initial_gap(scene: Scene, x: Array) -> Array | None:
-    """Distance (n,) of the members at their stations before anything presses; None if they touch.
-
-    A hole is a gap that nothing closes.
-    """
-    table, holes = scene.member.gap, scene.member.holes
-    if table is None and holes is None:
+    """Distance (n,) of the members at their stations before the pressing; None if they touch."""
+    gap = scene.member.gap
+    if gap is None:
         return None
-    gap = jnp.zeros_like(x) if table is None else _on_stations(table, x)
-    if holes is None:
-        return gap
-    begin, end = scene.member.hole_edges.T
-    inside = jnp.any((x[:, None] > begin) & (x[:, None] < end), axis=1)
-    return gap + jnp.where(inside, HOLE_DEPTH * scene.strip.half_height, 0.0)
-
-
-def _on_stations(gap: Array, x: Array) -> Array:
-    """Values (n,) of a number or a table at the stations."""
     return jnp.interp(x, gap[:, 0], gap[:, 1]) if gap.ndim else jnp.broadcast_to(gap, x.shape)
 
 
@@ -249,8 +236,10 @@ def is_pressed_evenly(scene: Scene) -> bool:
 def stays_flat(scene: Scene) -> bool:
     """True if the pressures squeeze the strip evenly onto a foundation, so that it does not bend.
 
-    Layers and a Phi of the user's own may bend.
+    Layers and a Phi of the user's own may bend.  A bar never does.
     """
+    if scene.plan.section == "bar":
+        return True
     homogeneous = scene.strip.layers is None and scene.energy is None
     alone = homogeneous and scene.member.support == "none"
     return is_pressed_evenly(scene) and alone and scene.contact.normal == "rigid"
@@ -277,12 +266,9 @@ def stations(scene: Scene, nodes: int) -> Array:
 
 
 def _joint_stations(scene: Scene, nodes: int) -> Array:
-    """Stations of a lap joint, denser at its ends, at steps of the pressure and edges of holes."""
+    """Stations of a lap joint, denser at its ends and at steps of the pressure."""
     length, half_height = scene.strip.length, scene.strip.half_height
     steps, plan = scene.contact.steps(length), scene.plan
-    if scene.member.holes is not None:
-        edges = scene.member.hole_edges.ravel()
-        steps = jnp.sort(edges if steps is None else jnp.append(steps, edges))
     if not plan.elastic:
         start = jnp.zeros_like(length)[None]
         foci = start if steps is None else jnp.append(start, steps)
@@ -299,8 +285,8 @@ def _joint_stations(scene: Scene, nodes: int) -> Array:
 def _plane_vertices(
     scene: Scene, nodes: int, sizes: Array | float, foci: Array | None, growths: Array | float
 ) -> Array:
-    """Stations of plane elasticity: small elements grow slowly too, as stresses are singular."""
-    grading = (sizes, foci, growths, PLANE_FAR_SIZE, PLANE_GROWTH)
+    """Stations of plane elasticity, which has small elements in singular corners."""
+    grading = (sizes, foci, growths, PLANE_FAR_SIZE, PLANE_SMALL_GROWTH)
     length, half_height = scene.strip.length, scene.strip.half_height
     return elements.vertices(nodes - 1, length, half_height, *grading)
 

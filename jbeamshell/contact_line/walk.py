@@ -7,6 +7,7 @@ levels only say where a path is looked at, and every answer is a smooth function
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -17,10 +18,11 @@ from jax import Array, lax
 from jax.typing import ArrayLike
 from jaxtyping import PyTree
 
+from jbeamshell.contact_line import native
 from jbeamshell.contact_line.body import Body, local_compliance
-from jbeamshell.contact_line.branches import ContactState
+from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.contact_line.events import Search
-from jbeamshell.contact_line.polygon import Polygon, Slip, polygon
+from jbeamshell.contact_line.polygon import Known, Polygon, Slip, polygon
 from jbeamshell.contact_line.spline import read, slipped
 from jbeamshell.contact_line.tableau import Branch
 
@@ -144,7 +146,6 @@ def walk(
     forces: Array,
     turns: ArrayLike | tuple[bool, ...],
     lift: Array | None = None,
-    needed: Array | None = None,
     rounded: bool = True,
 ) -> Level:
     """Levels of a load path, stacked along the first axis.
@@ -159,7 +160,6 @@ def walk(
     forces : (levels,) end loads
     turns : (levels,) True where the load has turned since the level before; so is the first
     lift : (n,) lift at the start; None is none
-    needed : False to leave out the walk at no cost; its levels mean nothing then.  None is True
     rounded : False reads the polygon of the events itself, whose nodes slip one after the other
 
     Returns
@@ -168,7 +168,51 @@ def walk(
         with the axis of the levels first
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    return walk_on(body, friction, Contact.of(start, lift), forces, turns, needed, rounded)[0]
+    if isinstance(turns, tuple) and forces.dtype == float and native.serves():
+        numbers = _Numbers(body, jnp.asarray(friction, float), start, forces, lift)
+        return _native(turns, rounded, numbers)
+    return walk_on(body, friction, Contact.of(start, lift), forces, turns, rounded)[0]
+
+
+class _Numbers(NamedTuple):
+    """Numbers of a path, see `walk`."""
+
+    body: Body
+    friction: Array
+    start: ContactState
+    forces: Array
+    lift: Array
+
+
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _native(turns: tuple[bool, ...], rounded: bool, numbers: _Numbers) -> Level:
+    """Levels of a path by the walk in C."""
+    return _level(native.levels(native.arguments(*numbers), turns, rounded), numbers.forces)
+
+
+@_native.defjvp
+def _native_jvp(turns, rounded, primals, tangents):  # type: ignore[no-untyped-def]
+    numbers = jax.tree.map(lax.stop_gradient, primals[0])
+    found, known = native.recorded(native.arguments(*numbers), turns, rounded)
+    level = _level(found, numbers.forces)
+    again = functools.partial(_again, turns, rounded, known)
+    none = (np.zeros(a.shape, jax.dtypes.float0) for a in (level.slipping, level.settled))
+    return level, Level(*jax.jvp(again, (numbers,), tangents)[1], *none)
+
+
+def _again(
+    turns: tuple[bool, ...], rounded: bool, known: Known, numbers: _Numbers
+) -> tuple[ContactState, Array, Array]:
+    """What has derivatives of the levels of a path whose events are known."""
+    body, friction, start, forces, lift = numbers
+    contact = Contact.of(start, lift)
+    levels = _in_branches(body, friction, contact, forces, turns, rounded, known)[0]
+    return levels.state, levels.lift, levels.slip_work
+
+
+def _level(found: native.Levels, forces: Array) -> Level:
+    state = ContactState(found.v, found.r_t, found.r_n, forces, found.displacement)
+    return Level(state, found.lift, found.slip_work, found.slipping, found.settled)
 
 
 def walk_on(
@@ -177,24 +221,13 @@ def walk_on(
     start: Contact,
     forces: Array,
     turns: ArrayLike | tuple[bool, ...],
-    needed: Array | None = None,
     rounded: bool = True,
 ) -> tuple[Level, Contact]:
     """Levels of a load path, and the contact at its end; see `walk`."""
     friction = jnp.asarray(friction, forces.dtype)
-
-    def path() -> tuple[Level, Contact]:
-        if isinstance(turns, tuple):
-            return _in_branches(body, friction, start, forces, turns, rounded)
-        return _in_levels(body, friction, start, forces, jnp.asarray(turns), rounded)
-
-    if needed is None:
-        return path()
-
-    def nothing() -> tuple[Level, Contact]:
-        return jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), jax.eval_shape(path))
-
-    return lax.cond(needed, path, nothing)
+    if isinstance(turns, tuple):
+        return _in_branches(body, friction, start, forces, turns, rounded)
+    return _in_levels(body, friction, start, forces, jnp.asarray(turns), rounded)
 
 
 def _in_branches(
@@ -204,33 +237,42 @@ def _in_branches(
     forces: Array,
     turns: tuple[bool, ...],
     rounded: bool,
+    known: Known | None = None,
 ) -> tuple[Level, Contact]:
-    """Levels of a path whose turns are known: each branch is read at all its levels at once."""
+    """Levels of a path whose turns are known: each branch is read at all its levels at once.
+
+    Parameters
+    ----------
+    known : what was found of the two parts (branches, 2) of each branch; None finds it
+    """
     begins = np.flatnonzero(turns)
     ends = np.append(begins[1:], len(turns))
     longest = int(np.max(ends - begins))
     places = np.minimum(begins[:, None] + np.arange(longest), ends[:, None] - 1)
 
-    def part(contact: Contact, targets: Array) -> tuple[Contact, Level]:
+    def part(contact: Contact, targets: Array, known: Known | None) -> tuple[Contact, Level]:
         """Part of a branch, seen at its end and at all levels of the branch."""
         drive = along(body, contact, targets[-1])
-        course = departed(body, friction, contact, drive, targets[-1], rounded)
+        course = departed(body, friction, contact, drive, targets[-1], rounded, known)
         levels = levels_of(body, course, jnp.append(course.end, targets))
         return arrived(jax.tree.map(lambda a: a[0], levels), course), levels
 
-    def go(contact: Contact, targets: Array) -> tuple[Contact, Level]:
-        def further(now: Contact, number: Array) -> tuple[Contact, Level]:
-            arrives = (number > 0) & (now.state.force == targets[-1])
-            return lax.cond(arrives, stay, part, now, targets)
+    def go(contact: Contact, branch: tuple[Array, Known | None]) -> tuple[Contact, Level]:
+        targets, known = branch
 
-        end, parts = lax.scan(further, contact, jnp.arange(2))
+        def further(now: Contact, part_of: tuple[Array, Known | None]) -> tuple[Contact, Level]:
+            number, known = part_of
+            arrives = (number > 0) & (now.state.force == targets[-1])
+            return lax.cond(arrives, stay, part, now, targets, known)
+
+        end, parts = lax.scan(further, contact, (jnp.arange(2), known))
         return end, _joined(parts, targets, end.memory.sense)
 
-    def stay(now: Contact, targets: Array) -> tuple[Contact, Level]:
-        shapes = jax.eval_shape(part, now, targets)[1]
+    def stay(now: Contact, targets: Array, known: Known | None) -> tuple[Contact, Level]:
+        shapes = jax.eval_shape(part, now, targets, known)[1]
         return now, jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), shapes)
 
-    end, levels = lax.scan(go, start, forces[places])
+    end, levels = lax.scan(go, start, (forces[places], known))
     rows = np.flatnonzero(np.diff(places.ravel(), prepend=-1) > 0)
     return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[rows], levels), end
 
@@ -332,6 +374,7 @@ def departed(
     drive: Drive,
     target: Array,
     rounded: bool = True,
+    known: Known | None = None,
 ) -> Course:
     """Course that begins with a contact, with its polygon up to its end and a little beyond.
 
@@ -341,6 +384,7 @@ def departed(
     Parameters
     ----------
     rounded : False reads the polygon itself, whose nodes slip one after the other
+    known : what was found of it before; None finds it
     """
     state, memory = contact.state, contact.memory
     matrix = jnp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
@@ -362,7 +406,7 @@ def departed(
     if not rounded:
         search = Search(jnp.zeros_like(extra), search.back)
     sliding = SLIDES_ON * _slides(body)
-    vertices, slip = polygon(branch, search, contact.lift > 0.0, reach, sliding)
+    vertices, slip = polygon(branch, search, contact.lift > 0.0, reach, sliding, known)
     if not rounded:
         own = jnp.arange(vertices.tau.size)  # with no step before it a corner stays sharp
         vertices = vertices._replace(before=own)

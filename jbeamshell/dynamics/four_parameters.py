@@ -107,7 +107,7 @@ def _of_scene(scene: Scene) -> tuple[Any, ...]:
     fix = "must have gross slip: give it friction and contact"
     require("contact.friction", scene.contact.friction, slips, fix)
     f = limit * np.array([LITTLE, *FRACTIONS])
-    cycles = steady_cycles(scene.serving(("load.amplitude",)), f)
+    cycles = steady_cycles(scene, f)
     u, d = np.asarray(cycles.displacement), np.asarray(cycles.dissipation)
     felt = d > LEAST * f * u
     felt[0] = False

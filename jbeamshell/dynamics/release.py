@@ -4,10 +4,10 @@ The mass m feels the strip as a spring of compliance c, whose own mass moves wit
 m_1, the integral of rho |u|^2/u(L)^2 over the stuck strip under an end load.  Rayleigh's quotient
 with this shape gives (omega/omega_1)^2 = m_1/m, where omega = 1/sqrt(m c) and
 omega_1 = 1/sqrt(m_1 c) are the lowest frequencies of the mass on the strip and of the strip alone.
-Where this ratio is small, the strip is its network of sliders (`jbeamshell.contact_line.network`)
-under the mass.  Compared with the motion of whole strips, eta .1126 and .3, pulled with .25 and .8
-of gross slip, frequencies without the strip's inertia are too high by m_1/2m and damping ratios by
-2 m_1/m, and by up to 10 m_1/m in the first swings from .8 of gross slip.
+Where this ratio is small, the strip is the sliders of its joint under the mass.  Compared with the
+motion of whole strips, eta .1126 and .3, pulled with .25 and .8 of gross slip, frequencies without
+the strip's inertia are too high by m_1/2m and damping ratios by 2 m_1/m, and by up to 10 m_1/m in
+the first swings from .8 of gross slip.
 """
 
 from __future__ import annotations
@@ -18,12 +18,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
 
 from jbeamshell.common.checks import POSITIVE, require, require_number
 from jbeamshell.common.errors import InputError
-from jbeamshell.common.small import Small
-from jbeamshell.contact_line.network import Network
+from jbeamshell.contact_line.strip import condensed, moving_volume
 from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.over_amplitude import RingDown
 from jbeamshell.dynamics.ringdown import ring_down
@@ -35,13 +33,11 @@ from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 
 LIGHT = 0.005  # largest m_1/m at which the strip's inertia is left out by itself
-NO_NETWORK = (
-    "plane elasticity does not cover this scene, so that it has no network: take True "
+NO_SLIDERS = (
+    "plane elasticity does not cover this scene, so that it has no sliders: take True "
     "(--strip whole)"
 )
-NOT_NESTED = (
-    "slip zones are not nested, so that it is no network of sliders: take True (--strip whole)"
-)
+STUCK = "nothing slips under it, so that nothing damps: take more of gross slip, mu F_N L"
 LAP = "follows no lap joint in time steps: take None (--strip auto), for its sliders"
 DAMPED = "is for time steps, and a lap joint has none: leave it out"
 FEW = "shows too little of the motion: take more cycles, or a smaller force or a heavier payload"
@@ -65,8 +61,8 @@ class RingDownStudy:
     predicted : frequency and damping over amplitude, with the strip as a joint; its amplitudes are
         u(L) times the square root of the payload
     payload : mass per width
-    share : mass of the strip that moves with its stuck end, over the payload; None if the strip has
-        no network of sliders
+    share : mass of the strip that moves with its stuck end, over the payload; None if the strip was
+        followed as a whole without asking
     """
 
     motion: Motion | LightMotion
@@ -77,7 +73,7 @@ class RingDownStudy:
 
     @property
     def light(self) -> bool:
-        """True if the strip was its network of sliders, False if its inertia was followed."""
+        """True if the strip was its sliders, False if its inertia was followed."""
         return isinstance(self.motion, LightMotion)
 
     @property
@@ -136,11 +132,11 @@ def let_go(
     inertia : density and damping of the strip; None is density 1
     cycles : span of the transient, in periods of the stuck strip
     per_cycle : number of time steps in a period, of the whole strip
-    whole : True to follow the whole strip in time steps; False to follow the network of sliders of
-        plane elasticity (or of the section that the scene names, on its contact line), exact in
-        time, without the strip's inertia; None to take the network, if the scene has one, where the
-        strip's inertia matters little (`LIGHT`), it is not damped, and its slip zones are nested.
-        A lap joint is always its sliders
+    whole : True to follow the whole strip in time steps; False to follow the sliders of plane
+        elasticity (or of the section that the scene names, on its contact line), exact in time,
+        without the strip's inertia; None to take the sliders, if the scene has them, where the
+        strip's inertia matters little (`LIGHT`) and it is not damped.  A lap joint is always its
+        sliders
     progress : show a progress bar of the time steps; None shows it where a person watches
 
     Returns
@@ -150,8 +146,8 @@ def let_go(
     Raises
     ------
     InputError
-        for a force beyond gross slip, a number that is not positive, or a strip that has no network
-        where one is asked for
+        for a force beyond gross slip or under which nothing slips, a number that is not positive,
+        or a strip that has no sliders where they are asked for
     InterruptedMotionError
         if the solver stops before the end; it carries the part that was computed
 
@@ -172,18 +168,17 @@ def let_go(
     mass = HEAVY * _strip_mass(scene, inertia) if payload is None else payload
     require_number("payload", mass)
     samples = round(cycles * SAMPLES_PER_CYCLE) + 1
-    require("whole", whole, line is not None or whole is not False, NO_NETWORK)
+    require("whole", whole, line is not None or whole is not False, NO_SLIDERS)
     motion: LightMotion | Motion | None = None
-    share, nested = None, False
+    share = None
     if line is not None and (whole is False or not inertia.damped):
-        joint = Joint.of(line, end_force)
-        network = joint.network or Network.nearest(line, *joint.below_gross_slip)
-        share = _share(network, inertia, mass)
+        share = _share(line, inertia, mass)
         if lap or whole is False or share <= LIGHT:
-            motion = ring(line, network, mass, end_force, cycles, samples)
-            nested = bool(motion.nested)
-    if motion is None or not nested:
-        require("whole", whole, whole is not False and not lap, NOT_NESTED)
+            joint = Joint.of(line, end_force)
+            slips = bool(np.any(np.asarray(joint.springs) > 0.0))
+            require("force", end_force, slips, STUCK)
+            motion = ring(line, joint, mass, end_force, cycles, samples)
+    if motion is None:
         require("model.section", scene.plan.section, steps, NO_INERTIA)
         motion = _whole(scene, end_force, mass, inertia, cycles, per_cycle, samples, progress)
         joint = Joint.of(motion.scene, end_force)  # which is held down as the motion is
@@ -197,17 +192,8 @@ def let_go(
 
 def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
     """Frequency and damping of the mass on steady cycles, from a displacement to the largest."""
-    if joint.network is None:
-        largest = np.asarray(joint.below_gross_slip[0])[-1]
-        reach = np.geomspace(smallest, largest, AMPLITUDES)
-        force, loss = np.asarray(joint.backbone(reach)), np.asarray(joint.dissipation(reach))
-    else:
-        known = np.asarray(joint.forces)
-        low = np.interp(smallest, np.asarray(joint.displacements), known)
-        force = np.geomspace(low, known[-1], AMPLITUDES)
-        reach, loss = jax.device_get(_cycles((joint.network, force)))
-        nested = np.isfinite(loss)
-        force, reach, loss = force[nested], reach[nested], loss[nested]
+    reach = np.geomspace(smallest, np.asarray(joint.below_gross_slip[0])[-1], AMPLITUDES)
+    force, loss = np.asarray(joint.backbone(reach)), np.asarray(joint.dissipation(reach))
     elastic = np.real(np.asarray(joint.harmonic(jnp.asarray(reach))))
     softer = elastic * reach / force
     return ModalCurve(
@@ -219,13 +205,6 @@ def _prediction(joint: Joint, mass: float, smallest: float) -> ModalCurve:
         frequency_error=1.0 - np.sqrt(softer),
         damping_error=1.0 - 1.0 / softer,
     )
-
-
-@Small
-def _cycles(given: tuple[Network, Array]) -> tuple[Array, Array]:
-    """Displacements and work of steady cycles of a network at the amplitudes (k,) of the force."""
-    network, forces = given
-    return lax.map(network.cycle, forces)
 
 
 def on_contact_line(scene: Scene) -> Scene | None:
@@ -249,9 +228,10 @@ def _strip_mass(scene: Scene, inertia: Inertia) -> float:
     return float(scene.strip.length * np.sum(np.asarray(weights)))
 
 
-def _share(network: Network, inertia: Inertia, mass: float) -> float:
+def _share(line: Scene, inertia: Inertia, mass: float) -> float:
     """Mass of the strip that moves with the stuck end, over the payload."""
-    return float(np.sum(np.asarray(inertia.density) * np.asarray(network.volume))) / mass
+    volume = jax.jit(lambda line: moving_volume(condensed(line, line.plan.nodes)))(line)
+    return float(np.sum(np.asarray(inertia.density) * np.asarray(volume))) / mass
 
 
 def _whole(

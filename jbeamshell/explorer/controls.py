@@ -85,7 +85,7 @@ def _pressure(scene: Scene) -> Iterator[Control]:
             label = f"{name}: force [force/width]"
             yield _around(BOLT.format(number, "force"), label, force)
             low, high = 0.5 * width, length - 0.5 * width
-            if scene.member.holes is None and high > low:  # holes stay where they are
+            if high > low:
                 label = f"{name}: place X [length]"
                 step = round_down((high - low) / STEPS)
                 yield Control(BOLT.format(number, "place"), label, place, low, high, step)

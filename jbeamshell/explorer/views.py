@@ -66,10 +66,10 @@ class Curve(NamedTuple):
 def drawable(scene: Scene) -> Scene:
     """Scene whose settings stay as they are chosen now, so that nothing is compiled again.
 
-    A section that was left open is plane elasticity, whatever the sliders say.  Plane elasticity
-    gets as many nodes as can be drawn while a slider moves, unless the scene says how many.
+    Plane elasticity gets as many nodes as can be drawn while a slider moves, unless the scene says
+    how many.
     """
-    found = scene.serving(()).pinned()
+    found = scene.pinned()
     if found.plan.elastic and scene.model.nodes == AUTO:
         return found.replace({"model.nodes": min(found.plan.nodes, PLANE_NODES)})
     return found

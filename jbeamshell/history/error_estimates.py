@@ -227,7 +227,7 @@ def estimates(scene: Scene, cycle: SlipCycle, change: Array | None = None) -> tu
 
 def _factor(scene: Scene) -> float:
     """Factor on the rule for the grid's error."""
-    stepped = scene.contact.jumps + scene.member.jumps > 1
+    stepped = scene.contact.jumps > 1
     if not scene.plan.elastic:
         return STEPS if stepped else 1.0
     if scene.load.kind == "moment":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import jax.numpy as jnp
@@ -88,6 +89,12 @@ class CycleFigures(Record, LoopFigures):
             dissipation=work if line else None,
         )
 
+    @functools.cached_property
+    def errors(self) -> tuple[Array, ...]:
+        """Estimated relative errors of the dissipation, see `estimates`; they are found once."""
+        with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
+            return estimates(self.scene, self.slip_cycle, self.change)
+
     @property
     def dissipation_error(self) -> Array:
         """Estimated relative error of the dissipation that the grid at the loaded end makes.
@@ -95,5 +102,4 @@ class CycleFigures(Record, LoopFigures):
         Rather too large than too small; infinite if nothing slips.  Of a refined grid it is at
         least the change by the last halving of the elements.  See `History.doubts`.
         """
-        errors = estimates(self.scene, self.slip_cycle, self.change)
-        return jnp.max(jnp.stack(errors))
+        return jnp.max(jnp.stack(self.errors))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+from typing import Any, Self
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import require
-from jbeamshell.common.errors import InputError, Status
+from jbeamshell.common.errors import Status
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
 from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
@@ -63,10 +64,16 @@ class History(Profiles, ContactLine, CycleFigures):
         """True if every step found its equilibrium."""
         return bool(np.all(np.asarray(self.status) == Status.CONVERGED))
 
-    @property
+    @functools.cached_property
+    def plain(self) -> Self:
+        """The same in arrays of NumPy, which are quicker where nothing is compiled."""
+        plain: Self = jax.tree.map(np.asarray, self.but(above=None))
+        return plain
+
+    @functools.cached_property
     def doubts(self) -> tuple[str, ...]:
         """Reasons to doubt this run, each a sentence with the size of the error and the remedy."""
-        return doubts_of_run(self)
+        return doubts_of_run(self.plain)
 
     def figures(self) -> dict[str, Any]:
         """Figures of the last cycle and of the contact at the last step, as plain numbers.
@@ -139,27 +146,6 @@ class History(Profiles, ContactLine, CycleFigures):
         from jbeamshell import plotting
 
         return self._summary.as_html(plotting.thumbnail(self.plot()))
-
-    def continued(self, path: Any = None, **options: Any) -> History:
-        """History with further load steps.
-
-        Parameters
-        ----------
-        path, options : see `jbeamshell.load_steps.continuation.PathEnd.continued`
-
-        Raises
-        ------
-        InputError
-            if it was not solved step by step, if its last step found no equilibrium, or if the
-            path makes no sense
-        """
-        fix = "keeps no state of the contact from which to go on: take jb.solve(..., by='steps')"
-        plan = self.scene.plan
-        require("model.section", f"{plan.section} in {plan.engine}", plan.walks_any_path, fix)
-        if self.end is None:
-            raise InputError("history: was made by hand and has no end to continue: solve it")
-        further: History = self.end.continued(self, path, **options)
-        return further
 
     def table(self) -> dict[str, np.ndarray]:
         """Columns (steps+1,) of the load path by name.

@@ -48,7 +48,7 @@ class Record(Tree):
     contact_v : (steps+1, n) tangential displacement of the contact, relative to the second member
         if there is one
     above : `Above`, or what has one as ``found``, when somebody reads a field
-    fields : (steps+1, n, m) v, w, beta, psi, and those of a hierarchic section
+    fields : (steps+1, n, 4) v, w, beta and psi
     gap : (steps+1, n) height of the strip's bottom face over what it lies on
     sections : (steps+1, elements) section forces N, Q, M, chi and xi in the places of e, g, k, psi
         and psi'
@@ -68,7 +68,6 @@ class Record(Tree):
         along X as those of the strip; None on a rigid base
     change : relative change of the dissipation or the secant stiffness, the larger one, when the
         elements were last halved; None for a grid that was not refined
-    end : end of the path, for `continued`; None for the bar in closed form
     """
 
     scene: Scene
@@ -93,7 +92,6 @@ class Record(Tree):
     status: Array
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
     target: Array | None = None
-    end: Any = None
     change: Array | None = None
 
     @property
@@ -103,7 +101,7 @@ class Record(Tree):
 
     @property
     def fields(self) -> Array:
-        """Fields v, w, beta, psi, and those of a hierarchic section, (steps+1, n, m)."""
+        """Fields v, w, beta and psi, (steps+1, n, 4)."""
         fields: Array = self.above.found.fields
         return fields
 

@@ -6,17 +6,15 @@ of `jbeamshell.history.error_estimates`.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, Self
 
 import jax
 import numpy as np
 from jax import Array
 
-from jbeamshell.history.error_estimates import SlipCycle, estimates
 from jbeamshell.scene.buckling import sway, weakest_column
 from jbeamshell.scene.keys import ARC_LENGTH
 from jbeamshell.scene.linearisation import linear_error
-from jbeamshell.scene.plan import CLOSED
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.section_error import doubt_of_section
@@ -50,7 +48,9 @@ class Run(Protocol):
     @property
     def slip_length(self) -> Array: ...
     @property
-    def slip_cycle(self) -> SlipCycle: ...
+    def errors(self) -> tuple[Array, ...]: ...
+    @property
+    def plain(self) -> Self: ...
 
 
 def doubted_from(tolerance: float) -> float:
@@ -74,22 +74,17 @@ def change_of(coarse: Run, fine: Run) -> Array:
 
 def misses_tolerance(history: Run) -> bool:
     """True if the estimated error of a run exceeds its tolerance; never without friction."""
-    plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
+    plain = history.plain
     if not plain.scene.contact.friction > 0.0:
         return False
-    with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
-        errors = estimates(plain.scene, plain.slip_cycle, plain.change)
-    return bool(max(errors) > plain.scene.model.tolerance)
+    return bool(max(plain.errors) > plain.scene.model.tolerance)
 
 
-def doubts_of_run(history: Run) -> tuple[str, ...]:
-    """Doubts about a run that was solved."""
-    plain = jax.tree.map(np.asarray, history)  # quicker than JAX where nothing is compiled
+def doubts_of_run(plain: Run) -> tuple[str, ...]:
+    """Doubts about a run that was solved, in arrays of NumPy."""
     if not plain.converged:
         return ("a load step found no equilibrium: that step and all after it hold NaN",)
     scene = plain.scene
-    if scene.plan.engine == CLOSED:
-        return _section(plain)
     if scene.contact.normal == "none":
         return _buckling(scene)
     if not plain.cycles:
@@ -102,7 +97,7 @@ def doubts_of_run(history: Run) -> tuple[str, ...]:
 def doubts_of_scene(scene: Scene) -> tuple[str, ...]:
     """Doubts about the loop of a scene that need no run."""
     allowed, found = doubted_from(scene.model.tolerance), []
-    linear = scene.plan.kinematics == "linear"
+    linear = scene.plan.kinematics == "linear" and scene.plan.section != "bar"  # which never turns
     error = linear_error(scene) + sway(scene) if linear else 0.0
     if error > allowed:
         found.append(f"{_off(error)}: kinematics are linear; {_exact(scene)}")
@@ -120,7 +115,7 @@ def _exact(scene: Scene) -> str:
     """Fix that makes a scene's kinematics exact."""
     if scene.member.support != "none":
         return "a lap joint knows no others: take a smaller load.amplitude"
-    section = "model.section = p6 with " if scene.plan.elastic else ""
+    section = "model.section = squeeze with " if scene.plan.elastic else ""
     return f"take {section}model.kinematics = exact"
 
 
@@ -153,10 +148,7 @@ def _unsteady(history: Run) -> tuple[str, ...]:
 
 def _resolution(history: Run) -> tuple[str, ...]:
     """Doubts about the slip zone's resolution by the grid."""
-    with np.errstate(over="ignore", invalid="ignore"):  # infinite where nothing slips
-        cycle = jax.tree.map(np.asarray, history.slip_cycle)
-        errors = estimates(history.scene, cycle, history.change)
-        grid, corner, slider, steps = map(float, errors)
+    grid, corner, slider, steps = map(float, history.errors)
     finer = finer_grid(history.scene)
     if np.isinf(grid):
         return (

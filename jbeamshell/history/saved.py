@@ -1,8 +1,8 @@
 """Writing of histories to files; `jbeamshell.read_history` reads them.
 
-A file is an .npz of NumPy without pickled objects.  It holds the arrays of a history by name,
-including the state of the strip after the last step, and as ``about`` one line of JSON: the
-format, the scene as TOML, the data type and the cycles.  A check sum covers all of them.
+A file is an .npz of NumPy without pickled objects.  It holds the arrays of a history by name, and
+as ``about`` one line of JSON: the format, the scene as TOML, the data type and the cycles.  A check
+sum covers all of them.
 """
 
 from __future__ import annotations

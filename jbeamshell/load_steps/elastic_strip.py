@@ -10,7 +10,6 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.mechanics import elements
-from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, contraction, forces
 from jbeamshell.mechanics.kinematics import (
     FIELDS,
@@ -26,14 +25,13 @@ V, W, BETA, PSI = range(len(FIELDS))
 
 
 class ElasticStrip(eqx.Module):
-    """Elastic strip with n nodes and m fields per node, loaded by dead pressures.
+    """Elastic strip with n nodes, loaded by dead pressures.
 
-    The fields q (n, m) are v, w, beta and psi, and those of a section of order p behind them.
+    The fields q (n, 4) are v, w, beta and psi.
 
     Attributes
     ----------
     energy : strain energy Phi of the beamshell, a function of its strains
-    section : section of order p, which replaces the beamshell's; None keeps the beamshell's
     x : (n,) node positions
     lengths : (elements,) element lengths
     tributary : (n,) contact length l_i of each node
@@ -48,7 +46,6 @@ class ElasticStrip(eqx.Module):
     """
 
     energy: Energy
-    section: Hierarchic | None
     x: Array
     lengths: Array
     tributary: Array
@@ -65,7 +62,7 @@ class ElasticStrip(eqx.Module):
     def __init__(self, scene: Scene) -> None:
         strip, contact, self.plan = scene.strip, scene.contact, scene.plan
         self.grid = scene.model.grid
-        self.energy, self.section = scene.strain_energy(), scene.hierarchic_section()
+        self.energy = scene.strain_energy()
         self.contraction = contraction(self.energy, jnp.zeros_like(strip.half_height))
         self.quadratic_energy = scene.energy is None
         ends = elements.vertices(
@@ -110,7 +107,7 @@ class ElasticStrip(eqx.Module):
 
     def embed(self, active: Array) -> Array:
         """All fields (n, m) of the sections from the active ones; frozen fields are zero."""
-        columns = [jnp.zeros_like(self.x)] * self.plan.width
+        columns = [jnp.zeros_like(self.x)] * len(FIELDS)
         for column, field in enumerate(self.plan.active):
             columns[field] = active[:, column]
         return jnp.stack(columns, axis=1)
@@ -131,13 +128,7 @@ class ElasticStrip(eqx.Module):
         return lift + rise + 2.0 * self.half_height * jnp.sin(half) ** 2
 
     def end_displacement(self, q: Array) -> Array:
-        """Displacement u(L) of the loaded end, the conjugate of F.
-
-        It is the mean over the height for a section of order p, and that at mid-height for the
-        beamshell.
-        """
-        if self.section is not None:
-            return self.section.mean_displacement(q[-1])
+        """Displacement u(L) of the loaded end at mid-height, the conjugate of F."""
         return self._displacement(q[-1:], self.x[-1:], 0.0)[0][0]
 
     def _initial_angle(self, x: Array) -> Array:
@@ -151,7 +142,7 @@ class ElasticStrip(eqx.Module):
             return self._kinematics.position(section, self.half_height, height)
 
         if self.curvature is None:
-            return jax.vmap(position)(*q[:, : len(FIELDS)].T)
+            return jax.vmap(position)(*q.T)
         angle = self._initial_angle(x)
         local = rotated(q[:, V], q[:, W], angle)
         return rotated(*jax.vmap(position)(*local, q[:, BETA], q[:, PSI]), -angle)
@@ -169,10 +160,7 @@ class ElasticStrip(eqx.Module):
 
     def strain_energy(self, q: Array) -> Array:
         """Strain energy at fields q (n, m), per unit width."""
-        if self.section is None:
-            density = jax.vmap(jax.vmap(self.energy))(*self._strains(q))
-        else:
-            density = jax.vmap(jax.vmap(self.section.energy))(*self._fields_and_slopes(q))
+        density = jax.vmap(jax.vmap(self.energy))(*self._strains(q))
         return jnp.sum(self.element_rule.weights[:, None] * self.lengths * density)
 
     def elastic_forces(self, q: Array, pressure: ArrayLike) -> Array:
@@ -182,10 +170,7 @@ class ElasticStrip(eqx.Module):
     def section_forces(self, q: Array) -> Strains:
         """Mean N, Q, M, chi and xi of every element, (elements,) local."""
         strains = self._strains(q)
-        if self.section is None:
-            local = jax.vmap(jax.vmap(lambda s: forces(self.energy, s)))(strains)
-        else:
-            local = jax.vmap(jax.vmap(self.section.forces))(*self._fields_and_slopes(q))
+        local = jax.vmap(jax.vmap(lambda s: forces(self.energy, s)))(strains)
         if self.plan.section == "assumed":
             stretch = 2.0 * self.half_height * jnp.asarray(self.youngs_modulus)
             local = local._replace(psi=stretch * strains.psi)
@@ -200,9 +185,8 @@ class ElasticStrip(eqx.Module):
             return jnp.asarray(sum(s[:, None] * v for s, v in zip(shape.T, values.T, strict=True)))
 
         rule = self.element_rule
-        shapes = [rule.values] * self.plan.width
-        if self.section is None:
-            shapes[PSI] = rule.squeeze
+        shapes = [rule.values] * len(FIELDS)
+        shapes[PSI] = rule.squeeze
         nodal = [elements.gather(column, self.element_order) for column in q.T]
         section = [at(shape, values) for shape, values in zip(shapes, nodal, strict=True)]
         slope = [at(rule.slopes, values) / self.lengths for values in nodal]
@@ -215,11 +199,8 @@ class ElasticStrip(eqx.Module):
     def _strains(self, q: Array) -> Strains:
         """Strains of the beamshell at all points of all elements, (points, elements) each."""
         section, slope = self._fields_and_slopes(q)
-        shell = slice(len(FIELDS))
-        strains = self._kinematics.strains(
-            section[shell], slope[shell], self.half_height, self.curvature
-        )
-        if self.section is not None or self.element_order > 1:
+        strains = self._kinematics.strains(section, slope, self.half_height, self.curvature)
+        if self.element_order > 1:
             return strains
         # e varies within an element so that N does not vary with psi, see `mechanics.elements`.
         weights = self.element_rule.weights

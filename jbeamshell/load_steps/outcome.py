@@ -31,20 +31,13 @@ def check_solver(solver: Newton | None) -> None:
     require("solver", solver, solver is None or isinstance(solver, Newton), fix)
 
 
-def raise_if_failed(scene: Scene, steps: StepResults, path: LoadPath, before: int = 0) -> None:
-    """Raise `UnconvergedError` with the first failed step.
-
-    Parameters
-    ----------
-    scene, steps, path : scene, results of a load path, and the path
-    before : number of steps of the history that the path continues
-    """
+def raise_if_failed(scene: Scene, steps: StepResults, path: LoadPath) -> None:
+    """Raise `UnconvergedError` with the first failed step of a load path."""
     converged = np.asarray(steps.state.converged)
     if converged.all():
         return
     first = int(np.argmin(converged))
-    number, last = before + first, before + converged.size - 1
-    where = f"load step {number} of {last} (load {float(path.target[first]):.6g})"
+    where = f"load step {first} of {converged.size - 1} (load {float(path.target[first]):.6g})"
     if not path.rough[first]:
         where = f"pressing down (to {100.0 * float(path.pressure[first]):.3g} % of the pressure)"
     reason = Status(int(steps.status[first])).name.lower().replace("_", " ")
@@ -62,7 +55,7 @@ def raise_if_failed(scene: Scene, steps: StepResults, path: LoadPath, before: in
 
 @eqx.filter_jit
 def history_of(scene: Scene, steps: StepResults, pressure: Array) -> History:
-    """History of the steps without its end and cycles, so that paths share compilations."""
+    """History of the steps without its cycles, so that paths share compilations."""
     system = System(scene)
     converged, level = steps.state.converged, steps.state.level
 

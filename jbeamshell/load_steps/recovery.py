@@ -36,24 +36,24 @@ def recover(
     count = path.target.size
     while not _converged(steps):
         first = int(np.argmin(np.asarray(steps.state.converged)))
-        before = rows(steps.state, first - 1) if first else start
-        pieces = _walk_in_pieces(scene, before, rows(path, first), solver)
+        before = _rows(steps.state, first - 1) if first else start
+        pieces = _walk_in_pieces(scene, before, _rows(path, first), solver)
         if pieces is None:
             return steps
-        step = rows(pieces, -1)._replace(
+        step = _rows(pieces, -1)._replace(
             slip_work=jnp.sum(pieces.slip_work),
             iterations=steps.iterations[first] + jnp.sum(pieces.iterations),
             slipping=jnp.any(pieces.slipping, axis=0),
         )
         # The path's end is repeated: with the shapes of the first march nothing compiles again.
-        further = rows(path, jnp.minimum(jnp.arange(count) + first + 1, count - 1))
-        tail = rows(compiled_march(scene, step.state, further, solver), np.s_[: count - first - 1])
-        parts = rows(steps, np.s_[:first]), rows(step, None), tail
+        further = _rows(path, jnp.minimum(jnp.arange(count) + first + 1, count - 1))
+        tail = _rows(compiled_march(scene, step.state, further, solver), np.s_[: count - first - 1])
+        parts = _rows(steps, np.s_[:first]), _rows(step, None), tail
         steps = jax.tree.map(lambda *columns: jnp.concatenate(columns), *parts)
     return steps
 
 
-def rows(tree: Any, index: Any) -> Any:
+def _rows(tree: Any, index: Any) -> Any:
     """Rows of a pytree's arrays (steps, ...), by an index of NumPy."""
     return jax.tree.map(lambda a: a[index], tree)
 

@@ -32,7 +32,7 @@ class LoadLevel(NamedTuple):
 
     Attributes
     ----------
-    q : (n, m) nodal fields v, w, beta and psi, and those of a section of order p
+    q : (n, 4) nodal fields v, w, beta and psi
     traction : (n,) friction traction t, positive along v (on the foundation)
     cap : (n,) Coulomb cap mu R
     reaction : (n,) normal reaction R
@@ -146,7 +146,7 @@ class System(ElasticStrip):
     def unloaded(self) -> LoadLevel:
         """State of the strip before anything acts on it."""
         zero = jnp.zeros_like(self.x)
-        fields = jnp.zeros((self.x.size, self.plan.width), zero.dtype)
+        fields = jnp.zeros((self.x.size, len(FIELDS)), zero.dtype)
         return LoadLevel(fields, zero, zero, zero, zero[0])
 
     # --- equilibrium ----------------------------------------------------------------------------
@@ -210,7 +210,7 @@ class System(ElasticStrip):
             forces = forces.at[:, PSI].set(2.0 * self.half_height * self.tributary * assumed)
         force, forces = self._end_load(forces, q, prescribed)
         forces = self._hold_ends(forces, q, prescribed.rough)
-        per_force = jnp.stack([self._per_force(field) for field in range(self.plan.width)])
+        per_force = jnp.stack([self._per_force(field) for field in range(len(FIELDS))])
         residual = (forces * per_force / self.force_scale)[:, list(self.plan.active)]
         return force, residual
 
@@ -256,11 +256,7 @@ class System(ElasticStrip):
         ends = [0] if "beta" in names else []
         if self.entry == "guided":
             ends.append(LAST)
-        scales |= {(node, BETA): turning for node in ends}
-        # A section of order p also has displacements along X beyond its rotation.
-        higher = range(len(FIELDS), self.plan.width, 2)
-        ends += [LAST] if self.entry == "face" else []
-        return scales | {(node, field): self.stiffness_scale for node in ends for field in higher}
+        return scales | {(node, BETA): turning for node in ends}
 
     def end_displacement(self, q: Array) -> Array:
         """Displacement u(L) of the loaded end, the conjugate of F; see `ElasticStrip`."""

@@ -25,6 +25,7 @@ from jbeamshell.load_steps.system import (
     V,
     W,
 )
+from jbeamshell.mechanics.kinematics import FIELDS
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
 
@@ -142,7 +143,7 @@ def _probes(system: System, like: Array) -> np.ndarray:
     units = block_tridiagonal.seeds(like)
     active = list(system.plan.active)
     nodes = units.reshape(*units.shape[:2], -1)[..., like.size - system.x.size * len(active) :]
-    fields = np.zeros((*units.shape[:2], system.x.size, system.plan.width), units.dtype)
+    fields = np.zeros((*units.shape[:2], system.x.size, len(FIELDS)), units.dtype)
     fields[..., active] = nodes.reshape(*units.shape[:2], -1, len(active))
     return fields
 

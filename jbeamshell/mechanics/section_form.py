@@ -31,8 +31,7 @@ class SectionForm(NamedTuple):
     press : (m,) parts of the fields in the lift of the top face
     held : (m,) True for fields that are zero at a held far end
     further : (k, m) parts of the fields in those that a history has beside v and w: the rotation
-        beta and the squeeze strain psi (their means over the height, if the section bends), and the
-        displacements of a section of order p
+        beta and the squeeze strain psi (their means over the height, if the section bends)
     modes : (5, 2, m) fields and slopes that are a unit strain e, g, k, psi and psi'; zero for a
         strain that the section does not have
     spread : (m, m) second derivatives of the energy in how far the fields at an element's ends

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 from jax import Array
@@ -21,13 +21,28 @@ from jaxtyping import PyTree
 Function = Callable[[PyTree, PyTree], PyTree]
 
 
-def pushforward(function: Function, at: PyTree, beside: PyTree, change: PyTree) -> PyTree:
+class Rule(NamedTuple):
+    """Derivatives of a function that are known.
+
+    Attributes
+    ----------
+    forward : tangents of the value, (at, beside, change of ``at``)
+    backward : cotangents of ``at``, (at, beside, cotangents of the value)
+    shapes : structure of the value with its shapes, (at, beside)
+    """
+
+    forward: Callable[[PyTree, PyTree, PyTree], PyTree]
+    backward: Callable[[PyTree, PyTree, PyTree], PyTree]
+    shapes: Function
+
+
+def pushforward(function: Function | Rule, at: PyTree, beside: PyTree, change: PyTree) -> PyTree:
     """Change of function(at, beside) for a change of ``at``; linear in the change.
 
     Parameters
     ----------
     function : function of two pytrees of arrays, the first of which holds real numbers; it has
-        derivatives of both modes, and is the same object from call to call
+        derivatives of both modes, or is a `Rule`, and is the same object from call to call
     at, beside : its arguments
     change : change of ``at``
     """
@@ -52,7 +67,7 @@ class _Along:
     back : True for the transpose
     """
 
-    function: Function
+    function: Function | Rule
     tree: Any
     inner: Any
     first: Any
@@ -61,14 +76,25 @@ class _Along:
 
     def structure(self, points: Sequence[Array]) -> Any:
         """Structure of the function's value."""
-        return jax.tree.structure(jax.eval_shape(self.function, *self._given(points)))
+        given = self._given(points)
+        if isinstance(self.function, Rule):
+            return jax.tree.structure(self.function.shapes(*given))
+        return jax.tree.structure(jax.eval_shape(self.function, *given))
 
     def __call__(self, *arrays: Array) -> list[Array]:
         points, linear = arrays[: self.count], arrays[self.count :]
         at, beside = self._given(points)
 
+        rule = self.function
+        if isinstance(rule, Rule):
+            if self.back:
+                out = jax.tree.structure(rule.shapes(at, beside))
+                return jax.tree.leaves(rule.backward(at, beside, jax.tree.unflatten(out, linear)))
+            change = jax.tree.unflatten(self.inner, linear)
+            return jax.tree.leaves(rule.forward(at, beside, change))
+
         def value(at: PyTree) -> PyTree:
-            return self.function(at, beside)
+            return rule(at, beside)
 
         if self.back:
             out, pull = jax.vjp(value, at)

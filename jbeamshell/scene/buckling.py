@@ -39,9 +39,9 @@ class Column(NamedTuple):
     limit: np.ndarray
 
     @property
-    def near(self) -> bool:
-        """True if the compression comes near the load that buckles, for any strip."""
-        return bool(np.any(self.force >= NEAR_BUCKLING * self.limit))
+    def near(self) -> np.ndarray:
+        """True where the compression comes near the load that buckles."""
+        return np.asarray(self.force >= NEAR_BUCKLING * self.limit)
 
 
 @np.errstate(all="ignore")  # the largest numbers there are may overflow

@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
 from jbeamshell.common.checks import require
-from jbeamshell.mechanics.bar import bar_backbone
 from jbeamshell.scene.keys import FAR_ENDS
 from jbeamshell.scene.parts import Contact, Load, Member, Strip
-from jbeamshell.scene.plan import CLOSED, Plan
+from jbeamshell.scene.plan import Plan
 from jbeamshell.scene.pressure import face_resultant, is_table, resultant
 
 EDGE = 1e-12  # part of the length by which a table may run beyond the strip, for round-off
@@ -67,9 +65,6 @@ def support_rules(
     rough = (friction > 0.0) | ("v" in held_fields)
     fix = "nothing holds the strip along X (rigid-body motion): give strip.far_end or friction"
     rules = [Rule("contact.friction", friction, rough, fix)]
-    if plan.engine == CLOSED:
-        fix = "the bar needs friction: give a positive number"
-        rules.append(Rule("contact.friction", friction, friction > 0.0, fix))
     for key, pressure in (("contact.pressure", top), ("contact.bottom_pressure", bottom)):
         if is_table(pressure):
             rules.append(_on_strip(key, pressure[:, 0], length))
@@ -147,21 +142,6 @@ def stays_below(size: Any, limit: Any, part: Any) -> Any:
     part : part of the pressures that acts
     """
     return (size == 0.0) | (limit == 0.0) | (size < (1.0 - MARGIN) * (limit * part))
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def bar_rule(load: Load, plan: Plan, numbers: Numbers) -> Rule:
-    """Rule that a controlled displacement stays below the gross slip of a bar in closed form."""
-    key, amplitude = "load.amplitude", numbers("load.amplitude")
-    if plan.engine != CLOSED or load.control == "force":
-        return Rule(key, amplitude, True, "")
-    pressure = numbers("contact.pressure") - numbers("contact.bottom_pressure")
-    per_length = numbers("contact.friction") * pressure
-    with jax.ensure_compile_time_eval():
-        gross_slip = per_length * numbers("strip.length")
-        limit = np.asarray(bar_backbone(gross_slip, numbers("strip.axial_stiffness"), per_length))
-    fix = f"must stay below the bar's gross slip, {np.max(limit):.6g}; take model.section = shell"
-    return Rule(key, amplitude, amplitude < limit, f"{fix} beyond, or jb.solve(..., by='steps')")
 
 
 def _on_strip(key: str, x: np.ndarray, length: np.ndarray) -> Rule:

@@ -13,7 +13,7 @@ from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.parts import Contact, Load, Member, Model, Strip
 from jbeamshell.scene.plan import Plan
-from jbeamshell.scene.pressure import check_holes_of_bolts, pressure_values
+from jbeamshell.scene.pressure import pressure_values
 from jbeamshell.scene.rows import AUTO, rows
 
 
@@ -43,12 +43,12 @@ def check_joint(scene: Parts) -> None:
     fix = "must be 'rigid' in a lap joint, whose second member is elastic"
     require("contact.normal", contact.normal, contact.normal == "rigid", fix)
     by = scene.model.by
-    fix = "is no engine of a lap joint: its pressures stay beside elastic sliders, a gap or holes; "
+    fix = "is no engine of a lap joint: its pressures stay beside elastic sliders or a gap; "
     fix += "for vibrations take jb.dynamics.let_go, or Joint.of(scene) in a structure"
     require("model.by", by, by == AUTO, fix)
     fix = "must be linear in a lap joint, which is solved on its contact line: leave it out"
     require("model.kinematics", plan.kinematics, plan.kinematics == "linear", fix)
-    fix = "is no section of a lap joint: take plane, squeeze, shell or p1 to p12"
+    fix = "is no section of a lap joint: take plane, squeeze or shell"
     bends = plan.section not in ("bar", "assumed")
     require("model.section", plan.section, bends, fix)
     grid, sharp = scene.model.grid, isinstance(contact.law, SharpSlip)
@@ -64,23 +64,12 @@ def check_joint(scene: Parts) -> None:
     fix = "needs member.bearing_stiffness"
     bears = member.clearance is None or member.bearing_stiffness is not None
     require("member.clearance", member.clearance, bears, fix)
-    bolts = None if member.holes is None else contact.bolts
-    if member.holes is not None and bolts is not None and not is_traced(bolts):
-        check_holes_of_bolts(member.holes, bolts)
-    if member.holes is not None and not is_traced(strip.length):
-        edges, length = np.asarray(member.hole_edges), float(strip.length)
-        fix = f"lies off the overlap, X from 0 to {length:g}: move it or narrow it"
-        inside = bool(np.all(edges >= 0.0) and np.all(edges <= length))
-        require("member.holes", member.holes, inside, fix)
     load = scene.load
     fix = "is for a force: leave it out with load.kind = moment"
     require("load.arm", load.arm, load.arm is None or load.kind == "force", fix)
     turned = load.kind == "moment" or load.arm is not None
     fix = "may not turn: take member, face or traction, or a force without load.arm"
     require("load.entry", load.entry, load.entry != "guided" or not turned, fix)
-    plain = member.layers is None and strip.layers is None
-    fix = "is for homogeneous members: take plane, squeeze or shell"
-    require("model.section", plan.section, plan.order == 0 or plain, fix)
     if member.support != "rolling":
         return
     bottom = contact.bottom_pressure

@@ -39,7 +39,6 @@ FINEST, COARSEST = 1e-4, 0.1  # tolerance: below, the finest mesh may not reach 
 LAYERS = "give rows [thickness, E, nu] of all layers, from the bottom to the top"
 PRESSURE = "give a number or a table of [X, pressure] rows"
 BOLTS = "give rows of numbers [X, force, width of the patch]"
-HOLES = "give rows of numbers [X, diameter]"
 GAP = "give a number or a table of [X, gap] rows"
 WIDTH = 96  # characters of a line of the printed table
 
@@ -188,6 +187,12 @@ class LoadKeys(Part):
     pressure_steps: int = count(1, 1, "Equal steps in which the pressure is applied.")
 
 
+HIERARCHIC = (
+    tuple(f"p{order}" for order in range(1, 13)),
+    "take plane, or squeeze with model.kinematics = exact",
+)
+
+
 class ModelKeys(Part):
     """Extent and resolution of the model, section ``[model]``."""
 
@@ -196,8 +201,9 @@ class ModelKeys(Part):
     section: str = word(
         AUTO,
         SECTIONS,
-        "Section: bar, shell, squeeze, assumed (its squeeze strain from the pressures), p1 to p12 "
-        "(displacements of that order) or plane (elasticity).",
+        "Section: bar, shell, squeeze, assumed (its squeeze strain from the pressures) or plane "
+        "(elasticity).",
+        former=HIERARCHIC,
     )
     kinematics: str = word(AUTO, KINEMATICS, "Rotations: exact or linear.")
     by: str = word(AUTO, ("steps",), "Engine: steps are load steps, also where others would do.")
@@ -303,13 +309,6 @@ class MemberKeys(Part):
         unit="length",
         closed=True,
     )
-    holes: Array | None = number(
-        None,
-        "Rows [X, diameter] of holes, in which the members do not touch; none is none.",
-        unit="length",
-        table=True,
-        fix=HOLES,
-    )
 
 
 # Keys that are no field of their own: they set, or read, a field in another form.
@@ -366,7 +365,8 @@ DERIVED = {row.name: row.through for row in INDIRECT if row.through}
 KEYS = tuple(TABLE)
 NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
 # Keys of old files, with what is to be done about them.
-_SECTION = "say model.section: bar, shell, squeeze, p1 to p12 or plane"
+_SECTION = "say model.section: bar, shell, squeeze or plane"
+_HOLE = "say contact.pressure, a table that is zero over the hole"
 FORMER = {
     "strip.deviation": "a laminate's shear is split at mid-height: leave it out",
     "strip.loaded_end": "say member.loaded_end",
@@ -376,8 +376,10 @@ FORMER = {
     "model.solution": "leave it out, or say model.by = steps",
     "model.squeeze": "say model.section = assumed",
     "model.end_size": "elements follow from model.nodes: leave it out",
+    "member.holes": _HOLE,
+    "contact.holes": _HOLE,
 }
-_OF_JOINT = ("assembly", "gap", "bolt_stiffness", "bearing_stiffness", "clearance", "holes")
+_OF_JOINT = ("assembly", "gap", "bolt_stiffness", "bearing_stiffness", "clearance")
 FORMER |= {f"contact.{name}": f"say member.{name}" for name in _OF_JOINT}
 
 

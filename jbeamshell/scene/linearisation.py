@@ -17,7 +17,7 @@ from jbeamshell.scene.pressure import is_table
 
 # Constants of `bound`, fitted by verification/map_kinematics.py to map_kinematics.json beside it.
 BEAMSHELL = (3.2, 3.6, 3.6, 0.5, 0.0, 3.0)
-SECTIONS = (14.0, 2.7, 3.5, 1.7, 1.7, 3.0)
+ELASTICITY = (14.0, 2.7, 3.5, 1.7, 1.7, 3.0)
 
 
 def bound(
@@ -35,7 +35,7 @@ def bound(
     slip : slip length over H
     friction : Coulomb friction coefficient mu
     softness : E'/(2G)
-    constants : `BEAMSHELL` or `SECTIONS`
+    constants : `BEAMSHELL` or `ELASTICITY`
 
     Returns
     -------
@@ -68,8 +68,7 @@ def linear_error(scene: Parts) -> float:
     ----------
     scene : scene with a foundation and without traced leaves
     """
-    elastic = scene.plan.order > 0 or scene.plan.elastic
-    return float(linear_errors(scene.strip, scene.load, elastic, scene.number))
+    return float(linear_errors(scene.strip, scene.load, scene.plan.elastic, scene.number))
 
 
 @np.errstate(divide="ignore", invalid="ignore")
@@ -82,15 +81,15 @@ def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> 
 
         error <= p (1 + 3 p) (3.2/(1 + (x/3.6)^3.6) + 0.5 mu).
 
-    Sections of order p have other constants, because their exact material is St. Venant and
-    Kirchhoff's.  The bound was measured for loads up to E' 2H/10 and pressures up to E'/3
-    (verification/map_kinematics.json).  Beyond, and for a strip that is curved or on a compliant
-    foundation, it is a guess.
+    Plane elasticity has other constants.  They were fitted to displacements of third order through
+    the height, of St. Venant and Kirchhoff's material.  The bound was measured for loads up to
+    E' 2H/10 and pressures up to E'/3 (verification/map_kinematics.json).  Beyond, and for a strip
+    that is curved or on a compliant foundation, it is a guess.
 
     Parameters
     ----------
     strip, load : parts of the scene, for their words
-    elastic : True for plane elasticity and sections of order p
+    elastic : True for plane elasticity
     numbers : values by dotted key
 
     Returns
@@ -112,7 +111,7 @@ def linear_errors(strip: Strip, load: Load, elastic: bool, numbers: Numbers) -> 
     else:
         softness = 0.5 / shear_modulus(1.0, numbers("strip.poisson_ratio"), strip.plane)
     strain = 2.0 * height * pressure / stiffness
-    constants = SECTIONS if elastic else BEAMSHELL
+    constants = ELASTICITY if elastic else BEAMSHELL
     return bound(strain, slip / height, limit / pressure, softness, constants)
 
 

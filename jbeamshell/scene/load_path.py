@@ -13,8 +13,9 @@ from jax.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, is_traced, require
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.jax_options import memory
+from jbeamshell.mechanics.kinematics import FIELDS
 from jbeamshell.numerics.cycles import closed_cycles
-from jbeamshell.scene.domain import bar_rule, gross_slip_rule, stays_below
+from jbeamshell.scene.domain import gross_slip_rule, stays_below
 from jbeamshell.scene.parts import unit_path
 from jbeamshell.scene.pressure import resultant
 from jbeamshell.scene.scene import Scene
@@ -32,7 +33,6 @@ def check(
         _check_size(scene, loads)
         parts = scene.load, scene.member, scene.number
         gross_slip_rule(*parts, loads.target, loads.pressure).demand()
-        bar_rule(scene.load, scene.plan, scene.number).demand()
     return loads, cycles
 
 
@@ -41,8 +41,6 @@ def whole_path(
 ) -> tuple[LoadPath, tuple[tuple[int, int, int], ...]]:
     """Path of the pressing and of some loads, None for the scene's, and its closed cycles."""
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
-    if path is not None or scene.load.cycles > 0:
-        scene.check_entry()
     numbers: Any = jnp if is_traced(scene.load.amplitude, path) else np  # NumPy is faster
     amplitude = numbers.asarray(scene.load.amplitude)
     if path is None:
@@ -63,7 +61,7 @@ def whole_path(
             pulling = pressures < 0.0
             fix = "the part of the pressures that acts must not be negative"
             require("path", np.asarray(pressures)[pulling], not np.any(pulling), fix)
-            cycles = closed_cycles_of(np.asarray(targets), np.asarray(pressures))
+            cycles = _closed_cycles_of(np.asarray(targets), np.asarray(pressures))
     if is_traced(scene, targets) and scene.load.control == "force":
         targets, numbers = _below_gross_slip(scene, targets, pressures), jnp
     steps = scene.load.pressure_steps
@@ -77,7 +75,7 @@ def whole_path(
     return loads, tuple((a + last, b + last, c + last) for a, b, c in cycles)
 
 
-def closed_cycles_of(loads: np.ndarray, parts: np.ndarray) -> tuple[tuple[int, int, int], ...]:
+def _closed_cycles_of(loads: np.ndarray, parts: np.ndarray) -> tuple[tuple[int, int, int], ...]:
     """Closed cycles of loads that start from zero, whose pressures close too; none of none."""
     cycles = closed_cycles(np.append(0.0, loads)) if loads.size else ()
     parts = np.append(1.0, parts)
@@ -88,7 +86,7 @@ def closed_cycles_of(loads: np.ndarray, parts: np.ndarray) -> tuple[tuple[int, i
 def _unit_cycles(cycles: int, steps: int) -> tuple[tuple[int, int, int], ...]:
     """Closed cycles of a scene's own path."""
     loads = unit_path(cycles, steps)
-    return closed_cycles_of(loads, np.ones_like(loads))
+    return _closed_cycles_of(loads, np.ones_like(loads))
 
 
 def _below_gross_slip(scene: Scene, targets: Array, pressures: Array | np.ndarray) -> Array:
@@ -117,7 +115,7 @@ def check_contact(scene: Scene, contact: ArrayLike) -> np.ndarray:
 def _check_size(scene: Scene, path: LoadPath) -> None:
     """Raise `InputError` for a path whose results would fill this machine's memory."""
     levels, nodes = path.target.size, scene.plan.nodes
-    need, most = 8.0 * levels * nodes * (2 * scene.plan.width + NUMBERS_PER_NODE), memory()
+    need, most = 8.0 * levels * nodes * (2 * len(FIELDS) + NUMBERS_PER_NODE), memory()
     fix = f"and {levels} load steps take {need:.2g} bytes of memory, this machine has {most:.2g}"
     require("model.nodes", nodes, need < most, f"{fix}: take fewer")
 

@@ -33,7 +33,7 @@ from jbeamshell.scene.keys import (
     key_table,
 )
 from jbeamshell.scene.layers import check_layers
-from jbeamshell.scene.pressure import check_gap, check_holes, check_pressure, pressure_values
+from jbeamshell.scene.pressure import check_gap, check_pressure, pressure_values
 from jbeamshell.scene.rows import AUTO, Key
 
 
@@ -112,24 +112,10 @@ class Member(MemberKeys):
     def __check_init__(self) -> None:
         if self.gap is not None and not isinstance(self.gap, jax.core.Tracer):
             check_gap(np.asarray(self.gap))
-        if self.holes is not None:
-            check_holes(self.holes)
         for name in ("axial_stiffness", "poisson_ratio"):
             value = getattr(self, name)
             fix = "member.layers say it already; leave it out"
             require(f"member.{name}", value, self.layers is None or value is None, fix)
-
-    @property
-    def hole_edges(self) -> Array:
-        """Positions X (k, 2) at which each hole begins and ends."""
-        assert self.holes is not None
-        middle, diameter = self.holes.T
-        return jnp.stack([middle - 0.5 * diameter, middle + 0.5 * diameter], axis=1)
-
-    @property
-    def jumps(self) -> int:
-        """Number of edges of holes, at which the contact ends."""
-        return 0 if self.holes is None else 2 * self.holes.shape[0]
 
     def beside(self, strip: Strip) -> Strip:
         """Member as a strip whose contact is its bottom face; what it leaves out is the strip's."""

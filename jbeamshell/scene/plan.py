@@ -12,11 +12,10 @@ from jbeamshell.mechanics.elements import (
     TINY,
 )
 from jbeamshell.mechanics.kinematics import FIELDS
-from jbeamshell.scene.sections import ORDERS, fields_of
+from jbeamshell.scene.sections import fields_of
 
 LINE = "contact line"  # event by event, exact in time
 STEPS = "load steps"  # Newton's method
-CLOSED = "closed form"  # Goodman's bar
 
 
 class Plan(NamedTuple):
@@ -26,7 +25,7 @@ class Plan(NamedTuple):
     ----------
     section : name of the section, see `jbeamshell.scene.sections`
     kinematics : rotations, "exact" or "linear"
-    engine : "contact line", "load steps" or "closed form"
+    engine : "contact line" or "load steps"
     lifts : True if the strip may lift off
     nodes : number of nodes along X
     end_size : smallest elements in units of H, before the number of nodes scales all of them; below
@@ -48,19 +47,9 @@ class Plan(NamedTuple):
         return self.engine == LINE
 
     @property
-    def walks_any_path(self) -> bool:
-        """True if the engine follows any path of loads."""
-        return self.engine != CLOSED
-
-    @property
     def elastic(self) -> bool:
         """True for plane elasticity."""
         return self.section == "plane"
-
-    @property
-    def order(self) -> int:
-        """Order p of the displacements through the height; 0 for the beamshell and elasticity."""
-        return ORDERS.get(self.section, 0)
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -68,19 +57,9 @@ class Plan(NamedTuple):
         return fields_of(self.section, self.lifts)
 
     @property
-    def width(self) -> int:
-        """Number of fields of a section, active or not."""
-        return len(FIELDS) + 2 * max(self.order - 1, 0)
-
-    @property
     def active(self) -> tuple[int, ...]:
-        """Positions of the active fields among (v, w, beta, psi, and a section's further ones)."""
-        return (*(FIELDS.index(f) for f in self.fields), *range(len(FIELDS), self.width))
-
-    @property
-    def warps(self) -> bool:
-        """True if a section may warp, so that its end is no rigid face by nature."""
-        return self.elastic or self.order > 1
+        """Positions of the active fields among v, w, beta and psi."""
+        return tuple(FIELDS.index(f) for f in self.fields)
 
     @property
     def far_size(self) -> float:
@@ -94,8 +73,7 @@ class Plan(NamedTuple):
 
     def __str__(self) -> str:
         held = "" if self.lifts or self.section == "bar" else " held down"
-        by = {LINE: "on its contact line", STEPS: "in load steps", CLOSED: "in closed form"}
+        by = "on its contact line" if self.on_contact_line else "in load steps"
         return (
-            f"section {self.section}{held} {by[self.engine]}, {self.kinematics} kinematics, "
-            f"{self.nodes} nodes"
+            f"section {self.section}{held} {by}, {self.kinematics} kinematics, {self.nodes} nodes"
         )

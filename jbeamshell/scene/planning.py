@@ -3,16 +3,16 @@
 A setting that is `AUTO` is decided here, when a scene is made, for its ``model.tolerance``.  The
 rules were measured (verification/campaign.py, verification/default_settings.py).
 
-* Rotations are linear where the bound on what that leaves out is a small part of the tolerance,
+* A strip is plane elasticity wherever that can stand for it, whatever its numbers are.  Else it is
+  the beamshell with its squeeze strain.
+* Plane elasticity has linear rotations.  Where these are known to be far off, or a part without
+  pressure comes near to buckling, the beamshell with exact rotations takes its place.  The
+  beamshell has linear ones where the bound on what they leave out is a small part of the tolerance,
   see `jbeamshell.scene.linearisation`.
-* The section is the beamshell's with its squeeze strain, or plane elasticity where that is known to
-  be needed, see `jbeamshell.scene.section_error`.
-* A strip that is only pressed, and unevenly, is plane elasticity on small elements: with one
-  squeeze strain through its height it lifts off too near to the edge of a pressure.
+* A strip that is only pressed, and unevenly, is plane elasticity on small elements.
 * A linear strip on a rigid base with sharp friction is solved on its contact line, which is exact
   in time; its strain energy may be a quadratic one of the user's own.  So are plane elasticity and
-  lap joints.  A bar under an even pressure has a closed form.  Any other strip is solved in load
-  steps.
+  lap joints.  Any other strip is solved in load steps.
 * A strip that bends may lift off.  Where strips that lift were held down, their dissipation was off
   by 1 to 10 %.
 * Where the corner may open, elements are smaller at the loaded end.  In load steps this is so only
@@ -38,14 +38,12 @@ from jbeamshell.scene.buckling import weakest_column
 from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import ARC_LENGTH, CONTROLS, KAPPA_S, TABLE
 from jbeamshell.scene.linearisation import Parts, linear_errors
-from jbeamshell.scene.plan import CLOSED, LINE, STEPS, Plan
+from jbeamshell.scene.plan import LINE, STEPS, Plan
 from jbeamshell.scene.quadratic import is_quadratic
 from jbeamshell.scene.rows import AUTO
-from jbeamshell.scene.section_error import known_beforehand
-from jbeamshell.scene.sections import ORDERS
 
-LINEAR_PART = 0.2  # of the tolerance that linear rotations may take
-SECTION_PART = 0.8  # of the tolerance that the section may take
+LINEAR_PART = 0.2  # of the tolerance that the beamshell's linear rotations may take
+ROTATES = 0.05  # error of linear rotations from which on exact ones are worth the plainer section
 FEW_STEPS = 1  # load steps per half cycle where only figures of a cycle are asked of exact events
 
 
@@ -71,6 +69,7 @@ class Grid(NamedTuple):
 KNOWN = 0.005  # tolerance for which the grids were measured
 PLANE_NODES = 67  # of plane elasticity for that
 CONTACT_LINE = Grid(65, 1.0 / 48.0, 2.0, 20, halvings=2)
+BAR = Grid(97, 1.0 / 16.0, 2.0, 20, halvings=2)  # D within a tenth of the tolerance
 SOFT_CONTACT_LINE = Grid(97, 2.0**-16 / 48.0, 2.0, 20, halvings=1)  # of sliders with elastic slip
 MOST_REFINED = 513  # nodes of a grid that was refined
 PLANE = Grid(PLANE_NODES, END_SIZE, 2.0, 20, halvings=1)
@@ -99,8 +98,7 @@ def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
         kinematics = _kinematics(scene, numbers)
     if section == AUTO:
         elastic = kinematics == "linear" and may_be_elastic(scene, numbers)
-        off = only_pressed(scene) or _squeeze_error(scene, numbers) > SECTION_PART * model.tolerance
-        section = "plane" if elastic and off else "squeeze"
+        section = "plane" if elastic else "squeeze"
     engine = _engine(scene, section, kinematics)
     lifts = section != "bar" and contact.normal != "held"
     opens = lifts and scene.strip.curvature is None
@@ -118,35 +116,26 @@ def plan(scene: Parts, numbers: Numbers | None = None) -> Plan:
 
 
 def _engine(scene: Parts, section: str, kinematics: str) -> str:
-    """Engine of a section: the contact line or the closed form where they can stand for it."""
+    """Engine of a section: the contact line where it can stand for it."""
     if scene.model.by == "steps":
         return STEPS
     if section == "plane" or scene.member.support != "none":
         return LINE
-    if section == "bar":
-        return CLOSED if _has_closed_form(scene) else STEPS
     line = kinematics == "linear" and section != "assumed" and has_contact_line(scene)
     return LINE if line and _is_linear(scene, section) else STEPS
 
 
 def _is_linear(scene: Parts, section: str) -> bool:
-    """True if a strain energy of the user's own, if there is one, makes a linear section."""
+    """True if a strain energy of the user's own, if there is one, makes a linear section.
+
+    It could bend a bar, which is held down then.
+    """
     energy, half_height = scene.energy, scene.strip.half_height
-    if energy is None:
-        return True
+    if energy is None or section == "bar":
+        return energy is None
     if is_traced(energy, half_height):
         return scene.plan is not None and scene.plan.on_contact_line
     return is_quadratic(energy, half_height, section != "shell")
-
-
-def _has_closed_form(scene: Parts) -> bool:
-    """True if a bar is Goodman's: homogeneous, straight, under even pressures and whole cycles."""
-    strip, contact, load = scene.strip, scene.contact, scene.load
-    plain = scene.energy is None and strip.layers is None and strip.curvature is None
-    even = contact.pressure.ndim == 0 and contact.bottom_pressure.ndim == 0
-    base = contact.normal in ("rigid", "held") and isinstance(contact.law, SharpSlip)
-    halves = load.steps_per_half_cycle == AUTO or load.steps_per_half_cycle % 2 == 0
-    return plain and even and base and halves and load.control in CONTROLS and load.cycles > 0
 
 
 def has_contact_line(scene: Parts) -> bool:
@@ -192,44 +181,69 @@ def may_be_elastic(scene: Parts, numbers: Numbers | None = None) -> bool:
     return bool(np.all(np.isin(factors, in_either_precision))) and solvable
 
 
-def _squeeze_error(scene: Parts, numbers: Numbers | None) -> float:
-    """Error of the squeeze section beside plane elasticity; infinite where it is not known."""
-    if is_traced(scene.strip, scene.contact, scene.load):
-        return float(np.inf)
-    with jax.ensure_compile_time_eval():
-        error = known_beforehand(scene, "squeeze", numbers or scene.number)
-    return float(np.inf) if error is None else error.largest
-
-
 def _kinematics(scene: Parts, numbers: Numbers | None) -> str:
-    """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown."""
+    """Linear kinematics where rotations do not matter, exact ones elsewhere or where unknown.
+
+    Strips of a sweep that may be plane elasticity are so together; `turning` says which need exact
+    rotations and have a plan of their own.
+    """
     strip, contact, load, model = scene.strip, scene.contact, scene.load, scene.model
-    if scene.member.support != "none" or model.section == "plane":
+    if scene.member.support != "none" or model.section in ("plane", "bar"):
         return "linear"
+    may_be = may_be_elastic(scene, numbers)
     if is_traced(strip, contact, load):
-        return "exact" if scene.plan is None else scene.plan.kinematics
+        unknown = "linear" if may_be else "exact"
+        return unknown if scene.plan is None else scene.plan.kinematics
     bounded = strip.curvature is None and contact.normal in ("rigid", "held")
     if not bounded or scene.energy is not None or load.control not in CONTROLS:
         return "exact"
-    may_be = may_be_elastic(scene, numbers)
+    allowance = ROTATES if may_be else LINEAR_PART * model.tolerance
+    errors, near = _errors_of_rotations(scene, numbers, may_be)
+    known = np.isfinite(errors)  # lanes of a sweep outside the domain have none
+    turns = ((errors > allowance) | near)[known]
+    exact = np.all(turns) if may_be else np.any(turns)
+    return "exact" if exact else "linear"
+
+
+def turning(scene: Parts, numbers: Numbers) -> np.ndarray:
+    """True for strips of a sweep that need exact rotations while the others are plane elasticity.
+
+    Parameters
+    ----------
+    scene : scene with all that is not varied, whose settings are open
+    numbers : values by dotted key of the strips
+
+    Returns
+    -------
+    array of bool
+        of the shape that the numbers broadcast to
+    """
+    if scene.model.kinematics != AUTO or scene.member.support != "none":
+        return np.zeros((), bool)
+    if not may_be_elastic(scene, numbers):
+        return np.zeros((), bool)
+    errors, near = _errors_of_rotations(scene, numbers, True)
+    return np.isfinite(errors) & ((errors > ROTATES) | near)
+
+
+def _errors_of_rotations(
+    scene: Parts, numbers: Numbers | None, elastic: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of linear rotations, and True where a part without pressure may buckle."""
     # Numbers stay numbers within a caller's jit; the largest there are may overflow.
     with jax.ensure_compile_time_eval(), np.errstate(all="ignore"):
-        errors = linear_errors(
-            strip, load, model.section in ORDERS or may_be, numbers or scene.number
-        )
-        column = weakest_column(scene, numbers)
-    errors = errors[np.isfinite(errors)]  # lanes of a sweep outside the domain have none
-    allowance = LINEAR_PART * model.tolerance
-    if may_be:  # better linear than a section that is further off
-        allowance = max(allowance, _squeeze_error(scene, numbers))
-    small = errors.size > 0 and np.max(errors) <= allowance
-    return "linear" if small and not column.near else "exact"
+        errors = linear_errors(scene.strip, scene.load, elastic, numbers or scene.number)
+        near = weakest_column(scene, numbers).near
+    errors, near = np.broadcast_arrays(errors, near)
+    return errors, near
 
 
 def _grid(section: str, engine: str, opens: bool, soft: bool) -> Grid:
     """Grid of a kind of strip for the tolerance `KNOWN`."""
     if section == "plane":
         return PLANE
+    if engine == LINE and section == "bar":
+        return BAR
     if engine == LINE:
         return SOFT_CONTACT_LINE if soft else CONTACT_LINE
     return LIFTING if opens and not soft else STEPWISE
@@ -247,9 +261,8 @@ def _nodes(grid: Grid, scene: Parts, numbers: Numbers | None = None) -> int:
     if grid is PLANE and only_pressed(scene) and is_traced(scene.strip) and scene.plan is not None:
         return scene.plan.nodes
     elements = (grid.nodes - 1) * (KNOWN / scene.model.tolerance) ** (1.0 / grid.order)
-    if grid in (CONTACT_LINE, SOFT_CONTACT_LINE):
-        jumps = scene.contact.jumps + scene.member.jumps
-        elements *= 1.0 + PER_STEP * min(jumps, MOST_JUMPS)
+    if grid in (CONTACT_LINE, SOFT_CONTACT_LINE, BAR):
+        elements *= 1.0 + PER_STEP * min(scene.contact.jumps, MOST_JUMPS)
     elif grid is PLANE and scene.member.support != "none":
         elements *= BOTH_ENDS
     elif grid is PLANE and only_pressed(scene) and not is_traced(scene.strip):
@@ -281,19 +294,6 @@ def finer(scene: Parts) -> Plan:
     return plan._replace(nodes=2 * plan.nodes - 1, end_size=end_size)
 
 
-def elasticity(scene: Parts) -> Plan:
-    """Plan of a scene as plane elasticity, on a grid of its own."""
-    plan, model = scene.plan, scene.model
-    return plan._replace(
-        section="plane",
-        kinematics="linear",
-        engine=LINE,
-        lifts=True,
-        nodes=_nodes(PLANE, scene) if model.nodes == AUTO else plan.nodes,
-        end_size=PLANE.end_size if model.end_size == AUTO else plan.end_size,
-    )
-
-
 def in_words(scene: Parts) -> str:
     """One line that says for what a grid is planned; empty if it was given."""
     if scene.model.nodes != AUTO:
@@ -303,5 +303,4 @@ def in_words(scene: Parts) -> str:
 
 def reference(scene: Parts) -> str:
     """Words for what a scene's tolerance is relative to."""
-    elastic = scene.plan.elastic or may_be_elastic(scene)
-    return "plane elasticity" if elastic else "its own fine mesh"
+    return "plane elasticity" if scene.plan.elastic else "its own fine mesh"

@@ -14,7 +14,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced, require
-from jbeamshell.scene.keys import BOLTS, GAP, HOLES, PRESSURE
+from jbeamshell.scene.keys import BOLTS, GAP, PRESSURE
 
 
 def is_table(pressure: Any) -> bool:
@@ -127,32 +127,3 @@ def check_gap(gap: np.ndarray) -> None:
     require("member.gap", gap, good, "must be finite and nowhere negative")
     rises = not table or bool(np.all(np.diff(gap[:, 0]) > 0.0))
     require("member.gap", gap, rises, "its X must rise from row to row")
-
-
-def check_holes(holes: Array) -> None:
-    """Raise `InputError` unless holes are rows [X, diameter], side by side."""
-    key = "member.holes"
-    require(key, "traced", not is_traced(holes), "knows no derivatives: give plain numbers")
-    rows = np.asarray(holes)
-    require(key, rows, rows.ndim == 2 and rows.shape[1] == 2, HOLES)
-    good = bool(np.all(np.isfinite(rows)) and np.all(rows[:, 1] > 0.0))
-    require(key, rows, good, "diameters must be positive numbers")
-    begin, end = rows[:, 0] - 0.5 * rows[:, 1], rows[:, 0] + 0.5 * rows[:, 1]
-    apart = bool(np.all(begin[1:] >= end[:-1]))
-    require(key, rows, apart, "overlap, or X falls: sort the rows and narrow them")
-
-
-def check_holes_of_bolts(holes: Array, bolts: Array) -> None:
-    """Raise `InputError` unless each hole lies within a patch of the bolts.
-
-    Parameters
-    ----------
-    holes : (k, 2) rows of X and diameter
-    bolts : (m, 3) rows of X, force and width of the patch
-    """
-    (x, diameter), (middle, _, width) = np.asarray(holes).T, np.asarray(bolts).T
-    begin, end = x - 0.5 * diameter, x + 0.5 * diameter
-    inside = (begin[:, None] >= middle - 0.5 * width) & (end[:, None] <= middle + 0.5 * width)
-    for hole in np.flatnonzero(~inside.any(axis=1)):
-        fix = "lies in no bolt's patch: narrow the hole, or widen the patch"
-        require(f"member.holes[{hole}]", holes[hole], False, fix)

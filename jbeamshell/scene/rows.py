@@ -45,6 +45,7 @@ class Key:
     scale : "log" for a number that is known by its order of magnitude, else "linear"
     whole : True if the setting is a whole number
     choices : words to choose from; empty if they are checked elsewhere
+    former : words of old files, with what to say instead
     table : True if rows of numbers are allowed as well
     open : True if a scene chooses the value where it is `AUTO`, see `jbeamshell.scene.planning`
     through : key of the number that this one sets, if it is another form of it
@@ -63,6 +64,7 @@ class Key:
     scale: str = "log"
     whole: bool = False
     choices: tuple[str, ...] = ()
+    former: tuple[tuple[str, ...], str] = ((), "")
     table: bool = False
     open: bool = False
     through: str = ""
@@ -110,6 +112,8 @@ class Key:
             return
         if self.kind == "word":
             if self.choices:
+                gone, instead = self.former
+                require(self.name, value, value not in gone, f"is gone: {instead}")
                 require_choice(self.name, value, (*self.choices, *[AUTO] * self.open))
         elif self.whole:
             require_count(self.name, value, int(self.low), int(self.high))
@@ -159,9 +163,9 @@ def count(default: int | str, low: int, sentence: str, high: int = MOST_STEPS) -
     return setting(default, sentence, low=low, high=high, closed=True, whole=True)
 
 
-def word(default: Any, choices: Any, sentence: str) -> Any:
+def word(default: Any, choices: Any, sentence: str, **facts: Any) -> Any:
     """Field and row of a word, one of some choices."""
-    facts = {"choices": tuple(choices), "open": default == AUTO}
+    facts |= {"choices": tuple(choices), "open": default == AUTO}
     return _field("word", default, sentence, default, facts, static=True)
 
 

@@ -30,14 +30,13 @@ from jbeamshell.mechanics.friction import (
     law_named,
     takes_smoothing,
 )
-from jbeamshell.mechanics.hierarchic import Hierarchic
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
 from jbeamshell.scene.domain import Numbers, gross_slip, support_rules
 from jbeamshell.scene.joint import check_joint
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, KAPPA_S, TABLE, check_key
 from jbeamshell.scene.parts import PARTS, Contact, Load, Member, Model, Part, Strip
 from jbeamshell.scene.plan import Plan
-from jbeamshell.scene.planning import elasticity, finer, may_be_elastic, plan
+from jbeamshell.scene.planning import finer, may_be_elastic, plan
 from jbeamshell.scene.pressure import bolt_pressure
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.text import summary
@@ -147,30 +146,12 @@ class Scene(Tree):
             plane=strip.plane,
         )
 
-    def hierarchic_section(self) -> Hierarchic | None:
-        """Section of order p; None if the section is the beamshell's."""
-        strip, plan = self.strip, self.plan
-        if plan.order == 0:
-            return None
-        return Hierarchic(
-            half_height=strip.half_height,
-            plane_modulus=strip.plane_modulus,
-            poisson_ratio=jnp.asarray(strip.poisson_ratio),
-            order=plan.order,
-            kinematics=plan.kinematics,
-            plane=strip.plane,
-        )
-
     def _check_plan(self) -> None:
         """Refuse what the planned section and engine cannot represent."""
         strip, plan, load = self.strip, self.plan, self.load
         levels = 2 * load.cycles * plan.steps
         fix = f"with {plan.steps} steps per half cycle are more than {MOST_LEVELS} load steps: "
         require("load.cycles", load.cycles, levels <= MOST_LEVELS, f"{fix}take fewer")
-        plain = self.energy is None and strip.layers is None and strip.curvature is None
-        fix = "is for a straight homogeneous strip without an energy of its own: take squeeze"
-        fix += " or plane" * (self.energy is None and strip.curvature is None)
-        require("model.section", plan.section, plain or plan.order == 0, fix)
         fix = "is for a homogeneous strip: take squeeze"
         homogeneous = strip.layers is None or plan.section != "assumed"
         require("model.section", plan.section, homogeneous, fix)
@@ -180,11 +161,10 @@ class Scene(Tree):
     def _check_elasticity(self) -> None:
         """Refuse what is not plane elasticity."""
         strip, contact, model, energy = self.strip, self.contact, self.model, self.energy
-        others = "squeeze, or p6 of a homogeneous strip"
-        section = f"model.section = {others}"
+        section = "model.section = squeeze"
         fix = f"must be linear for plane elasticity: take {section} for rotations"
         require("model.kinematics", model.kinematics, self.plan.kinematics == "linear", fix)
-        fix = f"is no engine of plane elasticity: leave it out, or take model.section = {others}"
+        fix = f"is no engine of plane elasticity: leave it out, or take {section}"
         require("model.by", model.by, model.by == AUTO, fix)
         for key, value in (("strip.curvature", strip.curvature), ("energy", energy)):
             fix = f"must be left out for plane elasticity: take {section}"
@@ -349,30 +329,22 @@ class Scene(Tree):
         """Copy on elements half as large, from which any change goes back to the planned grid."""
         return self.but(plan=finer(self))
 
-    def as_elasticity(self) -> Scene:
-        """Copy as plane elasticity, from which any change goes back to the planned section."""
-        return self.but(plan=elasticity(self))
-
     def serving(self, keys: Collection[str]) -> Scene:
-        """Copy on the section that serves any values of some numbers, if the section is open.
+        """Copy on the beamshell if some numbers are its own and the section is open.
 
-        Plane elasticity serves all but the squeeze-shear factor, which it does not have.
+        Plane elasticity has no squeeze-shear factor.
 
         Parameters
         ----------
         keys : dotted keys of the numbers
         """
-        if not may_be_elastic(self):
+        if KAPPA_S not in keys or not may_be_elastic(self):
             return self
-        if KAPPA_S not in keys:
-            return self.as_elasticity()
         return self.pinned(lambda key: np.array(np.nan) if key == KAPPA_S else self.number(key))
 
     def by_load_steps(self) -> Scene:
         """Copy that is solved in load steps, of any section but plane elasticity."""
-        scene = self.replace({"model.by": "steps"})
-        scene.check_entry()
-        return scene
+        return self.replace({"model.by": "steps"})
 
     def on_grid(self, nodes: int, end_size: float) -> Scene:
         """Copy on a grid of its own, for studies of convergence.
@@ -385,14 +357,6 @@ class Scene(Tree):
         """
         model = dataclasses.replace(self.model, nodes=nodes, end_size=end_size)
         return dataclasses.replace(self, model=model)
-
-    def check_entry(self) -> None:
-        """Refuse a member that goes on where load steps cannot continue its section."""
-        plan, entry = self.plan, self.load.entry
-        fix = f"has no section of order {plan.order} in load steps: take load.entry = face, "
-        fix += "guided or traction, linear kinematics, or model.section = squeeze"
-        ends = plan.on_contact_line or not plan.warps or entry != "member"
-        require("load.entry", entry, ends, fix)
 
 
 def _number(key: str, value: Any) -> Array:

@@ -17,14 +17,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jbeamshell.common.checks import is_traced
-from jbeamshell.mechanics.bar import bar_force
 from jbeamshell.mechanics.friction import SharpSlip
-from jbeamshell.scene.domain import Numbers
 from jbeamshell.scene.keys import TABLE
-from jbeamshell.scene.linearisation import Parts, stretching
-from jbeamshell.scene.pressure import is_table
+from jbeamshell.scene.linearisation import Parts
 
-KNOWN_ORDERS = (6, 4, 3, 2)
 ENTERS = {
     "member": "enters a member that goes on beyond the contact",
     "face": "enters a rigid face that may turn",
@@ -32,8 +28,6 @@ ENTERS = {
     "traction": "is an even traction on the face",
 }
 TOLD_FROM = 0.005  # error that is told
-LARGEST_NU = 0.49  # of the strips that were recorded
-POINTS = 400  # along X, for the friction of a pressure table
 
 
 class SectionError(NamedTuple):
@@ -83,9 +77,7 @@ def kind_of(scene: Parts) -> str:
 
 def section_of(scene: Parts) -> str:
     """Section of a scene for which curves are recorded; empty if there are none for it."""
-    section, order = scene.plan.section, scene.plan.order
-    if order > 0:
-        return next((f"p{p}" for p in KNOWN_ORDERS if p <= order), "")
+    section = scene.plan.section
     return section if section in ("bar", "shell", "squeeze") else ""
 
 
@@ -100,57 +92,12 @@ def section_error(scene: Parts, slip_length: float) -> SectionError | None:
     Returns
     -------
     SectionError or None
-        the curve's first point where slip is shorter than that.  None where nothing slips, for
-        plane elasticity, and for scenes unlike those that were recorded
+        from the curve, at that slip length.  None where nothing slips, for plane elasticity, and
+        for scenes unlike those that were recorded
     """
     reach = slip_length / float(scene.strip.half_height)
-    return _on_curve(scene, section_of(scene), reach) if reach > 0.0 else None
-
-
-def known_beforehand(scene: Parts, section: str, numbers: Numbers) -> SectionError | None:
-    """Error of a section at the slip length of a bar, the shortest of all numbers.
-
-    Parameters
-    ----------
-    scene : parts of the scene, for their words
-    section : name of a section, such as "squeeze"
-    numbers : values by dotted key, of one scene or of many
-
-    Returns
-    -------
-    SectionError or None
-        None where no curve is recorded, or the slip length is not known
-    """
-    if scene.member.support != "none":  # slip zones of both ends
-        return None
-    if scene.strip.layers is None and np.any(numbers("strip.poisson_ratio") > LARGEST_NU):
-        return None
-    with np.errstate(all="ignore"):  # numbers may be as large or as small as there are
-        reach = float(np.min(slip_of_bar(scene, numbers) / numbers("strip.half_height")))
-    return _on_curve(scene, section, reach) if reach > 0.0 else None
-
-
-def slip_of_bar(scene: Parts, numbers: Numbers) -> np.ndarray:
-    """Slip length of a bar at the load's amplitude, at most L; NaN where it is not known."""
-    length, friction = numbers("strip.length"), numbers("contact.friction")
-    force, pressure = numbers("load.amplitude"), numbers("contact.pressure")
-    if is_table(pressure):
-        if scene.load.control == "displacement":
-            return np.full(np.shape(length), np.nan)
-        x = np.linspace(0.0, float(np.max(length)), POINTS)[::-1]
-        pressures = np.interp(x, pressure[:, 0], pressure[:, 1], left=0.0, right=0.0)
-        forces = np.append(0.0, np.cumsum(-0.5 * (pressures[1:] + pressures[:-1]) * np.diff(x)))
-        return np.interp(force / friction, forces, x[0] - x)
-    limit = friction * pressure
-    if scene.load.control == "displacement":
-        force = bar_force(force, stretching(scene.strip, numbers), limit)
-    return np.minimum(length, force / limit)
-
-
-def _on_curve(scene: Parts, section: str, reach: float) -> SectionError | None:
-    """Error of a section whose slip reaches so many H, by its curve; None if there is none."""
-    curve = curves().get(kind_of(scene), {}).get(scene.load.entry, {}).get(section)
-    if curve is None:
+    curve = curves().get(kind_of(scene), {}).get(scene.load.entry, {}).get(section_of(scene))
+    if curve is None or not reach > 0.0:
         return None
     place = np.log(reach), np.log(curve["slip_over_H"])
     sizes = (np.exp(np.interp(*place, np.log(curve[name]))) for name in ("usual", "largest"))

@@ -6,7 +6,6 @@
 | ``shell`` | v, w and beta |
 | ``squeeze`` | v, w, beta and psi, the beamshell with its squeeze strain |
 | ``assumed`` | the same, with psi = -(F_N + R)/(2E) (Brink 2015, section 4.2) |
-| ``p1``, ``p2``, ... | displacements of order p, see `jbeamshell.mechanics.hierarchic` |
 | ``plane`` | plane elasticity, see `jbeamshell.contact_line` |
 
 The bar, and a strip that is held down (``contact.normal = held``), are without the lift w.
@@ -14,11 +13,9 @@ The bar, and a strip that is held down (``contact.normal = held``), are without 
 
 from __future__ import annotations
 
-LARGEST_ORDER = 12
 _FIELDS = {"bar": ("v",), "shell": ("v", "w", "beta")}
 _WHOLE = ("v", "w", "beta", "psi")
-ORDERS = {f"p{order}": order for order in range(1, LARGEST_ORDER + 1)}
-SECTIONS = ("bar", "shell", "squeeze", "assumed", *ORDERS, "plane")
+SECTIONS = ("bar", "shell", "squeeze", "assumed", "plane")
 
 
 def fields_of(section: str, lifts: bool) -> tuple[str, ...]:
@@ -31,7 +28,7 @@ def fields_of(section: str, lifts: bool) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> fields_of("p2", lifts=False)
+    >>> fields_of("squeeze", lifts=False)
     ('v', 'beta', 'psi')
     """
     fields = _FIELDS.get(section, _WHOLE)

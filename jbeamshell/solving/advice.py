@@ -9,12 +9,12 @@ import numpy as np
 
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.friction import SharpSlip
+from jbeamshell.scene.buckling import weakest_column
 from jbeamshell.scene.keys import CONTROLS, KAPPA_S, TABLE
 from jbeamshell.scene.load_path import check
-from jbeamshell.scene.planning import has_contact_line, may_be_elastic, only_pressed, reference
+from jbeamshell.scene.planning import has_contact_line, may_be_elastic, reference
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
-from jbeamshell.scene.section_error import SectionError, known_beforehand
 
 CHOSEN = ("section", "kinematics", "nodes")
 
@@ -28,14 +28,11 @@ class Advice:
     scene : scene with that model
     to : what the tolerance is relative to, "plane elasticity" or "its own fine mesh"
     reason : why this section was taken, in words
-    section_error : largest error of the section beside plane elasticity that is expected; None
-        where none is known, zero for plane elasticity itself
     """
 
     scene: Scene
     to: str
     reason: str
-    section_error: float | None
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -45,7 +42,7 @@ class Advice:
     def figures(self) -> dict[str, Any]:
         """Advice as plain values for JSON."""
         own = {"tolerance": self.scene.model.tolerance, "to": self.to, "reason": self.reason}
-        return own | {"section_error": self.section_error, "settings": self.settings}
+        return own | {"settings": self.settings}
 
     def __str__(self) -> str:
         percent = 100.0 * self.scene.model.tolerance
@@ -63,7 +60,7 @@ def advise(scene: Scene, tolerance: float | None = None) -> Advice:
     Returns
     -------
     Advice
-        which section and grid, why, and how far the section is off
+        which section and grid, and why
 
     Raises
     ------
@@ -80,26 +77,25 @@ def advise(scene: Scene, tolerance: float | None = None) -> Advice:
     require("scene", "traced", not is_traced(scene), "give plain numbers; advice has no derivative")
     scene = within(scene, tolerance)
     check(scene)
-    known = known_beforehand(scene, "squeeze", scene.number)
-    if not may_be_elastic(scene):
-        return Advice(scene, reference(scene), _why_not(scene), None)
-    at = "for slip as long as a bar's"
-    if scene.plan.elastic:
-        if only_pressed(scene):
-            text = "a squeeze section lifts off too near to the edge of a pressure"
-        elif known is None:
-            text = "no curve says how far a squeeze section is off for such a scene"
-        else:
-            text = f"a squeeze section may be off by {_percent(known)} {at}"
-        return Advice(scene, reference(scene), text, 0.0)
-    assert known is not None
-    text = f"a squeeze section is at most {_percent(known)} off {at}"
-    return Advice(scene, reference(scene), text, known.largest)
+    return Advice(scene, reference(scene), _why(scene))
 
 
 def within(scene: Scene, tolerance: float | None) -> Scene:
     """Scene with a tolerance; None keeps its own."""
     return scene if tolerance is None else scene.replace({"model.tolerance": tolerance})
+
+
+def _why(scene: Scene) -> str:
+    """Reason for the section of a scene."""
+    if not may_be_elastic(scene):
+        return _why_not(scene)
+    if scene.plan.elastic:
+        return "the scene has all that plane elasticity needs"
+    if scene.model.kinematics == "exact":
+        return "plane elasticity has no exact rotations"
+    if weakest_column(scene).near:
+        return "a part without pressure may buckle, of which linear rotations know nothing"
+    return "rotations are so large that linear ones, as plane elasticity has, would be far off"
 
 
 def _why_not(scene: Scene) -> str:
@@ -121,8 +117,3 @@ def _why_not(scene: Scene) -> str:
         or model.constants != "consistent",
     }
     return next(reason for reason, holds in reasons.items() if holds)
-
-
-def _percent(known: SectionError) -> str:
-    size = known.largest
-    return f"{100.0 * size:.2g} %" if size < 1.0 else f"a factor of {1.0 + size:.2g}"

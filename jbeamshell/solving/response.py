@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import inspect
 from collections.abc import Callable, Sequence
@@ -12,10 +13,11 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jbeamshell.common.checks import check_words, is_traced, require, require_choice
+from jbeamshell.common.checks import check_words, is_staged, is_traced, require, require_choice
 from jbeamshell.common.errors import InputError
-from jbeamshell.common.native import Native
 from jbeamshell.common.precision import doubled, in_double, is_single
+from jbeamshell.common.small import Small
+from jbeamshell.common.threads import on_one_core
 from jbeamshell.contact_line.shared import Layout, Shared, shared
 from jbeamshell.contact_line.strip import Strip
 from jbeamshell.history.history import FIGURES, History
@@ -33,7 +35,6 @@ Response = Callable[..., dict[str, Array]]
 # Figures of a cycle that condensed strips know from its turning points alone.
 EXACT = {*FIGURES, "dissipation_error"} - {"dissipation_loop", "reaction_min"}
 KEPT = 16  # compiled functions that are kept for scenes of other numbers
-FEW = 200  # number of nodes beyond which the arithmetic takes longer than the calls
 RESPONSES = (
     "force",
     "displacement",
@@ -50,9 +51,7 @@ def response(
 ) -> Response:
     """Make a pure function of some of a scene's numbers, for `jax.jit`, `jax.vmap`, `jax.grad`.
 
-    It computes only its figures, so it costs less than `jbeamshell.solve`.  A call with numbers
-    outside of a transformation runs as one native function on a CPU, if the compiler allows
-    that: for some dozen nodes handing parts to threads takes longer than the arithmetic.
+    It computes only its figures, so it costs less than `jbeamshell.solve`.
 
     Many strips are faster with `jax.lax.map` than with `jax.vmap`.
 
@@ -163,19 +162,26 @@ def _programs(template: Template, asked: _Asked, layout: Layout | None = None) -
     over, solver = asked.over, asked.solver
     apart = 0 if layout is None else 1
 
-    def figures_of(fixed: Sequence[Array], *given: Array) -> dict[str, Array]:
-        values = dict(zip(over, given[apart:], strict=True))
+    @Small
+    def figures_of(given: tuple[Any, ...]) -> dict[str, Array]:
+        fixed, *further = given
+        values = dict(zip(over, further[apart:], strict=True))
         varied = template.scene(list(fixed)).replace(values)
-        strip = None if layout is None else layout.strip(given[0], varied)
+        strip = None if layout is None else layout.strip(further[0], varied)
         return figures(varied, asked.figures, strip, solver)
 
-    shape = jax.ShapeDtypeStruct((), template.dtype)
-    scene = template.scene([shape] * template.numbers)
-    program = Native(figures_of, worth=scene.plan.nodes <= FEW)
+    @on_one_core
+    def now(given: tuple[Any, ...]) -> dict[str, Array]:
+        # While another function is traced, numbers would become a part of its program.  Elsewhere
+        # each operation on constants would be compiled and run by itself.
+        with jax.ensure_compile_time_eval() if is_staged() else contextlib.nullcontext():
+            found: dict[str, Array] = jax.block_until_ready(figures_of(given))
+        return found
 
     def ask(*given: Any) -> dict[str, Array]:
-        found: dict[str, Array] | None = program.now(*given)
-        return program.ordinary(*given) if found is None else found
+        arrays = jax.tree.map(lambda a: a if isinstance(a, Array) else np.asarray(a), given)
+        found: dict[str, Array] = figures_of(arrays) if is_traced(arrays) else now(arrays)
+        return found
 
     return ask
 

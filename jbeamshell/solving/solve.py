@@ -3,9 +3,8 @@
 1. A scene is planned when it is made, see `jbeamshell.scene.planning`; `_able` plans it anew if the
    path needs load steps.
 2. `_walked` follows the path on the contact line, exactly in time (`jbeamshell.contact_line`);
-   `_marched` takes load steps by Newton's method, or the closed form of a bar.
-3. `_refined` halves the elements while the estimated error exceeds the tolerance, and plane
-   elasticity takes the place of a section that is further off.
+   `_marched` takes load steps by Newton's method.
+3. `_refined` halves the elements while the estimated error exceeds the tolerance.
 4. What may still be wrong is a doubt, see `jbeamshell.history.reliability`.
 """
 
@@ -22,27 +21,23 @@ from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, is_staged, is_traced, require
 from jbeamshell.common.errors import DoubtfulWarning, Status, UnconvergedError, warn_of_doubts
-from jbeamshell.common.native import Program
 from jbeamshell.common.precision import in_double, is_single
 from jbeamshell.common.progress import patience
+from jbeamshell.common.small import Small
 from jbeamshell.common.threads import on_one_core
 from jbeamshell.contact_line.solve import Cycles, walks_pressures
 from jbeamshell.contact_line.solve import solve as walk
 from jbeamshell.contact_line.strip import Strip
 from jbeamshell.history.history import History
 from jbeamshell.history.reliability import change_of, misses_tolerance
-from jbeamshell.load_steps.closed_bar import bar_cycles
-from jbeamshell.load_steps.continuation import further_path, with_end
 from jbeamshell.load_steps.outcome import ADVICE, check_solver, history_of, raise_if_failed
 from jbeamshell.load_steps.path_state import StepResults, initial_state
 from jbeamshell.load_steps.recovery import recover
-from jbeamshell.load_steps.stepping import fits_native, march
+from jbeamshell.load_steps.stepping import march
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.load_path import LOADS, LoadPath, check, check_contact, whole_path
-from jbeamshell.scene.plan import CLOSED, STEPS
-from jbeamshell.scene.planning import may_be_elastic, refinements
+from jbeamshell.scene.planning import refinements
 from jbeamshell.scene.scene import Scene
-from jbeamshell.scene.section_error import section_error
 from jbeamshell.solving.advice import within
 
 NO_END = (
@@ -85,8 +80,8 @@ def solve(
     throw : True raises for a step without equilibrium and warns of doubts; False leaves both to
         ``history.status`` and ``history.doubts``
     tolerance : ``model.tolerance``, .0001 to .1; None is the scene's own
-    by : "steps" solves in load steps by Newton's method, to check what the contact line or a closed
-        form says; None leaves it to the plan
+    by : "steps" solves in load steps by Newton's method, to check what the contact line says; None
+        leaves it to the plan
 
     Returns
     -------
@@ -160,8 +155,8 @@ def _able(scene: Scene, path: ArrayLike | None, contact: ArrayLike | None) -> Sc
     if path is not None and (loads := as_leaf(path, "path", LOADS)).ndim > 1:
         vanish = not is_traced(loads) and not np.all(np.asarray(loads)[:, -1])
         line = line and walks_pressures(scene) and not vanish
-    able = line if scene.plan.on_contact_line else path is None or scene.plan.walks_any_path
-    return scene if able or scene.model.section == "plane" else scene.by_load_steps()
+    able = line or not scene.plan.on_contact_line or scene.model.section == "plane"
+    return scene if able else scene.by_load_steps()
 
 
 def _walked(
@@ -172,14 +167,13 @@ def _walked(
     own: bool,
     strip: Strip | None = None,
 ) -> History:
-    """History on the contact line, on a grid and a section that keep the tolerance."""
+    """History on the contact line, on a grid that keeps the tolerance."""
     traced = is_traced(scene, path) or is_staged()
     if traced and not _precise(scene):
         warnings.warn(f"doubtful: {SINGLE}", DoubtfulWarning, stacklevel=STACK + 1)
 
     def walked(scene: Scene, strip: Strip | None = None) -> History:
-        history = walk(scene, path, cycles, own=own, strip=strip)
-        return history.but(end=WholePath())
+        return walk(scene, path, cycles, own=own, strip=strip)
 
     history = walked(scene, strip)
     if traced:
@@ -187,8 +181,6 @@ def _walked(
         return eqx.error_if(history, failed, f"a load step has {NO_END}") if throw else history
     if cycles and history.converged:
         history = _refined(history, walked)
-        if _needs_elasticity(history):
-            history = walked(scene.as_elasticity())
     if throw and not history.converged:
         step = int(np.argmax(np.asarray(history.status)))
         load = float(path.target[step])
@@ -203,37 +195,28 @@ def _marched(
     scene: Scene, path: LoadPath, touching: np.ndarray | None, solver: Newton, throw: bool
 ) -> History:
     """History in load steps; a failed step is taken again in pieces."""
-    native, enabled = fits_native(scene), np.asarray(True)
-    steps, history = _stepped(scene, touching, path, enabled, solver, native=native)
+    steps, history = _stepped((scene, touching, path, np.asarray(True)), solver)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
         return eqx.error_if(history, ~converged, message) if throw else history
     if not np.asarray(steps.state.converged)[-1]:  # indexing a JAX array would compile
-        if scene.plan.engine == STEPS:
-            steps = recover(scene, steps, path, solver, initial_state(scene, touching))
+        steps = recover(scene, steps, path, solver, initial_state(scene, touching))
         if throw:
             raise_if_failed(scene, steps, path)
-        history = with_end(history_of(scene, steps, path.pressure), steps)
+        history = history_of(scene, steps, path.pressure)
     return history
 
 
-@Program
+@Small
 def _stepped(
-    scene: Scene,
-    touching: np.ndarray | None,
-    path: LoadPath,
-    enabled: ArrayLike,
-    solver: Newton,
-    native: bool,
+    given: tuple[Scene, np.ndarray | None, LoadPath, np.ndarray], solver: Newton
 ) -> tuple[StepResults, History]:
     """Results and history of a load path, from the nodes in contact and True to follow it."""
+    scene, touching, path, enabled = given
     start = initial_state(scene, touching)._replace(converged=jnp.asarray(enabled))
-    if scene.plan.engine == CLOSED:
-        steps = bar_cycles(scene, path)
-    else:
-        steps = march(scene, start, path, solver, native)
-    return steps, with_end(history_of(scene, steps, path.pressure), steps)
+    steps = march(scene, start, path, solver)
+    return steps, history_of(scene, steps, path.pressure)
 
 
 def _refined(history: History, walked: Callable[[Scene], History]) -> History:
@@ -254,39 +237,10 @@ def _refined(history: History, walked: Callable[[Scene], History]) -> History:
     return history
 
 
-def _needs_elasticity(history: History) -> bool:
-    """True if a section that was left open is further off than the tolerance, by its own slip."""
-    scene = history.scene
-    if scene.plan.elastic or not may_be_elastic(scene):
-        return False
-    own = section_error(scene, float(history.slip_length))
-    return own is None or own.largest > scene.model.tolerance
-
-
 def _precise(scene: Scene) -> bool:
     """True if a transformation's precision is enough for a scene on its contact line."""
     few = scene.plan.nodes <= SINGLE_NODES and not scene.plan.elastic
     return few or not is_single(scene)
-
-
-class WholePath(eqx.Module):
-    """End of a path on the contact line: to go on, the whole path is walked anew."""
-
-    def continued(
-        self,
-        history: History,
-        path: ArrayLike | None = None,
-        *,
-        solver: Newton | None = None,
-        throw: bool = True,
-    ) -> History:
-        """History with further loads; see `PathEnd.continued`."""
-        scene, first = history.scene, history.pressed + 1
-        loads, parts = (np.asarray(a)[first:] for a in (history.target, history.pressure))
-        further = further_path(scene, float(loads[-1]) if loads.size else 0.0, path)
-        loads, parts = np.append(loads, further.target), np.append(parts, further.pressure)
-        whole = loads if np.all(parts == 1.0) else np.stack([loads, parts], axis=1)
-        return run(scene, whole, solver=solver, throw=throw)
 
 
 def compile_for(
@@ -298,5 +252,5 @@ def compile_for(
     if scene.plan.on_contact_line:
         _walked(scene, whole, cycles, False, path is None)
         return
-    given = scene, None, whole, np.asarray(False), solver or Newton()
-    jax.block_until_ready(_stepped(*given, native=fits_native(scene)))
+    given = scene, None, whole, np.asarray(False)
+    jax.block_until_ready(_stepped(given, solver or Newton()))

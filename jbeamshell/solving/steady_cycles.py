@@ -35,9 +35,6 @@ class SteadyCycles(Tree):
 def steady_cycles(scene: Scene, forces: ArrayLike) -> SteadyCycles:
     """Cycles of rising amplitude (k,), one after the other; NaN where traced ones do not converge.
 
-    All have the section of the scene's plan; one that serves all amplitudes is that of
-    ``scene.serving(("load.amplitude",))``.
-
     Raises
     ------
     UnconvergedError

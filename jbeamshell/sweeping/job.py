@@ -16,6 +16,7 @@ from jbeamshell.common.arrays import check_sum
 from jbeamshell.common.errors import InputError
 from jbeamshell.contact_line.interpolation import HEIGHT, POISSON
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_from_values, scene_to_toml
 from jbeamshell.sweeping.lanes import Lanes, Outcome
 from jbeamshell.sweeping.runner import BLOCK, Block, Runner, shared_keys, width_of_chunks
@@ -32,12 +33,14 @@ class Job:
 
     Attributes
     ----------
-    lanes : lanes of the sweep
+    lanes : lanes of the sweep, whose scene has the settings that serve all of them
+    open : scene with the settings as they were given
     figures : attributes of `jbeamshell.History`
     solver : settings of Newton's method; None is the default
     """
 
     lanes: Lanes
+    open: Scene
     figures: tuple[str, ...]
     solver: Newton | None = None
 
@@ -47,12 +50,12 @@ class Job:
         return np.dtype(self.lanes.scene.strip.length.dtype)
 
     @functools.cached_property
-    def scene(self) -> str | None:
-        """TOML of what is not varied; None if the scene has a function of the user's own."""
+    def scenes(self) -> list[str]:
+        """TOML of what is not varied, with settings for all and open; empty with own functions."""
         try:
-            return scene_to_toml(self.lanes.scene)
+            return [scene_to_toml(scene) for scene in (self.lanes.scene, self.open)]
         except InputError:
-            return None
+            return []
 
     @functools.cached_property
     def outside(self) -> np.ndarray:
@@ -125,8 +128,10 @@ class Job:
 
     def runner(self) -> Runner:
         """Runner with the model of this sweep, to be compiled."""
-        about = self.lanes.scene, tuple(self.lanes.axes), self.figures, self.width, self.solver
-        return Runner(*about, many=self.many, ranges=self.ranges)
+        scenes, keys = (self.lanes.scene, self.open), tuple(self.lanes.axes)
+        return Runner(
+            scenes, keys, self.figures, self.width, self.solver, many=self.many, ranges=self.ranges
+        )
 
     def collected(self, blocks: Mapping[int, Block]) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Figures by name and codes of `Outcome` of all lanes, arrays of the lanes' shape."""
@@ -147,14 +152,14 @@ class Job:
 
     def description(self) -> str:
         """Text from which a worker makes the runner."""
-        if self.scene is None:
+        if not self.scenes:
             raise InputError(
                 "out, executor: a scene with a function of your own cannot be written down: sweep "
                 "it without them"
             )
         about = {
             "version": version("jbeamshell"),
-            "scene": self.scene,
+            "scenes": self.scenes,
             "keys": list(self.lanes.axes),
             "paired": self.lanes.paired,
             "figures": list(self.figures),
@@ -175,11 +180,17 @@ def runner_of(text: str) -> Runner:
             f"executor: its workers have jbeamshell {here}, this process {about['version']}: "
             "install the same version"
         )
-    tables = tomllib.loads(about["scene"])
-    flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
-    scene = jax.tree.map(lambda leaf: leaf.astype(about["dtype"]), scene_from_values(flat))
+    scene, own = (_scene_of(text, about["dtype"]) for text in about["scenes"])
     solver = None if about["solver"] is None else Newton(**about["solver"])
     *_, width, many = about["layout"]
     ranges = about["ranges"] and {key: tuple(ends) for key, ends in about["ranges"].items()}
-    own = scene, about["keys"], about["figures"], width, solver
-    return Runner(*own, many=many, ranges=ranges)
+    asked = about["keys"], about["figures"], width, solver
+    return Runner((scene, own), *asked, many=many, ranges=ranges)
+
+
+def _scene_of(text: str, dtype: str) -> Scene:
+    """Scene of a TOML text, its numbers in a precision."""
+    tables = tomllib.loads(text)
+    flat = {f"{part}.{name}": v for part, table in tables.items() for name, v in table.items()}
+    scene: Scene = jax.tree.map(lambda leaf: leaf.astype(dtype), scene_from_values(flat))
+    return scene

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from jbeamshell.common.checks import as_leaf, require
 from jbeamshell.common.errors import InputError
 from jbeamshell.mechanics.homogeneous import plane_modulus
-from jbeamshell.scene.domain import bar_rule, gross_slip, gross_slip_rule, support_rules
+from jbeamshell.scene.domain import gross_slip, gross_slip_rule, support_rules
 from jbeamshell.scene.keys import DERIVED, NUMBERS, TABLE, check_key
 from jbeamshell.scene.layers import fill_height
 from jbeamshell.scene.scene import Scene
@@ -159,7 +159,6 @@ class Lanes:
         for rule in (
             *support_rules(strip, member, contact, scene.plan, load, self.value),
             gross_slip_rule(load, member, self.value, targets),
-            bar_rule(load, scene.plan, self.value),
         ):
             yield rule.holds
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import jax
+import numpy as np
 from numpy.typing import ArrayLike
 
 from jbeamshell.common.checks import check_words, require
@@ -25,6 +26,7 @@ from jbeamshell.common.precision import doubled, is_single
 from jbeamshell.common.progress import counting, in_notebook
 from jbeamshell.common.threads import on_one_core
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.planning import turning
 from jbeamshell.scene.scene import Scene
 from jbeamshell.solving.response import pinned
 from jbeamshell.sweeping.executors import blocks_of, check_executor
@@ -120,11 +122,11 @@ def sweep(
         names, lanes = _lanes_of(scene, over, figures, paired)
         if is_single(lanes.scene):
             stack.enter_context(jax.enable_x64(True))
-            lanes = dataclasses.replace(lanes, scene=doubled(lanes.scene))
+            scene, lanes = doubled(scene), dataclasses.replace(lanes, scene=doubled(lanes.scene))
         fix = "give a jbeamshell.Newton"
         require("solver", solver, solver is None or isinstance(solver, Newton), fix)
         check_figures(lanes.scene, tuple(lanes.axes), names, solver)
-        job = Job(lanes, names, solver)
+        job = Job(lanes, scene, names, solver)
         table = None if out is None else _check_out(out)
         store = None if table is None else Store(f"{table}{PARTS}", job.mark())
         if store is not None:
@@ -168,6 +170,9 @@ def _run(
     found = {} if store is None else _stored(job, store)
     before, total = _lanes(found), sum(block.size for block in job.blocks)
     notes = [f"{before:,} lanes were done before"] if before else []
+    turns = turning(job.open, job.lanes.value) & ~job.outside
+    if exact := int(np.sum(turns)) if job.lanes.scene.plan.elastic else 0:
+        notes.append(f"{exact:,} lanes need exact rotations: they are beamshells in load steps")
     told(before, total)
     try:
         missing = [number for number in range(len(job.blocks)) if number not in found]

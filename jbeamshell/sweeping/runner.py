@@ -21,11 +21,12 @@ from jbeamshell.contact_line.interpolation import Range
 from jbeamshell.contact_line.shared import Layout, shared
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.planning import turning
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
 from jbeamshell.solving.response import Response, figures, response
 from jbeamshell.solving.solve import run
-from jbeamshell.sweeping.lanes import Outcome
+from jbeamshell.sweeping.lanes import Lanes, Outcome
 
 ABREAST = 32  # most lanes of a chunk on a core, where they share a condensed body
 BLOCK = 1024  # lanes of the largest block, for which the program is compiled
@@ -131,6 +132,7 @@ class Runner:
 
     Attributes
     ----------
+    scene, open : scene with the settings that serve all lanes, and with those that were given
     width : lanes of a chunk, see `width_of_chunks`
     many : True for so many lanes that a program that takes longer to compile is worth it
     ranges : least and most height ratio and Poisson's ratio, by key, if strips may be interpolated
@@ -138,7 +140,7 @@ class Runner:
 
     def __init__(
         self,
-        scene: Scene,
+        scenes: tuple[Scene, Scene],
         keys: Sequence[str],
         figures: Sequence[str],
         width: int,
@@ -147,7 +149,8 @@ class Runner:
         many: bool = False,
         ranges: Mapping[str, Range] | None = None,
     ) -> None:
-        self.scene, self.keys, self.figures = scene, tuple(keys), tuple(figures)
+        self.scene, self.open = scene, _ = scenes
+        self.keys, self.figures = tuple(keys), tuple(figures)
         self.solver, self.dtype = solver, np.dtype(scene.strip.length.dtype)
         self.width = width
         template, self._numbers = Template.of(scene)
@@ -190,21 +193,27 @@ class Runner:
         return program(self._numbers, self._strips, filled, np.int32(count))
 
     def _mend(self, columns: np.ndarray, block: Block) -> None:
-        """Solve failed lanes alone, where long load steps are divided; mark what still fails."""
+        """Solve failed lanes alone, where long load steps are divided; mark what still fails.
+
+        Lanes that need exact rotations have a plan of their own.
+        """
         values, status = block
         unclear = (status != Outcome.CONVERGED) | ~np.all(self._known(values.T), axis=1)
-        for lane in np.flatnonzero(unclear):
-            values[:, lane], status[lane] = self._alone(columns[:, lane])
+        lanes = Lanes(self.open, dict(zip(self.keys, columns, strict=True)), paired=True)
+        turns = np.broadcast_to(turning(self.open, lanes.value), lanes.shape)
+        for lane in np.flatnonzero(unclear | turns):
+            scene = self.open if turns[lane] else self.scene
+            values[:, lane], status[lane] = self._alone(scene, columns[:, lane])
 
     def _known(self, values: np.ndarray) -> np.ndarray:
         """True for numbers (..., figures); an estimated error is infinite where nothing slips."""
         errors = np.array([name == "dissipation_error" for name in self.figures])
         return np.isfinite(values) | (errors & np.isposinf(values))
 
-    def _alone(self, numbers: np.ndarray) -> tuple[np.ndarray, int]:
+    def _alone(self, scene: Scene, numbers: np.ndarray) -> tuple[np.ndarray, int]:
         given = (jnp.asarray(number, self.dtype) for number in numbers)
         try:
-            scene = self.scene.replace(dict(zip(self.keys, given, strict=True)))
+            scene = scene.replace(dict(zip(self.keys, given, strict=True)))
             history = run(scene, throw=False, solver=self.solver)
         except InputError:
             return np.full(len(self.figures), np.nan), Outcome.OUTSIDE

@@ -141,7 +141,7 @@ def condensed(record: dict) -> str:
         for row in record["error"]
     ]  # fmt: skip
     heads = ("contact nodes", "largest error of D where D exceeds .1 of the bar's",
-             "1e-4 of the bar's", "a cycle, factors kept", "a cycle, all built")  # fmt: skip
+             "1e-4 of the bar's", "cycles, body kept", "cycles, new body")  # fmt: skip
     return table(heads, rows) + machine(record["about"])
 
 
@@ -235,20 +235,20 @@ def laws(record: dict) -> str:
 
 
 def squeeze(record: dict) -> str:
-    """Receding contact and Filon's tension over the order of the section."""
+    """Receding contact and Filon's tension by the beamshell and by plane elasticity."""
     exact = record["finite_elements"]
-    finest = {row["order"]: row for row in sorted(record["sections"], key=lambda row: row["nodes"])}
+    finest = {row["section"]: row for row in record["sections"]}
     rows = [
-        (order, f"{row['receding']['contact_end_mm']:.3f}",
+        (f"`{name}`", f"{row['receding']['contact_end_mm']:.3f}",
          f"{row['receding']['reaction_max_MPa']:.2f}", f"{row['receding']['lift_slope']:.4g}",
          f"{row['squeezed']['tension_MPa']:.2f}")
-        for order, row in sorted(finest.items())
+        for name, row in finest.items()
     ]  # fmt: skip
     rows.append(
         ("finite elements", exact["contact_end_mm"], exact["reaction_max_MPa"],
          f"{exact['lift_slope']:.4g}", f"{exact['tension_MPa']:.2f}")
     )  # fmt: skip
-    heads = ("order of the section", "contact ends beyond the load, mm", "largest reaction, MPa",
+    heads = ("section", "contact ends beyond the load, mm", "largest reaction, MPa",
              "slope of the lifted end", "Filon's tension, MPa")  # fmt: skip
     return table(heads, rows)
 

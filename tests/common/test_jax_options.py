@@ -42,6 +42,28 @@ def test_nothing_is_chosen_by_import():
     assert flags_after({}, "jbeamshell.configure(fast_loops=False)") == ""
 
 
+def test_the_walk_is_in_jax_where_it_is_asked_for_and_says_the_same():
+    """A process has one walk: that in C if it was built, or that in JAX."""
+    code = (
+        "import jax; jax.config.update('jax_enable_x64', True); "
+        "from jbeamshell.contact_line import native; import jbeamshell as jb; "
+        "scene = jb.Scene().replace({'model.nodes': 17, 'load.cycles': 1}); "
+        "print(float(jb.solve(scene, throw=False).dissipation), native.in_words(), sep='|')"
+    )
+    by_choice = flags_after({}, f"jbeamshell.configure(walk='jax'); exec({code!r})")
+    by_variable = flags_after({jax_options.WALK: "jax"}, f"jbeamshell.configure(); exec({code!r})")
+    usual = flags_after({}, f"exec({code!r})", without=(jax_options.WALK,))
+    for said in (by_choice, by_variable):
+        assert said.splitlines()[0].endswith("in JAX, more slowly (JBEAMSHELL_WALK = jax)")
+    works = [float(said.partition("|")[0]) for said in (by_choice, by_variable, usual)]
+    assert works == pytest.approx([works[0]] * 3, rel=1e-9)
+
+
+def test_a_walk_that_is_none():
+    with pytest.raises(InputError, match="walk = 'rust': choose 'c' or 'jax'"):
+        jax_options.configure(walk="rust")
+
+
 def test_calls_wait_unless_told_otherwise():
     look = f"print(jax.config.values[{jax_options.ASYNCHRONOUS!r}])"
     assert flags_after({}, f"import jax; {look}") == "True"

@@ -1,4 +1,4 @@
-"""Beamshells, laminates, sections of order p and a Phi of the user's own on their contact line."""
+"""Beamshells, laminates and a Phi of the user's own on their contact line."""
 
 import sys
 from functools import partial
@@ -52,10 +52,8 @@ def beside(scene, **values):
 BODIES = {
     "shell": linear("shell"),
     "squeeze": linear("squeeze"),
-    "p2": linear("p2"),
-    "p4": linear("p4", **{"strip.plane": "stress"}),
-    "face": linear("p3", **{"load.entry": "face"}),
-    "guided": linear("p3", **{"load.entry": "guided"}),
+    "plane stress": linear("squeeze", **{"strip.plane": "stress"}),
+    "guided": linear("squeeze", **{"load.entry": "guided"}),
     "laminate": linear("squeeze", **{"strip.layers": LAYERS}),
     "printed": linear("squeeze", **{"model.constants": "printed"}),
     "coupled": of_phi(
@@ -65,18 +63,12 @@ BODIES = {
 
 
 class TestBody:
-    @pytest.mark.parametrize(
-        "name",
-        [
-            pytest.param(name, marks=pytest.mark.slow if name in ("p2", "guided") else [])
-            for name in BODIES
-        ],
-    )
+    @pytest.mark.parametrize("name", BODIES)
     def test_it_is_the_strip_of_the_load_steps_without_its_inner_fields(self, name):
         """Elimination station by station is that of the whole potential's second derivatives."""
         scene = BODIES[name].replace({"model.nodes": 5})
         elastic = ElasticStrip(scene)
-        zero = jnp.zeros((5, scene.plan.width))
+        zero = jnp.zeros((5, 4))
         free = np.zeros(zero.shape, bool)
         free[:, list(scene.plan.active)] = True
         for (node, field), _ in System(scene).supports(True).items():
@@ -150,16 +142,15 @@ class TestHistory:
 
     @pytest.mark.slow
     @pytest.mark.usefixtures("polygon")
-    @pytest.mark.parametrize("name", ["face", "guided"])
-    def test_a_rigid_face(self, name):
-        scene = BODIES[name].replace(SOFT | {"load.amplitude": 0.4})
+    def test_a_face_that_may_not_turn(self):
+        scene = BODIES["guided"].replace(SOFT | {"load.amplitude": 0.4})
         steps = jb.solve(beside(scene, **{"load.steps_per_half_cycle": 160}))
         check_against_load_steps(jb.solve(scene), steps)
 
     @pytest.mark.slow
     @pytest.mark.usefixtures("polygon")
-    def test_a_section_of_order_two(self, tmp_path):
-        scene = BODIES["p2"].replace(SOFT)
+    def test_plane_stress_and_its_file(self, tmp_path):
+        scene = BODIES["plane stress"].replace(SOFT)
         exact = jb.solve(scene)
         steps = jb.solve(beside(scene, **{"load.steps_per_half_cycle": 160}))
         check_against_load_steps(exact, steps)
@@ -184,18 +175,19 @@ class TestHistory:
 
 class TestFigures:
     def test_derivatives_of_the_dissipation_have_slope_two(self):
-        scene, keys = BODIES["shell"], ("strip.height_ratio", "contact.friction")
+        keys = ("strip.height_ratio", "contact.friction")
+        scene = BODIES["shell"].replace({"load.amplitude": 0.9})
         at = jnp.array([float(scene.get(key)) for key in keys])
+        response = jb.response(scene, keys, ["dissipation"])
 
         def work(numbers):
-            varied = scene.replace(dict(zip(keys, numbers, strict=True)))
-            return jb.contact_line.dissipation(varied, jnp.array([0.9]))[0]
+            return response(*numbers)["dissipation"]
 
         ask = jax.jit(lambda x, way: (*jax.jvp(work, (x,), (way,)), jax.grad(work)(x)))
         for way in at * jnp.eye(2):
             value, forward, reverse = ask(at, way)
             assert float(forward) == pytest.approx(float(reverse @ way), rel=1e-10)
-            sizes = (1e-3, 5e-4)
+            sizes = (2e-4, 1e-4)  # on 17 nodes slopes change a little .05 % away
             rest = [abs(float(ask(at + h * way, way)[0] - value - h * forward)) for h in sizes]
             assert np.log2(rest[0] / rest[1]) == pytest.approx(2.0, abs=0.1)
 
@@ -204,21 +196,17 @@ class TestFigures:
         scene = BODIES["shell"].replace({"load.steps_per_half_cycle": 1})
         table = jb.sweep(scene, {"load.amplitude": [0.5, AMPLITUDE]})
         assert np.all(table.status == 0)
-        works = jb.contact_line.dissipation(scene, [0.5, AMPLITUDE])
-        # Steady cycles follow the edge of the slip zone within an element in their own way.
-        np.testing.assert_allclose(table["dissipation"], works, rtol=5e-3)
         history = jb.solve(scene)
         np.testing.assert_allclose(table["dissipation"][1], history.dissipation, rtol=1e-10)
         joint = Joint.of(scene, 1.2)
-        assert joint.network is not None
         moved = history.displacement - history.displacement[history.pressed]
         steps = slice(history.pressed + 1, None)
         # On 17 nodes: a joint is driven by displacements.
-        np.testing.assert_allclose(joint.path_forces(moved[steps]), history.force[steps], rtol=4e-3)
+        np.testing.assert_allclose(joint.path_forces(moved[steps]), history.force[steps], rtol=1e-5)
 
 
 class TestEngine:
-    @pytest.mark.parametrize("section", ["squeeze", "p2"])
+    @pytest.mark.parametrize("section", ["squeeze", "shell"])
     @pytest.mark.parametrize(
         "values",
         [

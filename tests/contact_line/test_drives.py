@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line import branches, drives, strip, walk
+from jbeamshell.contact_line import drives, strip, walk
 from jbeamshell.contact_line.body import Body
+from jbeamshell.contact_line.contact_state import pressed
 
 NODES = 33
 MU = 0.3
@@ -32,16 +33,10 @@ def body(request):
     return STRIP(scene).body
 
 
-@jax.jit
-def by_factors(body, turns):
-    factors = branches.factorise(body, MU)
-    return branches.path(body, factors, MU, branches.pressed(body), turns)
-
-
 def by_events(body, turns, friction=MU):
     turned = np.diff(np.sign(np.diff(np.append([0.0, 0.0], turns))), append=0.0)[:-1] != 0.0
     turned[0] = True
-    levels = WALK(body, friction, branches.pressed(body), jnp.asarray(turns), jnp.asarray(turned))
+    levels = WALK(body, friction, pressed(body), jnp.asarray(turns), jnp.asarray(turned))
     assert np.all(levels.settled)
     return levels
 
@@ -77,24 +72,6 @@ class TestDisplacementControl:
         np.testing.assert_allclose(state.force, TURNS, atol=1e-10)
         np.testing.assert_allclose(state.displacement, pushed.state.displacement, rtol=1e-12)
         np.testing.assert_allclose(state.v, pushed.state.v, atol=1e-10 * np.abs(state.v).max())
-        np.testing.assert_allclose(driven.slip_work, pushed.slip_work, rtol=1e-10)
-
-    def test_factors_serve_it_where_zones_are_nested(self):
-        changed = {"model.section": "plane", "load.entry": "traction"}
-        body = STRIP(jb.Scene().replace(changed)).body
-
-        @jax.jit
-        def both(body):
-            start = branches.pressed(body)
-            pushed = branches.path(body, branches.factorise(body, 0.1), 0.1, start, TURNS)
-            other = drives.driven_by_displacement(body)
-            factors, turns = branches.factorise(other, 0.1), pushed.at.displacement
-            return pushed, branches.path(other, factors, 0.1, start, turns)
-
-        pushed, driven = both(body)
-        assert np.all(pushed.valid)
-        assert np.all(driven.valid)
-        np.testing.assert_allclose(drives.exchanged(driven.at).force, TURNS, atol=1e-10)
         np.testing.assert_allclose(driven.slip_work, pushed.slip_work, rtol=1e-10)
 
     def test_gross_slip_stays_on_its_plateau_and_energy_balances(self, body):

@@ -65,7 +65,7 @@ class TestElements:
 
     def test_the_edge_opens_as_far(self):
         (row,) = (r for r in elements("member") if (r["eta"], r["mu"], r["A"]) == (H, 0.1, 0.7855))
-        history = jb.solve(PLANE)
+        history = jb.solve(PLANE.replace({"model.nodes": 97}))  # the edge is .01 H from the corner
         opened = jnp.sum((history.w[history.pressed + 1 :] > 0.0) * history.tributary, axis=1)
         assert float(jnp.max(opened)) == pytest.approx(row["open_length"], rel=0.1)
 
@@ -128,13 +128,11 @@ class TestSections:
         ("name", "section"),
         [
             ("face", "squeeze"),
-            ("guided", "p3"),
-            pytest.param("face", "p3", marks=pytest.mark.slow),
-            pytest.param("guided", "squeeze", marks=pytest.mark.slow),
+            ("guided", "squeeze"),
         ],
     )
     def test_load_steps_and_the_contact_line_agree(self, name, section):
-        """A section of order 3 and the beamshell, whose end is held alike in both."""
+        """The end of the beamshell is held alike in both."""
         few = {"load.entry": name, "model.kinematics": "linear"}
         few |= {"contact.stick_stiffness": 50.0, "load.steps_per_half_cycle": 20}
         scene = jb.Scene().replace(few | {"model.section": section}).on_grid(17, 1.0 / 6.0)
@@ -146,18 +144,6 @@ class TestSections:
         assert float(steps.secant_stiffness) == pytest.approx(
             float(line.secant_stiffness), rel=1e-2
         )
-
-    @pytest.mark.parametrize("name", QUICK[:1] + SLOW[1:])
-    def test_sections_of_rising_order_climb_to_plane_elasticity(self, name):
-        small = {"load.amplitude": 0.2, "model.nodes": 65, "load.entry": name}
-        small |= {"model.kinematics": "linear"}
-        plane, low, high = (
-            float(
-                jb.solve(PLANE.replace(small | {"model.section": section}), throw=False).dissipation
-            )
-            for section in ("plane", "p2", "p8")
-        )
-        assert abs(high / plane - 1.0) < 0.5 * abs(low / plane - 1.0)
 
 
 class TestJoints:

@@ -72,16 +72,6 @@ class TestElements:
         for name in ("open_at_pull", "open_at_push"):
             assert found[name] == pytest.approx(elements[name], rel=0.03)
 
-    @pytest.mark.slow
-    def test_sections_of_higher_order_climb_to_them(self):
-        (row,) = (r for r in elements("double-shear") if (r["A"], r["H2"]) == (1.0, 0.2358))
-        errors = []
-        for section in ("squeeze", "p2", "p4", "p6"):
-            history = jb.solve(SQUEEZE.replace({"model.section": section} | of_row(row)))
-            errors.append(float(history.dissipation) / row["D"] - 1.0)
-        assert np.all(np.diff(errors) < 0.0)
-        assert errors[-1] > 0.0
-
 
 class TestLimits:
     @pytest.mark.slow
@@ -228,16 +218,20 @@ class TestBearings:
         assert float(jnp.max(jnp.abs(history.energy_imbalance))) < 1e-4 * work
 
 
-class TestHoles:
-    def test_nothing_touches_in_a_hole(self):
-        values = {"model.section": "shell", "model.nodes": 65, "member.holes": [[1.0, 0.2]]}
-        history = jb.solve(library.single_lap().replace(values), throw=False)
-        assert history.converged
-        inside = np.abs(np.asarray(history.x) - 1.0) < 0.1
-        assert inside.any()
-        assert not np.any(np.asarray(history.touching)[:, inside])
-        pressed = np.asarray(history.reaction @ history.tributary)
-        np.testing.assert_allclose(pressed, 20.0, rtol=0.01)  # the ends' supports carry some
+def test_where_no_pressure_acts_the_members_carry_next_to_nothing():
+    ring = [[0.75, 0.0], [0.75, 40.0], [0.9, 40.0], [0.9, 0.0]]  # of a bolt, around its hole
+    ring += [[1.1, 0.0], [1.1, 40.0], [1.25, 40.0], [1.25, 0.0]]
+    values = {"contact.pressure": ring, "contact.bottom_pressure": ring}
+    values |= {"model.section": "shell", "model.nodes": 65}
+    history = jb.solve(library.single_lap().replace(values), throw=False)
+    assert history.converged
+    away = np.abs(np.asarray(history.x) - 1.0)
+    reaction = np.asarray(history.reaction)
+    assert np.sum(away < 0.09) >= 5
+    assert np.all(reaction[:, away < 0.09] < 0.02 * 40.0)
+    np.testing.assert_allclose(reaction[:, np.abs(away - 0.175) < 0.06], 40.0, rtol=0.05)
+    pressed = reaction @ np.asarray(history.tributary)
+    np.testing.assert_allclose(pressed, 12.0, rtol=0.01)  # the ends' supports carry some
 
 
 def moments(amplitude, **values):
@@ -248,7 +242,7 @@ def moments(amplitude, **values):
 
 class TestMoments:
     @pytest.mark.parametrize(
-        "section", ["squeeze", *(pytest.param(r, marks=pytest.mark.slow) for r in ("p3", "plane"))]
+        "section", ["squeeze", "shell", pytest.param("plane", marks=pytest.mark.slow)]
     )
     def test_an_arm_adds_the_rotation_of_the_end(self, section):
         scene = library.single_lap().replace({"model.section": section, "model.nodes": 25})

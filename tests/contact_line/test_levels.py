@@ -1,7 +1,6 @@
-"""Levels of load paths: events beside factors, in batches, and their slopes; turns of loads."""
+"""Levels of load paths: in batches, and their slopes; turns of loads."""
 
 import dataclasses
-import functools
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +8,8 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line import branches, drives, strip, walk
+from jbeamshell.contact_line import drives, strip, walk
+from jbeamshell.contact_line.contact_state import pressed
 from jbeamshell.contact_line.turns import known_turns, turns_of
 
 NODES = 21
@@ -35,7 +35,7 @@ def open_body(eta):
 
 
 def path(body, friction, amplitude):
-    start = branches.pressed(body)
+    start = pressed(body)
     lift = jnp.where(body.r_0 > 0.0, 0.0, 1e-5 * body.x)
     # Gross slip of the standard pressure is at 20 mu.
     return walk.walk(body, friction, start, 20.0 * amplitude * TURNS, TURNED, lift)
@@ -86,7 +86,7 @@ class TestSlopes:
         # Far nodes slip and stick in turn after the reversal from near gross slip.
         thin = jax.jit(lambda scene: strip.condensed(scene, 41).body)
         body = drives.driven_by_displacement(thin(PLANE.replace({"strip.height_ratio": 0.0274})))
-        start = branches.pressed(body)
+        start = pressed(body)
 
         @jax.jit
         def works(friction):
@@ -106,22 +106,6 @@ class TestSlopes:
 
 
 class TestLevels:
-    def test_factors_and_events_tell_the_same(self):
-        body, friction = strip_body(0.1), 0.1
-        start, turns = branches.pressed(body), 1.2 * jnp.asarray([1.0, -1.0, 1.0])
-
-        @jax.jit
-        def nested(body):
-            return branches.path(body, branches.factorise(body, friction), friction, start, turns)
-
-        fast = nested(body)
-        polygon = functools.partial(walk.walk, rounded=False)
-        slow = jax.jit(polygon)(body, friction, start, turns, jnp.ones(3, bool))
-        assert np.all(fast.valid)
-        np.testing.assert_allclose(fast.slip_work, slow.slip_work, rtol=1e-9)
-        np.testing.assert_allclose(fast.at.v, slow.state.v, atol=1e-12 * fast.at.v.max())
-        np.testing.assert_array_equal(fast.slipping, slow.slipping)
-
     def test_a_batch_is_its_lanes(self):
         value = jax.jit(figures)
         frictions = jnp.asarray([0.05, 0.1, 0.5, 0.8])
@@ -153,7 +137,7 @@ class TestTurns:
 
     def test_traced_turns_are_walked_as_known_ones(self):
         body = strip_body(0.1)
-        given = body, 0.1, branches.pressed(body), 1.2 * TURNS
+        given = body, 0.1, pressed(body), 1.2 * TURNS
         known = jax.jit(walk.walk, static_argnums=4)(*given, TURNED)
         traced = jax.jit(walk.walk)(*given, jnp.asarray(TURNED))
         np.testing.assert_allclose(traced.slip_work, known.slip_work, rtol=1e-9)

@@ -107,7 +107,7 @@ class TestLaminate:
 class TestReceding:
     def test_finite_elements_are_met(self):
         """Finite elements of the plane: .779, 103.12, 1.9858e-4; mean squeeze 101.78 and -.8901."""
-        history = jb.solve(library.receding().replace(PLANE))
+        history = jb.solve(library.receding().replace({"model.section": "plane"}))
         figures = history.figures()
         assert figures["contact_end"] - 50.0 == pytest.approx(0.779, rel=0.01)
         assert figures["reaction_max"] == pytest.approx(103.12, rel=2e-3)

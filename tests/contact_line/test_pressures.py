@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line import branches, drives, strip, walk
+from jbeamshell.contact_line import contact_state, drives, strip, walk
 from jbeamshell.contact_line.assembly import press_roughly
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.pressures import Press, walk_with_pressures
@@ -39,7 +39,7 @@ def pressed():
         body, press = line.body, Press.of(line.loaded.hessian, line.body.f_t.size, 0)
         rough = press_roughly(body.K_tt, body.K_tn, body.K_nn, -press.g_t, -press.g_n, MU)
         body = dataclasses.replace(body, r_0=rough.reaction, t_0=rough.traction)
-        return (body, press, MU, branches.pressed(body)), rough
+        return (body, press, MU, contact_state.pressed(body)), rough
 
     return made(SCENE)
 
@@ -84,7 +84,7 @@ def test_a_bar_slips_where_less_pressure_no_longer_holds_it():
         body,
         press,
         friction,
-        branches.pressed(body),
+        contact_state.pressed(body),
         jnp.asarray([force, force]),
         jnp.asarray([1.0, 0.5]),
     )
@@ -98,7 +98,7 @@ def test_a_bar_slips_where_less_pressure_no_longer_holds_it():
     half, _ = bar(120, 0.5 * pressure)
     one = jnp.ones(1, bool)
     pull = walk.walk(
-        half, friction, branches.pressed(half), jnp.asarray([force]), one, rounded=False
+        half, friction, contact_state.pressed(half), jnp.asarray([force]), one, rounded=False
     )
     np.testing.assert_allclose(found.state.v[1], pull.state.v[0], atol=1e-12 * by_hand)
 
@@ -161,7 +161,7 @@ class TestPath:
             # The contact that was pressed is at its limit of friction, wherever that is.
             share = -press.g_t, -press.g_n
             rough = press_roughly(body.K_tt, body.K_tn, body.K_nn, *share, friction)
-            start = branches.pressed(
+            start = contact_state.pressed(
                 dataclasses.replace(body, r_0=rough.reaction, t_0=rough.traction)
             )
             own = dataclasses.replace(body, K_nn=stiffer * body.K_nn, K_tt=stiffer * body.K_tt)
@@ -198,13 +198,6 @@ def test_works_of_the_load_and_of_the_pressures_are_kept_or_taken_by_friction(sc
     left = [float(np.abs(run.energy_imbalance).max()) for run in (few, many)]
     assert left[1] < 0.1 * left[0]  # trapezoids of the works are of second order
     assert left[1] < 0.01 * float(np.sum(many.slip_work))
-
-
-def test_a_path_of_pressures_goes_on():
-    scene, path = SCENE.replace({"contact.friction": 0.1}), finer(PATH * [0.2, 1.0], 4)
-    further = jb.solve(scene, path, throw=False).continued([[0.3, 0.9]], throw=False)
-    whole = jb.solve(scene, np.append(path, [[0.3, 0.9]], axis=0), throw=False)
-    np.testing.assert_array_equal(further.displacement, whole.displacement)
 
 
 def test_a_cycle_of_the_load_is_none_where_the_pressures_do_not_close():

@@ -102,16 +102,6 @@ def test_a_strip_on_a_rigid_base_is_held_down_in_motion():
     assert soft < 0.99 * held
 
 
-@pytest.mark.slow
-def test_sections_of_higher_order_vibrate_ever_slower_and_the_shell_is_near():
-    entry = {"load__entry": "traction", "model__nodes": 41}
-    sections = ("squeeze", "p1", "p2", "p3")
-    strips = (scene(model__section=section, **entry) for section in sections)
-    shell, *orders = (dynamics.modes(strip).frequency[0] for strip in strips)
-    assert np.all(np.diff(orders) < 0.0)
-    assert shell == pytest.approx(orders[-1], rel=0.02)
-
-
 def test_the_first_thickness_stretch_is_ten_per_cent_off():
     """A straight line over the height, beside the exact sine."""
     strip = scene()

@@ -40,7 +40,7 @@ def test_a_table_comes_back_to_the_last_digit(tmp_path, name):
 @pytest.mark.parametrize("capacity", [np.inf, 80.0, 45.5])
 def test_a_table_keeps_what_is_known_of_the_joint(tmp_path, name, capacity):
     sides = np.stack([0.98 * U, 1.02 * U])
-    joint = Joint(U, JOINT.forces, None, 30.0, capacity, sides)
+    joint = Joint(U, JOINT.forces, 30.0, capacity, sides)
     back = Joint.read(joint.export("table", tmp_path / name))
     for one, other in zip(jax.tree.leaves(back), jax.tree.leaves(joint), strict=True):
         np.testing.assert_array_equal(one, other)

@@ -77,7 +77,6 @@ class TestScenes:
         force = float(scene.gross_slip) * np.array([0.1, 0.25, 0.5, 0.75, 0.93])
         cycles = steady_cycles(scene, force)
         joint = Joint.of(scene, force[-1])
-        assert joint.network is None
         u = np.interp(force, np.append(0.0, joint.forces), np.append(0.0, joint.displacements))
         np.testing.assert_allclose(u, cycles.displacement, rtol=0.025)
         np.testing.assert_allclose(joint.dissipation(u), cycles.dissipation, rtol=0.05)

@@ -61,18 +61,23 @@ class TestJoint:
         joint = Joint.of(PLANE, 1.2, width=3.0)
         history = jb.solve(PLANE, LOADS)
         u = np.asarray(history.displacement - history.displacement[history.pressed])[-len(LOADS) :]
-        # A joint slips node by node, the history evenly.
-        np.testing.assert_allclose(joint.path_forces(u), 3.0 * np.array(LOADS), atol=0.03)
+        # A loop within a loop closes where its load comes back; driven by u, where its u does.
+        np.testing.assert_allclose(joint.path_forces(u), 3.0 * np.array(LOADS), atol=0.01)
 
-    def test_a_strips_points_are_the_means_of_pull_and_push(self):
-        joint = Joint.of(PLANE, 1.2, width=3.0)
-        assert float(joint.forces[-1]) == pytest.approx(3.6)
-        rest = joint.network.rest
-        pull, push = (joint.network.sliders(rest, jnp.asarray(way)) for way in (1.0, -1.0))
-        force = joint.forces / 3.0
-        mean = 0.5 * (pull.displacement_after(force) + push.displacement_after(force))
-        np.testing.assert_allclose(joint.displacements, mean, rtol=1e-12)
-        np.testing.assert_allclose(joint.stiffness * joint.network.body.c, 3.0, rtol=1e-6)
+    @pytest.mark.parametrize("entry", ["traction", "face", "member", "guided"])
+    def test_a_strips_cycles_are_its_own(self, entry):
+        """Short slip, a tall strip: the nodes' own thresholds would be off by factors."""
+        tall = {"strip.height_ratio": 0.34, "contact.friction": 0.2, "strip.poisson_ratio": 0.16}
+        scene = PLANE.replace(tall | {"load.entry": entry, "load.amplitude": 1.05})
+        joint = Joint.of(scene, width=3.0)
+        assert float(joint.forces[-1]) == pytest.approx(3.15)
+        own = jb.response(scene, ["load.amplitude"], ["dissipation", "secant_stiffness"])
+        for part in (1.0, 0.6, 0.1):
+            found = own(part * 1.05)
+            u = joint.displacement(3.0 * part * 1.05)
+            loss, stiffness = float(found["dissipation"]), float(found["secant_stiffness"])
+            assert float(joint.dissipation(u)) == pytest.approx(3.0 * loss, rel=0.015)
+            assert 3.0 * part * 1.05 / float(u) == pytest.approx(3.0 * stiffness, rel=5e-3)
 
     def test_a_spring_in_series_adds_its_displacement(self):
         springy = JOINT.in_series(2.0)
@@ -117,9 +122,8 @@ class TestJoint:
 
     @pytest.mark.slow
     def test_a_bar_of_load_steps_has_goodmans_energy(self):
-        bar = STRIP.replace({"model.section": "bar", "model.nodes": 101})
+        bar = STRIP.replace({"model.section": "bar", "model.nodes": 101}).by_load_steps()
         joint = Joint.of(bar, 1.2)
-        assert joint.network is None
         u = 0.5 * float(joint.displacements[-1])
         force = float(joint.backbone(u))
         assert float(joint.dissipation(u)) == pytest.approx(2.0 / 3.0 * force**3 / 3.4e4, rel=0.01)
@@ -391,7 +395,6 @@ REFUSED = {
     ),
     "no joints": (lambda: modal_curve(Structure(np.eye(1), np.eye(1)), [1.0]), "give a joint"),
     "series": (lambda: JOINT.in_series(-1.0), "series stiffness = -1.0"),
-    "sliders": (lambda: Joint.of(STRIP, 1.0, by="sliders"), "by = 'sliders'"),
     "nowhere": (lambda: Structure(np.eye(1), np.eye(1), [Attachment(JOINT, 1)]), "attachments"),
     "no law": (
         lambda: Structure(np.eye(1), np.eye(1), [Attachment(jb.Scene(), 0)]),
@@ -404,10 +407,6 @@ REFUSED = {
     "no force": (
         lambda: Joint.of(PLANE.replace({"load.control": "displacement", "load.amplitude": 1e-5})),
         "load.amplitude.*force",
-    ),
-    "path beyond gross slip": (
-        lambda: Joint.of(PLANE, 1.0).path_forces([1e-2]),
-        "path.*gross slip",
     ),
     "amplitudes": (lambda: modal_curve(chain(), [0.2, 0.1]), "amplitudes"),
     "still": (lambda: dynamics.shake(chain(), 1.0), "nothing happens"),
@@ -437,7 +436,8 @@ def test_pull_and_push_each_have_their_backbone():
     assert joint.sides is not None
     pull, push = (float(joint.backbone(way * 1e-5, mean=False)) for way in (1.0, -1.0))
     assert pull > float(joint.backbone(1e-5)) > -push > 0.0  # a pull presses the corner down
-    apart = np.abs(np.asarray(joint.sides) - joint.displacements) / joint.displacements
+    mean = np.mean(joint.sides, axis=0)
+    apart = np.abs(np.asarray(joint.sides) - mean) / mean
     assert float(joint.asymmetry) == pytest.approx(float(apart.max()), rel=1e-9)
     at_end = joint.backbone(jnp.stack([joint.sides[0, -1], -joint.sides[1, -1]]), mean=False)
     np.testing.assert_allclose(at_end, [3.6, -3.6], rtol=1e-9)

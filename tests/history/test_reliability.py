@@ -171,7 +171,7 @@ def test_a_corner_that_may_open_counts_where_friction_is_elastic():
         v=even.v * np.where(even.x < 4, 0.5, 1.0),
     )
     elastic = rigid._replace(slip_stiffness=np.asarray([1e6]))
-    line, lifting = jb.Scene(), jb.Scene().by_load_steps()
+    line, lifting = SQUEEZE, jb.Scene().by_load_steps()
     steps = lifting.replace({"contact.normal": "held"})
     soft, soft_lifting = (s.replace({"contact.stick_stiffness": 999.0}) for s in (line, lifting))
     open_ends = [error_estimates.estimates(scene, rigid)[1] for scene in (line, lifting)]
@@ -264,7 +264,7 @@ def test_the_standard_strip_is_beyond_doubt():
 
 def relative_error(run, times=6):
     """Relative error of a run's dissipation, to the same model on elements of 1/times the size."""
-    coarse = jb.Scene().plan
+    coarse = SQUEEZE.plan
     mesh = times * (coarse.nodes - 1) + 1, coarse.end_size / times
     fine = jb.solve(run.scene.pinned().on_grid(*mesh), throw=False)
     return abs(float(run.dissipation / fine.dissipation) - 1.0)
@@ -423,9 +423,9 @@ def test_the_estimate_knows_no_units(unit):
 def test_an_open_loop_and_a_failed_run_are_doubted():
     history = jb.solve(STRIP.replace(COARSE))
     shifted = history.displacement.at[-1].add(0.01 * jnp.ptp(history.displacement))
-    opened = jb.History(**(vars(history) | {"displacement": shifted}))
+    opened = history.but(displacement=shifted)
     assert any("does not close" in doubt for doubt in opened.doubts)
-    failed = jb.History(**(vars(history) | {"status": history.status.at[-1].set(1)}))
+    failed = history.but(status=history.status.at[-1].set(1))
     assert [doubt[:33] for doubt in failed.doubts] == ["a load step found no equilibrium:"]
 
 

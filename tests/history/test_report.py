@@ -44,7 +44,7 @@ def pressed(history, steps, **values):
     """First steps of a history, as of a scene that only presses."""
     scene = history.scene.replace({"load.cycles": 0, "load.pressure_steps": steps} | values)
     kept = {"x", "middles", "tributary", "load"}
-    path = {k: v for k, v in vars(history).items() if k not in kept | {"scene", "cycles", "end"}}
+    path = {k: v for k, v in vars(history).items() if k not in kept | {"scene", "cycles"}}
     path = jax.tree.map(lambda a: a[:steps], path)
     return jb.History(**vars(history) | path | {"scene": scene, "cycles": ()})
 

@@ -10,27 +10,29 @@ from hypothesis import strategies as st
 
 import jbeamshell as jb
 from jbeamshell.scene.keys import ENTRIES
-from jbeamshell.scene.plan import CLOSED, LINE, STEPS
+from jbeamshell.scene.plan import LINE, STEPS
 from jbeamshell.scene.planning import (
+    BAR,
     CONTACT_LINE,
     KNOWN,
     LIFTING,
     PLANE,
     SOFT_CONTACT_LINE,
     STEPWISE,
+    refinements,
 )
 
 FINE = {"model.tolerance": KNOWN}  # for which grids were measured
 SQUEEZE = jb.Scene().replace({"model.section": "squeeze"})
-ROTATING = {"contact.pressure": 500.0, "load.amplitude": 40.0}
+ROTATING = {"contact.pressure": 5000.0, "load.amplitude": 400.0}
 
 
 def test_the_standard_strip_is_solved_on_its_contact_line():
     scene = jb.Scene().replace(FINE | {"load.amplitude": 1.8})
     plan = scene.plan
-    assert (plan.section, plan.engine, plan.kinematics) == ("squeeze", LINE, "linear")
+    assert (plan.section, plan.engine, plan.kinematics) == ("plane", LINE, "linear")
     assert plan.lifts
-    assert (plan.nodes, plan.end_size) == (CONTACT_LINE.nodes, CONTACT_LINE.end_size)
+    assert (plan.nodes, plan.end_size) == (PLANE.nodes, PLANE.end_size)
     model = scene.model
     assert model.section == model.kinematics == model.nodes == model.end_size == "auto"
 
@@ -38,39 +40,24 @@ def test_the_standard_strip_is_solved_on_its_contact_line():
 @pytest.mark.parametrize(
     ("values", "section"),
     [
-        ({}, "squeeze"),
-        ({"load.amplitude": 0.4}, "plane"),  # its slip reaches 2.5 H
-        ({"load.amplitude": 0.4, "model.tolerance": 0.1}, "squeeze"),
+        ({}, "plane"),
+        ({"load.amplitude": 0.01}, "plane"),
+        ({"model.tolerance": 0.1}, "plane"),
         ({"load.entry": "traction"}, "plane"),
-        ({"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]}, "plane"),
-        ({"contact.pressure": [[0.0, 9.0], [2.0, 4.0]]}, "squeeze"),
-        ({"contact.pressure": [[0.5, 10.0], [1.5, 10.0]]}, "plane"),  # a patch
+        ({"contact.pressure": [[0.5, 10.0], [1.5, 10.0]]}, "plane"),
         ({"strip.far_end": "free"}, "plane"),
-        ({"strip.poisson_ratio": 0.495, "load.amplitude": 1.5}, "plane"),  # none was recorded
         ({"strip.layers": [[0.1, 1e5, 0.3], [0.1252, 2e5, 0.3]]}, "plane"),
-        ({"load.control": "displacement", "load.amplitude": 1e-5}, "squeeze"),
-        ({"load.control": "displacement", "load.amplitude": 1e-6}, "plane"),
-        ({"strip.kappa_s": 0.5, "load.amplitude": 0.4}, "squeeze"),
-        ({"strip.height_ratio": 0.4}, "plane"),  # though its rotations make more than .2 %
-        ({"model.section": "squeeze", "load.amplitude": 0.4}, "squeeze"),
+        ({"load.control": "displacement", "load.amplitude": 1e-5}, "plane"),
+        ({"strip.height_ratio": 0.4}, "plane"),
+        ({"strip.kappa_s": 0.5}, "squeeze"),
+        ({"model.section": "squeeze"}, "squeeze"),
+        ({"model.constants": "printed"}, "squeeze"),
     ],
     ids=str,
 )
-def test_the_section_is_the_cheapest_that_keeps_the_tolerance(values, section):
+def test_a_strip_is_plane_elasticity_where_that_can_stand_for_it(values, section):
     plan = jb.Scene().replace(values).plan
     assert (plan.section, plan.engine) == (section, LINE)
-
-
-def test_a_section_that_is_too_far_off_gives_way_to_elasticity():
-    """A bar would slip over 4.4 H.  The section slips over 3 H, where it is some 5 % off."""
-    scene = jb.Scene().replace({"load.amplitude": 0.5, "model.tolerance": 0.02})
-    assert scene.plan.section == "squeeze"
-    history = jb.solve(scene)
-    assert history.scene.plan.section == "plane"
-    exact = jb.solve(scene.replace({"model.section": "plane", "model.nodes": 193}))
-    assert float(history.dissipation) == pytest.approx(float(exact.dissipation), rel=0.02)
-    again = history.scene.replace({"load.amplitude": 1.2})
-    assert again.plan.section == "squeeze"
 
 
 @pytest.mark.parametrize(
@@ -99,18 +86,30 @@ def test_the_contact_line_takes_any_number_of_nodes():
 @pytest.mark.parametrize(
     ("values", "engine"),
     [
-        ({}, CLOSED),
-        ({"load.steps_per_half_cycle": 1}, STEPS),
+        ({}, LINE),
+        ({"load.steps_per_half_cycle": 1}, LINE),
+        ({"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]}, LINE),
+        ({"load.amplitude": 1.9, "strip.height_ratio": 0.5, "contact.pressure": 1e3}, LINE),
         ({"load.cycles": 0}, STEPS),
         ({"contact.smoothing": 8.0}, STEPS),
-        ({"contact.pressure": [[0.0, 10.0], [2.0, 8.0]]}, STEPS),
+        ({"contact.normal": "held"}, STEPS),
+        ({"model.kinematics": "exact"}, STEPS),
     ],
     ids=str,
 )
-def test_a_bar_has_a_closed_form_where_it_is_goodmans(values, engine):
+def test_a_bar_is_on_its_contact_line_like_any_section_that_does_not_turn(values, engine):
     bar = jb.Scene().replace({"model.section": "bar"} | values)
     assert (bar.plan.engine, bar.plan.fields) == (engine, ("v",))
     assert bar.by_load_steps().plan.engine == STEPS
+
+
+def test_a_bar_has_a_grid_of_its_own():
+    bar = jb.Scene().replace({"model.section": "bar"})
+    assert (bar.plan.nodes, bar.plan.end_size) == (69, BAR.end_size)
+    assert bar.replace(FINE).plan.nodes == BAR.nodes
+    assert refinements(bar) == BAR.halvings
+    phi = jb.Scene(energy=lambda e, g, k, psi, dpsi: 1e4 * (e**2 + e * g + g**2 + k**2 + psi**2))
+    assert phi.replace({"model.section": "bar"}).plan.engine == STEPS
 
 
 def test_a_strip_that_is_pressed_unevenly_alone_is_plane_elasticity():
@@ -126,7 +125,6 @@ def test_a_strip_that_is_pressed_unevenly_alone_is_plane_elasticity():
         {"model.section": "squeeze"},
     ):
         assert scene.replace(more).plan.section == "squeeze"
-    assert "too near to the edge of a pressure" in jb.advise(scene).reason
 
 
 def test_load_steps_stick_through_changes():
@@ -186,9 +184,10 @@ def test_ideal_sliders_hold_as_much_on_small_elements_as_on_large_ones():
 
 def test_rotations_are_exact_where_their_bound_says_so():
     assert jb.Scene().replace(ROTATING).plan.kinematics == "exact"
-    loose = jb.Scene().replace(ROTATING | {"model.tolerance": 0.1})
-    assert loose.plan.kinematics == "linear"
-    assert jb.Scene().replace({"model.section": "p2"} | ROTATING).plan.kinematics == "exact"
+    pressed = {"contact.pressure": 500.0, "load.amplitude": 40.0}  # linear ones are .8 % off
+    assert jb.Scene().replace(pressed).plan.kinematics == "linear"
+    assert SQUEEZE.replace(pressed).plan.kinematics == "exact"
+    assert SQUEEZE.replace(pressed | {"model.tolerance": 0.1}).plan.kinematics == "linear"
 
 
 def test_an_overhang_near_buckling_rotates():
@@ -287,10 +286,6 @@ def test_a_sweep_chooses_for_all_its_strips():
     over = {"contact.pressure": [10.0, 500.0], "load.amplitude": [0.5]}
     assert SQUEEZE.pinned(_numbers(over)).plan.kinematics == "exact"
     assert SQUEEZE.pinned(_numbers({"load.amplitude": [0.5]})).plan.kinematics == "linear"
-    slips = {"load.amplitude": [0.4, 1.2]}  # over 2.5 H at least
-    assert jb.Scene().pinned(_numbers(slips)).plan.section == "plane"
-    slips = {"load.amplitude": [0.9, 1.2]}
-    assert jb.Scene().pinned(_numbers(slips)).plan.section == "squeeze"
 
 
 def _numbers(over):
@@ -301,7 +296,7 @@ def _numbers(over):
 
 def test_history_says_its_plan():
     history = jb.solve(jb.Scene())
-    plan = "section squeeze on its contact line, linear kinematics"
+    plan = "section plane on its contact line, linear kinematics"
     first, second, *_ = str(history).splitlines()
     assert first.endswith(f": {plan}, {history.x.size} nodes")
     assert second == "planned to be within 1 % of plane elasticity"
@@ -332,19 +327,9 @@ def test_pressures_that_change_beside_elastic_sliders_take_load_steps():
         jb.solve(soft.replace({"model.section": "plane"}), path)
 
 
-def test_a_history_on_the_contact_line_goes_on():
-    scene = jb.Scene().replace({"model.nodes": 33, "load.cycles": 1})
-    begun = jb.solve(scene)
-    further = begun.continued([0.5, -0.2])
-    whole = jb.solve(scene, np.append(np.asarray(begun.target)[begun.pressed + 1 :], [0.5, -0.2]))
-    np.testing.assert_array_equal(further.displacement, whole.displacement)
-    assert further.force.size == begun.force.size + 2
-
-
 def test_a_plan_does_not_depend_on_the_plan_before():
     little = {"strip.height_ratio": 0.3, "strip.kappa_s": 0.6, "load.amplitude": 0.02}
-    strip = jb.Scene().replace({"load.entry": "traction"})
-    before = [strip.replace({"load.amplitude": size}) for size in (0.5, 1.6)]
+    before = [jb.Scene().replace(values) for values in ({}, {"strip.kappa_s": 0.5})]
     assert [scene.plan.section for scene in before] == ["plane", "squeeze"]
     assert before[0].replace(little).plan == before[1].replace(little).plan
 
@@ -371,7 +356,7 @@ def scenes(draw):
         "contact.smoothing": [8.0],
         "contact.normal": ["held", "compliant"],
         "load.steps_per_half_cycle": [1, 6],
-        "model.section": ["bar", "shell", "squeeze", "assumed", "p1", "p3", "plane"],
+        "model.section": ["bar", "shell", "squeeze", "assumed", "plane"],
         "model.kinematics": ["exact", "linear"],
         "model.grid": ["collocation"],
         "model.nodes": [41, 401],
@@ -402,7 +387,7 @@ def test_a_pinned_scene_keeps_its_plan(scene, tmp_path_factory):
 
 @pytest.mark.parametrize(
     "section",
-    ["shell", *(pytest.param(name, marks=pytest.mark.slow) for name in ("squeeze", "p2"))],
+    ["shell", pytest.param("squeeze", marks=pytest.mark.slow)],
 )
 @pytest.mark.doubtful("the section")
 def test_load_steps_dissipate_as_the_contact_line_does(section):

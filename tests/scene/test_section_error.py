@@ -56,7 +56,7 @@ def test_it_is_told_in_words():
 
 @pytest.mark.parametrize(
     "section",
-    [*(pytest.param(name, marks=pytest.mark.slow) for name in ("bar", "shell")), "squeeze", "p3"],
+    [*(pytest.param(name, marks=pytest.mark.slow) for name in ("bar", "shell")), "squeeze"],
 )
 def test_a_section_that_the_user_names_is_doubted_where_slip_is_short(section):
     """The doubt says the size and the fix, which leaves none; much slip is never doubted."""

@@ -10,16 +10,22 @@ import jbeamshell as jb
 from jbeamshell.scene import library
 from jbeamshell.scene.plan import STEPS
 
-SHORT = {"load.amplitude": 0.4}  # a bar slips over 3.6 H
+ROTATING = {"contact.pressure": 5000.0, "load.amplitude": 400.0}
+SLENDER = {
+    "strip.height_ratio": 0.01,
+    "contact.friction": 0.3,
+    "contact.pressure": [[0.0, 30.0], [0.6, 30.0], [0.6, 0.0], [2.0, 0.0]],
+}
 
 
 @pytest.mark.parametrize(
     ("values", "section", "to", "reason"),
     [
-        ({}, "squeeze", "plane elasticity", "at most 0.77 % off"),
-        (SHORT, "plane", "plane elasticity", "may be off by 6.8 %"),
-        ({"load.amplitude": 0.03}, "plane", "plane elasticity", "off by a factor of"),
-        ({"strip.far_end": "free"}, "plane", "plane elasticity", "no curve says"),
+        ({}, "plane", "plane elasticity", "all that plane elasticity needs"),
+        ({"strip.far_end": "free"}, "plane", "plane elasticity", "all that plane elasticity needs"),
+        ({"model.kinematics": "exact"}, "squeeze", "its own fine mesh", "no exact rotations"),
+        (ROTATING, "squeeze", "its own fine mesh", "rotations are so large"),
+        (SLENDER, "squeeze", "its own fine mesh", "may buckle"),
         ({"model.section": "squeeze"}, "squeeze", "its own fine mesh", "section is named"),
         ({"strip.curvature": 1e-3}, "squeeze", "its own fine mesh", "it is curved"),
         ({"contact.normal": "compliant"}, "squeeze", "its own fine mesh", "base is not rigid"),
@@ -57,11 +63,9 @@ def test_an_energy_of_ones_own_keeps_to_its_own_mesh():
 
 
 def test_a_tolerance_is_the_scenes_number():
-    scene = jb.Scene().replace(SHORT)
+    scene = jb.Scene().replace({"load.amplitude": 0.4})
     loose = jb.advise(scene, 0.1)
-    assert loose.settings["model.section"] == "squeeze"
-    assert 0.01 < loose.section_error < 0.08
-    assert jb.advise(scene).section_error == 0.0
+    assert loose.settings["model.nodes"] < jb.advise(scene).settings["model.nodes"]
     given = scene.replace({"model.tolerance": 0.1})
     assert loose.scene.model == given.model
     history = jb.solve(scene, tolerance=0.1, throw=False)
@@ -73,7 +77,7 @@ def test_a_tolerance_is_the_scenes_number():
 def test_a_lap_joint_is_plane_elasticity():
     named = library.double_shear()
     opened = named.replace({"model.section": "auto"})
-    for joint, reason in ((named, "is named"), (opened, "no curve")):
+    for joint, reason in ((named, "is named"), (opened, "all that plane")):
         advice = jb.advise(joint)
         assert (advice.scene.plan.section, advice.to) == ("plane", "plane elasticity")
         assert reason in advice.reason

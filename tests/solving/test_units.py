@@ -15,7 +15,6 @@ SCENES = {
     "plane": {"model.section": "plane"},
     "load steps": COARSE | {"model.kinematics": "exact"},
     "smooth": COARSE | {"contact.smoothing": 8.0},
-    "p3": COARSE | {"model.section": "p3", "model.kinematics": "exact", "load.entry": "face"},
     "compliant": COARSE | {"model.section": "squeeze", "contact.normal": "compliant"},
     "displaced": COARSE | {"load.control": "displacement", "load.amplitude": 2e-5},
     "lap": {"strip.far_end": "free", "member.support": "rolling", "load.amplitude": 1.0},

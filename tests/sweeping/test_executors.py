@@ -149,7 +149,7 @@ def test_what_is_no_place_for_blocks_is_refused(given, says):
 
 
 def test_workers_of_another_version_are_refused():
-    about = Job(lanes_of(SCENE, over(SMALL)), FIGURES).description()
+    about = Job(lanes_of(SCENE, over(SMALL)), SCENE, FIGURES).description()
     other = json.dumps(json.loads(about) | {"version": "0.0.1"})
     with pytest.raises(InputError, match=r"this process 0\.0\.1: install the same version"):
         runner_of(other)

@@ -21,6 +21,7 @@ TINY = {
     "load.steps_per_half_cycle": 2,
     "load.cycles": 1,
 }
+OPEN = {"model.kinematics": "auto"}
 SCENE = STRIP.replace(TINY)
 OVER = {"load.amplitude": [0.3, 1.9, 1.1, 2.5, 0.7], "strip.height_ratio": [0.05, 0.4]}
 FIGURES = ("dissipation", "dissipation_ratio", "secant_stiffness", "reaction_max")
@@ -69,6 +70,19 @@ def test_every_lane_says_what_solve_says(result):
         f"10 lanes over load.amplitude (5), strip.height_ratio (2): {summary(8, 0, 2)}"
     )
     assert re.match(r"2 lanes lie outside .*: load.amplitude = 2.5: .*gross slip", result.notes)
+
+
+def test_a_lane_that_needs_exact_rotations_leaves_the_others_alone():
+    """The part that nothing presses is a column: the thin strip may buckle, the other may not."""
+    overhang = {"contact.friction": 0.3, "load.amplitude": 1.0}
+    overhang["contact.pressure"] = [[0.0, 30.0], [0.6, 30.0], [0.6, 0.0], [2.0, 0.0]]
+    scene, heights = jb.Scene().replace(TINY | overhang | OPEN), [0.01, 0.05]
+    found = jb.sweep(scene, {"strip.height_ratio": heights}, ["dissipation"])
+    assert "1 lanes need exact rotations" in found.attrs["notes"]
+    alone = [jb.solve(scene.replace({"strip.height_ratio": h}), throw=False) for h in heights]
+    assert [run.scene.plan.kinematics for run in alone] == ["exact", "linear"]
+    known = [float(run.dissipation) for run in alone]
+    np.testing.assert_allclose(found["dissipation"], known, rtol=1e-9)
 
 
 def test_pairs_are_the_product_lane_by_lane(result):
@@ -372,7 +386,7 @@ def test_other_files_in_the_store_are_left_alone(tmp_path):
 def test_a_model_of_ones_own_is_not_kept_on_disk():
     scene = jb.Scene(energy=lambda e, g, k, psi, dpsi: e**2)
     with pytest.raises(InputError, match="sweep it without them"):
-        job.Job(lanes_of(scene, OVER), FIGURES).description()
+        job.Job(lanes_of(scene, OVER), scene, FIGURES).description()
 
 
 def test_chunks_hold_lanes_that_share_what_they_must():
@@ -390,7 +404,7 @@ def test_lanes_advance_together_as_far_as_they_share_a_body():
     over = {"contact.pressure": pressures, "strip.height_ratio": heights}
 
     def width(over, paired=False):
-        return job.Job(lanes_of(scene, over, paired), ("dissipation",)).width
+        return job.Job(lanes_of(scene, over, paired), scene, ("dissipation",)).width
 
     assert width(over) == runner.ABREAST
     assert width(over, paired=True) == 1

@@ -1,10 +1,10 @@
-"""Time of steady cycles of plane elasticity from factors, at their error, on one core.
+"""Time of cycles of plane elasticity on the contact line, at their error, on one core.
 
 The record has best and median of repeated warm calls and their time of the core, which other work
 on the machine disturbs least; compile time apart.  Rates and ratios are of the core's time.  Its
 parts:
 
-- cycle: one pull and a cycle of the standard strip, factors kept and building included;
+- cycle: one pull and cycles of the standard strip, on a body that is kept and on a new one;
 - error: over the contact nodes, against converged finite elements;
 - peer: elements of your own at equal error, by peer=SCRIPT: a module that condenses finite elements
   with `Strip(eta, lines=, keep_lu=)` and `cyc(strip, amplitude, steps_per_quarter, cycles)`.
@@ -19,18 +19,16 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 import jbeamshell as jb
 from calibration.running import read
 from calibration.tables import rows
-from jbeamshell import contact_line
-from jbeamshell.contact_line.dissipation import NODES, REFINED
 from verification.benchmarks.speeds.machine import peak_gflops
 
 ETA, AMPLITUDE = 0.1126, 0.7855
-COUNTS = (17, 25, 33, 49, 65, 89, 129)
+NODES = {"default": 49, "refined": 93}
+COUNTS = (17, 25, 33, 49, 65, 93, 129)
 BUDGET = 2.0  # seconds of a repeated call
 WANTED = (0.01, 0.005, 0.002)
 MESHES = ((30, 3), (40, 4), (60, 6), (80, 8), (120, 12))
@@ -59,35 +57,38 @@ def first(call: Callable[[], Any]) -> float:
     return time.perf_counter() - begin
 
 
-def scene(eta: Any = ETA) -> jb.Scene:
-    """Standard strip of a height ratio."""
-    return jb.library.standard().replace({"strip.height_ratio": eta})
-
-
 @functools.cache
-def builder(nodes: int) -> Callable[[jax.Array], contact_line.CycleFactors]:
-    """Compiled function from a height ratio to factors."""
-    return jax.jit(lambda eta: contact_line.factors(scene(eta), nodes=nodes))
+def response(nodes: int, *keys: str) -> Callable[..., jax.Array]:
+    """Dissipation of the standard strip on some nodes, as a function of some of its numbers."""
+    values = {"model.section": "plane", "model.nodes": nodes, "strip.height_ratio": ETA}
+    whole = jb.response(jb.library.standard().replace(values), keys, ["dissipation"])
+    return lambda *numbers: whole(*numbers)["dissipation"]
+
+
+def over_load(nodes: int, eta: float) -> Callable[[float], float]:
+    """Dissipation of a strip of a height ratio over the load."""
+    whole = response(nodes, "strip.height_ratio", "load.amplitude")
+    return lambda amplitude: float(whole(eta, amplitude))
 
 
 # --- parts ----------------------------------------------------------------------------------------
 
 
 def cycle() -> dict[str, Any]:
-    """One pull and a cycle, dissipation only."""
+    """One pull and cycles, dissipation only."""
     found = {}
-    for name, nodes in (("default", NODES), ("refined", REFINED)):
-        build = builder(nodes)
-        ask = jax.jit(lambda kept, amplitudes: kept.dissipation(amplitudes))
-        eta, amplitude = jnp.asarray(ETA), jnp.asarray([AMPLITUDE])
-        found[name] = {"nodes": nodes, "compile_s": first(lambda b=build, e=eta: b(e))}
-        kept = build(eta)
-        slope = jax.jit(jax.value_and_grad(lambda kept, a: kept.dissipation(a)[0], argnums=1))
+    for name, nodes in NODES.items():
+        kept, built = (
+            response(nodes, *keys)
+            for keys in (("load.amplitude",), ("strip.height_ratio", "load.amplitude"))
+        )
+        slope = jax.jit(jax.value_and_grad(kept))
         calls = {
-            "factors_kept": lambda k=kept, a=amplitude, f=ask: f(k, a),
-            "value_and_slope": lambda k=kept, a=amplitude, f=slope: f(k, a),
-            "built": lambda e=eta, a=amplitude, b=build, f=ask: f(b(e), a),
+            "kept": lambda f=kept: f(AMPLITUDE),
+            "value_and_slope": lambda f=slope: f(AMPLITUDE),
+            "built": lambda f=built: f(ETA, AMPLITUDE),
         }
+        found[name] = {"nodes": nodes, "compile_s": first(calls["kept"])}
         found[name] |= {key: repeated(call) for key, call in calls.items()}
     return found
 
@@ -96,15 +97,12 @@ def error() -> list[dict[str, Any]]:
     """Worst errors over the nodes."""
     cells, found = rows("energy.csv"), []
     for nodes in COUNTS:
-        build = builder(nodes)
         worst = {"above_tenth": 0.0, "above_ten_thousandth": 0.0}
-        for eta in sorted({row["eta"] for row in cells}):
-            kept = build(jnp.asarray(eta))
-            for row in cells:
-                if row["eta"] == eta and row["ratio"] > 1e-4:
-                    off = abs(float(kept.dissipation([row["A"]])[0]) / row["D"] - 1.0)
-                    key = "above_tenth" if row["ratio"] > 0.1 else "above_ten_thousandth"
-                    worst[key] = max(worst[key], off)
+        for row in cells:
+            if row["ratio"] > 1e-4:
+                off = abs(over_load(nodes, row["eta"])(row["A"]) / row["D"] - 1.0)
+                key = "above_tenth" if row["ratio"] > 0.1 else "above_ten_thousandth"
+                worst[key] = max(worst[key], off)
         found.append({"nodes": nodes} | worst)
     return found
 
@@ -116,13 +114,10 @@ def beside(script: str, budget: float = 0.2 * BUDGET) -> dict[str, Any]:
     theirs = [settings for mesh in MESHES for settings in meshed(module, mesh, own, budget)]
     ours = []
     for nodes in COUNTS:
-        build = builder(nodes)
-        ask = jax.jit(lambda kept, a: kept.dissipation(a))
-        eta, amplitude = jnp.asarray(ETA), jnp.asarray([AMPLITUDE])
-        kept = build(eta)
-        off = max(abs(float(kept.dissipation([r["A"]])[0]) / r["D"] - 1.0) for r in own)
-        run = repeated(lambda k=kept, a=amplitude, f=ask: f(k, a), budget)["core_us"]
-        whole = run + repeated(lambda e=eta, b=build: b(e), budget)["core_us"]
+        kept, built = response(nodes, "load.amplitude"), over_load(nodes, ETA)
+        off = max(abs(built(r["A"]) / r["D"] - 1.0) for r in own)
+        run = repeated(lambda f=kept: f(AMPLITUDE), budget)["core_us"]
+        whole = repeated(lambda f=built: f(AMPLITUDE), budget)["core_us"]
         ours.append({"nodes": nodes, "error": off, "kept_us": run, "built_us": whole})
     ratios = []
     for wanted in WANTED:

@@ -19,8 +19,9 @@ from jbeamshell.common.errors import InputError
 from jbeamshell.plotting.style import single, style
 
 CYCLES = 2
-SECTIONS = ("bar", "shell", "squeeze", "p2", "p3", "p4", "p6")
-NODES, STEPS = 81, 10  # load steps per half cycle
+SECTIONS = ("bar", "shell", "squeeze")
+NODES, END_SIZE = 81, 1.0 / 6.0  # smallest elements over H
+STEPS = 10  # load steps per half cycle
 CONTOURS = (1.0, 5.0, 20.0)  # per cent
 SMALLEST = 1e-3  # per cent, of errors drawn
 SHADES = (0.1, 100.0)  # per cent, of the lightest and the darkest colour
@@ -47,9 +48,9 @@ def modelled(strip: tuple[float, float], section: str) -> jb.Scene:
                 "model.kinematics": "linear",
             }
         )
-        .on_grid(NODES, 1.0 / 12.0 if section.startswith("p") else 1.0 / 6.0)
+        .on_grid(NODES, END_SIZE)
     )
-    return scene if section == "bar" else scene.by_load_steps()
+    return scene.by_load_steps()
 
 
 def ratio(history: jb.History, strip: tuple[float, float]) -> float:

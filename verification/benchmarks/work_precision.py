@@ -35,7 +35,7 @@ from jbeamshell.plotting.style import DATA, FAINT, style
 
 HEIGHT, LOAD = "strip.height_ratio", "load.amplitude"
 STRIPS = ((0.2358, 0.5851), (0.1126, 0.4359), (0.1126, 0.7855))  # eta and A
-SECTIONS = ("shell", "squeeze", "p2", "p4", "p6", "plane")
+SECTIONS = ("shell", "squeeze", "plane")
 NODES = (17, 33, 65, 129)
 PEER_MESHES = ((20, 2, 6), (40, 4, 10), (80, 8, 20))  # along x, over the height, steps per quarter
 SIDE = 64  # heights and loads of the sweep
@@ -45,9 +45,6 @@ LOOKS: dict[str, dict[str, Any]] = {  # by family
     "bar": {"color": "0.6", "marker": "s"},
     "shell": {"color": "#D55E00", "marker": "v"},
     "squeeze": {"color": "#CC79A7", "marker": "o"},
-    "p2": {"color": "#56B4E9", "marker": "^"},
-    "p4": {"color": "#009E73", "marker": "X"},
-    "p6": {"color": "#332288", "marker": "P"},
     "plane": {"color": "#117733", "marker": "h"},
     "plain call": {"color": "#E69F00", "marker": "*", "markersize": 13.0},
     "response": {"color": "#E69F00", "marker": "D"},

@@ -71,7 +71,7 @@ class Inertia(eqx.Module):
     def through_height(self, scene: Scene) -> tuple[Array, Array]:
         """Heights s above mid-height and weights rho ds of the integral over it, (points,) each."""
         strip, half = scene.strip, scene.strip.half_height
-        points, weights = legendre.leggauss(scene.plan.order + 3)
+        points, weights = legendre.leggauss(3)
         if strip.layers is None:
             return half * jnp.asarray(points), jnp.mean(self.density) * half * jnp.asarray(weights)
         thick = strip.layers[:, 0]

@@ -24,7 +24,7 @@ from jax.typing import ArrayLike
 
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.load_steps.system import System
-from jbeamshell.mechanics.kinematics import FIELDS, KINEMATICS
+from jbeamshell.mechanics.kinematics import KINEMATICS
 from jbeamshell.scene.scene import Scene
 
 
@@ -57,11 +57,8 @@ class MassMatrix(eqx.Module):
         """Kinetic energy per length of a section with fields and rates (m,)."""
 
         def position(fields: Array, height: Array) -> Array:
-            system = self.system
-            if system.section is not None:
-                return jnp.stack(system.section.displacement(fields, height))
-            place = KINEMATICS[system.plan.kinematics].position
-            return jnp.stack(place(fields[: len(FIELDS)], system.half_height, height))
+            place = KINEMATICS[self.system.plan.kinematics].position
+            return jnp.stack(place(fields, self.system.half_height, height))
 
         def squared_speed(height: Array) -> Array:
             _, rate = jax.jvp(lambda f: position(f, height), (fields,), (rates,))

@@ -17,6 +17,7 @@ from jbeamshell.dynamics.strip.equations import Equations, movable
 from jbeamshell.dynamics.strip.excitation import Excitation
 from jbeamshell.dynamics.strip.inertia import Inertia
 from jbeamshell.load_steps.system import V, W
+from jbeamshell.mechanics.kinematics import FIELDS
 from jbeamshell.mechanics.normal_contact import Compliance
 from jbeamshell.scene.scene import Scene
 
@@ -49,7 +50,7 @@ def modes(
     free = np.flatnonzero(moves)
     pick = np.ix_(free, free)
     values, vectors = scipy.linalg.eigh(stiffness[pick], scipy.linalg.block_diag(*blocks)[pick])
-    shapes = np.zeros((free.size, x.size, scene.plan.width))
+    shapes = np.zeros((free.size, x.size, len(FIELDS)))
     active = np.zeros((free.size, moves.size))
     active[:, free] = vectors.T
     shapes[..., list(scene.plan.active)] = active.reshape(-1, *moves.shape)

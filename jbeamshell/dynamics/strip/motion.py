@@ -56,8 +56,7 @@ class Motion(EndMotion):
     Attributes
     ----------
     x, tributary : (n,) node positions and tributary lengths
-    fields, rates : (T, n, m) nodal fields v, w, beta, psi (and those of a section of order p), and
-        their rates
+    fields, rates : (T, n, 4) nodal fields v, w, beta and psi, and their rates
     traction, reaction : (T, n) friction traction and normal reaction
     steps : number of time steps
     """

@@ -24,6 +24,7 @@ from jbeamshell.load_steps.tangent import (
     with_v,
     zero_unknowns,
 )
+from jbeamshell.mechanics.kinematics import FIELDS
 from jbeamshell.numerics import block_tridiagonal
 from jbeamshell.numerics.block_tridiagonal import BlockTridiagonal
 
@@ -100,7 +101,7 @@ class StepMatrices(eqx.Module):
         self.equations, system = equations, equations.system
         self.static = initial_stiffness(system, 1.0)
         like, q = zero_unknowns(system), system.unloaded().q
-        scales = jnp.stack([system.residual_scale(field) for field in range(system.plan.width)])
+        scales = jnp.stack([system.residual_scale(field) for field in range(len(FIELDS))])
 
         def inertia_forces(unknown: Array) -> Array:
             return equations.mass.momentum(q, system.embed(nodal(system, unknown)))

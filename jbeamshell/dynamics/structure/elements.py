@@ -50,7 +50,7 @@ class Elements(ParallelIwan):
 
 def elements_of(joints: Sequence[Joint]) -> Elements:
     """Elements of joints, whose numbers may be traced."""
-    return _stacked([joint.but(network=None, scene=None, sides=None) for joint in joints])
+    return _stacked([joint.but(scene=None, sides=None) for joint in joints])
 
 
 @in_double

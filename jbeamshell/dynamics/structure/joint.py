@@ -5,9 +5,8 @@ u, a spring of stiffness s starts to slip at the force s u; a spring with the la
 (Iwan 1966).  Their loops follow Masing's rule exactly: the branch from U is F(U) - 2 F((U-u)/2).
 A joint is known up to the last point of its backbone.  If that point is gross slip, the force stays
 there, and the joint is known everywhere; beyond any other last point nothing is known.
-A strip becomes one such element by the mean of its pull and its push, whose sliders are the nodes
-of its contact; `jbeamshell.contact_line.network` has both, and every branch between them, exactly.
-Scenes that are no network, such as lap joints, become the element nearest to their steady cycles.
+A strip or a lap joint becomes the element whose loops are nearest to its steady cycles.  The paths
+of its own contact, on which pull and push differ, stay at hand.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ import warnings
 from pathlib import Path
 from typing import Any, ClassVar
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -28,24 +26,15 @@ from jbeamshell.common.checks import (
     as_leaf,
     is_traced,
     require,
-    require_choice,
     require_number,
 )
 from jbeamshell.common.errors import DoubtfulWarning
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.summary import Summary, with_unit
-from jbeamshell.contact_line.entry import goes_on
-from jbeamshell.contact_line.network import Network
 from jbeamshell.dynamics.export import table
 from jbeamshell.dynamics.export.element import Element
 from jbeamshell.dynamics.export.targets import write
-from jbeamshell.dynamics.structure.strip_line import (
-    cycled_line,
-    network_forces,
-    slider_line,
-    slider_line_once,
-    walked_forces,
-)
+from jbeamshell.dynamics.structure.steady_backbone import steady_backbone, walked_forces
 from jbeamshell.laws.law import Law, as_path
 from jbeamshell.laws.parallel_iwan import ParallelIwan, backbone_points
 from jbeamshell.scene.domain import gross_slip_rule
@@ -54,10 +43,8 @@ from jbeamshell.scene.scene import Scene
 BACKBONE = "give as many displacements as forces, both rising from above zero, softening throughout"
 SIDES = "give the displacements of pull and push, (2, k), both positive, at the forces"
 DOUBTED_ASYMMETRY = 0.05  # of an exported joint
-BY = ("sliders", "cycles")
 GROSS = 0.99  # force over that of gross slip from which on the last point counts as gross slip
 FLAT = 1e-9  # last slope over the first one that counts as zero
-UNLIKE = "needs sliders that follow one another: take 'cycles', or None"
 
 
 class Joint(ParallelIwan):
@@ -67,12 +54,11 @@ class Joint(ParallelIwan):
     ----------
     displacements, forces : (k,) points of the backbone.  At .99 of the capacity or more a point on
         the plateau of gross slip follows the given ones
-    network : sliders of the strip behind it, per width; None for a backbone alone
     width : of the strip
     capacity : force of gross slip; infinite if it is not known
-    sides : (2, k) displacements of a pull and of a push at the forces; None if they are the
-        backbone's
-    scene : scene behind a joint without a network, such as a lap joint, for `path_forces`
+    sides : (2, k) displacements of a first pull and of a first push at the forces; None if they are
+        the backbone's
+    scene : scene on its contact line behind it, for `path_forces`; None if there is none
 
     Raises
     ------
@@ -90,7 +76,6 @@ class Joint(ParallelIwan):
 
     displacements: Any
     forces: Any
-    network: Network | None = None
     width: Any = 1.0
     capacity: Any = np.inf
     sides: Any = None
@@ -124,38 +109,33 @@ class Joint(ParallelIwan):
         require("joint.forces", f, rising and softening and slopes[0] > 0.0, BACKBONE)
 
     @classmethod
-    def of(
-        cls, scene: Scene | Law, force: Any = None, *, width: Any = 1.0, by: str | None = None
-    ) -> Joint:
-        """Joint with the mean backbone of a strip's pull and push, or with that of a law.
+    def of(cls, scene: Scene | Law, force: Any = None, *, width: Any = 1.0) -> Joint:
+        """Joint whose loops are nearest to the steady cycles of a scene, or those of a law.
 
-        Scenes that are solved on their contact line give the sliders of their contact where slip
-        zones are nested.  Lap joints and members that go on open, and are no network.  Their
-        sliders, and those of other scenes, are those whose loops are nearest to the scene's own
-        steady cycles.  A scene that leaves its section open is plane elasticity, which alone is
-        close at all amplitudes.
+        Displacement and energy of the cycles are matched from a fiftieth of the largest force on.
+        A scene that leaves its section open is plane elasticity, which alone is close at all
+        amplitudes.
 
         A law of Masing's rule gives its sliders, or those on 160 points of its backbone, within
         1 % of its energy, see `jbeamshell.laws.parallel_iwan.backbone_points`.
 
-        All numbers may be traced by `jax.jit` and `jax.grad`.  A traced scene cannot tell whether
-        its slip zones are nested, nor whether a load step failed: the joint then holds NaN.
+        All numbers may be traced by `jax.jit` and `jax.grad`.  A traced scene cannot tell whether a
+        step failed: the joint then holds NaN.
 
         Parameters
         ----------
-        scene : scene of the strip, whose load path is not used; or law
+        scene : scene of the strip or the lap joint, whose load path is not used; or law
         force : largest end force per width, below gross slip; None is ``scene.load.amplitude``, and
             gross slip of a law
         width : width of the strip, by which forces are multiplied
-        by : "sliders" of the contact, or "cycles" that are run; None takes the sliders where they
-            are nested.  A traced strip on a contact line takes them unless told otherwise; a traced
-            lap joint, a member that goes on and a strip of load steps take cycles
 
         Raises
         ------
         InputError
-            for a force or a width that is not positive, a force beyond gross slip, sliders of a
-            scene that has none, or a law without Masing's memory
+            for a force or a width that is not positive, a force beyond gross slip, or a law without
+            Masing's memory
+        UnconvergedError
+            for a scene without equilibrium
 
         Examples
         --------
@@ -166,34 +146,17 @@ class Joint(ParallelIwan):
         if isinstance(scene, Law):
             require_number("width", width)
             u, f = backbone_points(scene, force)
-            return cls(u, width * f, width=width, capacity=width * scene.capacity)
+            return cls(u, width * f, width, width * scene.capacity)
         force = largest_force(scene, force)
         if scene.load.control != "force":
             load = dataclasses.replace(scene.load, control="force", amplitude=as_leaf(force))
             scene = dataclasses.replace(scene, load=load)
-        scene = scene.serving(("load.amplitude",))
         require_number("width", width)
-        require_choice("by", by, (None, *BY))
         bolted = scene.member.bolt_stiffness is not None  # which holds beyond
         capacity = np.inf if bolted else width * scene.gross_slip
-        condensed = scene.plan.on_contact_line
-        traced = is_traced(scene, force)
-        opens = scene.member.support != "none" or (condensed and goes_on(scene))
-        if condensed and by != "cycles" and not (traced and opens and by is None):
-            inside = is_traced(scene, force, jnp.zeros(()))  # in a program of its own options
-            line = slider_line if inside else slider_line_once
-            network, found = line(scene, as_leaf(force, "force"))
-            sides, f, count = found if is_traced(found) else jax.device_get(found)
-            if not is_traced(sides) and np.all(np.isfinite(sides)):
-                kept = np.append(np.arange(f.size - 1) < int(count), True)
-                sides, f = jnp.asarray(sides[:, kept]), jnp.asarray(f[kept])
-            if is_traced(sides) or np.all(np.isfinite(sides)):
-                mean = jnp.mean(sides, axis=0)
-                return cls(mean, width * f, network, width, capacity, sides)
-        require("by", by, by != "sliders", UNLIKE)
-        u, f, sides = cycled_line(scene, as_leaf(force, "force"))
-        walked = scene if condensed and not traced else None
-        return cls(u, width * f, None, width, capacity, sides, walked)
+        u, f, sides = steady_backbone(scene, as_leaf(force, "force"))
+        walked = scene if scene.plan.on_contact_line and not is_traced(scene, force) else None
+        return cls(u, width * f, width, capacity, sides, walked)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Joint:
@@ -233,7 +196,7 @@ class Joint(ParallelIwan):
         require_number("series stiffness", stiffness)
         more = self.forces / as_leaf(stiffness, "series stiffness")
         u, sides = self.displacements + more, None if self.sides is None else self.sides + more
-        return Joint(u, self.forces, None, self.width, self.capacity, sides)
+        return Joint(u, self.forces, self.width, self.capacity, sides)
 
     @property
     def asymmetry(self) -> Array:
@@ -329,20 +292,17 @@ class Joint(ParallelIwan):
     def path_forces(self, path: ArrayLike) -> Array:
         """Forces (T,) on a path (T,) of displacements, which starts with unloaded sliders.
 
-        Those of a strip or a lap joint are exact, pull and push apart, and not those of the mean
-        backbone.
+        Those of a strip or a lap joint on its contact line are its own, pull and push apart, and
+        not those of the mean backbone.
 
         Raises
         ------
         InputError
-            for a path of a strip beyond gross slip, or on which its slip zones are not nested; for
-            one beyond the `reach` of other joints
+            for a path beyond the `reach` of a joint that has only its backbone
         UnconvergedError
-            for a path of a lap joint without equilibrium
+            for a path without equilibrium
         """
         points = as_path(path)
-        if self.network is not None:
-            return self.width * network_forces(self.network, np.asarray(points))
         if self.scene is not None and not is_traced(self.scene):
             return self.width * walked_forces(self.scene, np.asarray(points))
         return super().path_forces(self._where_known(points, points))

@@ -1,4 +1,4 @@
-"""Backbones of a strip: the corners of its network's lines, or nearest to its steady cycles."""
+"""Backbone of sliders whose loops are nearest to the steady cycles of a scene; its own paths."""
 
 from __future__ import annotations
 
@@ -8,56 +8,18 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import is_traced, require
-from jbeamshell.common.failed import nan_unless
-from jbeamshell.common.jax_options import ONCE
-from jbeamshell.contact_line.network import Network, Response, Sliders
+from jbeamshell.common.checks import is_traced
 from jbeamshell.scene.scene import Scene
 from jbeamshell.solving.solve import run
 from jbeamshell.solving.steady_cycles import steady_cycles
 
-# Amplitudes of steady cycles, over the largest
-AMPLITUDES = np.append(np.geomspace(0.05, 0.4, 16), np.linspace(0.4, 1.0, 17)[1:])
-LEAST = 1e-7  # energy of a cycle that matters, over F u
+# Amplitudes of steady cycles, over the largest: a chord between two of them adds .4 % to D at most
+AMPLITUDES = np.append(np.geomspace(0.02, 0.4, 36), np.linspace(0.4, 1.0, 19)[1:])
+LEAST = 1e-12  # energy of a cycle that matters, over F u
 ROUNDING = 10.0  # slope of the squares below which another entry is not tried, over rounding
-BELOW = 1.0 - 1e-6  # thresholds nearer to the largest force are left out
 
 
-def slider_line(scene: Scene, force: Array) -> tuple[Network, tuple[Array, ...]]:
-    """Network and backbone of a scene.
-
-    The backbone is the displacements (2, k + 1) of pull and push, the forces (k + 1,), and the
-    count of points below the force.  The points are the means of the thresholds, and the force;
-    those beyond are laid evenly on the straight line from the last one below it.  The displacements
-    are NaN where the slip zones are not nested, and for a joint with bearings.
-    """
-    network = Network.of(scene)
-    ways = jnp.asarray([1.0, -1.0])
-    branches = jax.vmap(lambda way: network.sliders(network.rest, way))(ways)
-    levels = jnp.mean(branches.force, axis=0)[1:]
-    below = levels < BELOW * force
-    count = jnp.sum(below)
-    last = jnp.where(count > 0, levels[jnp.maximum(count - 1, 0)], 0.0)
-    number = jnp.arange(levels.size)
-    part = (number + 1 - count) / (levels.size + 1 - count)
-
-    def points(inside: Array, begin: Array, end: Array) -> Array:
-        return jnp.append(jnp.where(number < count, inside, begin + (end - begin) * part), end)
-
-    def line(side: Sliders) -> Array:
-        return points(*map(side.displacement_after, (levels, last, force)))
-
-    f, u = points(levels, last, force), jax.vmap(line)(branches)
-    nested = jax.vmap(lambda way: network.branch(network.rest, way * force)[2])(ways)
-    rising = jnp.all(jnp.diff(f, prepend=0.0) > 0.0)
-    series = scene.member.bearing_stiffness is None  # a bearing is no slider
-    return network, (nan_unless(jnp.all(nested) & rising & series, u), f, count)
-
-
-slider_line_once = jax.jit(slider_line, compiler_options=ONCE)
-
-
-def cycled_line(scene: Scene, force: Array) -> tuple[Array, Array, Array]:
+def steady_backbone(scene: Scene, force: Array) -> tuple[Array, Array, Array]:
     """Backbone whose loops by Masing's rule are nearest to a scene's steady cycles.
 
     A slider in series with compliance c_i and threshold F_i adds c_i (F - F_i) to the displacement
@@ -156,21 +118,3 @@ def walked_forces(scene: Scene, path: NDArray[np.float64]) -> Array:
     size = max(float(np.max(np.abs(path), initial=0.0)), np.finfo(float).tiny)
     driven = scene.replace({"load.control": "displacement", "load.amplitude": size})
     return run(driven, path).force[-path.size :]
-
-
-def network_forces(network: Network, path: NDArray[np.float64]) -> Array:
-    """Forces (T,) per width of a network on a path (T,) of displacements."""
-    found = _along(network, jnp.asarray(path))
-    reached, limit = jnp.max(jnp.abs(found.state.force), initial=0.0), network.gross_slip
-    fix = f"must stay below gross slip, mu F_N L = {float(limit):.6g} per width"
-    require("force on the path", float(reached), bool(reached < limit), fix)
-    first = int(np.argmin(found.valid))
-    nested = bool(np.all(np.asarray(found.valid)))
-    fix = "slip zones are not nested from here on: take jbeamshell.contact_line.solve"
-    require(f"path[{first}]", path[first], nested, fix)
-    return found.state.force
-
-
-@jax.jit
-def _along(network: Network, path: Array) -> Response:
-    return network.along(path)

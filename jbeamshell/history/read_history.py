@@ -9,7 +9,6 @@ import os
 import tomllib
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -20,12 +19,8 @@ from jbeamshell.common.files import as_path, check_regular
 from jbeamshell.history.history import History
 from jbeamshell.history.record import Above
 from jbeamshell.history.saved import FORMAT, named_arrays, without_scene
-from jbeamshell.load_steps.continuation import PathEnd
-from jbeamshell.load_steps.path_state import initial_state
-from jbeamshell.mechanics.kinematics import Strains
-from jbeamshell.scene.plan import STEPS
+from jbeamshell.mechanics.kinematics import FIELDS, Strains
 from jbeamshell.scene.toml import scene_from_values
-from jbeamshell.solving.solve import WholePath
 
 # Names of a history's arrays, by what their axes run along.
 ALONG_X = ("x", "tributary", "load")
@@ -86,7 +81,7 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     count = functools.partial(jax.ShapeDtypeStruct, dtype=jnp.result_type(int))
     steps, elements = len(arrays["force"]), len(arrays["middles"])
     sections: list[Any] = [number((steps, elements))] * len(Strains._fields)
-    nodes, width = scene.plan.nodes, scene.plan.width
+    nodes, width = scene.plan.nodes, len(FIELDS)
     fields: Any = number((steps, nodes, width))
     shapes: dict[str, Any] = {name: number((steps,)) for name in ALONG_PATH}
     shapes |= {name: count((steps,)) for name in COUNTS}
@@ -103,8 +98,4 @@ def _blank(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> History:
     if "change" in arrays:
         shapes["change"] = number(())
     cycles = tuple((int(a), int(b), int(c)) for a, b, c in about["cycles"])
-    stepwise = scene.plan.engine == STEPS
-    end: Any = PathEnd(eqx.filter_eval_shape(initial_state, scene)) if stepwise else None
-    if scene.plan.on_contact_line:
-        end = WholePath()
-    return History(scene=scene, cycles=cycles, end=end, **shapes)
+    return History(scene=scene, cycles=cycles, **shapes)

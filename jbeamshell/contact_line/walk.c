@@ -1,0 +1,725 @@
+/* Load paths of a body on its contact line: events, polygon and spline of each branch.
+
+   The same walk as walk.py, polygon.py, events.py and spline.py, which explain it; names are theirs.
+   One difference: no tableau is kept.  An event needs one of its columns, and that follows from the
+   column of the stiffness by the events before it (product form of the inverse).  Columns depend on
+   the events alone, so that branches of one sense share them as long as their events are the same.
+   A path has no global state and calls nothing but the C library.  Numbers are doubles. */
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "xla.h"
+
+#define R restrict /* vectors that do not overlap */
+
+enum { ALONG, AGAINST, STICK, OPEN, CLOSE, KINDS };
+enum { BY_ROW, AT_ONCE, AT_RETURN, FIXED };
+
+static const double SLIDES = 1e6, SLIDES_ON = 1e-2, ABOUT = 2.0, TOUCHES = 1e-9, SAME = 1e-9;
+static const double ROUNDING = 32.0 * 2.220446049250313e-16;
+static const double LATE = 1e-9, MERGED = 1e-9, MOST_PART = 0.6, UNEVEN = 3.0, STARTS = 0.25;
+enum { MOST_VERTICES = 8, MOST_EVENTS = 40, DENSE = 3, PRODUCT = 3 };  /* times the nodes */
+
+/* --- product form of the inverse --------------------------------------------------------------- */
+
+/* Exchanges of rows and columns; those from count on are remembered, and may come again. */
+typedef struct {
+    int count, known, room;
+    double *share, *add, *rest, *pivot; /* share (room, m) */
+    int *row, *normal, *kind;
+} Product;
+
+/* A vector after an exchange. */
+static void exchanged(const Product *p, int e, int m, double *R a) {
+    const double *R share = p->share + (size_t)e * m;
+    int i = p->row[e], q = p->normal[e];
+    double entry = a[i] + p->add[e] * a[q];
+    if (entry != 0.0)
+        for (int r = 0; r < m; ++r) a[r] -= share[r] * entry;
+    a[i] = (p->rest[e] != 0.0 ? p->rest[e] * a[q] : 0.0) - entry / p->pivot[e];
+}
+
+/* Column j of the tableau. */
+static void column(const double *K, const Product *p, int m, int j, double *R a) {
+    int e = p->count - 1;
+    while (e >= 0 && p->row[e] != j) --e; /* the last exchange that made this column */
+    memcpy(a, e < 0 ? K + (size_t)j * m : p->share + (size_t)e * m, m * sizeof(double));
+    for (++e; e < p->count; ++e) exchanged(p, e, m, a);
+}
+
+/* --- what a path knows ------------------------------------------------------------------------- */
+
+typedef struct {
+    int n, k, m, vertices;             /* nodes, those that may slip, fields, room */
+    int places;                        /* nodes with a position: bearings have none */
+    const double *K, *x;               /* (m, m) symmetric, (places,) */
+    double mu, c, slides;
+    Product product[2], *now;          /* one for each sense of the load */
+    /* branch: equations, tableau */
+    double *r_0, *lift, *pull, *extra; /* (m,), (n,), (m,), (2, k) */
+    double *answer, *rate, *held, *sigma, back, tau;
+    unsigned char *open, *lifted;      /* (n,) open now, and where the branch begins */
+    /* polygon */
+    int number, *before, *after, *node, *last; /* last (KINDS, n) */
+    unsigned char *way;
+    double *at, *change, *force, *pulled, *rise, *whole, *part_before, *part_behind, *begins;
+    /* slip of a branch */
+    double *side, *later_side;
+    unsigned char *stuck, *opened, *sliding;
+    int *later, ended;
+    double *column;
+} Walk;
+
+/* Record of a part of a branch, for derivatives. */
+typedef struct {
+    int32_t *events, *counts, *corners, *slip; /* (events, 5), (3,), (vertices, 4), (k, 5) */
+    int32_t *lifted;                           /* (n,) */
+    double *tau, *at, *change; /* (events,), (vertices,), (vertices, m) */
+} Record;
+
+typedef struct { double wait, tau; int kind, node, cause; } Event;
+
+/* --- tableau ----------------------------------------------------------------------------------- */
+
+/* Product form anew, of the nodes that slip and that are open. */
+static void rebuild(Walk *w) {
+    Product *p = w->now;
+    p->count = p->known = 0;
+    for (int pass = 0; pass < 2; ++pass)
+        for (int i = 0; i < w->n; ++i) {
+            int slips = pass == 0 && i < w->k && w->sigma[i] != 0.0;
+            if (!slips && !(pass == 1 && w->open[i])) continue;
+            int q = w->k + i, row = slips ? i : q, e = p->count, m = w->m;
+            double *share = p->share + (size_t)e * m, add = slips ? w->sigma[i] * w->mu : 0.0;
+            column(w->K, p, m, row, w->column);
+            double pivot = w->column[row] + add * w->column[q];
+            for (int r = 0; r < m; ++r) share[r] = w->column[r] / pivot;
+            share[row] = 1.0 / pivot;
+            p->row[e] = row, p->normal[e] = q, p->add[e] = add, p->rest[e] = 0.0, p->pivot[e] = pivot;
+            p->kind[e] = !slips ? OPEN : add > 0.0 ? ALONG : AGAINST;
+            p->count = p->known = e + 1;
+        }
+}
+
+static void change_contact(Walk *w, int kind, int node, int keeps) {
+    Product *p = w->now;
+    if (p->count == p->room) rebuild(w);
+    int m = w->m, k = w->k, q = k + node, i = kind < OPEN ? node : q, e = p->count;
+    if (!(e < p->known && p->kind[e] == kind && p->row[e] == i)) {
+        double *share = p->share + (size_t)e * m;
+        double add = kind == ALONG ? w->mu : kind == AGAINST ? -w->mu : 0.0;
+        double rest = kind == STICK ? -w->sigma[node] * w->mu : 0.0;
+        column(w->K, p, m, i, w->column);
+        double pivot = w->column[i] + add * w->column[q];
+        for (int r = 0; r < m; ++r) share[r] = w->column[r] / pivot;
+        share[i] = 1.0 / pivot + (rest != 0.0 ? rest * share[q] : 0.0);
+        p->row[e] = i, p->normal[e] = q, p->add[e] = add, p->rest[e] = rest, p->pivot[e] = pivot;
+        p->kind[e] = kind;
+        p->known = e + 1;
+    }
+    exchanged(p, e, m, w->rate);
+    /* An event that undoes the one before leaves what was before both. */
+    int undoes = e > 0 && p->row[e - 1] == i && p->add[e - 1] == -p->rest[e] && p->rest[e - 1] == -p->add[e];
+    p->count = undoes ? e - 1 : e + 1;
+
+    double answer = w->answer[i] + p->add[e] * w->answer[q];
+    w->answer[i] = w->held[i] + (p->rest[e] != 0.0 ? p->rest[e] * w->answer[q] : 0.0);
+    w->held[i] = kind <= STICK || keeps ? answer : kind == CLOSE ? -w->lift[node] : 0.0;
+    if (kind < OPEN) w->sigma[node] = kind == ALONG ? 1.0 : kind == AGAINST ? -1.0 : 0.0;
+    else w->open[node] = kind == OPEN;
+}
+
+static void begin(Walk *w) {
+    memcpy(w->answer, w->r_0, w->m * sizeof(double));
+    for (int r = 0; r < w->m; ++r) w->rate[r] = -w->pull[r], w->held[r] = 0.0;
+    for (int i = 0; i < w->n; ++i) w->sigma[i] = 0.0, w->open[i] = 0;
+    w->tau = 0.0, w->now->count = 0;
+    for (int i = 0; i < w->n; ++i)
+        if (w->lifted[i]) {
+            if (i < w->k) change_contact(w, w->answer[i] > 0.0 ? AGAINST : ALONG, i, 1);
+            change_contact(w, OPEN, i, 1);
+        }
+}
+
+static int moves(const Walk *w, int r) { return r < w->k ? w->sigma[r] != 0.0 : w->open[r - w->k]; }
+
+static void advance(Walk *w, double tau) {
+    double step = tau - w->tau;
+    for (int r = 0; r < w->m; ++r) w->answer[r] += w->rate[r] * step;
+    w->tau = tau;
+}
+
+/* --- events ------------------------------------------------------------------------------------ */
+
+static double until(double room, double change) {
+    return change < 0.0 ? fmax(room, 0.0) / -change : INFINITY;
+}
+
+static void earlier(Event *best, double wait, int kind, int node, int cause) {
+    int first = wait < best->wait || (wait == best->wait && wait < INFINITY &&
+                (kind < best->kind || (kind == best->kind && node < best->node)));
+    if (first) best->wait = wait, best->kind = kind, best->node = node, best->cause = cause;
+}
+
+static Event next_event(const Walk *w) {
+    int k = w->k, n = w->n;
+    const double *R normal = w->answer + k, *R fall = w->rate + k;
+    double most = 0.0, rest = w->back - w->tau;
+    for (int i = 0; i < k; ++i) most = fmax(most, w->mu * normal[i]);
+    Event best = {INFINITY, INFINITY, KINDS, n, FIXED};
+    for (int i = 0; i < n; ++i) {
+        if (w->open[i]) {
+            int rises = w->held[k + i] > 0.0 && fall[i] > 0.0;
+            if (rises) earlier(&best, 0.0, CLOSE, i, AT_ONCE);
+            else earlier(&best, until(w->lift[i] + normal[i], fall[i]), CLOSE, i, BY_ROW);
+        } else if (i >= k || w->sigma[i] != 0.0) {
+            if (i < k && w->sigma[i] * w->rate[i] < 0.0) earlier(&best, 0.0, STICK, i, AT_ONCE);
+            earlier(&best, until(normal[i], fall[i]), OPEN, i, BY_ROW);
+        } else
+            for (int kind = ALONG; kind <= AGAINST; ++kind) {
+                double side = kind == ALONG ? 1.0 : -1.0, more = w->extra[kind * k + i];
+                double change = w->mu * fall[i] + side * w->rate[i];
+                if (change >= 0.0) continue;
+                double room = w->mu * normal[i] + side * w->answer[i];
+                double wait = until(room + more, change), own = until(room, change);
+                int ends = wait >= rest, late = (ends ? room : room + more) < -LATE * most;
+                int cause = ends && own < rest ? AT_RETURN : late ? AT_ONCE : BY_ROW;
+                earlier(&best, ends ? fmax(own, rest) : wait, kind, i, cause);
+            }
+    }
+    best.tau = w->tau + best.wait;
+    return best;
+}
+
+/* --- polygon ----------------------------------------------------------------------------------- */
+
+static void set_vertex(Walk *w, int place) {
+    int m = w->m, k = w->k;
+    double *R change = w->change + (size_t)place * m, *R force = w->force + (size_t)place * m;
+    w->at[place] = w->tau;
+    for (int r = 0; r < m; ++r) change[r] = moves(w, r) ? w->answer[r] : w->held[r];
+    for (int i = 0; i < w->n; ++i) force[k + i] = w->open[i] ? w->held[k + i] : w->answer[k + i];
+    for (int i = 0; i < k; ++i)
+        force[i] = w->sigma[i] == 0.0 ? w->answer[i] : w->held[i] - w->sigma[i] * w->mu * force[k + i];
+}
+
+static int with_vertex(Walk *w, double reach) {
+    int last = w->number - 1, dense = w->number > DENSE * w->n;
+    double close = (dense ? 0.5 / w->n : MERGED) * reach;
+    int place = w->tau - w->at[last] > close ? last + 1 : last;
+    if (place > 0) {
+        if (place > last) w->before[place] = w->after[place] = w->node[place] = w->way[place] = 0;
+        set_vertex(w, place);
+    }
+    w->number = place + 1;
+    return place;
+}
+
+static void with_neighbours(Walk *w, int kind, int node, int vertex) {
+    int *row = w->last + kind * w->n;
+    int below = node > 0 ? row[node - 1] : -1, above = node < w->n - 1 ? row[node + 1] : -1;
+    if (below >= vertex) below = -1;
+    if (above >= vertex) above = -1;
+    int found = below > above ? below : above;
+    if (kind != STICK && found > 0 && node < w->k) {
+        if (w->before[vertex] == 0)
+            w->before[vertex] = found, w->node[vertex] = node, w->way[vertex] = below == found;
+        if (w->after[found] == 0) w->after[found] = vertex;
+    }
+    row[node] = vertex;
+}
+
+static void with_slip(Walk *w, const Event *event, int vertex, double reach) {
+    int node = event->node, kind = event->kind;
+    if (node >= w->k) return;
+    double side = kind == ALONG ? 1.0 : -1.0;
+    if (event->tau <= reach) {
+        if (kind < STICK) w->side[node] = side;
+        if (kind <= STICK) w->stuck[node] = kind == STICK;
+        if (kind >= OPEN) w->opened[node] = 1;
+    } else if (kind < STICK && w->later[node] == 0)
+        w->later[node] = vertex, w->later_side[node] = side;
+}
+
+/* Vertex at which the first front starts that goes on; a front that starts behind it is late. */
+static int first_front(const Walk *w) {
+    int j = 1;
+    while (j < w->number && (w->before[j] != 0 || w->after[j] == 0)) ++j;
+    return j;
+}
+
+/* Load up to which events are needed: those that may round a corner at the branch's end. */
+static double horizon(const Walk *w, double reach) {
+    double most = reach;
+    int first = first_front(w);
+    for (int j = 1; j < w->number; ++j) {
+        double step = w->at[j] - w->at[w->before[j]];
+        int late = w->before[j] == 0 && j > first;
+        if (w->after[j] != 0 || w->at[j] - (late ? STARTS : MOST_PART) * step >= reach) continue;
+        if (late) {
+            most = fmax(most, w->at[j] + STARTS / (1.0 - MOST_PART) * step);
+            continue;
+        }
+        most = fmax(most, w->at[j] + UNEVEN * MOST_PART / (1.0 - MOST_PART) * step);
+        if (w->before[j] > 0) most = fmax(most, reach + UNEVEN * MOST_PART * step);
+    }
+    return most;
+}
+
+static double velocity(const Walk *w) {
+    double sum = 0.0;
+    for (int r = 0; r < w->m; ++r)
+        if (moves(w, r)) sum += w->pull[r] * w->rate[r];
+    return fabs(sum);
+}
+
+static void write(const Record *record, const Event *event, int vertex, int keep) {
+    if (record == NULL) return;
+    int32_t number = record->counts[0]++, *row = record->events + 5 * (size_t)number;
+    row[0] = event->kind, row[1] = event->node, row[2] = event->cause, row[3] = vertex, row[4] = keep;
+    record->tau[number] = event->tau;
+}
+
+static void write_corners(const Record *record, const Walk *w) {
+    if (record == NULL) return;
+    record->counts[1] = w->number, record->counts[2] = w->ended;
+    memcpy(record->at, w->at, w->number * sizeof(double));
+    memcpy(record->change, w->change, (size_t)w->number * w->m * sizeof(double));
+    for (int j = 0; j < w->number; ++j) {
+        int32_t *row = record->corners + 4 * (size_t)j;
+        row[0] = w->before[j], row[1] = w->after[j], row[2] = w->node[j], row[3] = w->way[j];
+    }
+    for (int i = 0; i < w->n; ++i) record->lifted[i] = w->lifted[i];
+    for (int i = 0; i < w->k; ++i) {
+        int32_t *row = record->slip + 5 * (size_t)i;
+        row[0] = (int32_t)w->side[i], row[1] = w->stuck[i], row[2] = w->opened[i];
+        row[3] = w->later[i], row[4] = (int32_t)w->later_side[i];
+    }
+}
+
+/* Polygon of a branch up to tau = reach, and a little beyond. */
+static void polygon(Walk *w, double reach, const Record *record) {
+    int n = w->n, k = w->k, events = 0, most = MOST_EVENTS * n;
+    begin(w);
+    w->number = 1, w->at[0] = 0.0, w->before[0] = w->after[0] = w->node[0] = w->way[0] = 0;
+    memset(w->change, 0, w->m * sizeof(double));
+    memcpy(w->force, w->r_0, w->m * sizeof(double));
+    for (int i = 0; i < KINDS * n; ++i) w->last[i] = -1;
+    for (int i = 0; i < k; ++i) {
+        w->side[i] = w->later_side[i] = 0.0, w->later[i] = 0;
+        w->stuck[i] = 0, w->opened[i] = w->lifted[i];
+    }
+    Event event = next_event(w);
+    while (event.tau <= horizon(w, reach) && events < most - 1 && w->number < w->vertices - 2 &&
+           !(w->tau >= reach && velocity(w) > SLIDES_ON * w->slides)) {
+        advance(w, event.tau);
+        int keep = event.kind == CLOSE && w->rate[k + event.node] > 0.0;
+        int vertex = with_vertex(w, reach);
+        write(record, &event, vertex, keep);
+        with_neighbours(w, event.kind, event.node, vertex);
+        change_contact(w, event.kind, event.node, keep);
+        with_slip(w, &event, vertex, reach);
+        event = next_event(w), ++events;
+    }
+    w->ended = event.tau > reach || w->tau >= reach;
+    /* A vertex at the next event, or anywhere beyond, ends the last edge. */
+    double reached = fmax(reach, w->tau), anywhere = reached > 0.0 ? 2.0 * reached : 1.0;
+    int comes = event.tau - w->tau > MERGED * reached && event.tau < anywhere, place = w->number++;
+    if (!comes) event.tau = anywhere, event.kind = KINDS, event.node = 0, event.cause = FIXED;
+    advance(w, event.tau);
+    w->before[place] = w->after[place] = w->node[place] = w->way[place] = 0;
+    set_vertex(w, place);
+    write(record, &event, place, 0);
+    write_corners(record, w);
+}
+
+/* --- spline ------------------------------------------------------------------------------------ */
+
+/* Corners where the body slides as a whole stay sharp; sums for the work of friction. */
+static void prepare(Walk *w) {
+    int m = w->m, last = w->number - 1;
+    for (int j = 0; j <= last; ++j) {
+        double sum = 0.0;
+        for (int r = 0; r < m; ++r) sum += w->change[(size_t)j * m + r] * w->pull[r];
+        w->pulled[j] = sum;
+    }
+    w->whole[0] = 0.0, w->rise[last] = 0.0, w->sliding[last] = 0;
+    for (int j = 0; j < last; ++j) {
+        double step = w->at[j + 1] - w->at[j];
+        w->rise[j] = (w->pulled[j + 1] - w->pulled[j]) / step;
+        w->whole[j + 1] = w->whole[j] + step * (w->pulled[j] + 0.5 * w->rise[j] * step);
+        w->sliding[j] = fabs(w->rise[j]) > w->slides;
+    }
+    for (int j = 0; j <= last; ++j)
+        if (w->sliding[j] || (j > 0 && w->sliding[j - 1])) w->part_before[j] = w->part_behind[j] = 0.0;
+}
+
+/* Parts of the rounded corners before and behind each vertex; zero for sharp ones. */
+static void corners(Walk *w, int rounded) {
+    int last = w->number - 1, first = first_front(w);
+    const double *x = w->x;
+    for (int j = 0; j <= last; ++j) {
+        int i = w->node[j];
+        double part = 0.5; /* of its step that is nearer to a vertex than to the one before */
+        if (i > 0 && i < w->places - 1) {
+            double a = fabs(x[i] - x[i - 1]), b = fabs(x[i + 1] - x[i]);
+            part = a + b > 0.0 ? b / (a + b) : 0.5;
+        }
+        part = w->way[j] ? part : 1.0 - part;
+        w->begins[j] = fmin(fmax(part, 1.0 - MOST_PART), MOST_PART);
+    }
+    for (int j = 0; j <= last; ++j) { /* what lies before a vertex of its step, and behind */
+        int b = w->before[j], a = w->after[j];
+        w->part_before[j] = (w->at[j] - w->at[b]) * w->begins[j];
+        w->part_behind[j] = (w->at[a] - w->at[j]) * (1.0 - w->begins[a]);
+    }
+    memcpy(w->whole, w->part_before, (last + 1) * sizeof(double));
+    for (int j = 0; j <= last; ++j) {
+        int starts = w->before[j] == 0, ends = w->after[j] == 0;
+        double ahead = w->part_behind[j];
+        double room = j > first ? STARTS * w->at[j] : w->at[j];
+        double half = starts ? fmin(room, ahead) : fmin(w->whole[j], UNEVEN * w->whole[w->before[j]]);
+        if (ends) ahead = half;
+        int is_round = rounded && j < last && !(starts && ends);
+        w->part_before[j] = is_round ? fmin(half, UNEVEN * ahead) : 0.0;
+        w->part_behind[j] = is_round ? fmin(ahead, UNEVEN * half) : 0.0;
+        w->begins[j] = w->at[j] - w->part_before[j];
+    }
+    prepare(w);
+}
+
+typedef struct { int edge, slides; double work; } Reading;
+
+/* Area under a rounded corner less that under the sharp one, from its begin to t. */
+static double area(double a, double b, double t, double x) {
+    return b * t * t * t * (2.0 * a / 3.0 + 0.5 * (b - a) * t) - 0.5 * fmax(x, 0.0) * fmax(x, 0.0);
+}
+
+/* Contact (m,) at a load of the branch: change of the fields and forces. */
+static Reading read_at(const Walk *w, double tau, double *R change, double *R force) {
+    int m = w->m, edge = 0, last = w->number - 2;
+    while (edge < last && w->at[edge + 1] < tau) ++edge;
+    double since = tau - w->at[edge], step = w->at[edge + 1] - w->at[edge], part = since / step;
+    const double *R q_0 = w->change + (size_t)edge * m, *R q_1 = q_0 + m;
+    const double *R r_0 = w->force + (size_t)edge * m, *R r_1 = r_0 + m;
+    for (int r = 0; r < m; ++r) {
+        change[r] = q_0[r] + part * (q_1[r] - q_0[r]);
+        force[r] = r_0[r] + part * (r_1[r] - r_0[r]);
+    }
+    double under = w->whole[edge] + since * (w->pulled[edge] + 0.5 * w->rise[edge] * since);
+    for (int j = 1; j <= last; ++j) {
+        double a = w->part_before[j], b = w->part_behind[j], x = tau - w->at[j];
+        if (!(a > 0.0 && b > 0.0) || x <= -a) continue;
+        double kink = w->rise[j] - w->rise[j - 1];
+        if (x >= b) {
+            under += area(a, b, 1.0, b) * kink;
+            continue;
+        }
+        double s = (x + a) / a, t = s / (1.0 + sqrt(1.0 + (b - a) / a * s));
+        double rounding = b * t * t - fmax(x, 0.0);
+        double ahead = rounding / (w->at[j + 1] - w->at[j]), behind = rounding / (w->at[j] - w->at[j - 1]);
+        const double *R q = w->change + (size_t)j * m, *R f = w->force + (size_t)j * m;
+        for (int r = 0; r < m; ++r) {
+            change[r] += ahead * (q[r + m] - q[r]) - behind * (q[r] - q[r - m]);
+            force[r] += ahead * (f[r + m] - f[r]) - behind * (f[r] - f[r - m]);
+        }
+        under += area(a, b, t, x) * kink;
+    }
+    double moved = 0.0, stored = 0.0;
+    for (int r = 0; r < m; ++r) {
+        moved += change[r] * w->pull[r];
+        stored += 0.5 * change[r] * (w->r_0[r] + force[r]);
+    }
+    return (Reading){edge, w->sliding[edge], 0.5 * tau * moved - under - stored};
+}
+
+/* --- path -------------------------------------------------------------------------------------- */
+
+/* Contact where a branch begins, and what it remembers; see walk.py. */
+typedef struct {
+    double *v, *r, *lift, load, displacement; /* (k,), (m,), (n,) */
+    double *side, *extra, *extra_before, sense, length, closed;
+    unsigned char *free, turned, settled;
+} Contact;
+
+typedef struct { double *v, *r_t, *r_n, *displacement, *lift, *work; unsigned char *slipping, *settled; } Levels;
+
+/* Branch, or a part of one, that begins with a contact and ends at a target or where a loop closes. */
+typedef struct { double sense, end; int turns, closes; } Course;
+
+static Course depart(Walk *w, const Contact *from, const double *f, double target, int rounded, const Record *record) {
+    int k = w->k, m = w->m, n = w->n;
+    Course course;
+    course.sense = target >= from->load ? 1.0 : -1.0;
+    course.turns = course.sense * from->sense < 0.0;
+    double reach = fabs(target - from->load);
+    int loops = course.turns && from->turned;
+    int splits = loops && reach * (1.0 - SAME) > from->length;
+    course.end = splits ? from->load + course.sense * from->length : target;
+    course.closes = loops && reach * (1.0 + SAME) >= from->length;
+    for (int r = 0; r < m; ++r) w->pull[r] = course.sense * f[r];
+    memcpy(w->r_0, from->r, m * sizeof(double));
+    memcpy(w->lift, from->lift, n * sizeof(double));
+    w->now = &w->product[course.sense < 0.0];
+    w->back = course.turns && !from->turned ? from->length : INFINITY;
+    memset(w->extra, 0, 2 * k * sizeof(double));
+    if (rounded && course.closes && from->closed >= 2.0)
+        memcpy(w->extra, from->extra_before, 2 * k * sizeof(double));
+    else if (rounded && course.turns)
+        for (int i = 0; i < k; ++i) {
+            int slipped = from->side[i] != 0.0;
+            double side = slipped ? from->side[i] : from->r[i] > 0.0 ? -1.0 : 1.0;
+            double used = -side * from->r[i], left = w->mu * from->r[k + i] - used;
+            double more = slipped ? left : fmax(fmin(left, ABOUT * used), 0.0);
+            if (!from->free[i]) w->extra[(side < 0.0 ? 0 : k) + i] = more;
+        }
+    for (int i = 0; i < n; ++i) w->lifted[i] = from->lift[i] > 0.0;
+    polygon(w, fabs(course.end - from->load), record);
+    corners(w, rounded);
+    return course;
+}
+
+/* Level of a course at a load: contact in ``at``, and work since it began. */
+static double level(const Walk *w, const Contact *from, const Course *course, double load, double *change, Contact *at, unsigned char *slipping) {
+    int k = w->k, m = w->m, n = w->n;
+    double tau = course->sense * (load - from->load), most = 0.0, moved = 0.0;
+    Reading read = read_at(w, tau, change, at->r);
+    for (int i = 0; i < n; ++i) at->lift[i] = from->lift[i] + change[k + i];
+    for (int i = k; i < m; ++i) most = fmax(most, at->r[i]);
+    for (int r = 0; r < m; ++r) moved += change[r] * w->pull[r];
+    /* Rounding leaves open nodes a little force: the shorter the elements, the more. */
+    for (int i = 0; i < n; ++i) {
+        int q = k + i;
+        double least_n = fmax(TOUCHES * most, ROUNDING * w->K[(size_t)q * m + q] * fabs(change[q]));
+        if (!(at->lift[i] > 0.0 && !(at->r[q] > least_n))) continue;
+        at->r[q] = 0.0;
+        if (i < k) {
+            double least_t = fmax(TOUCHES * most, ROUNDING * w->K[(size_t)i * m + i] * fabs(change[i]));
+            if (fabs(at->r[i]) <= least_t) at->r[i] = 0.0;
+        }
+    }
+    for (int i = 0; i < k; ++i) {
+        at->v[i] = from->v[i] + change[i];
+        const double *q = w->change + (size_t)read.edge * m + i;
+        slipping[i] = q[m] != q[0] && at->lift[i] <= 0.0;
+    }
+    at->load = load;
+    at->displacement = from->displacement + w->c * (load - from->load) + course->sense * moved;
+    at->settled = from->settled && w->ended && !read.slides;
+    return read.work;
+}
+
+/* What a contact at the end of a course remembers. */
+static void arrive(const Walk *w, const Contact *from, const Course *course, Contact *at) {
+    int k = w->k, goes_on = course->sense * from->sense > 0.0;
+    double length = fabs(at->load - from->load);
+    for (int i = 0; i < k; ++i) {
+        int j = w->later[i], part = j > 0 && w->begins[j] < length;
+        double side = part ? w->later_side[i] : w->side[i];
+        int stays = (w->stuck[i] && !part) || w->opened[i];
+        at->side[i] = goes_on && side == 0.0 && !stays ? from->side[i] : side;
+        at->free[i] = stays || (goes_on && from->free[i] && side == 0.0);
+    }
+    at->sense = course->sense;
+    at->length = goes_on ? from->length + length : length;
+    at->turned = goes_on ? from->turned : course->turns;
+    at->closed = course->closes ? from->closed + 1.0 : 0.0;
+    memcpy(at->extra, goes_on ? from->extra : w->extra, 2 * k * sizeof(double));
+    memcpy(at->extra_before, goes_on ? from->extra_before : from->extra, 2 * k * sizeof(double));
+}
+
+static void swap(Contact *a, Contact *b) {
+    Contact c = *a;
+    *a = *b, *b = c;
+}
+
+/* Levels of a path from the contact ``from``; records (2 for each branch) may be null. */
+static void path(Walk *w, Contact *from, Contact *to, const double *f, int levels, const double *load,
+                 const unsigned char *turn, int rounded, Levels out, Record *records, double *change, unsigned char *slipping) {
+    int k = w->k, n = w->n;
+    Contact spare = to[1];
+    for (int begin = 0, end, branch = 0; begin < levels; begin = end, ++branch) {
+        for (end = begin + 1; end < levels && !turn[end];) ++end;
+        double target = load[end - 1], done = 0.0, before = 0.0;
+        for (int part = 0, next = begin; part < 2 && next < end; ++part) {
+            Course course = depart(w, from, f, target, rounded, records ? records + 2 * branch + part : NULL);
+            for (; next < end && course.sense * (load[next] - course.end) <= 0.0; ++next) {
+                double work = done + level(w, from, &course, load[next], change, &spare, slipping);
+                memcpy(out.v + (size_t)next * k, spare.v, k * sizeof(double));
+                memcpy(out.r_t + (size_t)next * k, spare.r, k * sizeof(double));
+                memcpy(out.r_n + (size_t)next * n, spare.r + k, n * sizeof(double));
+                memcpy(out.lift + (size_t)next * n, spare.lift, n * sizeof(double));
+                memcpy(out.slipping + (size_t)next * k, slipping, k);
+                out.displacement[next] = spare.displacement, out.settled[next] = spare.settled;
+                out.work[next] = work - before, before = work;
+            }
+            done += level(w, from, &course, course.end, change, to, slipping);
+            arrive(w, from, &course, to);
+            swap(from, to);
+        }
+    }
+}
+
+/* --- room -------------------------------------------------------------------------------------- */
+
+typedef struct { char *at; size_t used; } Room;
+
+static void *take(Room *room, size_t bytes) {
+    void *found = room->at == NULL ? NULL : room->at + room->used;
+    room->used += (bytes + 63) / 64 * 64;
+    return found;
+}
+
+#define REALS(count) take(room, (size_t)(count) * sizeof(double))
+#define WHOLES(count) take(room, (size_t)(count) * sizeof(int))
+#define FLAGS(count) take(room, (size_t)(count))
+
+static Contact contact_in(Room *room, int k, int n) {
+    Contact c;
+    memset(&c, 0, sizeof c);
+    c.v = REALS(k), c.r = REALS(k + n), c.lift = REALS(n), c.side = REALS(k);
+    c.extra = REALS(2 * k), c.extra_before = REALS(2 * k), c.free = FLAGS(k);
+    return c;
+}
+
+static void walk_in(Room *room, Walk *w) {
+    int n = w->n, k = w->k, m = w->m, v = w->vertices;
+    for (int i = 0; i < 2; ++i) {
+        Product *p = &w->product[i];
+        p->count = p->known = 0, p->room = PRODUCT * n;
+        p->share = REALS((size_t)p->room * m), p->add = REALS(p->room), p->rest = REALS(p->room);
+        p->pivot = REALS(p->room), p->row = WHOLES(p->room), p->normal = WHOLES(p->room);
+        p->kind = WHOLES(p->room);
+    }
+    w->r_0 = REALS(m), w->lift = REALS(n), w->pull = REALS(m), w->extra = REALS(2 * k);
+    w->answer = REALS(m), w->rate = REALS(m), w->held = REALS(m), w->sigma = REALS(n);
+    w->open = FLAGS(n), w->lifted = FLAGS(n), w->column = REALS(m);
+    w->before = WHOLES(v), w->after = WHOLES(v), w->node = WHOLES(v), w->last = WHOLES(KINDS * n);
+    w->way = FLAGS(v), w->at = REALS(v), w->change = REALS((size_t)v * m), w->force = REALS((size_t)v * m);
+    w->pulled = REALS(v), w->rise = REALS(v), w->whole = REALS(v), w->part_before = REALS(v);
+    w->part_behind = REALS(v), w->begins = REALS(v), w->sliding = FLAGS(v);
+    w->side = REALS(k), w->later_side = REALS(k), w->stuck = FLAGS(k), w->opened = FLAGS(k);
+    w->later = WHOLES(k);
+}
+
+/* Load from which on a body slides as a whole, as a change of the displacement per load. */
+static double slides(const double *K, const double *f, double c, int m) {
+    double square = 0.0, whole = 0.0;
+    for (int r = 0; r < m; ++r) square += f[r] * f[r], whole += f[r] * f[r] * K[(size_t)r * m + r];
+    return SLIDES * (fabs(c) + square / (whole > 0.0 ? whole : 1.0));
+}
+
+/* Path of a body, its arguments in the order of native.py. */
+typedef struct {
+    const double *K, *f, *x, *mu, *c, *v, *r, *lift, *start, *loads;
+    const unsigned char *turn, *rounded;
+} Given;
+
+/* Room for paths of n nodes, of which k may slip; without memory opening it fails. */
+typedef struct {
+    Walk walk;
+    Contact contacts[3];
+    double *change;
+    unsigned char *flags;
+    void *memory;
+} Desk;
+
+static int open_desk(Desk *desk, int k, int n, int places) {
+    Room whole = {NULL, 0}, *room = &whole;
+    Walk *w = &desk->walk;
+    w->n = n, w->k = k, w->m = k + n, w->places = places, w->vertices = MOST_VERTICES * n;
+    for (int pass = 0; pass < 2; ++pass) { /* counts first, and then takes */
+        walk_in(room, w);
+        for (int i = 0; i < 3; ++i) desk->contacts[i] = contact_in(room, k, n);
+        desk->change = REALS(k + n), desk->flags = FLAGS(k);
+        if (pass == 0) whole.at = malloc(whole.used), whole.used = 0;
+        if (whole.at == NULL) return 0;
+    }
+    desk->memory = whole.at;
+    return 1;
+}
+
+static void run(Desk *desk, const Given *given, int same_body, int levels, Levels out, Record *records) {
+    Walk *w = &desk->walk;
+    int k = w->k, n = w->n, m = w->m;
+    Contact *from = &desk->contacts[0];
+    if (!same_body) w->product[0].known = w->product[1].known = 0;
+    w->K = given->K, w->x = given->x, w->mu = *given->mu, w->c = *given->c;
+    w->slides = slides(given->K, given->f, w->c, m);
+    memcpy(from->v, given->v, k * sizeof(double)), memcpy(from->r, given->r, m * sizeof(double));
+    memcpy(from->lift, given->lift, n * sizeof(double));
+    memset(from->side, 0, k * sizeof(double)), memset(from->free, 0, k);
+    memset(from->extra, 0, 2 * k * sizeof(double)), memset(from->extra_before, 0, 2 * k * sizeof(double));
+    from->load = given->start[0], from->displacement = given->start[1], from->settled = 1;
+    from->sense = from->length = from->closed = 0.0, from->turned = 0;
+    path(w, from, from + 1, given->f, levels, given->loads, given->turn, *given->rounded, out, records, desk->change, desk->flags);
+}
+
+/* One path for arrays of NumPy; the arguments of native.py, then the levels.  1 if it ran. */
+API int jbeamshell_path(int k, int n, int places, int levels, const void *const *in, void *const *out) {
+    Desk desk;
+    if (!open_desk(&desk, k, n, places)) return 0;
+    Given given = {in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11]};
+    run(&desk, &given, 0, levels, (Levels){out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7]}, NULL);
+    free(desk.memory);
+    return 1;
+}
+
+/* --- handler for XLA ---------------------------------------------------------------------------- */
+
+enum { ARGUMENTS = 12, RESULTS = 8 };
+static const int ARGUMENT_RANKS[ARGUMENTS] = {2, 1, 1, 0, 0, 1, 1, 1, 1, 1, 1, 0};
+
+/* Paths of many lanes, one after the other; lanes of one body share its columns. */
+API void *jbeamshell_walk(CallFrame *frame) {
+    if (asks_version(frame)) return NULL;
+    Buffer **in = frame->args.buffers, **out = frame->rets.buffers;
+    for (int64_t i = RESULTS; i < frame->rets.count; ++i) { /* what is not reached is zero */
+        int64_t bytes = i == 9 || i == 13 || i == 14 ? 8 : 4;
+        memset(out[i]->data, 0, (size_t)(product_of(out[i]->dims, out[i]->rank) * bytes));
+    }
+    int64_t axes = in[0]->rank - 2;
+    int m = (int)in[1]->dims[axes], n = (int)in[7]->dims[axes], k = m - n, levels = (int)in[9]->dims[axes];
+    int64_t lanes = product_of(out[0]->dims, axes), body = -1;
+    int parts = frame->rets.count > RESULTS ? (int)out[8]->dims[axes] : 0, events = MOST_EVENTS * n;
+    Record *records = parts > 0 ? calloc((size_t)parts, sizeof(Record)) : NULL;
+    Desk desk;
+    int opened = open_desk(&desk, k, n, (int)in[2]->dims[axes]) && (parts == 0 || records != NULL);
+    for (int64_t lane = 0; lane < lanes; ++lane) {
+        const void *at[ARGUMENTS];
+        int64_t numbers[ARGUMENTS];
+        for (int i = 0; i < ARGUMENTS; ++i) {
+            numbers[i] = number_in(in[i], ARGUMENT_RANKS[i], lane, out[0]);
+            int64_t size = product_of(in[i]->dims + axes, ARGUMENT_RANKS[i]);
+            at[i] = (const char *)in[i]->data + numbers[i] * size * (i < 10 ? (int64_t)sizeof(double) : 1);
+        }
+        double *r[6];
+        for (int i = 0; i < 6; ++i) r[i] = (double *)out[i]->data + lane * product_of(out[i]->dims + axes, out[i]->rank - axes);
+        Levels to = {r[0], r[1], r[2], r[3], r[4], r[5], (unsigned char *)out[6]->data + lane * levels * k,
+                     (unsigned char *)out[7]->data + lane * levels};
+        if (!opened) { /* no memory */
+            memset(to.settled, 0, levels);
+            continue;
+        }
+        for (int p = 0; p < parts; ++p) {
+            int64_t place = lane * parts + p;
+            records[p].events = (int32_t *)out[8]->data + place * events * 5;
+            records[p].tau = (double *)out[9]->data + place * events;
+            records[p].counts = (int32_t *)out[10]->data + place * 3;
+            records[p].corners = (int32_t *)out[11]->data + place * desk.walk.vertices * 4;
+            records[p].slip = (int32_t *)out[12]->data + place * k * 5;
+            records[p].at = (double *)out[13]->data + place * desk.walk.vertices;
+            records[p].change = (double *)out[14]->data + place * desk.walk.vertices * m;
+            records[p].lifted = (int32_t *)out[15]->data + place * n;
+        }
+        Given given = {at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8], at[9], at[10], at[11]};
+        int64_t own = numbers[0] * product_of(in[3]->dims, axes) + numbers[3]; /* of body and friction */
+        run(&desk, &given, own == body, levels, to, records);
+        body = own;
+    }
+    if (opened) free(desk.memory);
+    free(records);
+    return NULL;
+}

@@ -1,0 +1,140 @@
+"""The walk in C beside the walk in JAX: levels, derivatives of both modes, batches."""
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jbeamshell as jb
+from jbeamshell.common import jax_options
+from jbeamshell.contact_line import bearings, drives, native, strip
+from jbeamshell.contact_line.contact_state import pressed
+from jbeamshell.contact_line.walk import Contact, walk, walk_on
+
+pytestmark = pytest.mark.skipif(not native.serves(), reason="the walk in C was not built")
+
+NODES = 21
+ENTRIES = "traction", "face", "member", "guided"
+# Loops within loops, a branch that goes on beyond the loop it closes, and a rest.
+LOADS = jnp.asarray([1.0, 0.3, -1.0, -0.2, 0.4, 0.4, -0.3, 0.9, -1.1, 1.2])
+TURNS = True, True, False, True, False, False, True, True, True, True
+STRIP = jax.jit(lambda scene: strip.condensed(scene, NODES).body)
+
+
+def random_body(seed):
+    """Strip of a random height, friction and Poisson's ratio; its friction and a load."""
+    random = np.random.default_rng(seed)
+    friction = 10 ** random.uniform(-1.2, 0.1)
+    values = {
+        "model.section": "plane",
+        "load.entry": ENTRIES[seed % 4],
+        "strip.height_ratio": 10 ** random.uniform(-1.4, -0.4),
+        "strip.poisson_ratio": random.uniform(0.1, 0.45),
+        "contact.pressure": 10.0,
+    }
+    body = STRIP(jb.Scene().replace(values))
+    return body, friction, 20.0 * friction * 10 ** random.uniform(-1.0, -0.15)
+
+
+@functools.partial(jax.jit, static_argnames=("in_c", "rounded"))
+def levels(body, friction, loads, in_c, rounded=True, lift=None):
+    start = pressed(body)
+    lift = jnp.zeros_like(start.r_n) if lift is None else lift
+    if in_c:
+        return walk(body, friction, start, loads, TURNS, lift, rounded=rounded)
+    contact = Contact.of(start, lift)
+    return walk_on(body, friction, contact, loads, TURNS, rounded=rounded)[0]
+
+
+def figures(body, friction, loads, in_c):
+    """Numbers of like size of all levels."""
+    found = levels(body, friction, loads, in_c)
+    state = found.state
+    many = [1e5 * state.displacement, 1e6 * found.slip_work, state.r_n[-1], 1e5 * state.v[-1]]
+    return jnp.concatenate(many)
+
+
+SLOPES = jax.jit(jax.jacfwd(figures, argnums=(1, 2)), static_argnums=3)
+BACK = jax.jit(jax.grad(lambda *at: figures(*at)[15], argnums=(0, 1, 2)), static_argnums=3)
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [(None, "no C compiler"), (b"no library", "libwalk.so cannot be loaded: install")],
+)
+def test_a_library_that_is_not_there_leaves_the_walk_to_jax(tmp_path, monkeypatch, content, says):
+    monkeypatch.delenv(jax_options.WALK, raising=False)
+    monkeypatch.setattr(native, "LIBRARY", tmp_path / "libwalk.so")
+    if content is not None:
+        native.LIBRARY.write_bytes(content)
+    for known in (native.library, native.serves):
+        known.cache_clear()
+    try:
+        assert not native.serves()
+        assert says in native.in_words()
+    finally:
+        for known in (native.library, native.serves):
+            known.cache_clear()
+
+
+@pytest.mark.parametrize("rounded", [True, False])
+def test_it_walks_as_the_walk_in_jax(rounded):
+    for seed in range(12):
+        body, friction, size = random_body(seed)
+        own, other = (levels(body, friction, size * LOADS, way, rounded) for way in (True, False))
+        np.testing.assert_array_equal(own.settled, other.settled)
+        for name in ("v", "r_t", "r_n", "displacement"):
+            one, two = (np.asarray(getattr(each.state, name)) for each in (own, other))
+            np.testing.assert_allclose(one, two, atol=1e-6 * np.abs(two).max(), err_msg=name)
+        scale = np.asarray(other.slip_work).max()
+        np.testing.assert_allclose(own.slip_work, other.slip_work, atol=1e-7 * scale)
+
+
+def test_a_body_driven_by_displacement_is_walked_as_well():
+    body, friction, size = random_body(2)
+    reach = levels(body, friction, size * LOADS, False).state.displacement
+    driven = drives.driven_by_displacement(body)
+    own, other = (levels(driven, friction, reach, way) for way in (True, False))
+    np.testing.assert_allclose(own.slip_work, other.slip_work, rtol=1e-7)
+
+
+def test_bearings_are_nodes_without_a_place():
+    body, friction, size = random_body(1)
+    slip = np.asarray(levels(body, friction, size * LOADS, False).state.v)
+    share = jnp.full(slip.shape[1], 1.0 / slip.shape[1])
+    held = bearings.with_bearings(body, jnp.asarray(2e4), share)
+    lift = bearings.with_gaps(jnp.zeros(NODES), 0.3 * np.abs(slip.mean(axis=1)).max())
+    own, other = (levels(held, friction, size * LOADS, way, lift=lift) for way in (True, False))
+    assert np.any(np.asarray(other.state.r_n)[:, -2:] > 0.0)
+    np.testing.assert_allclose(own.state.r_n, other.state.r_n, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(own.slip_work, other.slip_work, rtol=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_derivatives_are_those_of_the_walk_in_jax(seed):
+    body, friction, size = random_body(seed)
+    at = body, jnp.asarray(friction), size * LOADS
+    for own, other in zip(SLOPES(*at, True), SLOPES(*at, False), strict=True):
+        np.testing.assert_allclose(own, other, atol=1e-8 * np.abs(other).max())
+    pairs = zip(*(jax.tree.leaves(BACK(*at, way)) for way in (True, False)), strict=True)
+    for own, other in pairs:
+        np.testing.assert_allclose(own, other, atol=1e-8 * np.abs(other).max())
+
+
+def test_a_batch_is_its_lanes():
+    bodies, frictions, sizes = zip(*(random_body(seed) for seed in range(4)), strict=True)
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *bodies)
+    frictions, loads = jnp.asarray(frictions), jnp.asarray(sizes)[:, None] * LOADS
+    many = jax.jit(jax.vmap(lambda *at: figures(*at, True)))(stacked, frictions, loads)
+    shared = jax.jit(jax.vmap(lambda load: figures(bodies[0], frictions[0], load, True)))(loads)
+    slopes = jax.jit(jax.vmap(jax.grad(lambda *at: figures(*at, True)[15], argnums=1)))
+    of_many = slopes(stacked, frictions, loads)
+    for i, body in enumerate(bodies):
+        np.testing.assert_array_equal(many[i], figures(body, frictions[i], loads[i], True))
+        np.testing.assert_allclose(
+            shared[i], figures(bodies[0], frictions[0], loads[i], True), rtol=1e-12, atol=1e-12
+        )
+        alone = BACK(body, frictions[i], loads[i], True)[1]
+        np.testing.assert_allclose(of_many[i], alone, rtol=1e-9)
