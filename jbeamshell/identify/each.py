@@ -1,4 +1,4 @@
-"""Many fits, each on its own: of the specimens of a series, or of bootstrap copies of one fit.
+"""Many fits, each on its own: of the specimens of a series, or of copies of one loop.
 
 All measurements of one kind and length share one compiled run of the model, and searches run on all
 cores.
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jbeamshell.common.checks import require, require_count
+from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.progress import counting
 from jbeamshell.common.summary import Summary
@@ -25,8 +25,6 @@ from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.parameters import Parameter
 from jbeamshell.identify.plan import Plan, planned
 from jbeamshell.identify.results import Fit
-from jbeamshell.identify.rig import RiggedObservation
-from jbeamshell.identify.specimens import Specimen
 
 LEVEL = 0.95  # part of the values between the ends that a summary names
 
@@ -52,7 +50,7 @@ class Fits:
     def intervals(self, level: float = LEVEL) -> dict[str, tuple[float, float]]:
         """Ends between which this part of the converged values lies, by key.
 
-        Of bootstrap copies they are a confidence interval.
+        Of copies whose noise is drawn anew they are a confidence interval.
 
         Raises
         ------
@@ -140,16 +138,12 @@ def fit_each(
     return _found(plans, progress)
 
 
-def _found(
-    plans: Sequence[Plan],
-    progress: Callable[[int, int], None] | None = None,
-    unseen: bool = False,
-) -> Fits:
+def _found(plans: Sequence[Plan], progress: Callable[[int, int], None] | None) -> Fits:
     """Fits of plans, on all cores."""
 
     def one(place: int) -> Fit:
         with _naming(place, len(plans)):
-            return plans[place].found(progress=lambda _: None, unseen=unseen)
+            return plans[place].found(progress=lambda _: None)
 
     with counting(progress, "fits", "fit") as told, ThreadPoolExecutor(os.cpu_count()) as pool:
         found = [one(0)]  # threads that miss the same compiled code would all compile it
@@ -173,68 +167,3 @@ def _naming(place: int, count: int) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"fit {place + 1} of {count}: {error}") from None
-
-
-@on_one_core
-def bootstrap(result: Fit, copies: int = 1000, *, seed: int = 0) -> Fits:
-    """Fit copies of a fit's data, whose residuals are drawn anew.
-
-    Each copy is the fitted response with residuals that are drawn in blocks along the curve, so
-    that neighbours stay as correlated as they are (Kunsch, Ann. Stat. 17, 1989).  The spread of the
-    values holds what residuals make of them, and not what the model's grid may leave.
-
-    Parameters
-    ----------
-    result : result of `fit` for one strip, law or structure
-    copies : number of copies
-    seed : seed of the draws
-
-    Returns
-    -------
-    Fits
-        with ``intervals()``
-
-    Raises
-    ------
-    InputError
-        if the result has several specimens, or a rig
-
-    Examples
-    --------
-    ::
-
-        jb.identify.bootstrap(jb.fit(loops, scene, ["contact.friction"])).intervals()
-    """
-    require_count("copies", copies, 2)
-    problem, uncertainty = result.problem, result.uncertainty
-    fix = "has several specimens: fit them one by one"
-    require("result", len(result.scenes), len(result.scenes) == 1, fix)
-    experiment, space = problem.experiment, uncertainty.space
-    rigged = any(isinstance(each, RiggedObservation) for each in experiment.observations)
-    require("result", "a rig", not rigged, "has a rig, whose numbers copies do not know")
-    best = problem(uncertainty.point)
-    rows = experiment.weight.size
-    residual = best.residual[:rows] / experiment.emphasis / experiment.weight
-    residual = residual * np.sqrt(
-        rows / max(rows - len(space.names), 1)
-    )  # of which a fit took part
-    random = np.random.default_rng(seed)
-    free = [
-        dataclasses.replace(own, start=result.values[name])
-        for own, name in zip(space.parameters, space.names, strict=True)
-    ]
-    options = Options(starts=1, throw=False)
-    plans = []
-    for _ in range(copies):
-        drawn = np.concatenate([_blocks(residual[own], random) for own in experiment.slices])
-        data = experiment.as_measurements(best.prediction - drawn)
-        plans.append(Plan([Specimen(result.scene, data)], free, options=options))
-    return _found(plans, unseen=True)
-
-
-def _blocks(values: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
-    """Blocks of values, drawn from a closed curve and joined to as many, with mean zero."""
-    size = max(1, round(np.sqrt(values.size)))
-    begins = random.integers(values.size, size=-(-values.size // size))
-    places = (begins[:, None] + np.arange(size)).ravel()[: values.size] % values.size
-    return values[places] - np.mean(values)

@@ -82,13 +82,11 @@ class Plan:
         self,
         save: str | os.PathLike[str] | None = None,
         progress: Callable[[FitProgress], None] | None = None,
-        unseen: bool = False,
     ) -> Fit:
-        """Run the fit in a thread of its own; ``unseen`` takes the data without an inspection."""
+        """Run the fit in a thread of its own."""
         specimens, doubts = counted_once(self.specimens)
         keys = [parameter.key for parameter in self.free]
-        if not unseen:
-            doubts = [*doubts, *inspected(specimens, keys, self.options.unchecked)]
+        doubts = [*doubts, *inspected(specimens, keys, self.options.unchecked)]
         parameters = with_starts(self.free, specimens)
         space, models = search_space(parameters, {one.label: one.model for one in specimens})
         specimens = [dataclasses.replace(one, scene=models[one.label]) for one in specimens]

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, lax
 from jax.typing import ArrayLike
 
 from jbeamshell.common.checks import is_traced
-from jbeamshell.common.errors import Status
+from jbeamshell.common.errors import Status, UnconvergedError
 from jbeamshell.common.failed import nan_unless
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.scene.scene import Scene
-from jbeamshell.solving.solve import run
+from jbeamshell.solving.response import response
+from jbeamshell.solving.solve import NO_END, run
+
+AMPLITUDE, FIGURES = "load.amplitude", ("secant_stiffness", "dissipation")
 
 CYCLE = np.array([1.0, -1.0, 1.0, -1.0, 1.0])  # the last two branches are the steady cycle
 
@@ -33,7 +37,11 @@ class SteadyCycles(Tree):
 
 
 def steady_cycles(scene: Scene, forces: ArrayLike) -> SteadyCycles:
-    """Cycles of rising amplitude (k,), one after the other; NaN where traced ones do not converge.
+    """Cycles of rising amplitude (k,); NaN where traced ones do not converge.
+
+    On the contact line each cycle starts from the strip as it was pressed: of cycles in a row, what
+    their readings leave on coarse grids adds up to per cents of the smallest losses.  Load steps
+    take them one after the other.
 
     Raises
     ------
@@ -42,6 +50,21 @@ def steady_cycles(scene: Scene, forces: ArrayLike) -> SteadyCycles:
     """
     throw = not is_traced(scene, forces, jnp.zeros(()))
     levels = jnp.asarray(forces)
+    if scene.plan.on_contact_line:
+        scene = scene.replace({AMPLITUDE: levels[-1], "load.cycles": len(CYCLE) // 2})
+        grid = run(scene, throw=throw).scene  # refined, if the largest needs it
+        own = response(grid, [AMPLITUDE], FIGURES)
+        if throw:  # one compiled program serves all scenes of its kind
+            found = jax.tree.map(lambda *one: jnp.stack(one), *map(own, np.asarray(levels)))
+        else:
+            found = lax.map(own, levels)
+        sound = jnp.all(found["status"] == Status.CONVERGED)
+        if throw and not sound:
+            raise UnconvergedError(f"a cycle below the load {float(levels[-1]):.6g} has {NO_END}")
+        return SteadyCycles(
+            levels,
+            *nan_unless(sound, (levels / found["secant_stiffness"], found["dissipation"])),
+        )
     history = run(scene, (levels[:, None] * CYCLE).ravel(), throw=throw)
     size = levels.size * CYCLE.size
     u, work = (

@@ -1,4 +1,4 @@
-"""Many fits, each on its own: planted values, bootstrap copies beside intervals, bad input."""
+"""Many fits, each on its own: planted values, the defaults of a fit, bad input."""
 
 import numpy as np
 import pytest
@@ -13,24 +13,12 @@ MU, ETA = "contact.friction", "strip.height_ratio"
 START = jb.Scene().replace({"load.entry": "traction", "model.nodes": 33, "model.section": "plane"})
 PLANTED = {MU: [0.08, 0.1, 0.14], ETA: [0.2, 0.25, 0.3]}
 POINTS = 32
-NOISE = 0.01  # of the range, more than what the grid leaves
 
 
-def loop_of(mu, eta, seed=0, noise=0.0):
-    """Loop of a strip with noise on the displacement."""
+def loop_of(mu, eta):
+    """Loop of a strip."""
     history = jb.solve(START.replace({MU: mu, ETA: eta, "load.amplitude": 10.0 * mu}), throw=False)
-    force, displacement = map(np.asarray, history.loop)
-    random = np.random.default_rng(seed)
-    return make_loop(
-        force, displacement + noise * np.ptp(displacement) * random.normal(size=force.size)
-    )
-
-
-@pytest.fixture(scope="module")
-def noisy():
-    start = START.replace({MU: 0.12, ETA: 0.22})
-    loop = loop_of(0.1, 0.25, 3, NOISE)
-    return identify.fit(loop, start, [MU, ETA], points=POINTS, unchecked=True)
+    return make_loop(*map(np.asarray, history.loop))
 
 
 def test_planted_values_come_back_one_by_one():
@@ -63,21 +51,7 @@ def test_each_fit_has_the_defaults_of_a_fit():
         assert fits.doubts[place] == alone.doubts
 
 
-def test_bootstrap_copies_spread_as_the_standard_error_says(noisy):
-    """Under white noise and a model that is right, both tell the same spread and the truth."""
-    copies = identify.bootstrap(noisy, 40)
-    assert copies.converged.all()
-    for key, truth in ((MU, 0.1), (ETA, 0.25)):
-        spread = np.std(copies.values[key])
-        assert spread == pytest.approx(noisy.errors[key], rel=0.5)
-        assert abs(noisy.values[key] - truth) < 4.0 * spread
-        low, high = copies.intervals()[key]
-        assert low < noisy.values[key] < high
-    again = identify.bootstrap(noisy, 3)
-    np.testing.assert_array_equal(again.values[MU], copies.values[MU][:3])
-
-
-def test_bad_input_names_the_fit(noisy):
+def test_bad_input_names_the_fit():
     loop = loop_of(0.1, 0.25)
     with pytest.raises(jb.InputError, match="data"):
         identify.fit_each([], START, [MU])
@@ -88,5 +62,3 @@ def test_bad_input_names_the_fit(noisy):
     with pytest.raises(jb.InputError, match="start closer"):
         none.intervals()
     assert str(none) == "2 fits, 0 converged"
-    with pytest.raises(jb.InputError, match="copies"):
-        identify.bootstrap(noisy, 1)
