@@ -14,8 +14,8 @@ from jbeamshell.solving.solve import run
 from jbeamshell.solving.steady_cycles import steady_cycles
 
 # Amplitudes of steady cycles, over the largest.  Where D rises with the power n of the force, the
-# chord between two that are apart by a factor r is n (n - 1) ln(r)^2 / 8 too high.  Below .4 that is
-# .6 % for Goodman's n = 3, and above 1.5 % for 14, as where short slip is just beginning.
+# chord between two that are apart by a factor r is n (n - 1) ln(r)^2 / 8 too high: below .4 .6 %
+# for Goodman's n = 3, and above it 1.5 % for 14, as where short slip is just beginning.
 AMPLITUDES = np.append(np.geomspace(0.02, 0.4, 36), np.geomspace(0.4, 1.0, 37)[1:])
 LEAST = 1e-12  # energy of a cycle that matters, over F u
 ROUNDING = 10.0  # slope of the squares below which another entry is not tried, over rounding
