@@ -1,6 +1,7 @@
 """Files of a run or a fit: every number to the last bit, whole files, no others."""
 
 import csv
+import dataclasses
 import io
 import json
 import os
@@ -44,9 +45,10 @@ def pressed(history, steps, **values):
     """First steps of a history, as of a scene that only presses."""
     scene = history.scene.replace({"load.cycles": 0, "load.pressure_steps": steps} | values)
     kept = {"x", "middles", "tributary", "load"}
-    path = {k: v for k, v in vars(history).items() if k not in kept | {"scene", "cycles"}}
+    arrays = {field.name: getattr(history, field.name) for field in dataclasses.fields(history)}
+    path = {k: v for k, v in arrays.items() if k not in kept | {"scene", "cycles"}}
     path = jax.tree.map(lambda a: a[:steps], path)
-    return jb.History(**vars(history) | path | {"scene": scene, "cycles": ()})
+    return history.but(**path, scene=scene, cycles=())
 
 
 @pytest.fixture(scope="module")
@@ -148,12 +150,12 @@ def test_the_section_table_keeps_every_bit(history):
 
 def test_steps_to_look_at(history):
     several = {"cycles": ((4, 12, 20), (20, 28, 36), (36, 44, 52)), "force": np.zeros(53)}
-    assert report.turning_steps(jb.History(**vars(history) | several)) == [0, 4, 36, 44, 52]
+    assert report.turning_steps(history.but(**several)) == [0, 4, 36, 44, 52]
     for steps, shown in [(1, [0]), (2, [0, 1]), (20, [0, 9, 19])]:
         assert report.turning_steps(pressed(history, steps)) == shown
     # Pressed in steps, then loaded one way.
     scene = history.scene.replace({"load.pressure_steps": 5})
-    one_way = jb.History(**vars(history) | {"cycles": (), "scene": scene})
+    one_way = history.but(cycles=(), scene=scene)
     assert report.turning_steps(one_way) == [0, 2, 4, 20]
 
 
@@ -205,7 +207,7 @@ def test_a_run_that_only_presses_has_no_loop_to_draw(history, tmp_path, values, 
 
 def test_a_run_without_friction_has_no_traction_to_draw(history, tmp_path):
     scene = history.scene.replace({"contact.friction": 0.0})
-    smooth = jb.History(**vars(history) | {"scene": scene})
+    smooth = history.but(scene=scene)
     report.write_run(tmp_path, smooth, {})
     assert names(tmp_path) == RUN_FILES - {"profiles.png"}
 
@@ -223,7 +225,7 @@ def test_only_what_was_written_is_listed(history, tmp_path):
 def test_a_run_of_ones_own_energy_has_no_scene_file(history, tmp_path):
     own = Homogeneous(0.1126, 1.5e5, 0.3, 0.44)
     scene = jb.Scene(history.scene.strip, model=history.scene.model, energy=own)
-    paths = report.write_run(tmp_path, jb.History(**vars(history) | {"scene": scene}), {})
+    paths = report.write_run(tmp_path, history.but(scene=scene), {})
     assert {path.name for path in paths} == names(tmp_path) == RUN_FILES - {"scene.toml"}
 
 
