@@ -34,7 +34,10 @@ class ContactLine(Record):
 
     @property
     def reaction_max(self) -> Array:
-        """Largest normal reaction, (steps+1,), stress."""
+        """Largest normal reaction, (steps+1,), stress.
+
+        In plane elasticity it may lie in the corner of a body, where it grows with the mesh.
+        """
         return jnp.max(self.reaction, axis=1)
 
     @property
