@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import os
+import warnings
 from pathlib import Path
 from typing import NamedTuple
 
@@ -77,7 +78,9 @@ def serves() -> bool:
         for target in (TARGET, FORWARD, BACKWARD):
             handler = jax.ffi.pycapsule(getattr(found, target))
             jax.ffi.register_ffi_target(target, handler, platform="cpu")
-    except Exception:
+    except Exception as error:  # a release of JAX that refuses the handler may raise anything
+        words = f"load paths are walked in JAX, more slowly: it refuses the walk in C ({error})"
+        warnings.warn(words, RuntimeWarning, stacklevel=2)
         return False
     return True
 

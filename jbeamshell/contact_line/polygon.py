@@ -102,7 +102,7 @@ class Slip(NamedTuple):
 
 
 class Corners(NamedTuple):
-    """What a polygon has beside its vertices, see `Polygon`."""
+    """Neighbours and nodes of a polygon's vertices, see `Polygon`."""
 
     before: Array
     after: Array
@@ -112,7 +112,7 @@ class Corners(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What the walk in C has found of a branch, see `Polygon`.
+    """Events and vertices of a branch as the walk in C has found them, see `Polygon`.
 
     Its own open nodes (n,) count: another rounding of a lift would be another contact.
     """

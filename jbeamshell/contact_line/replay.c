@@ -5,6 +5,7 @@
    vertices, ``backward`` pulls cotangents of the vertices back; one is the transpose of the other.
    The tableau is kept here, because each derivative multiplies it by a vector at each event. */
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -318,7 +319,8 @@ static void *replayed(CallFrame *frame, int back) {
     for (int64_t i = 0; i < frame->rets.count; ++i)
         memset(out[i]->data, 0, (size_t)product_of(out[i]->dims, out[i]->rank) * sizeof(double));
     unsigned char *taken = malloc((size_t)vertices);
-    for (int64_t lane = 0; lane < lanes && taken != NULL; ++lane) {
+    int64_t lane = 0;
+    for (; lane < lanes && taken != NULL; ++lane) {
         Replay p;
         p.m = (int)in[1]->dims[in[1]->rank - 1], p.n = (int)in[4]->dims[in[4]->rank - 1], p.k = p.m - p.n;
         p.at = equations(in, lane, first);
@@ -343,6 +345,9 @@ static void *replayed(CallFrame *frame, int back) {
         }
         free(memory);
     }
+    if (lane < lanes) /* no memory: derivatives that are not known must not pass for zero */
+        for (int64_t i = 0; i < frame->rets.count; ++i)
+            for (int64_t j = product_of(out[i]->dims, out[i]->rank); j-- > 0;) ((double *)out[i]->data)[j] = NAN;
     free(taken);
     return NULL;
 }

@@ -203,7 +203,7 @@ def _native_jvp(turns, rounded, primals, tangents):  # type: ignore[no-untyped-d
 def _again(
     turns: tuple[bool, ...], rounded: bool, known: Known, numbers: _Numbers
 ) -> tuple[ContactState, Array, Array]:
-    """What has derivatives of the levels of a path whose events are known."""
+    """States, lifts and works of the levels, which have derivatives, by events that are known."""
     body, friction, start, forces, lift = numbers
     contact = Contact.of(start, lift)
     levels = _in_branches(body, friction, contact, forces, turns, rounded, known)[0]

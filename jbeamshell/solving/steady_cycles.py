@@ -17,8 +17,8 @@ from jbeamshell.solving.response import response
 from jbeamshell.solving.solve import NO_END, run
 
 AMPLITUDE, FIGURES = "load.amplitude", ("secant_stiffness", "dissipation")
-
-CYCLE = np.array([1.0, -1.0, 1.0, -1.0, 1.0])  # the last two branches are the steady cycle
+CYCLES = 2  # after the first loading, the last of which counts as steady
+CYCLE = np.array([1.0, *[-1.0, 1.0] * CYCLES])  # turns of the load, over its amplitude
 
 
 class SteadyCycles(Tree):
@@ -39,9 +39,9 @@ class SteadyCycles(Tree):
 def steady_cycles(scene: Scene, forces: ArrayLike) -> SteadyCycles:
     """Cycles of rising amplitude (k,); NaN where traced ones do not converge.
 
-    On the contact line each cycle starts from the strip as it was pressed: of cycles in a row, what
-    their readings leave on coarse grids adds up to per cents of the smallest losses.  Load steps
-    take them one after the other.
+    On the contact line each cycle starts from the strip as it was pressed.  Walked one after the
+    other on a coarse grid, they would have errors that add up, to per cents where little is lost.
+    Load steps have no such errors, and take them one after the other.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def steady_cycles(scene: Scene, forces: ArrayLike) -> SteadyCycles:
     throw = not is_traced(scene, forces, jnp.zeros(()))
     levels = jnp.asarray(forces)
     if scene.plan.on_contact_line:
-        scene = scene.replace({AMPLITUDE: levels[-1], "load.cycles": len(CYCLE) // 2})
+        scene = scene.replace({AMPLITUDE: levels[-1], "load.cycles": CYCLES})
         grid = run(scene, throw=throw).scene  # refined, if the largest needs it
         own = response(grid, [AMPLITUDE], FIGURES)
         if throw:  # one compiled program serves all scenes of its kind

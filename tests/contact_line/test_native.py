@@ -1,6 +1,8 @@
 """The walk in C beside the walk in JAX: levels, derivatives of both modes, batches."""
 
 import functools
+import os
+import shutil
 
 import jax
 import jax.numpy as jnp
@@ -13,7 +15,9 @@ from jbeamshell.contact_line import bearings, drives, native, strip
 from jbeamshell.contact_line.contact_state import pressed
 from jbeamshell.contact_line.walk import Contact, walk, walk_on
 
-pytestmark = pytest.mark.skipif(not native.serves(), reason="the walk in C was not built")
+COMPILER = any(map(shutil.which, ("cc", "gcc", "clang")))  # which an install has used then
+IN_C = COMPILER and os.environ.get(jax_options.WALK) != "jax"
+pytestmark = pytest.mark.skipif(not IN_C, reason="no C compiler, or the walk in JAX is asked for")
 
 NODES = 21
 ENTRIES = "traction", "face", "member", "guided"
@@ -77,6 +81,19 @@ def test_a_library_that_is_not_there_leaves_the_walk_to_jax(tmp_path, monkeypatc
     finally:
         for known in (native.library, native.serves):
             known.cache_clear()
+
+
+def test_a_refusal_by_jax_is_told_and_leaves_the_walk_to_jax(monkeypatch):
+    def refuse(*_, **__):
+        raise ValueError("another version")
+
+    monkeypatch.setattr(jax.ffi, "register_ffi_target", refuse)
+    native.serves.cache_clear()
+    try:
+        with pytest.warns(RuntimeWarning, match=r"walked in JAX.*refuses.*another version"):
+            assert not native.serves()
+    finally:
+        native.serves.cache_clear()
 
 
 @pytest.mark.parametrize("rounded", [True, False])

@@ -83,7 +83,7 @@ def test_truth_lies_in_the_intervals_of_a_few_planted_pairs():
     assert np.mean([inside(seed) for seed in (1, 19)]) >= 0.75
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=15)
 def test_truth_lies_in_the_intervals_of_planted_pairs():
     assert 0.9 <= np.mean([inside(seed) for seed in range(200)]) <= 0.99
 
