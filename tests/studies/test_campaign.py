@@ -55,7 +55,8 @@ def test_a_row_of_the_record(rows, kind):
     found = campaign.compared(values, campaign.KINDS[kind].other)
     assert found["outcome"] == row["outcome"]
     assert found["dissipation"] == pytest.approx(row["dissipation"], rel=1e-6)
-    assert found["errors"] == pytest.approx(row["errors"], rel=1e-2, abs=1e-9)
+    # Errors compare two energies, and neither is closer to its record than 1e-6.
+    assert found["errors"] == pytest.approx(row["errors"], rel=1e-2, abs=1e-6)
 
 
 def test_an_error_over_nothing_is_whole():
