@@ -13,7 +13,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from packaging.tags import platform_tags
 
 FOLDER = Path("jbeamshell", "contact_line")
-SOURCES = "walk.c", "replay.c"
+SOURCES = "walk.c", "slopes.c"
 LIBRARY = "libwalk.so"
 FLAGS = "-std=c11", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-fPIC"
 COMPILERS = "cc", "gcc", "clang"

@@ -1,4 +1,4 @@
-"""The walk in C (walk.c): its library, as one operation of JAX and for arrays of NumPy.
+"""The walk in C (walk.c) and its derivatives (slopes.c), as operations of JAX.
 
 The library is built when jbeamshell is installed, if there is a C compiler.  Without it the walk in
 JAX stands in, which says the same more slowly.
@@ -22,13 +22,15 @@ from jax.typing import ArrayLike
 from jbeamshell.common.jax_options import WALK
 from jbeamshell.contact_line.body import Body
 from jbeamshell.contact_line.contact_state import ContactState
-from jbeamshell.contact_line.events import MOST_VERTICES, Record
-from jbeamshell.contact_line.native_replay import BACKWARD, FORWARD
-from jbeamshell.contact_line.polygon import MOST_EVENTS, Corners, Known, Slip
+from jbeamshell.numerics.pushforward import Rule, pushforward
 
 TARGET = "jbeamshell_walk"
 LIBRARY = Path(__file__).with_name("libwalk.so")
-REALS = 10  # of the arguments; the others are flags
+FORWARD, BACKWARD = "jbeamshell_slopes_forward", "jbeamshell_slopes_backward"
+REALS = 6  # of the levels' arrays, the first, have derivatives
+
+Numbers = tuple[Array, ...]
+Flags = tuple[Array, Array]
 
 
 class Levels(NamedTuple):
@@ -87,7 +89,7 @@ def serves() -> bool:
 
 def arguments(
     body: Body, friction: ArrayLike, start: ContactState, forces: ArrayLike, lift: ArrayLike
-) -> tuple[Array, ...]:
+) -> Numbers:
     """Numbers of a path in the order of walk.c, without its flags."""
     matrix = jnp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
     pull = jnp.concatenate([body.f_t, body.f_n])
@@ -97,65 +99,50 @@ def arguments(
     return tuple(jnp.asarray(each, float) for each in given)
 
 
-def levels(given: tuple[Array, ...], turns: tuple[bool, ...], rounded: bool) -> Levels:
-    """Levels of a path, see `walk.walk`."""
-    return Levels(*_called(given, turns, rounded, _shapes(given)))
+@jax.custom_jvp
+def levels(given: Numbers, beside: Flags) -> Levels:
+    """Levels of a path, see `walk.walk`; first derivatives are exact, forward and reverse.
+
+    Parameters
+    ----------
+    given : `arguments`
+    beside : turns (levels,), and True to read the spline of the events
+    """
+    call = jax.ffi.ffi_call(TARGET, _shapes(given), vmap_method="expand_dims")
+    return Levels(*call(*given, *beside))
 
 
-def recorded(
-    given: tuple[Array, ...], turns: tuple[bool, ...], rounded: bool
-) -> tuple[Levels, Known]:
-    """Levels of a path, and what was found of each of the two parts (branches, 2) of a branch."""
-    n, m = given[7].size, given[1].size
-    k, parts = m - n, 2 * sum(turns)
-    events, vertices = MOST_EVENTS * n, MOST_VERTICES * n
-    sizes = (
-        *((events, 5), (events,), (3,), (vertices, 4), (k, 5)),
-        *((vertices,), (vertices, m), (n,)),
-    )
-    kinds = jnp.int32, float, jnp.int32, jnp.int32, jnp.int32, float, float, jnp.int32
-    more = [
-        jax.ShapeDtypeStruct((parts, *size), kind) for size, kind in zip(sizes, kinds, strict=True)
-    ]
-    found = _called(given, turns, rounded, [*_shapes(given), *more])
-    rows, tau, counts, corners, slip, at, change, lifted = (
-        a.reshape(-1, 2, *a.shape[1:]) for a in found[len(Levels._fields) :]
-    )
-    number, count, ended = jnp.moveaxis(counts, -1, 0)
-    before, after, node, way = jnp.moveaxis(corners, -1, 0)
-    side, stuck, opened, later, later_side = jnp.moveaxis(slip, -1, 0)
-    known = Known(
-        at,
-        change,
-        lifted != 0,
-        Corners(before, after, node, way != 0, count),
-        Slip(
-            side.astype(float),
-            stuck != 0,
-            opened != 0,
-            later,
-            later_side.astype(float),
-            ended != 0,
-        ),
-        Record(rows, tau, number),
-    )
-    return Levels(*found[: len(Levels._fields)]), known
+@levels.defjvp
+def _levels_jvp(primals, tangents):  # type: ignore[no-untyped-def]
+    given, beside = primals
+    found = levels(given, beside)
+    slopes = pushforward(RULE, given, beside, tangents[0])
+    none = (np.zeros(a.shape, jax.dtypes.float0) for a in (found.slipping, found.settled))
+    return found, Levels(*slopes, *none)
 
 
-def _shapes(given: tuple[Array, ...]) -> list[jax.ShapeDtypeStruct]:
+def _forward(given: Numbers, beside: Flags, change: Numbers) -> list[Array]:
+    call = jax.ffi.ffi_call(FORWARD, _real_shapes(given, beside), vmap_method="expand_dims")
+    return list(call(*given, *beside, *change))
+
+
+def _backward(given: Numbers, beside: Flags, levels: list[Array]) -> Numbers:
+    made = [jax.ShapeDtypeStruct(a.shape, a.dtype) for a in given]
+    call = jax.ffi.ffi_call(BACKWARD, made, vmap_method="expand_dims")
+    return tuple(call(*given, *beside, *levels))
+
+
+def _real_shapes(given: Numbers, _: Flags) -> list[jax.ShapeDtypeStruct]:
+    return _shapes(given)[:REALS]
+
+
+RULE = Rule(_forward, _backward, _real_shapes)
+
+
+def _shapes(given: Numbers) -> list[jax.ShapeDtypeStruct]:
     n, m, count = given[7].size, given[1].size, given[9].size
     k = m - n
     reals = (count, k), (count, k), (count, n), (count,), (count, n), (count,)
     flags = (count, k), (count,)
     made = [jax.ShapeDtypeStruct(shape, float) for shape in reals]
     return made + [jax.ShapeDtypeStruct(shape, bool) for shape in flags]
-
-
-def _called(
-    given: tuple[Array, ...],
-    turns: tuple[bool, ...],
-    rounded: bool,
-    shapes: list[jax.ShapeDtypeStruct],
-) -> list[Array]:
-    call = jax.ffi.ffi_call(TARGET, shapes, vmap_method="expand_dims")
-    return list(call(*given, np.asarray(turns), np.asarray(rounded)))

@@ -26,7 +26,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from jbeamshell.contact_line import native_replay, replay
+from jbeamshell.contact_line import replay
 from jbeamshell.contact_line.events import (
     END,
     FIXED,
@@ -101,37 +101,12 @@ class Slip(NamedTuple):
     ended: Array
 
 
-class Corners(NamedTuple):
-    """Neighbours and nodes of a polygon's vertices, see `Polygon`."""
-
-    before: Array
-    after: Array
-    node: Array
-    way: Array
-    number: Array
-
-
-class Known(NamedTuple):
-    """Events and vertices of a branch as the walk in C has found them, see `Polygon`.
-
-    Its own open nodes (n,) count: another rounding of a lift would be another contact.
-    """
-
-    tau: Array
-    change: Array
-    lifted: Array
-    corners: Corners
-    slip: Slip
-    record: Record
-
-
 def polygon(
     branch: Branch,
     search: Search,
     opened: Array,
     reach: Array,
     slides: Array,
-    known: Known | None = None,
 ) -> tuple[Polygon, Slip]:
     """Polygon of a branch; the derivatives of its vertices are exact, forward and reverse.
 
@@ -142,11 +117,7 @@ def polygon(
     opened : (n,) True for nodes that are open where it begins
     reach : tau of its end; vertices beyond it are found as far as `spline` needs them
     slides : change of pull.q per load from which on a body slides as a whole
-    known : what was found of the branch before; None finds it
     """
-    if known is not None:
-        tau, change = _known_vertices((branch, search), known)
-        return Polygon(tau, change, *known.corners), known.slip
     tau, change, corners, slip = _vertices(branch, search, opened, reach, slides)
     return Polygon(tau, change, *corners), slip
 
@@ -167,18 +138,6 @@ def _vertices_jvp(primals, tangents):  # type: ignore[no-untyped-def]
     slopes = pushforward(replay.vertices, (branch, search), known, tangents[:2])
     none = jax.tree.map(_no_slope, (corners, slip))
     return (tau, change, corners, slip), (*slopes, *none)
-
-
-@jax.custom_jvp
-def _known_vertices(at: tuple[Branch, Search], known: Known) -> tuple[Array, Array]:
-    return known.tau, known.change
-
-
-@_known_vertices.defjvp
-def _known_vertices_jvp(primals, tangents):  # type: ignore[no-untyped-def]
-    at, known = jax.tree.map(lax.stop_gradient, primals)
-    beside = known.lifted, known.record
-    return (known.tau, known.change), pushforward(native_replay.RULE, at, beside, tangents[0])
 
 
 def _no_slope(a: Array) -> Array | np.ndarray:

@@ -10,29 +10,39 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "xla.h"
+#include "walk.h"
 
-#define R restrict /* vectors that do not overlap */
-
-enum { ALONG, AGAINST, STICK, OPEN, CLOSE, KINDS };
-enum { BY_ROW, AT_ONCE, AT_RETURN, FIXED };
-
-static const double SLIDES = 1e6, SLIDES_ON = 1e-2, ABOUT = 2.0, TOUCHES = 1e-9, SAME = 1e-9;
+static const double SLIDES = 1e6, SLIDES_ON = 1e-2, TOUCHES = 1e-9, SAME = 1e-9;
 static const double ROUNDING = 32.0 * 2.220446049250313e-16;
-static const double LATE = 1e-9, MERGED = 1e-9, MOST_PART = 0.6, UNEVEN = 3.0, STARTS = 0.25;
-enum { MOST_VERTICES = 8, MOST_EVENTS = 40, DENSE = 3, PRODUCT = 3 };  /* times the nodes */
+static const double LATE = 1e-9, MERGED = 1e-9;
+
+/* --- room -------------------------------------------------------------------------------------- */
+
+void *take(Room *room, size_t bytes) {
+    void *found = room->at == NULL ? NULL : room->at + room->used;
+    room->used += (bytes + 63) / 64 * 64;
+    return found;
+}
+
+void product_in(Room *room, Product *p, int exchanges, int m) {
+    p->count = p->known = p->whole = 0, p->room = exchanges;
+    p->share = REALS((size_t)exchanges * m), p->add = REALS(exchanges), p->rest = REALS(exchanges);
+    p->pivot = REALS(exchanges), p->row = WHOLES(exchanges), p->normal = WHOLES(exchanges);
+    p->kind = WHOLES(exchanges);
+}
+
+Contact contact_in(Room *room, int k, int n) {
+    Contact c;
+    memset(&c, 0, sizeof c);
+    c.v = REALS(k), c.r = REALS(k + n), c.lift = REALS(n), c.side = REALS(k);
+    c.extra = REALS(2 * k), c.extra_before = REALS(2 * k), c.free = FLAGS(k);
+    return c;
+}
 
 /* --- product form of the inverse --------------------------------------------------------------- */
 
-/* Exchanges of rows and columns; those from count on are remembered, and may come again. */
-typedef struct {
-    int count, known, room;
-    double *share, *add, *rest, *pivot; /* share (room, m) */
-    int *row, *normal, *kind;
-} Product;
-
 /* A vector after an exchange. */
-static void exchanged(const Product *p, int e, int m, double *R a) {
+void exchanged(const Product *p, int e, int m, double *R a) {
     const double *R share = p->share + (size_t)e * m;
     int i = p->row[e], q = p->normal[e];
     double entry = a[i] + p->add[e] * a[q];
@@ -48,38 +58,6 @@ static void column(const double *K, const Product *p, int m, int j, double *R a)
     memcpy(a, e < 0 ? K + (size_t)j * m : p->share + (size_t)e * m, m * sizeof(double));
     for (++e; e < p->count; ++e) exchanged(p, e, m, a);
 }
-
-/* --- what a path knows ------------------------------------------------------------------------- */
-
-typedef struct {
-    int n, k, m, vertices;             /* nodes, those that may slip, fields, room */
-    int places;                        /* nodes with a position: bearings have none */
-    const double *K, *x;               /* (m, m) symmetric, (places,) */
-    double mu, c, slides;
-    Product product[2], *now;          /* one for each sense of the load */
-    /* branch: equations, tableau */
-    double *r_0, *lift, *pull, *extra; /* (m,), (n,), (m,), (2, k) */
-    double *answer, *rate, *held, *sigma, back, tau;
-    unsigned char *open, *lifted;      /* (n,) open now, and where the branch begins */
-    /* polygon */
-    int number, *before, *after, *node, *last; /* last (KINDS, n) */
-    unsigned char *way;
-    double *at, *change, *force, *pulled, *rise, *whole, *part_before, *part_behind, *begins;
-    /* slip of a branch */
-    double *side, *later_side;
-    unsigned char *stuck, *opened, *sliding;
-    int *later, ended;
-    double *column;
-} Walk;
-
-/* Record of a part of a branch, for derivatives. */
-typedef struct {
-    int32_t *events, *counts, *corners, *slip; /* (events, 5), (3,), (vertices, 4), (k, 5) */
-    int32_t *lifted;                           /* (n,) */
-    double *tau, *at, *change; /* (events,), (vertices,), (vertices, m) */
-} Record;
-
-typedef struct { double wait, tau; int kind, node, cause; } Event;
 
 /* --- tableau ----------------------------------------------------------------------------------- */
 
@@ -103,7 +81,7 @@ static void rebuild(Walk *w) {
         }
 }
 
-static void change_contact(Walk *w, int kind, int node, int keeps) {
+void change_contact(Walk *w, int kind, int node, int keeps) {
     Product *p = w->now;
     if (p->count == p->room) rebuild(w);
     int m = w->m, k = w->k, q = k + node, i = kind < OPEN ? node : q, e = p->count;
@@ -121,7 +99,7 @@ static void change_contact(Walk *w, int kind, int node, int keeps) {
     }
     exchanged(p, e, m, w->rate);
     /* An event that undoes the one before leaves what was before both. */
-    int undoes = e > 0 && p->row[e - 1] == i && p->add[e - 1] == -p->rest[e] && p->rest[e - 1] == -p->add[e];
+    int undoes = !p->whole && e > 0 && p->row[e - 1] == i && p->add[e - 1] == -p->rest[e] && p->rest[e - 1] == -p->add[e];
     p->count = undoes ? e - 1 : e + 1;
 
     double answer = w->answer[i] + p->add[e] * w->answer[q];
@@ -131,7 +109,7 @@ static void change_contact(Walk *w, int kind, int node, int keeps) {
     else w->open[node] = kind == OPEN;
 }
 
-static void begin(Walk *w) {
+void begin(Walk *w) {
     memcpy(w->answer, w->r_0, w->m * sizeof(double));
     for (int r = 0; r < w->m; ++r) w->rate[r] = -w->pull[r], w->held[r] = 0.0;
     for (int i = 0; i < w->n; ++i) w->sigma[i] = 0.0, w->open[i] = 0;
@@ -143,9 +121,9 @@ static void begin(Walk *w) {
         }
 }
 
-static int moves(const Walk *w, int r) { return r < w->k ? w->sigma[r] != 0.0 : w->open[r - w->k]; }
+int moves(const Walk *w, int r) { return r < w->k ? w->sigma[r] != 0.0 : w->open[r - w->k]; }
 
-static void advance(Walk *w, double tau) {
+void advance(Walk *w, double tau) {
     double step = tau - w->tau;
     for (int r = 0; r < w->m; ++r) w->answer[r] += w->rate[r] * step;
     w->tau = tau;
@@ -157,10 +135,11 @@ static double until(double room, double change) {
     return change < 0.0 ? fmax(room, 0.0) / -change : INFINITY;
 }
 
+/* Takes an event that comes after a wait, ``tau`` of the best, if it is earlier. */
 static void earlier(Event *best, double wait, int kind, int node, int cause) {
-    int first = wait < best->wait || (wait == best->wait && wait < INFINITY &&
+    int first = wait < best->tau || (wait == best->tau && wait < INFINITY &&
                 (kind < best->kind || (kind == best->kind && node < best->node)));
-    if (first) best->wait = wait, best->kind = kind, best->node = node, best->cause = cause;
+    if (first) best->tau = wait, best->kind = kind, best->node = node, best->cause = cause;
 }
 
 static Event next_event(const Walk *w) {
@@ -168,7 +147,7 @@ static Event next_event(const Walk *w) {
     const double *R normal = w->answer + k, *R fall = w->rate + k;
     double most = 0.0, rest = w->back - w->tau;
     for (int i = 0; i < k; ++i) most = fmax(most, w->mu * normal[i]);
-    Event best = {INFINITY, INFINITY, KINDS, n, FIXED};
+    Event best = {INFINITY, KINDS, n, FIXED, 0, 0};
     for (int i = 0; i < n; ++i) {
         if (w->open[i]) {
             int rises = w->held[k + i] > 0.0 && fall[i] > 0.0;
@@ -189,7 +168,7 @@ static Event next_event(const Walk *w) {
                 earlier(&best, ends ? fmax(own, rest) : wait, kind, i, cause);
             }
     }
-    best.tau = w->tau + best.wait;
+    best.tau += w->tau;
     return best;
 }
 
@@ -244,7 +223,7 @@ static void with_slip(Walk *w, const Event *event, int vertex, double reach) {
 }
 
 /* Vertex at which the first front starts that goes on; a front that starts behind it is late. */
-static int first_front(const Walk *w) {
+int first_front(const Walk *w) {
     int j = 1;
     while (j < w->number && (w->before[j] != 0 || w->after[j] == 0)) ++j;
     return j;
@@ -275,32 +254,14 @@ static double velocity(const Walk *w) {
     return fabs(sum);
 }
 
-static void write(const Record *record, const Event *event, int vertex, int keep) {
-    if (record == NULL) return;
-    int32_t number = record->counts[0]++, *row = record->events + 5 * (size_t)number;
-    row[0] = event->kind, row[1] = event->node, row[2] = event->cause, row[3] = vertex, row[4] = keep;
-    record->tau[number] = event->tau;
-}
-
-static void write_corners(const Record *record, const Walk *w) {
-    if (record == NULL) return;
-    record->counts[1] = w->number, record->counts[2] = w->ended;
-    memcpy(record->at, w->at, w->number * sizeof(double));
-    memcpy(record->change, w->change, (size_t)w->number * w->m * sizeof(double));
-    for (int j = 0; j < w->number; ++j) {
-        int32_t *row = record->corners + 4 * (size_t)j;
-        row[0] = w->before[j], row[1] = w->after[j], row[2] = w->node[j], row[3] = w->way[j];
-    }
-    for (int i = 0; i < w->n; ++i) record->lifted[i] = w->lifted[i];
-    for (int i = 0; i < w->k; ++i) {
-        int32_t *row = record->slip + 5 * (size_t)i;
-        row[0] = (int32_t)w->side[i], row[1] = w->stuck[i], row[2] = w->opened[i];
-        row[3] = w->later[i], row[4] = (int32_t)w->later_side[i];
-    }
+static void note(Tape *tape, Event event, int vertex, int keep) {
+    if (tape == NULL) return;
+    event.vertex = vertex, event.keep = keep;
+    tape->event[tape->events++] = event;
 }
 
 /* Polygon of a branch up to tau = reach, and a little beyond. */
-static void polygon(Walk *w, double reach, const Record *record) {
+static void polygon(Walk *w, double reach) {
     int n = w->n, k = w->k, events = 0, most = MOST_EVENTS * n;
     begin(w);
     w->number = 1, w->at[0] = 0.0, w->before[0] = w->after[0] = w->node[0] = w->way[0] = 0;
@@ -317,7 +278,7 @@ static void polygon(Walk *w, double reach, const Record *record) {
         advance(w, event.tau);
         int keep = event.kind == CLOSE && w->rate[k + event.node] > 0.0;
         int vertex = with_vertex(w, reach);
-        write(record, &event, vertex, keep);
+        note(w->tape, event, vertex, keep);
         with_neighbours(w, event.kind, event.node, vertex);
         change_contact(w, event.kind, event.node, keep);
         with_slip(w, &event, vertex, reach);
@@ -331,8 +292,7 @@ static void polygon(Walk *w, double reach, const Record *record) {
     advance(w, event.tau);
     w->before[place] = w->after[place] = w->node[place] = w->way[place] = 0;
     set_vertex(w, place);
-    write(record, &event, place, 0);
-    write_corners(record, w);
+    note(w->tape, event, place, 0);
 }
 
 /* --- spline ------------------------------------------------------------------------------------ */
@@ -356,20 +316,22 @@ static void prepare(Walk *w) {
         if (w->sliding[j] || (j > 0 && w->sliding[j - 1])) w->part_before[j] = w->part_behind[j] = 0.0;
 }
 
-/* Parts of the rounded corners before and behind each vertex; zero for sharp ones. */
-static void corners(Walk *w, int rounded) {
-    int last = w->number - 1, first = first_front(w);
-    const double *x = w->x;
-    for (int j = 0; j <= last; ++j) {
-        int i = w->node[j];
-        double part = 0.5; /* of its step that is nearer to a vertex than to the one before */
-        if (i > 0 && i < w->places - 1) {
-            double a = fabs(x[i] - x[i - 1]), b = fabs(x[i + 1] - x[i]);
-            part = a + b > 0.0 ? b / (a + b) : 0.5;
-        }
-        part = w->way[j] ? part : 1.0 - part;
-        w->begins[j] = fmin(fmax(part, 1.0 - MOST_PART), MOST_PART);
+/* Part of the step to a vertex that is nearer to it than to the vertex before. */
+double share_of(const Walk *w, int j) {
+    int i = w->node[j];
+    double part = 0.5;
+    if (i > 0 && i < w->places - 1) {
+        double a = fabs(w->x[i] - w->x[i - 1]), b = fabs(w->x[i + 1] - w->x[i]);
+        part = a + b > 0.0 ? b / (a + b) : 0.5;
     }
+    part = w->way[j] ? part : 1.0 - part;
+    return fmin(fmax(part, 1.0 - MOST_PART), MOST_PART);
+}
+
+/* Parts of the rounded corners before and behind each vertex; zero for sharp ones. */
+void corners(Walk *w, int rounded) {
+    int last = w->number - 1, first = first_front(w);
+    for (int j = 0; j <= last; ++j) w->begins[j] = share_of(w, j);
     for (int j = 0; j <= last; ++j) { /* what lies before a vertex of its step, and behind */
         int b = w->before[j], a = w->after[j];
         w->part_before[j] = (w->at[j] - w->at[b]) * w->begins[j];
@@ -389,8 +351,6 @@ static void corners(Walk *w, int rounded) {
     }
     prepare(w);
 }
-
-typedef struct { int edge, slides; double work; } Reading;
 
 /* Area under a rounded corner less that under the sharp one, from its begin to t. */
 static double area(double a, double b, double t, double x) {
@@ -437,35 +397,26 @@ static Reading read_at(const Walk *w, double tau, double *R change, double *R fo
 
 /* --- path -------------------------------------------------------------------------------------- */
 
-/* Contact where a branch begins, and what it remembers; see walk.py. */
-typedef struct {
-    double *v, *r, *lift, load, displacement; /* (k,), (m,), (n,) */
-    double *side, *extra, *extra_before, sense, length, closed;
-    unsigned char *free, turned, settled;
-} Contact;
-
-typedef struct { double *v, *r_t, *r_n, *displacement, *lift, *work; unsigned char *slipping, *settled; } Levels;
-
-/* Branch, or a part of one, that begins with a contact and ends at a target or where a loop closes. */
-typedef struct { double sense, end; int turns, closes; } Course;
-
-static Course depart(Walk *w, const Contact *from, const double *f, double target, int rounded, const Record *record) {
+static Course depart(Walk *w, const Contact *from, const double *f, double target, int rounded) {
     int k = w->k, m = w->m, n = w->n;
     Course course;
     course.sense = target >= from->load ? 1.0 : -1.0;
     course.turns = course.sense * from->sense < 0.0;
+    course.goes_on = course.sense * from->sense > 0.0;
     double reach = fabs(target - from->load);
     int loops = course.turns && from->turned;
-    int splits = loops && reach * (1.0 - SAME) > from->length;
-    course.end = splits ? from->load + course.sense * from->length : target;
+    course.splits = loops && reach * (1.0 - SAME) > from->length;
+    course.end = course.splits ? from->load + course.sense * from->length : target;
     course.closes = loops && reach * (1.0 + SAME) >= from->length;
+    course.first = course.turns && !from->turned;
+    course.again = course.closes && from->closed >= 2.0;
     for (int r = 0; r < m; ++r) w->pull[r] = course.sense * f[r];
     memcpy(w->r_0, from->r, m * sizeof(double));
     memcpy(w->lift, from->lift, n * sizeof(double));
     w->now = &w->product[course.sense < 0.0];
-    w->back = course.turns && !from->turned ? from->length : INFINITY;
+    w->back = course.first ? from->length : INFINITY;
     memset(w->extra, 0, 2 * k * sizeof(double));
-    if (rounded && course.closes && from->closed >= 2.0)
+    if (rounded && course.again)
         memcpy(w->extra, from->extra_before, 2 * k * sizeof(double));
     else if (rounded && course.turns)
         for (int i = 0; i < k; ++i) {
@@ -476,13 +427,13 @@ static Course depart(Walk *w, const Contact *from, const double *f, double targe
             if (!from->free[i]) w->extra[(side < 0.0 ? 0 : k) + i] = more;
         }
     for (int i = 0; i < n; ++i) w->lifted[i] = from->lift[i] > 0.0;
-    polygon(w, fabs(course.end - from->load), record);
+    polygon(w, fabs(course.end - from->load));
     corners(w, rounded);
     return course;
 }
 
 /* Level of a course at a load: contact in ``at``, and work since it began. */
-static double level(const Walk *w, const Contact *from, const Course *course, double load, double *change, Contact *at, unsigned char *slipping) {
+double level(const Walk *w, const Contact *from, const Course *course, double load, double *change, Contact *at, unsigned char *slipping) {
     int k = w->k, m = w->m, n = w->n;
     double tau = course->sense * (load - from->load), most = 0.0, moved = 0.0;
     Reading read = read_at(w, tau, change, at->r);
@@ -513,7 +464,7 @@ static double level(const Walk *w, const Contact *from, const Course *course, do
 
 /* What a contact at the end of a course remembers. */
 static void arrive(const Walk *w, const Contact *from, const Course *course, Contact *at) {
-    int k = w->k, goes_on = course->sense * from->sense > 0.0;
+    int k = w->k, goes_on = course->goes_on;
     double length = fabs(at->load - from->load);
     for (int i = 0; i < k; ++i) {
         int j = w->later[i], part = j > 0 && w->begins[j] < length;
@@ -535,16 +486,62 @@ static void swap(Contact *a, Contact *b) {
     *a = *b, *b = c;
 }
 
-/* Levels of a path from the contact ``from``; records (2 for each branch) may be null. */
+static void copy_contact(Contact *a, const Contact *b, int k, int n) {
+    Contact c = *b;
+    c.v = a->v, c.r = a->r, c.lift = a->lift, c.side = a->side, c.free = a->free;
+    c.extra = a->extra, c.extra_before = a->extra_before;
+    memcpy(c.v, b->v, k * sizeof(double)), memcpy(c.r, b->r, (k + n) * sizeof(double));
+    memcpy(c.lift, b->lift, n * sizeof(double)), memcpy(c.side, b->side, k * sizeof(double));
+    memcpy(c.extra, b->extra, 2 * k * sizeof(double)), memcpy(c.free, b->free, k);
+    memcpy(c.extra_before, b->extra_before, 2 * k * sizeof(double));
+    *a = c;
+}
+
+/* Keeps a part of a branch on the tape. */
+static void keep(const Walk *w, const Contact *from, const Course *course, int target, int begin, int end) {
+    Tape *tape = w->tape;
+    if (tape->count == tape->room) {
+        int more = 2 * tape->room + 8;
+        Part *parts = realloc(tape->parts, (size_t)more * sizeof(Part));
+        if (parts != NULL) tape->parts = parts, tape->room = more;
+    }
+    Part part = {.course = *course, .target = target, .begin = begin, .end = end, .number = w->number, .events = tape->events};
+    Room whole = {NULL, 0}, *room = &whole;
+    size_t v = (size_t)w->number, m = (size_t)w->m;
+    for (int pass = 0; pass < 2 && tape->count < tape->room; ++pass) {
+        part.from = contact_in(room, w->k, w->n);
+        part.event = take(room, (size_t)part.events * sizeof(Event));
+        part.before = WHOLES(v), part.after = WHOLES(v), part.node = WHOLES(v), part.way = FLAGS(v);
+        part.at = REALS(v), part.change = REALS(v * m), part.force = REALS(v * m);
+        if (pass == 0) part.memory = whole.at = malloc(whole.used), whole.used = 0;
+        if (whole.at == NULL) break;
+    }
+    tape->events = 0;
+    if (part.memory == NULL) {
+        tape->failed = 1;
+        return;
+    }
+    copy_contact(&part.from, from, w->k, w->n);
+    memcpy(part.event, tape->event, (size_t)part.events * sizeof(Event));
+    memcpy(part.before, w->before, v * sizeof(int)), memcpy(part.after, w->after, v * sizeof(int));
+    memcpy(part.node, w->node, v * sizeof(int)), memcpy(part.way, w->way, v);
+    memcpy(part.at, w->at, v * sizeof(double));
+    memcpy(part.change, w->change, v * m * sizeof(double));
+    memcpy(part.force, w->force, v * m * sizeof(double));
+    tape->parts[tape->count++] = part;
+}
+
+/* Levels of a path from the contact ``from``. */
 static void path(Walk *w, Contact *from, Contact *to, const double *f, int levels, const double *load,
-                 const unsigned char *turn, int rounded, Levels out, Record *records, double *change, unsigned char *slipping) {
+                 const unsigned char *turn, int rounded, Levels out, double *change, unsigned char *slipping) {
     int k = w->k, n = w->n;
     Contact spare = to[1];
-    for (int begin = 0, end, branch = 0; begin < levels; begin = end, ++branch) {
+    for (int begin = 0, end; begin < levels; begin = end) {
         for (end = begin + 1; end < levels && !turn[end];) ++end;
         double target = load[end - 1], done = 0.0, before = 0.0;
         for (int part = 0, next = begin; part < 2 && next < end; ++part) {
-            Course course = depart(w, from, f, target, rounded, records ? records + 2 * branch + part : NULL);
+            int first = next;
+            Course course = depart(w, from, f, target, rounded);
             for (; next < end && course.sense * (load[next] - course.end) <= 0.0; ++next) {
                 double work = done + level(w, from, &course, load[next], change, &spare, slipping);
                 memcpy(out.v + (size_t)next * k, spare.v, k * sizeof(double));
@@ -555,6 +552,7 @@ static void path(Walk *w, Contact *from, Contact *to, const double *f, int level
                 out.displacement[next] = spare.displacement, out.settled[next] = spare.settled;
                 out.work[next] = work - before, before = work;
             }
+            if (w->tape) keep(w, from, &course, end - 1, first, next);
             done += level(w, from, &course, course.end, change, to, slipping);
             arrive(w, from, &course, to);
             swap(from, to);
@@ -562,37 +560,11 @@ static void path(Walk *w, Contact *from, Contact *to, const double *f, int level
     }
 }
 
-/* --- room -------------------------------------------------------------------------------------- */
-
-typedef struct { char *at; size_t used; } Room;
-
-static void *take(Room *room, size_t bytes) {
-    void *found = room->at == NULL ? NULL : room->at + room->used;
-    room->used += (bytes + 63) / 64 * 64;
-    return found;
-}
-
-#define REALS(count) take(room, (size_t)(count) * sizeof(double))
-#define WHOLES(count) take(room, (size_t)(count) * sizeof(int))
-#define FLAGS(count) take(room, (size_t)(count))
-
-static Contact contact_in(Room *room, int k, int n) {
-    Contact c;
-    memset(&c, 0, sizeof c);
-    c.v = REALS(k), c.r = REALS(k + n), c.lift = REALS(n), c.side = REALS(k);
-    c.extra = REALS(2 * k), c.extra_before = REALS(2 * k), c.free = FLAGS(k);
-    return c;
-}
+/* --- desk -------------------------------------------------------------------------------------- */
 
 static void walk_in(Room *room, Walk *w) {
     int n = w->n, k = w->k, m = w->m, v = w->vertices;
-    for (int i = 0; i < 2; ++i) {
-        Product *p = &w->product[i];
-        p->count = p->known = 0, p->room = PRODUCT * n;
-        p->share = REALS((size_t)p->room * m), p->add = REALS(p->room), p->rest = REALS(p->room);
-        p->pivot = REALS(p->room), p->row = WHOLES(p->room), p->normal = WHOLES(p->room);
-        p->kind = WHOLES(p->room);
-    }
+    for (int i = 0; i < 2; ++i) product_in(room, &w->product[i], PRODUCT * n, m);
     w->r_0 = REALS(m), w->lift = REALS(n), w->pull = REALS(m), w->extra = REALS(2 * k);
     w->answer = REALS(m), w->rate = REALS(m), w->held = REALS(m), w->sigma = REALS(n);
     w->open = FLAGS(n), w->lifted = FLAGS(n), w->column = REALS(m);
@@ -611,25 +583,14 @@ static double slides(const double *K, const double *f, double c, int m) {
     return SLIDES * (fabs(c) + square / (whole > 0.0 ? whole : 1.0));
 }
 
-/* Path of a body, its arguments in the order of native.py. */
-typedef struct {
-    const double *K, *f, *x, *mu, *c, *v, *r, *lift, *start, *loads;
-    const unsigned char *turn, *rounded;
-} Given;
+void close_desk(Desk *desk) { free(desk->memory); }
 
-/* Room for paths of n nodes, of which k may slip; without memory opening it fails. */
-typedef struct {
-    Walk walk;
-    Contact contacts[3];
-    double *change;
-    unsigned char *flags;
-    void *memory;
-} Desk;
-
-static int open_desk(Desk *desk, int k, int n, int places) {
+int open_desk(Desk *desk, int k, int n, int places) {
     Room whole = {NULL, 0}, *room = &whole;
     Walk *w = &desk->walk;
+    desk->memory = NULL;
     w->n = n, w->k = k, w->m = k + n, w->places = places, w->vertices = MOST_VERTICES * n;
+    w->tape = NULL;
     for (int pass = 0; pass < 2; ++pass) { /* counts first, and then takes */
         walk_in(room, w);
         for (int i = 0; i < 3; ++i) desk->contacts[i] = contact_in(room, k, n);
@@ -641,7 +602,7 @@ static int open_desk(Desk *desk, int k, int n, int places) {
     return 1;
 }
 
-static void run(Desk *desk, const Given *given, int same_body, int levels, Levels out, Record *records) {
+void run(Desk *desk, const Given *given, int same_body, int levels, Levels out) {
     Walk *w = &desk->walk;
     int k = w->k, n = w->n, m = w->m;
     Contact *from = &desk->contacts[0];
@@ -654,7 +615,7 @@ static void run(Desk *desk, const Given *given, int same_body, int levels, Level
     memset(from->extra, 0, 2 * k * sizeof(double)), memset(from->extra_before, 0, 2 * k * sizeof(double));
     from->load = given->start[0], from->displacement = given->start[1], from->settled = 1;
     from->sense = from->length = from->closed = 0.0, from->turned = 0;
-    path(w, from, from + 1, given->f, levels, given->loads, given->turn, *given->rounded, out, records, desk->change, desk->flags);
+    path(w, from, from + 1, given->f, levels, given->loads, given->turn, *given->rounded, out, desk->change, desk->flags);
 }
 
 /* One path for arrays of NumPy; the arguments of native.py, then the levels.  1 if it ran. */
@@ -662,39 +623,35 @@ API int jbeamshell_path(int k, int n, int places, int levels, const void *const 
     Desk desk;
     if (!open_desk(&desk, k, n, places)) return 0;
     Given given = {in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11]};
-    run(&desk, &given, 0, levels, (Levels){out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7]}, NULL);
-    free(desk.memory);
+    run(&desk, &given, 0, levels, (Levels){out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7]});
+    close_desk(&desk);
     return 1;
 }
 
 /* --- handler for XLA ---------------------------------------------------------------------------- */
 
-enum { ARGUMENTS = 12, RESULTS = 8 };
-static const int ARGUMENT_RANKS[ARGUMENTS] = {2, 1, 1, 0, 0, 1, 1, 1, 1, 1, 1, 0};
+/* Path of a lane, and the numbers of its arrays in their buffers. */
+Given given_of(Buffer **in, int64_t lane, const Buffer *first, int64_t *numbers) {
+    const void *at[ARGUMENTS];
+    for (int i = 0; i < ARGUMENTS; ++i) {
+        int64_t size = product_of(in[i]->dims + in[i]->rank - ARGUMENT_RANKS[i], ARGUMENT_RANKS[i]);
+        numbers[i] = number_in(in[i], ARGUMENT_RANKS[i], lane, first);
+        at[i] = (const char *)in[i]->data + numbers[i] * size * (i < 10 ? (int64_t)sizeof(double) : 1);
+    }
+    return (Given){at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8], at[9], at[10], at[11]};
+}
 
 /* Paths of many lanes, one after the other; lanes of one body share its columns. */
 API void *jbeamshell_walk(CallFrame *frame) {
     if (asks_version(frame)) return NULL;
     Buffer **in = frame->args.buffers, **out = frame->rets.buffers;
-    for (int64_t i = RESULTS; i < frame->rets.count; ++i) { /* what is not reached is zero */
-        int64_t bytes = i == 9 || i == 13 || i == 14 ? 8 : 4;
-        memset(out[i]->data, 0, (size_t)(product_of(out[i]->dims, out[i]->rank) * bytes));
-    }
-    int64_t axes = in[0]->rank - 2;
+    int64_t axes = in[0]->rank - 2, lanes = product_of(out[0]->dims, axes), body = -1;
     int m = (int)in[1]->dims[axes], n = (int)in[7]->dims[axes], k = m - n, levels = (int)in[9]->dims[axes];
-    int64_t lanes = product_of(out[0]->dims, axes), body = -1;
-    int parts = frame->rets.count > RESULTS ? (int)out[8]->dims[axes] : 0, events = MOST_EVENTS * n;
-    Record *records = parts > 0 ? calloc((size_t)parts, sizeof(Record)) : NULL;
     Desk desk;
-    int opened = open_desk(&desk, k, n, (int)in[2]->dims[axes]) && (parts == 0 || records != NULL);
+    int opened = open_desk(&desk, k, n, (int)in[2]->dims[axes]);
     for (int64_t lane = 0; lane < lanes; ++lane) {
-        const void *at[ARGUMENTS];
         int64_t numbers[ARGUMENTS];
-        for (int i = 0; i < ARGUMENTS; ++i) {
-            numbers[i] = number_in(in[i], ARGUMENT_RANKS[i], lane, out[0]);
-            int64_t size = product_of(in[i]->dims + axes, ARGUMENT_RANKS[i]);
-            at[i] = (const char *)in[i]->data + numbers[i] * size * (i < 10 ? (int64_t)sizeof(double) : 1);
-        }
+        Given given = given_of(in, lane, out[0], numbers);
         double *r[6];
         for (int i = 0; i < 6; ++i) r[i] = (double *)out[i]->data + lane * product_of(out[i]->dims + axes, out[i]->rank - axes);
         Levels to = {r[0], r[1], r[2], r[3], r[4], r[5], (unsigned char *)out[6]->data + lane * levels * k,
@@ -703,23 +660,10 @@ API void *jbeamshell_walk(CallFrame *frame) {
             memset(to.settled, 0, levels);
             continue;
         }
-        for (int p = 0; p < parts; ++p) {
-            int64_t place = lane * parts + p;
-            records[p].events = (int32_t *)out[8]->data + place * events * 5;
-            records[p].tau = (double *)out[9]->data + place * events;
-            records[p].counts = (int32_t *)out[10]->data + place * 3;
-            records[p].corners = (int32_t *)out[11]->data + place * desk.walk.vertices * 4;
-            records[p].slip = (int32_t *)out[12]->data + place * k * 5;
-            records[p].at = (double *)out[13]->data + place * desk.walk.vertices;
-            records[p].change = (double *)out[14]->data + place * desk.walk.vertices * m;
-            records[p].lifted = (int32_t *)out[15]->data + place * n;
-        }
-        Given given = {at[0], at[1], at[2], at[3], at[4], at[5], at[6], at[7], at[8], at[9], at[10], at[11]};
         int64_t own = numbers[0] * product_of(in[3]->dims, axes) + numbers[3]; /* of body and friction */
-        run(&desk, &given, own == body, levels, to, records);
+        run(&desk, &given, own == body, levels, to);
         body = own;
     }
-    if (opened) free(desk.memory);
-    free(records);
+    close_desk(&desk);
     return NULL;
 }

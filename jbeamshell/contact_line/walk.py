@@ -7,7 +7,6 @@ levels only say where a path is looked at, and every answer is a smooth function
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -22,7 +21,7 @@ from jbeamshell.contact_line import native
 from jbeamshell.contact_line.body import Body, local_compliance
 from jbeamshell.contact_line.contact_state import ContactState
 from jbeamshell.contact_line.events import Search
-from jbeamshell.contact_line.polygon import Known, Polygon, Slip, polygon
+from jbeamshell.contact_line.polygon import Polygon, Slip, polygon
 from jbeamshell.contact_line.spline import read, slipped
 from jbeamshell.contact_line.tableau import Branch
 
@@ -168,51 +167,12 @@ def walk(
         with the axis of the levels first
     """
     lift = jnp.zeros_like(start.r_n) if lift is None else lift
-    if isinstance(turns, tuple) and forces.dtype == float and native.serves():
-        numbers = _Numbers(body, jnp.asarray(friction, float), start, forces, lift)
-        return _native(turns, rounded, numbers)
+    if forces.dtype == float and native.serves():
+        given = native.arguments(body, friction, start, forces, lift)
+        found = native.levels(given, (jnp.asarray(turns), jnp.asarray(rounded)))
+        state = ContactState(found.v, found.r_t, found.r_n, forces, found.displacement)
+        return Level(state, found.lift, found.slip_work, found.slipping, found.settled)
     return walk_on(body, friction, Contact.of(start, lift), forces, turns, rounded)[0]
-
-
-class _Numbers(NamedTuple):
-    """Numbers of a path, see `walk`."""
-
-    body: Body
-    friction: Array
-    start: ContactState
-    forces: Array
-    lift: Array
-
-
-@functools.partial(jax.custom_jvp, nondiff_argnums=(0, 1))
-def _native(turns: tuple[bool, ...], rounded: bool, numbers: _Numbers) -> Level:
-    """Levels of a path by the walk in C."""
-    return _level(native.levels(native.arguments(*numbers), turns, rounded), numbers.forces)
-
-
-@_native.defjvp
-def _native_jvp(turns, rounded, primals, tangents):  # type: ignore[no-untyped-def]
-    numbers = jax.tree.map(lax.stop_gradient, primals[0])
-    found, known = native.recorded(native.arguments(*numbers), turns, rounded)
-    level = _level(found, numbers.forces)
-    again = functools.partial(_again, turns, rounded, known)
-    none = (np.zeros(a.shape, jax.dtypes.float0) for a in (level.slipping, level.settled))
-    return level, Level(*jax.jvp(again, (numbers,), tangents)[1], *none)
-
-
-def _again(
-    turns: tuple[bool, ...], rounded: bool, known: Known, numbers: _Numbers
-) -> tuple[ContactState, Array, Array]:
-    """States, lifts and works of the levels, which have derivatives, by events that are known."""
-    body, friction, start, forces, lift = numbers
-    contact = Contact.of(start, lift)
-    levels = _in_branches(body, friction, contact, forces, turns, rounded, known)[0]
-    return levels.state, levels.lift, levels.slip_work
-
-
-def _level(found: native.Levels, forces: Array) -> Level:
-    state = ContactState(found.v, found.r_t, found.r_n, forces, found.displacement)
-    return Level(state, found.lift, found.slip_work, found.slipping, found.settled)
 
 
 def walk_on(
@@ -237,42 +197,33 @@ def _in_branches(
     forces: Array,
     turns: tuple[bool, ...],
     rounded: bool,
-    known: Known | None = None,
 ) -> tuple[Level, Contact]:
-    """Levels of a path whose turns are known: each branch is read at all its levels at once.
-
-    Parameters
-    ----------
-    known : what was found of the two parts (branches, 2) of each branch; None finds it
-    """
+    """Levels of a path whose turns are known: each branch is read at all its levels at once."""
     begins = np.flatnonzero(turns)
     ends = np.append(begins[1:], len(turns))
     longest = int(np.max(ends - begins))
     places = np.minimum(begins[:, None] + np.arange(longest), ends[:, None] - 1)
 
-    def part(contact: Contact, targets: Array, known: Known | None) -> tuple[Contact, Level]:
+    def part(contact: Contact, targets: Array) -> tuple[Contact, Level]:
         """Part of a branch, seen at its end and at all levels of the branch."""
         drive = along(body, contact, targets[-1])
-        course = departed(body, friction, contact, drive, targets[-1], rounded, known)
+        course = departed(body, friction, contact, drive, targets[-1], rounded)
         levels = levels_of(body, course, jnp.append(course.end, targets))
         return arrived(jax.tree.map(lambda a: a[0], levels), course), levels
 
-    def go(contact: Contact, branch: tuple[Array, Known | None]) -> tuple[Contact, Level]:
-        targets, known = branch
-
-        def further(now: Contact, part_of: tuple[Array, Known | None]) -> tuple[Contact, Level]:
-            number, known = part_of
+    def go(contact: Contact, targets: Array) -> tuple[Contact, Level]:
+        def further(now: Contact, number: Array) -> tuple[Contact, Level]:
             arrives = (number > 0) & (now.state.force == targets[-1])
-            return lax.cond(arrives, stay, part, now, targets, known)
+            return lax.cond(arrives, stay, part, now, targets)
 
-        end, parts = lax.scan(further, contact, (jnp.arange(2), known))
+        end, parts = lax.scan(further, contact, jnp.arange(2))
         return end, _joined(parts, targets, end.memory.sense)
 
-    def stay(now: Contact, targets: Array, known: Known | None) -> tuple[Contact, Level]:
-        shapes = jax.eval_shape(part, now, targets, known)[1]
+    def stay(now: Contact, targets: Array) -> tuple[Contact, Level]:
+        shapes = jax.eval_shape(part, now, targets)[1]
         return now, jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), shapes)
 
-    end, levels = lax.scan(go, start, (forces[places], known))
+    end, levels = lax.scan(go, start, forces[places])
     rows = np.flatnonzero(np.diff(places.ravel(), prepend=-1) > 0)
     return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[rows], levels), end
 
@@ -374,7 +325,6 @@ def departed(
     drive: Drive,
     target: Array,
     rounded: bool = True,
-    known: Known | None = None,
 ) -> Course:
     """Course that begins with a contact, with its polygon up to its end and a little beyond.
 
@@ -384,7 +334,6 @@ def departed(
     Parameters
     ----------
     rounded : False reads the polygon itself, whose nodes slip one after the other
-    known : what was found of it before; None finds it
     """
     state, memory = contact.state, contact.memory
     matrix = jnp.block([[body.K_tt, body.K_tn], [body.K_tn.T, body.K_nn]])
@@ -406,7 +355,7 @@ def departed(
     if not rounded:
         search = Search(jnp.zeros_like(extra), search.back)
     sliding = SLIDES_ON * _slides(body)
-    vertices, slip = polygon(branch, search, contact.lift > 0.0, reach, sliding, known)
+    vertices, slip = polygon(branch, search, contact.lift > 0.0, reach, sliding)
     if not rounded:
         own = jnp.arange(vertices.tau.size)  # with no step before it a corner stays sharp
         vertices = vertices._replace(before=own)
@@ -468,7 +417,7 @@ def arrived(level: Level, course: Course) -> Contact:
     """Contact at a level of a course."""
     before = course.contact.memory
     goes_on = course.drive.sense * before.sense > 0.0  # of the branch that it is a part of
-    length = lax.stop_gradient(jnp.abs(level.state.force - course.contact.state.force))
+    length = jnp.abs(level.state.force - course.contact.state.force)
     side, stuck = slipped(course.vertices, course.slip, course.x, length)
     free = stuck | course.slip.opened
     now = Memory(

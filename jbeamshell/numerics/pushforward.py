@@ -133,13 +133,13 @@ def _transpose(cotangents: Sequence[Any], *arrays: Any, rule: _Along) -> list[An
 
 
 def _batch(arrays: Sequence[Array], axes: Sequence[Any], *, rule: _Along) -> tuple[Any, Any]:
-    """Lanes one after the other; tangents at the same points side by side."""
+    """Lanes one after the other; tangents at the same points, and those of a rule, side by side."""
     lanes = [axis is not None for axis in axes]
     moved = [
         jax.numpy.moveaxis(array, axis, 0) if lane else array
         for array, axis, lane in zip(arrays, axes, lanes, strict=True)
     ]
-    if not any(lanes[: rule.count]):
+    if isinstance(rule.function, Rule) or not any(lanes[: rule.count]):
         outs = jax.vmap(rule, in_axes=[0 if lane else None for lane in lanes])(*moved)
         return outs, [0] * len(outs)
     mapped = [array for array, lane in zip(moved, lanes, strict=True) if lane]

@@ -60,8 +60,27 @@ def figures(body, friction, loads, in_c):
     return jnp.concatenate(many)
 
 
+def mixed(body, friction, loads, lift, in_c):
+    """One number of all that a path gives at all levels."""
+    found = levels(body, friction, loads, in_c, lift=lift)
+    state = found.state
+    lengths = state.displacement, state.v, found.lift
+    forces = state.r_t, state.r_n, 10.0 * found.slip_work
+    many = jnp.concatenate([1e5 * a.ravel() for a in lengths] + [a.ravel() for a in forces])
+    return many @ jnp.cos(jnp.arange(many.size))
+
+
 SLOPES = jax.jit(jax.jacfwd(figures, argnums=(1, 2)), static_argnums=3)
-BACK = jax.jit(jax.grad(lambda *at: figures(*at)[15], argnums=(0, 1, 2)), static_argnums=3)
+BACK = jax.jit(jax.grad(mixed, argnums=(0, 1, 2, 3)), static_argnums=4)
+
+
+def assert_equal_slopes(at):
+    """All cotangents of a path in C are those of the walk in JAX."""
+    pairs = zip(*(jax.tree.leaves(BACK(*at, way)) for way in (True, False)), strict=True)
+    for own, other in pairs:
+        if own.ndim == 2 and own.shape[0] == own.shape[1]:  # symmetric matrices by either half
+            own, other = own + own.T, other + other.T
+        np.testing.assert_allclose(own, other, atol=1e-8 * np.abs(other).max())
 
 
 @pytest.mark.parametrize(
@@ -127,6 +146,7 @@ def test_bearings_are_nodes_without_a_place():
     assert np.any(np.asarray(other.state.r_n)[:, -2:] > 0.0)
     np.testing.assert_allclose(own.state.r_n, other.state.r_n, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(own.slip_work, other.slip_work, rtol=1e-7)
+    assert_equal_slopes((held, jnp.asarray(friction), size * LOADS, lift))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -135,9 +155,7 @@ def test_derivatives_are_those_of_the_walk_in_jax(seed):
     at = body, jnp.asarray(friction), size * LOADS
     for own, other in zip(SLOPES(*at, True), SLOPES(*at, False), strict=True):
         np.testing.assert_allclose(own, other, atol=1e-8 * np.abs(other).max())
-    pairs = zip(*(jax.tree.leaves(BACK(*at, way)) for way in (True, False)), strict=True)
-    for own, other in pairs:
-        np.testing.assert_allclose(own, other, atol=1e-8 * np.abs(other).max())
+    assert_equal_slopes((*at, jnp.zeros(NODES)))
 
 
 def test_a_batch_is_its_lanes():
@@ -146,12 +164,13 @@ def test_a_batch_is_its_lanes():
     frictions, loads = jnp.asarray(frictions), jnp.asarray(sizes)[:, None] * LOADS
     many = jax.jit(jax.vmap(lambda *at: figures(*at, True)))(stacked, frictions, loads)
     shared = jax.jit(jax.vmap(lambda load: figures(bodies[0], frictions[0], load, True)))(loads)
-    slopes = jax.jit(jax.vmap(jax.grad(lambda *at: figures(*at, True)[15], argnums=1)))
-    of_many = slopes(stacked, frictions, loads)
+    closed = jnp.zeros((4, NODES))
+    slopes = jax.jit(jax.vmap(jax.grad(lambda *at: mixed(*at, True), argnums=1)))
+    of_many = slopes(stacked, frictions, loads, closed)
     for i, body in enumerate(bodies):
         np.testing.assert_array_equal(many[i], figures(body, frictions[i], loads[i], True))
         np.testing.assert_allclose(
             shared[i], figures(bodies[0], frictions[0], loads[i], True), rtol=1e-12, atol=1e-12
         )
-        alone = BACK(body, frictions[i], loads[i], True)[1]
+        alone = BACK(body, frictions[i], loads[i], closed[i], True)[1]
         np.testing.assert_allclose(of_many[i], alone, rtol=1e-9)
