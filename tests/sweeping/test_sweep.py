@@ -191,9 +191,9 @@ def test_a_figure_of_nought_over_nought_is_told_from_a_failure(result, monkeypat
 def test_steps_that_fail_in_the_batch_are_walked_in_pieces(monkeypatch):
     alone, solve_alone = [], runner.Runner._alone
 
-    def noted(self, numbers):
+    def noted(self, scene, numbers):
         alone.append(numbers)
-        return solve_alone(self, numbers)
+        return solve_alone(self, scene, numbers)
 
     monkeypatch.setattr(runner.Runner, "_alone", noted)
     # Smooth sliders need Newton's method, whose iterations are limited here; sharp ones do not.
