@@ -171,7 +171,7 @@ def measured(kind: str, count: int) -> Record:
 def stepped() -> Record:
     """Largest change of a logarithmic slope from one even step to the next, in per cent.
 
-    The polygon of the events is that of 93 nodes; its grid does not move with the height.
+    Beside it, for load and friction, that of the polygon of the events on 93 nodes.
     """
     scene, record = jb.Scene(), {}
     body = strip_of(scene.replace({"model.section": "plane", "model.nodes": 93})).body

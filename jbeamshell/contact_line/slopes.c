@@ -228,19 +228,6 @@ static void events_back(Bench *z, Numbers *d, Change *from) {
 
 /* --- extra friction ---------------------------------------------------------------------------- */
 
-/* Slopes of the extra friction of a node of a branch that turns back, see `depart` in walk.c. */
-typedef struct { int place; double mu, r_t, r_n; } Extra;
-
-static Extra extra_at(const Walk *w, const Contact *from, int i) {
-    int slipped = from->side[i] != 0.0;
-    double side = slipped ? from->side[i] : from->r[i] > 0.0 ? -1.0 : 1.0;
-    double used = -side * from->r[i], reaction = from->r[w->k + i], left = w->mu * reaction - used;
-    int place = (side < 0.0 ? 0 : w->k) + i;
-    if (from->free[i] || (!slipped && fmin(left, ABOUT * used) <= 0.0)) return (Extra){place, 0.0, 0.0, 0.0};
-    if (slipped || left < ABOUT * used) return (Extra){place, reaction, side, w->mu};
-    return (Extra){place, 0.0, -ABOUT * side, 0.0};
-}
-
 static void extra_forth(Bench *z, const Numbers *d, const Change *from) {
     const Course *course = &z->part->course;
     int k = z->w->k;
@@ -402,36 +389,6 @@ static void spline_back(Bench *z, Numbers *d) {
         below *= s->share[j], above *= s->share[j];
         d->x[i] += below - above, d->x[i - 1] -= below, d->x[i + 1] += above;
     }
-}
-
-/* Rounded corner at a load and the area under it, each less those of the sharp one, with slopes to
-   the parts before and behind; the area's slope to the load is the corner itself. */
-typedef struct { int counts, inside; double value, load, before, behind, area, area_before, area_behind; } Round;
-
-static Round round_at(double x, double a, double b) {
-    Round o = {0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-    o.counts = a > 0.0 && b > 0.0 && x > -a, o.inside = o.counts && x < b;
-    if (!o.counts) return o;
-    if (!o.inside) {
-        o.area = a * b / 6.0, o.area_before = b / 6.0, o.area_behind = a / 6.0;
-        return o;
-    }
-    double s = (x + a) / a, t = s / (1.0 + sqrt(1.0 + (b - a) / a * s)), sharp = fmax(x, 0.0);
-    double slope = 2.0 * a + 2.0 * (b - a) * t, mean = 2.0 * a / 3.0 + 0.5 * (b - a) * t;
-    double to_a = (1.0 - t) * (1.0 - t) / slope, to_b = -t * t / slope;
-    o.value = b * t * t - sharp;
-    o.load = 2.0 * b * t / slope - (x > 0.0 ? 1.0 : 0.0);
-    o.before = 2.0 * b * t * to_a, o.behind = t * t + 2.0 * b * t * to_b;
-    o.area = b * t * t * t * mean - 0.5 * sharp * sharp;
-    o.area_before = b * t * t * t * (2.0 / 3.0 - 0.5 * t) + b * t * t * slope * to_a;
-    o.area_behind = t * t * t * mean + 0.5 * b * t * t * t * t + b * t * t * slope * to_b;
-    return o;
-}
-
-static int edge_of(const Walk *w, double tau) {
-    int edge = 0, last = w->number - 2;
-    while (edge < last && w->at[edge + 1] < tau) ++edge;
-    return edge;
 }
 
 /* Change y (m,) of the fields at a load; returns that of the load's work on them. */
@@ -656,7 +613,8 @@ static void forget(Tape *tape) {
     tape->count = tape->events = tape->failed = 0;
 }
 
-static void copied(Change *a, const double *v, const double *r, const double *lift, int k, int n) {
+/* Tangent of the contact where a path begins; zero for cotangents of where it ends. */
+static void set_change(Change *a, const double *v, const double *r, const double *lift, int k, int n) {
     memcpy(a->v, v, k * sizeof(double)), memcpy(a->r, r, (k + n) * sizeof(double));
     memcpy(a->lift, lift, n * sizeof(double));
     memset(a->extra, 0, 2 * k * sizeof(double)), memset(a->extra_before, 0, 2 * k * sizeof(double));
@@ -695,7 +653,7 @@ static int derive(Desk *desk, const Given *given, int levels, int lanes, Numbers
     for (int lane = 0; lane < lanes && done; ++lane) {
         Change *at = &states[2 * lane];
         const Numbers *d = &numbers[lane];
-        copied(at, d->v, d->r, d->lift, k, n); /* which are zero for cotangents */
+        set_change(at, d->v, d->r, d->lift, k, n);
         at->load = d->start[0], at->displacement = d->start[1];
     }
     for (int i = 0; i < tape->count && done; ++i) {

@@ -12,7 +12,7 @@
 
 #include "walk.h"
 
-static const double SLIDES = 1e6, SLIDES_ON = 1e-2, TOUCHES = 1e-9, SAME = 1e-9;
+static const double ABOUT = 2.0, SLIDES = 1e6, SLIDES_ON = 1e-2, TOUCHES = 1e-9, SAME = 1e-9;
 static const double ROUNDING = 32.0 * 2.220446049250313e-16;
 static const double LATE = 1e-9, MERGED = 1e-9;
 
@@ -352,15 +352,36 @@ void corners(Walk *w, int rounded) {
     prepare(w);
 }
 
-/* Area under a rounded corner less that under the sharp one, from its begin to t. */
-static double area(double a, double b, double t, double x) {
-    return b * t * t * t * (2.0 * a / 3.0 + 0.5 * (b - a) * t) - 0.5 * fmax(x, 0.0) * fmax(x, 0.0);
+Round round_at(double x, double a, double b) {
+    Round o = {0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    o.counts = a > 0.0 && b > 0.0 && x > -a, o.inside = o.counts && x < b;
+    if (!o.counts) return o;
+    if (!o.inside) {
+        o.area = a * b / 6.0, o.area_before = b / 6.0, o.area_behind = a / 6.0;
+        return o;
+    }
+    double s = (x + a) / a, t = s / (1.0 + sqrt(1.0 + (b - a) / a * s)), sharp = fmax(x, 0.0);
+    double slope = 2.0 * a + 2.0 * (b - a) * t, mean = 2.0 * a / 3.0 + 0.5 * (b - a) * t;
+    double to_a = (1.0 - t) * (1.0 - t) / slope, to_b = -t * t / slope;
+    o.value = b * t * t - sharp;
+    o.load = 2.0 * b * t / slope - (x > 0.0 ? 1.0 : 0.0);
+    o.before = 2.0 * b * t * to_a, o.behind = t * t + 2.0 * b * t * to_b;
+    o.area = b * t * t * t * mean - 0.5 * sharp * sharp;
+    o.area_before = b * t * t * t * (2.0 / 3.0 - 0.5 * t) + b * t * t * slope * to_a;
+    o.area_behind = t * t * t * mean + 0.5 * b * t * t * t * t + b * t * t * slope * to_b;
+    return o;
+}
+
+/* Edge of the polygon on which a load lies. */
+int edge_of(const Walk *w, double tau) {
+    int edge = 0, last = w->number - 2;
+    while (edge < last && w->at[edge + 1] < tau) ++edge;
+    return edge;
 }
 
 /* Contact (m,) at a load of the branch: change of the fields and forces. */
 static Reading read_at(const Walk *w, double tau, double *R change, double *R force) {
-    int m = w->m, edge = 0, last = w->number - 2;
-    while (edge < last && w->at[edge + 1] < tau) ++edge;
+    int m = w->m, edge = edge_of(w, tau), last = w->number - 2;
     double since = tau - w->at[edge], step = w->at[edge + 1] - w->at[edge], part = since / step;
     const double *R q_0 = w->change + (size_t)edge * m, *R q_1 = q_0 + m;
     const double *R r_0 = w->force + (size_t)edge * m, *R r_1 = r_0 + m;
@@ -370,22 +391,16 @@ static Reading read_at(const Walk *w, double tau, double *R change, double *R fo
     }
     double under = w->whole[edge] + since * (w->pulled[edge] + 0.5 * w->rise[edge] * since);
     for (int j = 1; j <= last; ++j) {
-        double a = w->part_before[j], b = w->part_behind[j], x = tau - w->at[j];
-        if (!(a > 0.0 && b > 0.0) || x <= -a) continue;
-        double kink = w->rise[j] - w->rise[j - 1];
-        if (x >= b) {
-            under += area(a, b, 1.0, b) * kink;
-            continue;
-        }
-        double s = (x + a) / a, t = s / (1.0 + sqrt(1.0 + (b - a) / a * s));
-        double rounding = b * t * t - fmax(x, 0.0);
-        double ahead = rounding / (w->at[j + 1] - w->at[j]), behind = rounding / (w->at[j] - w->at[j - 1]);
+        Round o = round_at(tau - w->at[j], w->part_before[j], w->part_behind[j]);
+        if (!o.counts) continue;
+        under += o.area * (w->rise[j] - w->rise[j - 1]);
+        if (!o.inside) continue;
+        double ahead = o.value / (w->at[j + 1] - w->at[j]), behind = o.value / (w->at[j] - w->at[j - 1]);
         const double *R q = w->change + (size_t)j * m, *R f = w->force + (size_t)j * m;
         for (int r = 0; r < m; ++r) {
             change[r] += ahead * (q[r + m] - q[r]) - behind * (q[r] - q[r - m]);
             force[r] += ahead * (f[r + m] - f[r]) - behind * (f[r] - f[r - m]);
         }
-        under += area(a, b, t, x) * kink;
     }
     double moved = 0.0, stored = 0.0;
     for (int r = 0; r < m; ++r) {
@@ -396,6 +411,17 @@ static Reading read_at(const Walk *w, double tau, double *R change, double *R fo
 }
 
 /* --- path -------------------------------------------------------------------------------------- */
+
+/* Extra friction of a node of a branch that turns back, see polygon.py. */
+Extra extra_at(const Walk *w, const Contact *from, int i) {
+    int slipped = from->side[i] != 0.0;
+    double side = slipped ? from->side[i] : from->r[i] > 0.0 ? -1.0 : 1.0;
+    double used = -side * from->r[i], reaction = from->r[w->k + i], left = w->mu * reaction - used;
+    int place = (side < 0.0 ? 0 : w->k) + i;
+    if (from->free[i] || (!slipped && fmin(left, ABOUT * used) <= 0.0)) return (Extra){place, 0.0, 0.0, 0.0, 0.0};
+    if (slipped || left < ABOUT * used) return (Extra){place, left, reaction, side, w->mu};
+    return (Extra){place, ABOUT * used, 0.0, -ABOUT * side, 0.0};
+}
 
 static Course depart(Walk *w, const Contact *from, const double *f, double target, int rounded) {
     int k = w->k, m = w->m, n = w->n;
@@ -420,11 +446,8 @@ static Course depart(Walk *w, const Contact *from, const double *f, double targe
         memcpy(w->extra, from->extra_before, 2 * k * sizeof(double));
     else if (rounded && course.turns)
         for (int i = 0; i < k; ++i) {
-            int slipped = from->side[i] != 0.0;
-            double side = slipped ? from->side[i] : from->r[i] > 0.0 ? -1.0 : 1.0;
-            double used = -side * from->r[i], left = w->mu * from->r[k + i] - used;
-            double more = slipped ? left : fmax(fmin(left, ABOUT * used), 0.0);
-            if (!from->free[i]) w->extra[(side < 0.0 ? 0 : k) + i] = more;
+            Extra more = extra_at(w, from, i);
+            w->extra[more.place] = more.value;
         }
     for (int i = 0; i < n; ++i) w->lifted[i] = from->lift[i] > 0.0;
     polygon(w, fabs(course.end - from->load));
@@ -616,16 +639,6 @@ void run(Desk *desk, const Given *given, int same_body, int levels, Levels out) 
     from->load = given->start[0], from->displacement = given->start[1], from->settled = 1;
     from->sense = from->length = from->closed = 0.0, from->turned = 0;
     path(w, from, from + 1, given->f, levels, given->loads, given->turn, *given->rounded, out, desk->change, desk->flags);
-}
-
-/* One path for arrays of NumPy; the arguments of native.py, then the levels.  1 if it ran. */
-API int jbeamshell_path(int k, int n, int places, int levels, const void *const *in, void *const *out) {
-    Desk desk;
-    if (!open_desk(&desk, k, n, places)) return 0;
-    Given given = {in[0], in[1], in[2], in[3], in[4], in[5], in[6], in[7], in[8], in[9], in[10], in[11]};
-    run(&desk, &given, 0, levels, (Levels){out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7]});
-    close_desk(&desk);
-    return 1;
 }
 
 /* --- handler for XLA ---------------------------------------------------------------------------- */

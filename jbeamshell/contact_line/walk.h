@@ -8,7 +8,7 @@ enum { ALONG, AGAINST, STICK, OPEN, CLOSE, KINDS };
 enum { BY_ROW, AT_ONCE, AT_RETURN, FIXED };
 enum { MOST_VERTICES = 8, MOST_EVENTS = 40, DENSE = 3, PRODUCT = 3 }; /* times the nodes */
 
-static const double ABOUT = 2.0, MOST_PART = 0.6, UNEVEN = 3.0, STARTS = 0.25;
+static const double MOST_PART = 0.6, UNEVEN = 3.0, STARTS = 0.25;
 
 /* Exchanges of rows and columns; those from count on are remembered, and may come again. */
 typedef struct {
@@ -91,6 +91,13 @@ typedef struct {
 
 typedef struct { int edge, slides; double work; } Reading;
 
+/* Extra friction of a node, its place in (2, k), and its slopes to friction and to the node's forces. */
+typedef struct { int place; double value, mu, r_t, r_n; } Extra;
+
+/* Rounded corner at a load and the area under it, each less those of the sharp one, with slopes to
+   the parts before and behind; the area's slope to the load is the corner itself. */
+typedef struct { int counts, inside; double value, load, before, behind, area, area_before, area_behind; } Round;
+
 /* Memory in pieces: its bytes are counted first, with no memory, and then taken. */
 typedef struct { char *at; size_t used; } Room;
 
@@ -113,6 +120,9 @@ void exchanged(const Product *p, int e, int m, double *R a);
 int moves(const Walk *w, int r);
 
 int first_front(const Walk *w);
+Extra extra_at(const Walk *w, const Contact *from, int i);
+int edge_of(const Walk *w, double tau);
+Round round_at(double x, double a, double b);
 double share_of(const Walk *w, int j);
 void corners(Walk *w, int rounded);
 double level(const Walk *w, const Contact *from, const Course *course, double load, double *change, Contact *at, unsigned char *slipping);
