@@ -14,26 +14,22 @@ from .common.errors import (
     UnconvergedError as UnconvergedError,
 )
 from .common.jax_options import configure as configure
-from .contact_face.body import FaceBody as FaceBody
-from .contact_face.modes import (
+from .bodies.contact import solve_contact as solve_contact
+from .bodies.contact_file import read_contact as read_contact, read_parts as read_parts
+from .bodies.deck import Deck as Deck
+from .bodies.modes import (
     FaceCurve as FaceCurve,
     FacePart as FacePart,
     ModalBodies as ModalBodies,
     face_curve as face_curve,
     modal_bodies as modal_bodies,
 )
-from .contact_face.deck import Deck as Deck
-from .contact_face.part_file import read_parts as read_parts
-from .contact_face.solve import solve_faces as solve_faces
-from .contact_face.surface import Surface as Surface, face_surface as face_surface
-from .contact_line.contact import solve_contact as solve_contact
-from .contact_line.contact_file import read_contact as read_contact
-from .contact_line.stiffness_model import StiffnessModel as StiffnessModel
-from .contact_line.substructure import Substructure as Substructure
+from .bodies.stiffness_model import StiffnessModel as StiffnessModel
+from .bodies.substructure import Substructure as Substructure
+from .bodies.surface import Surface as Surface, face_surface as face_surface
 from .explorer import explore as explore
 from .identify.plan import fit as fit
 from .history.contact_history import ContactHistory as ContactHistory
-from .history.face_history import FaceHistory as FaceHistory
 from .history.history import History as History
 from .history.read_history import read_history as read_history
 from .solving.advice import Advice as Advice, advise as advise

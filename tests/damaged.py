@@ -21,7 +21,7 @@ import scipy.io
 import scipy.sparse
 
 import jbeamshell as jb
-from jbeamshell.contact_line.matrix_files import read_matrix
+from jbeamshell.bodies.matrix_files import read_matrix
 from jbeamshell.dynamics.export import table
 from jbeamshell.identify.experiment import Evaluation
 from jbeamshell.identify.plan_file import read_plan
@@ -114,7 +114,7 @@ def saved_runs(path, **settings):
 
 def _bodies(folder):
     """Matrices of stiffness in all formats, a substructure, and the nodes of a contact."""
-    calculix = TESTS / "contact_line" / "calculix"
+    calculix = TESTS / "bodies" / "calculix"
     shutil.copy(calculix / "strip.sti", folder / "matrix.sti")
     shutil.copy(calculix / "strip.dof", folder / "matrix.dof")
     random = np.random.default_rng(1)

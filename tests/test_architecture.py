@@ -24,7 +24,7 @@ ORDER = [
     "plotting",
     "history",
     "contact_line",
-    "contact_face",
+    "bodies",
     "load_steps",
     "solving",
     "sweeping",

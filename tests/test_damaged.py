@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line.matrix_files import read_matrix
+from jbeamshell.bodies.matrix_files import read_matrix
 
 FILES = 1_000  # more by hand: python tests/damaged.py SEED COUNT
 
@@ -63,7 +63,7 @@ def test_a_matrix_that_points_beyond_itself_is_told(tmp_path):
 
 @pytest.mark.parametrize("cut", [-1, -40, 20_000])
 def test_a_matrix_that_was_cut_is_told(cut, tmp_path):
-    whole = damaged.TESTS / "contact_line" / "calculix" / "strip"
+    whole = damaged.TESTS / "bodies" / "calculix" / "strip"
     (tmp_path / "strip.dof").write_bytes(whole.with_suffix(".dof").read_bytes())
     (tmp_path / "strip.sti").write_bytes(whole.with_suffix(".sti").read_bytes()[:cut])
     with pytest.raises(jb.InputError, match="copy the whole file again"):

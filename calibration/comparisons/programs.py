@@ -165,13 +165,14 @@ def pair() -> Floats:
     slip = 0.9 * np.sin(angle) + 0.3 * np.sin(3.0 * angle + 0.4)
     closing = 0.5 + 0.8 * np.cos(angle + 0.7) + 0.2 * np.cos(4.0 * angle)
     pressed = PAIR_STIFFNESS[1] * np.maximum(closing, 0.0)
-    body = jb.FaceBody([[0.0, 0.0, 0.0]], np.eye(3), np.diag([1.0, 1.0, -1.0]))  # on springs of 1
+    # On springs of 1.
+    body = jb.Substructure([[0.0, 0.0, 0.0]], np.eye(3), np.diag([1.0, 1.0, -1.0]))
     loads = np.column_stack([slip + PAIR_FORCES, 0.0 * slip, closing + pressed])
     softness = 1.0 / np.array(PAIR_STIFFNESS)
-    history = jb.solve_faces(
+    history = jb.solve_contact(
         body, friction=FRICTION, bolts=[0.0, 1.0], softness=softness, path=np.tile(loads, (2, 1))
     )
-    return np.asarray(history.traction[-32:, 0, 0])
+    return np.asarray(history.friction_force[-32:, 0, 0])
 
 
 def beam(kind: str, what: str) -> tuple[Callable[[], Floats], Callable[[], Floats]]:

@@ -30,7 +30,7 @@ from calibration.finite_elements.bricks import (
     steps,
 )
 from calibration.finite_elements.cards import card
-from jbeamshell.contact_face.body import FaceBody
+from jbeamshell.bodies.substructure import Substructure
 
 LOAD: dict[str, Any] = {"friction": 0.3, "amplitude": 700.0, "bolts": 10.0, "cycles": 1}
 
@@ -75,11 +75,11 @@ def block(counts: tuple[int, int, int], sizes: tuple[float, float, float]) -> Bl
     return Block(made, areas, pull, press)
 
 
-def body_of(made: Block, folder: Path, program: str | None = None) -> FaceBody:
+def body_of(made: Block, folder: Path, program: str | None = None) -> Substructure:
     """Block as a body on its face, its matrix from CalculiX."""
     model = matrix(cards_of(made.bricks, "BLOCK") + material(), folder, program)
     nodes = np.column_stack([made.face, made.bricks.at(made.face)])
-    return FaceBody.of(model, nodes, pull=made.pull, press=[made.press], areas=made.areas)
+    return model.condensed(nodes, pull=made.pull, press=[made.press], tributary=made.areas)
 
 
 def contact_deck(made: Block, loads: np.ndarray) -> str:
@@ -114,7 +114,7 @@ def main(counts: tuple[int, int, int] = (8, 4, 3), steps: int = 16) -> None:
     moved = np.asarray(history.displacement), displacement_there(made.pull, "BLOCK", text)
     here, there = (loop_figures(history, each) for each in moved)
     off = ", ".join(f"{key} {there[key] / value - 1.0:+.3%}" for key, value in here.items())
-    print(f"{body.areas.size} pairs; CalculiX - here: {off.replace('_', ' ')}")
+    print(f"{body.places.shape[0]} pairs; CalculiX - here: {off.replace('_', ' ')}")
     print(f"seconds: CalculiX {theirs:.1f}, here {ours:.3f}, ratio {theirs / ours:.0f}")
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from calibration.finite_elements.bricks import MATRIX_STEP, cards_of, material, run
 from calibration.finite_elements.cards import card
 from calibration.finite_elements.flange import BOLTS, WASHER, Plate, flange, supports
-from jbeamshell.contact_face.deck import Deck
-from jbeamshell.contact_line.stiffness_model import StiffnessModel
+from jbeamshell.bodies.deck import Deck
+from jbeamshell.bodies.stiffness_model import StiffnessModel
 from jbeamshell.measured.example import data_folder
 
 LAP, LAYERS = (12, 6), 2  # bricks along and across the lap, and through a plate

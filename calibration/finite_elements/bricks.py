@@ -15,16 +15,16 @@ import numpy as np
 from calibration.finite_elements.cards import card
 from calibration.finite_elements.program import find_program
 from calibration.finite_elements.results import read
-from jbeamshell.contact_face.body import FaceBody
-from jbeamshell.contact_face.solve import solve_faces
-from jbeamshell.contact_line.stiffness_model import StiffnessModel
-from jbeamshell.history.face_history import FaceHistory
+from jbeamshell.bodies.contact import solve_contact
+from jbeamshell.bodies.stiffness_model import StiffnessModel
+from jbeamshell.bodies.substructure import Substructure
+from jbeamshell.history.contact_history import ContactHistory
 
 MODULUS, POISSON = 210e3, 0.3
 STEEL = [(MODULUS, POISSON)]
 SOFTNESS = 0.3 / MODULUS  # of the pairs, displacement per stress
 SMALLEST_PART = 1e-7  # of a level, below which CalculiX gives up
-TIGHTENED = 8  # steps of the pressing, as `solve_faces` takes
+TIGHTENED = 8  # steps of the pressing, as `solve_contact` takes
 MATRIX_STEP = card("STEP") + card("FREQUENCY, SOLVER=MATRIXSTORAGE", [(1,)]) + card("END STEP")
 TENSION = 1e-3  # stress that CalculiX lets an open pair carry
 
@@ -39,7 +39,7 @@ class Runs(NamedTuple):
     seconds : of the processor here, warm, and there
     """
 
-    history: FaceHistory
+    history: ContactHistory
     text: str
     seconds: tuple[float, float]
 
@@ -126,16 +126,16 @@ def run(deck: str, folder: Path, job: str, program: str | None = None) -> str:
 
 
 def run_both(
-    bodies: Sequence[FaceBody],
+    bodies: Sequence[Substructure],
     options: dict[str, Any],
     deck_of: Callable[[np.ndarray], str],
     folder: Path,
 ) -> Runs:
     """Contact of bodies with `SOFTNESS` here, and of the deck of its loads (levels,) there."""
     options = options | {"softness": SOFTNESS, "throw": False}
-    jax.block_until_ready(solve_faces(*bodies, **options).loads)
+    jax.block_until_ready(solve_contact(*bodies, **options).loads)
     begin = time.process_time()
-    history = jax.block_until_ready(solve_faces(*bodies, **options))
+    history = jax.block_until_ready(solve_contact(*bodies, **options))
     here = time.process_time() - begin
     deck = deck_of(np.asarray(history.force)[1:])
     begin = seconds_of_programs()
@@ -196,7 +196,7 @@ def displacement_there(pull: np.ndarray, name: str, text: str) -> np.ndarray:
     return sum(force * moved[:, row[int(node)], int(way) - 1] for node, way, force in pull)
 
 
-def loop_figures(history: FaceHistory, displacement: np.ndarray) -> dict[str, float]:
+def loop_figures(history: ContactHistory, displacement: np.ndarray) -> dict[str, float]:
     """Area and secant stiffness of the last cycle of a displacement (levels,) at its loads."""
     start, _, stop = history.cycles[-1]
     force, moved = np.asarray(history.force)[start : stop + 1], displacement[start : stop + 1]

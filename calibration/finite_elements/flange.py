@@ -1,4 +1,4 @@
-"""Single lap of two plates with two round bolts: its contact by `solve_faces` and by CalculiX.
+"""Single lap of two plates with two round bolts: its contact by `solve_contact` and by CalculiX.
 
 Two plates of bricks (C3D8) lap over a face whose nodes match.  The far end of the lower one is
 clamped.  That of the upper one is held across and pulled along X.  A bolt is an even pressure
@@ -39,7 +39,7 @@ from calibration.finite_elements.cards import card, node_set
 from calibration.finite_elements.program import find_program, version
 from calibration.finite_elements.results import read
 from calibration.provenance import provenance
-from jbeamshell.contact_face.body import FaceBody
+from jbeamshell.bodies.substructure import Substructure
 
 RECORD = Path(__file__).with_name("flange.json")
 LAP, FREE, WIDTH, THICK = 60.0, 20.0, 30.0, 8.0  # mm; of the lap, beyond it, across, of a plate
@@ -107,15 +107,14 @@ def washer(made: Box, outer: np.ndarray, middle: tuple[float, float], sign: floa
     return np.column_stack([nodes, np.full(nodes.size, 3), sign * part / np.sum(part)])
 
 
-def bodies_of(made: Flange, folder: Path) -> tuple[FaceBody, FaceBody]:
+def bodies_of(made: Flange, folder: Path) -> tuple[Substructure, Substructure]:
     """Upper and lower plate on their face, their matrices from CalculiX."""
     upper, lower = (
-        FaceBody.of(
-            matrix(cards_of(plate.bricks, "PLATE") + material() + held, folder),
+        matrix(cards_of(plate.bricks, "PLATE") + material() + held, folder).condensed(
             np.column_stack([plate.face, plate.bricks.at(plate.face)]),
             pull=pull,
             press=plate.press,
-            areas=made.areas,
+            tributary=made.areas,
         )
         for plate, held, pull in (
             (made.upper, supports(made.upper, 2), made.pull),
@@ -174,8 +173,12 @@ def compare(lap: tuple[int, int], layers: int, steps_per_half_cycle: int) -> dic
             bodies_of(made, folder), options, lambda loads: contact_deck(made, loads), folder
         )
     _, turn, stop = history.cycles[-1]
+    opened = np.sum(made.areas) - np.asarray(history.contact_extent)
     both = {
-        "here": (np.asarray(history.displacement), np.asarray(history.open_area)),
+        "here": (
+            np.asarray(history.displacement),
+            opened,
+        ),
         "calculix": (
             displacement_there(made.pull, "END", text),
             (gaps_there(made, text) > 0.0) @ made.areas,

@@ -2,7 +2,7 @@
 
 A strip of C3D8I bricks lies on a rigid base under an even pressure.  Its far end cannot move along
 X; the loaded end has an even traction.  With its sides held, and all nodes with them, nothing moves
-across the width.  The matrices are those of CalculiX, the contact that of `solve_faces`.
+across the width.  The matrices are those of CalculiX, the contact that of `solve_contact`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ COUNTS = (30, 6, 3)  # bricks along, across and through the strip
 GROSS = FRICTION * PRESSURE * LENGTH
 
 
-def body(width: float, free: bool) -> jb.FaceBody:
+def body(width: float, free: bool) -> jb.Substructure:
     """Strip on its face; its forces are those of the whole width."""
     made = box(COUNTS, (LENGTH, width, THICK))
     number = made.number
@@ -48,7 +48,7 @@ def body(width: float, free: bool) -> jb.FaceBody:
     with tempfile.TemporaryDirectory() as name:
         model = matrix(deck, Path(name))
     nodes = np.column_stack([face, made.at(face)])
-    return jb.FaceBody.of(model, nodes, pull=pull, press=[press], areas=areas)
+    return model.condensed(nodes, pull=pull, press=[press], tributary=areas)
 
 
 def measure() -> dict[str, Any]:
@@ -57,7 +57,7 @@ def measure() -> dict[str, Any]:
     for sides, width in [("held", 1.0)] + [("free", width) for width in WIDTHS]:
         strip = body(width * THICK, sides == "free")
         for load in LOADS:
-            history = jb.solve_faces(
+            history = jb.solve_contact(
                 strip, friction=FRICTION, amplitude=load * GROSS, bolts=1.0, throw=False
             )
             figures = {

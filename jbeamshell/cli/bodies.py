@@ -62,24 +62,18 @@ def run(options: argparse.Namespace) -> int:
 
 def _result(options: argparse.Namespace) -> Any:
     """History of the bodies, or the curve of a mode."""
+    from jbeamshell.bodies.contact import solve_contact
+    from jbeamshell.bodies.contact_file import read_contact, read_parts, touches_on_face
+    from jbeamshell.bodies.modes import face_curve, modal_bodies
     from jbeamshell.common.checks import require
     from jbeamshell.common.files import read_toml
-    from jbeamshell.contact_face.modes import face_curve, modal_bodies
-    from jbeamshell.contact_face.part_file import read_parts
-    from jbeamshell.contact_face.solve import solve_faces
-    from jbeamshell.contact_line.contact import solve_contact
-    from jbeamshell.contact_line.contact_file import read_contact
 
-    upper = read_toml(options.file).get("upper")
-    on_face = isinstance(upper, dict) and "face" in upper
-    fix = "needs bodies that touch on a face: write face = in [upper]"
-    require("--mode", options.mode, options.mode is None or on_face, fix)
-    if not on_face:
+    if options.mode is None:
         return solve_contact(**_changed(options, read_contact(options.file)))
+    fix = "needs bodies that touch on a face: write face = in [upper]"
+    require("--mode", options.mode, touches_on_face(read_toml(options.file)), fix)
     above, below, given = read_parts(options.file)
     given = _changed(options, given)
-    if options.mode is None:
-        return solve_faces(above.body(), below and below.body(), **given)
     fix = "a mode takes amplitudes of its own: leave it out"
     require("--amplitude", options.amplitude, options.amplitude is None, fix)
     pressing = {name: given[name] for name in ("friction", "bolts", "gap") if name in given}

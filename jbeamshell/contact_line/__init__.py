@@ -1,7 +1,6 @@
 """Condensed contact: a linear elastic strip on its contact line, solved exactly in time.
 
 `solve` walks the load path of a scene that is planned so, as `jbeamshell.solve` does.
-`jbeamshell.solve_contact` takes bodies from other programs.
 """
 
 from jbeamshell.contact_line.solve import solve as solve

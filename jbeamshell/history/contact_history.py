@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jbeamshell.common.checks import require
+from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.error_estimates import grid_error
 from jbeamshell.history.figures import UNITS
 from jbeamshell.history.loop_figures import LoopFigures
-from jbeamshell.history.reliability import CLOSES, doubts_of_mesh
+from jbeamshell.history.reliability import CLOSES, TOLERANCE, doubts_of_mesh
 
 FIGURES = (
     "dissipation",
@@ -24,11 +27,14 @@ FIGURES = (
     "secant_stiffness",
     "loss_factor",
     "peak_displacement",
-    "slip_length",
     "closure",
 )
 OUT_OF_BALANCE = 1e-4  # force over the largest reaction, from which on a result is doubted
-NO_SLIP = 1e-12  # work over that of the loop's width, taken as zero
+NO_SLIP = {1: 1e-12, 2: 1e-9}  # work over that of the loop's width, taken as zero
+TOUCHES = 1e-9  # of the largest reaction, below which a reaction is that of an open pair, rounded
+FEW = 10.0  # pairs of a face that share the work of friction, below which the mesh decides about it
+MESH = 3.0  # error of the dissipation over one per pair that shares it: measured .5 to 3, and up to
+# 10 where nearly all of the face slides
 PRESSED = {"frictionless": "pressed without friction", "frictional": "pressed with friction"}
 
 
@@ -39,16 +45,24 @@ class ContactHistory(LoopFigures, eqx.Module):
 
     Attributes
     ----------
-    x, tributary : (n,) places of the contact nodes, rising, and their contact lengths
-    force, displacement : (steps+1,) load, and the displacement conjugate to it since the pressing
-    slip, gap : (steps+1, n) tangential displacement since the pressing and height of the body, over
-        what it touches
-    traction, reaction : (steps+1, n) friction traction on what is below, normal reaction
+    places : (n,) X of the nodes of a contact line, or (n, 3) of those of a face
+    normals : (n, 3) normals of a face; None on a line
+    tributary : (n,) contact length or area of each node; None on a face whose areas are not known
+    loads, displacements : (steps+1, m) loads, the one to and fro first, and the displacements
+        conjugate to them since the pressing
+    slip : (steps+1, n) slip of the upper nodes over the lower ones since the pressing; on a face
+        (steps+1, n, 2), in the frames of `jbeamshell.Substructure.frames`
+    gap : (steps+1, n) distance of the nodes
+    friction_force : (steps+1, n) or (steps+1, n, 2) nodal forces of friction on what is below
+    normal_force : (steps+1, n) nodal forces that press
     slipping : (steps+1, n) True if the node slips at the end of the step
     slip_work : (steps+1,) work of friction in each step
-    settled : (steps+1,) True where equilibrium was found
-    error : (steps+1,) violation of balance, friction and contact, force over the largest reaction
-    friction : Coulomb's coefficient mu
+    status : (steps+1,) codes of `jbeamshell.Status`
+    error : (steps+1,) violation of balance, friction and contact, force over the largest one
+    iterations : (steps+1,) of Newton's method; 0 on a line
+    friction : Coulomb's coefficient mu, a number or (n,)
+    change : dissipation less that of every second load step; None where steps have no error, or it
+        was not estimated
     cycles : steps at the start, the turn and the end of each closed cycle
     control : "force" or "displacement", what the amplitude is of
     assembly : "frictionless" or "frictional", how the bodies were pressed together
@@ -60,33 +74,97 @@ class ContactHistory(LoopFigures, eqx.Module):
     >>> float(history.dissipation)
     """
 
-    x: Array
-    tributary: Array
-    force: Array
-    displacement: Array
+    places: Array
+    normals: Array | None
+    tributary: Array | None
+    loads: Array
+    displacements: Array
     slip: Array
     gap: Array
-    traction: Array
-    reaction: Array
+    friction_force: Array
+    normal_force: Array
     slipping: Array
     slip_work: Array
-    settled: Array
+    status: Array
     error: Array
+    iterations: Array
     friction: Array
+    change: Array | None
     cycles: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
     control: str = eqx.field(static=True)
     assembly: str = eqx.field(static=True)
     points: bool = eqx.field(static=True)
 
+    def with_change(self, change: Array) -> ContactHistory:
+        """History with the change of the dissipation by half of the load steps."""
+        return dataclasses.replace(self, change=change)
+
+    @property
+    def on_face(self) -> bool:
+        """True for a contact on a face, False on a line."""
+        return self.normals is not None
+
     @property
     def converged(self) -> bool:
         """True if every step found its equilibrium."""
-        return bool(np.all(np.asarray(self.settled)))
+        return bool(np.all(np.asarray(self.status) == Status.CONVERGED))
+
+    @property
+    def force(self) -> Array:  # type: ignore[override]
+        """Load to and fro (steps+1,)."""
+        return self.loads[:, 0]
+
+    @property
+    def displacement(self) -> Array:  # type: ignore[override]
+        """Displacement (steps+1,) conjugate to the load to and fro."""
+        return self.displacements[:, 0]
+
+    @property
+    def reaction(self) -> Array:
+        """Normal reaction (steps+1, n), stress.
+
+        Raises
+        ------
+        InputError
+            on a face whose areas are not known, as for `traction`
+        """
+        return self.normal_force / self._known_areas
+
+    @property
+    def traction(self) -> Array:
+        """Friction traction on what is below, (steps+1, n) or (steps+1, n, 2), stress."""
+        areas = self._known_areas
+        return self.friction_force / (areas[:, None] if self.on_face else areas)
+
+    @property
+    def _known_areas(self) -> Array:
+        areas = self.tributary
+        if areas is None:
+            fix = "areas of the face are not known: read normal_force and friction_force, or give "
+            raise InputError(f"tributary = None: {fix}its elements or tributary to the body")
+        return areas
 
     @property
     def touching(self) -> Array:
         """True if a node is in contact, (steps+1, n)."""
-        return self.reaction > 0.0
+        largest = jnp.max(self.normal_force, axis=-1, keepdims=True)
+        return self.normal_force > TOUCHES * largest
+
+    @property
+    def contact_extent(self) -> Array:
+        """Length, on a face area, of the nodes that touch, (steps+1,)."""
+        return self.touching @ self._known_areas
+
+    @property
+    def slip_extent(self) -> Array:
+        """Largest length, on a face area, that slipped in one step of the last cycle."""
+        start, _, stop = self._last
+        return jnp.max(self.slipping[start + 1 : stop + 1] @ self._known_areas)
+
+    @property
+    def dissipation(self) -> Array:
+        """Work of friction in the last cycle, D; on a face the area of the loop."""
+        return self.dissipation_loop if self.on_face else super().dissipation
 
     @property
     def closure(self) -> Array:
@@ -97,26 +175,50 @@ class ContactHistory(LoopFigures, eqx.Module):
         start, _, stop = self._last
         force, displacement = self.loop
         answer = displacement if self.control == "force" else force
-        both = (_ends_apart(each) for each in (answer[:, None], self.slip[start : stop + 1]))
-        loop, slip = both
+        slips = self.slip[start : stop + 1].reshape(stop + 1 - start, -1)
+        loop, slip = (_ends_apart(each) for each in (answer[:, None], slips))
         return jnp.maximum(loop, jnp.where(self._slips, slip, 0.0))
 
     @property
     def _slips(self) -> Array:
         """True if slip in the last cycle is more than rounding."""
         force, displacement = self.loop
-        return self.dissipation > NO_SLIP * jnp.ptp(force) * jnp.ptp(displacement)
+        least = NO_SLIP[2 if self.on_face else 1]
+        return self.dissipation > least * jnp.ptp(force) * jnp.ptp(displacement)
 
     @property
     def dissipation_error(self) -> Array:
-        """Estimated relative error of the dissipation that the mesh of the contact makes.
+        """Estimated relative error of the dissipation.
 
-        See `jbeamshell.history.error_estimates.grid_error`; infinite if nothing slips.
+        On a line that of the mesh, see `jbeamshell.history.error_estimates.grid_error`; infinite if
+        nothing slips.  On a face that of the load steps, NaN if it was not estimated: half of the
+        steps change the dissipation by as much as is left.
         """
+        if self.on_face:
+            change = jnp.nan if self.change is None else jnp.abs(self.change)
+            slips = self._slips
+            return jnp.where(slips, change / jnp.where(slips, self.dissipation, 1.0), 0.0)
+        return grid_error(self._friction_works)
+
+    @property
+    def sharing(self) -> Array:
+        """Nodes that share the work of friction of the last cycle, W_i: (sum W_i)^2 / sum W_i^2."""
+        work = self._friction_works
+        squares = jnp.sum(work**2)
+        return jnp.sum(work) ** 2 / jnp.where(squares > 0.0, squares, 1.0)
+
+    @property
+    def _friction_works(self) -> Array:
+        """Work of friction (n,) of each node in the last cycle; zero where nothing slips."""
         start, _, stop = self._last
-        slip, cap = self.slip[start : stop + 1], self.friction * self.reaction[start : stop + 1]
-        path = jnp.abs(jnp.diff(slip, axis=0)) * 0.5 * (cap[1:] + cap[:-1])
-        return grid_error(jnp.where(self._slips, jnp.sum(path, axis=0), 0.0) * self.tributary)
+        slip = jnp.diff(self.slip[start : stop + 1], axis=0)
+        if self.on_face:
+            pull = self.friction_force[start : stop + 1]
+            return jnp.sum(0.5 * (pull[1:] + pull[:-1]) * slip, axis=(0, 2))
+        # Work at the limit: what is left of rounding in stuck nodes counts for nothing.
+        cap = self.friction * self.normal_force[start : stop + 1]
+        path = jnp.abs(slip) * 0.5 * (cap[1:] + cap[:-1])
+        return jnp.where(self._slips, jnp.sum(path, axis=0), 0.0)
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -129,10 +231,9 @@ class ContactHistory(LoopFigures, eqx.Module):
                 f"forces are off by {wrong:.2g} of the largest reaction: the contact jumps where "
                 "much friction meets little stiffness; take a smaller amplitude or friction",
             )
-        if not self.cycles or not float(self.friction) > 0.0:
+        if not self.cycles or not float(jnp.max(self.friction)) > 0.0:
             return ()
-        mesh = () if self.points else doubts_of_mesh(float(self.dissipation_error))
-        return *self._unsteady, *mesh
+        return *self._unsteady, *self._coarse
 
     @property
     def _unsteady(self) -> tuple[str, ...]:
@@ -155,6 +256,26 @@ class ContactHistory(LoopFigures, eqx.Module):
             said += f", and the dissipation changed by {percent:.3g} % since the cycle before"
         return (f"{said}; leave cycles out, or take more than {count}",)
 
+    @property
+    def _coarse(self) -> tuple[str, ...]:
+        """Doubts about the load steps and the mesh."""
+        error = float(self.dissipation_error)
+        if not self.on_face:
+            return () if self.points else doubts_of_mesh(error)
+        doubts = []
+        if error > TOLERANCE:
+            doubts.append(
+                f"the dissipation may be off by {100.0 * error:.2g} %: take more "
+                "steps_per_half_cycle"
+            )
+        pairs = float(self.sharing)
+        if bool(self._slips) and pairs < FEW and not self.points:
+            doubts.append(
+                f"only {pairs:.1f} pairs share the slip, so that the mesh may put the dissipation "
+                f"off by {min(100.0 * MESH / pairs, 100.0):.0f} %: mesh the face finer"
+            )
+        return tuple(doubts)
+
     def figures(self) -> dict[str, Any]:
         """Figures of the last cycle and of the contact at the last step, as plain numbers.
 
@@ -164,17 +285,25 @@ class ContactHistory(LoopFigures, eqx.Module):
             numbers by name, None where undefined (such as 0/0), and the doubts
         """
         values = {name: float(getattr(self, name)) for name in FIGURES if self.cycles}
-        values |= {
-            "reaction_max": float(jnp.max(self.reaction[-1])),
-            "opening_max": float(jnp.max(self.gap)),
-            "contact_length": float(self.touching[-1] @ self.tributary),
-        }
+        extent = "area" if self.on_face else "length"
+        if self.tributary is None:
+            values["normal_force_max"] = float(jnp.max(self.normal_force[-1]))
+        else:
+            values["reaction_max"] = float(jnp.max(self.reaction[-1]))
+            values[f"contact_{extent}"] = float(self.contact_extent[-1])
+            if self.cycles:
+                values[f"slip_{extent}"] = float(self.slip_extent)
+        values["opening_max"] = float(jnp.max(self.gap))
         found: dict[str, Any] = {k: v if np.isfinite(v) else None for k, v in values.items()}
         return found | {"assembly": self.assembly, "doubts": list(self.doubts)}
 
     def __str__(self) -> str:
-        title = f"{self.force.size} levels on {self.x.size} contact nodes, {PRESSED[self.assembly]}"
+        where = "of a contact face" if self.on_face else "of a contact line"
+        count = self.gap.shape[1]
+        title = f"{self.force.size} levels on {count} nodes {where}, {PRESSED[self.assembly]}"
+        # Forces and works on a line are per width.
         units = UNITS | {"opening_max": "length", "contact_length": "length"}
+        units = {name: word for name, word in units.items() if not self.on_face}
         figures = self.figures()
         figures.pop("assembly")
         doubts = [f"doubtful: {doubt}" for doubt in figures.pop("doubts")]
@@ -191,39 +320,78 @@ class ContactHistory(LoopFigures, eqx.Module):
         """Draw force over displacement; returns the axes."""
         from jbeamshell import plotting
 
-        return plotting.loop(self, axes)
+        drawn = plotting.loop(self, axes)
+        if self.on_face:
+            drawn.set(xlabel="displacement of the load", ylabel="load")
+        return drawn
 
     def plot_contact(self, steps: Any = None, axes: Any = None) -> Any:
-        """Draw slip, gap, traction and reaction along X at chosen steps; returns the axes."""
+        """Draw slip, gap, traction and reaction along X at chosen steps; returns the axes.
+
+        On a face they are maps of one step, the last if left out; returns the figure.
+        """
         from jbeamshell import plotting
 
+        if self.on_face:
+            require("axes", axes, axes is None, "a map of a face has a figure of its own")
+            return plotting.face_map(self, -1 if steps is None else steps)
         return plotting.contact_lines(self, steps, axes)
 
     def animate(self, steps: Any = None, **options: Any) -> Any:
-        """Film of the last cycle, to be saved as a GIF; see `jbeamshell.plotting.animate`."""
+        """Film of the last cycle on a line, for a GIF; see `jbeamshell.plotting.animate`.
+
+        Raises
+        ------
+        InputError
+            for a contact on a face
+        """
         from jbeamshell import plotting
 
+        fix = "a film shows a contact line: draw maps of a face by plot_contact"
+        require("history", "of a face", not self.on_face, fix)
         return plotting.animate(self, steps, **options)
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write ``loop.csv``, ``contact.csv``, ``result.json`` and pictures to a folder."""
+        """Write ``loop.csv``, ``contact.csv``, ``result.json`` and pictures to a folder.
+
+        ``contact.csv`` has the contact at all steps.  On a face it has the pressing, and the start,
+        the turn and the end of the last cycle; without one, the last step.
+        """
         from jbeamshell.plotting.folder import check_folder, write_folder
 
-        names = ("force", "displacement", "slip_work", "settled")
-        loop = np.column_stack([np.asarray(getattr(self, name)) for name in names])
-        along = ("slip", "gap", "traction", "reaction", "slipping")
-        size = self.gap.shape
-        step, x = np.indices(size)[0], np.broadcast_to(np.asarray(self.x), size)
-        rows = [step, x, *(np.asarray(getattr(self, name)) for name in along)]
-        contact = np.column_stack([row.ravel() for row in rows])
+        count, n = self.gap.shape
+        steps = list(range(count))
+        if self.on_face:
+            steps = [0, *(self.cycles[-1] if self.cycles else (count - 1,))]
+        loop = {"force": self.force, "displacement": self.displacement}
+        loop |= {"slip_work": self.slip_work, "status": self.status}
+        columns: dict[str, Any] = {"step": np.arange(count)[:, None]}
+        places = np.asarray(self.places).reshape(n, -1)
+        columns |= dict(zip("xyz", places.T, strict=False))
+        if self.tributary is not None:
+            columns["tributary"] = self.tributary
+        columns |= _by_ways("slip", self.slip) | {"gap": self.gap}
+        columns |= _by_ways("friction_force", self.friction_force)
+        columns |= {"normal_force": self.normal_force, "slipping": self.slipping}
+        every = [np.broadcast_to(values, (count, n)) for values in columns.values()]
+        contact = np.column_stack([values[steps].ravel() for values in every])
         texts = {
-            "loop.csv": csv_text(names, loop.tolist()),
-            "contact.csv": csv_text(("step", "x", *along), contact.tolist()),
+            "loop.csv": csv_text(tuple(loop), np.column_stack(list(loop.values())).tolist()),
+            "contact.csv": csv_text(tuple(columns), contact.tolist()),
             "result.json": as_json(self.figures()),
         }
-        drawn = {"loop.png": self.plot(), "contact.png": self.plot_contact()}
-        pictures = {name: np.ravel(axes)[0].figure for name, axes in drawn.items()}
-        return write_folder(check_folder(folder), texts, pictures)
+        turn = steps[-2] if self.on_face and self.cycles else None
+        drawn = {"loop.png": np.ravel(self.plot())[0].figure}
+        maps = self.plot_contact(turn)
+        drawn["contact.png"] = maps if self.on_face else np.ravel(maps)[0].figure
+        return write_folder(check_folder(folder), texts, drawn)
+
+
+def _by_ways(name: str, values: Array) -> dict[str, Array]:
+    """Columns of a tangential field (steps, n), or of both components (steps, n, 2) on a face."""
+    if values.ndim == 2:
+        return {name: values}
+    return {f"{name}_{way + 1}": values[..., way] for way in range(2)}
 
 
 def _ends_apart(values: Array) -> Array:

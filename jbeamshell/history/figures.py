@@ -66,6 +66,12 @@ class CycleFigures(Record, LoopFigures):
         return (answer[-1] - answer[0]) / (answer.max() - answer.min())
 
     @property
+    def slip_length(self) -> Array:
+        """Largest length of contact that slipped in one step of the last cycle."""
+        start, _, stop = self._last
+        return jnp.max(self.slipping[start + 1 : stop + 1] @ self.tributary)
+
+    @property
     def slip_cycle(self) -> SlipCycle:
         """Slip, traction and reaction of the contact in the last cycle.
 

@@ -16,9 +16,7 @@ class LoopFigures:
 
     Attributes
     ----------
-    tributary : (n,) contact length of each node
     force, displacement : (steps+1,) load and the displacement conjugate to it
-    slipping : (steps+1, n) True if the node slipped in the step
     slip_work : (steps+1,) work dissipated by friction in each step
     cycles : steps at the start, the turn and the end of each closed cycle
 
@@ -29,10 +27,8 @@ class LoopFigures:
     """
 
     if TYPE_CHECKING:  # fields of the classes that have these figures, in the order they choose
-        tributary: Array
         force: Array
         displacement: Array
-        slipping: Array
         slip_work: Array
         cycles: tuple[tuple[int, int, int], ...]
 
@@ -82,9 +78,3 @@ class LoopFigures:
     def peak_displacement(self) -> Array:
         """Largest abs(u(L)) of the last loop, length."""
         return jnp.max(jnp.abs(self.loop[1]))
-
-    @property
-    def slip_length(self) -> Array:
-        """Largest length of contact that slipped in one step of the last cycle."""
-        start, _, stop = self._last
-        return jnp.max(self.slipping[start + 1 : stop + 1] @ self.tributary)

@@ -22,7 +22,7 @@ def face_map(history: Any, step: int = -1) -> Figure:
 
     Parameters
     ----------
-    history : `jbeamshell.FaceHistory`
+    history : `jbeamshell.ContactHistory` on a face
     step : index into the path
 
     Returns
@@ -30,10 +30,11 @@ def face_map(history: Any, step: int = -1) -> Figure:
     matplotlib.figure.Figure
     """
     (x, y), names = _flat(np.asarray(history.places), np.asarray(history.normals))
-    area, touching = np.asarray(history.tributary), np.asarray(history.touching)[step]
+    touching, known = np.asarray(history.touching)[step], history.tributary is not None
+    pressed = history.reaction if known else history.normal_force
     state = np.where(touching, 1 + np.asarray(history.slipping)[step].astype(int), 0)
     fields = {
-        "normal force per area": np.asarray(history.reaction)[step] / area,
+        "normal reaction" if known else "normal force": np.asarray(pressed)[step],
         "slip since the pressing": np.linalg.norm(np.asarray(history.slip)[step], axis=1),
         "gap": np.maximum(np.asarray(history.gap)[step], 0.0),
     }

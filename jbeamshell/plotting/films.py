@@ -171,7 +171,7 @@ def _members(history: Any, scale: float | None) -> Callable[[int, Axes], object]
 
 def _traction(history: Any) -> Callable[[int, Axes], object]:
     """Function that draws the friction traction at a step in the colours of the contact."""
-    x, traction = np.asarray(history.x), np.asarray(history.traction)
+    x, traction = np.asarray(history.places), np.asarray(history.traction)
     most = 1.1 * float(np.nanmax(np.abs(traction)))
 
     def draw(step: int, axes: Axes) -> None:

@@ -162,7 +162,7 @@ def contact_lines(
     """
     turns = history.cycles[-1][1:] if history.cycles else (-1,)
     chosen = checked_steps(history, (0, *turns) if steps is None else steps)
-    x = np.asarray(history.x)
+    x = np.asarray(history.places)
     names = {"slip": "slip  [length]", "gap": "gap  [length]"}
     names |= {"traction": "friction traction  [stress]", "reaction": "normal reaction  [stress]"}
     with style():

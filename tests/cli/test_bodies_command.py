@@ -31,17 +31,17 @@ def test_a_face_has_a_loop_and_maps(joint, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["bodies", joint(), "--amplitude", "1000", "--json", "--out", str(out)]) == 0
     figures = json.loads(capsys.readouterr().out)
-    names = {"loop.csv", "face.csv", "result.json", "loop.png", "face.png"}
+    names = {"loop.csv", "contact.csv", "result.json", "loop.png", "contact.png"}
     assert {path.name for path in out.iterdir()} == names
     loop = np.genfromtxt(out / "loop.csv", delimiter=",", names=True)
     last = loop[-17:]
     area = np.sum(0.5 * (last["force"][1:] + last["force"][:-1]) * np.diff(last["displacement"]))
     assert figures["dissipation"] == pytest.approx(abs(area), rel=0.02)
-    face = np.genfromtxt(out / "face.csv", delimiter=",", names=True)
+    face = np.genfromtxt(out / "contact.csv", delimiter=",", names=True)
     pressed = face[face["step"] == 0]
     assert len(pressed) == 91
     assert np.sum(pressed["tributary"]) == pytest.approx(1800.0)
-    assert np.sum(pressed["reaction"]) == pytest.approx(16e3)  # of both bolts
+    assert np.sum(pressed["normal_force"]) == pytest.approx(16e3)  # of both bolts
 
 
 def test_a_mode_has_a_backbone(joint, tmp_path, capsys):

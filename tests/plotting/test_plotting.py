@@ -357,9 +357,12 @@ class TestFilm:
 
     def test_draws_the_traction_of_bodies_without_a_shape(self, history):
         names = [field.name for field in dataclasses.fields(jb.ContactHistory)]
+        given = {"places": history.x, "loads": history.force[:, None]}
+        given |= {"displacements": history.displacement[:, None]}
+        given |= {"friction_force": history.traction * history.tributary}
+        given |= {"normal_force": history.reaction * history.tributary}
         held = {name: getattr(history, name, None) for name in names}
-        settled = np.ones(history.force.size, dtype=bool)
-        film = jb.ContactHistory(**held | {"settled": settled}).animate([21])
+        film = jb.ContactHistory(**held | given).animate([21])
         traction = film.still().axes[0]
         slips = {line.get_label(): line for line in traction.get_lines()}["slips"]
         np.testing.assert_array_equal(slips.get_xdata(), history.x[history.slipping[21]])

@@ -25,8 +25,8 @@ from calibration.finite_elements.bricks import (
     run,
     seconds_of_programs,
 )
-from jbeamshell.contact_face.body import FaceBody
-from jbeamshell.contact_face.solve import solve_faces
+from jbeamshell.bodies.contact import solve_contact
+from jbeamshell.bodies.substructure import Substructure
 from jbeamshell.plotting.style import DATA, PALETTE, style
 
 FACES = ((9, 4), (14, 9), (19, 19), (39, 19))  # bricks along and across the face
@@ -47,26 +47,26 @@ def row(counts: tuple[int, int]) -> dict[str, Any]:
         folder = Path(name)
         body = block.body_of(made, folder)
         begin = time.perf_counter()
-        history = jax.block_until_ready(solve_faces(body, **OPTIONS))
+        history = jax.block_until_ready(solve_contact(body, **OPTIONS))
         found: dict[str, Any] = {
-            "pairs": body.areas.size,
+            "pairs": body.places.shape[0],
             "first_s": time.perf_counter() - begin,
             "seconds": best(body),
             "iterations": int(np.sum(history.iterations)),
             "dissipation": float(history.dissipation),
             "estimate": float(history.dissipation_error),
         }
-        if body.areas.size <= BESIDE:
+        if body.places.shape[0] <= BESIDE:
             found["calculix"] = beside(made, history, folder)
     return found
 
 
-def best(body: FaceBody) -> float:
+def best(body: Substructure) -> float:
     """Least time of the processor for a warm call."""
     seconds = []
     for _ in range(CALLS):
         begin = time.process_time()
-        jax.block_until_ready(solve_faces(body, **OPTIONS))
+        jax.block_until_ready(solve_contact(body, **OPTIONS))
         seconds.append(time.process_time() - begin)
     return min(seconds)
 

@@ -23,13 +23,13 @@ from jax.typing import ArrayLike as Number
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.linalg import eigsh
 
+from jbeamshell.bodies.contact import solve_contact
+from jbeamshell.bodies.stiffness_model import StiffnessModel
+from jbeamshell.bodies.substructure import Substructure
 from jbeamshell.common.checks import as_leaf, is_traced, require, require_count
 from jbeamshell.common.errors import UnconvergedError, warn_of_doubts
 from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.summary import Summary, ranged
-from jbeamshell.contact_face.body import FaceBody
-from jbeamshell.contact_face.solve import solve_faces
-from jbeamshell.contact_line.stiffness_model import StiffnessModel
 
 RIGID = 1e-7  # eigenvalue over the largest one found, below which a mode is a rigid motion
 LEAST, POINTS = 0.03, 20  # of the amplitudes that are taken: part of `slides`, and how many
@@ -48,23 +48,30 @@ class FacePart(NamedTuple):
     Attributes
     ----------
     model : stiffness and mass, which only modes need
-    nodes : (n, 4) node, X, Y and Z of the face's nodes
+    contact : (n, 4) node, X, Y and Z of the face's nodes
     press : for each bolt, (k, 3) node, direction and force
     pull : (k, 3) node, direction and force of a unit of the load that is cycled; modes need none
-    normals, areas, elements : of the face, see `jbeamshell.FaceBody.of`
+    normals, tributary, elements : of the face, see `jbeamshell.StiffnessModel.condensed`
     """
 
     model: StiffnessModel
-    nodes: ArrayLike
+    contact: ArrayLike
     press: Sequence[ArrayLike] = ()
     pull: ArrayLike | None = None
-    normals: ArrayLike = (0.0, 0.0, 1.0)
-    areas: ArrayLike | None = None
+    normals: ArrayLike | None = None
+    tributary: ArrayLike | None = None
     elements: Iterable[ArrayLike] | None = None
 
-    def body(self) -> FaceBody:
-        """Body on its face; see `jbeamshell.FaceBody.of`."""
-        return FaceBody.of(**self._asdict())
+    def body(self) -> Substructure:
+        """Body on its face; see `jbeamshell.StiffnessModel.condensed`."""
+        return self.model.condensed(
+            self.contact,
+            pull=self.pull,
+            press=self.press,
+            normals=self.normals,
+            elements=self.elements,
+            tributary=self.tributary,
+        )
 
 
 class ModalBodies(NamedTuple):
@@ -75,15 +82,15 @@ class ModalBodies(NamedTuple):
 
     Attributes
     ----------
-    upper, lower : bodies for `jbeamshell.solve_faces`; lower is None on a rigid base
+    upper, lower : bodies for `jbeamshell.solve_contact`; lower is None on a rigid base
     omega : angular frequency of the mode while the face sticks
     touching : (n,) True for the pairs that the bolts press together
     slides : modal displacement at which friction would bear the forces on the stuck face in sum
     friction, bolts, gap : of the pressing
     """
 
-    upper: FaceBody
-    lower: FaceBody | None
+    upper: Substructure
+    lower: Substructure | None
     omega: float
     touching: NDArray[np.bool_]
     slides: float
@@ -109,7 +116,7 @@ def modal_bodies(
     ----------
     upper, lower : bodies with masses; None is a rigid base
     mode : number of the mode, counted from 0; rigid motions do not count
-    friction, bolts, gap : as in `jbeamshell.solve_faces`, for the pressing
+    friction, bolts, gap : as in `jbeamshell.solve_contact`, for the pressing
 
     Raises
     ------
@@ -124,14 +131,14 @@ def modal_bodies(
     pulls: list[ArrayLike | None] = [part.press[0] if part.press else None for part in parts]
     pressed = _bodies(parts, pulls)
     sizes = np.broadcast_to(np.asarray(bolts, float), max(body.bolts for body in pressed))
-    history = solve_faces(
+    history = solve_contact(
         *pressed, friction=friction, bolts=sizes, gap=gap, path=np.append(0.0, sizes)[None]
     )
     touching = np.asarray(history.touching[0])
     found = _stuck_mode(parts, touching, mode)
     bodies = _bodies(parts, found.inertia)
     shear = np.einsum("nij,nj->ni", bodies[0].frames, found.borne)[:, :2]
-    holds = float(np.sum(np.asarray(history.friction * history.reaction[0])))
+    holds = float(np.sum(np.asarray(history.friction * history.normal_force[0])))
     size = float(np.sum(np.linalg.norm(shear[touching], axis=1)))
     return ModalBodies(
         upper=bodies[0],
@@ -208,8 +215,8 @@ def face_curve(
     bodies : of `modal_bodies`
     amplitudes : (k,) modal displacements, positive; None is 20 of them, up to the one at which
         nearly all of the face slides
-    throw : as in `jbeamshell.solve_faces`
-    options : softness, steps_per_half_cycle and the like, as `jbeamshell.solve_faces` takes them;
+    throw : as in `jbeamshell.solve_contact`
+    options : softness, steps_per_half_cycle and the like, as `jbeamshell.solve_contact` takes them;
         friction, bolts and gap are those of `modal_bodies` if left out
 
     Raises
@@ -231,7 +238,7 @@ def face_curve(
     options |= {"control": "displacement", "throw": False}
     loops = []
     for size in sizes:
-        loop = solve_faces(bodies.upper, bodies.lower, amplitude=size, **options)
+        loop = solve_contact(bodies.upper, bodies.lower, amplitude=size, **options)
         if throw and not is_traced(loop) and not loop.converged:
             raise UnconvergedError(
                 f"amplitude {size:.6g}: a step has no equilibrium; take more steps"
@@ -255,12 +262,12 @@ def face_curve(
     return curve
 
 
-def _bodies(parts: list[FacePart], pulls: Sequence[ArrayLike | None]) -> list[FaceBody]:
+def _bodies(parts: list[FacePart], pulls: Sequence[ArrayLike | None]) -> list[Substructure]:
     """Bodies with other pulls, all with the areas and normals of the first one."""
     first = parts[0]._replace(pull=pulls[0]).body()
-    areas, normals = np.asarray(first.areas), np.asarray(first.normals)
+    areas, normals = first.tributary, first.normals
     others = [
-        part._replace(pull=pull, areas=areas, normals=normals, elements=None).body()
+        part._replace(pull=pull, tributary=areas, normals=normals, elements=None).body()
         for part, pull in zip(parts[1:], pulls[1:], strict=True)
     ]
     return [first, *others]
@@ -305,7 +312,7 @@ def _stuck_mode(parts: list[FacePart], touching: NDArray[np.bool_], mode: int) -
         tables.append(np.column_stack([part.model.dofs, rows]))
         begin += len(part.model.dofs)
     force = {(int(a), int(b)): f for (a, b), f in zip(parts[0].model.dofs, borne, strict=False)}
-    face = np.asarray(parts[0].nodes, float)[:, 0].astype(int).tolist()
+    face = np.asarray(parts[0].contact, float)[:, 0].astype(int).tolist()
     on_face = [[force.get((node, way), 0.0) for way in (1, 2, 3)] for node in face]
     return Stuck(float(np.sqrt(values[at])), tables, np.array(on_face))
 
@@ -316,7 +323,7 @@ def _ties(parts: list[FacePart], touching: NDArray[np.bool_]) -> scipy.sparse.cs
     names = [(side, node, way) for side, rows in enumerate(dofs) for node, way in rows]
     row = {name: i for i, name in enumerate(names)}
     column = np.arange(len(names))
-    faces = [np.asarray(part.nodes, float)[:, 0].astype(int) for part in parts]
+    faces = [np.asarray(part.contact, float)[:, 0].astype(int) for part in parts]
     for pair in np.flatnonzero(touching):
         for way in (1, 2, 3):
             ends = [row.get((side, int(face[pair]), way)) for side, face in enumerate(faces)]

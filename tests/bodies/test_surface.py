@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_face.surface import matched, spread
-from tests.contact_face.bricks import box
+from jbeamshell.bodies.surface import matched, spread
+from tests.bodies.bricks import box
 
 SQUARE = np.array([[1, 0, 0, 0], [2, 1, 0, 0], [3, 1, 1, 0], [4, 0, 1, 0]], float)
 
@@ -83,11 +83,11 @@ class TestBody:
         quads = np.vectorize(number.get)(quads)[:, ::-1]  # as seen from below
         nodes[:, 0] = at
         loads = {"pull": [[at[0], 1, 1.0]], "press": [[[at[0], 3, -1.0]]]}
-        body = jb.FaceBody.of(model, nodes, elements=quads, **loads)
-        assert float(np.sum(body.areas)) == pytest.approx(12.0)
+        body = model.condensed(nodes, elements=quads, **loads)
+        assert float(np.sum(body.tributary)) == pytest.approx(12.0)
         np.testing.assert_allclose(body.normals, np.tile([0.0, 0.0, 1.0], (20, 1)), atol=1e-14)
-        with pytest.raises(jb.InputError, match="areas = "):
-            jb.FaceBody.of(model, nodes, elements=quads, areas=np.ones(20), **loads)
+        with pytest.raises(jb.InputError, match="tributary = "):
+            model.condensed(nodes, elements=quads, tributary=np.ones(20), **loads)
 
 
 class TestMatch:

@@ -11,11 +11,11 @@ import jbeamshell as jb
 from calibration.finite_elements import body as calculix
 from calibration.finite_elements.block import LOAD
 from calibration.finite_elements.bricks import SOFTNESS, area
-from jbeamshell.contact_face.body import frames_of
+from jbeamshell.bodies.substructure import frames_of
 from jbeamshell.measured.example import data_folder
 
 DATA = Path(__file__).parent
-STRIP = DATA.parent / "contact_line" / "calculix" / "strip.sti"  # by CalculiX 2.20
+STRIP = DATA / "calculix" / "strip.sti"  # by CalculiX 2.20
 SPRING, LIMIT = 2.0, 0.3
 
 
@@ -23,12 +23,12 @@ def point(normal=0.0):
     """A node on springs over a rigid base, pulled along X and Y, and pressed."""
     stiffness = np.diag([SPRING, SPRING, 1.0])
     forces = np.array([[1.0, 0.0, normal], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]])
-    return jb.FaceBody([[0.0, 0.0, 0.0]], stiffness, forces)
+    return jb.Substructure([[0.0, 0.0, 0.0]], stiffness, forces)
 
 
 def block():
     """Block of 6 x 4 x 2 bricks of CalculiX on its 35 nodes."""
-    return jb.FaceBody.read(data_folder() / "calculix_block.npz")
+    return jb.Substructure.read(data_folder() / "calculix_block.npz")
 
 
 class TestPoint:
@@ -38,7 +38,7 @@ class TestPoint:
         angle = turn * np.arange(801)
         pull = SPRING * reach * np.column_stack([np.cos(angle), np.sin(angle)])
         path = np.column_stack([pull, np.ones(angle.size)])
-        history = jb.solve_faces(point(), friction=LIMIT, bolts=[0.0, 1.0], path=path)
+        history = jb.solve_contact(point(), friction=LIMIT, bolts=[0.0, 1.0], path=path)
         stretch, half = LIMIT / SPRING, np.sin(0.5 * turn)  # chords drag it in steps
         radius = np.sqrt(reach**2 - stretch**2 * (1.0 - half**2)) - stretch * half
         slip = history.slip[-200:, 0]
@@ -51,7 +51,7 @@ class TestPoint:
     def test_one_direction_is_a_jenkins_element(self):
         # Its force is mu N however far it slips.
         with pytest.warns(jb.DoubtfulWarning, match=r"1\.0 pairs share the slip"):
-            history = jb.solve_faces(point(), friction=LIMIT, bolts=[0.0, 1.0], amplitude=0.8)
+            history = jb.solve_contact(point(), friction=LIMIT, bolts=[0.0, 1.0], amplitude=0.8)
         slip = float(jnp.ptp(history.slip[:, 0, 0]))
         assert slip == pytest.approx(2.0 * (0.8 - LIMIT) / SPRING, rel=1e-9)
         assert float(history.dissipation) == pytest.approx(2.0 * LIMIT * slip, rel=0.02)
@@ -60,10 +60,10 @@ class TestPoint:
     def test_softness_takes_the_forces_of_springs_and_sliders(self):
         soft = np.array([0.05, 0.02])
         path = np.random.default_rng(0).normal(size=(40, 3)) * [0.5, 0.5, 0.3] + [0.0, 0.0, 1.0]
-        history = jb.solve_faces(
+        history = jb.solve_contact(
             point(0.2), friction=LIMIT, bolts=[0.0, 1.0], softness=soft, path=path
         )
-        force = np.concatenate([-history.traction[:, 0], history.reaction], axis=1)
+        force = np.concatenate([-history.friction_force[:, 0], history.normal_force], axis=1)
         w = (force + path_forces(path)) / [SPRING, SPRING, 1.0]
         slip = np.zeros(2)
         for each, moved in zip(force, w, strict=True):
@@ -78,8 +78,9 @@ class TestPoint:
         height, pressure = 0.3, 0.2
         loads = np.array([0.5, 1.0, 3.0, 0.7])
         path = np.column_stack([0.0 * loads, 0.0 * loads, loads])
-        history = jb.solve_faces(point(), bolts=[0.0, 0.1], roughness=[height, pressure], path=path)
-        found, gap = history.reaction[1:, 0], -history.gap[1:, 0]
+        rough = {"bolts": [0.0, 0.1], "roughness": [height, pressure]}
+        history = jb.solve_contact(point(), **rough, path=path)
+        found, gap = history.normal_force[1:, 0], -history.gap[1:, 0]
         np.testing.assert_allclose(gap, height * np.log1p(found / pressure), rtol=1e-9)
         np.testing.assert_allclose(found, loads - gap, rtol=1e-9)  # the rest is in the spring of 1
 
@@ -95,12 +96,10 @@ class TestSlice:
         line = model.condensed(made.contact, pull=made.pull, press=[made.press])
         front = len(made.contact) // 2
         nodes = [(n, x, 0.0, float(k >= front)) for k, (n, x) in enumerate(made.contact)]
-        face = jb.FaceBody.of(
-            model, nodes, pull=made.pull, press=[made.press], normals=(0.0, 1.0, 0.0)
-        )
+        face = model.condensed(nodes, pull=made.pull, press=[made.press], normals=(0.0, 1.0, 0.0))
         load = {"friction": 0.1, "amplitude": 0.8, "assembly": "frictionless"}
         exact = jb.solve_contact(line, **load, points=True)  # faces slip node by node
-        found = jb.solve_faces(face, **load, steps_per_half_cycle=64, throw=False)
+        found = jb.solve_contact(face, **load, steps_per_half_cycle=64, throw=False)
         assert float(found.dissipation) == pytest.approx(float(exact.dissipation), rel=2e-3)
         assert float(found.secant_stiffness) == pytest.approx(
             float(exact.secant_stiffness), rel=1e-4
@@ -111,7 +110,7 @@ class TestSlice:
 class TestBlock:
     def test_the_loop_is_that_of_calculix(self):
         loop = np.loadtxt(DATA / "block_loop.csv", delimiter=",", skiprows=2)
-        history = jb.solve_faces(
+        history = jb.solve_contact(
             block(), **LOAD, steps_per_half_cycle=16, softness=SOFTNESS, throw=False
         )
         np.testing.assert_allclose(history.force, loop[:, 0], atol=1e-9)
@@ -124,11 +123,11 @@ class TestBlock:
         clear = jnp.abs(history.gap) > 1e-6 * jnp.max(jnp.abs(history.gap))
         closed = (history.gap < 0.0)[clear]  # springs penetrate
         np.testing.assert_array_equal(history.touching[clear], closed)
-        assert float(history.open_area[-1]) > 0.0
+        assert float(history.contact_extent[-1]) < float(jnp.sum(block().tributary))
 
     def test_the_estimate_bounds_the_error_of_the_load_steps(self):
         found = [
-            jb.solve_faces(block(), **STEADY, steps_per_half_cycle=steps)
+            jb.solve_contact(block(), **STEADY, steps_per_half_cycle=steps)
             for steps in (8, 16, 32, 128)
         ]
         truth = float(found[-1].dissipation)
@@ -147,50 +146,51 @@ class TestBlock:
         change = np.zeros((n, 3, n, 3))
         change[np.arange(n), :, np.arange(n), :] = both
         change = change.reshape(3 * n, 3 * n)
-        turned = jb.FaceBody(
+        turned = jb.Substructure(
             np.asarray(body.places) @ turn.T,
             change @ np.asarray(body.stiffness) @ change.T,
             change @ np.asarray(body.forces),
             body.flexibility,
             normals=normals,
-            areas=body.areas,
+            tributary=body.tributary,
         )
-        ours, theirs = (jb.solve_faces(b, **STEADY, steps_per_half_cycle=8) for b in (body, turned))
+        load = STEADY | {"steps_per_half_cycle": 8}
+        ours, theirs = (jb.solve_contact(b, **load) for b in (body, turned))
         np.testing.assert_allclose(theirs.displacement, ours.displacement, rtol=1e-6)
         np.testing.assert_allclose(theirs.reaction, ours.reaction, atol=1e-6)
 
     def test_a_stiff_body_below_is_a_rigid_base(self):
         body, stiff = block(), 1e6 * float(jnp.max(block().stiffness))
         size = body.stiffness.shape[0]
-        lower = jb.FaceBody(body.places, stiff * np.eye(size), np.zeros((size, 1)))
-        alone = jb.solve_faces(body, **STEADY, steps_per_half_cycle=8)
-        pair = jb.solve_faces(body, lower, **STEADY, steps_per_half_cycle=8)
+        lower = jb.Substructure(body.places, stiff * np.eye(size), np.zeros((size, 1)))
+        alone = jb.solve_contact(body, **STEADY, steps_per_half_cycle=8)
+        pair = jb.solve_contact(body, lower, **STEADY, steps_per_half_cycle=8)
         assert float(pair.dissipation) == pytest.approx(float(alone.dissipation), rel=1e-4)
 
     def test_equal_bodies_grow_alike_under_the_bolts(self):
         # No support holds them: the loads are in balance.  Nothing slips, as both widen alike.
         body = block()
-        mirror = np.tile([1.0, 1.0, -1.0], body.areas.size)
+        mirror = np.tile([1.0, 1.0, -1.0], body.tributary.size)
         forces = np.asarray(body.forces)[:, [1, 1]]  # pressed and pressed again
-        upper = jb.FaceBody(body.places, body.stiffness, forces, areas=body.areas)
-        lower = jb.FaceBody(
+        upper = jb.Substructure(body.places, body.stiffness, forces, tributary=body.tributary)
+        lower = jb.Substructure(
             body.places,
             mirror[:, None] * np.asarray(body.stiffness) * mirror,
             mirror[:, None] * forces,
-            areas=body.areas,
+            tributary=body.tributary,
         )
         path = np.tile([0.0, 10.0], (2, 1))
-        history = jb.solve_faces(upper, lower, friction=0.3, bolts=10.0, path=path)
+        history = jb.solve_contact(upper, lower, friction=0.3, bolts=10.0, path=path)
         limit = 0.3 * np.max(history.reaction)
         np.testing.assert_allclose(history.traction, 0.0, atol=1e-6 * limit)
 
     def test_loads_that_nothing_balances_are_refused(self):
         with pytest.raises(jb.InputError, match="not in balance"):
-            jb.solve_faces(block(), block(), **STEADY)
+            jb.solve_contact(block(), block(), **STEADY)
 
     def test_displacements_that_forces_caused_cause_them(self):
-        forces = jb.solve_faces(block(), **STEADY, steps_per_half_cycle=8)
-        found = jb.solve_faces(
+        forces = jb.solve_contact(block(), **STEADY, steps_per_half_cycle=8)
+        found = jb.solve_contact(
             block(),
             control="displacement",
             path=forces.displacement[1:],
@@ -209,7 +209,7 @@ class TestBlock:
             wedge = 1e-7 * (block().places[:, 0] - 20.0) ** 2
             inputs["gap"] *= wedge
             inputs["roughness"] = inputs["roughness"] * jnp.array([1.0, 1e6])
-            history = jb.solve_faces(block(), **inputs, **options)
+            history = jb.solve_contact(block(), **inputs, **options)
             return jnp.sum(history.slip_work)
 
         value = jnp.asarray(start[key])
@@ -244,11 +244,11 @@ class TestRefusals:
     def test_bad_input_names_its_key(self, change, words):
         options = {"upper": block(), "friction": 0.3, "bolts": 10.0} | change
         with pytest.raises(jb.InputError, match=words.replace("(", r"\(")):
-            jb.solve_faces(**options)
+            jb.solve_contact(**options)
 
     def test_beyond_gross_slip_there_is_no_equilibrium(self):
         with pytest.raises(jb.UnconvergedError, match="step"):
-            jb.solve_faces(block(), friction=0.3, amplitude=2000.0, bolts=10.0, cycles=1)
+            jb.solve_contact(block(), friction=0.3, amplitude=2000.0, bolts=10.0, cycles=1)
 
     def test_no_damaged_body_is_taken(self):
         whole = {name: np.array(getattr(block(), name)) for name in DAMAGED}
@@ -257,10 +257,10 @@ class TestRefusals:
             arrays = {name: array.copy() for name, array in whole.items()}
             DAMAGES[draw.choice(list(DAMAGES))](draw, arrays)
             with pytest.raises(jb.InputError, match=" = "):
-                jb.FaceBody(**arrays)
+                jb.Substructure(**arrays)
 
 
-DAMAGED = ("places", "normals", "areas", "stiffness", "forces", "flexibility")
+DAMAGED = ("places", "normals", "tributary", "stiffness", "forces", "flexibility")
 
 
 def entry(draw, arrays, value, names=DAMAGED):
@@ -300,7 +300,7 @@ DAMAGES = {
     "permuted": permuted,
     "mixed units": mixed_units,
     "short": short,
-    "area": lambda draw, arrays: entry(draw, arrays, -draw.random(), ["areas"]),
+    "area": lambda draw, arrays: entry(draw, arrays, -draw.random(), ["tributary"]),
     "normal": lambda draw, arrays: entry(draw, arrays, draw.uniform(0.1, 0.9), ["normals"]),
     "single": lambda _, arrays: arrays.update(
         stiffness=jnp.asarray(arrays["stiffness"], "float32")

@@ -10,7 +10,7 @@ import jbeamshell as jb
 from calibration.finite_elements.bolted_lap import decks
 from calibration.finite_elements.bricks import run
 from jbeamshell.measured.example import data_folder
-from tests.contact_face.bricks import box
+from tests.bodies.bricks import box
 from tests.damaged import damage
 
 LAP = data_folder() / "bolted_lap"
@@ -158,10 +158,10 @@ class TestTables:
         (tmp_path / "joint.toml").write_text(text)
         upper, lower, options = jb.read_parts(tmp_path / "joint.toml")
         assert options == {"bolts": 2.0}
-        np.testing.assert_array_equal(upper.nodes[:, 1:], lower.nodes[:, 1:])
+        np.testing.assert_array_equal(upper.contact[:, 1:], lower.contact[:, 1:])
         above = upper.body()
-        assert float(np.sum(above.areas)) == pytest.approx(6.0)
-        np.testing.assert_allclose(lower.areas, above.areas)
+        assert float(np.sum(above.tributary)) == pytest.approx(6.0)
+        np.testing.assert_allclose(lower.tributary, above.tributary)
         assert upper.model.mass is not None
         assert len(lower.model.dofs) == 3 * 24 - 3
 
@@ -171,13 +171,13 @@ class TestLap:
         upper, lower, options = jb.read_parts(LAP / "joint.toml")
         assert options["bolts"] == [8e3, 8e3]
         for part, sign in ((upper, -1.0), (lower, 1.0)):
-            assert np.sum(part.areas) == pytest.approx(60.0 * 30.0)
+            assert np.sum(part.tributary) == pytest.approx(60.0 * 30.0)
             np.testing.assert_allclose(part.normals[:, 2], 1.0)
             assert len(part.press) == 2
             for bolt in part.press:
                 assert set(bolt[:, 1]) == {3.0}
                 assert np.sum(bolt[:, 2]) == pytest.approx(sign)
-        np.testing.assert_allclose(upper.nodes[:, 1:], lower.nodes[:, 1:])
+        np.testing.assert_allclose(upper.contact[:, 1:], lower.contact[:, 1:])
         assert set(upper.pull[:, 1]) == {1.0}
         assert np.sum(upper.pull[:, 2]) == pytest.approx(1.0)
 

@@ -12,25 +12,28 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import scipy.sparse
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse.linalg import SuperLU, splu
 
-from jbeamshell.common.checks import require, require_count, shown, whole_numbers
+from jbeamshell.bodies.condensation import (
+    condensed_on,
+    face_rows,
+    factors_of,
+    line_rows,
+    nodal_forces,
+)
+from jbeamshell.bodies.craig_bampton import reduced
+from jbeamshell.bodies.matrix_files import read_matrix
+from jbeamshell.bodies.substructure import Substructure
+from jbeamshell.bodies.tables import table_of
+from jbeamshell.common.checks import require, require_count, whole_numbers
 from jbeamshell.common.errors import InputError
-from jbeamshell.contact_line.craig_bampton import reduced
-from jbeamshell.contact_line.matrix_files import read_matrix
-from jbeamshell.contact_line.substructure import Substructure
 
 SYMMETRIC = 1e-8  # of the largest entry
-SAME_PLACE = 1e-9  # of the contact's length, within which nodes lie at one X
-LOST = 1e-12  # pivot over its diagonal entry, from which on nothing is left of the stiffness
-TABLE = "give rows of node and X"
-FORCES = "give rows of node, direction and force"
 SUPPORTS = "give rows of node and direction"
 DIRECTIONS = 6  # three ways and three turns
 MODAL = 0  # direction of a row that is the coordinate of a mode, not of a node
@@ -98,7 +101,7 @@ class StiffnessModel:
         directions: int = 2,
         mass: str | os.PathLike[str] | None = None,
     ) -> StiffnessModel:
-        """Model in a file, see `jbeamshell.contact_line.matrix_files` for the formats.
+        """Model in a file, see `jbeamshell.bodies.matrix_files` for the formats.
 
         Parameters
         ----------
@@ -135,48 +138,61 @@ class StiffnessModel:
         held: ArrayLike | None = None,
         tangential: int = 1,
         normal: int = 2,
+        normals: ArrayLike | None = None,
+        elements: Iterable[ArrayLike] | None = None,
         tributary: ArrayLike | None = None,
     ) -> Substructure:
-        """Body on its contact line, everything else eliminated.
+        """Body on its contact, everything else eliminated.
 
         Parameters
         ----------
-        contact : (k, 2) node and X of the contact's nodes; those at one X move together, such as
-            the front and the back of a slice
+        contact : (k, 2) node and X of the nodes of a contact line; those at one X move together,
+            such as the front and the back of a slice.  Or (n, 4) node, X, Y and Z of a face's nodes
         pull : (k, 3) node, direction and force of a unit of the load that is cycled; its
             displacement is the one conjugate to it.  None for a body that is not pulled
         press : for each bolt or pressure, (k, 3) node, direction and force
         held : (k, 2) node and direction of supports that the matrix still has; may be empty
-        tangential, normal : directions along the contact and away from the body below
-        tributary : contact length of each X; None is half the way to its neighbours
+        tangential, normal : directions along a line and away from the body below
+        normals : (3,) or (n, 3) of a face, from the body below to the one above; along Z if left
+            out.  With elements, roughly
+        elements : (k, 3 or 4) nodes of each element of a face, which give areas and normals by
+            their shape functions, see `jbeamshell.face_surface`
+        tributary : contact length of each X, half the way to its neighbours if left out; or area of
+            each node of a face
 
         Raises
         ------
         InputError
             for a node or a direction that the model does not have, or that is no whole number; for
-            forces and lengths that are not finite; for a body with a negative or a loose mode
+            forces and lengths that are not finite; for a body with a negative or a loose mode; for
+            a support at a face that does not lie along a frame, or elements that are no mesh
         """
         model = self if held is None else self.without(held)
-        directions = {"tangential": tangential, "normal": normal}
-        for key, direction in directions.items():
-            require_count(key, direction, 1, DIRECTIONS)
-        require("normal", normal, normal != tangential, "must differ from tangential")
+        if np.ndim(contact) == 2 and np.shape(contact)[1] == 4:
+            directions = (tangential, normal) == (1, 2)
+            fix = "are those of a line: give the normals of the face"
+            require("tangential, normal", (tangential, normal), directions, fix)
+            place, turn, given = face_rows(model.dofs, contact, normals, elements, tributary)
+        else:
+            for key, value in (("normals", normals), ("elements", elements)):
+                require(key, value, value is None, "are those of a face: leave them out")
+            for key, direction in (("tangential", tangential), ("normal", normal)):
+                require_count(key, direction, 1, DIRECTIONS)
+            require("normal", normal, normal != tangential, "must differ from tangential")
+            place, given = line_rows(model.dofs, self.dofs, contact, (tangential, normal))
+            turn, given = None, given | {"tributary": tributary}
         row = {(int(a), int(b)): i for i, (a, b) in enumerate(model.dofs)}
-        nodes, x, group = _groups(contact)
-        model_nodes = set(self.dofs[:, 0].tolist())
-        for node in nodes:
-            fix = "is no node of the model: give nodes that have rows in the matrix"
-            require("contact", node, node in model_nodes, fix)
-        for key, direction in directions.items():
-            fix = "is a direction that no node of the contact has: name another, or free a node"
-            require(key, direction, any((node, direction) in row for node in nodes), fix)
-        place, fixed = _places(row, nodes, group, (tangential, normal))
         forces = np.column_stack(
             [nodal_forces("pull", [] if pull is None else pull, row)]
             + [nodal_forces(f"press[{i}]", table, row) for i, table in enumerate(press)]
         )
-        matrices = condensed_on(model.matrix, forces, place, 2 * x.size)
-        return Substructure(x, *matrices, tributary=tributary, fixed=fixed.ravel().tolist())
+        stiffness, loads, flexibility = condensed_on(
+            model.matrix, forces, place, len(given["fixed"])
+        )
+        if turn is not None:
+            stiffness, loads = turn @ (turn @ stiffness).T, turn @ loads
+        places = given.pop("places")
+        return Substructure(places, stiffness, loads, flexibility, **given)
 
     def without(self, held: ArrayLike) -> StiffnessModel:
         """Model without the rows of supports."""
@@ -217,7 +233,7 @@ class StiffnessModel:
         kept = np.isin(self.dofs[:, 0], wanted) & (self.dofs[:, 1] > MODAL)
         inside = int(np.sum(~kept))
         require_count("modes", modes, 0, max(inside - 1, 0))
-        factors = _factors(self.matrix[~kept][:, ~kept]) if inside else None
+        factors = factors_of(self.matrix[~kept][:, ~kept]) if inside else None
         stiffness, mass = reduced(self.matrix, self.mass, kept, factors, modes)
         number = np.max(self.dofs[:, 0]) + np.arange(1, modes + 1)
         rows = np.column_stack([number, np.full(modes, MODAL)])
@@ -236,107 +252,3 @@ def _symmetric(key: str, given: Any) -> scipy.sparse.csc_array:
     fix = "is not symmetric: give the whole matrix, or mirror the half that was written"
     require(key, f"max|K - K'| {apart:.3g}", apart <= SYMMETRIC * largest, fix)
     return 0.5 * (matrix + matrix.T)
-
-
-def _groups(contact: ArrayLike) -> tuple[list[int], NDArray[np.float64], NDArray[np.int64]]:
-    """Nodes of the contact, the rising places X, and the place of each node."""
-    table = table_of("contact", contact, 2, TABLE)
-    nodes = whole_numbers("contact", table[:, 0]).tolist()
-    require("contact", len(nodes), len(set(nodes)) == len(nodes), "names a node twice")
-    order = np.argsort(table[:, 1], kind="stable")
-    rising = table[order, 1]
-    begins = np.diff(rising, prepend=-np.inf) > SAME_PLACE * np.ptp(rising)
-    group = np.empty(len(nodes), int)
-    group[order] = np.cumsum(begins) - 1
-    x = rising[begins]
-    require("contact", x.size, x.size > 1, "needs nodes at two or more places X")
-    return nodes, x, group
-
-
-def _places(
-    row: dict[tuple[int, int], int],
-    nodes: list[int],
-    group: NDArray[np.int64],
-    directions: tuple[int, int],
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Place of each row (N,) on the contact, and True for the contact's fixed displacements (n, 2).
-
-    A place is -1 inside the body, and -2 where a support holds another node at the same X.
-    """
-    place, fixed = np.full(len(row), -1), np.zeros((np.max(group) + 1, 2), bool)
-    for side, direction in enumerate(directions):
-        for node, g in zip(nodes, group, strict=True):
-            fixed[g, side] |= (node, direction) not in row
-        for node, g in zip(nodes, group, strict=True):
-            if (node, direction) in row:
-                place[row[node, direction]] = -2 if fixed[g, side] else 2 * g + side
-    return place, fixed
-
-
-def condensed_on(
-    matrix: scipy.sparse.csc_array, forces: NDArray[Any], place: NDArray[np.int64], size: int
-) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Stiffness, forces and flexibility of the contact's displacements, ``size`` of them."""
-    on_line, inside = np.flatnonzero(place >= 0), np.flatnonzero(place == -1)
-    ties = scipy.sparse.csc_array(
-        (np.ones(on_line.size), (np.arange(on_line.size), place[on_line])),
-        shape=(on_line.size, size),
-    )
-    stiffness = (ties.T @ matrix[on_line][:, on_line] @ ties).toarray()
-    across = (matrix[inside][:, on_line] @ ties).toarray()
-    loads, forces = forces[inside], ties.T @ forces[on_line]
-    flexibility = np.zeros((forces.shape[1],) * 2)
-    if inside.size:
-        fields = _factors(matrix[inside][:, inside]).solve(np.hstack([across, loads]))
-        by_contact, by_loads = np.split(fields, [across.shape[1]], axis=1)
-        stiffness = stiffness - across.T @ by_contact
-        forces = forces - across.T @ by_loads
-        flexibility = loads.T @ by_loads
-    return 0.5 * (stiffness + stiffness.T), forces, 0.5 * (flexibility + flexibility.T)
-
-
-def nodal_forces(
-    key: str, table: ArrayLike, row: dict[tuple[int, int], int]
-) -> NDArray[np.float64]:
-    """Nodal forces (N,) of a table of node, direction and force."""
-    values = table_of(key, table, 3, FORCES)
-    forces = np.zeros(len(row))
-    places = whole_numbers(key, values[:, :2]).tolist()
-    for (node, direction), force in zip(places, values[:, 2], strict=True):
-        where = row.get((node, direction))
-        if where is None:
-            fix = "is not in the model: leave it out where a support holds it"
-            raise InputError(f"{key} = node {node}, direction {direction}: {fix}")
-        forces[where] += force
-    return forces
-
-
-def table_of(key: str, table: ArrayLike, columns: int, fix: str) -> NDArray[np.float64]:
-    """Rows of finite numbers of a table; none of an empty one."""
-    try:
-        values = np.asarray(table, float)
-    except (TypeError, ValueError):
-        raise InputError(f"{key} = {shown(table)}: is no table of numbers: {fix}") from None
-    values = values if values.size else np.zeros((0, columns))
-    require(key, values.shape, values.ndim == 2 and values.shape[1] == columns, fix)
-    finite = np.all(np.isfinite(values), axis=1)
-    require(key, values[~finite], bool(np.all(finite)), "holds NaN or infinity: " + fix)
-    return values
-
-
-def _factors(matrix: scipy.sparse.csc_array) -> SuperLU:
-    """Factors of what is eliminated, which must be positive definite."""
-    try:
-        factors = splu(
-            scipy.sparse.csc_matrix(matrix),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError:  # exactly singular
-        pivot = 0.0
-    else:
-        pivot = float(np.min(factors.U.diagonal()[factors.perm_c] / matrix.diagonal()))
-    fix = "a part moves freely or has a negative mode with the contact clamped: check the supports"
-    require("matrix", f"pivot {pivot:.3g} of its diagonal", pivot > LOST, fix)
-    return factors

@@ -4,9 +4,9 @@ The bodies are condensed to v (n, 3), the displacement of the upper nodes over t
 
     lambda = K v - f P,
 
-and the residual is lambda less the force of the contact law (`pair.contact_force`).  It has kinks
-and no other nonlinearity, so that Newton's method ends after a few iterations (Alart and Curnier
-1991); a step that does not lower the residual is shortened.
+and the residual is lambda less the force of the contact law (`face_law.contact_force`).  It has
+kinks and no other nonlinearity, so that Newton's method ends after a few iterations (Alart and
+Curnier 1991); a step that does not lower the residual is shortened.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from jbeamshell.contact_face.pair import Pairs, contact_force
+from jbeamshell.bodies.face_law import Pairs, contact_force
 
 TOLERANCE = 1e-11  # force out of balance over the largest load of a node
 ITERATIONS = 40

@@ -126,7 +126,7 @@ def relative(upper, lower, bolts):
         mixed[0, 0], mixed[1:, 1] = 1.0, bolts[: forces.shape[1] - 1]
         soft = mixed.T @ np.asarray(body.flexibility) @ mixed
         parts.append((np.asarray(body.stiffness), forces @ mixed, soft, np.flatnonzero(~stays)))
-    free = np.zeros(2 * upper.x.size, bool)
+    free = np.zeros(2 * upper.places.size, bool)
     for *_, places in parts:
         free[places] = True
     g = np.flatnonzero(free)
@@ -191,7 +191,7 @@ def brute_force(case):
     """Dissipation and secant stiffness of the last cycle, and the largest error of a step."""
     bolts = np.asarray(case["bolts"])
     k, f, soft, free = relative(case["upper"], case["lower"], bolts)
-    gap = np.broadcast_to(case["gap"], case["upper"].x.shape)
+    gap = np.broadcast_to(case["gap"], case["upper"].places.shape)
     friction, amplitude = case["friction"], case["amplitude"]
     grow, rise = (np.linspace(0, 1, count + 1)[1:] for count in (STEPS, STEPS // 2))
     pressing = np.column_stack([0 * grow, grow, grow, friction + 0 * grow])

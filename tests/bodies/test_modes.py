@@ -10,7 +10,7 @@ import scipy.linalg
 import scipy.optimize
 
 import jbeamshell as jb
-from tests.contact_face.bricks import box
+from tests.bodies.bricks import box
 
 LENGTH, HEIGHT = 60.0, 5.0
 
@@ -71,8 +71,8 @@ class TestModes:
         pressed = [
             part._replace(press=[np.column_stack([rows[:, 0], np.full(len(rows), 3), force])])
             for part, rows, force in (
-                (upper, upper.nodes, np.full(len(upper.nodes), -1.0)),
-                (lower, lower.nodes, np.full(len(lower.nodes), 1.0)),
+                (upper, upper.contact, np.full(len(upper.contact), -1.0)),
+                (lower, lower.contact, np.full(len(lower.contact), 1.0)),
             )
         ]
         bodies = jb.modal_bodies(*pressed, friction=0.2)
@@ -129,7 +129,7 @@ class TestModes:
     def test_a_fit_finds_friction_and_preload_again(self):
         # A crowned face closes further with the preload, which tells it from friction.
         upper, lower, _ = leaves()
-        gap = 2e-7 * (upper.nodes[:, 1] - 0.5 * LENGTH) ** 2
+        gap = 2e-7 * (upper.contact[:, 1] - 0.5 * LENGTH) ** 2
         bodies = jb.modal_bodies(upper, lower, friction=0.2, bolts=2e3, gap=gap)
         amplitudes = bodies.slides * np.geomspace(0.05, 1.5, 6)
 
@@ -195,4 +195,4 @@ class TestReduced:
 
 def loaded(part):
     """Nodes of the face and those that the bolt presses."""
-    return np.concatenate([part.nodes[:, 0], part.press[0][:, 0]]).astype(int)
+    return np.concatenate([part.contact[:, 0], part.press[0][:, 0]]).astype(int)

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from jbeamshell.bodies.tables import node_table
 from jbeamshell.common.checks import require, whole_numbers
 from jbeamshell.common.errors import InputError
-from jbeamshell.contact_line.stiffness_model import table_of
 
-NODES = "give rows of node, X, Y and Z"
 ELEMENTS = "give rows of the 3 or 4 nodes of each element, in turn around it"
 QUADRATIC = (
     "has nodes on its edges, whose corners bear nothing or pull under an even pressure: "
@@ -39,15 +38,6 @@ class Surface(NamedTuple):
 
     areas: NDArray[np.float64]
     normals: NDArray[np.float64]
-
-
-def node_table(nodes: ArrayLike) -> tuple[list[int], NDArray[np.float64]]:
-    """Numbers (n) and places (n, 3) of a table of nodes."""
-    table = table_of("nodes", nodes, 4, NODES)
-    numbers = whole_numbers("nodes", table[:, 0]).tolist()
-    fix = "names a node twice"
-    require("nodes", len(numbers), len(set(numbers)) == len(numbers) > 0, fix)
-    return numbers, table[:, 1:]
 
 
 def face_surface(
