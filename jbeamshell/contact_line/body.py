@@ -63,16 +63,17 @@ class Body(Tree):
 class Elimination(NamedTuple):
     """Elimination of the fields between the contact's, station by station, to find them again.
 
-    The right-hand sides are v and w of all stations, the end load, and the pressure.  The unknowns
+    The right-hand sides are v and w of all stations, the end load, and p pressures.  The unknowns
     are the steps of the fields to a station from the next one, and at both ends the fields.
 
     Attributes
     ----------
     inverse : (n-2, m-2, m-2) inverses of the Cholesky factors
-    sides : (n-2, m-2, 2n+2) right-hand sides, reduced
+    sides : (n-2, m-2, 2n+1+p) right-hand sides, reduced
     onwards : (n-2, m-2, m-2) coupling to the fields of the next station, reduced
-    first : (m-2, 2n+2), (m-2, m-2) fields of the first station from the sides and from its next one
-    last : (m-2, 2n+2) fields of the last station from the sides
+    first : (m-2, 2n+1+p), (m-2, m-2) fields of the first station from the sides and from its next
+    last : (m-2, 2n+1+p) fields of the last station from the sides
+    sizes : (p,) of the pressures that act as one
     """
 
     inverse: Array
@@ -80,14 +81,20 @@ class Elimination(NamedTuple):
     onwards: Array
     first: tuple[Array, Array]
     last: Array
+    sizes: Array
 
     @property
     def forgotten(self) -> Unknown:
         """Elimination by which the fields are not found again."""
         return Unknown.of(self.inverse.shape[0] + 2, self.inverse.shape[1] + 2)
 
+    def pressed(self, sizes: Array) -> Elimination:
+        """Elimination under pressures of some sizes (p,) that act as one."""
+        return self._replace(sizes=sizes)
+
     def recovered(self, factors: Array) -> Array:
-        """Fields (n, m-2, levels) from the right-hand sides' factors (2n+2, levels)."""
+        """Fields (n, m-2, levels) from factors (2n+2, levels) of v, w, end load and pressure."""
+        factors = jnp.concatenate([factors[:-1], self.sizes[:, None] * factors[-1:]])
 
         def back(after: Array, station: tuple[Array, ...]) -> tuple[Array, Array]:
             inverse, sides, onwards = station
@@ -121,6 +128,11 @@ class Unknown(NamedTuple):
         """The same."""
         return self
 
+    def pressed(self, sizes: Array) -> Unknown:
+        """The same."""
+        del sizes
+        return self
+
     def recovered(self, factors: Array) -> Array:
         """Fields (n, m-2, levels), see `Elimination.recovered`."""
         return jnp.broadcast_to(self.nothing[..., None], (*self.nothing.shape, factors.shape[1]))
@@ -132,7 +144,7 @@ class Line(NamedTuple):
     Attributes
     ----------
     elimination : what finds the eliminated fields again
-    hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
+    hessian : (2n+1+p, 2n+1+p) of the potential in v and w of all stations, end load and p pressures
     """
 
     elimination: Elimination
@@ -146,12 +158,13 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
     ----------
     form : energy of the section, m fields
     x : (n,) stations, increasing, the loaded end last; three or more
-    loads : (n,) nodal forces that press on the top face
+    loads : (n, p) nodal forces of p pressures on the top face
     far : conditions at the first station; where v and w of the contact are held is left to the
         caller
     last : conditions at the last station of each strip
     """
-    n, columns = x.size, 2 * x.size + 2
+    n, count = x.size, 1 + loads.shape[1]
+    columns = 2 * n + count
 
     def go(
         carry: tuple[Array, Array], station: tuple[Array, ...]
@@ -160,7 +173,7 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
         i, load, length = station
         start, _, across = (part[0] for part in form.element(length[None]))
         stays, follows = form.moved(length)
-        forces = forces + load * _in_last_column(form.press[2:], forces)
+        forces = forces + _in_last_columns(form.press[2:, None] * load, forces)
         contacts = jnp.concatenate([start[2:, :2], across[2:, :2]], axis=1)
         inverse = inverse_cholesky(before + start[2:, 2:])
         sides = inverse @ _add(forces, contacts, 2 * i)
@@ -171,24 +184,25 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
         return (before + whole - onwards.T @ onwards, forces), (inverse, sides, onwards)
 
     carry, first, hessian = _begin(form, x, loads[0], far)
-    hessian, parts = _wider(_wider(hessian, columns).T, columns), []
+    hessian, parts = _wider(_wider(hessian, columns, count).T, columns, count), []
     stations = (jnp.arange(1, n - 1), loads[1:-1], jnp.diff(x)[1:])
     # No station knows a contact node beyond its next one: the right-hand sides grow part by part.
-    count = PARTS if n > FEW else 1
-    for begin, stop in itertools.pairwise(np.linspace(0, n - 2, count + 1).astype(int)):
-        carry = carry[0], _wider(carry[1], 2 * stop + 6)
+    several = PARTS if n > FEW else 1
+    for begin, stop in itertools.pairwise(np.linspace(0, n - 2, several + 1).astype(int)):
+        carry = carry[0], _wider(carry[1], 2 * stop + 4 + count, count)
         carry, part = lax.scan(go, carry, tuple(values[begin:stop] for values in stations))
         parts.append(part)
-        hessian = hessian - _products(part[1], columns)
+        hessian = hessian - _products(part[1], columns, count)
     inverse, sides, onwards = (
         jnp.concatenate([part[0] for part in parts]),
-        jnp.concatenate([_wider(part[1], columns) for part in parts]),
+        jnp.concatenate([_wider(part[1], columns, count) for part in parts]),
         jnp.concatenate([part[2] for part in parts]),
     )
-    first, hessian = (_wider(first[0], columns), first[1]), hessian + _contacts(form, x, loads)
+    first = _wider(first[0], columns, count), first[1]
+    hessian, sizes = hessian + _contacts(form, x, loads), jnp.ones(loads.shape[1], x.dtype)
     ends = [_finish(form, loads[-1], carry, end) for end in last]
     return tuple(
-        Line(Elimination(inverse, sides, onwards, first, fields), hessian + change)
+        Line(Elimination(inverse, sides, onwards, first, fields, sizes), hessian + change)
         for fields, change in ends
     )
 
@@ -196,20 +210,24 @@ def eliminate(form: SectionForm, x: Array, loads: Array, far: End, *last: End) -
 def _begin(
     form: SectionForm, x: Array, load: Array, far: End
 ) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
-    """Elimination of the first station; the sides are v and w of two stations, load and pressure.
+    """Elimination of the first station; the sides are v and w of two stations, and the loads.
+
+    Parameters
+    ----------
+    load : (p,) nodal forces of the pressures
 
     Returns
     -------
-    carry : stiffness (m-2, m-2) of the second station's fields, and their sides (m-2, 6)
-    first : fields of the first station from the sides (m-2, 6) and from the next (m-2, m-2)
-    hessian : (6, 6) of the energy of the first station's fields in the sides
+    carry : stiffness (m-2, m-2) of the second station's fields, and their sides (m-2, 5 + p)
+    first : fields of the first station from the sides (m-2, 5 + p) and from the next (m-2, m-2)
+    hessian : (5 + p, 5 + p) of the energy of the first station's fields in the sides
     """
     start, end, across = (part[0] for part in form.element(x[1:2] - x[:1]))
     none = jnp.zeros_like(start[:, :1])
     forces = [none, none, across[:, :2], none, load * form.press[:, None]]
     fields, back, hessian = _of_end(start, jnp.concatenate(forces, axis=1), far, 0)
     onwards = back.T @ across[:, 2:]
-    sides = across.T @ fields + jnp.pad(end[:, :2], ((0, 0), (2, 2)))
+    sides = across.T @ fields + jnp.pad(end[:, :2], ((0, 0), (2, 1 + load.size)))
     carry = end[2:, 2:] - onwards.T @ onwards, sides[2:]
     return carry, (fields[2:], -(back @ onwards)[2:]), hessian
 
@@ -217,19 +235,20 @@ def _begin(
 def _finish(
     form: SectionForm, load: Array, carry: tuple[Array, Array], loaded: End
 ) -> tuple[Array, Array]:
-    """Elimination of the last station.
+    """Elimination of the last station, on which the pressures have forces (p,).
 
     Returns
     -------
-    last : (m-2, 2n+2) its fields from the sides
-    hessian : (2n+2, 2n+2) of the energy of its fields in the sides
+    last : (m-2, 2n+1+p) its fields from the sides
+    hessian : (2n+1+p, 2n+1+p) of the energy of its fields in the sides
     """
     before, sides = (jnp.pad(part, ((2, 0), (0, 0))) for part in carry)
-    ends = jnp.stack([-loaded.pull, load * form.press], axis=1)
-    forces = sides + jnp.pad(ends, ((0, 0), (sides.shape[1] - 2, 0)))
+    ends = jnp.column_stack([-loaded.pull, form.press[:, None] * load])
+    count = ends.shape[1]
+    forces = sides + _in_last_columns(ends, sides)
     before = jnp.pad(before, ((0, 0), (2, 0)))
-    fields, _, hessian = _of_end(before, forces, loaded, sides.shape[1] - 4)
-    return fields[2:], hessian.at[-2, -2].add(-loaded.softness)
+    fields, _, hessian = _of_end(before, forces, loaded, sides.shape[1] - count - 2)
+    return fields[2:], hessian.at[-count, -count].add(-loaded.softness)
 
 
 def _of_end(stiffness: Array, forces: Array, end: End, place: int) -> tuple[Array, Array, Array]:
@@ -264,19 +283,19 @@ def _add(sides: Array, block: Array, column: Array) -> Array:
     return lax.dynamic_update_slice(sides, old + block, (0, column))
 
 
-def _in_last_column(values: Array, sides: Array) -> Array:
-    """Sides with values in their last column and zeros elsewhere."""
-    return jnp.pad(values[:, None], ((0, 0), (sides.shape[1] - 1, 0)))
+def _in_last_columns(values: Array, sides: Array) -> Array:
+    """Sides with values in their last columns and zeros elsewhere."""
+    return jnp.pad(values, ((0, 0), (sides.shape[1] - values.shape[1], 0)))
 
 
-def _wider(sides: Array, columns: int) -> Array:
-    """Sides with empty columns before the last two, those of the loads."""
+def _wider(sides: Array, columns: int, count: int) -> Array:
+    """Sides with empty columns before the last ones, so many loads'."""
     empty = [(0, 0)] * (sides.ndim - 1) + [(0, columns - sides.shape[-1])]
-    return jnp.concatenate([jnp.pad(sides[..., :-2], empty), sides[..., -2:]], axis=-1)
+    return jnp.concatenate([jnp.pad(sides[..., :-count], empty), sides[..., -count:]], axis=-1)
 
 
 def _contacts(form: SectionForm, x: Array, loads: Array) -> Array:
-    """Stiffness (2n + 2, 2n + 2) of the elements among v and w, and the forces of the pressure.
+    """Stiffness (2n+1+p, 2n+1+p) of the elements among v and w, and the forces of the pressures.
 
     The parts of the fields of both ends are left out, which have conditions of their own.
     """
@@ -290,15 +309,16 @@ def _contacts(form: SectionForm, x: Array, loads: Array) -> Array:
     blocks = here * diagonal[:, None] + following * coupling[:, None]
     blocks = blocks + np.swapaxes(following, 0, 1) * jnp.swapaxes(coupling, 1, 2)
     stiffness = jnp.moveaxis(blocks, 2, 1).reshape(2 * n, 2 * n)
-    press = (jnp.where(inner, loads, 0.0)[:, None] * form.press[:2]).ravel()
-    sides = jnp.stack([jnp.zeros_like(press), press], axis=1)
-    return jnp.block([[stiffness, sides], [sides.T, jnp.zeros((2, 2), x.dtype)]])
+    inner_loads = jnp.where(inner[:, None], loads, 0.0)
+    press = (inner_loads[:, None] * form.press[:2, None]).reshape(2 * n, -1)
+    sides = jnp.column_stack([jnp.zeros(2 * n, x.dtype), press])
+    return jnp.block([[stiffness, sides], [sides.T, jnp.zeros((sides.shape[1],) * 2, x.dtype)]])
 
 
-def _products(sides: Array, columns: int) -> Array:
+def _products(sides: Array, columns: int, count: int) -> Array:
     """Sum of sides' sides over the stations and their fields, (columns, columns)."""
     sides = sides.reshape(-1, sides.shape[-1])
-    return _wider(_wider(sides.T @ sides, columns).T, columns).T
+    return _wider(_wider(sides.T @ sides, columns, count).T, columns, count).T
 
 
 def local_compliance(stiffness: Array, pull: Array) -> Array:

@@ -33,13 +33,26 @@ class Pair(NamedTuple):
     form : energy of the section of the member below, seen from its contact face
     elimination : of the fields of the member below
     upper, lower : (2n, 2n + 2) v and w of each member's stations from the relative v and w, the end
-        load and the pressure; those of the member below in its own frame
+        load and the pressure; those of the member below in its own frame.  Of `joined` the
+        pressures are p ones, see `pressed`
     """
 
     form: SectionForm
     elimination: Elimination | Unknown
     upper: Array
     lower: Array
+
+    def pressed(self, top: Array, bottom: Array) -> Pair:
+        """Pair under pressures of some sizes that act as one.
+
+        Parameters
+        ----------
+        top, bottom : sizes of the pressures on the upper and on the lower member
+        """
+        sizes = jnp.append(top, bottom)
+        upper, lower = (as_one(moves, sizes) for moves in (self.upper, self.lower))
+        below = self.elimination.pressed(bottom)
+        return self._replace(elimination=below, upper=upper, lower=lower)
 
     def above(self, movement: Array) -> Array:
         """Movement of the member above and its loads, (steps, 2n + 2), from the pair's."""
@@ -49,6 +62,12 @@ class Pair(NamedTuple):
         """Movement of the member below in its own frame and its loads, (steps, 2n + 2)."""
         loads = movement[:, -2:] * np.array([0.0, 1.0])
         return jnp.concatenate([movement @ self.lower.T, loads], axis=1)
+
+
+def as_one(matrix: Array, sizes: Array) -> Array:
+    """Matrix (rows, columns + 1) whose last columns (p) act as one, with some sizes (p,)."""
+    others = matrix.shape[1] - sizes.size
+    return jnp.column_stack([matrix[:, :others], matrix[:, others:] @ sizes])
 
 
 class Member(NamedTuple):
@@ -72,12 +91,20 @@ def joined(upper: Member, lower: Member) -> tuple[Pair, Array]:
     Returns
     -------
     pair : what finds both members again
-    hessian : (2n + 2, 2n + 2) of the pair's potential in the relative v and w, load and pressure
+    hessian : (2n+1+p, 2n+1+p) of the pair's potential in the relative v and w, the end load and
+        the pressures, first those on the upper member
     """
-    sign = jnp.append(jnp.tile(jnp.asarray(UNITS), upper.fixed.size // 2), jnp.ones(2))
-    below = lower.line.hessian * sign[:, None] * sign
-    hessian, q_1, q_2 = together(upper.line.hessian, below, upper.fixed, lower.fixed)
-    moves = q_1[:-2], (sign[:, None] * q_2)[:-2]
+    size, dtype = upper.fixed.size, upper.line.hessian.dtype
+    on_top, below = (member.line.hessian.shape[0] - size - 1 for member in (upper, lower))
+    total, both = size + 1 + on_top + below, []
+    # The pressures on the member below come after those on the one above.
+    for member, own in ((upper, np.arange(on_top)), (lower, on_top + np.arange(below))):
+        at = np.append(np.arange(size + 1), size + 1 + own)
+        both.append(jnp.zeros((total, total), dtype).at[np.ix_(at, at)].set(member.line.hessian))
+    sign = jnp.append(jnp.tile(jnp.asarray(UNITS), size // 2), jnp.ones(total - size))
+    below_seen = both[1] * sign[:, None] * sign
+    hessian, q_1, q_2 = together(both[0], below_seen, upper.fixed, lower.fixed)
+    moves = q_1[:size], (sign[:, None] * q_2)[:size]
     return Pair(lower.form, lower.line.elimination, *moves), hessian
 
 

@@ -21,9 +21,16 @@ from jbeamshell.contact_line.drives import (
     spring_energy,
     with_springs,
 )
-from jbeamshell.contact_line.kept import kept
+from jbeamshell.contact_line.kept import alike, alike_but_pressures, kept
 from jbeamshell.contact_line.pressures import Press, walk_with_pressures
-from jbeamshell.contact_line.strip import Strip, condensed, spring_stiffness, stays_flat
+from jbeamshell.contact_line.strip import (
+    Strip,
+    Unpressed,
+    spring_stiffness,
+    stays_flat,
+    unpressed,
+)
+from jbeamshell.contact_line.strip import pressed as pressed_strip
 from jbeamshell.contact_line.turns import Turns, known_turns, turns_of, turns_of_cycles
 from jbeamshell.contact_line.walk import Level, walk
 from jbeamshell.history.history import History
@@ -123,13 +130,31 @@ def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
     return turns_of(targets) if is_traced(targets) else known_turns(np.asarray(targets))
 
 
-@kept
 @Small
-def strip_of(scene: Scene) -> Strip:
-    """Strip of a scene on its contact line."""
-    strip = condensed(scene, scene.plan.nodes)
+def _unpressed(scene: Scene) -> Unpressed:
+    """Strip of a scene on its contact line, condensed for pressures of any size."""
+    strip = unpressed(scene, scene.plan.nodes)
     no_masses = strip.form.masses[:0]  # of no use without inertia, and slow to compile
     return strip._replace(form=strip.form._replace(masses=no_masses))
+
+
+@Small
+def _pressed(inputs: tuple[Scene, Unpressed]) -> Strip:
+    """Strip of a scene, pressed down."""
+    return pressed_strip(*inputs)
+
+
+unpressed_of = kept(_unpressed, alike_but_pressures)
+
+
+def _strip_of(scene: Scene) -> Strip:
+    """Strip of a scene on its contact line."""
+    strip = unpressed_of(scene)
+    # What finds the fields above the contact is large, and goes past the program.
+    return _pressed((scene, strip.of_contact)).recovered_by(strip, scene)
+
+
+strip_of = kept(_strip_of, alike)
 
 
 @Small

@@ -12,7 +12,7 @@ from jbeamshell.contact_line import entry
 from jbeamshell.contact_line.assembly import press_roughly
 from jbeamshell.contact_line.body import Body, Elimination, Unknown, eliminate
 from jbeamshell.contact_line.ends import end_section
-from jbeamshell.contact_line.pair import Member, Pair, joined, with_shanks
+from jbeamshell.contact_line.pair import Member, Pair, as_one, joined, with_shanks
 from jbeamshell.contact_line.pressing import press as press_down
 from jbeamshell.contact_line.section import section_form
 from jbeamshell.mechanics import elements
@@ -36,13 +36,39 @@ class Members(NamedTuple):
     Attributes
     ----------
     elimination : what finds the fields above the contact again
-    hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure
+    hessian : (2n+2, 2n+2) of the potential in v and w of all stations, end load and pressure; of
+        members that are not `pressed` yet the pressures are several
     pair : second member of a lap joint; v, w and hessian are then relative to it
     """
 
     elimination: Elimination | Unknown
     hessian: Array
     pair: Pair | None = None
+
+    def pressed(self, top: Array, bottom: Array, up: Array) -> Members:
+        """Members under pressures of some sizes that act as one.
+
+        Parameters
+        ----------
+        top, bottom : sizes of the pressures on both faces, or members
+        up : (n,) nodal forces of the latter, on the contact line of a strip alone
+        """
+        elimination, pair = self.elimination.pressed(top), self.pair
+        sizes = top if pair is None else jnp.append(top, bottom)
+        hessian = as_one(as_one(self.hessian, sizes).T, sizes)
+        if pair is None:
+            lift = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
+            from_below = lift[:, None] * np.eye(lift.size)[-1]
+            return Members(elimination, hessian - from_below - from_below.T)
+        return Members(elimination, hessian, pair.pressed(top, bottom))
+
+    def recovered_by(self, members: Members, scene: Scene) -> Members:
+        """Members whose fields are found as those of others, of the same strip but not pressed."""
+        top, bottom = _sizes(scene)
+        pair = self.pair
+        if pair is not None and members.pair is not None:
+            pair = pair._replace(elimination=members.pair.elimination.pressed(bottom))
+        return self._replace(elimination=members.elimination.pressed(top), pair=pair)
 
     @property
     def of_contact(self) -> Members:
@@ -82,14 +108,62 @@ class Strip(NamedTuple):
         """Strip without what finds the fields above the contact again: they are NaN."""
         return self._replace(pressed=self.pressed.of_contact, loaded=self.loaded.of_contact)
 
+    def recovered_by(self, strip: Unpressed, scene: Scene) -> Strip:
+        """Strip whose fields above the contact are found as those of an unpressed one."""
+        pressed = self.pressed.recovered_by(strip.under_pressure, scene)
+        loaded = self.loaded.recovered_by(strip.under_load, scene)
+        return self._replace(pressed=pressed, loaded=loaded)
+
+
+class Unpressed(NamedTuple):
+    """Strip of a scene, condensed for pressures of any size.
+
+    Attributes
+    ----------
+    form : energy of the section
+    x : (n,) stations from the far end
+    top, bottom : (n, p) nodal forces of each row of both pressures, its size 1
+    under_pressure, under_load : members while they are pressed, and while they are loaded
+    """
+
+    form: SectionForm
+    x: Array
+    top: Array
+    bottom: Array
+    under_pressure: Members
+    under_load: Members
+
+    @property
+    def of_contact(self) -> Unpressed:
+        """Strip without what finds the fields above the contact again."""
+        parts = self.under_pressure.of_contact, self.under_load.of_contact
+        return self._replace(under_pressure=parts[0], under_load=parts[1])
+
 
 def condensed(scene: Scene, nodes: int) -> Strip:
     """Strip of a scene as its condensed section, or as plane elasticity, on its contact nodes."""
-    form, x = section_form(scene), stations(scene, nodes)
-    down, up = pressing(scene, x)
-    tributary = elements.tributary_lengths(RULE, x)
+    return pressed(scene, unpressed(scene, nodes))
+
+
+def unpressed(scene: Scene, nodes: int) -> Unpressed:
+    """Strip of a scene, condensed for pressures of any size."""
+    form, x, contact = section_form(scene), stations(scene, nodes), scene.contact
+    top, bottom = (_rows(x, face) for face in (contact.pressure, contact.bottom_pressure))
     alone = scene.member.support == "none"
-    under_pressure, under_load = (_alone if alone else _joint)(scene, form, x, down, up)
+    return Unpressed(
+        form, x, top, bottom, *(_alone if alone else _joint)(scene, form, x, top, bottom)
+    )
+
+
+def pressed(scene: Scene, strip: Unpressed) -> Strip:
+    """Strip under a scene's pressures, condensed for its other numbers."""
+    form, x = strip.form, strip.x
+    top, bottom = _sizes(scene)
+    down, up = strip.top @ top, strip.bottom @ bottom
+    tributary = elements.tributary_lengths(RULE, x)
+    under_pressure, under_load = (
+        members.pressed(top, bottom, up) for members in (strip.under_pressure, strip.under_load)
+    )
     gap = initial_gap(scene, x)
     last = 2 * x.size - 2
     v = slice(last, 0 if "v" in FAR_ENDS[scene.strip.far_end] else None, -2)
@@ -133,34 +207,35 @@ def condensed(scene: Scene, nodes: int) -> Strip:
 
 
 def _alone(
-    scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
+    scene: Scene, form: SectionForm, x: Array, top: Array, bottom: Array
 ) -> tuple[Members, Members]:
-    """Strip on a rigid base, under its pressures and under its load."""
-    lift = jnp.pad(jnp.stack([jnp.zeros_like(up), up], axis=1).ravel(), (0, 2))
-    from_below = lift[:, None] * np.eye(lift.size)[-1]
+    """Strip on a rigid base, while it is pressed and while it is loaded."""
+    del bottom  # what lifts it acts on its contact line itself
     ends = [entry.loaded_end(scene, form, mounted).end for mounted in entry.states(scene)]
-    members = [
-        Members(line.elimination, line.hessian - from_below - from_below.T, None)
-        for line in eliminate(form, x, down, entry.far_end(scene, form), *ends)
-    ]
+    lines = eliminate(form, x, top, entry.far_end(scene, form), *ends)
+    members = [Members(line.elimination, line.hessian) for line in lines]
     return members[0], members[-1]
 
 
 def _joint(
-    scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
+    scene: Scene, form: SectionForm, x: Array, top: Array, bottom: Array
 ) -> tuple[Members, Members]:
-    """Both members of a lap joint, under the pressures and under the load."""
-    members = []
-    for upper, lower, stretch in lap_members(scene, form, x, down, up):
+    """Both members of a lap joint, while they are pressed and while they are loaded."""
+    members, load = [], 2 * x.size
+    for upper, lower, stretch in lap_members(scene, form, x, top, bottom):
         pair, hessian = joined(upper, lower)
-        members.append(Members(upper.line.elimination, hessian.at[-2, -2].add(stretch), pair))
+        members.append(Members(upper.line.elimination, hessian.at[load, load].add(stretch), pair))
     return members[0], members[-1]
 
 
 def lap_members(
-    scene: Scene, form: SectionForm, x: Array, down: Array, up: Array
+    scene: Scene, form: SectionForm, x: Array, top: Array, bottom: Array
 ) -> list[tuple[Member, Member, Array]]:
     """Members of a lap joint under the pressures, and under the load if they are mounted then.
+
+    Parameters
+    ----------
+    top, bottom : (n, p) nodal forces of the pressures on both
 
     Returns
     -------
@@ -179,14 +254,14 @@ def lap_members(
     states = entry.states(scene)
     entering = [entry.loaded_end(scene, upper_form, mounted) for mounted in states]
     uppers = eliminate(
-        upper_form, x, down, end_section(upper_form), *(held.end for held in entering)
+        upper_form, x, top, end_section(upper_form), *(held.end for held in entering)
     )
     members = []
     for mounted, held, upper in zip(states, entering, uppers, strict=True):
         leaving, stretch = entry.leaving_end(scene, below, pull, flat, mounted)
         fixed = np.append(leaving.fixed, free).reshape(n, 2) | [False, flat]
         fixed[-1, 1] |= not mounted and not rolls  # else it would turn
-        (lower,) = eliminate(below, x, up, leaving.end, end_section(below))
+        (lower,) = eliminate(below, x, bottom, leaving.end, end_section(below))
         above = Member(upper_form, upper, np.append(free, held.fixed))
         members.append((above, Member(below, lower, fixed.ravel()), stretch))
     return members
@@ -220,6 +295,22 @@ def loaded(form: SectionForm, load: Load) -> SectionForm:
     if load.kind == "moment":
         return form._replace(pull=form.turn)
     return form if load.arm is None else form._replace(pull=form.pull - load.arm * form.turn)
+
+
+def _sizes(scene: Scene) -> tuple[Array, Array]:
+    """Sizes (p,) of the rows of the pressures on both faces."""
+    faces = scene.contact.pressure, scene.contact.bottom_pressure
+    top, bottom = (face[:, 1] if face.ndim else face[None] for face in faces)
+    return top, bottom
+
+
+def _rows(x: Array, pressure: Array) -> Array:
+    """Nodal forces (n, p) of the rows of a pressure, each of size 1."""
+    if pressure.ndim == 0:
+        return elements.nodal_loads(RULE, x, jnp.ones((), x.dtype))[:, None]
+    places, units = pressure[:, 0], np.eye(len(pressure))
+    tables = [jnp.stack([places, jnp.asarray(unit, x.dtype)], axis=1) for unit in units]
+    return jnp.stack([elements.nodal_loads(RULE, x, table) for table in tables], axis=1)
 
 
 def pressing(scene: Scene, x: Array) -> tuple[Array, Array]:

@@ -48,7 +48,7 @@ def potentials(scene):
     """Stations, and of both members of a lap joint the Hessian and what is held."""
     x = stations(scene, scene.plan.nodes)
     down, up = pressing(scene, x)
-    upper, lower, _ = lap_members(scene, section_form(scene), x, down, up)[-1]
+    upper, lower, _ = lap_members(scene, section_form(scene), x, down[:, None], up[:, None])[-1]
     return x, (upper.line.hessian, upper.fixed), (lower.line.hessian, lower.fixed)
 
 

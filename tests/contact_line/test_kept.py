@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.contact_line.kept import kept
+from jbeamshell.contact_line.kept import alike, alike_but_pressures, kept
 
 PLANE = jb.Scene().replace({"model.section": "plane", "model.nodes": 17})
 LAP = {"strip.far_end": "free", "member.support": "rolling"}
@@ -20,7 +20,7 @@ def counted():
         built.append(scene)
         return scene
 
-    return kept(build), built
+    return kept(build, alike), built
 
 
 @pytest.mark.parametrize(
@@ -52,6 +52,38 @@ def test_a_joint_that_is_pressed_with_friction_depends_on_it(counted):
         found(joint)
         found(joint.replace({"contact.friction": 0.3}))
         assert len(built) == builds
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "builds"),
+    [
+        ("contact.pressure", [10.0, 9.0, 4.0], 1),
+        ("contact.pressure", [[[0.0, 1.0], [2.0, 3.0]], [[0.0, 5.0], [2.0, 2.0]]], 1),
+        ("contact.pressure", [[[0.0, 1.0], [2.0, 3.0]], [[0.5, 1.0], [2.0, 3.0]]], 2),
+        ("contact.bolts", [[[0.6, 4.0, 0.3]], [[0.6, 9.0, 0.3]]], 1),
+        ("contact.bolts", [[[0.6, 4.0, 0.3]], [[0.7, 4.0, 0.3]]], 2),
+    ],
+    ids=str,
+)
+def test_the_sizes_of_pressures_are_of_no_matter_to_what_is_condensed(key, values, builds):
+    built = []
+    found = kept(lambda scene: built.append(scene), alike_but_pressures)
+    for value in values:
+        found(PLANE.replace(LAP | {key: value}))
+    assert len(built) == builds
+
+
+def test_a_bolts_force_gives_what_a_joint_that_was_never_seen_gives():
+    joint = PLANE.replace(LAP | {"contact.bolts": [[0.6, 8.0, 0.4], [1.4, 8.0, 0.4]]})
+    jb.solve(joint, throw=False)
+    other = np.array([[0.6, 12.0, 0.4], [1.4, 5.0, 0.4]])
+    again = jb.solve(joint.replace({"contact.bolts": other}), throw=False)
+    fresh = jb.response(joint, ["contact.bolts"], ["dissipation", "secant_stiffness"])(other)
+    for name in ("dissipation", "secant_stiffness"):
+        assert float(getattr(again, name)) == pytest.approx(float(fresh[name]), rel=1e-8)
+    assert np.all(np.isfinite(again.fields[-1]))
+    force = np.sum(again.load)
+    assert force == pytest.approx(17.0, rel=1e-12)
 
 
 def test_other_sections_and_traced_scenes_are_built_each_time(counted):

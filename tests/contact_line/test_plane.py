@@ -82,7 +82,7 @@ class TestBody:
         known = np.linalg.solve(whole[np.ix_(gone, gone)], whole[np.ix_(gone, kept)])
         schur = whole[np.ix_(kept, kept)] - whole[np.ix_(kept, gone)] @ known
         far, loaded = end_section(form, "held"), end_section(form)
-        ((elimination, found),) = strip.eliminate(form, x, loads, far, loaded)
+        ((elimination, found),) = strip.eliminate(form, x, loads[:, None], far, loaded)
         np.testing.assert_allclose(found, schur, atol=1e-10 * np.abs(schur[:8, :8]).max())
         given = np.random.default_rng(0).normal(size=(2 * n + 2, 3))
         recovered = np.zeros((n * m, 3))

@@ -23,7 +23,7 @@ def layer(section, eta, side, nodes=41):
     pull = jnp.zeros_like(form.pull).at[1].set(0.5 * side)
     form = form._replace(pull=pull)
     ends = end_section(form, "guided", level=True), end_section(form)
-    (made,) = eliminate(form, x, jnp.asarray(10.0 * weights), *ends)
+    (made,) = eliminate(form, x, jnp.asarray(10.0 * weights)[:, None], *ends)
     sign = np.append(np.tile([1.0, side], nodes), [1.0, 1.0])
     hessian = (np.asarray(made.hessian) * sign[:, None] * sign)[2:, 2:]  # without the clamped node
     return jb.Substructure(x[1:], hessian[:-2, :-2], -hessian[:-2, -2:], -hessian[-2:, -2:])
