@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import math
 import textwrap
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from jax import Array
 
@@ -19,7 +19,7 @@ from jbeamshell.mechanics.elements import ORDER
 from jbeamshell.mechanics.friction import LAWS
 from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES
 from jbeamshell.mechanics.kinematics import KINEMATICS
-from jbeamshell.scene.rows import AUTO, Key, Part, count, number, rows, setting, word
+from jbeamshell.scene.rows import AUTO, Given, Key, Part, count, number, rows, setting, word
 from jbeamshell.scene.sections import SECTIONS
 
 FAR_ENDS = {"guided": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held at X = 0
@@ -49,12 +49,17 @@ class StripKeys(Part):
     heading: ClassVar[str] = "strip"
 
     length: Array = number(2.0, "Length L of the strip.", symbol="L", unit="length")
-    height_ratio: Array = number(
-        0.1126, "Half height over half the length, eta = H/(L/2).", symbol=r"\eta"
+    given_height: Given = number(
+        0.1126,
+        "Half height over half the length, eta = H/(L/2).",
+        name="height_ratio",
+        left_out=None,
+        symbol=r"\eta",
     )
-    axial_stiffness: Array | None = number(
+    given_stiffness: Given | None = number(
         3.4e4,
         "Stretching stiffness E' 2H; E' = E/(1-nu^2) in plane strain, E in plane stress.",
+        name="axial_stiffness",
         left_out=None,
         symbol="E' 2H",
         unit="force/width",
@@ -244,7 +249,7 @@ class MemberKeys(Part):
     )
     axial_stiffness: Array | None = number(
         None,
-        "Its stretching stiffness E' 2H; none is that of the strip's material.",
+        "Its stretching stiffness E' 2H; none is by the strip's E if given, else by its E'.",
         symbol="(E' 2H)_2",
         unit="force/width",
     )
@@ -311,13 +316,13 @@ class MemberKeys(Part):
     )
 
 
-# Keys that are no field of their own: they set, or read, a field in another form.
+# Keys that are no row of a field: they say what a field holds in another form.
 INDIRECT = (
     Key(
         "strip.half_height",
         "number",
         None,
-        "Half height H; sets the height ratio.",
+        "Half height H, in place of the height ratio.",
         symbol="H",
         unit="length",
         through="strip.height_ratio",
@@ -326,7 +331,7 @@ INDIRECT = (
         "strip.youngs_modulus",
         "number",
         None,
-        "Young's modulus E; sets the stretching stiffness.",
+        "Young's modulus E, in place of the stretching stiffness.",
         symbol="E",
         unit="stress",
         through="strip.axial_stiffness",
@@ -360,8 +365,9 @@ TABLE: dict[str, Key] = {}
 for _part in (StripKeys, ContactKeys, LoadKeys, ModelKeys, MemberKeys):
     _indirect = (row for row in INDIRECT if row.name.startswith(f"{_part.heading}."))
     TABLE |= {row.name: row for row in (*rows(_part).values(), *_indirect)}
-# Keys that set a field through another number, in the order in which they apply.
+# Keys that say the same thing as another one.
 DERIVED = {row.name: row.through for row in INDIRECT if row.through}
+TWINS = DERIVED | {through: name for name, through in DERIVED.items()}
 KEYS = tuple(TABLE)
 NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
 # Keys of old files, with what is to be done about them.
@@ -408,6 +414,13 @@ def check_key(key: str) -> None:
         matches = difflib.get_close_matches(key, KEYS, 1)
         hint = f"did you mean {matches[0]!r}?" if matches else f"keys are {', '.join(KEYS)}"
         raise InputError(f"unknown key {key!r}: {hint}")
+
+
+def leaf_of(key: str, value: Any) -> Array:
+    """Leaf of a number of the scene, checked."""
+    number: Array = TABLE[key].convert(value)
+    TABLE[key].check(number)
+    return number
 
 
 def unit_of(key: str, load: LoadKeys) -> str:

@@ -9,7 +9,8 @@ made.
 from __future__ import annotations
 
 import textwrap
-from typing import cast
+from collections.abc import Callable, Collection
+from typing import Any, Self, cast
 
 import equinox as eqx
 import jax
@@ -20,10 +21,11 @@ from jax import Array
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.elements import ORDER, table_steps
 from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
-from jbeamshell.mechanics.homogeneous import shear_modulus, youngs_modulus
+from jbeamshell.mechanics.homogeneous import plane_modulus, shear_modulus, youngs_modulus
 from jbeamshell.mechanics.laminate import Laminate
 from jbeamshell.scene.keys import (
     TABLE,
+    TWINS,
     ContactKeys,
     LoadKeys,
     MemberKeys,
@@ -31,26 +33,63 @@ from jbeamshell.scene.keys import (
     Part,
     StripKeys,
     key_table,
+    leaf_of,
 )
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.pressure import check_gap, check_pressure, pressure_values
-from jbeamshell.scene.rows import AUTO, Key
+from jbeamshell.scene.rows import AUTO, Given, Key
+
+# Fields of a `Strip` that hold a `Given`, by both keys that it may be given by.
+HOLDERS = {
+    "strip.height_ratio": "given_height",
+    "strip.half_height": "given_height",
+    "strip.axial_stiffness": "given_stiffness",
+    "strip.youngs_modulus": "given_stiffness",
+}
+
+
+def follows(key: str, numbers: Callable[[str], Any], plane: str) -> Any:
+    """Number of a key of `HOLDERS` where its twin is given; any shape, traced or not.
+
+    Parameters
+    ----------
+    key : dotted key
+    numbers : values by dotted key
+    plane : "strain" or "stress"
+    """
+    if key == "strip.height_ratio":
+        return 2.0 * numbers("strip.half_height") / numbers("strip.length")
+    if key == "strip.half_height":
+        return 0.5 * numbers("strip.height_ratio") * numbers("strip.length")
+    height, nu = 2.0 * numbers("strip.half_height"), numbers("strip.poisson_ratio")
+    if key == "strip.axial_stiffness":
+        return plane_modulus(numbers("strip.youngs_modulus"), nu, plane) * height
+    return youngs_modulus(numbers("strip.axial_stiffness") / height, nu, plane)
 
 
 class Strip(StripKeys):
     """Geometry and material of the strip.
 
-    With ``layers`` there is no ``axial_stiffness`` and no ``poisson_ratio``: they are None.
+    Of ``height_ratio`` and ``half_height`` one is given, the last one that was set, and the other
+    one follows.  So it is with ``axial_stiffness`` and ``youngs_modulus``.  With ``layers`` there
+    is no stiffness and no ``poisson_ratio``: they are None.
     """
 
     def __post_init__(self) -> None:
-        for name in ("axial_stiffness", "poisson_ratio"):
-            key, value = TABLE[f"strip.{name}"], getattr(self, name)
-            if self.layers is not None:
-                fix = "strip.layers say it already; leave it out"
-                require(key.name, value, value is None, fix)
-            elif value is None:
-                setattr(self, name, key.default)
+        stiffness = self.given_stiffness
+        if self.layers is not None:
+            fix = "strip.layers say it already; leave it out"
+            if stiffness is not None:
+                require(stiffness.key, stiffness.value, False, fix)
+            nu = self.poisson_ratio
+            require("strip.poisson_ratio", nu, nu is None, fix)
+        else:
+            if stiffness is None:
+                self.given_stiffness = _default("strip.axial_stiffness")
+            if self.poisson_ratio is None:
+                self.poisson_ratio = TABLE["strip.poisson_ratio"].default
+        if self.given_height is None:
+            self.given_height = _default("strip.height_ratio")
         super().__post_init__()
         curvature = self.curvature
         if (
@@ -64,10 +103,60 @@ class Strip(StripKeys):
         if self.layers is not None:
             check_layers(self.layers, 2.0 * self.half_height, self.plane)
 
+    def changed(self, **values: Any) -> Self:
+        for key, holder in HOLDERS.items():
+            name = key.removeprefix("strip.")
+            if name in values:
+                values[holder] = Given(key, leaf_of(key, values.pop(name)))
+        if values.get("layers") is not None:
+            # The layers give the stiffness and nu; the strip refuses both being given.
+            values = {"given_stiffness": None, "poisson_ratio": None} | values
+        return super().changed(**values)
+
+    @property
+    def said(self) -> set[str]:
+        """Keys of `HOLDERS` that are given."""
+        holders = self.given_height, self.given_stiffness
+        return {given.key for given in holders if given is not None}
+
+    def derives(self, key: str, others: Collection[str] = ()) -> bool:
+        """True if the number of a key follows from its twin.
+
+        Parameters
+        ----------
+        key : dotted key
+        others : keys whose numbers are given in place of the strip's
+        """
+        return key in HOLDERS and (TWINS[key] in others or TWINS[key] in self.said)
+
+    def _number(self, key: str) -> Any:
+        """Number of a key, as it was given or as it follows; None for a stiffness of layers."""
+        if key not in HOLDERS:
+            return getattr(self, key.removeprefix("strip."))
+        given: Given | None = getattr(self, HOLDERS[key])
+        if given is None:
+            return None
+        return given.value if given.key == key else follows(key, self._number, self.plane)
+
+    @property
+    def height_ratio(self) -> Array:
+        """Half height over half the length, eta = H/(L/2)."""
+        return cast(Array, self._number("strip.height_ratio"))
+
     @property
     def half_height(self) -> Array:
         """Half height H, length."""
-        return 0.5 * self.height_ratio * self.length
+        return cast(Array, self._number("strip.half_height"))
+
+    @property
+    def axial_stiffness(self) -> Array | None:
+        """Stretching stiffness E' 2H, force per unit width; None when there are layers."""
+        return cast(Array | None, self._number("strip.axial_stiffness"))
+
+    @property
+    def youngs_modulus(self) -> Array | None:
+        """Young's modulus E, stress; None when there are layers."""
+        return cast(Array | None, self._number("strip.youngs_modulus"))
 
     @property
     def section(self) -> Laminate | None:
@@ -86,14 +175,10 @@ class Strip(StripKeys):
     @property
     def plane_modulus(self) -> Array:
         """Plane modulus E' (of the mean stiffness where there are layers), stress."""
+        given = self.given_stiffness
+        if given is not None and given.key == "strip.youngs_modulus":
+            return cast(Array, plane_modulus(given.value, self.poisson_ratio, self.plane))
         return self.stretching_stiffness / (2.0 * self.half_height)
-
-    @property
-    def youngs_modulus(self) -> Array | None:
-        """Young's modulus E, stress; None when there are layers."""
-        if self.poisson_ratio is None:
-            return None
-        return youngs_modulus(self.plane_modulus, self.poisson_ratio, self.plane)
 
     @property
     def shear_modulus(self) -> Array:
@@ -101,6 +186,10 @@ class Strip(StripKeys):
         if self.section is not None:
             return self.section.mean_shear_modulus
         return shear_modulus(self.plane_modulus, cast(Array, self.poisson_ratio), self.plane)
+
+
+def _default(key: str) -> Given:
+    return Given(key, leaf_of(key, TABLE[key].default))
 
 
 class Member(MemberKeys):
@@ -120,23 +209,19 @@ class Member(MemberKeys):
     def beside(self, strip: Strip) -> Strip:
         """Member as a strip whose contact is its bottom face; what it leaves out is the strip's."""
         layered = self.layers is not None
-        ratio = strip.height_ratio if self.height_ratio is None else self.height_ratio
         stiffness, nu = self.axial_stiffness, self.poisson_ratio
         layers = self.layers if layered or stiffness is not None or nu is not None else strip.layers
+        values: dict[str, Any] = {"layers": layers, "overhang": None, "curvature": None}
+        if self.height_ratio is not None:
+            values["height_ratio"] = self.height_ratio
         if layers is None:
-            height = ratio * strip.length
-            stiffness = strip.plane_modulus * height if stiffness is None else stiffness
-            nu = strip.poisson_ratio if nu is None else nu
-        return Strip(
-            length=strip.length,
-            height_ratio=ratio,
-            axial_stiffness=stiffness,
-            poisson_ratio=nu,
-            kappa_s=strip.kappa_s,
-            far_end="guided",
-            layers=layers,
-            plane=strip.plane,
-        )
+            values["poisson_ratio"] = strip.poisson_ratio if nu is None else nu
+            if stiffness is None and "strip.youngs_modulus" not in strip.said:
+                ratio = values.get("height_ratio", strip.height_ratio)
+                stiffness = strip.plane_modulus * ratio * strip.length
+            if stiffness is not None:
+                values["axial_stiffness"] = stiffness
+        return strip.changed(far_end="guided", **values)
 
 
 class Contact(ContactKeys):

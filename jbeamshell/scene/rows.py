@@ -5,11 +5,12 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import equinox as eqx
 import jax
 import numpy as np
+from jax import Array
 
 from jbeamshell.common.checks import (
     NOT_NEGATIVE,
@@ -139,6 +140,19 @@ class Key:
         return ",".join(self.default) if isinstance(self.default, tuple) else str(self.default)
 
 
+class Given(Tree):
+    """Number that was given, of two keys that say the same thing; the other one follows from it.
+
+    Attributes
+    ----------
+    key : dotted key, such as "strip.half_height"
+    value : its number
+    """
+
+    key: str = eqx.field(static=True)
+    value: Array
+
+
 def number(default: float | None, sentence: str, *, left_out: Any = (), **facts: Any) -> Any:
     """Field and row of a number of the scene.
 
@@ -147,7 +161,7 @@ def number(default: float | None, sentence: str, *, left_out: Any = (), **facts:
     default : value of the standard strip
     sentence : meaning
     left_out : value of the field when it is not given, if that is not the default
-    **facts : further entries of the `Key`
+    **facts : further entries of the `Key`; its name is the field's, unless the field is a `Given`
     """
     return _field("number", default, sentence, default if left_out == () else left_out, facts)
 
@@ -172,7 +186,7 @@ def word(default: Any, choices: Any, sentence: str, **facts: Any) -> Any:
 def _field(
     kind: str, default: Any, sentence: str, value: Any, facts: Any, static: bool = False
 ) -> Any:
-    row = Key("", kind, default, sentence, **facts)
+    row = Key(facts.pop("name", ""), kind, default, sentence, **facts)
     return eqx.field(default=value, static=static, metadata={"row": row})
 
 
@@ -183,6 +197,8 @@ class Part(Tree):
 
     def __post_init__(self) -> None:
         for name, key in rows(type(self)).items():
+            if name not in self.__dataclass_fields__:
+                continue  # a `Given`, which was checked when it was made
             value = getattr(self, name)
             if value is None and getattr(type(self), name) is None:
                 continue  # None is what the field holds when it is not given
@@ -193,12 +209,19 @@ class Part(Tree):
     def __check_init__(self) -> None:
         """Raise `InputError` for values that do not go together."""
 
+    def changed(self, **values: Any) -> Self:
+        """Copy with other values of its keys."""
+        return dataclasses.replace(self, **values)
+
 
 @functools.cache
 def rows(part: type[Part]) -> dict[str, Key]:
-    """Rows of a part by the names of its fields."""
-    return {
-        field.name: dataclasses.replace(field.metadata["row"], name=f"{part.heading}.{field.name}")
+    """Rows of a part by the names of its fields, or of what is `Given`."""
+    named = {
+        field.metadata["row"].name or field.name: field.metadata["row"]
         for field in dataclasses.fields(part)
         if "row" in field.metadata
+    }
+    return {
+        name: dataclasses.replace(row, name=f"{part.heading}.{name}") for name, row in named.items()
     }
