@@ -51,4 +51,5 @@ def alike(scene: Scene) -> Scene:
     model, contact = scene.model.but(tolerance=1.0), scene.contact
     if scene.member.assembly != "frictional":
         contact = contact.but(friction=none)
-    return scene.but(load=load, contact=contact, model=model, plan=scene.plan._replace(steps=1))
+    parts = {"strip": scene.strip.in_one_form(), "load": load, "contact": contact, "model": model}
+    return scene.but(**parts, plan=scene.plan._replace(steps=1))

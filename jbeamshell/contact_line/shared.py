@@ -32,9 +32,7 @@ from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
 
 LOADS = frozenset({"load.amplitude", "contact.friction"})
-SCALES = frozenset(
-    {"contact.pressure", "strip.length", "strip.axial_stiffness", "strip.youngs_modulus"}
-)
+SCALES = frozenset({"contact.pressure", "strip.length", "strip.axial_stiffness"})
 HEIGHTS = frozenset({HEIGHT, "strip.half_height"})
 OF_CONTACT = frozenset({*FIGURES, "dissipation_error", "force", "displacement", "status"})
 """Figures that need no field above the contact."""

@@ -158,6 +158,17 @@ class Strip(StripKeys):
         """Young's modulus E, stress; None when there are layers."""
         return cast(Array | None, self._number("strip.youngs_modulus"))
 
+    def in_one_form(self) -> Self:
+        """Same strip by its height ratio and E' 2H, so that programs do not ask what was given."""
+        numbers: Any = jnp if is_traced(self) else np  # much faster
+        strip = jax.tree.map(numbers.asarray, self)
+        forms = {
+            HOLDERS[key]: Given(key, numbers.asarray(strip._number(key)))
+            for key in ("strip.height_ratio", "strip.axial_stiffness")
+            if getattr(strip, HOLDERS[key]) is not None
+        }
+        return strip.but(**forms)
+
     @property
     def section(self) -> Laminate | None:
         """Laminated section; None for a homogeneous strip."""
