@@ -46,10 +46,9 @@ def kept(build: Build) -> Build:
 
 def alike(scene: Scene) -> Scene:
     """One scene for all that share a condensed strip, whose grid no further change decides."""
-    scene, none = scene.pinned(), np.zeros_like(scene.load.amplitude)
+    scene, none = scene.pinned().in_one_form(), np.zeros_like(scene.load.amplitude)
     load = scene.load.but(amplitude=none, cycles=1, steps_per_half_cycle=1)
     model, contact = scene.model.but(tolerance=1.0), scene.contact
     if scene.member.assembly != "frictional":
         contact = contact.but(friction=none)
-    parts = {"strip": scene.strip.in_one_form(), "load": load, "contact": contact, "model": model}
-    return scene.but(**parts, plan=scene.plan._replace(steps=1))
+    return scene.but(load=load, contact=contact, model=model, plan=scene.plan._replace(steps=1))

@@ -103,7 +103,7 @@ def _solved(
     fix += "model.section"
     require("contact.normal", scene.contact.normal, base, fix)
     turns = _turns(scene, targets, own) if whole else ()
-    same = scene.but(strip=scene.strip.in_one_form())
+    same = scene.in_one_form()
     strip = strip_of(same) if strip is None else strip
     if not is_traced(strip.lift):
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))

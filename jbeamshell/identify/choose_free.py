@@ -76,7 +76,7 @@ def _told(
         return [(FRICTION, "the plateau is mu F_N L"), way]
     if found is not None and found.work is None and not suited:
         return [(stiff, "the loops are lines: they tell a stiffness, and no friction")]
-    if MODULUS in said and FRICTION in said and not said.intersection(HEIGHT):
+    if MODULUS in said and FRICTION in said and said.isdisjoint(HEIGHT):
         return [(TALL, over_height)]
     if found is None:
         other = (stiff, "and the stiffness") if MODULUS in said else (TALL, "and the height")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 import math
 import textwrap
+from dataclasses import InitVar
 from typing import Any, ClassVar
 
 from jax import Array
@@ -19,7 +20,7 @@ from jbeamshell.mechanics.elements import ORDER
 from jbeamshell.mechanics.friction import LAWS
 from jbeamshell.mechanics.homogeneous import CONSTANTS, PLANES
 from jbeamshell.mechanics.kinematics import KINEMATICS
-from jbeamshell.scene.rows import AUTO, Given, Key, Part, count, number, rows, setting, word
+from jbeamshell.scene.rows import AUTO, Key, Part, count, number, rows, setting, word
 from jbeamshell.scene.sections import SECTIONS
 
 FAR_ENDS = {"guided": ("v", "beta"), "pinned": ("v",), "free": ()}  # fields held at X = 0
@@ -49,20 +50,32 @@ class StripKeys(Part):
     heading: ClassVar[str] = "strip"
 
     length: Array = number(2.0, "Length L of the strip.", symbol="L", unit="length")
-    given_height: Given = number(
+    height_ratio: InitVar[Any] = number(
         0.1126,
         "Half height over half the length, eta = H/(L/2).",
-        name="height_ratio",
         left_out=None,
         symbol=r"\eta",
     )
-    given_stiffness: Given | None = number(
+    half_height: InitVar[Any] = number(
+        None,
+        "Half height H, in place of the height ratio.",
+        symbol="H",
+        unit="length",
+        through="strip.height_ratio",
+    )
+    axial_stiffness: InitVar[Any] = number(
         3.4e4,
         "Stretching stiffness E' 2H; E' = E/(1-nu^2) in plane strain, E in plane stress.",
-        name="axial_stiffness",
         left_out=None,
         symbol="E' 2H",
         unit="force/width",
+    )
+    youngs_modulus: InitVar[Any] = number(
+        None,
+        "Young's modulus E, in place of the stretching stiffness.",
+        symbol="E",
+        unit="stress",
+        through="strip.axial_stiffness",
     )
     poisson_ratio: Array | None = number(
         0.3,
@@ -316,26 +329,8 @@ class MemberKeys(Part):
     )
 
 
-# Keys that are no row of a field: they say what a field holds in another form.
+# Keys that are no field of their own: they set, or read, a field in another form.
 INDIRECT = (
-    Key(
-        "strip.half_height",
-        "number",
-        None,
-        "Half height H, in place of the height ratio.",
-        symbol="H",
-        unit="length",
-        through="strip.height_ratio",
-    ),
-    Key(
-        "strip.youngs_modulus",
-        "number",
-        None,
-        "Young's modulus E, in place of the stretching stiffness.",
-        symbol="E",
-        unit="stress",
-        through="strip.axial_stiffness",
-    ),
     Key(
         "contact.bolts",
         "number",
@@ -366,7 +361,7 @@ for _part in (StripKeys, ContactKeys, LoadKeys, ModelKeys, MemberKeys):
     _indirect = (row for row in INDIRECT if row.name.startswith(f"{_part.heading}."))
     TABLE |= {row.name: row for row in (*rows(_part).values(), *_indirect)}
 # Keys that say the same thing as another one.
-DERIVED = {row.name: row.through for row in INDIRECT if row.through}
+DERIVED = {row.name: row.through for row in TABLE.values() if row.through}
 TWINS = DERIVED | {through: name for name, through in DERIVED.items()}
 KEYS = tuple(TABLE)
 NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")

@@ -8,8 +8,8 @@ made.
 
 from __future__ import annotations
 
+import dataclasses
 import textwrap
-from collections.abc import Callable, Collection
 from typing import Any, Self, cast
 
 import equinox as eqx
@@ -21,11 +21,11 @@ from jax import Array
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.elements import ORDER, table_steps
 from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
-from jbeamshell.mechanics.homogeneous import plane_modulus, shear_modulus, youngs_modulus
+from jbeamshell.mechanics.homogeneous import plane_modulus, shear_modulus
 from jbeamshell.mechanics.laminate import Laminate
+from jbeamshell.scene.forms import HOLDERS, Forms, default, given
 from jbeamshell.scene.keys import (
     TABLE,
-    TWINS,
     ContactKeys,
     LoadKeys,
     MemberKeys,
@@ -33,41 +33,13 @@ from jbeamshell.scene.keys import (
     Part,
     StripKeys,
     key_table,
-    leaf_of,
 )
 from jbeamshell.scene.layers import check_layers
 from jbeamshell.scene.pressure import check_gap, check_pressure, pressure_values
-from jbeamshell.scene.rows import AUTO, Given, Key
-
-# Fields of a `Strip` that hold a `Given`, by both keys that it may be given by.
-HOLDERS = {
-    "strip.height_ratio": "given_height",
-    "strip.half_height": "given_height",
-    "strip.axial_stiffness": "given_stiffness",
-    "strip.youngs_modulus": "given_stiffness",
-}
+from jbeamshell.scene.rows import AUTO, Key
 
 
-def follows(key: str, numbers: Callable[[str], Any], plane: str) -> Any:
-    """Number of a key of `HOLDERS` where its twin is given; any shape, traced or not.
-
-    Parameters
-    ----------
-    key : dotted key
-    numbers : values by dotted key
-    plane : "strain" or "stress"
-    """
-    if key == "strip.height_ratio":
-        return 2.0 * numbers("strip.half_height") / numbers("strip.length")
-    if key == "strip.half_height":
-        return 0.5 * numbers("strip.height_ratio") * numbers("strip.length")
-    height, nu = 2.0 * numbers("strip.half_height"), numbers("strip.poisson_ratio")
-    if key == "strip.axial_stiffness":
-        return plane_modulus(numbers("strip.youngs_modulus"), nu, plane) * height
-    return youngs_modulus(numbers("strip.axial_stiffness") / height, nu, plane)
-
-
-class Strip(StripKeys):
+class Strip(Forms, StripKeys):
     """Geometry and material of the strip.
 
     Of ``height_ratio`` and ``half_height`` one is given, the last one that was set, and the other
@@ -75,21 +47,22 @@ class Strip(StripKeys):
     is no stiffness and no ``poisson_ratio``: they are None.
     """
 
-    def __post_init__(self) -> None:
-        stiffness = self.given_stiffness
+    def __post_init__(
+        self, height_ratio: Any, half_height: Any, axial_stiffness: Any, youngs_modulus: Any
+    ) -> None:
+        tall = {"strip.height_ratio": height_ratio, "strip.half_height": half_height}
+        stiff = {"strip.axial_stiffness": axial_stiffness, "strip.youngs_modulus": youngs_modulus}
+        self.given_height = given(tall, self.given_height) or default("strip.height_ratio")
+        stiffness = self.given_stiffness = given(stiff, self.given_stiffness)
+        nu = self.poisson_ratio
         if self.layers is not None:
             fix = "strip.layers say it already; leave it out"
             if stiffness is not None:
                 require(stiffness.key, stiffness.value, False, fix)
-            nu = self.poisson_ratio
             require("strip.poisson_ratio", nu, nu is None, fix)
         else:
-            if stiffness is None:
-                self.given_stiffness = _default("strip.axial_stiffness")
-            if self.poisson_ratio is None:
-                self.poisson_ratio = TABLE["strip.poisson_ratio"].default
-        if self.given_height is None:
-            self.given_height = _default("strip.height_ratio")
+            self.given_stiffness = stiffness or default("strip.axial_stiffness")
+            self.poisson_ratio = TABLE["strip.poisson_ratio"].default if nu is None else nu
         super().__post_init__()
         curvature = self.curvature
         if (
@@ -102,72 +75,20 @@ class Strip(StripKeys):
     def __check_init__(self) -> None:
         if self.layers is not None:
             check_layers(self.layers, 2.0 * self.half_height, self.plane)
+        if is_traced(self):
+            return
+        same, fix = self.in_one_form(), "overflows beside the strip's other numbers: take others"
+        for holder in dict.fromkeys(HOLDERS.values()):
+            said, other = getattr(self, holder), getattr(same, holder)
+            if said is not None:
+                require(said.key, said.value, bool(TABLE[other.key].holds(other.value)), fix)
 
     def changed(self, **values: Any) -> Self:
-        for key, holder in HOLDERS.items():
-            name = key.removeprefix("strip.")
-            if name in values:
-                values[holder] = Given(key, leaf_of(key, values.pop(name)))
-        if values.get("layers") is not None:
-            # The layers give the stiffness and nu; the strip refuses both being given.
-            values = {"given_stiffness": None, "poisson_ratio": None} | values
-        return super().changed(**values)
-
-    @property
-    def said(self) -> set[str]:
-        """Keys of `HOLDERS` that are given."""
-        holders = self.given_height, self.given_stiffness
-        return {given.key for given in holders if given is not None}
-
-    def derives(self, key: str, others: Collection[str] = ()) -> bool:
-        """True if the number of a key follows from its twin.
-
-        Parameters
-        ----------
-        key : dotted key
-        others : keys whose numbers are given in place of the strip's
-        """
-        return key in HOLDERS and (TWINS[key] in others or TWINS[key] in self.said)
-
-    def _number(self, key: str) -> Any:
-        """Number of a key, as it was given or as it follows; None for a stiffness of layers."""
-        if key not in HOLDERS:
-            return getattr(self, key.removeprefix("strip."))
-        given: Given | None = getattr(self, HOLDERS[key])
-        if given is None:
-            return None
-        return given.value if given.key == key else follows(key, self._number, self.plane)
-
-    @property
-    def height_ratio(self) -> Array:
-        """Half height over half the length, eta = H/(L/2)."""
-        return cast(Array, self._number("strip.height_ratio"))
-
-    @property
-    def half_height(self) -> Array:
-        """Half height H, length."""
-        return cast(Array, self._number("strip.half_height"))
-
-    @property
-    def axial_stiffness(self) -> Array | None:
-        """Stretching stiffness E' 2H, force per unit width; None when there are layers."""
-        return cast(Array | None, self._number("strip.axial_stiffness"))
-
-    @property
-    def youngs_modulus(self) -> Array | None:
-        """Young's modulus E, stress; None when there are layers."""
-        return cast(Array | None, self._number("strip.youngs_modulus"))
-
-    def in_one_form(self) -> Self:
-        """Same strip by its height ratio and E' 2H, so that programs do not ask what was given."""
-        numbers: Any = jnp if is_traced(self) else np  # much faster
-        strip = jax.tree.map(numbers.asarray, self)
-        forms = {
-            HOLDERS[key]: Given(key, numbers.asarray(strip._number(key)))
-            for key in ("strip.height_ratio", "strip.axial_stiffness")
-            if getattr(strip, HOLDERS[key]) is not None
-        }
-        return strip.but(**forms)
+        own = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        own |= {HOLDERS[key]: None for key in HOLDERS if key.removeprefix("strip.") in values}
+        if values.get("layers") is not None:  # which give the stiffness and nu
+            own |= {"given_stiffness": None, "poisson_ratio": None}
+        return type(self)(**own | values)
 
     @property
     def section(self) -> Laminate | None:
@@ -186,9 +107,9 @@ class Strip(StripKeys):
     @property
     def plane_modulus(self) -> Array:
         """Plane modulus E' (of the mean stiffness where there are layers), stress."""
-        given = self.given_stiffness
-        if given is not None and given.key == "strip.youngs_modulus":
-            return cast(Array, plane_modulus(given.value, self.poisson_ratio, self.plane))
+        stiffness = self.given_stiffness
+        if stiffness is not None and stiffness.key == "strip.youngs_modulus":
+            return cast(Array, plane_modulus(stiffness.value, self.poisson_ratio, self.plane))
         return self.stretching_stiffness / (2.0 * self.half_height)
 
     @property
@@ -197,10 +118,6 @@ class Strip(StripKeys):
         if self.section is not None:
             return self.section.mean_shear_modulus
         return shear_modulus(self.plane_modulus, cast(Array, self.poisson_ratio), self.plane)
-
-
-def _default(key: str) -> Given:
-    return Given(key, leaf_of(key, TABLE[key].default))
 
 
 class Member(MemberKeys):

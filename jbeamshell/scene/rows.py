@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Self
 import equinox as eqx
 import jax
 import numpy as np
-from jax import Array
 
 from jbeamshell.common.checks import (
     NOT_NEGATIVE,
@@ -49,7 +48,7 @@ class Key:
     former : words of old files, with what to say instead
     table : True if rows of numbers are allowed as well
     open : True if a scene chooses the value where it is `AUTO`, see `jbeamshell.scene.planning`
-    through : key of the number that this one sets, if it is another form of it
+    through : key of the number that this one is another form of
     fix : fix in the message for a number outside its domain; None is made from the bounds
     """
 
@@ -140,19 +139,6 @@ class Key:
         return ",".join(self.default) if isinstance(self.default, tuple) else str(self.default)
 
 
-class Given(Tree):
-    """Number that was given, of two keys that say the same thing; the other one follows from it.
-
-    Attributes
-    ----------
-    key : dotted key, such as "strip.half_height"
-    value : its number
-    """
-
-    key: str = eqx.field(static=True)
-    value: Array
-
-
 def number(default: float | None, sentence: str, *, left_out: Any = (), **facts: Any) -> Any:
     """Field and row of a number of the scene.
 
@@ -161,7 +147,7 @@ def number(default: float | None, sentence: str, *, left_out: Any = (), **facts:
     default : value of the standard strip
     sentence : meaning
     left_out : value of the field when it is not given, if that is not the default
-    **facts : further entries of the `Key`; its name is the field's, unless the field is a `Given`
+    **facts : further entries of the `Key`
     """
     return _field("number", default, sentence, default if left_out == () else left_out, facts)
 
@@ -186,7 +172,7 @@ def word(default: Any, choices: Any, sentence: str, **facts: Any) -> Any:
 def _field(
     kind: str, default: Any, sentence: str, value: Any, facts: Any, static: bool = False
 ) -> Any:
-    row = Key(facts.pop("name", ""), kind, default, sentence, **facts)
+    row = Key("", kind, default, sentence, **facts)
     return eqx.field(default=value, static=static, metadata={"row": row})
 
 
@@ -197,8 +183,8 @@ class Part(Tree):
 
     def __post_init__(self) -> None:
         for name, key in rows(type(self)).items():
-            if name not in self.__dataclass_fields__:
-                continue  # a `Given`, which was checked when it was made
+            if name not in vars(self):
+                continue  # an argument that is no field, which the part checks
             value = getattr(self, name)
             if value is None and getattr(type(self), name) is None:
                 continue  # None is what the field holds when it is not given
@@ -216,12 +202,9 @@ class Part(Tree):
 
 @functools.cache
 def rows(part: type[Part]) -> dict[str, Key]:
-    """Rows of a part by the names of its fields, or of what is `Given`."""
-    named = {
-        field.metadata["row"].name or field.name: field.metadata["row"]
-        for field in dataclasses.fields(part)
-        if "row" in field.metadata
-    }
+    """Rows of a part by the names of its fields, and of arguments that are no field."""
     return {
-        name: dataclasses.replace(row, name=f"{part.heading}.{name}") for name, row in named.items()
+        name: dataclasses.replace(field.metadata["row"], name=f"{part.heading}.{name}")
+        for name, field in part.__dataclass_fields__.items()
+        if "row" in field.metadata
     }

@@ -33,9 +33,10 @@ from jbeamshell.mechanics.friction import (
 )
 from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy
 from jbeamshell.scene.domain import Numbers, gross_slip, support_rules
+from jbeamshell.scene.forms import follows
 from jbeamshell.scene.joint import check_joint
 from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, KAPPA_S, TABLE, check_key, leaf_of
-from jbeamshell.scene.parts import PARTS, Contact, Load, Member, Model, Part, Strip, follows
+from jbeamshell.scene.parts import PARTS, Contact, Load, Member, Model, Part, Strip
 from jbeamshell.scene.plan import Plan
 from jbeamshell.scene.planning import finer, may_be_elastic, plan
 from jbeamshell.scene.pressure import bolt_pressure
@@ -246,6 +247,7 @@ class Scene(Tree):
             return law_name(self.contact.law)
         return getattr(getattr(self, heading), name)
 
+    @np.errstate(over="ignore")  # rules refuse what is not finite
     def number(self, key: str, others: Mapping[str, Any] = MappingProxyType({})) -> np.ndarray:
         """Number or table of a dotted key in double precision, for the rules of `domain`.
 
@@ -328,6 +330,10 @@ class Scene(Tree):
     def refined(self) -> Scene:
         """Copy on elements half as large, from which any change goes back to the planned grid."""
         return self.but(plan=finer(self))
+
+    def in_one_form(self) -> Scene:
+        """Copy whose strip is given in one form, so that programs do not ask what was given."""
+        return self.but(strip=self.strip.in_one_form())
 
     def serving(self, keys: Collection[str]) -> Scene:
         """Copy on the beamshell if some numbers are its own and the section is open.

@@ -9,9 +9,9 @@ import numpy as np
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.summary import Summary
 from jbeamshell.mechanics.friction import law_name
+from jbeamshell.scene.forms import HOLDERS
 from jbeamshell.scene.keys import TABLE, unit_of
 from jbeamshell.scene.linearisation import Parts
-from jbeamshell.scene.parts import HOLDERS
 from jbeamshell.scene.planning import in_words
 
 ALWAYS = {

@@ -1,5 +1,6 @@
 """What was given last stays given: all pairs of keys of a size or a material, in both orders."""
 
+import dataclasses
 import itertools
 import tomllib
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.scene.parts import Strip
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import overridden, scene_from_values, scene_to_toml
 from jbeamshell.sweeping.lanes import lanes_of
@@ -128,6 +130,18 @@ def test_layers_keep_the_height_that_was_given():
     assert float(layered.replace({"strip.layers": None, MODULUS: 7e4}).get(MODULUS)) == 7e4
     with pytest.raises(InputError, match=r"add up to 12, but the height 2H is 15"):
         layered.replace({RATIO: 0.1}).replace({LENGTH: 150.0})
+
+
+def test_a_strip_by_itself_takes_either_key():
+    steel = Strip(length=120.0, half_height=6.0, youngs_modulus=2.1e5)
+    for key, value in {"height_ratio": 0.1, "axial_stiffness": 2.1e5 / 0.91 * 12.0}.items():
+        assert float(getattr(steel, key)) == pytest.approx(value, rel=1e-14)
+    with pytest.raises(InputError, match="height_ratio and strip.half_height say the same"):
+        Strip(height_ratio=0.1, half_height=6.0)
+    with pytest.raises(InputError, match=r"take Scene.replace\(.* in place of dataclasses.replace"):
+        dataclasses.replace(steel, length=150.0)
+    with pytest.raises(InputError, match="strip.half_height = 6e\\+250: overflows beside the"):
+        Strip(length=1e-100, half_height=6e250)
 
 
 def test_a_text_names_what_was_given():
