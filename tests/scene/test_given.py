@@ -136,11 +136,11 @@ def test_a_strip_by_itself_takes_either_key():
     steel = Strip(length=120.0, half_height=6.0, youngs_modulus=2.1e5)
     for key, value in {"height_ratio": 0.1, "axial_stiffness": 2.1e5 / 0.91 * 12.0}.items():
         assert float(getattr(steel, key)) == pytest.approx(value, rel=1e-14)
-    with pytest.raises(InputError, match="height_ratio and strip.half_height say the same"):
+    with pytest.raises(InputError, match=r"height_ratio and strip.half_height say the same"):
         Strip(height_ratio=0.1, half_height=6.0)
     with pytest.raises(InputError, match=r"take Scene.replace\(.* in place of dataclasses.replace"):
         dataclasses.replace(steel, length=150.0)
-    with pytest.raises(InputError, match="strip.half_height = 6e\\+250: overflows beside the"):
+    with pytest.raises(InputError, match=r"strip.half_height = 6e\+250: overflows beside the"):
         Strip(length=1e-100, half_height=6e250)
 
 
