@@ -24,7 +24,7 @@ import numpy as np
 
 import jbeamshell as jb
 from calibration.strip import changed
-from jbeamshell.scene.keys import NUMBERS, TABLE
+from jbeamshell.scene.keys import NUMBERS
 from jbeamshell.solving.response import RESPONSES
 from verification.gradient_scenes import SETTINGS, SIZES, Values
 
@@ -73,7 +73,7 @@ def numbers_of(scene: jb.Scene, given: Values) -> Walk:
     """Every number that a scene holds, each entry of its tables a direction of its own."""
     keys, values, directions = [], [], []
     for key in NUMBERS:
-        if TABLE[key].through and key != "contact.bolts":
+        if scene.strip.derives(key):
             continue
         if key == "contact.bolts" and key not in given:
             continue

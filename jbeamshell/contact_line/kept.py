@@ -48,7 +48,7 @@ def kept(build: Build, same: Callable[[Scene], Scene]) -> Build:
 
 def alike(scene: Scene) -> Scene:
     """One scene for all that share a condensed strip, whose grid no further change decides."""
-    scene, none = scene.pinned(), np.zeros_like(scene.load.amplitude)
+    scene, none = scene.pinned().in_one_form(), np.zeros_like(scene.load.amplitude)
     load = scene.load.but(amplitude=none, cycles=1, steps_per_half_cycle=1)
     model, contact = scene.model.but(tolerance=1.0), scene.contact
     if scene.member.assembly != "frictional":

@@ -86,11 +86,7 @@ class Shared(NamedTuple):
         if self.heights is None:
             return True
         numbers = {key: float(value) for key, value in zip(over, values, strict=True)}
-        height = numbers.get(HEIGHT, scene.strip.height_ratio)
-        if "strip.half_height" in numbers:
-            length = numbers.get("strip.length", scene.strip.length)
-            height = 2.0 * numbers["strip.half_height"] / length
-        return self.heights[0] <= float(height) <= self.heights[1]
+        return self.heights[0] <= float(scene.number(HEIGHT, numbers)) <= self.heights[1]
 
 
 def shared(
@@ -121,7 +117,8 @@ def shared(
         return None
     height, ratio = float(strip.height_ratio), float(nu)
     usual = min(USUAL_HEIGHTS[0], height / AROUND), max(USUAL_HEIGHTS[1], height * AROUND)
-    ends = {HEIGHT: usual if vary & HEIGHTS else (height, height), POISSON: (ratio, ratio)}
+    varies = vary & HEIGHTS or (strip.derives(HEIGHT) and "strip.length" in vary)
+    ends = {HEIGHT: usual if varies else (height, height), POISSON: (ratio, ratio)}
     ends |= dict(ranges or {})
     return _interpolated(*_numbers(scene), ends[HEIGHT], ends[POISSON])
 

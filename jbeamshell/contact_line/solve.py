@@ -110,13 +110,14 @@ def _solved(
     fix += "model.section"
     require("contact.normal", scene.contact.normal, base, fix)
     turns = _turns(scene, targets, own) if whole else ()
-    strip = strip_of(scene) if strip is None else strip
+    same = scene.in_one_form()
+    strip = strip_of(same) if strip is None else strip
     if not is_traced(strip.lift):
         down = bool(np.all(np.isfinite(np.asarray(strip.lift))))
         fix = f"must press the strip down for model.section = {scene.plan.section}"
         require("contact.pressure", scene.contact.pressure, down, fix)
     known_turns, traced = (turns, ()) if isinstance(turns, tuple) else ((), turns)
-    inputs = scene, strip, targets, None if whole else parts, traced
+    inputs = same, strip, targets, None if whole else parts, traced
     history, movement = _walk(inputs, known_turns, cycles)
     above = Unread(strip, movement)
     history = history.but(scene=scene, above=above.found if now else above)

@@ -88,7 +88,7 @@ class History(Profiles, ContactLine, CycleFigures):
         turned = self.scene.load.kind == "moment"  # which no bar can be
         of_cycle = [name for name in FIGURES if not (turned and name == "dissipation_ratio")]
         names = (*(of_cycle if self.cycles else ()), *self._contact_figures)
-        read = self.but(above=self.above.found)
+        read = self.but(above=self.above.found, scene=self.scene.in_one_form())
         values = {name: float(value) for name, value in _last_values(read, names).items()}
         figures: dict[str, Any] = {k: v if np.isfinite(v) else None for k, v in values.items()}
         figures["newton_iterations"] = int(np.sum(np.asarray(self.iterations)))

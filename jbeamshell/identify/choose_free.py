@@ -3,11 +3,14 @@
 A loop with a plateau tells friction and one stiffness: that of the sliders if the way to the
 plateau is straight, else that of the strip.  A loop below gross slip tells by its work the force of
 gross slip over the height, and by its displacement the stiffness.  What the user gives stays fixed.
+
+Where Young's modulus is given, friction and height act by their product alone: a long strip of
+elasticity has no other scale than A/(mu F_N H), with displacements in units of A/E'.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import Any
 
 from jbeamshell.identify.starts import HEIGHT, STIFFNESS, Estimate, suits
@@ -15,7 +18,8 @@ from jbeamshell.measured.curves import SqueezeCurve
 from jbeamshell.scene.scene import Scene
 
 FRICTION, SLIDERS = "contact.friction", "contact.stick_stiffness"
-TALL, STIFF, SQUEEZE = "strip.height_ratio", "strip.axial_stiffness", "strip.kappa_s"
+TALL, SQUEEZE = "strip.height_ratio", "strip.kappa_s"
+STIFF, MODULUS = STIFFNESS
 
 
 def chosen_free(
@@ -30,18 +34,18 @@ def chosen_free(
     data : measurements of a specimen
     found : figures of its loops; None without loops
     """
-    stiff = scene is not None or any(key in known for key in STIFFNESS)
+    said = set(known) if scene is None else scene.strip.said
     suited = scene is None and found is not None and suits(known, found)
     other_names = dict.fromkeys(STIFFNESS, STIFF) | dict.fromkeys(HEIGHT, TALL)
     given = {other_names.get(key, key) for key in known}
     layers = "strip.layers" in known if scene is None else scene.strip.layers is not None
     reasons = {
         key: reason
-        for key, reason in _told(data, found, stiff, suited)
+        for key, reason in _told(data, found, said, suited)
         if not (layers and key in (STIFF, TALL))
         and not (scene is not None and scene.get(key) is None)
     }
-    free = {key: reason for key, reason in reasons.items() if key not in given}
+    free = {k: reason for k, reason in reasons.items() if other_names.get(k, k) not in given}
     if free:
         return free
     # All that the data tell is given: these values are starts.
@@ -51,25 +55,37 @@ def chosen_free(
 
 
 def _told(
-    data: Sequence[Any], found: Estimate | None, stiff: bool, suited: bool
+    data: Sequence[Any], found: Estimate | None, said: Set[str], suited: bool
 ) -> list[tuple[str, str]]:
-    """Parameters that data tell, with reasons; the last of several stiffnesses if it is unknown."""
+    """Parameters that data tell, with reasons; a stiffness by the key that says it.
+
+    Parameters
+    ----------
+    said : keys by which the strip is given
+    """
+    stiff = MODULUS if MODULUS in said else STIFF
+    over_height = "the work of a cycle tells mu F_N L over the height"
     if all(isinstance(item, SqueezeCurve) for item in data):
         return [(SQUEEZE, "the squeeze stress decays by it")]
-    if found is None:
-        return [(FRICTION, "the figures over the amplitude tell it"), (TALL, "and the height")]
-    if found.slides:
+    if found is not None and found.slides:
         way = (
             (SLIDERS, "the way to the plateau is straight, as of soft sliders")
             if found.soft
-            else (STIFF, "the way to the plateau is bent, as of a strip that slides from its end")
+            else (stiff, "the way to the plateau is bent, as of a strip that slides from its end")
         )
         return [(FRICTION, "the plateau is mu F_N L"), way]
+    if found is not None and found.work is None and not suited:
+        return [(stiff, "the loops are lines: they tell a stiffness, and no friction")]
+    if MODULUS in said and FRICTION in said and said.isdisjoint(HEIGHT):
+        return [(TALL, over_height)]
+    if found is None:
+        other = (stiff, "and the stiffness") if MODULUS in said else (TALL, "and the height")
+        return [(FRICTION, "the figures over the amplitude tell it"), other]
+    if MODULUS in said:
+        return [(FRICTION, over_height), (stiff, "the displacement tells it")]
     if suited:
         return [(FRICTION, "of the standard strip, which suits the loops"), (TALL, "likewise")]
-    if found.work is None:
-        return [(STIFF, "the loops are lines: they tell a stiffness, and no friction")]
-    by_work = (FRICTION, "the work of a cycle tells mu F_N L over the height")
-    if stiff:
-        return [by_work, (TALL, "the stiffness is given, so the displacement tells the height")]
-    return [by_work, (STIFF, "the displacement tells it")]
+    if STIFF in said:
+        given = "the stiffness is given, so the displacement tells the height"
+        return [(FRICTION, over_height), (TALL, given)]
+    return [(FRICTION, over_height), (stiff, "the displacement tells it")]

@@ -10,7 +10,8 @@ from __future__ import annotations
 import difflib
 import math
 import textwrap
-from typing import ClassVar
+from dataclasses import InitVar
+from typing import Any, ClassVar
 
 from jax import Array
 
@@ -49,15 +50,32 @@ class StripKeys(Part):
     heading: ClassVar[str] = "strip"
 
     length: Array = number(2.0, "Length L of the strip.", symbol="L", unit="length")
-    height_ratio: Array = number(
-        0.1126, "Half height over half the length, eta = H/(L/2).", symbol=r"\eta"
+    height_ratio: InitVar[Any] = number(
+        0.1126,
+        "Half height over half the length, eta = H/(L/2).",
+        left_out=None,
+        symbol=r"\eta",
     )
-    axial_stiffness: Array | None = number(
+    half_height: InitVar[Any] = number(
+        None,
+        "Half height H, in place of the height ratio.",
+        symbol="H",
+        unit="length",
+        through="strip.height_ratio",
+    )
+    axial_stiffness: InitVar[Any] = number(
         3.4e4,
         "Stretching stiffness E' 2H; E' = E/(1-nu^2) in plane strain, E in plane stress.",
         left_out=None,
         symbol="E' 2H",
         unit="force/width",
+    )
+    youngs_modulus: InitVar[Any] = number(
+        None,
+        "Young's modulus E, in place of the stretching stiffness.",
+        symbol="E",
+        unit="stress",
+        through="strip.axial_stiffness",
     )
     poisson_ratio: Array | None = number(
         0.3,
@@ -244,7 +262,7 @@ class MemberKeys(Part):
     )
     axial_stiffness: Array | None = number(
         None,
-        "Its stretching stiffness E' 2H; none is that of the strip's material.",
+        "Its stretching stiffness E' 2H; none is by the strip's E if given, else by its E'.",
         symbol="(E' 2H)_2",
         unit="force/width",
     )
@@ -314,24 +332,6 @@ class MemberKeys(Part):
 # Keys that are no field of their own: they set, or read, a field in another form.
 INDIRECT = (
     Key(
-        "strip.half_height",
-        "number",
-        None,
-        "Half height H; sets the height ratio.",
-        symbol="H",
-        unit="length",
-        through="strip.height_ratio",
-    ),
-    Key(
-        "strip.youngs_modulus",
-        "number",
-        None,
-        "Young's modulus E; sets the stretching stiffness.",
-        symbol="E",
-        unit="stress",
-        through="strip.axial_stiffness",
-    ),
-    Key(
         "contact.bolts",
         "number",
         None,
@@ -360,8 +360,9 @@ TABLE: dict[str, Key] = {}
 for _part in (StripKeys, ContactKeys, LoadKeys, ModelKeys, MemberKeys):
     _indirect = (row for row in INDIRECT if row.name.startswith(f"{_part.heading}."))
     TABLE |= {row.name: row for row in (*rows(_part).values(), *_indirect)}
-# Keys that set a field through another number, in the order in which they apply.
-DERIVED = {row.name: row.through for row in INDIRECT if row.through}
+# Keys that say the same thing as another one.
+DERIVED = {row.name: row.through for row in TABLE.values() if row.through}
+TWINS = DERIVED | {through: name for name, through in DERIVED.items()}
 KEYS = tuple(TABLE)
 NUMBERS = tuple(name for name, key in TABLE.items() if key.kind == "number")
 # Keys of old files, with what is to be done about them.
@@ -408,6 +409,13 @@ def check_key(key: str) -> None:
         matches = difflib.get_close_matches(key, KEYS, 1)
         hint = f"did you mean {matches[0]!r}?" if matches else f"keys are {', '.join(KEYS)}"
         raise InputError(f"unknown key {key!r}: {hint}")
+
+
+def leaf_of(key: str, value: Any) -> Array:
+    """Leaf of a number of the scene, checked."""
+    number: Array = TABLE[key].convert(value)
+    TABLE[key].check(number)
+    return number
 
 
 def unit_of(key: str, load: LoadKeys) -> str:

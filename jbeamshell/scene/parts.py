@@ -8,8 +8,9 @@ made.
 
 from __future__ import annotations
 
+import dataclasses
 import textwrap
-from typing import cast
+from typing import Any, Self, cast
 
 import equinox as eqx
 import jax
@@ -20,8 +21,9 @@ from jax import Array
 from jbeamshell.common.checks import is_traced, require
 from jbeamshell.mechanics.elements import ORDER, table_steps
 from jbeamshell.mechanics.friction import FrictionLaw, SharpSlip, takes_smoothing
-from jbeamshell.mechanics.homogeneous import shear_modulus, youngs_modulus
+from jbeamshell.mechanics.homogeneous import plane_modulus, shear_modulus
 from jbeamshell.mechanics.laminate import Laminate
+from jbeamshell.scene.forms import HOLDERS, Forms, default, given
 from jbeamshell.scene.keys import (
     TABLE,
     ContactKeys,
@@ -37,20 +39,30 @@ from jbeamshell.scene.pressure import check_gap, check_pressure, pressure_values
 from jbeamshell.scene.rows import AUTO, Key
 
 
-class Strip(StripKeys):
+class Strip(Forms, StripKeys):
     """Geometry and material of the strip.
 
-    With ``layers`` there is no ``axial_stiffness`` and no ``poisson_ratio``: they are None.
+    Of ``height_ratio`` and ``half_height`` one is given, the last one that was set, and the other
+    one follows.  So it is with ``axial_stiffness`` and ``youngs_modulus``.  With ``layers`` there
+    is no stiffness and no ``poisson_ratio``: they are None.
     """
 
-    def __post_init__(self) -> None:
-        for name in ("axial_stiffness", "poisson_ratio"):
-            key, value = TABLE[f"strip.{name}"], getattr(self, name)
-            if self.layers is not None:
-                fix = "strip.layers say it already; leave it out"
-                require(key.name, value, value is None, fix)
-            elif value is None:
-                setattr(self, name, key.default)
+    def __post_init__(
+        self, height_ratio: Any, half_height: Any, axial_stiffness: Any, youngs_modulus: Any
+    ) -> None:
+        tall = {"strip.height_ratio": height_ratio, "strip.half_height": half_height}
+        stiff = {"strip.axial_stiffness": axial_stiffness, "strip.youngs_modulus": youngs_modulus}
+        self.given_height = given(tall, self.given_height) or default("strip.height_ratio")
+        stiffness = self.given_stiffness = given(stiff, self.given_stiffness)
+        nu = self.poisson_ratio
+        if self.layers is not None:
+            fix = "strip.layers say it already; leave it out"
+            if stiffness is not None:
+                require(stiffness.key, stiffness.value, False, fix)
+            require("strip.poisson_ratio", nu, nu is None, fix)
+        else:
+            self.given_stiffness = stiffness or default("strip.axial_stiffness")
+            self.poisson_ratio = TABLE["strip.poisson_ratio"].default if nu is None else nu
         super().__post_init__()
         curvature = self.curvature
         if (
@@ -63,11 +75,20 @@ class Strip(StripKeys):
     def __check_init__(self) -> None:
         if self.layers is not None:
             check_layers(self.layers, 2.0 * self.half_height, self.plane)
+        if is_traced(self):
+            return
+        same, fix = self.in_one_form(), "overflows beside the strip's other numbers: take others"
+        for holder in dict.fromkeys(HOLDERS.values()):
+            said, other = getattr(self, holder), getattr(same, holder)
+            if said is not None:
+                require(said.key, said.value, bool(TABLE[other.key].holds(other.value)), fix)
 
-    @property
-    def half_height(self) -> Array:
-        """Half height H, length."""
-        return 0.5 * self.height_ratio * self.length
+    def changed(self, **values: Any) -> Self:
+        own = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        own |= {HOLDERS[key]: None for key in HOLDERS if key.removeprefix("strip.") in values}
+        if values.get("layers") is not None:  # which give the stiffness and nu
+            own |= {"given_stiffness": None, "poisson_ratio": None}
+        return type(self)(**own | values)
 
     @property
     def section(self) -> Laminate | None:
@@ -86,14 +107,10 @@ class Strip(StripKeys):
     @property
     def plane_modulus(self) -> Array:
         """Plane modulus E' (of the mean stiffness where there are layers), stress."""
+        stiffness = self.given_stiffness
+        if stiffness is not None and stiffness.key == "strip.youngs_modulus":
+            return cast(Array, plane_modulus(stiffness.value, self.poisson_ratio, self.plane))
         return self.stretching_stiffness / (2.0 * self.half_height)
-
-    @property
-    def youngs_modulus(self) -> Array | None:
-        """Young's modulus E, stress; None when there are layers."""
-        if self.poisson_ratio is None:
-            return None
-        return youngs_modulus(self.plane_modulus, self.poisson_ratio, self.plane)
 
     @property
     def shear_modulus(self) -> Array:
@@ -120,23 +137,19 @@ class Member(MemberKeys):
     def beside(self, strip: Strip) -> Strip:
         """Member as a strip whose contact is its bottom face; what it leaves out is the strip's."""
         layered = self.layers is not None
-        ratio = strip.height_ratio if self.height_ratio is None else self.height_ratio
         stiffness, nu = self.axial_stiffness, self.poisson_ratio
         layers = self.layers if layered or stiffness is not None or nu is not None else strip.layers
+        values: dict[str, Any] = {"layers": layers, "overhang": None, "curvature": None}
+        if self.height_ratio is not None:
+            values["height_ratio"] = self.height_ratio
         if layers is None:
-            height = ratio * strip.length
-            stiffness = strip.plane_modulus * height if stiffness is None else stiffness
-            nu = strip.poisson_ratio if nu is None else nu
-        return Strip(
-            length=strip.length,
-            height_ratio=ratio,
-            axial_stiffness=stiffness,
-            poisson_ratio=nu,
-            kappa_s=strip.kappa_s,
-            far_end="guided",
-            layers=layers,
-            plane=strip.plane,
-        )
+            values["poisson_ratio"] = strip.poisson_ratio if nu is None else nu
+            if stiffness is None and "strip.youngs_modulus" not in strip.said:
+                ratio = values.get("height_ratio", strip.height_ratio)
+                stiffness = strip.plane_modulus * ratio * strip.length
+            if stiffness is not None:
+                values["axial_stiffness"] = stiffness
+        return strip.changed(far_end="guided", **values)
 
 
 class Contact(ContactKeys):

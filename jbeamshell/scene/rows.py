@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import equinox as eqx
 import jax
@@ -48,7 +48,7 @@ class Key:
     former : words of old files, with what to say instead
     table : True if rows of numbers are allowed as well
     open : True if a scene chooses the value where it is `AUTO`, see `jbeamshell.scene.planning`
-    through : key of the number that this one sets, if it is another form of it
+    through : key of the number that this one is another form of
     fix : fix in the message for a number outside its domain; None is made from the bounds
     """
 
@@ -183,6 +183,8 @@ class Part(Tree):
 
     def __post_init__(self) -> None:
         for name, key in rows(type(self)).items():
+            if name not in vars(self):
+                continue  # an argument that is no field, which the part checks
             value = getattr(self, name)
             if value is None and getattr(type(self), name) is None:
                 continue  # None is what the field holds when it is not given
@@ -193,12 +195,16 @@ class Part(Tree):
     def __check_init__(self) -> None:
         """Raise `InputError` for values that do not go together."""
 
+    def changed(self, **values: Any) -> Self:
+        """Copy with other values of its keys."""
+        return dataclasses.replace(self, **values)
+
 
 @functools.cache
 def rows(part: type[Part]) -> dict[str, Key]:
-    """Rows of a part by the names of its fields."""
+    """Rows of a part by the names of its fields, and of arguments that are no field."""
     return {
-        field.name: dataclasses.replace(field.metadata["row"], name=f"{part.heading}.{field.name}")
-        for field in dataclasses.fields(part)
+        name: dataclasses.replace(field.metadata["row"], name=f"{part.heading}.{name}")
+        for name, field in part.__dataclass_fields__.items()
         if "row" in field.metadata
     }

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Collection, Mapping
+from types import MappingProxyType
 from typing import Any, cast
 
 import equinox as eqx
@@ -30,10 +31,11 @@ from jbeamshell.mechanics.friction import (
     law_named,
     takes_smoothing,
 )
-from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy, plane_modulus
+from jbeamshell.mechanics.homogeneous import Energy, Homogeneous, as_energy
 from jbeamshell.scene.domain import Numbers, gross_slip, support_rules
+from jbeamshell.scene.forms import follows
 from jbeamshell.scene.joint import check_joint
-from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, KAPPA_S, TABLE, check_key
+from jbeamshell.scene.keys import CONTROLS, DERIVED, FAR_ENDS, KAPPA_S, TABLE, check_key, leaf_of
 from jbeamshell.scene.parts import PARTS, Contact, Load, Member, Model, Part, Strip
 from jbeamshell.scene.plan import Plan
 from jbeamshell.scene.planning import finer, may_be_elastic, plan
@@ -245,17 +247,29 @@ class Scene(Tree):
             return law_name(self.contact.law)
         return getattr(getattr(self, heading), name)
 
-    def number(self, key: str) -> np.ndarray:
-        """Number or table of a dotted key in double precision, for the rules of `domain`."""
-        if key == "strip.half_height":  # quicker than by JAX
-            return 0.5 * self.number("strip.height_ratio") * self.number("strip.length")
+    @np.errstate(over="ignore")  # rules refuse what is not finite
+    def number(self, key: str, others: Mapping[str, Any] = MappingProxyType({})) -> np.ndarray:
+        """Number or table of a dotted key in double precision, for the rules of `domain`.
+
+        Parameters
+        ----------
+        key : dotted key
+        others : numbers by dotted key in place of the scene's own, as `replace` takes them; any
+            shapes that broadcast
+        """
+        if key in others:
+            return np.asarray(others[key], dtype=float)
+        strip = self.strip
+        if strip.derives(key, others):  # quicker than by JAX
+            return np.asarray(follows(key, lambda key: self.number(key, others), strip.plane))
         return np.asarray(self.get(key), dtype=float)
 
     def replace(self, values: Mapping[str, Any]) -> Scene:
         """Copy with other values, such as ``scene.replace({"contact.friction": 0.2})``.
 
         Keys are those of the TOML file and the command line.  Values may be traced, so that
-        gradients and batches reach every number of the scene.
+        gradients and batches reach every number of the scene.  What was given last stays given:
+        after ``strip.youngs_modulus`` a new height keeps E, after ``strip.axial_stiffness`` E' 2H.
 
         Raises
         ------
@@ -273,20 +287,11 @@ class Scene(Tree):
             return self.serving([KAPPA_S]).replace(values)
         parts: dict[str, dict[str, Any]] = {heading: {} for heading in PARTS}
         for key, value in values.items():
-            if key not in DERIVED:
-                heading, name = key.split(".")
-                parts[heading][name] = value
-        if "strip.half_height" in values:
-            height = _number("strip.half_height", values["strip.half_height"])
-            length = parts["strip"].get("length", self.strip.length)
-            parts["strip"]["height_ratio"] = 2.0 * height / as_leaf(length, "strip.length")
-        if parts["strip"].get("layers") is not None:
-            # The layers give the stiffness and nu; the strip refuses both being given.
-            for name in ("axial_stiffness", "poisson_ratio"):
-                parts["strip"].setdefault(name, None)
+            heading, name = key.split(".")
+            parts[heading][name] = value
         contact = parts["contact"]
-        if "contact.bolts" in values:
-            rows = _number("contact.bolts", values["contact.bolts"])
+        if "bolts" in contact:
+            rows = leaf_of("contact.bolts", contact.pop("bolts"))
             length = as_leaf(parts["strip"].get("length", self.strip.length), "strip.length")
             contact["pressure"] = bolt_pressure(rows, length)
             clamped = parts["member"].get("support", self.member.support) == "clamped"
@@ -298,14 +303,11 @@ class Scene(Tree):
             if parts["load"].get(word, getattr(self.load, word)) != getattr(self.load, word):
                 parts["load"].setdefault("amplitude", None)
         new_parts = {
-            heading: dataclasses.replace(getattr(self, heading), **changes) if changes else None
+            heading: getattr(self, heading).changed(**changes)
             for heading, changes in parts.items()
+            if changes
         }
-        scene = dataclasses.replace(self, **{k: v for k, v in new_parts.items() if v is not None})
-        if "strip.youngs_modulus" in values:
-            strip = _with_youngs_modulus(scene.strip, values["strip.youngs_modulus"])
-            scene = dataclasses.replace(scene, strip=strip)
-        return scene
+        return dataclasses.replace(self, **new_parts)
 
     def pinned(self, numbers: Numbers | None = None) -> Scene:
         """Copy whose settings are given as they are planned, so that no change decides others.
@@ -328,6 +330,10 @@ class Scene(Tree):
     def refined(self) -> Scene:
         """Copy on elements half as large, from which any change goes back to the planned grid."""
         return self.but(plan=finer(self))
+
+    def in_one_form(self) -> Scene:
+        """Copy whose strip is given in one form, so that programs do not ask what was given."""
+        return self.but(strip=self.strip.in_one_form())
 
     def serving(self, keys: Collection[str]) -> Scene:
         """Copy on the beamshell if some numbers are its own and the section is open.
@@ -357,21 +363,6 @@ class Scene(Tree):
         """
         model = dataclasses.replace(self.model, nodes=nodes, end_size=end_size)
         return dataclasses.replace(self, model=model)
-
-
-def _number(key: str, value: Any) -> Array:
-    """Leaf of a key that is no field, checked."""
-    leaf = TABLE[key].convert(value)
-    TABLE[key].check(leaf)
-    return leaf
-
-
-def _with_youngs_modulus(strip: Strip, value: Any) -> Strip:
-    key = "strip.youngs_modulus"
-    value = _number(key, value)
-    require(key, value, strip.layers is None, "strip.layers say it already; leave it out")
-    plane = plane_modulus(value, jnp.asarray(strip.poisson_ratio), strip.plane)
-    return dataclasses.replace(strip, axial_stiffness=plane * 2.0 * strip.half_height)
 
 
 def _make_law(current: FrictionLaw, contact: dict[str, Any]) -> FrictionLaw:

@@ -9,12 +9,13 @@ import numpy as np
 from jbeamshell.common.checks import is_traced
 from jbeamshell.common.summary import Summary
 from jbeamshell.mechanics.friction import law_name
+from jbeamshell.scene.forms import HOLDERS
 from jbeamshell.scene.keys import TABLE, unit_of
 from jbeamshell.scene.linearisation import Parts
 from jbeamshell.scene.planning import in_words
 
 ALWAYS = {
-    *("strip.length", "strip.height_ratio", "strip.axial_stiffness", "strip.poisson_ratio"),
+    *("strip.length", *HOLDERS, "strip.poisson_ratio"),
     *("contact.friction", "contact.pressure", "load.control", "load.amplitude"),
 }
 TITLE = ("model.section", "model.kinematics", "model.nodes")
@@ -30,7 +31,8 @@ def summary(scene: Parts, own_energy: bool) -> Summary:
     """
     rows = []
     for name, key in TABLE.items():
-        if key.through or name in TITLE:
+        follows = name == "contact.bolts" or scene.strip.derives(name)
+        if follows or name in TITLE:
             continue
         heading, field = name.split(".")
         value = getattr(getattr(scene, heading), field)

@@ -15,7 +15,7 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.files import read_toml, write_text
 from jbeamshell.mechanics.friction import law_name
-from jbeamshell.scene.keys import DERIVED, KEYS, LENGTHS, NUMBERS
+from jbeamshell.scene.keys import KEYS, LENGTHS, NUMBERS, TWINS
 from jbeamshell.scene.parts import PARTS, Load
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
@@ -33,8 +33,7 @@ def scene_from_values(values: Mapping[str, Any]) -> Scene:
 
 def overridden(values: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Dotted keys with others on top, in which ``half_height`` replaces ``height_ratio``, etc."""
-    twins = DERIVED | {primary: derived for derived, primary in DERIVED.items()}
-    displaced = {twins[key] for key in overrides if key in twins}
+    displaced = {TWINS[key] for key in overrides if key in TWINS}
     return {k: v for k, v in values.items() if k not in displaced} | dict(overrides)
 
 
@@ -86,9 +85,8 @@ def entry_note(values: Mapping[str, Any]) -> str:
 def scene_to_toml(scene: Scene) -> str:
     """TOML text of a scene; `read_scene` makes the same scene of it, to the last bit.
 
-    What two keys can say is written by the one that says it in few digits, which is the one that
-    was given: Young's modulus, the half height and bolts.  Settings that the scene left open are
-    written as such; write ``scene.pinned()`` to keep what was chosen.
+    What two keys can say is written by the one that was given.  Settings that the scene left open
+    are written as such; write ``scene.pinned()`` to keep what was chosen.
     """
     require("scene", scene, isinstance(scene, Scene), "give a jbeamshell.Scene")
     if scene.energy is not None or not isinstance(law_name(scene.contact.law), str):
@@ -98,13 +96,11 @@ def scene_to_toml(scene: Scene) -> str:
     fix = "is a grid of its own, which no file holds: keep it in code"
     require("end_size", scene.model.end_size, scene.model.end_size == AUTO, fix)
     tables: dict[str, dict[str, Any]] = {heading: {} for heading in PARTS}
-    short = _in_few_digits(scene)
+    bolts = _bolts(scene)
     for key in KEYS:
-        if key in DERIVED and key not in short:
-            continue
         heading, name = key.split(".")
-        value = short.get(key, scene.get(key))
-        if value is None:  # such as no layers
+        value = bolts[key] if key in bolts else scene.get(key)
+        if value is None or scene.strip.derives(key):  # such as no layers
             continue
         if key in NUMBERS:
             value = _shortest(value)
@@ -114,25 +110,19 @@ def scene_to_toml(scene: Scene) -> str:
     return tomli_w.dumps(tables)
 
 
-def _in_few_digits(scene: Scene) -> dict[str, Any]:
-    """Values of derived keys that take fewer digits than their fields, which are None then."""
-    short: dict[str, Any] = {}
-    for key in ("strip.youngs_modulus", "strip.half_height", "contact.bolts"):
-        field, value = DERIVED[key], scene.get(key)
-        if value is None:
-            continue
-        number, digits = np.asarray(scene.get(field)), _rounded(value)
-        copy = scene.replace({key: digits})
-        # Beside a modulus stands the half height; bolts are fewer rows always.
-        shorter = bool(short) or key == "contact.bolts" or _digits(digits) < _digits(number)
-        if not (shorter and np.array_equal(copy.get(field), number)):
-            continue
-        short |= {key: digits, field: None}
-        if key == "contact.bolts" and np.array_equal(
-            copy.contact.bottom_pressure, scene.contact.bottom_pressure
-        ):
-            short["contact.bottom_pressure"] = None  # follows from the bolts
-    return short
+def _bolts(scene: Scene) -> dict[str, Any]:
+    """Bolts, if the pressures are theirs, and None for what follows from them, by key."""
+    given, none = scene.contact, {"contact.bolts": None}
+    if given.bolts is None:
+        return none
+    rows = _rounded(given.bolts)
+    copy = scene.replace({"contact.bolts": rows}).contact
+    if not np.array_equal(copy.pressure, given.pressure):
+        return none
+    said = {"contact.bolts": rows, "contact.pressure": None}
+    if np.array_equal(copy.bottom_pressure, given.bottom_pressure):
+        said["contact.bottom_pressure"] = None
+    return said
 
 
 def _rounded(value: Any) -> NDArray[Any]:
@@ -141,12 +131,6 @@ def _rounded(value: Any) -> NDArray[Any]:
     digits = FEW_DIGITS[array.dtype.itemsize]
     few = [float(f"{number:.{digits}g}") for number in array.ravel()]
     return np.asarray(few, array.dtype).reshape(array.shape)
-
-
-def _digits(array: NDArray[Any]) -> int:
-    """Most significant digits that one of some numbers takes."""
-    texts = (np.format_float_scientific(number) for number in array.ravel())
-    return max(len(text.partition("e")[0].strip("-0.").replace(".", "")) for text in texts)
 
 
 def _shortest(value: Any) -> Any:

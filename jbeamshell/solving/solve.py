@@ -195,7 +195,8 @@ def _marched(
     scene: Scene, path: LoadPath, touching: np.ndarray | None, solver: Newton, throw: bool
 ) -> History:
     """History in load steps; a failed step is taken again in pieces."""
-    steps, history = _stepped((scene, touching, path, np.asarray(True)), solver)
+    steps, history = _stepped((scene.in_one_form(), touching, path, np.asarray(True)), solver)
+    history = history.but(scene=scene)
     if is_traced(steps):  # by its scene, or by a caller's jit around a scene of plain numbers
         converged = steps.state.converged[-1]
         message = f"a load step found no equilibrium: {ADVICE}"
@@ -252,5 +253,5 @@ def compile_for(
     if scene.plan.on_contact_line:
         _walked(scene, whole, cycles, False, path is None)
         return
-    given = scene, None, whole, np.asarray(False)
+    given = scene.in_one_form(), None, whole, np.asarray(False)
     jax.block_until_ready(_stepped(given, solver or Newton()))

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from jbeamshell.common.checks import as_leaf, require
 from jbeamshell.common.errors import InputError
-from jbeamshell.mechanics.homogeneous import plane_modulus
 from jbeamshell.scene.domain import gross_slip, gross_slip_rule, support_rules
 from jbeamshell.scene.keys import DERIVED, NUMBERS, TABLE, check_key
 from jbeamshell.scene.layers import fill_height
+from jbeamshell.scene.linearisation import stretching
 from jbeamshell.scene.scene import Scene
 
 LARGEST = 400_000_000  # bytes of a sweep's arrays; with those of the compiler less than 1 GB
@@ -81,30 +81,14 @@ class Lanes:
 
         A number that depends on others, such as the half height, follows those that are varied.
         """
-        if key in self.axes:
-            return self.grid(key)
-        if key == "strip.half_height":
-            return 0.5 * self.value("strip.height_ratio") * self.value("strip.length")
-        if key == "strip.height_ratio" and "strip.half_height" in self.axes:
-            return 2.0 * self.grid("strip.half_height") / self.value("strip.length")
-        if key == "strip.axial_stiffness":
-            return self._stiffness()
-        return self.scene.number(key)
-
-    def _stiffness(self) -> np.ndarray:
-        """Stretching stiffness E' 2H of lanes that do not give it, force per unit width."""
-        strip = self.scene.strip
-        if "strip.youngs_modulus" not in self.axes:
-            return np.asarray(strip.stretching_stiffness, dtype=float)
-        modulus, nu = self.grid("strip.youngs_modulus"), self.value("strip.poisson_ratio")
-        return plane_modulus(2.0 * self.value("strip.half_height") * modulus, nu, strip.plane)
+        return self.scene.number(key, {key: self.grid(key) for key in self.axes})
 
     # --- quantities of the lanes, broadcasting to their shape -------------------------------------
 
     @property
     def height_ratio(self) -> np.ndarray:
         """Height ratio eta = H/(L/2)."""
-        return 2.0 * self.value("strip.half_height") / self.value("strip.length")
+        return self.value("strip.height_ratio")
 
     @property
     def gross_slip(self) -> np.ndarray:
@@ -128,7 +112,8 @@ class Lanes:
         """Estimate of a lane's cost, which grows with the slip zone; an array of their shape."""
         amplitude, load = self.value("load.amplitude"), self.scene.load
         if load.control == "displacement":
-            amplitude = amplitude * self.value("strip.axial_stiffness") / self.value("strip.length")
+            stiffness = stretching(self.scene.strip, self.value)
+            amplitude = amplitude * stiffness / self.value("strip.length")
         with np.errstate(all="ignore"):
             ratio = amplitude / self.gross_slip / self.height_ratio
         return np.broadcast_to(np.nan_to_num(ratio, posinf=0.0, neginf=0.0), self.shape)

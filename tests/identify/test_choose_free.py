@@ -14,6 +14,7 @@ from tests import rig
 SI = {"force": "N/m", "displacement": "m"}
 MU, ETA, STIFF = "contact.friction", "strip.height_ratio", "strip.axial_stiffness"
 SLIDERS, PRESSURE, LENGTH = "contact.stick_stiffness", "contact.pressure", "strip.length"
+MODULUS = "strip.youngs_modulus"
 
 
 def chosen(data, known=None):
@@ -61,6 +62,24 @@ def test_what_is_given_is_not_fitted():
     friction = {MU: 0.1, PRESSURE: 1e6, LENGTH: 2.0, STIFF: 3.4e8}
     assert chosen([in_si()], known=friction) == [ETA]
     assert chosen([in_si()], known=friction | {ETA: 0.1}) == [MU, ETA]  # what is given starts there
+
+
+def test_beside_youngs_modulus_friction_and_height_are_one_number():
+    """In units of A/E' nothing but A/(mu F_N H) is left, so that loops tell one of the two."""
+    scene = jb.Scene().replace({MODULUS: 2e5})
+    ask = jb.response(scene, [MU, ETA], ["dissipation", "peak_displacement"])
+    one, other = ask(0.1, 0.1), ask(0.2, 0.05)
+    for name in ("dissipation", "peak_displacement"):
+        assert float(other[name]) == pytest.approx(float(one[name]), rel=0.03)
+    steel = {MODULUS: 1.4e9, LENGTH: 2.0, PRESSURE: 1e6}
+    assert chosen([in_si()], known=steel) == [MU]
+    assert chosen([in_si()], known=steel | {MU: 0.1}) == [ETA]
+    assert chosen([in_si()], known=steel | {ETA: 0.1}) == [MU]
+    assert chosen([in_si()], known=steel | {ETA: 0.1, MU: 0.1}) == [MU, MODULUS]
+    assert chosen([in_si()], known=scene) == [MU, MODULUS]
+    assert chosen([root()], known=scene) == [MU, MODULUS]
+    amplitude = np.array([0.3, 0.6, 1.2])
+    assert chosen([DissipationCurve(amplitude, amplitude**3)], known=scene) == [MU, MODULUS]
 
 
 def test_the_numbers_of_a_whole_scene_are_starts():
