@@ -124,8 +124,14 @@ def test_it_walks_as_the_walk_in_jax(rounded):
         for name in ("v", "r_t", "r_n", "displacement"):
             one, two = (np.asarray(getattr(each.state, name)) for each in (own, other))
             np.testing.assert_allclose(one, two, atol=1e-6 * np.abs(two).max(), err_msg=name)
-        scale = np.asarray(other.slip_work).max()
-        np.testing.assert_allclose(own.slip_work, other.slip_work, atol=1e-7 * scale)
+        work, scale = np.asarray(own.slip_work), np.asarray(other.slip_work).max()
+        # Where a branch goes on beyond the loop that it closes, nodes begin to slip at one load.
+        # Rounding decides which of them is the first: by up to 1e-3 of a step's work, here as there.
+        near = [friction * (1.0 + s * 0.1**p) for s in (-1, 1) for p in range(7, 14)]
+        flips = [levels(body, each, size * LOADS, True, rounded).slip_work for each in near]
+        undecided = np.max(np.abs(np.array(flips) - work), axis=0)
+        off = np.abs(work - np.asarray(other.slip_work))
+        assert np.all(off <= 1e-7 * scale + 1.01 * undecided)
 
 
 def test_a_body_driven_by_displacement_is_walked_as_well():
