@@ -126,7 +126,7 @@ def test_it_walks_as_the_walk_in_jax(rounded):
             np.testing.assert_allclose(one, two, atol=1e-6 * np.abs(two).max(), err_msg=name)
         work, scale = np.asarray(own.slip_work), np.asarray(other.slip_work).max()
         # Where a branch goes on beyond the loop that it closes, nodes begin to slip at one load.
-        # Rounding decides which of them is the first: by up to 1e-3 of a step's work, here as there.
+        # Rounding decides which of them is the first, by up to 1e-3 of a step's work.
         near = [friction * (1.0 + s * 0.1**p) for s in (-1, 1) for p in range(7, 14)]
         flips = [levels(body, each, size * LOADS, True, rounded).slip_work for each in near]
         undecided = np.max(np.abs(np.array(flips) - work), axis=0)
