@@ -238,8 +238,8 @@ class LawModel(Model):
         """Raise `InputError` for a law without loops, and forces that it cannot follow."""
         _ = self.law.stiffness  # raises for a law without loops
         if self.control == "force":
-            fix = f"{self.law.heading} is driven by the displacement alone: take 'displacement'"
-            require("load.control", "force", isinstance(self.law, MasingLaw), fix)
+            fix = "follows displacements alone: let these drive it, or take a law such as iwan4"
+            require("law driven by the force", self.law.heading, self.law.by_force, fix)
             self._check_forces(path)
 
     def check_amplitudes(self, amplitude: ArrayLike) -> None:

@@ -258,7 +258,8 @@ def _completed(
         control = meant.control
     else:
         control = of_model.pop("load.control", None)
-    driver = control if control in CONTROLS else None
+    driver = None if getattr(meant, "by_force", True) else "displacement"
+    driver = control if control in CONTROLS else driver
     read = one.read(folder, driver, [parameter.key for parameter in free], unchecked)
     data = [item for item, _ in read]
     notes = [f"{item.label}: {note}" for item, said in read for note in said]

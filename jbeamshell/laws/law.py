@@ -41,6 +41,7 @@ class Law(Part):
     """
 
     masing: ClassVar[bool] = False  # True if loops are the backbone doubled, see `MasingLaw`
+    by_force: ClassVar[bool] = False  # True if a fit may prescribe forces on a path
     fitted: ClassVar[tuple[str, ...]] = ()  # numbers that a loop tells; all if empty
 
     @property
