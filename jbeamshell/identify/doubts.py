@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.dynamics.structure.modal import DOUBTED
 from jbeamshell.identify.experiment import Experiment
-from jbeamshell.identify.models import Model
+from jbeamshell.identify.models import LawModel, Model
 from jbeamshell.identify.observations import ModalObservation
 from jbeamshell.identify.parameters import Bijection
 from jbeamshell.identify.problem import Problem
@@ -64,6 +64,14 @@ def doubts_of(
         *_contradictions(problem, uncertainty.point),
         *doubt_of_units(space, values),
     ]
+    for model in models:
+        if isinstance(model, LawModel) and np.isfinite(model.law.fitted_to):
+            law, far = model.law, model.law.fitted_to
+            doubts.append(
+                f"the data do not reach gross slip of {law.heading}, {float(law.capacity):.4g}, "
+                f"which its form adds: they tell it up to the displacement {far:.4g} and the force "
+                f"{float(law.backbone(far)):.4g}"
+            )
     if best.converged:
         doubts += _of_statics(experiment, models, uncertainty, jacobian)
     for name, bijection, value in zip(space.names, space.bijections, values, strict=True):

@@ -39,7 +39,7 @@ MOST = 32
 POINTS = 160  # of a smooth backbone
 HALVED = 8  # of them, which halve the way to the last one
 LEAST = 1e-5  # displacement of the first of them, over the last one's
-NEARLY = 1e-6  # part of gross slip that the last of them lacks
+NEARLY = 1.0 - 1e-6  # part of gross slip that the last of them reaches
 NO_MASING = "has no Masing memory, so no sliders hold it: take iwan4, bar, mindlin or sliders8"
 ENDLESS = "rises for ever: give the largest force, Joint.of(law, force)"
 
@@ -210,7 +210,7 @@ def backbone_points(law: Law, force: Any = None) -> tuple[Array, Array]:
     if isinstance(law, ParallelIwan) and force is None:
         u = jnp.sort(law.slips)
     else:
-        end = law.displacement((1.0 - NEARLY) * law.capacity if force is None else force)
+        end = law.displacement(NEARLY * law.capacity if force is None else force)
         # Only the last point moves with the law, so its neighbours are close.  Chords between
         # moving points have slopes, by the law's numbers, that swing about the law's by a fifth.
         inner = jnp.geomspace(LEAST, 1.0, POINTS - HALVED)[:-1]

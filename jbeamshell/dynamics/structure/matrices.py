@@ -291,7 +291,7 @@ def _traced_modes(stiffness: Array, mass: Array, count: int) -> tuple[Array, Arr
 def _checked(name: str, matrix: Any, size: int | None = None) -> Any:
     """Matrix of floats, dense or sparse; raises `InputError`."""
     if is_traced(matrix):
-        known = as_leaf(matrix, name, SQUARE)
+        known: Any = as_leaf(matrix, name, SQUARE)
         square = known.ndim == 2 and known.shape[0] == known.shape[1]
         require(name, known.shape, square and size in (None, known.shape[0]), SQUARE)
         return known
