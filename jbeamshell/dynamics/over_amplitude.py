@@ -19,6 +19,8 @@ from jbeamshell.measured.curves import (
 Floats = NDArray[np.float64]
 
 FEWEST = 4  # points of a bin that tell its scatter
+DEGREE = 3  # of the frequency over the logarithm of the amplitude, for its slope
+TELLING = 0.02  # difference of the damping of steady cycles that is printed
 TWO_SIGMA = 1.96  # half width of a 95 % interval over the standard error
 
 
@@ -31,7 +33,8 @@ class RingDown:
     time : times
     amplitude : half of a swing
     frequency : cycles per time, as they pass; see `omega` for the undamped one
-    damping : damping ratio zeta; the logarithmic decrement is 2 pi zeta/sqrt(1 - zeta^2) per cycle
+    damping : damping ratio zeta of the decay; the logarithmic decrement is
+        2 pi zeta/sqrt(1 - zeta^2) per cycle
     frequency_interval, damping_interval : (k, 2) ends of 95 % intervals; None where not known
     numbers : how many numbers of frequency and of damping the data told; 1 if neither depends on
         the amplitude as far as the data tell, 0 if each point is measured by itself
@@ -53,6 +56,20 @@ class RingDown:
     def omega(self) -> Floats:
         """Undamped angular frequency (k,), 2 pi frequency/sqrt(1 - zeta^2)."""
         return 2.0 * np.pi * self.frequency / np.sqrt(1.0 - self.damping**2)
+
+    @property
+    def steady_damping(self) -> Floats:
+        """Damping ratio (k,) of steady vibration, if friction is what softens the joint.
+
+        A swing of a decay begins on the branch of the swing before, from a turn of larger force.
+        To first order of Masing's rule, for any backbone, zeta of a steady cycle is that of the
+        decay times 1 + d log omega^2/d log a.
+        """
+        if self.numbers == 1 or self.amplitude.size < 2 * FEWEST:
+            return self.damping
+        size = np.log(self.amplitude)
+        line = np.polynomial.Polynomial.fit(size, 2.0 * np.log(self.omega), DEGREE)
+        return self.damping * (1.0 + np.clip(line.deriv()(size), -1.0, 0.0))
 
     @property
     def omega_interval(self) -> Floats | None:
@@ -92,6 +109,8 @@ class RingDown:
                 + (f" +- {0.5 * np.ptp(ends[row]):.2g}" if ends is not None else "")
                 for name, (column, ends) in columns.items()
             ]
+            if abs(self.steady_damping[row] - self.damping[row]) > TELLING * self.damping[row]:
+                words.append(f"{self.steady_damping[row]:.3g} in steady cycles of friction")
             where = "" if self.numbers == 1 else f"amplitude {self.amplitude[row]:.4g}: "
             lines.append(f"  {where}{', '.join(words)}")
         if self.numbers == 1:
@@ -105,7 +124,7 @@ class RingDown:
         """Dissipation and stiffness of a strip from the ring-down of a mass on it.
 
         The mass balances the strip, so the amplitude of the force is F = m omega^2 u, and the
-        energy per cycle is 2 pi zeta F u.
+        energy per cycle is 2 pi zeta F u, with the `steady_damping`.
 
         Parameters
         ----------
@@ -131,7 +150,7 @@ class RingDown:
         u = np.geomspace(smallest, largest, points)
         frequency, damping = (
             np.interp(u, self.amplitude[known], column[known])
-            for column in (self.frequency, self.damping)
+            for column in (self.frequency, self.steady_damping)
         )
         force = mass / width * (2.0 * np.pi * frequency) ** 2 * u
         loss = DissipationCurve(
@@ -142,7 +161,7 @@ class RingDown:
     def modal_curves(
         self, points: int = 20, *, low: float = 0.0, high: float = np.inf, label: str = "ring-down"
     ) -> tuple[FrequencyCurve, DampingCurve]:
-        """Frequency and damping of a structure over the amplitude, with their noise.
+        """Frequency and steady damping of a structure over the amplitude, with their noise.
 
         Each point is the mean of a bin, evenly wide in the logarithm of the amplitude.  Its noise
         is that of the fitted rates, shared among the bins, if they were fitted.  Otherwise it is
@@ -166,7 +185,7 @@ class RingDown:
             for a signal that does not decay between these amplitudes
         """
         kept = (self.amplitude >= low) & (self.amplitude <= high)
-        size, bins = np.log(self.amplitude[kept]), []
+        size, steady, bins = np.log(self.amplitude[kept]), self.steady_damping[kept], []
         fix = "leaves no vibration: take wider bounds"
         require("low, high", (low, high), size.size >= FEWEST, fix)
         edges = np.linspace(size.min(), size.max() + 1e-9, points + 1)
@@ -174,7 +193,7 @@ class RingDown:
             inside = (size >= edges[place]) & (size < edges[place + 1])
             if np.count_nonzero(inside) < FEWEST:
                 continue
-            columns = (self.frequency[kept][inside], self.damping[kept][inside])
+            columns = (self.frequency[kept][inside], steady[inside])
             means = [_mean_and_noise(size[inside], column) for column in columns]
             if means[1][0] > 0.0:
                 bins.append((np.exp(np.mean(size[inside])), *means[0], *means[1]))

@@ -57,6 +57,9 @@ def ring_down(
 ) -> RingDown:
     """Amplitude, frequency and damping of one decaying vibration, with their 95 % intervals.
 
+    The damping is that of the decay.  Steady vibration of a joint that softens by friction is
+    damped less, by a quarter near gross slip: see `RingDown.steady_damping`.
+
     Parameters
     ----------
     time : (T,) evenly spaced times

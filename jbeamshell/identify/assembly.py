@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
@@ -21,6 +22,11 @@ from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.toml import scene_to_toml
 
 REACH = 0.9  # force up to which a joint is computed, over its gross slip
+UNTRACED = (jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError)
+TRACED = (
+    "JAX traces its numbers in a fit: take jax.numpy in place of numpy and math, and no float(), "
+    "int() or if on them"
+)
 NUMBERS = "give numbers by name, such as {'damping_ratio': 0.001}"
 
 Build = Callable[[Scene | None, Mapping[str, Array]], Structure]
@@ -187,7 +193,10 @@ class Assembly(Model):
 
     def structure(self) -> Structure:
         """Structure with these numbers."""
-        built = self.build(self.scene, self.numbers)
+        try:
+            built = self.build(self.scene, self.numbers)
+        except UNTRACED as error:
+            raise InputError(f"build: {TRACED}") from error
         fix = "must return a jbeamshell.dynamics.Structure"
         require("build", built, isinstance(built, Structure), fix)
         for name, place in {"point": self.point, "driven": self.driven}.items():

@@ -18,11 +18,11 @@ from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.identify.models import LawModel, Model, as_model
 from jbeamshell.identify.multistart import Options
 from jbeamshell.identify.observations import Observation, observe
-from jbeamshell.identify.plan import planned
+from jbeamshell.identify.plan import Datum, planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.specimens import Specimen
 from jbeamshell.laws import Law, PowerLaw, law_named
-from jbeamshell.measured.curves import DissipationCurve, StiffnessCurve
+from jbeamshell.measured.curves import AmplitudeCurve, DissipationCurve, StiffnessCurve
 from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
@@ -150,7 +150,7 @@ class Comparison:
 
 
 def compare(
-    target: Measurement | Sequence[Measurement] | Scene,
+    target: Datum | Sequence[Datum] | Scene,
     models: Sequence[str | Law] = MODELS,
     *,
     amplitudes: ArrayLike | None = None,
@@ -160,8 +160,9 @@ def compare(
 
     Parameters
     ----------
-    target : measured loops, or curves with a dissipation among them; or a strip, whose steady
-        cycles under forces give its dissipation and secant stiffness over the displacement
+    target : measured loops or the names of their files, or curves with a dissipation among them;
+        or a strip, whose steady cycles under forces give its dissipation and secant stiffness over
+        the displacement
     models : names of laws, see `jbeamshell.laws.law_named`, or laws as starts
     amplitudes : (n,) force amplitudes of a strip's cycles, below gross slip; None spreads twelve up
         to that of the scene
@@ -187,8 +188,12 @@ def compare(
     if isinstance(target, Scene):
         return _with_strip(target, models, amplitudes, options)
     require("amplitudes", amplitudes, amplitudes is None, "are the target's own: leave them out")
-    data = [item for item, _ in Specimen(None, target).read(Path())]
-    amplitude, energy, drive = _energies(data)
+    specimen = Specimen(None, target)
+    # Any law has a force for a displacement, so that all answer with the same column.
+    over = any(isinstance(item, DissipationCurve) for item in specimen.measurements)
+    drive = "force" if over else "displacement"
+    data = [item for item, _ in specimen.read(Path(), drive)]
+    amplitude, energy = _energies(data)
     rows = [_fitted(model, data, amplitude, drive, options) for model in models]
     return Comparison(amplitude, energy, drive, tuple(rows))
 
@@ -232,19 +237,19 @@ def _criterion(row: Compared) -> float:
     return float(row.points * np.log(max(size, least)) + row.numbers * np.log(row.points))
 
 
-def _energies(data: Sequence[Measurement]) -> tuple[Floats, Floats, str]:
-    """Amplitudes and energies of a target's steady cycles, and what drives them."""
+def _energies(data: Sequence[Measurement]) -> tuple[Floats, Floats]:
+    """Amplitudes and energies of a target's steady cycles."""
     curves = [item for item in data if isinstance(item, DissipationCurve)]
     loops = [item for item in data if isinstance(item, Loop) and item.closed]
     if curves:
         columns = ([getattr(c, name) for c in curves] for name in ("amplitude", "dissipation"))
         amplitude, energy = map(np.concatenate, columns)
-        return amplitude, energy, "force"
+        return amplitude, energy
     if not loops:
         raise InputError("target: give closed loops, or a curve of dissipation over amplitude")
     sizes = np.array([0.5 * np.ptp(loop.displacement) for loop in loops])
     order = np.argsort(sizes)
-    return sizes[order], np.array([loop.work for loop in loops])[order], "displacement"
+    return sizes[order], np.array([loop.work for loop in loops])[order]
 
 
 def _fitted(
@@ -261,7 +266,8 @@ def _fitted(
         if isinstance(model, str):
             law_named(model)  # raises for the name of anything else
         own = [i for i in data if not (_is_power(model) and isinstance(i, StiffnessCurve))]
-        specimen = Specimen(model, own, set={"load.control": drive})
+        over = any(isinstance(item, AmplitudeCurve) for item in own)  # of a column they do not say
+        specimen = Specimen(model, own, set={"load.control": drive} if over else {})
         found = planned(specimen, options=Options(**{"throw": False, **options})).run()
     except (InputError, UnconvergedError) as error:
         return Compared(name, None, nothing, np.nan, np.nan, str(error))
@@ -271,7 +277,8 @@ def _fitted(
     told = "" if found.converged else "the search has not converged"
     if not found.describes:
         told = "; ".join(filter(None, (told, "does not describe these data")))
-    return Compared(name, found, energy, found.misfit, _seconds(own, LawModel(law, drive)), told)
+    seconds = _seconds(found.data, LawModel(law, found.controls[0]))
+    return Compared(name, found, energy, found.misfit, seconds, told)
 
 
 def _is_power(model: str | Law) -> bool:

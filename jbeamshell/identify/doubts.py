@@ -8,6 +8,7 @@ lie between those of two measurements describe neither.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from jbeamshell.dynamics.structure.modal import DOUBTED
 from jbeamshell.identify.experiment import Experiment
-from jbeamshell.identify.models import Model
+from jbeamshell.identify.models import LawModel, Model
 from jbeamshell.identify.observations import ModalObservation
 from jbeamshell.identify.parameters import Bijection
 from jbeamshell.identify.problem import Problem
@@ -27,6 +28,14 @@ from jbeamshell.measured.loops import Loop
 
 LIMITS = {"linear": 0.05, "log": 0.3}  # misfit by the model above which it does not describe data
 ENERGY, STIFFNESS_ERROR = 0.2, 0.1  # errors of a closed loop above which it does not either
+LOCAL = {  # errors of two neighbours of a curve over the amplitude, likewise
+    "dissipation": ENERGY,
+    "damping": ENERGY,
+    "stiffness": STIFFNESS_ERROR,
+    "frequency": 0.5 * STIFFNESS_ERROR,
+}
+FEWEST = 4  # points of such a curve
+NORMAL = 0.6745  # median of the size of a normal number of unit variance
 SURE = 2.0  # standard errors by which noise may move energy and stiffness
 APART = 0.5  # of the misfit of all together, left by each alone, below which they contradict
 MANY = 5.0  # standard errors of each alone between what they would have
@@ -64,6 +73,14 @@ def doubts_of(
         *_contradictions(problem, uncertainty.point),
         *doubt_of_units(space, values),
     ]
+    for model in models:
+        if isinstance(model, LawModel) and np.isfinite(model.law.fitted_to):
+            law, far = model.law, model.law.fitted_to
+            doubts.append(
+                f"the data do not reach gross slip of {law.heading}, {float(law.capacity):.4g}, "
+                f"which its form adds: they tell it up to the displacement {far:.4g} and the force "
+                f"{float(law.backbone(far)):.4g}"
+            )
     if best.converged:
         doubts += _of_statics(experiment, models, uncertainty, jacobian)
     for name, bijection, value in zip(space.names, space.bijections, values, strict=True):
@@ -116,12 +133,13 @@ def undescribed(experiment: Experiment, left: Sequence[float], prediction: Vecto
     for label, data, model, owner in zip(
         experiment.labels, experiment.measurements, models, experiment.owners, strict=True
     ):
-        for name, limit, own, wanted, chance in _figures(
-            data, model, experiment.models[owner].control
-        ):
+        control = experiment.models[owner].control
+        figures = _local if data.form.scale == "log" else partial(_figures, control=control)
+        for name, limit, own, wanted, chance in figures(data, model):
             error = abs(own / wanted - 1.0) - SURE * chance - limit
-            if error > beyond.get(name, (0.0, ""))[0]:
-                beyond[name] = error, f"its {name} is {own:.3g} where {label} has {wanted:.3g}"
+            kind = name.partition(" at ")[0]
+            if error > beyond.get(kind, (0.0, ""))[0]:
+                beyond[kind] = error, f"its {name} is {own:.3g} where {label} has {wanted:.3g}"
     said += [text for _, text in beyond.values()]
     return [f"this model does not describe these data: {'; '.join(said)}"] if said else []
 
@@ -148,6 +166,30 @@ def _figures(
         width, chance = float(drive[high] - drive[low]), np.sqrt(2.0) * noise / wanted
         own, wanted = (width / s if control == "force" else s / width for s in (own, wanted))
         yield "secant stiffness", STIFFNESS_ERROR, own, wanted, float(chance)
+
+
+def _local(data: Any, model: Any) -> Iterator[tuple[str, float, float, float, float]]:
+    """Figures of a curve over the amplitude where two neighbours in a row are farthest off.
+
+    Its noise, where that is not known, is told by the second differences of what the model leaves,
+    in the median, so that a few large ones may be the model's.
+    """
+    if data.kind not in LOCAL or data.amplitude.size < FEWEST:
+        return
+    order = np.argsort(data.amplitude, kind="stable")
+    wanted, own = (getattr(curve, data.form.y)[order] for curve in (data, model))
+    left = np.log(own / wanted)
+    if data.noise is None:
+        spread = float(np.median(np.abs(np.diff(left, 2)))) / (NORMAL * np.sqrt(6.0))
+        noise = np.full(left.size, spread)
+    else:
+        noise = data.noise[order] / wanted
+    pairs = 0.5 * (left[1:] + left[:-1])
+    chances = 0.5 * np.hypot(noise[1:], noise[:-1])
+    at = int(np.argmax(np.abs(np.expm1(pairs)) - SURE * chances))
+    middle = float(np.sqrt(wanted[at] * wanted[at + 1]))
+    name = f"{data.kind} at the amplitude {data.amplitude[order][at]:.3g}"
+    yield name, LOCAL[data.kind], middle * float(np.exp(pairs[at])), middle, float(chances[at])
 
 
 def _contradictions(problem: Problem, point: Vector) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.models import LawModel
 from jbeamshell.identify.starts import estimate
-from jbeamshell.laws import Law, MasingLaw
+from jbeamshell.laws import Law
 from jbeamshell.measured.curves import (
     AmplitudeCurve,
     Backbone,
@@ -18,6 +18,8 @@ from jbeamshell.measured.curves import (
     StiffnessCurve,
 )
 from jbeamshell.measured.loops import Loop
+
+ABOVE = 1.2  # force of a start over the largest one that drives
 
 
 def driven(
@@ -34,14 +36,19 @@ def driven(
     measurements : what was measured
     control : column that drives it; None chooses as above
     """
-    if not isinstance(law, Law):
-        law = law.started(*_figures(measurements, control or "force"))
     pulls = [item for item in measurements if isinstance(item, Loop | Backbone)]
     by_force = [getattr(pull, "driver", None) == "force" for pull in pulls]
     noisy = [pull.deviations is not None for pull in pulls]
     backward = any(a and b for a, b in zip(by_force, noisy, strict=True))
-    force = not pulls or (backward and isinstance(law, MasingLaw))
-    return LawModel(law, control or ("force" if force else "displacement"))
+    force = not pulls or (backward and law.by_force)
+    by = control or ("force" if force else "displacement")
+    if not isinstance(law, Law):
+        kind, (size, *rest) = law, _figures(measurements, control or "force")
+        law = kind.started(size, *rest)
+        most = max([size, *(float(np.max(np.abs(pull.force))) for pull in pulls)])
+        if by == "force" and law.capacity <= most:  # a law has no answer at its gross slip
+            law = kind.started(ABOVE * most, *rest)
+    return LawModel(law, by)
 
 
 def _figures(measurements: Sequence[Any], control: str) -> tuple[float, float, float, float]:

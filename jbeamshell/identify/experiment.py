@@ -146,6 +146,10 @@ class Experiment:
         known = np.repeat([m.deviations is not None for m in self.measurements], sizes)
         self.relative = np.where(known, 1.0 / (self.weight * spans), noise or 1.0)
 
+    def of(self, owner: int) -> list[Any]:
+        """Measurements of a specimen, by its number."""
+        return [m for m, own in zip(self.measurements, self.owners, strict=True) if own == owner]
+
     @property
     def model_error(self) -> float:
         """Size of what a grid of plane elasticity may leave in a residual; 0 for other models.

@@ -22,6 +22,7 @@ from jbeamshell.contact_line.shared import Shared, shared
 from jbeamshell.contact_line.strip import Strip
 from jbeamshell.laws import Law, MasingLaw, PowerLaw
 from jbeamshell.measured.curves import AmplitudeCurve, DissipationCurve, StiffnessCurve
+from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
 from jbeamshell.scene.keys import CONTROLS
 from jbeamshell.scene.load_path import check
@@ -35,6 +36,7 @@ FIGURES: dict[type[AmplitudeCurve], str] = {
     DissipationCurve: "dissipation",
     StiffnessCurve: "secant_stiffness",
 }
+WITHIN, GROSS = 0.95, 0.99  # parts of the data and of gross slip, where data reach gross slip
 FINER = 0.5  # part of the tolerance that plane elasticity keeps: fitted numbers amplify its error
 
 
@@ -60,6 +62,10 @@ class Model(eqx.Module):
     @abc.abstractmethod
     def replace(self, values: Mapping[str, Any]) -> Self:
         """Copy with other numbers, by dotted key; they may be traced."""
+
+    def fitted(self, measurements: Sequence[Any]) -> Model:
+        """Model that knows how far its measurements went, where that matters."""
+        return self
 
     @property
     def tolerance(self) -> float:
@@ -231,6 +237,24 @@ class LawModel(Model):
     def replace(self, values: Mapping[str, Any]) -> Self:
         return type(self)(self.law.replace(values), self.control)
 
+    def fitted(self, measurements: Sequence[Any]) -> Model:
+        """Model whose law knows how far measurements went, unless it slides well within."""
+        law, far = self.law, 0.0
+        if not np.isfinite(law.capacity):
+            return self
+        for item in measurements:
+            if not isinstance(item, AmplitudeCurve):
+                u = item.displacement
+                closed = isinstance(item, Loop) and item.closed
+                size = 0.5 * np.ptp(u) if closed else np.max(np.abs(u))
+            else:
+                size = np.max(item.amplitude)
+                size = law.displacement(size) if self.control == "force" else size
+            far = max(far, float(size))
+        if law.backbone(WITHIN * far) >= GROSS * law.capacity:
+            return self
+        return type(self)(law.but(fitted_to=far), self.by)
+
     def as_toml(self) -> str:
         return self.law.as_toml()
 
@@ -238,8 +262,8 @@ class LawModel(Model):
         """Raise `InputError` for a law without loops, and forces that it cannot follow."""
         _ = self.law.stiffness  # raises for a law without loops
         if self.control == "force":
-            fix = f"{self.law.heading} is driven by the displacement alone: take 'displacement'"
-            require("load.control", "force", isinstance(self.law, MasingLaw), fix)
+            fix = "follows displacements alone: let these drive it, or take a law such as iwan4"
+            require("law driven by the force", self.law.heading, self.law.by_force, fix)
             self._check_forces(path)
 
     def check_amplitudes(self, amplitude: ArrayLike) -> None:

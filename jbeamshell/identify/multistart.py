@@ -174,7 +174,10 @@ def found_by(
         )
     uncertainty = uncertainty_at(problem, end.point, end.jacobian)
     values = space.values(end.point)
-    models = [one.replace(space.of(values, i)) for i, one in enumerate(problem.experiment.models)]
+    models = [
+        model.replace(space.of(values, owner)).fitted(problem.experiment.of(owner))
+        for owner, model in enumerate(problem.experiment.models)
+    ]
     fit = Fit(
         problem,
         uncertainty,

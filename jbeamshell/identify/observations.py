@@ -148,11 +148,12 @@ class LoopObservation(Observation):
         noise = measurement.deviations
         driver = getattr(measurement, "driver", None) or model.control
         if noise is not None and driver != model.control:
+            fix = f"average its cycles by steady_loops(recording, {model.control!r})"
+            if isinstance(model, StripModel):
+                fix = f"set load.control to {driver!r}, or {fix}"
             raise InputError(
                 f"{measurement.label}: its {driver} drives, so its noise is not that of the "
-                f"{driver}, which is the response under load.control = {model.control!r}: "
-                f"set load.control to {driver!r}, or average its cycles by "
-                f"steady_loops(recording, {model.control!r})"
+                f"{driver}, by which {model.kind} answers where the {model.control} drives: {fix}"
             )
         if noise is not None and np.min(noise) >= np.ptp(response):
             raise InputError(

@@ -67,7 +67,7 @@ def fitted_row(key: str) -> Key:
     if law := law_of(key):
         return law.table()[key]
     if is_of_structure(key):
-        return Key(key, "number", 1.0, "Number of a structure.", low=0.0, scale="log")
+        return Key(key, "number", 1.0, "Number of a structure.", low=ANY, scale="log")
     of_rig = isinstance(key, str) and key.startswith(PREFIX)
     (check_rig_key if of_rig else check_key)(key)
     return RIG[key] if of_rig else TABLE[key]
@@ -198,9 +198,10 @@ class Parameter:
     ----------
     key : dotted key, such as "contact.friction", "iwan4.chi" or "rig.compliance"
     start : value at which the search starts; None takes the scene's own value
-    low, high : bounds, both excluded; None takes the bounds in the table of keys
+    low, high : bounds, both excluded; None takes the bounds in the table of keys.  A number of a
+        structure that starts above zero stays there; give ``low`` if it may have any sign
     scale : "log" for a quantity known by its order of magnitude, or "linear"; None takes the scale
-        in the table of keys
+        in the table of keys, and "linear" for a number of a structure that may be negative
     prior : mean and standard deviation of prior knowledge, in the parameter's own units
     each : True if every specimen has a value of its own; False if all share one
 
@@ -254,8 +255,10 @@ class Parameter:
     def bounds(self) -> tuple[float, float]:
         """Open interval in which to search."""
         least, most = fitted_row(self.key).low, fitted_row(self.key).high
-        low = least if self.low is None else float(self.low)
-        return low, most if self.high is None else float(self.high)
+        high = most if self.high is None else float(self.high)
+        if is_of_structure(self.key) and high > 0.0:
+            least = 0.0
+        return least if self.low is None else float(self.low), high
 
     @property
     def bounded(self) -> bool:
@@ -265,10 +268,13 @@ class Parameter:
     def bijection(self, start: float) -> Bijection:
         """Map from the search space; raises `InputError` if the start lies out of bounds."""
         low, high = self.bounds
+        if is_of_structure(self.key) and self.low is None and start < 0.0:
+            low = ANY
         fix = f"must lie between low = {low:g} and high = {high:g}, both excluded"
         self._require("start", start, low < start < high, fix)
         scale = fitted_row(self.key).scale if self.scale is None else self.scale
-        return Bijection(start, low, high, scale == "log")
+        signed = is_of_structure(self.key) and low < 0.0
+        return Bijection(start, low, high, scale == "log" and not signed)
 
     def _check_prior(self) -> None:
         if self.prior is None:

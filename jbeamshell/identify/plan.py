@@ -32,7 +32,7 @@ from jbeamshell.identify.results import Fit
 from jbeamshell.identify.rig import with_starts
 from jbeamshell.identify.search_space import search_space
 from jbeamshell.identify.specimens import Specimen
-from jbeamshell.identify.starts import Estimate, check_starts, estimate, started
+from jbeamshell.identify.starts import Estimate, check_starts, doubt_of_strain, estimate, started
 from jbeamshell.laws import LAWS, Law, law_named
 from jbeamshell.measured.curves import AmplitudeCurve, Backbone
 from jbeamshell.measured.form import Measurement
@@ -61,12 +61,14 @@ class Plan:
     free : parameters to fit
     notes : sentences on what was done to the data, and what was chosen by default
     options : settings of the fit
+    doubts : sentences on data that may be wrong
     """
 
     specimens: Sequence[Specimen]
     free: Sequence[Parameter]
     notes: Sequence[str] = ()
     options: Options = DEFAULTS
+    doubts: Sequence[str] = ()
 
     @on_one_core
     def run(
@@ -86,7 +88,7 @@ class Plan:
         """Run the fit in a thread of its own."""
         specimens, doubts = counted_once(self.specimens)
         keys = [parameter.key for parameter in self.free]
-        doubts = [*doubts, *inspected(specimens, keys, self.options.unchecked)]
+        doubts = [*self.doubts, *doubts, *inspected(specimens, keys, self.options.unchecked)]
         parameters = with_starts(self.free, specimens)
         space, models = search_space(parameters, {one.label: one.model for one in specimens})
         specimens = [dataclasses.replace(one, scene=models[one.label]) for one in specimens]
@@ -212,11 +214,13 @@ def planned(
     parameters = as_parameters(free) if chosen else ()
     whole: list[Specimen] = []
     notes: list[str] = []
+    doubts: list[str] = []
     for one in _specimens(data, scene, weights):
-        done, parameters, said = _completed(one, parameters, folder, options.unchecked)
+        done, parameters, said, doubted = _completed(one, parameters, folder, options.unchecked)
         whole.append(done)
         notes += said
-    return Plan(whole, parameters, notes, options)
+        doubts += doubted
+    return Plan(whole, parameters, notes, options, doubts)
 
 
 def _specimens(data: Any, scene: Any, weights: Sequence[float]) -> list[Specimen]:
@@ -245,8 +249,8 @@ Free = tuple[Parameter, ...]
 
 def _completed(
     one: Specimen, free: Free, folder: Path, unchecked: bool
-) -> tuple[Specimen, Free, list[str]]:
-    """Specimen with a whole model and data as they are compared, what to fit, and notes."""
+) -> tuple[Specimen, Free, list[str], list[str]]:
+    """Specimen with a whole model and data as they are compared, what to fit, notes and doubts."""
     meant, of_model = _meant(one.scene, folder), one.of_model
     known = one.known(folder)
     if isinstance(meant, Mapping):
@@ -258,15 +262,18 @@ def _completed(
         control = meant.control
     else:
         control = of_model.pop("load.control", None)
-    driver = control if control in CONTROLS else None
+    driver = None if getattr(meant, "by_force", True) else "displacement"
+    driver = control if control in CONTROLS else driver
     read = one.read(folder, driver, [parameter.key for parameter in free], unchecked)
     data = [item for item, _ in read]
     notes = [f"{item.label}: {note}" for item, said in read for note in said]
     notes += known.notes
     model: Model
     said: list[str]
+    doubts: list[str] = []
     if isinstance(meant, Mapping):
         model, free, said = _strip(meant, data, free)
+        doubts = doubt_of_strain(meant, model.own, estimate(data))
     elif isinstance(meant, Model):
         model, said = meant, []
         if isinstance(meant, StripModel) and not free:
@@ -284,7 +291,7 @@ def _completed(
     )
     notes += [f"{one.label}: {note}" if one.label else note for note in said]
     whole = model.own if isinstance(model, StripModel) else model
-    return dataclasses.replace(one, scene=whole, data=data, set=one.rig), free, notes
+    return dataclasses.replace(one, scene=whole, data=data, set=one.rig), free, notes, doubts
 
 
 def _meant(scene: Any, folder: Path) -> Any:

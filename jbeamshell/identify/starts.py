@@ -44,6 +44,7 @@ STIFFEST = 50.0  # largest stiffness after a turn over the secant
 STRAIN = 1e-3  # displacement over a length that nobody gave, at most
 FRICTIONS = (0.003, 3.0)  # friction that surfaces have, beyond which a unit is wrong
 MODULI = (5e8, 3e12)  # plane moduli [Pa] of the materials of joints, likewise
+STRAINS = (1e-7, 1e-2)  # of a strip under the force of a measured loop, likewise
 SIMILAR = 3.0  # factor of a force of gross slip within which the standard strip may be meant
 
 HEIGHT = ("strip.height_ratio", "strip.half_height")
@@ -237,6 +238,32 @@ def _check_modulus(modulus: float) -> None:
             f"{TOO_SOFT if modulus < low else TOO_STIFF}, or is --width wrong; if all are right, "
             "give --modulus"
         )
+
+
+def doubt_of_strain(known: Mapping[str, Any], scene: Scene, found: Estimate | None) -> list[str]:
+    """Sentence on a stiffness from loops that only a wrong unit explains; none if it may be right.
+
+    Numbers without units have no modulus that is too large or too small, but the strain under the
+    measured force is a pure number.
+
+    Parameters
+    ----------
+    known : values by dotted key that were given
+    scene : strip at the start
+    found : figures of the loops; None without loops
+    """
+    stretching = scene.strip.axial_stiffness
+    given = any(key in known for key in STIFFNESS) or "strip.length" not in known
+    if found is None or given or stretching is None:
+        return []
+    strain = found.force / float(stretching)
+    low, high = STRAINS
+    if low <= strain <= high:
+        return []
+    return [
+        f"by the measured displacement, the measured force stretches the strip by {strain:.2g} of "
+        f"its length, which no usual joint does: {TOO_SOFT if strain > high else TOO_STIFF}"
+    ]
 
 
 def check_starts(specimens: Sequence[Specimen], parameters: Sequence[Parameter]) -> None:

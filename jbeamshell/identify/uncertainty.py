@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.identify.parameters import FARTHEST
 from jbeamshell.identify.problem import Problem
 from jbeamshell.identify.search_space import SearchSpace
 
@@ -215,11 +216,6 @@ def uncertainty_at(problem: Problem, point: Vector, jacobian: Vector) -> Uncerta
     at_bound = np.array([bijection.bound_at(value) is not None for bijection, value in pairs])
     free = np.ix_(~at_bound, ~at_bound)
     eigenvalues, vectors = np.linalg.eigh((jacobian.T @ jacobian)[free])
-    # A pseudo-inverse would give directions without influence no variance; theirs is large.
-    least = max(LEAST * np.max(eigenvalues, initial=0.0), np.finfo(float).tiny ** 0.5)
-    safe = np.maximum(eigenvalues, least)
-    inverse = np.zeros((point.size, point.size))
-    inverse[free] = (vectors / safe) @ vectors.T
     priors = np.ones(residual.size - emphasis.size)
     factors = np.append(emphasis, priors)
     left = (residual / factors)[: relative.size]
@@ -236,16 +232,20 @@ def uncertainty_at(problem: Problem, point: Vector, jacobian: Vector) -> Uncerta
         if explained and independent == left.size:
             sigma, freedom = 1.0, None
     sigma = float(np.hypot(sigma, experiment.model_error * np.sqrt(left.size / FEWEST)))
+    # A model fitted to its own data leaves no noise to divide by.
+    sigma, scatter = (max(size, np.finfo(float).tiny ** 0.25) for size in (sigma, scatter))
+    # A pseudo-inverse would give directions without influence no variance; theirs is that of the
+    # whole search space, however small the noise.
+    least = max(LEAST * np.max(eigenvalues, initial=0.0), np.finfo(float).tiny ** 0.5)
+    safe = np.where(eigenvalues > least, eigenvalues, min(least, (sigma / FARTHEST) ** 2))
+    inverse = np.zeros((point.size, point.size))
+    inverse[free] = (vectors / safe) @ vectors.T
     factors = np.append(emphasis, priors / sigma)
     if np.any(factors != 1.0):
         # Sandwich estimator: the factors change the minimum, not the noise; priors keep theirs.
         inner = jacobian.T @ (factors[:, None] ** 2 * jacobian)
         inverse = inverse @ inner @ inverse
-    noise = scatter * float(np.sqrt(np.mean(relative**2)))
-    # A model fitted to its own data leaves no noise to divide by.
-    sigma, scatter, noise = (
-        max(size, np.finfo(float).tiny ** 0.25) for size in (sigma, scatter, noise)
-    )
+    noise = max(scatter * float(np.sqrt(np.mean(relative**2))), np.finfo(float).tiny ** 0.25)
     return Uncertainty(space, point, inverse, at_bound, sigma, scatter, freedom, noise, independent)
 
 

@@ -26,6 +26,7 @@ class Jenkins(ParallelIwan):
     """
 
     heading: ClassVar[str] = "jenkins"
+    by_force: ClassVar[bool] = False  # below gross slip it tells nothing but its stiffness
 
     slip_force: Array = number(1.0, "Force of gross slip, F_S.", symbol="F_S", unit="force/width")
     stiffness: Array = number(

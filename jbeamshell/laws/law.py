@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -34,13 +35,20 @@ class Law(Part):
     and `path_forces`; one that is fitted has a start too.  Closed forms of `dissipation` and
     `displacement` replace the slow ones here.
 
+    Attributes
+    ----------
+    fitted_to : largest displacement of the data that it was fitted to, if it does not slide there;
+        else infinite
+
     Raises
     ------
     InputError
         for a number outside its bounds
     """
 
+    fitted_to: float = eqx.field(default=math.inf, static=True, kw_only=True)
     masing: ClassVar[bool] = False  # True if loops are the backbone doubled, see `MasingLaw`
+    by_force: ClassVar[bool] = False  # True if a fit may prescribe forces on a path
     fitted: ClassVar[tuple[str, ...]] = ()  # numbers that a loop tells; all if empty
 
     @property
@@ -111,10 +119,9 @@ class Law(Part):
         return getattr(self, self._field_of(key))
 
     def replace(self, values: Mapping[str, Any]) -> Self:
-        """Copy with other numbers, by dotted key; they may be traced."""
-        return dataclasses.replace(
-            self, **{self._field_of(key): value for key, value in values.items()}
-        )
+        """Copy with other numbers, by dotted key, which were not fitted; they may be traced."""
+        own = {self._field_of(key): value for key, value in values.items()}
+        return dataclasses.replace(self, fitted_to=math.inf, **own)
 
     def as_toml(self) -> str:
         """Entries of a plan of a fit that has this law: its name, and its numbers."""

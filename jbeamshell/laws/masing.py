@@ -101,6 +101,7 @@ class MasingLaw(Law):
     """Law that follows Masing's rule; a subclass implements `backbone` and `work`."""
 
     masing: ClassVar[bool] = True
+    by_force: ClassVar[bool] = True
 
     @abc.abstractmethod
     def work(self, u: ArrayLike) -> Array:

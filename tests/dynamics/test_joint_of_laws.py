@@ -39,6 +39,25 @@ def test_a_joint_has_the_loops_of_its_law(name):
     np.testing.assert_allclose(joint.backbone(u), [0.6, 3.0], rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["iwan4", "mindlin"])
+def test_a_joint_has_the_slopes_of_its_law(name):
+    """Relative changes of the energy with each number, between the points as well."""
+    law = MASING[name]
+    size = float(Joint.of(law).displacements[-2]) * np.geomspace(1e-3, 0.999, 57)
+    lost = np.asarray(law.dissipation(size))[:, None]
+
+    def slopes(of):
+        keys = list(law.table())
+        start = jnp.asarray([law.get(key) for key in keys])
+
+        def loss(values):
+            return of(law.replace(dict(zip(keys, values, strict=True)))).dissipation(size)
+
+        return np.asarray(jax.jacfwd(loss)(start)) * np.asarray(start) / lost
+
+    np.testing.assert_allclose(slopes(Joint.of), slopes(lambda law: law), rtol=0.03, atol=5e-3)
+
+
 def test_a_structure_takes_a_law_as_its_joint_with_derivatives_to_its_numbers():
     """One mass on a Jenkins element: F(U)/U is omega^2, and 4 F (U - u_S) is lost per cycle."""
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jbeamshell as jb
-from jbeamshell.dynamics import ring_down
+from jbeamshell.dynamics import Joint, ring_down
 
 TIME = np.linspace(0.0, 30.0, 6001)
 PLAIN = np.exp(-0.1 * TIME) * np.cos(10.0 * TIME)
@@ -105,6 +105,40 @@ def test_planted_values_lie_in_the_stated_intervals_of_200(draw, most):
     assert np.all((part > 0.9) & (part < most))
     assert wide < 0.03
     assert refused <= 4
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_a_decay_under_friction_tells_the_damping_of_steady_cycles(noise):
+    """A mass on sliders is let go: its decrement is more than steady cycles of Masing's rule have.
+
+    They lose D = 8 W - 4 U F at the amplitude U, of which zeta is D/(2 pi F U).
+    """
+    law = jb.laws.Iwan4(1.0, 1.0, -0.5, 0.2)
+    joint, step, speed = Joint.of(law), 2.0 * np.pi / 400.0, 0.0
+    springs, slips = np.asarray(joint.springs), np.asarray(joint.slips)
+    path = [0.5 * float(law.phi_max)]
+    held = np.clip(path[0], -slips, slips)
+    for _ in range(40 * 400):
+        speed -= step * float(springs @ held)
+        path.append(path[-1] + step * speed)
+        held = np.clip(held + path[-1] - path[-2], -slips, slips)
+    random = np.random.default_rng(0)
+    values = np.array(path[::5]) + noise * random.standard_normal(len(path[::5]))
+    found = ring_down(5.0 * step * np.arange(values.size), values)
+
+    def steady(size):
+        return np.asarray(law.dissipation(size) / (2.0 * np.pi * law.backbone(size) * size))
+
+    true = steady(found.amplitude)
+    assert np.max(np.abs(found.damping / true - 1.0)) > 0.2
+    off = 0.5 * np.ptp(found.damping_interval, axis=1) / found.damping  # of noise
+    assert np.all(np.abs(found.steady_damping / true - 1.0) < 0.04 + off)
+    assert "in steady cycles of friction" in str(found)
+    lost, _ = found.curves(mass=1.0)
+    u = np.asarray(law.displacement(lost.amplitude))
+    np.testing.assert_allclose(lost.dissipation[4:], law.dissipation(u)[4:], rtol=0.1)
+    damping = found.modal_curves()[1]
+    np.testing.assert_allclose(damping.damping[4:], steady(damping.amplitude)[4:], rtol=0.06)
 
 
 def test_little_noise_leaves_frequency_and_damping():

@@ -12,6 +12,7 @@ from jbeamshell import identify, laws, plotting
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.comparison import Compared, Comparison
 from jbeamshell.measured.curves import DissipationCurve, StiffnessCurve
+from jbeamshell.measured.loops import Loop
 
 FORCE = np.linspace(0.2, 1.9, 7)
 LAW = laws.Mindlin(2.0, 50.0)
@@ -46,6 +47,36 @@ def test_the_planted_law_loses_nothing_and_a_power_law_does():
     assert compared.drive == "force"
     figures = compared.figures()
     assert figures["models"]["mindlin"]["values"]["mindlin.slip_force"] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("driver", ["force", "displacement"])
+def test_a_recording_is_compared_whatever_drives_it(driver, tmp_path):
+    """Laws that follow displacements alone take part, and those with gross slip in the range."""
+    law, way = laws.Iwan4(1.0, 1.0, -0.4, 0.5), np.sin(np.linspace(0.0, 12.0 * np.pi, 1800))
+    if driver == "force":
+        columns = [0.75 * way, np.asarray(law.path_displacements(0.75 * way))]
+    else:
+        columns = [np.asarray(law.path_forces(0.8 * way)), 0.8 * way]
+    table = np.stack(columns, axis=1) + 1e-3 * np.random.default_rng(0).normal(size=(1800, 2))
+    file = str(tmp_path / "rig.csv")
+    np.savetxt(file, table, delimiter=",", header="force,displacement", comments="")
+    found = identify.compare(file, ["iwan4", "jenkins", "bouc-wen"], starts=1)
+    assert [row.told for row in found.rows] == ["", "", ""]
+    iwan4, jenkins, bouc_wen = (np.max(np.abs(found.error(row))) for row in found.rows)
+    assert max(iwan4, bouc_wen) < 0.01 < jenkins < 0.1
+    for name in ("jenkins", "bouc-wen"):  # by themselves too
+        assert jb.fit(file, name, starts=1).controls == ["displacement"]
+
+
+def test_what_a_law_cannot_answer_is_told_without_keys_of_strips():
+    """Mean loops whose force drives know the noise of their displacement alone."""
+    way = np.cos(np.linspace(0.0, 2.0 * np.pi, 65))
+    loop = Loop(way, 0.1 * way + 0.01 * np.sin(np.arccos(way)), noise=1e-3, driver="force")
+    dissipation = DissipationCurve(FORCE, FORCE**3)
+    by_path = identify.compare([loop.but(noise=None), dissipation], ["bouc-wen"])
+    for told in (identify.compare([loop], ["bouc-wen"]).rows[0].told, by_path.rows[0].told):
+        assert "load.control" not in told
+        assert "displacement" in told
 
 
 def test_a_comparison_is_printed_and_recorded(made):

@@ -5,6 +5,7 @@ import pytest
 
 from jbeamshell import identify, laws
 from jbeamshell.common.errors import InputError
+from jbeamshell.dynamics import Joint
 from jbeamshell.identify.data_checks import feature_doubts, inspected
 from jbeamshell.identify.models import LawModel, StripModel
 from jbeamshell.identify.specimens import Specimen
@@ -50,6 +51,28 @@ def test_the_four_parameters_of_iwan_are_found_with_their_intervals():
     assert float(fit.law.dissipation(0.01)) == pytest.approx(
         float(PLANTED["iwan4"].dissipation(0.01)), rel=0.02
     )
+
+
+def test_a_law_fitted_below_gross_slip_does_not_claim_to_know_it():
+    """Slip force and beta are one number there; beyond the data the law's form alone speaks."""
+    law, said = PLANTED["iwan4"], "the data do not reach gross slip of iwan4"
+    below = identify.fit(loops(law, sizes=SIZES[:2]), "iwan4", starts=1)
+    low, high = below.intervals["iwan4.slip_force"]
+    assert low < 1.0 < high
+    assert any(doubt.startswith(said) for doubt in below.doubts)
+    joint = Joint.of(below.law)
+    assert float(joint.reach) == pytest.approx(SIZES[1], rel=1e-6)
+    with pytest.raises(InputError, match="of a law, a larger force"):
+        joint.backbone(SIZES[2])
+    assert np.isinf(Joint.of(below.law, 0.999 * below.law.capacity).reach)
+    noisy = loops(law, np.random.default_rng(1), sizes=(0.004, 0.0153))
+    corner = laws.Iwan4(0.87, 100.0, -0.5, 0.6)  # slides where the data end
+    told = LawModel(corner).fitted(noisy)
+    assert np.isfinite(float(Joint.of(told.law).reach))
+    whole = identify.fit(loops(law), "iwan4", starts=1)
+    assert not any(doubt.startswith(said) for doubt in whole.doubts)
+    assert np.isinf(Joint.of(whole.law).reach)
+    assert np.isinf(Joint.of(below.law.replace(whole.values)).reach)
 
 
 def test_a_first_loading_leaves_out_what_bends_unloading_alone():

@@ -185,3 +185,19 @@ def test_a_wrong_unit_is_named_where_no_surface_or_material_explains_it(factors,
     planned(right, known, [MU])
     with pytest.raises(InputError, match=told):
         planned(wrong, known, [MU])
+
+
+def test_numbers_without_units_whose_strip_would_stretch_as_none_does_are_doubted():
+    """Millimetres and newtons beside lengths in millimetres, where nobody gives a modulus."""
+    u, known = rig.path(4), {L: 120.0, "strip.half_height": 6.0, P: 5.0}
+    made = rig.recorded(70.0 * rig.iwan(u), 1e-3 * u, 0.002, driver="displacement")
+
+    def doubts(factor, given):
+        loops = steady_loops(made.but(displacement=factor * made.displacement))
+        return planned(loops, given, [MU, STIFF]).doubts
+
+    assert doubts(1.0, known) == []
+    (soft,), (stiff,) = doubts(1e3, known), doubts(1e-3, known)
+    assert "displacement=um" in soft
+    assert "--unit displacement=m)" in stiff
+    assert doubts(1e3, {"strip.half_height": 6.0, P: 5.0}) == []  # no length is known

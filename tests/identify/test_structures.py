@@ -104,6 +104,40 @@ def test_planted_numbers_are_recovered_within_their_intervals():
     np.testing.assert_allclose(again, found.model[1].damping, rtol=1e-6)
 
 
+def test_a_number_of_a_structure_may_be_negative_and_stand_in_a_list():
+    """Iwan's exponent is found, with bounds or without; a stiffness in lists of numbers too."""
+
+    def law(scene, numbers):
+        joint = jb.laws.Iwan4(2.0, 50.0, numbers["chi"], 0.3)
+        return Structure([[1.0]], [[numbers["k"]]], [Attachment(joint, 0)])
+
+    size = np.geomspace(0.002, 0.03, 8)
+    start = Assembly(law, numbers={"chi": -0.6, "k": 25.0}, point=0)
+    curve = start.replace({"structure.chi": -0.3, "structure.k": 20.0}).curve(size)
+    data = [FrequencyCurve(size, curve.frequency), DampingCurve(size, curve.damping)]
+    for chi in ("structure.chi", Parameter("structure.chi", low=-0.95, high=-0.05)):
+        found = fit(data, start, [chi, "structure.k"], starts=1)
+        assert found.values["structure.chi"] == pytest.approx(-0.3, rel=1e-6)
+        assert found.values["structure.k"] == pytest.approx(20.0, rel=1e-6)
+    assert Parameter("structure.k").bijection(25.0).log  # a positive one stays positive
+
+
+def test_a_builder_that_jax_cannot_trace_is_told_so():
+    def with_numpy(scene, numbers):
+        return Structure(np.eye(1), np.diag([numbers["k"]]), [Attachment(jb.laws.Iwan4(), 0)])
+
+    def with_float(scene, numbers):
+        stiffness = [[float(numbers["k"])]]
+        return Structure(np.eye(1), stiffness, [Attachment(jb.laws.Iwan4(), 0)])
+
+    for built in (with_numpy, with_float):
+        start = Assembly(built, numbers={"k": 1.0}, point=0)
+        with pytest.raises(jb.InputError, match=r"^build: JAX traces its numbers.*jax\.numpy"):
+            fit(DAMPING, start, ["structure.k"])
+    with pytest.raises(jb.InputError, match=r"^stiffness = .*give a square matrix"):
+        Structure(np.eye(2), [[1.0, 0.0], [0.0]])
+
+
 def soft(scene, numbers):
     """One mass on a joint alone that softens much, whose secant is not its first harmonic."""
     force = np.linspace(0.02, 0.9, 60) * numbers["limit"]

@@ -36,7 +36,7 @@ from jbeamshell.dynamics.export.element import Element
 from jbeamshell.dynamics.export.targets import write
 from jbeamshell.dynamics.structure.steady_backbone import steady_backbone, walked_forces
 from jbeamshell.laws.law import Law, as_path
-from jbeamshell.laws.parallel_iwan import ParallelIwan, backbone_points
+from jbeamshell.laws.parallel_iwan import NEARLY, ParallelIwan, backbone_points
 from jbeamshell.scene.domain import gross_slip_rule
 from jbeamshell.scene.scene import Scene
 
@@ -117,7 +117,8 @@ class Joint(ParallelIwan):
         amplitudes.
 
         A law of Masing's rule gives its sliders, or those on 160 points of its backbone, within
-        1 % of its energy, see `jbeamshell.laws.parallel_iwan.backbone_points`.
+        1 % of its energy, see `jbeamshell.laws.parallel_iwan.backbone_points`.  A law that was
+        fitted to data below its gross slip gives a joint that ends where they did.
 
         All numbers may be traced by `jax.jit` and `jax.grad`.  A traced scene cannot tell whether a
         step failed: the joint then holds NaN.
@@ -126,7 +127,7 @@ class Joint(ParallelIwan):
         ----------
         scene : scene of the strip or the lap joint, whose load path is not used; or law
         force : largest end force per width, below gross slip; None is ``scene.load.amplitude``, and
-            gross slip of a law
+            gross slip of a law, or the largest force to which it was fitted
         width : width of the strip, by which forces are multiplied
 
         Raises
@@ -145,8 +146,12 @@ class Joint(ParallelIwan):
         """
         if isinstance(scene, Law):
             require_number("width", width)
+            capacity = width * scene.capacity
+            if force is None and np.isfinite(scene.fitted_to):
+                force = jnp.minimum(scene.backbone(scene.fitted_to), NEARLY * scene.capacity)
+                capacity = np.inf  # which no data showed
             u, f = backbone_points(scene, force)
-            return cls(u, width * f, width, width * scene.capacity)
+            return cls(u, width * f, width, capacity)
         force = largest_force(scene, force)
         if scene.load.control != "force":
             load = dataclasses.replace(scene.load, control="force", amplitude=as_leaf(force))
@@ -247,7 +252,8 @@ class Joint(ParallelIwan):
             fix = f"give Joint.of the force {level:.6g} per width, or points up to there: this is "
             fix += "nearly gross slip, beyond which the force is known"
         else:
-            fix = f"give more points, or capacity={top:.6g} if it slides at this force (gross slip)"
+            fix = "give more points or, of a law, a larger force; or give "
+            fix += f"capacity={top:.6g} if it slides at this force (gross slip)"
         return (
             f"{u:.4g}, beyond its backbone, which ends at {float(self.displacements[-1]):.4g} and "
             f"the force {top:.4g}, below gross slip: take less, or {fix}"

@@ -15,7 +15,7 @@ from jax import Array, lax
 from jax.scipy.linalg import solve_triangular
 from numpy.typing import ArrayLike, NDArray
 
-from jbeamshell.common.checks import TINY, as_leaf, is_traced, require, require_number
+from jbeamshell.common.checks import TINY, as_leaf, is_traced, require, require_number, shown
 from jbeamshell.common.errors import InputError
 from jbeamshell.dynamics.frequencies import Modes
 from jbeamshell.dynamics.structure.joint import Joint
@@ -291,12 +291,15 @@ def _traced_modes(stiffness: Array, mass: Array, count: int) -> tuple[Array, Arr
 def _checked(name: str, matrix: Any, size: int | None = None) -> Any:
     """Matrix of floats, dense or sparse; raises `InputError`."""
     if is_traced(matrix):
-        shape = jnp.shape(matrix)
-        square = len(shape) == 2 and shape[0] == shape[1]
-        require(name, shape, square and size in (None, shape[0]), SQUARE)
-        return jnp.asarray(matrix)
+        known: Any = as_leaf(matrix, name, SQUARE)
+        square = known.ndim == 2 and known.shape[0] == known.shape[1]
+        require(name, known.shape, square and size in (None, known.shape[0]), SQUARE)
+        return known
     sparse = scipy.sparse.issparse(matrix)
-    real = not np.iscomplexobj(matrix.data if sparse else matrix)
+    try:
+        real = not np.iscomplexobj(matrix.data if sparse else matrix)
+    except ValueError:  # rows of different length
+        raise InputError(f"{name} = {shown(matrix)}: {SQUARE}") from None
     require(name, np.shape(matrix), real, "must be real: give its real part if the rest is zero")
     if sparse:
         known, values = scipy.sparse.csr_array(matrix).astype(float), matrix.data
