@@ -122,16 +122,24 @@ class FaceHistory(LoopFigures, eqx.Module):
 
     @property
     def dissipation(self) -> Array:
-        """Area of the last loop, D."""
-        return self.dissipation_loop
+        """Area of the last loop, D; 0 if it is rounding."""
+        return jnp.where(self._slips, self.dissipation_loop, 0.0)
+
+    @property
+    def _slips(self) -> Array:
+        """True if slip in the last cycle is more than rounding."""
+        force, displacement = self.loop
+        return self.dissipation_loop > NO_SLIP * jnp.ptp(force) * jnp.ptp(displacement)
 
     @property
     def dissipation_error(self) -> Array:
         """Estimated relative error of the dissipation by the load steps; NaN if not estimated.
 
-        The error falls with the steps, so that half of them change it by as much as is left.
+        The error falls with the steps, so that half of them change it by as much as is left.  It is
+        0 if nothing slips.
         """
-        return jnp.abs(self.change) / self.dissipation
+        known = jnp.where(self._slips, self.dissipation, 1.0)
+        return jnp.where(self._slips, jnp.abs(self.change) / known, 0.0 * self.change)
 
     @property
     def closure(self) -> Array:
@@ -167,10 +175,8 @@ class FaceHistory(LoopFigures, eqx.Module):
                 f"the dissipation may be off by {100.0 * error:.2g} %: take more "
                 "steps_per_half_cycle"
             )
-        force, displacement = self.loop
-        slips = self.dissipation > NO_SLIP * jnp.ptp(force) * jnp.ptp(displacement)
         pairs = float(self.sharing)
-        if bool(slips) and pairs < FEW:
+        if bool(self._slips) and pairs < FEW:
             doubts.append(
                 f"only {pairs:.1f} pairs share the slip, so that the mesh may put the dissipation "
                 f"off by {min(100.0 * MESH / pairs, 100.0):.0f} %: mesh the face finer"
