@@ -137,13 +137,13 @@ def modal_bodies(
     rough = np.broadcast_to(history.friction, touching.shape)[touching]
     holds = rough * np.asarray(history.reaction[0])[touching]
     # A pair lets go where its shear meets the friction of what the mode leaves of its reaction.
-    pulls, size = np.asarray(shear + rough * normal), float(np.sum(shear))
+    pulled, size = shear + rough * normal, float(np.sum(shear))
     return ModalBodies(
         upper=bodies[0],
         lower=bodies[1] if lower is not None else None,
         omega=found.omega,
         touching=touching,
-        begins=float(np.min(holds[pulls > 0.0] / pulls[pulls > 0.0], initial=np.inf)),
+        begins=float(np.min(holds[pulled > 0.0] / pulled[pulled > 0.0], initial=np.inf)),
         slides=float(np.sum(holds)) / size if size > 0.0 else np.inf,
         friction=friction,
         bolts=bolts,
