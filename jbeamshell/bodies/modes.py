@@ -32,7 +32,7 @@ from jbeamshell.common.files import as_json, csv_text
 from jbeamshell.common.summary import Summary, ranged
 
 RIGID = 1e-7  # eigenvalue over the largest one found, below which a mode is a rigid motion
-LEAST, POINTS = 0.03, 20  # of the amplitudes that are taken: part of `slides`, and how many
+ABOVE, LEAST, POINTS = 1.2, 0.03, 20  # of the amplitudes taken: over `begins`, `slides`, how many
 COLUMNS = {
     "amplitude": "modal displacement",
     "frequency": "frequency",
@@ -85,6 +85,7 @@ class ModalBodies(NamedTuple):
     upper, lower : bodies for `jbeamshell.solve_contact`; lower is None on a rigid base
     omega : angular frequency of the mode while the face sticks
     touching : (n,) True for the pairs that the bolts press together
+    begins : modal displacement at which friction no longer bears the force on one of the pairs
     slides : modal displacement at which friction would bear the forces on the stuck face in sum
     friction, bolts, gap : of the pressing
     """
@@ -93,6 +94,7 @@ class ModalBodies(NamedTuple):
     lower: Substructure | None
     omega: float
     touching: NDArray[np.bool_]
+    begins: float
     slides: float
     friction: Number
     bolts: Number
@@ -137,15 +139,19 @@ def modal_bodies(
     touching = np.asarray(history.touching[0])
     found = _stuck_mode(parts, touching, mode)
     bodies = _bodies(parts, found.inertia)
-    shear = np.einsum("nij,nj->ni", bodies[0].frames, found.borne)[:, :2]
-    holds = float(np.sum(np.asarray(history.friction * history.normal_force[0])))
-    size = float(np.sum(np.linalg.norm(shear[touching], axis=1)))
+    borne = np.einsum("nij,nj->ni", bodies[0].frames, found.borne)[touching]
+    shear, normal = np.linalg.norm(borne[:, :2], axis=1), np.abs(borne[:, 2])
+    rough = np.broadcast_to(history.friction, touching.shape)[touching]
+    holds = rough * np.asarray(history.normal_force[0])[touching]
+    # A pair lets go where its shear meets the friction of what the mode leaves of its reaction.
+    pulled, size = shear + rough * normal, float(np.sum(shear))
     return ModalBodies(
         upper=bodies[0],
         lower=bodies[1] if lower is not None else None,
         omega=found.omega,
         touching=touching,
-        slides=holds / size if size > 0.0 else np.inf,
+        begins=float(np.min(holds[pulled > 0.0] / pulled[pulled > 0.0], initial=np.inf)),
+        slides=float(np.sum(holds)) / size if size > 0.0 else np.inf,
         friction=friction,
         bolts=bolts,
         gap=gap,
@@ -213,8 +219,8 @@ def face_curve(
     Parameters
     ----------
     bodies : of `modal_bodies`
-    amplitudes : (k,) modal displacements, positive; None is 20 of them, up to the one at which
-        nearly all of the face slides
+    amplitudes : (k,) modal displacements, positive; None is 20 of them, from where the first pair
+        slips to where nearly all of the face slides
     throw : as in `jbeamshell.solve_contact`
     options : softness, steps_per_half_cycle and the like, as `jbeamshell.solve_contact` takes them;
         friction, bolts and gap are those of `modal_bodies` if left out
@@ -229,7 +235,8 @@ def face_curve(
     if amplitudes is None:
         fix = "the mode does not shear the face, so that nothing slides: give amplitudes"
         require("amplitudes", None, bool(np.isfinite(bodies.slides)), fix)
-        amplitudes = bodies.slides * np.geomspace(LEAST, 1.0, POINTS)
+        begin = min(max(ABOVE * bodies.begins, LEAST * bodies.slides), 0.5 * bodies.slides)
+        amplitudes = np.geomspace(begin, bodies.slides, POINTS)
     sizes = jnp.atleast_1d(as_leaf(amplitudes, "amplitudes"))
     fix = "give positive modal displacements"
     positive = is_traced(sizes) or bool(np.all(np.asarray(sizes) > 0.0))

@@ -163,8 +163,13 @@ class ContactHistory(LoopFigures, eqx.Module):
 
     @property
     def dissipation(self) -> Array:
-        """Work of friction in the last cycle, D; on a face the area of the loop."""
-        return self.dissipation_loop if self.on_face else super().dissipation
+        """Work of friction in the last cycle, D.
+
+        On a face it is the area of the loop, and 0 if that is rounding.
+        """
+        if not self.on_face:
+            return super().dissipation
+        return jnp.where(self._slips, self.dissipation_loop, 0.0)
 
     @property
     def closure(self) -> Array:
@@ -183,16 +188,17 @@ class ContactHistory(LoopFigures, eqx.Module):
     def _slips(self) -> Array:
         """True if slip in the last cycle is more than rounding."""
         force, displacement = self.loop
+        lost = self.dissipation_loop if self.on_face else super().dissipation
         least = NO_SLIP[2 if self.on_face else 1]
-        return self.dissipation > least * jnp.ptp(force) * jnp.ptp(displacement)
+        return lost > least * jnp.ptp(force) * jnp.ptp(displacement)
 
     @property
     def dissipation_error(self) -> Array:
         """Estimated relative error of the dissipation.
 
         On a line that of the mesh, see `jbeamshell.history.error_estimates.grid_error`; infinite if
-        nothing slips.  On a face that of the load steps, NaN if it was not estimated: half of the
-        steps change the dissipation by as much as is left.
+        nothing slips.  On a face that of the load steps, by which half of them change the
+        dissipation; NaN if it was not estimated, and 0 if nothing slips.
         """
         if self.on_face:
             change = jnp.nan if self.change is None else jnp.abs(self.change)

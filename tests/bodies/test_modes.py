@@ -89,6 +89,24 @@ class TestModes:
         assert high < peak  # once all of it slides, only the elastic energy grows
         assert "modal displacement" in str(curve)
 
+    def test_default_amplitudes_slip(self):
+        """From the first pair on; below it nothing is lost, nothing negative and no error of it."""
+        *_, bodies = leaves()
+        curve = jb.face_curve(bodies, **COARSE)
+        assert np.all(np.asarray(curve.dissipation) > 0.0)
+        assert bodies.begins < curve.amplitude[0] < 0.5 * bodies.slides == 0.5 * curve.amplitude[-1]
+        for part in (0.9, 0.3, 0.1, 0.03):
+            stuck = jb.solve_contact(
+                bodies.upper,
+                bodies.lower,
+                control="displacement",
+                amplitude=part * bodies.begins,
+                **OPTIONS,
+            )
+            assert float(stuck.dissipation) == float(stuck.loss_factor) == 0.0
+            assert float(stuck.dissipation_error) == 0.0
+            assert not [doubt for doubt in stuck.doubts if "dissipation" in doubt]
+
     def test_a_model_without_mass_is_refused(self):
         upper, lower, _ = leaves()
         model = jb.StiffnessModel(upper.model.matrix, upper.model.dofs)

@@ -63,6 +63,23 @@ class TestForcedResponse:
         second = response.frequency[np.argmax(part)] * 3.0  # its superharmonic is largest there
         assert second == pytest.approx(HELD.modes().frequency[1], rel=0.1)
 
+    def test_harmonics_left_out_are_told_by_what_they_change_at_a_resonance(self):
+        """A small part of the motion, which a resonance turns into .4 % of its amplitude."""
+        stiffness = [[0.3 + 21.6, -21.6], [-21.6, 21.6]]
+        slider = Attachment(jb.laws.Jenkins(1.0, 5.2), 1)
+        structure = Structure(np.diag([1.0, 0.006]), stiffness, [slider], damping_ratio=0.017)
+        top = float(structure.modes(1).frequency[0])
+        frequencies = top * np.linspace(0.8, 1.0, 9)
+        with pytest.warns(jb.DoubtfulWarning, match=r"may change the amplitude by 0\.\d %"):
+            nine = dynamics.steady_response(structure, [0.217, 0.0], frequencies)
+        assert np.max(nine.truncation) < 1e-3
+        more = dynamics.steady_response(structure, [0.217, 0.0], frequencies, harmonics=41)
+        assert more.doubts == ()
+        at = int(np.argmax(more.amplitude))
+        off = abs(nine.amplitude[at] / more.amplitude[at] - 1.0)
+        assert off > 2e-3
+        assert off == pytest.approx(nine.truncation_error[at], rel=0.7)
+
     def test_the_force_supplies_what_joints_and_dampers_lose(self, response):
         harmonic, omega = response.harmonics, 2.0 * np.pi * response.frequency
         x = np.stack([response.at(0), response.at(1)])

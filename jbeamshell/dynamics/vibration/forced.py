@@ -66,7 +66,8 @@ def forced_response(
     Warns
     -----
     DoubtfulWarning
-        if the next harmonic moves the joints by more than a thousandth of the first
+        if the next harmonic moves the joints by more than a thousandth of the first, or may make an
+        error of a quarter of a per cent
 
     Notes
     -----

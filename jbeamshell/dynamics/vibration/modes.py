@@ -56,7 +56,8 @@ def nonlinear_mode(
     Warns
     -----
     DoubtfulWarning
-        if the next harmonic moves the joints by more than a thousandth of the first
+        if the next harmonic moves the joints by more than a thousandth of the first, or may make an
+        error of a quarter of a per cent
 
     Examples
     --------

@@ -103,11 +103,23 @@ def columns(model: Reduced, balance: Balance, found: Found, basis: Any, xp: Any)
     motion, omega, directions = found.point.x, found.point.p[:, 0], xp.asarray(model.directions)
     u, number = motion @ directions, np.array(balance.harmonics)
     lost = xp.imag(found.lost[:, :-1] * xp.conj(u)) * number[:, None]
+    dissipation = np.pi * xp.sum(lost, axis=(-2, -1))
+    truncation = xp.asarray(left_out(model, balance, omega, u, found.lost))
+    # What is left out acts on the first harmonic, whose elastic forces balance but for the driving
+    # force or, of a mode, the damping.
+    first = motion[:, 0]
+    mass, damping, drive = (xp.asarray(a) for a in (model.mass, model.damping, model.drive))
+    viscous, elastic = (
+        xp.real(xp.sum(xp.conj(first) * (first @ matrix), axis=-1)) * omega**power
+        for matrix, power in ((damping, 1), (mass, 2))
+    )
+    held = xp.maximum(xp.abs(first @ drive), dissipation / np.pi + viscous)
     return {
         "harmonics": number,
         "coefficients": motion,
         "basis": basis,
         "joints": joint_peaks(motion, directions, balance.harmonics, xp),
-        "dissipation": np.pi * xp.sum(lost, axis=(-2, -1)),
-        "truncation": xp.asarray(left_out(model, balance, omega, u, found.lost)),
+        "dissipation": dissipation,
+        "truncation": truncation,
+        "truncation_error": truncation * elastic / xp.where(held > 0.0, held, elastic),
     }
