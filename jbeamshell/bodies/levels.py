@@ -39,7 +39,7 @@ class Levels(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What a solver found.
+    """Outcome of a solver of contacts.
 
     Attributes
     ----------

@@ -25,8 +25,9 @@ def add_to(commands: Any) -> None:
         "bodies",
         help="solve the contact of bodies from your own finite elements",
         description="Press bodies from your own finite elements together, load them to and fro, "
-        "and report the hysteresis loop. They are pressed without friction unless the file says "
-        "assembly, and loaded until the loop is steady unless it says cycles.",
+        "and report the hysteresis loop. Unless the file says assembly, bodies on a line are "
+        "pressed without friction and those on a face with friction. They are loaded until the "
+        "loop is steady unless it says cycles.",
         epilog="The file says friction, amplitude, cycles, bolts, gap, ... and, in [upper] and "
         "[lower], the file of each stiffness matrix (.sti of CalculiX, .mtx, .mat, .npz) "
         "with the tables contact (node, X), pull and press (node, direction, force).  With face in "

@@ -48,7 +48,7 @@ def default(key: str) -> Given:
 
 
 def given(values: Mapping[str, Any], before: Given | None) -> Given | None:
-    """What is given of two keys, or what was given before; None is nothing.
+    """Given number of two keys, or the one that was given before; None is nothing.
 
     Raises
     ------

@@ -16,7 +16,8 @@ import jbeamshell as jb
 from calibration.finite_elements import body as calculix
 from jbeamshell.cli.main import main
 from jbeamshell.contact_line.section import section_form
-from jbeamshell.contact_line.strip import lap_members, pressing, stations
+from jbeamshell.contact_line.stations import stations
+from jbeamshell.contact_line.strip import lap_members, pressing
 
 # Few nodes are quick; their meshes are doubted.
 pytestmark = pytest.mark.filterwarnings("ignore::jbeamshell.DoubtfulWarning")

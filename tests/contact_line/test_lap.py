@@ -14,7 +14,8 @@ from calibration.finite_elements import lap
 from jbeamshell.contact_line import strip
 from jbeamshell.contact_line.pair import Pair
 from jbeamshell.contact_line.section import section_form
-from jbeamshell.contact_line.strip import Members, over_gap, stations
+from jbeamshell.contact_line.stations import stations
+from jbeamshell.contact_line.strip import Members, over_gap
 from jbeamshell.dynamics import Joint
 from jbeamshell.mechanics.bar import lap_backbone, lap_cubic_law
 from jbeamshell.scene import library
