@@ -113,7 +113,7 @@ class Unknown(NamedTuple):
 
     Attributes
     ----------
-    nothing : (n, m-2) NaN
+    nothing : (n, m-2, 0) no values: the shape alone says for which fields
     """
 
     nothing: Array
@@ -121,7 +121,7 @@ class Unknown(NamedTuple):
     @classmethod
     def of(cls, nodes: int, fields: int) -> Unknown:
         """Elimination of a body of so many nodes whose form has so many fields."""
-        return cls(jnp.full((nodes, fields - 2), jnp.nan))
+        return cls(jnp.zeros((nodes, fields - 2, 0)))
 
     @property
     def forgotten(self) -> Unknown:
@@ -135,7 +135,7 @@ class Unknown(NamedTuple):
 
     def recovered(self, factors: Array) -> Array:
         """Fields (n, m-2, levels), see `Elimination.recovered`."""
-        return jnp.broadcast_to(self.nothing[..., None], (*self.nothing.shape, factors.shape[1]))
+        return jnp.full((*self.nothing.shape[:-1], factors.shape[1]), jnp.nan)
 
 
 class Line(NamedTuple):
