@@ -168,11 +168,13 @@ def lap(random: Random) -> Values:
         "contact.bolts": bolts,
         AMPLITUDE: random.uniform(0.1, 0.9) * gross,
     }
-    return values | ({"member.loaded_end": "level"} if values["member.support"] == "clamped" else {})
+    return values | (
+        {"member.loaded_end": "level"} if values["member.support"] == "clamped" else {}
+    )
 
 
 def lap_extras(random: Random) -> Values:
-    """Lap joint with overhangs, shanks, bearings, an arm, a moment, a gap or frictional assembly."""
+    """Lap joint with one of: overhangs, shanks, bearings, an arm, a moment, a gap, friction."""
     values = lap(random)
     force, height = values[AMPLITUDE], values["strip.height_ratio"]
     extra = random.choice(["overhang", "shanks", "bearings", "arm", "moment", "gap", "assembly"])

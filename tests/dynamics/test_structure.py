@@ -191,25 +191,6 @@ class TestReach:
         assert float(far.omega[1] ** 2) == pytest.approx(5.97 / (50.0 * end), rel=1e-9)
 
 
-def test_a_mass_has_the_spring_and_damper_of_the_first_harmonic():
-    """Jenkins: k_1 = k (theta - sin(2 theta)/2)/pi of the angle until slip, D = 4 F (U - u)."""
-    joint = Joint([0.5], [1.0], capacity=1.0)
-    size, mass = 2.0, 3.0
-    found = joint.equivalent(size, mass)
-    angle = np.arccos(1.0 - 2.0 * 0.5 / size)
-    stiffness = 2.0 * (angle - 0.5 * np.sin(2.0 * angle)) / np.pi
-    assert float(found.stiffness) == pytest.approx(stiffness, rel=1e-9)
-    omega = np.sqrt(stiffness / mass)
-    assert float(found.frequency) == pytest.approx(omega / (2.0 * np.pi), rel=1e-9)
-    lost = np.pi * float(found.damping) * omega * size**2
-    assert lost == pytest.approx(4.0 * 1.5, rel=1e-9)
-    ratio = float(found.damping) / (2.0 * mass * omega)
-    assert float(found.damping_ratio) == pytest.approx(ratio, rel=1e-9)
-    assert "damping ratio" in str(found)
-    with pytest.raises(jb.InputError, match="mass = 0"):
-        joint.equivalent(size, 0.0)
-
-
 class TestModes:
     def test_statics_doubt_themselves_where_they_are_off(self):
         """Three masses whose second mode has nearly three times the frequency of the first."""

@@ -154,8 +154,6 @@ def test_bad_input_is_one_clear_line():
         identify.fit(data, "iwan4", ["contact.friction"])
     with pytest.raises(InputError, match=r"^free 'iwan4.chi': low = -2.0: must lie between -1 and"):
         identify.Parameter("iwan4.chi", low=-2.0)
-    with pytest.raises(InputError, match=r"^power-law: knows the energy per cycle alone"):
-        identify.fit(data, "power-law")
     squeeze = SqueezeCurve(np.linspace(0.0, 1.0, 9), np.linspace(-1.0, -0.1, 9))
     with pytest.raises(InputError, match=r"^squeeze: squeeze stress: a law of a joint has none"):
         identify.fit([squeeze, *data], "jenkins")
