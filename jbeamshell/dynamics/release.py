@@ -4,7 +4,7 @@ The mass m feels the strip as a spring of compliance c, whose own mass moves wit
 m_1, the integral of rho |u|^2/u(L)^2 over the stuck strip under an end load.  Rayleigh's quotient
 with this shape gives (omega/omega_1)^2 = m_1/m, where omega = 1/sqrt(m c) and
 omega_1 = 1/sqrt(m_1 c) are the lowest frequencies of the mass on the strip and of the strip alone.
-Where this ratio is small, the mass is a structure with the sliders of the strip's joint.  Compared with the
+Where this ratio is small, the strip is the sliders of its joint under the mass.  Compared with the
 motion of whole strips, eta .1126 and .3, pulled with .25 and .8 of gross slip, frequencies without
 the strip's inertia are too high by m_1/2m and damping ratios by 2 m_1/m, and by up to 10 m_1/m in
 the first swings from .8 of gross slip.
