@@ -241,7 +241,7 @@ def _on_sliders(
     """Motion of a mass on the sliders of a joint, pulled with a force and let go."""
     period = 2.0 * np.pi * np.sqrt(mass / float(joint.stiffness))
     pulled = Structure([[mass]], [[0.0]], [Attachment(joint, 0)])
-    start = [float(joint.displacement(force))]
+    start = np.array([float(joint.displacement(force))])
     found = shake(pulled, cycles * period, displacement=start, samples=samples)
     return EndMotion(
         time=found.time,

@@ -270,7 +270,7 @@ class Fit:
         -------
         Posterior
             ``logdensity`` of points of the search space, ``start`` and ``covariance`` there,
-            ``constrain`` and ``unconstrain``, ``loglikelihood`` of values, ``prior_transform``
+            ``constrain`` and ``unconstrain``, ``loglikelihood`` of values
 
         Raises
         ------
