@@ -192,6 +192,17 @@ class TestReach:
 
 
 class TestModes:
+    def test_they_print_as_a_short_table(self):
+        """Springs of unit stiffness in a row of masses of 1: omega = 2 sin(pi j/2 (n + 1))."""
+        n = 12
+        modes = Structure(np.eye(n), 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)).modes(n)
+        first, second, *_, last = str(modes).splitlines()
+        assert first == "natural modes, cycles per time"
+        assert second.split()[:2] == ["mode", "0"]
+        expected = np.sin(0.5 * np.pi / (n + 1)) / np.pi
+        assert float(second.split()[2]) == pytest.approx(expected, rel=1e-5)
+        assert last.strip() == "and 2 more"
+
     def test_statics_doubt_themselves_where_they_are_off(self):
         """Three masses whose second mode has nearly three times the frequency of the first."""
         joint = Joint.of(PLANE, 1.99)

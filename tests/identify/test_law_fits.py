@@ -51,6 +51,11 @@ def test_the_four_parameters_of_iwan_are_found_with_their_intervals():
     assert float(fit.law.dissipation(0.01)) == pytest.approx(
         float(PLANTED["iwan4"].dissipation(0.01)), rel=0.02
     )
+    table = fit.to_dataframe()
+    assert list(table.index) == list(fit.values)
+    for key, row in table.iterrows():
+        assert (row["low"], row["high"]) == fit.intervals[key]
+        assert (row["value"], row["error"]) == (fit.values[key], fit.errors[key])
 
 
 def test_a_law_fitted_below_gross_slip_does_not_claim_to_know_it():
