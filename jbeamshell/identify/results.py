@@ -202,7 +202,9 @@ class Fit:
 
         Examples
         --------
-        >>> fit.to_dataframe().loc["contact.friction", "value"]
+        ::
+
+            fit.to_dataframe().loc["contact.friction", "value"]
         """
         low, high = zip(*self.intervals.values(), strict=True)
         columns = {

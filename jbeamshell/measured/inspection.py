@@ -128,7 +128,9 @@ class Inspection:
 
         Examples
         --------
-        >>> jb.inspect("rig.csv").to_dataframe()
+        ::
+
+            jb.inspect("rig.csv").to_dataframe()
         """
         pairs = [(view, level) for view in self.views for level in view.levels]
         ends: dict[str, Any] = {
