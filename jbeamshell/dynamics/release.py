@@ -135,9 +135,8 @@ def let_go(
     per_cycle : number of time steps in a period, of the whole strip
     whole : True to follow the whole strip in time steps; False to follow the sliders of plane
         elasticity (or of the section that the scene names, on its contact line), without the
-        strip's inertia; None to take the sliders, if the scene has them, where the
-        strip's inertia matters little (`LIGHT`) and it is not damped.  A lap joint is always its
-        sliders
+        strip's inertia; None to take the sliders, if the scene has them, where the strip's inertia
+        matters little (`LIGHT`) and it is not damped.  A lap joint is always its sliders
     progress : show a progress bar of the time steps; None shows it where a person watches
 
     Returns

@@ -1,4 +1,4 @@
-"""Search of a fit from several starts, and where it ends at a bound."""
+"""Search of a fit from several starts, and on to a bound where it runs into one."""
 
 from __future__ import annotations
 

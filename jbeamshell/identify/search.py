@@ -36,7 +36,7 @@ class StoppingRule(NamedTuple):
 
     Attributes
     ----------
-    max_iterations : largest number of iterations of each search
+    max_iterations : largest number of points that each search tries
     tolerance : relative change of the parameters below which a search has converged
     """
 
@@ -50,7 +50,7 @@ class SearchResult(NamedTuple):
     Attributes
     ----------
     point : (n,) coordinates in the unbounded search space
-    converged : False if it ran out of iterations
+    converged : False if it ran out of iterations, or could not begin
     """
 
     point: Vector
@@ -63,7 +63,7 @@ def minimise(
     stopping: StoppingRule,
     report: Callable[[int, Vector, float], None] | None = None,
 ) -> SearchResult:
-    """Run one search by Gauss-Newton steps within a trust region, of scipy.
+    """Run one search, by Gauss-Newton steps within a trust region.
 
     A point without derivatives is refused as one of infinite cost.
 
@@ -74,7 +74,9 @@ def minimise(
     stopping : conditions that end the search
     report : called after every step with its number, the point and the cost
     """
-    shift, steps = start - 1.0, itertools.count()  # the first step is as long as the first point
+    # Scipy's first trust region is as large as the first point.  With that at ones, it allows about
+    # a unit along each axis, for most parameters a factor e.
+    shift, steps = start - 1.0, itertools.count()
 
     def residual(point: Vector) -> Vector:
         at = evaluate(shift + point)
