@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -61,9 +60,3 @@ class Recorder:
         about = dict(zip(("seconds", "programs", "compiling"), whole, strict=True))
         text = ",\n".join(lines)
         self.path.write_text(f'{{"about": {json.dumps(about)}, "tests": [\n{text}\n]}}\n')
-
-
-def _named(row: Sequence[float]) -> dict[str, float]:
-    """Seconds, programs and seconds of compiling by name."""
-    seconds, programs, compiling = row
-    return {"seconds": round(seconds, 2), "programs": programs, "compiling": round(compiling, 2)}
