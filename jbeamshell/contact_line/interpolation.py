@@ -149,7 +149,7 @@ def built(scene: Scene, height_ratios: Range, poisson_ratios: Range) -> Bodies |
     return None
 
 
-@Small
+@functools.partial(Small, level=0)
 def _built(inputs: tuple[Scene, Array]) -> Body:
     """Bodies at points (bodies, 2) of ln(height ratio) and -ln(1 - 2 nu), in units of E' and L."""
     scene, points = inputs

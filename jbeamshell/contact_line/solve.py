@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -132,7 +134,7 @@ def _turns(scene: Scene, targets: Array, own: bool) -> Turns:
     return turns_of(targets) if is_traced(targets) else known_turns(np.asarray(targets))
 
 
-@Small
+@functools.partial(Small, level=0)
 def _unpressed(scene: Scene) -> Unpressed:
     """Strip of a scene on its contact line, condensed for pressures of any size."""
     strip = unpressed(scene, scene.plan.nodes)
