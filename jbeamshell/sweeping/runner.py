@@ -16,11 +16,11 @@ from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError
 from jbeamshell.common.small import quick_options
 from jbeamshell.common.threads import on_processor
-from jbeamshell.contact_line.entry import goes_on
 from jbeamshell.contact_line.interpolation import Range
 from jbeamshell.contact_line.shared import Layout, shared
 from jbeamshell.history.history import FIGURES, History
 from jbeamshell.numerics.newton import Newton
+from jbeamshell.scene.mounting import goes_on
 from jbeamshell.scene.planning import turning
 from jbeamshell.scene.scene import Scene
 from jbeamshell.scene.template import Template
