@@ -1,0 +1,194 @@
+"""Mean loops of recordings with noise in both columns.
+
+Where the driving column is noisy, its level tells neither the branch nor the place of a sample: the
+samples near a turn scatter across it, and the largest of them lies beyond it.  So samples are put
+in order by time.  Both columns are averaged over the same samples, at equal parts of the time from
+turn to turn, so that every mean pair lies on the loop but for its noise.  A turn is where parabolas
+through the samples before and after it meet.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from jbeamshell.measured.reversals import Floats
+from jbeamshell.measured.splitting import Cycle, Cycles
+
+FEWEST = 8  # samples of a branch
+CELLS = 47  # most mean pairs of a branch
+WINDOW = 0.2  # part of a branch beside a turn through which parabolas are laid
+SHIFTS = np.linspace(-0.1, 0.1, 21)  # parts of a branch by which a turn may lie beside its first guess
+QUIET = 1e-4  # noise of the drive over its range, below which it is none
+LITTLE = 0.03  # and over that of the response, likewise
+SHARED = 0.5  # part of the drive's roughness that the response follows, above which it is no noise
+ROUNDING = 1e-6  # of a column's range
+MEDIAN = 0.4549  # median of the square of a normal number
+THIRD = 20.0  # sum of the squares of the weights of a third difference
+
+
+class Noises(NamedTuple):
+    """Standard deviations of a single sample of both columns."""
+
+    drive: float
+    response: float
+
+
+class PairedMeans(NamedTuple):
+    """Mean pairs of cycles of one amplitude, from the high turn to the low one and back.
+
+    Attributes
+    ----------
+    columns : (2, points) driving and responding column; the first, the middle and the last point
+        are the turns
+    errors : (2, points) their standard errors over the noise of a single sample
+    """
+
+    columns: Floats
+    errors: Floats
+
+
+def noises_of(found: Cycles, cycles: list[Cycle]) -> Noises | None:
+    """Noise of both columns by their roughness; None if that of the drive is negligible.
+
+    What uneven times add to the roughness of the drive, the response follows by the loop's slope.
+    """
+    drive, response = getattr(found.recording, found.driver), found.response
+    thirds = []
+    for cycle in cycles:
+        for a, b in ((cycle.start, cycle.turn), (cycle.turn, cycle.end)):
+            if b - a < FEWEST:
+                return None
+            thirds.append([np.diff(column[a : b + 1], 3) for column in (drive, response)])
+    rough, answer = np.concatenate(thirds, axis=1)
+    squares = [float(np.median(each**2)) / (MEDIAN * THIRD) for each in (rough, answer)]
+    slope = float(np.ptp(response) / np.ptp(drive)) * float(
+        np.sign(np.corrcoef(drive, response)[0, 1])
+    )
+    shared = float(np.median(rough * answer / slope)) / (MEDIAN * THIRD)
+    if shared > SHARED * squares[0]:
+        return None
+    noises = Noises(*np.sqrt(squares).tolist())
+    part, other = noises.drive / float(np.ptp(drive)), noises.response / float(np.ptp(response))
+    return noises if part > max(QUIET, LITTLE * other) else None
+
+
+def paired_means(found: Cycles, cycles: list[Cycle], noises: Noises) -> PairedMeans:
+    """Mean pairs of some cycles of one amplitude."""
+    columns = np.stack([getattr(found.recording, found.driver), found.response])
+    branches = [(c, a, b) for c in cycles for a, b in ((c.start, c.turn), (c.turn, c.end))]
+    length = float(np.median([b - a for _, a, b in branches]))
+    reach, last = max(int(WINDOW * length), FEWEST // 2), columns.shape[1] - 1
+    sharp = _sharp(columns[0], [(a, b) for _, a, b in branches])
+    turns, sides = dict[int, Turn](), dict[int, bool]()
+    for cycle, a, b in branches:
+        down = (cycle.levels[0] > cycle.levels[1]) == (a == cycle.start)
+        sides |= {a: down, b: not down}
+    closed = sides.get(0) is not None and sides.get(0) == sides.get(last)
+    time = np.arange(-reach, reach + 1)
+    form = length, noises, sharp
+    for i in sides:
+        if i in (0, last) and closed:  # from turn to turn: the end goes on at the start
+            turns[i] = _turn(columns[:, time % last], time, sides[i], *form)
+        elif reach <= i <= last - reach and i in found.turns:
+            turns[i] = _turn(columns[:, i + time], time, sides[i], *form)
+    for cycle in cycles:
+        for i in (cycle.start, cycle.turn):
+            if not any(sides[i] == sides[other] for other in turns):  # near an end
+                part = time[(time >= -i) & (time <= last - i)]
+                turns[i] = _turn(columns[:, i + part], part, sides[i], *form)
+    ends = {i: i + (turns[i].time if i in turns else 0.0) for i in sides}
+    if not closed:
+        ends = {i: float(np.clip(time, 0, last)) for i, time in ends.items()}
+    shortest = min(ends[b] - ends[a] for _, a, b in branches)
+    cells = int(min(shortest - 2.0, CELLS))  # fewer than samples, so that none is empty
+    sums, counts = np.zeros((2, 2 * cells)), np.zeros(2 * cells)
+    for _, a, b in branches:
+        own = np.arange(int(np.ceil(ends[a])), int(np.ceil(ends[b])))
+        part = (own - ends[a]) / (ends[b] - ends[a])
+        cell = np.minimum((part * cells).astype(int), cells - 1) + cells * (not sides[a])
+        np.add.at(counts, cell, 1.0)
+        np.add.at(sums.T, cell, columns[:, own % last].T)  # a whole cycle goes on at its start
+    if closed and last in turns:
+        del turns[last]
+    (top, above), (bottom, below) = (
+        _mean([turn for i, turn in turns.items() if sides[i] == high]) for high in (True, False)
+    )
+    means, errors = sums / counts, np.tile(counts**-0.5, (2, 1))
+    return PairedMeans(
+        _around(top, means[:, :cells], bottom, means[:, cells:]),
+        _around(above, errors[:, :cells], below, errors[:, cells:]),
+    )
+
+
+def _around(top: Floats, down: Floats, bottom: Floats, up: Floats) -> Floats:
+    """Columns (2, points) from the high turn to the low one and back."""
+    return np.concatenate([top[:, None], down, bottom[:, None], up, top[:, None]], axis=1)
+
+
+class Turn(NamedTuple):
+    """Turn: its time in samples, levels (2,) of both columns, and their errors over the noise."""
+
+    time: float
+    levels: Floats
+    errors: Floats
+
+
+def _sharp(drive: Floats, branches: list[tuple[int, int]]) -> bool:
+    """True if the drive goes rather at a constant rate than as a sine."""
+    left = np.zeros(2)
+    for a, b in branches:
+        way = np.linspace(0.0, 1.0, b - a + 1)
+        for i, rate in enumerate((way, -np.cos(np.pi * way))):
+            left[i] += 1.0 - np.corrcoef(drive[a : b + 1], rate)[0, 1] ** 2
+    return bool(left[0] < left[1])
+
+
+def _turn(
+    columns: Floats, time: Floats, high: bool, length: float, noises: Noises, sharp: bool
+) -> Turn:
+    """Turn within a window (2, samples) about its first guess."""
+    sizes = np.maximum(noises, ROUNDING * np.ptp(columns, axis=1))
+    scaled = (columns - columns[:, [time.size // 2]]) / sizes[:, None]
+
+    def left(shift: float) -> float:
+        rows = _parabolas(time - shift)
+        return float(np.sum((scaled.T - rows @ np.linalg.lstsq(rows, scaled.T)[0]) ** 2))
+
+    if sharp:
+        shifts = length * SHIFTS
+        best, step = min(shifts.tolist(), key=left), shifts[1] - shifts[0]
+        best = float(minimize_scalar(left, bounds=(best - step, best + step), method="bounded").x)
+    else:  # the top of one parabola through the drive
+        rows = np.stack([np.ones(time.size), time, time**2], axis=1)
+        inverse = np.linalg.pinv(rows)
+        _, rise, bend = inverse @ columns[0]
+        best = -0.5 * rise / bend if bend * (1.0 if high else -1.0) < 0.0 else 0.0
+        best = float(np.clip(best, *(length * SHIFTS[[0, -1]])))
+        weights = np.array([1.0, best, best**2]) @ inverse
+        level, error = float(columns[0] @ weights), float(np.linalg.norm(weights))
+    rows = _parabolas(time - best)
+    inverse = np.linalg.pinv(rows)
+    levels, errors = columns @ inverse[0], np.full(2, np.linalg.norm(inverse[0]))
+    if not sharp:
+        return Turn(best, np.array([level, levels[1]]), np.array([error, errors[1]]))
+    # The time of a sharp turn has an error, which moves both levels.
+    steps = np.sign(time - best)
+    slopes = np.stack([np.zeros(time.size), steps < 0, 2.0 * rows[:, 1], steps > 0, 2.0 * rows[:, 3]])
+    moved = slopes.T @ (inverse @ scaled.T)
+    free = moved - rows @ (inverse @ moved)
+    return Turn(best, levels, np.hypot(errors, inverse[0] @ moved / np.linalg.norm(free)))
+
+
+def _parabolas(time: Floats) -> Floats:
+    """Columns (samples, 5) of two parabolas that meet at time 0."""
+    before, after = np.minimum(time, 0.0), np.maximum(time, 0.0)
+    return np.stack([np.ones(time.size), before, before**2, after, after**2], axis=1)
+
+
+def _mean(turns: list[Turn]) -> tuple[Floats, Floats]:
+    """Mean levels (2,) of some turns of one level, and their errors over the noise."""
+    levels, errors = (np.array([getattr(turn, name) for turn in turns]) for name in ("levels", "errors"))
+    return np.mean(levels, axis=0), np.linalg.norm(errors, axis=0) / len(turns)
