@@ -107,6 +107,11 @@ class Experiment:
                 thinned = given.thinned(points, control) if isinstance(given, Loop) else given
                 self.measurements.append(thinned)
                 self.owners.append(owner)
+        if any(measurement.deviations is not None for measurement in self.measurements):
+            self.measurements = [  # beside others that know theirs, a guess is better than none
+                item.but(guessed=False) if isinstance(item, Loop) else item
+                for item in self.measurements
+            ]
         observations = [
             _observed(measurement, specimens[owner], [key for key in free if key in RIG])
             for owner, measurement in zip(self.owners, self.measurements, strict=True)
@@ -301,7 +306,6 @@ def _response(
     layout: Layout | None,
 ) -> tuple[Array, Array, Array, Array]:
     """Residual (n,), its derivatives (n, k), prediction (n,) and convergence of a run."""
-
     drive = getattr(observation, "drive", None)
 
     def residual(own: Array, off: Array) -> tuple[Array, tuple[Array, Array, Array]]:

@@ -132,7 +132,9 @@ class NoisyDrive(eqx.Module):
     def read(self, path: Array, response: Array) -> tuple[Array, Array]:
         """Response (n,) at the samples, and its slopes (n,) there."""
         x, y = self._branches(path), self._branches(response)
-        here = jnp.sum(jnp.sign(x[:, -1:] - x[:, :1]) * (self.sample[:, None] - x) > 0.0, axis=1) - 1
+        here = (
+            jnp.sum(jnp.sign(x[:, -1:] - x[:, :1]) * (self.sample[:, None] - x) > 0.0, axis=1) - 1
+        )
         here, rows = jnp.clip(here, 0, STEPS - 1), jnp.arange(here.size)
         (x0, x1), (y0, y1) = ((a[rows, here], a[rows, here + 1]) for a in (x, y))
         slope = (y1 - y0) / (x1 - x0)

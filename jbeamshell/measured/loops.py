@@ -46,6 +46,7 @@ class Loop(Measurement):
         both columns are then means over the same samples, and turns are the first, the middle and
         the last point
     drive_error : (points,) standard error of the driving column then
+    guessed : True if the noise of both columns is a guess by the roughness of a single cycle
     cycles : number of cycles of which this loop is the mean
     dropped : number of rows that lacked a number and were left out
     scatter : (points,) standard deviation over the cycles of the responding column, at each point;
@@ -68,6 +69,7 @@ class Loop(Measurement):
     noise: float | None = None
     drive_noise: float | None = None
     drive_error: Floats | None = None
+    guessed: bool = False
     cycles: int = 1
     dropped: int = 0
     scatter: Floats | None = None
@@ -100,8 +102,11 @@ class Loop(Measurement):
             rows.append(("work of a cycle", work))
         if self.driver is not None:
             answer = LOOP.response(self.driver)
-            if self.noise is not None:
-                rows.append(("noise", f"{with_unit(self.noise, self.unit(answer))} of {answer}"))
+            both = ((self.noise, answer), (self.drive_noise, self.driver))
+            told = [
+                f"{with_unit(n, self.unit(name))} of {name}" for n, name in both if n is not None
+            ]
+            rows += [("noise", ", ".join(told))] if told else []
             rows.append(("driven by", self.driver))
         notes = self.notes if self.units else (*self.notes, NO_UNITS)
         return Summary(f"{self.label}: {self.force.size} points", rows, notes)
@@ -169,9 +174,9 @@ class Loop(Measurement):
     @property
     def deviations(self) -> Floats | None:
         """Standard errors (points,) of the responding column; None without repeated cycles."""
-        if self.drive_noise is not None:  # that of a single cycle is a guess by its roughness
+        if self.drive_noise is not None:
             assert self.driver is not None
-            return self.errors_of(LOOP.response(self.driver)) if self.cycles > 1 else None
+            return None if self.guessed else self.errors_of(LOOP.response(self.driver))
         error = self.standard_error
         if error is not None and self.scatter is not None and self.driver is not None:
             answer = getattr(self, LOOP.response(self.driver))
@@ -181,7 +186,8 @@ class Loop(Measurement):
 
     def errors_of(self, column: str) -> Floats:
         """Standard errors (points,) of a column, where both are noisy."""
-        assert self.scatter is not None and self.drive_error is not None
+        assert self.scatter is not None
+        assert self.drive_error is not None
         return self.drive_error if column == self.driver else self.scatter / np.sqrt(self.cycles)
 
     @property

@@ -20,13 +20,16 @@ from jbeamshell.measured.splitting import Cycle, Cycles
 FEWEST = 8  # samples of a branch
 CELLS = 47  # most mean pairs of a branch
 WINDOW = 0.2  # part of a branch beside a turn through which parabolas are laid
-SHIFTS = np.linspace(-0.1, 0.1, 21)  # parts of a branch by which a turn may lie beside its first guess
+SHIFTS = np.linspace(
+    -0.1, 0.1, 21
+)  # parts of a branch by which a turn may lie beside its first guess
 QUIET = 1e-4  # noise of the drive over its range, below which it is none
 LITTLE = 0.03  # and over that of the response, likewise
 SHARED = 0.5  # part of the drive's roughness that the response follows, above which it is no noise
 ROUNDING = 1e-6  # of a column's range
+BENT = 1.0 / 6.0  # of a pair's distance from the chord of its neighbours; 1/12 on a parabola
 MEDIAN = 0.4549  # median of the square of a normal number
-THIRD = 20.0  # sum of the squares of the weights of a third difference
+ORDER, SQUARES = 5, 252.0  # of differences, and the sum of the squares of their weights
 
 
 class Noises(NamedTuple):
@@ -49,6 +52,19 @@ class PairedMeans(NamedTuple):
     columns: Floats
     errors: Floats
 
+    @property
+    def bent(self) -> Floats:
+        """Distance (points,) along the response by which a mean pair lies beside a bent loop."""
+        drive, response = self.columns
+        off, middle = np.zeros(drive.size), drive.size // 2
+        for own in (slice(0, middle + 1), slice(middle, None)):
+            x, y = drive[own], response[own]
+            way = x[2:] - x[:-2]
+            part = np.divide(x[1:-1] - x[:-2], way, np.full(way.size, 0.5), where=way != 0.0)
+            chord = y[:-2] + np.clip(part, 0.0, 1.0) * (y[2:] - y[:-2])
+            off[own][1:-1] = BENT * np.abs(y[1:-1] - chord)
+        return off
+
 
 def noises_of(found: Cycles, cycles: list[Cycle]) -> Noises | None:
     """Noise of both columns by their roughness; None if that of the drive is negligible.
@@ -56,18 +72,18 @@ def noises_of(found: Cycles, cycles: list[Cycle]) -> Noises | None:
     What uneven times add to the roughness of the drive, the response follows by the loop's slope.
     """
     drive, response = getattr(found.recording, found.driver), found.response
-    thirds = []
+    rough = []
     for cycle in cycles:
         for a, b in ((cycle.start, cycle.turn), (cycle.turn, cycle.end)):
             if b - a < FEWEST:
                 return None
-            thirds.append([np.diff(column[a : b + 1], 3) for column in (drive, response)])
-    rough, answer = np.concatenate(thirds, axis=1)
-    squares = [float(np.median(each**2)) / (MEDIAN * THIRD) for each in (rough, answer)]
+            rough.append([np.diff(column[a : b + 1], ORDER) for column in (drive, response)])
+    drives, answers = np.concatenate(rough, axis=1)
+    squares = [float(np.median(each**2)) / (MEDIAN * SQUARES) for each in (drives, answers)]
     slope = float(np.ptp(response) / np.ptp(drive)) * float(
         np.sign(np.corrcoef(drive, response)[0, 1])
     )
-    shared = float(np.median(rough * answer / slope)) / (MEDIAN * THIRD)
+    shared = float(np.median(drives * answers / slope)) / (MEDIAN * SQUARES)
     if shared > SHARED * squares[0]:
         return None
     noises = Noises(*np.sqrt(squares).tolist())
@@ -102,25 +118,42 @@ def paired_means(found: Cycles, cycles: list[Cycle], noises: Noises) -> PairedMe
     ends = {i: i + (turns[i].time if i in turns else 0.0) for i in sides}
     if not closed:
         ends = {i: float(np.clip(time, 0, last)) for i, time in ends.items()}
-    shortest = min(ends[b] - ends[a] for _, a, b in branches)
-    cells = int(min(shortest - 2.0, CELLS))  # fewer than samples, so that none is empty
-    sums, counts = np.zeros((2, 2 * cells)), np.zeros(2 * cells)
-    for _, a, b in branches:
-        own = np.arange(int(np.ceil(ends[a])), int(np.ceil(ends[b])))
-        part = (own - ends[a]) / (ends[b] - ends[a])
-        cell = np.minimum((part * cells).astype(int), cells - 1) + cells * (not sides[a])
-        np.add.at(counts, cell, 1.0)
-        np.add.at(sums.T, cell, columns[:, own % last].T)  # a whole cycle goes on at its start
+    place, part, up = (
+        np.concatenate(each)
+        for each in zip(
+            *(_passed(found, ends[a], ends[b], a, b, not sides[a]) for _, a, b in branches),
+            strict=True,
+        )
+    )
+    cells = CELLS + 1
+    counts = np.zeros(1)
+    while not np.all(counts):
+        cells -= 1
+        cell = np.minimum((part * cells).astype(int), cells - 1) + cells * up
+        counts = np.bincount(cell, minlength=2 * cells)
+    own = columns[:, place % last]  # a whole cycle goes on at its start
+    sums = np.stack([np.bincount(cell, column, 2 * cells) for column in own])
     if closed and last in turns:
         del turns[last]
     (top, above), (bottom, below) = (
         _mean([turn for i, turn in turns.items() if sides[i] == high]) for high in (True, False)
     )
-    means, errors = sums / counts, np.tile(counts**-0.5, (2, 1))
+    means, errors = sums / counts, np.tile(1.0 / np.sqrt(counts), (2, 1))
     return PairedMeans(
         _around(top, means[:, :cells], bottom, means[:, cells:]),
         _around(above, errors[:, :cells], below, errors[:, cells:]),
     )
+
+
+def _passed(
+    found: Cycles, begin: float, end: float, first: int, last: int, up: bool
+) -> tuple[Floats, Floats, Floats]:
+    """Samples between the times of two turns without back-slips, their parts of it, and up."""
+    place = np.arange(int(np.ceil(begin)), int(np.ceil(end)))
+    way = (found.path[first : last + 1] - found.path[first]) * (1.0 if up else -1.0)
+    behind = way < np.maximum.accumulate(way) - 4.0 * found.noise
+    ahead = ~behind[np.clip(place - first, 0, last - first)]
+    return place[ahead], ((place - begin) / (end - begin))[ahead], np.full(ahead.sum(), up, int)
 
 
 def _around(top: Floats, down: Floats, bottom: Floats, up: Floats) -> Floats:
@@ -176,7 +209,9 @@ def _turn(
         return Turn(best, np.array([level, levels[1]]), np.array([error, errors[1]]))
     # The time of a sharp turn has an error, which moves both levels.
     steps = np.sign(time - best)
-    slopes = np.stack([np.zeros(time.size), steps < 0, 2.0 * rows[:, 1], steps > 0, 2.0 * rows[:, 3]])
+    slopes = np.stack(
+        [np.zeros(time.size), steps < 0, 2.0 * rows[:, 1], steps > 0, 2.0 * rows[:, 3]]
+    )
     moved = slopes.T @ (inverse @ scaled.T)
     free = moved - rows @ (inverse @ moved)
     return Turn(best, levels, np.hypot(errors, inverse[0] @ moved / np.linalg.norm(free)))
@@ -190,5 +225,7 @@ def _parabolas(time: Floats) -> Floats:
 
 def _mean(turns: list[Turn]) -> tuple[Floats, Floats]:
     """Mean levels (2,) of some turns of one level, and their errors over the noise."""
-    levels, errors = (np.array([getattr(turn, name) for turn in turns]) for name in ("levels", "errors"))
+    levels, errors = (
+        np.array([getattr(turn, name) for turn in turns]) for name in ("levels", "errors")
+    )
     return np.mean(levels, axis=0), np.linalg.norm(errors, axis=0) / len(turns)

@@ -98,8 +98,10 @@ def _mean_loop(found: Cycles, number: int, steady: float, points: int) -> Loop:
         drive, mean = means.columns
         low, high = float(drive[drive.size // 2]), float(drive[0])
         fields["drive_noise"], fields["noise"] = rough
+        fields["guessed"] = own.size == 1
         fields["drive_error"] = rough.drive * means.errors[0]
-        fields["scatter"] = np.sqrt(own.size) * rough.response * means.errors[1]
+        error = np.hypot(rough.response * means.errors[1], means.bent)
+        fields["scatter"] = np.sqrt(own.size) * error
     else:
         where = np.concatenate([samples[i][0] for i in own])
         phase = np.concatenate([samples[i][1] for i in own])
