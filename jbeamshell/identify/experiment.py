@@ -306,27 +306,25 @@ def _response(
     layout: Layout | None,
 ) -> tuple[Array, Array, Array, Array]:
     """Residual (n,), its derivatives (n, k), prediction (n,) and convergence of a run."""
-    drive = getattr(observation, "drive", None)
 
     def residual(own: Array, off: Array) -> tuple[Array, tuple[Array, Array, Array]]:
         given = dict(zip(keys, own, strict=True))
         at = model.replace({key: v for key, v in given.items() if key not in RIG})
         of_rig = {key: value for key, value in given.items() if key in RIG}
         through = with_rig(observation, of_rig) if of_rig else observation
-        if drive is not None:
-            path = drive.moved(through.path, through.weight, off)
-            through = eqx.tree_at(lambda o: o.path, through, path)
+        if observation.shares:
+            through = through.moved(off)
         if layout is not None:
             at = at.prepared(layout.strip(numbers, at.own))
         rows, prediction, converged = through.residual(at, solver)
         return rows, (rows, prediction, converged)
 
-    by = (0,) if drive is None else (0, 1)
+    by = (0, 1) if observation.shares else (0,)
     slopes, (rows, prediction, converged) = jax.jacfwd(residual, by, has_aux=True)(
         values, jnp.zeros(2)
     )
     jacobian = slopes[0]
-    if drive is not None:
+    if observation.shares:
         rows, jacobian = _whitened(slopes[1], rows, jacobian)
     return rows, jacobian, prediction, converged
 

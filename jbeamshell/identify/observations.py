@@ -66,6 +66,15 @@ class Observation(eqx.Module):
         """Range of the measured values, by which misfits are divided."""
         return float(np.ptp(np.asarray(self.measured)[np.asarray(self.weight) > 0.0]))
 
+    @property
+    def shares(self) -> bool:
+        """True if its points share two errors, see `moved`."""
+        return False
+
+    def moved(self, errors: Array) -> Observation:
+        """Copy moved by so many standard errors (2,) of the errors that all points share."""
+        return self
+
     @staticmethod
     def response_from(prediction: NDArray[np.float64]) -> NDArray[np.float64]:
         """Column of the measurement from the prediction, which may be on another scale."""
@@ -121,13 +130,6 @@ class NoisyDrive(eqx.Module):
     up: Array
     ratio: Array
     turn_errors: Array
-
-    def moved(self, path: Array, weight: Array, errors: Array) -> Array:
-        """Path whose turns (2,) are moved by so many of their standard errors."""
-        high, low = path[BEFORE], path[BEFORE + STEPS]
-        shift = errors * self.turn_errors * self.ratio / weight[BEFORE]
-        part = (path - low) / (high - low)
-        return path + part * shift[0] + (1.0 - part) * shift[1]
 
     def read(self, path: Array, response: Array) -> tuple[Array, Array]:
         """Response (n,) at the samples, and its slopes (n,) there."""
@@ -273,6 +275,20 @@ class LoopObservation(Observation):
             getattr(measurement, "free_zero", False),
             None,
         )
+
+    @property
+    def shares(self) -> bool:
+        """True if the levels of the turns, which all points share, are known but for an error."""
+        return self.drive is not None
+
+    def moved(self, errors: Array) -> Observation:
+        """Copy whose turns (2,) are moved by so many of their standard errors."""
+        assert self.drive is not None
+        high, low = self.path[BEFORE], self.path[BEFORE + STEPS]
+        shift = errors * self.drive.turn_errors * self.drive.ratio / self.weight[BEFORE]
+        part = (self.path - low) / (high - low)
+        path = self.path + part * shift[0] + (1.0 - part) * shift[1]
+        return eqx.tree_at(lambda o: o.path, self, path)
 
     def along(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         """Responding column (n,) on the path, and whether every load step converged."""

@@ -103,10 +103,10 @@ class Loop(Measurement):
         if self.driver is not None:
             answer = LOOP.response(self.driver)
             both = ((self.noise, answer), (self.drive_noise, self.driver))
-            told = [
+            own = [
                 f"{with_unit(n, self.unit(name))} of {name}" for n, name in both if n is not None
             ]
-            rows += [("noise", ", ".join(told))] if told else []
+            rows += [("noise", ", ".join(own))] if own else []
             rows.append(("driven by", self.driver))
         notes = self.notes if self.units else (*self.notes, NO_UNITS)
         return Summary(f"{self.label}: {self.force.size} points", rows, notes)

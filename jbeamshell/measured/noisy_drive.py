@@ -9,9 +9,11 @@ through the samples before and after it meet.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import dataclasses
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from jbeamshell.measured.reversals import Floats
@@ -23,12 +25,14 @@ WINDOW = 0.2  # part of a branch beside a turn through which parabolas are laid
 SHIFTS = np.linspace(
     -0.1, 0.1, 21
 )  # parts of a branch by which a turn may lie beside its first guess
+BEGIN = 0.05  # part of a branch beside an end of the recording, within which a turn is at the end
 QUIET = 1e-4  # noise of the drive over its range, below which it is none
 LITTLE = 0.03  # and over that of the response, likewise
 SHARED = 0.5  # part of the drive's roughness that the response follows, above which it is no noise
 ROUNDING = 1e-6  # of a column's range
 BENT = 1.0 / 6.0  # of a pair's distance from the chord of its neighbours; 1/12 on a parabola
 MEDIAN = 0.4549  # median of the square of a normal number
+STRAIGHT = [0, 1, 3]  # of the columns of two parabolas
 ORDER, SQUARES = 5, 252.0  # of differences, and the sum of the squares of their weights
 
 
@@ -94,9 +98,18 @@ def noises_of(found: Cycles, cycles: list[Cycle]) -> Noises | None:
 def paired_means(found: Cycles, cycles: list[Cycle], noises: Noises) -> PairedMeans:
     """Mean pairs of some cycles of one amplitude."""
     columns = np.stack([getattr(found.recording, found.driver), found.response])
+    last = columns.shape[1] - 1
+    length = 0.5 * float(np.median([cycle.end - cycle.start for cycle in cycles]))
+    reach = max(int(WINDOW * length), FEWEST // 2)
+    cycles = [  # noise hides whether a recording begins and ends at a turn
+        dataclasses.replace(
+            cycle,
+            start=cycle.start if cycle.start > BEGIN * length else 0,
+            end=cycle.end if last - cycle.end > BEGIN * length else last,
+        )
+        for cycle in cycles
+    ]
     branches = [(c, a, b) for c in cycles for a, b in ((c.start, c.turn), (c.turn, c.end))]
-    length = float(np.median([b - a for _, a, b in branches]))
-    reach, last = max(int(WINDOW * length), FEWEST // 2), columns.shape[1] - 1
     sharp = _sharp(columns[0], [(a, b) for _, a, b in branches])
     turns, sides = dict[int, Turn](), dict[int, bool]()
     for cycle, a, b in branches:
@@ -126,7 +139,7 @@ def paired_means(found: Cycles, cycles: list[Cycle], noises: Noises) -> PairedMe
         )
     )
     cells = CELLS + 1
-    counts = np.zeros(1)
+    counts = np.zeros(1, int)
     while not np.all(counts):
         cells -= 1
         cell = np.minimum((part * cells).astype(int), cells - 1) + cells * up
@@ -180,44 +193,55 @@ def _sharp(drive: Floats, branches: list[tuple[int, int]]) -> bool:
 
 
 def _turn(
-    columns: Floats, time: Floats, high: bool, length: float, noises: Noises, sharp: bool
+    columns: Floats, time: NDArray[np.int64], high: bool, length: float, noises: Noises, sharp: bool
 ) -> Turn:
     """Turn within a window (2, samples) about its first guess."""
+    # A turn at an end of the recording has samples on one side alone, which do not tell its time.
+    shifts = length * SHIFTS * min(-time[0], time[-1]) / max(-time[0], time[-1])
+    if not sharp:  # the top of a sine through the drive
+
+        def sine(time: Any) -> Floats:
+            angle = np.pi * np.asarray(time) / length
+            return np.stack([np.ones(angle.shape), np.sin(angle), np.cos(angle)], axis=-1)
+
+        whole = np.linalg.pinv(sine(time))
+        _, rise, top = (whole @ columns[0] * (1.0 if high else -1.0)).tolist()
+        best = float(np.clip(length / np.pi * np.arctan2(rise, top), shifts[0], shifts[-1]))
+        at_top = sine(best) @ whole
+        other = np.linalg.pinv(_parabolas(time - best))[0]
+        levels = np.array([at_top @ columns[0], other @ columns[1]])
+        return Turn(best, levels, np.linalg.norm([at_top, other], axis=1))
     sizes = np.maximum(noises, ROUNDING * np.ptp(columns, axis=1))
     scaled = (columns - columns[:, [time.size // 2]]) / sizes[:, None]
 
+    def rows(shift: float) -> list[Floats]:
+        both = _parabolas(time - shift)
+        return [both[:, STRAIGHT], both]  # the drive goes at a constant rate
+
     def left(shift: float) -> float:
-        rows = _parabolas(time - shift)
-        return float(np.sum((scaled.T - rows @ np.linalg.lstsq(rows, scaled.T)[0]) ** 2))
+        pairs = zip(rows(shift), scaled, strict=True)
+        return sum(float(np.sum((y - x @ np.linalg.lstsq(x, y)[0]) ** 2)) for x, y in pairs)
 
-    if sharp:
-        shifts = length * SHIFTS
-        best, step = min(shifts.tolist(), key=left), shifts[1] - shifts[0]
+    best, step = min(shifts.tolist(), key=left), shifts[1] - shifts[0]
+    if step > 0.0:
         best = float(minimize_scalar(left, bounds=(best - step, best + step), method="bounded").x)
-    else:  # the top of one parabola through the drive
-        rows = np.stack([np.ones(time.size), time, time**2], axis=1)
-        inverse = np.linalg.pinv(rows)
-        _, rise, bend = inverse @ columns[0]
-        best = -0.5 * rise / bend if bend * (1.0 if high else -1.0) < 0.0 else 0.0
-        best = float(np.clip(best, *(length * SHIFTS[[0, -1]])))
-        weights = np.array([1.0, best, best**2]) @ inverse
-        level, error = float(columns[0] @ weights), float(np.linalg.norm(weights))
-    rows = _parabolas(time - best)
-    inverse = np.linalg.pinv(rows)
-    levels, errors = columns @ inverse[0], np.full(2, np.linalg.norm(inverse[0]))
-    if not sharp:
-        return Turn(best, np.array([level, levels[1]]), np.array([error, errors[1]]))
+    inverses = [np.linalg.pinv(x) for x in rows(best)]
+    levels = np.array([own[0] @ column for own, column in zip(inverses, columns, strict=True)])
     # The time of a sharp turn has an error, which moves both levels.
-    steps = np.sign(time - best)
-    slopes = np.stack(
-        [np.zeros(time.size), steps < 0, 2.0 * rows[:, 1], steps > 0, 2.0 * rows[:, 3]]
-    )
-    moved = slopes.T @ (inverse @ scaled.T)
-    free = moved - rows @ (inverse @ moved)
-    return Turn(best, levels, np.hypot(errors, inverse[0] @ moved / np.linalg.norm(free)))
+    at, zero = time - best, np.zeros(time.size)
+    slopes = np.stack([zero, at < 0, 2.0 * np.minimum(at, 0.0), at > 0, 2.0 * np.maximum(at, 0.0)])
+    moved = [
+        own.T @ (inverse @ y)
+        for own, inverse, y in zip((slopes[STRAIGHT], slopes), inverses, scaled, strict=True)
+    ]
+    triples = zip(rows(best), inverses, moved, strict=True)
+    free = np.concatenate([by - x @ (inverse @ by) for x, inverse, by in triples])
+    by_time = [inverse[0] @ by for inverse, by in zip(inverses, moved, strict=True)]
+    own_errors = [np.linalg.norm(inverse[0]) for inverse in inverses]
+    return Turn(best, levels, np.hypot(own_errors, np.array(by_time) / np.linalg.norm(free)))
 
 
-def _parabolas(time: Floats) -> Floats:
+def _parabolas(time: NDArray[Any]) -> Floats:
     """Columns (samples, 5) of two parabolas that meet at time 0."""
     before, after = np.minimum(time, 0.0), np.maximum(time, 0.0)
     return np.stack([np.ones(time.size), before, before**2, after, after**2], axis=1)
