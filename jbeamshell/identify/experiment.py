@@ -325,7 +325,7 @@ def _response(
     )
     jacobian = slopes[0]
     if observation.shares:
-        rows, jacobian = _whitened(slopes[1], rows, jacobian)
+        rows, jacobian = _whitened(slopes[1] / observation.excess(rows), rows, jacobian)
     return rows, jacobian, prediction, converged
 
 

@@ -37,6 +37,7 @@ LENGTH_STEP = 32  # runs are filled up to multiples of this, where further point
 APPROACH = 8  # load steps from zero to the first point of a loop
 RUN_IN = 32  # approximate load steps of a closed loop's first, uncompared pass
 STEPS = 48  # load steps of a branch whose drive is noisy
+WRONG = 2.0  # residual over noise, in the mean, above which the model must be wrong
 BEFORE = APPROACH + RUN_IN  # load steps before the compared ones then
 POSITION_ROUNDING = 1e-6  # distance over L by which tables may round a position off the strip
 UNSOLVED_RESIDUAL = 10.0  # residual over the range of a trial without equilibrium: never accepted
@@ -74,6 +75,10 @@ class Observation(eqx.Module):
     def moved(self, errors: Array) -> Observation:
         """Copy moved by so many standard errors (2,) of the errors that all points share."""
         return self
+
+    def excess(self, residual: Array) -> Array:
+        """Size of residuals (n,) over that of right models under much noise; at least 1."""
+        return jnp.ones(())
 
     @staticmethod
     def response_from(prediction: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -123,12 +128,14 @@ class NoisyDrive(eqx.Module):
     sample : (n,) measured drive
     up : (n,) 0 for points of the branch from the high turn, 1 for those of the way back
     ratio : noise of the drive over that of the response
+    error : standard error of the response at the first point
     turn_errors : (2,) errors of the levels of both turns, over that of the drive at the first point
     """
 
     sample: Array
     up: Array
     ratio: Array
+    error: Array
     turn_errors: Array
 
     def read(self, path: Array, response: Array) -> tuple[Array, Array]:
@@ -142,11 +149,11 @@ class NoisyDrive(eqx.Module):
         slope = (y1 - y0) / (x1 - x0)
         return y0 + slope * (self.sample - x0), slope
 
-    def distance(self, path: Array, response: Array, measured: Array) -> Array:
+    def distance(self, path: Array, response: Array, measured: Array, ratio: Array) -> Array:
         """Distance (n,) of the branch above the measured points, in units of the response."""
-        x, y = self._branches(path) / self.ratio, self._branches(response)
+        x, y = self._branches(path) / ratio, self._branches(response)
         dx, dy = jnp.diff(x), jnp.diff(y)
-        to_x, to_y = (self.sample / self.ratio)[:, None] - x[:, :-1], measured[:, None] - y[:, :-1]
+        to_x, to_y = (self.sample / ratio)[:, None] - x[:, :-1], measured[:, None] - y[:, :-1]
         length = dx**2 + dy**2
         along = (to_x * dx + to_y * dy) / length
         inner = jnp.arange(STEPS)
@@ -222,6 +229,7 @@ class LoopObservation(Observation):
             whole(getattr(own, control)),
             whole((np.arange(response.size) >= middle - 1).astype(int)),
             jnp.asarray(errors[0] / error[0]),
+            jnp.asarray(error[0]),
             jnp.asarray(loop.errors_of(control)[[0, middle]] / errors[0]),
         )
         free = loop.free_zero
@@ -290,6 +298,13 @@ class LoopObservation(Observation):
         path = self.path + part * shift[0] + (1.0 - part) * shift[1]
         return eqx.tree_at(lambda o: o.path, self, path)
 
+    def excess(self, residual: Array) -> Array:
+        """Size of residuals (n,) over that of right models under much noise; at least 1."""
+        assert self.drive is not None
+        square = jnp.sum(residual**2) / jnp.sum(self.weight > 0.0)
+        usual = WRONG * self.weight[BEFORE] * self.drive.error
+        return jnp.maximum(square / usual**2, 1.0)
+
     def along(self, model: Model, solver: Newton) -> tuple[Array, Array]:
         """Responding column (n,) on the path, and whether every load step converged."""
         return model.along(self.path, solver)
@@ -307,8 +322,11 @@ class LoopObservation(Observation):
             return prediction, prediction - self.measured, converged
         read, slope = drive.read(self.path, response)
         prediction = self.shifted(read, self.weight / jnp.sqrt(1.0 + (drive.ratio * slope) ** 2))
-        shift = prediction[BEFORE] - read[BEFORE]
-        return prediction, drive.distance(self.path, response + shift, self.measured), converged
+        branch = response + prediction[BEFORE] - read[BEFORE]
+        off = drive.distance(self.path, branch, self.measured, drive.ratio)
+        # What a wrong model leaves beyond noise is an error of the response alone.
+        ratio = drive.ratio / self.excess(off * self.weight)
+        return prediction, drive.distance(self.path, branch, self.measured, ratio), converged
 
     def shifted(self, response: Array, weight: Array) -> Array:
         """Response (n,) shifted to where it fits best, if its zero is unknown."""
