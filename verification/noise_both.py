@@ -22,7 +22,7 @@ from jbeamshell import identify, laws
 from jbeamshell.common.errors import InputError, UnconvergedError
 from jbeamshell.measured.loops import Loop, make_loop
 
-COUNTS = {"law": 140, "strip": 40, "joint": 20}
+COUNTS = {"law": 160, "strip": 28, "joint": 12}
 NOISE = 0.03  # most of a column over its range
 CYCLES, SAMPLES = (1, 5), (40, 240)
 AMPLITUDES = (0.006, 0.012, 0.03)  # of a law

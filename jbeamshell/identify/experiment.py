@@ -107,7 +107,7 @@ class Experiment:
                 thinned = given.thinned(points, control) if isinstance(given, Loop) else given
                 self.measurements.append(thinned)
                 self.owners.append(owner)
-        if any(measurement.deviations is not None for measurement in self.measurements):
+        if any(getattr(item, "deviations", None) is not None for item in self.measurements):
             self.measurements = [  # beside others that know theirs, a guess is better than none
                 item.but(guessed=False) if isinstance(item, Loop) else item
                 for item in self.measurements
