@@ -4,10 +4,10 @@ import ctypes
 import gc
 import math
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import zlib
 from pathlib import Path
 
@@ -18,18 +18,40 @@ import hypothesis
 import jax
 import pytest
 import slow_sample
+from durations import Recorder
 
 os.environ["MPLBACKEND"] = "Agg"  # children of the tests inherit it
-# Workers and children share what they compile; the run's own folder, so nothing stale is used.
 CACHE = "JAX_COMPILATION_CACHE_DIR"
 OWNER = CACHE not in os.environ
+DAYS = 14.0  # after which a compiled program is compiled anew
+FLAGS = "--xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
+
+
+def programs() -> Path:
+    """Folder of compiled programs, which runs share; one for each release of JAX and processor."""
+    try:
+        features = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("flags")[2]
+    except OSError:
+        features = sys.platform
+    told = f"{FLAGS} {features.partition(chr(10))[0]}".encode()
+    home = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    folder = home / "jbeamshell-tests" / f"jax-{jax.__version__}-{zlib.crc32(told):08x}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="jbeamshell-tests-"))
+    for old in folder.iterdir():
+        if old.stat().st_mtime < time.time() - 86400.0 * DAYS:
+            old.unlink(missing_ok=True)
+    return folder
+
+
 if OWNER:
-    os.environ[CACHE] = tempfile.mkdtemp(prefix="jbeamshell-tests-")
+    os.environ[CACHE] = str(programs())
     # Small programs too: reading one takes a tenth of the time that compiling it takes.
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
 # The tests compile more than they run: a third of the time for code that is slower by half.
 os.environ["JAX_DISABLE_MOST_OPTIMIZATIONS"] = "true"  # for children; for this process below
-FLAGS = "--xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
 if OWNER and "XLA_FLAGS" not in os.environ:
     # A release that does not know the flag would abort.
     trial = [sys.executable, "-c", "import jax; jax.devices()"]
@@ -54,6 +76,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="SEED",
         help="a tenth of the slow tests too, drawn by SEED; HEAD takes the commit, or the date",
     )
+    parser.addoption("--record", metavar="FILE", help="time of every test, and what XLA compiles")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -62,6 +85,10 @@ def pytest_configure(config: pytest.Config) -> None:
         config.option.slow_sample = slow_sample.seed_of(given)
         if config.option.markexpr == "not slow":
             config.option.markexpr = ""
+    if path := config.option.record:
+        config.pluginmanager.register(
+            Recorder(None if hasattr(config, "workerinput") else Path(path).resolve())
+        )
 
 
 def pytest_report_header(config: pytest.Config) -> list[str]:
@@ -129,8 +156,3 @@ def most_memory() -> float:
     """Bytes that a worker may hold: a third of the machine shared by all, and 4 GB at most."""
     machine = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return min(4e9, machine / 3.0 / int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
-
-
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    if OWNER:
-        shutil.rmtree(os.environ[CACHE], ignore_errors=True)

@@ -46,7 +46,7 @@ HOMES = {
     "panel": "explorer/",
     "bokeh": "explorer/",
     "tqdm": "common/progress.py",
-    "xarray": ("history/history.py", "plotting/sweeps.py", "sweeping/"),
+    "xarray": ("common/frames.py", "plotting/sweeps.py", "sweeping/"),
     "lazy_loader": ("__init__.py", "dynamics/__init__.py", "scene/__init__.py"),
 }
 

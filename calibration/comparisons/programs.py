@@ -120,7 +120,8 @@ def sheared() -> Floats:
     history = cylinder()
     start, turn, _ = history.cycles[-1]
     rest = start + int(np.argmin(np.abs(np.asarray(history.force[start : turn + 1]))))
-    x, peak = np.asarray(history.x), bodies.FRICTION * 2.0 / np.pi  # Hertz, for a load of 1 on 2
+    x = np.asarray(history.places)
+    peak = bodies.FRICTION * 2.0 / np.pi  # Hertz, for a load of 1 on 2
     sense = np.sign(np.asarray(history.traction[start, x.size // 2]))
     shear = [
         0.5 * (np.interp(PLACES, x, row) + np.interp(-PLACES, x, row)) * sense / peak

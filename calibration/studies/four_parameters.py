@@ -2,8 +2,8 @@
 
 Every scene is plane elasticity in steady cycles of .1 to .95 of gross slip.  A row holds the
 exponents of D ~ F^n, the parameters of the four-parameter Iwan model that is nearest to the scene's
-displacement and dissipation, those of the short formula of `jbeamshell.laws.iwan4_of_strip`, the
-errors of both, and those of `jbeamshell.reference.slip_energy`.  Takes a quarter of an hour.
+displacement and dissipation, its errors, and those of `jbeamshell.reference.slip_energy`.  Takes
+a quarter of an hour.
 """
 
 import functools
@@ -68,25 +68,6 @@ def row(scene: jb.Scene) -> dict[str, Any]:
     }
 
 
-def formula_errors(scene: jb.Scene, each: dict[str, Any]) -> dict[str, Any]:
-    """Median and worst error of D by the short formula; nothing where it has none."""
-    try:
-        law = jb.laws.iwan4_of_strip(scene)
-    except jb.InputError:
-        return {}
-    slip = float(law.slip_force)
-    unit = slip * float(scene.strip.length / scene.strip.axial_stiffness)
-    u = law.displacement(slip * np.array(each["force"]))
-    off = np.abs(np.asarray(law.dissipation(u)) / (slip * unit) / each["dissipation"] - 1.0)
-    softer = np.abs(np.asarray(u) / unit / each["displacement"] - 1.0)
-    numbers = [float(law.stiffness) * unit / slip, float(law.chi), float(law.beta)]
-    return {
-        "formula": numbers,
-        "formula_errors": [float(np.median(off)), float(np.max(off))],
-        "formula_displacement_error": float(np.max(softer)),
-    }
-
-
 def energy_errors(about: dict[str, Any], each: dict[str, Any]) -> dict[str, Any]:
     """Errors of D by the bar's energy and the factor of height; nothing for other patches."""
     if about["patch"] not in EDGES:
@@ -107,8 +88,7 @@ def measure() -> dict[str, Any]:
         except jb.UnconvergedError as error:
             failed.append(about | {"why": str(error)})
             continue
-        further = formula_errors(scene, each) | energy_errors(about, each)
-        rows.append(about | each | further)
+        rows.append(about | each | energy_errors(about, each))
         print({key: rows[-1][key] for key in rows[-1] if key not in CURVES}, flush=True)
     return {"rows": rows, "failed": failed}
 
@@ -150,27 +130,20 @@ def _exponents(rows: Rows) -> Iterator[Curve]:
 
 
 def _parameter(rows: Rows, place: int, named: bool = False) -> Iterator[Curve]:
-    """Parameter over the height: the fitted one, and dashed that of the formula."""
+    """Parameter over the height."""
     for patch, words in LABELS.items():
-        label = words if named else "_"
         own = typical(rows, patch)
-        given = [row.get("formula", [np.nan] * 3)[place] for row in own]
-        dashed = None if np.all(np.isnan(given)) else given
         fitted = [row["fitted"][place] for row in own]
-        yield Curve(label, [row["eta"] for row in own], fitted, dashed)
+        yield Curve(words if named else "_", [row["eta"] for row in own], fitted)
 
 
 def _errors(rows: Rows, place: int) -> Iterator[Curve]:
-    """Errors of D over the height, worst over friction; dashed those of the formula."""
+    """Errors of D over the height, worst over friction."""
     for patch in LABELS:
         own = [row for row in rows if row["patch"] == patch and row["nu"] == TYPICAL["nu"]]
         heights = sorted({row["eta"] for row in own})
-        found = []
-        for name in ("fitted_errors", "formula_errors"):
-            by_height = [[r.get(name, [np.nan] * 2) for r in own if r["eta"] == h] for h in heights]
-            found.append([float(np.max(np.array(each)[:, place])) for each in by_height])
-        dashed = None if np.all(np.isnan(found[1])) else found[1]
-        yield Curve("_", heights, found[0], dashed)
+        errors = [[r["fitted_errors"][place] for r in own if r["eta"] == h] for h in heights]
+        yield Curve("_", heights, [max(each) for each in errors])
 
 
 def _plain(axes: Axes, rows: Any) -> None:
@@ -188,7 +161,7 @@ def _over_height(
     return Chart("rows", HEIGHT, label, title, curves, log, extra=extra)
 
 
-NEAREST, SHORT = "nearest four parameters", "dashed: short formulas"
+NEAREST = "nearest four parameters"
 CHARTS = {
     "exponents": Chart(
         "rows", "slipped length  s/H", r"exponent $n$ of $D \sim F^n$", "", _exponents, "x",
@@ -197,7 +170,7 @@ CHARTS = {
     "stiffness": _over_height(
         r"$K_T\, L / E'2H$", functools.partial(_parameter, place=0, named=True), "xy", NEAREST
     ),
-    "chi": _over_height(r"$\chi$", functools.partial(_parameter, place=1), title=SHORT),
+    "chi": _over_height(r"$\chi$", functools.partial(_parameter, place=1)),
     "beta": _over_height(
         r"$\beta$", functools.partial(_parameter, place=2), "xy", extra=_from_a_hundredth
     ),

@@ -100,6 +100,18 @@ class ModalBodies(NamedTuple):
     bolts: Number
     gap: Number
 
+    def __str__(self) -> str:
+        pairs = f"{self.touching.size} pairs, of which {int(np.sum(self.touching))} touch"
+        rows = [
+            ("frequency, stuck", f"{self.omega / (2.0 * np.pi):.6g}"),
+            ("slip begins at", f"{self.begins:.6g} modal displacement"),
+            ("all slides at", f"{self.slides:.6g}"),
+        ]
+        return Summary(f"bodies pulled into a mode, {pairs}", rows).as_text()
+
+    def __repr__(self) -> str:
+        return str(self)
+
 
 def modal_bodies(
     upper: FacePart,

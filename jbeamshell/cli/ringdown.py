@@ -67,9 +67,9 @@ def add_to(commands: Any) -> None:
         "--strip",
         choices=("auto", "whole", "sliders"),
         default="auto",
-        help="follow the whole strip in time steps, or the sliders of its contact without inertia, "
-        "exact in time (plane elasticity's, unless model.section is given); auto takes the sliders "
-        "where inertia matters little (default)",
+        help="follow the whole strip in time steps, or the sliders of its contact without inertia "
+        "(plane elasticity's, unless model.section is given); auto takes the sliders where inertia "
+        "matters little (default)",
     )
     add_settings(parser)
     add_folder(parser)

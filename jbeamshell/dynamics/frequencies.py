@@ -10,6 +10,8 @@ from jbeamshell.common.checks import is_traced
 from jbeamshell.common.pytrees import Tree
 from jbeamshell.common.summary import Summary, ranged
 
+SHOWN = 10  # modes that are printed
+
 
 class OverFrequency(Tree):
     """Result with a `frequency`, in cycles per time (hertz, if the time is in seconds)."""
@@ -76,3 +78,14 @@ class Modes(OverFrequency):
 
     shapes: Any
     x: Any = None
+
+    def __str__(self) -> str:
+        if is_traced(self):
+            return "natural modes, traced"
+        known = np.asarray(self.frequency)
+        rows = [(f"mode {number}", f"{each:.6g}") for number, each in enumerate(known[:SHOWN])]
+        notes = [f"and {known.size - SHOWN} more"] if known.size > SHOWN else []
+        return Summary("natural modes, cycles per time", rows, notes).as_text()
+
+    def __repr__(self) -> str:
+        return str(self)

@@ -22,13 +22,14 @@ import numpy as np
 from jbeamshell.common.checks import POSITIVE, require, require_number
 from jbeamshell.common.errors import InputError
 from jbeamshell.contact_line.strip import condensed, moving_volume
-from jbeamshell.dynamics.light_strip import LightMotion, ring
 from jbeamshell.dynamics.over_amplitude import RingDown
 from jbeamshell.dynamics.ringdown import ring_down
 from jbeamshell.dynamics.strip.inertia import Inertia
-from jbeamshell.dynamics.strip.motion import Motion
+from jbeamshell.dynamics.strip.motion import EndMotion, Motion
 from jbeamshell.dynamics.structure.joint import Joint, largest_force
+from jbeamshell.dynamics.structure.matrices import Attachment, Structure
 from jbeamshell.dynamics.structure.modal import ModalCurve
+from jbeamshell.dynamics.structure.shaking import shake
 from jbeamshell.scene.rows import AUTO
 from jbeamshell.scene.scene import Scene
 
@@ -65,7 +66,7 @@ class RingDownStudy:
         followed as a whole without asking
     """
 
-    motion: Motion | LightMotion
+    motion: EndMotion
     found: RingDown
     predicted: ModalCurve
     payload: float
@@ -74,7 +75,7 @@ class RingDownStudy:
     @property
     def light(self) -> bool:
         """True if the strip was its sliders, False if its inertia was followed."""
-        return isinstance(self.motion, LightMotion)
+        return not isinstance(self.motion, Motion)
 
     @property
     def ratio(self) -> Any:
@@ -133,10 +134,9 @@ def let_go(
     cycles : span of the transient, in periods of the stuck strip
     per_cycle : number of time steps in a period, of the whole strip
     whole : True to follow the whole strip in time steps; False to follow the sliders of plane
-        elasticity (or of the section that the scene names, on its contact line), exact in time,
-        without the strip's inertia; None to take the sliders, if the scene has them, where the
-        strip's inertia matters little (`LIGHT`) and it is not damped.  A lap joint is always its
-        sliders
+        elasticity (or of the section that the scene names, on its contact line), without the
+        strip's inertia; None to take the sliders, if the scene has them, where the strip's inertia
+        matters little (`LIGHT`) and it is not damped.  A lap joint is always its sliders
     progress : show a progress bar of the time steps; None shows it where a person watches
 
     Returns
@@ -169,7 +169,7 @@ def let_go(
     require_number("payload", mass)
     samples = round(cycles * SAMPLES_PER_CYCLE) + 1
     require("whole", whole, line is not None or whole is not False, NO_SLIDERS)
-    motion: LightMotion | Motion | None = None
+    motion: EndMotion | None = None
     share = None
     if line is not None and (whole is False or not inertia.damped):
         share = _share(line, inertia, mass)
@@ -177,7 +177,7 @@ def let_go(
             joint = Joint.of(line, end_force)
             slips = bool(np.any(np.asarray(joint.springs) > 0.0))
             require("force", end_force, slips, STUCK)
-            motion = ring(line, joint, mass, end_force, cycles, samples)
+            motion = _on_sliders(line, joint, mass, end_force, cycles, samples)
     if motion is None:
         require("model.section", scene.plan.section, steps, NO_INERTIA)
         motion = _whole(scene, end_force, mass, inertia, cycles, per_cycle, samples, progress)
@@ -232,6 +232,29 @@ def _share(line: Scene, inertia: Inertia, mass: float) -> float:
     """Mass of the strip that moves with the stuck end, over the payload."""
     volume = jax.jit(lambda line: moving_volume(condensed(line, line.plan.nodes)))(line)
     return float(np.sum(np.asarray(inertia.density) * np.asarray(volume))) / mass
+
+
+def _on_sliders(
+    line: Scene, joint: Joint, mass: float, force: float, cycles: float, samples: int
+) -> EndMotion:
+    """Motion of a mass on the sliders of a joint, pulled with a force and let go."""
+    period = 2.0 * np.pi * np.sqrt(mass / float(joint.stiffness))
+    pulled = Structure([[mass]], [[0.0]], [Attachment(joint, 0)])
+    start = np.array([float(joint.displacement(force))])
+    found = shake(pulled, cycles * period, displacement=start, samples=samples)
+    return EndMotion(
+        time=found.time,
+        displacement=found.displacement[:, 0],
+        velocity=found.velocity[:, 0],
+        kinetic=found.kinetic,
+        stored=found.stored,
+        external_work=found.external_work,
+        friction_work=found.friction_work,
+        damping_work=found.damping_work,
+        force=np.zeros(samples),
+        scene=line,
+        payload=mass,
+    )
 
 
 def _whole(

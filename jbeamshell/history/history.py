@@ -12,6 +12,7 @@ import numpy as np
 from jax import Array
 
 from jbeamshell.common.errors import Status
+from jbeamshell.common.frames import frame
 from jbeamshell.common.summary import Summary, in_words
 from jbeamshell.history.contact_line import ContactLine
 from jbeamshell.history.figures import TURNED_UNITS, UNITS, CycleFigures
@@ -173,10 +174,7 @@ class History(Profiles, ContactLine, CycleFigures):
         --------
         >>> history.to_dataframe().plot("displacement", "force")
         """
-        import xarray
-
-        columns = {name: ("row", column) for name, column in self.table().items()}
-        return xarray.Dataset(columns).to_dataframe()
+        return frame(self.table())
 
     def save(self, path: Any) -> None:
         """Write to an .npz file that `jbeamshell.read_history` reads.

@@ -21,7 +21,7 @@ from jbeamshell.identify.observations import Observation, observe
 from jbeamshell.identify.plan import Datum, planned
 from jbeamshell.identify.results import Fit
 from jbeamshell.identify.specimens import Specimen
-from jbeamshell.laws import Law, PowerLaw, law_named
+from jbeamshell.laws import Law, law_named
 from jbeamshell.measured.curves import AmplitudeCurve, DissipationCurve, StiffnessCurve
 from jbeamshell.measured.form import Measurement
 from jbeamshell.measured.loops import Loop
@@ -219,13 +219,7 @@ def _with_strip(
     )
     reached = amplitude / stiffness
     data = [DissipationCurve(reached, energy), StiffnessCurve(reached, stiffness)]
-    over_force = [DissipationCurve(amplitude, energy)]
-    rows = [
-        _fitted(model, over_force, amplitude, "force", options)
-        if _is_power(model)
-        else _fitted(model, data, reached, "displacement", options)
-        for model in models
-    ]
+    rows = [_fitted(model, data, reached, "displacement", options) for model in models]
     return Comparison(amplitude, energy, "force", (own, *rows))
 
 
@@ -265,9 +259,8 @@ def _fitted(
     try:
         if isinstance(model, str):
             law_named(model)  # raises for the name of anything else
-        own = [i for i in data if not (_is_power(model) and isinstance(i, StiffnessCurve))]
-        over = any(isinstance(item, AmplitudeCurve) for item in own)  # of a column they do not say
-        specimen = Specimen(model, own, set={"load.control": drive} if over else {})
+        over = any(isinstance(item, AmplitudeCurve) for item in data)  # of a column they do not say
+        specimen = Specimen(model, data, set={"load.control": drive} if over else {})
         found = planned(specimen, options=Options(**{"throw": False, **options})).run()
     except (InputError, UnconvergedError) as error:
         return Compared(name, None, nothing, np.nan, np.nan, str(error))
@@ -279,12 +272,6 @@ def _fitted(
         told = "; ".join(filter(None, (told, "does not describe these data")))
     seconds = _seconds(found.data, LawModel(law, found.controls[0]))
     return Compared(name, found, energy, found.misfit, seconds, told)
-
-
-def _is_power(model: str | Law) -> bool:
-    """True for the power law, which answers its energy over the force alone."""
-    heading = model if isinstance(model, str) else model.heading
-    return heading == PowerLaw.heading
 
 
 def _seconds(data: Sequence[Measurement], model: Any) -> float:

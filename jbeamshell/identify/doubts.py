@@ -50,7 +50,6 @@ Vector = NDArray[np.float64]
 def doubts_of(
     problem: Problem,
     uncertainty: Uncertainty,
-    jacobian: Vector,
     models: Sequence[Model],
     left: Sequence[float],
     minima: Sequence[float],
@@ -61,7 +60,6 @@ def doubts_of(
     ----------
     problem : least-squares problem
     uncertainty : uncertainty at the end of the fit
-    jacobian : (rows + priors, n) derivatives of the residuals there
     models : model of each specimen with the fitted values
     left : misfit of each measurement that is no white noise
     minima : cost at the end of each search, the best first
@@ -82,7 +80,7 @@ def doubts_of(
                 f"{float(law.backbone(far)):.4g}"
             )
     if best.converged:
-        doubts += _of_statics(experiment, models, uncertainty, jacobian)
+        doubts += _of_statics(experiment, models, uncertainty, best.jacobian)
     for name, bijection, value in zip(space.names, space.bijections, values, strict=True):
         bound = bijection.bound_at(value)
         if bound is not None:

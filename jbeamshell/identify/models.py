@@ -20,7 +20,7 @@ from jbeamshell.common.checks import require, require_choice
 from jbeamshell.common.errors import InputError
 from jbeamshell.contact_line.shared import Shared, shared
 from jbeamshell.contact_line.strip import Strip
-from jbeamshell.laws import Law, MasingLaw, PowerLaw
+from jbeamshell.laws import Law, MasingLaw
 from jbeamshell.measured.curves import AmplitudeCurve, DissipationCurve, StiffnessCurve
 from jbeamshell.measured.loops import Loop
 from jbeamshell.numerics.newton import Newton
@@ -280,11 +280,8 @@ class LawModel(Model):
 
     def cycles(self, amplitude: Array, figure: Array, solver: Newton) -> tuple[Array, Array]:
         law = self.law
-        if isinstance(law, PowerLaw):
-            values = jnp.where(figure == 0, law.dissipation_at_force(amplitude), jnp.nan)
-        else:
-            size = law.displacement(amplitude) if self.control == "force" else amplitude
-            values = lax.select_n(figure, law.dissipation(size), law.secant_stiffness(size))
+        size = law.displacement(amplitude) if self.control == "force" else amplitude
+        values = lax.select_n(figure, law.dissipation(size), law.secant_stiffness(size))
         return values, jnp.isfinite(values)
 
     def _check_forces(self, force: ArrayLike) -> None:

@@ -1,4 +1,4 @@
-"""Search of a fit: from several starts, then along the direction that the data know least."""
+"""Search of a fit from several starts, and on to a bound where it runs into one."""
 
 from __future__ import annotations
 
@@ -29,7 +29,6 @@ from jbeamshell.identify.search import (
     within_bounds,
 )
 from jbeamshell.identify.search_space import SearchSpace
-from jbeamshell.identify.settling import Settled, settle
 from jbeamshell.identify.uncertainty import uncertainty_at
 from jbeamshell.measured.form import FEWEST_POINTS
 from jbeamshell.numerics.newton import Newton
@@ -142,8 +141,7 @@ def found_by(
         bounded = all(parameter.bounded for parameter in space.parameters)
         starts = LAW_STARTS if of_law else STARTS if bounded else 1
     rescue = options.max_iterations is None
-    noise_cost = problem.experiment.weight.size if problem.experiment.noisy else 0
-    stopping = StoppingRule(most, options.tolerance, noise_cost)
+    stopping = StoppingRule(most, options.tolerance)
     told = "".join(f"; {sentence}" for sentence in (*doubts, *notes))
     try:
         watched: Any = bar("fit") if progress is None else contextlib.nullcontext()
@@ -153,7 +151,7 @@ def found_by(
                 shown.set_postfix_str(str(now))
                 shown.update()
 
-            end, ends = _search(problem, starts, stopping, rescue, progress or show)
+            ends = _search(problem, starts, stopping, rescue, progress or show)
     except KeyboardInterrupt:
         kept = (
             "nothing was saved: give save= (--save on the command line), a file, to continue later"
@@ -164,7 +162,7 @@ def found_by(
     except UnconvergedError as error:
         raise UnconvergedError(f"{error}{told}") from None
     minima = [(space.values(own.point), problem(own.point).cost) for own in ends]
-    converged = ends[0].converged
+    point, converged = ends[0]
     if options.throw and not converged:
         values, cost = minima[0]
         named = ", ".join(f"{name} = {value:.6g}" for name, value in space.named(values).items())
@@ -172,8 +170,7 @@ def found_by(
             f"the fit has not converged after {most} iterations, at {named}, cost "
             f"{cost:.4g}: start closer, free fewer parameters, or raise max_iterations{told}"
         )
-    uncertainty = uncertainty_at(problem, end.point, end.jacobian)
-    values = space.values(end.point)
+    values, uncertainty = space.values(point), uncertainty_at(problem, point)
     models = [
         model.replace(space.of(values, owner)).fitted(problem.experiment.of(owner))
         for owner, model in enumerate(problem.experiment.models)
@@ -187,7 +184,7 @@ def found_by(
         [(space.named(point), cost) for point, cost in minima],
         notes=notes,
     )
-    own = doubts_of(problem, uncertainty, end.jacobian, models, fit.left, [c for _, c in minima])
+    own = doubts_of(problem, uncertainty, models, fit.left, [c for _, c in minima])
     return dataclasses.replace(fit, doubts=[*own, *doubts])
 
 
@@ -211,8 +208,8 @@ def _search(
     stopping: StoppingRule,
     rescue: bool,
     progress: Callable[[FitProgress], None],
-) -> tuple[Settled, list[SearchResult]]:
-    """Ends of the searches from all starts, the best first, and where that settles."""
+) -> list[SearchResult]:
+    """Ends of the searches from all starts, the best first."""
     check_start(problem)
     space = problem.space
     tried = SCREENED * (starts - 1)
@@ -239,9 +236,7 @@ def _search(
     if _at_bound(space, ends[0].point):
         end = within_bounds(problem, ends[0].point, stopping)
         ends[0] = ends[0]._replace(point=min(ends[0], end, key=cost).point)
-    settled = settle(problem, ends[0].point, partial(report, starts + 3))
-    first_end = SearchResult(settled.point, ends[0].converged and settled.settled)
-    return settled, [first_end, *ends[1:]]
+    return ends
 
 
 def _at_bound(space: SearchSpace, point: Vector) -> bool:

@@ -125,11 +125,6 @@ class Bijection(NamedTuple):
         t, dt = self._at(point, jnp)
         return (jnp.exp(t) if self.log else t), jnp.broadcast_to(jnp.asarray(dt), jnp.shape(point))
 
-    def at_part(self, part: float) -> float:
-        """Parameter at a part, 0 to 1, of the way from bound to bound on its scale."""
-        low, high = self._scaled(self.low), self._scaled(self.high)
-        return self._unscaled(low + part * (high - low))
-
     def point(self, value: float) -> float:
         """Inverse of `value`; values on or beyond a bound are moved inside."""
         start, low, high = map(self._scaled, (self.start, self.low, self.high))

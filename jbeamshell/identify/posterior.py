@@ -1,8 +1,7 @@
 """Posterior density of a fit's parameters, for samplers of other libraries.
 
 Samplers that move freely, such as those of blackjax, numpyro or emcee, take `Posterior.logdensity`
-of points in the unbounded search space; nested samplers, such as dynesty, take
-`Posterior.prior_transform` of the unit cube and `Posterior.loglikelihood` of its values.
+of points in the unbounded search space.  `Posterior.loglikelihood` is the likelihood of values.
 
 The likelihood is that of the fit: normal where measured noise explains the residuals, else with
 Student's distribution of the estimated noise, whose few independent points include what the model
@@ -19,7 +18,6 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 from numpy.typing import NDArray
-from scipy import stats
 
 from jbeamshell.common.errors import InputError
 from jbeamshell.identify.problem import Problem
@@ -93,32 +91,6 @@ class Posterior:
             if self._space.bijections[axis].log:
                 total = total + jnp.log(value)
         return total
-
-    def prior_transform(self, cube: ArrayLike) -> NDArray[np.float64]:
-        """Parameters (n,) at a point (n,) of the unit cube, distributed as the prior.
-
-        Raises `InputError` for a parameter with neither a normal prior nor two finite bounds on its
-        scale, whose flat prior is no distribution.
-        """
-        priors = {axis: rest for axis, *rest in self.problem.priors}
-        parts = np.asarray(cube, float)
-        values = []
-        for axis, (name, bijection) in enumerate(
-            zip(self.names, self._space.bijections, strict=True)
-        ):
-            if axis in priors:
-                mean, deviation = priors[axis]
-                low, high = (np.subtract(bijection[1:3], mean) / deviation).tolist()
-                values.append(stats.truncnorm.ppf(parts[axis], low, high, mean, deviation))
-                continue
-            lowest = 0.0 if bijection.log else -np.inf
-            if not (bijection.low > lowest and np.isfinite(bijection.high)):
-                raise InputError(
-                    f"{name}: its prior is flat between {bijection.low:g} and {bijection.high:g}, "
-                    "which is no distribution: give both bounds (--bounds), or a prior (--prior)"
-                )
-            values.append(bijection.at_part(float(parts[axis])))
-        return np.asarray(values)
 
     @property
     def _space(self) -> SearchSpace:

@@ -82,7 +82,7 @@ def profile(
     others = np.delete(np.arange(best.size), axis)
     along = uncertainty.inverse[:, axis] / uncertainty.inverse[axis, axis]
     least, wanted = problem(best).cost, uncertainty.quantile(level)
-    stopping = StoppingRule(max_iterations, tolerance, uncertainty.sigma**2)
+    stopping = StoppingRule(max_iterations, tolerance)
     points, roots, settled = {0.0: best}, {0.0: 0.0}, True
 
     def root_at(step: float) -> float:

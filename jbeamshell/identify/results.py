@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from jbeamshell.common.checks import require
 from jbeamshell.common.errors import InputError, Status
 from jbeamshell.common.files import as_json, csv_text
+from jbeamshell.common.frames import frame
 from jbeamshell.common.summary import Summary
 from jbeamshell.identify.doubts import undescribed
 from jbeamshell.identify.experiment import Evaluation
@@ -214,6 +215,24 @@ class Fit:
             "minima": [{"values": values, "cost": cost} for values, cost in self.minima],
         }
 
+    def to_dataframe(self) -> Any:
+        """Fitted numbers as a `pandas.DataFrame`: value, standard error and 95 % interval.
+
+        Examples
+        --------
+        ::
+
+            fit.to_dataframe().loc["contact.friction", "value"]
+        """
+        low, high = zip(*self.intervals.values(), strict=True)
+        columns = {
+            "value": self.values.values(),
+            "error": self.errors.values(),
+            "low": low,
+            "high": high,
+        }
+        return frame(columns, self.values, "parameter")
+
     def intervals_at(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence interval of every value at a level between 0 and 1."""
         ends = self.uncertainty.intervals(level).tolist()
@@ -296,7 +315,7 @@ class Fit:
         -------
         Posterior
             ``logdensity`` of points of the search space, ``start`` and ``covariance`` there,
-            ``constrain`` and ``unconstrain``, ``loglikelihood`` of values, ``prior_transform``
+            ``constrain`` and ``unconstrain``, ``loglikelihood`` of values
 
         Raises
         ------

@@ -1,12 +1,13 @@
 """Searches for the minimum of a sum of squares: three, each with one job.
 
-Levenberg-Marquardt is the search of every fit.  It cannot end on a bound, so jaxopt's gradient
-search in a box goes on where it ran into one.  Where it does not converge, optax moves many starts
-together, and it searches again from the best.  The only file that imports jaxopt and optax.
+Scipy's least squares are the search of every fit.  They have no bounds here, so jaxopt's gradient
+search in a box goes on where they ran into one.  Where they do not converge, optax moves many
+starts together, and they search again from the best.  The only file that imports jaxopt and optax.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -16,15 +17,13 @@ import numpy as np
 import optax
 from jax import Array
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from jbeamshell.identify.experiment import Evaluation
 from jbeamshell.identify.problem import Problem
 
-DAMPING = 1e-4  # first damping of a Gauss-Newton step, in parameters of equal influence
-MAX_STEP = 1.0  # longest step along an axis of the search space, for most parameters a factor e
 FLAT = 1e-6  # relative gain in cost below which a search has converged
-REFUSED = 5  # steps in a row, each shorter than the last, that do not gain: the cost has a kink
-SHORT = 0.01  # length of a step, of which a kink may refuse so many
+GRADIENT = 1e-10  # slope of the cost below which a search has converged, as where nothing is left
 ADAM_STEPS = 25
 ADAM_RATE = 0.15  # step in the search space, where most parameters are logarithms
 
@@ -37,15 +36,12 @@ class StoppingRule(NamedTuple):
 
     Attributes
     ----------
-    max_iterations : largest number of iterations of each search
+    max_iterations : largest number of points that each search tries
     tolerance : relative change of the parameters below which a search has converged
-    noise_cost : cost that the measured noise alone leaves; gains far below it count as none.
-        0 if the noise is unknown
     """
 
     max_iterations: int
     tolerance: float
-    noise_cost: float = 0.0
 
 
 class SearchResult(NamedTuple):
@@ -54,7 +50,7 @@ class SearchResult(NamedTuple):
     Attributes
     ----------
     point : (n,) coordinates in the unbounded search space
-    converged : False if it ran out of iterations
+    converged : False if it ran out of iterations, or could not begin
     """
 
     point: Vector
@@ -67,50 +63,45 @@ def minimise(
     stopping: StoppingRule,
     report: Callable[[int, Vector, float], None] | None = None,
 ) -> SearchResult:
-    """Run one Levenberg-Marquardt search.
+    """Run one search, by Gauss-Newton steps within a trust region.
 
-    The damping follows Nielsen (1999), Damping parameter in Marquardt's method.  In NumPy, because
-    a search in JAX compiles some eighty small programs, which take longer than the runs.
+    A point without derivatives is refused as one of infinite cost.
 
     Parameters
     ----------
-    evaluate : function that returns residual and Jacobian at a point (n,)
+    evaluate : function that returns residual and Jacobian at a point (n,), and remembers them
     start : (n,) first point
     stopping : conditions that end the search
     report : called after every step with its number, the point and the cost
     """
-    # One damping for all axes is too strong for those with little influence: scale by influence.
-    current, here = start, evaluate(start)
-    influence = np.linalg.norm(here.jacobian, axis=0)
-    scale = np.where(influence > 0.0, influence, 1.0)
-    cost = 0.5 * float(here.residual @ here.residual)
-    damping = DAMPING * float(np.max(np.sum((here.jacobian / scale) ** 2, axis=0), initial=0.0))
-    growth, refused = 2.0, 0
-    for step in range(1, stopping.max_iterations + 1):
-        # The normal equations would square the condition number.
-        jacobian = here.jacobian / scale
-        rows = np.vstack([jacobian, np.sqrt(damping) * np.eye(start.size)])
-        wanted = np.linalg.lstsq(rows, -np.append(here.residual, np.zeros(start.size)))[0]
-        trial = current + np.clip(wanted / scale, -MAX_STEP, MAX_STEP)
-        there = evaluate(trial)
-        before, after = cost, 0.5 * float(there.residual @ there.residual)
-        foreseen = 0.5 * wanted @ (damping * wanted - jacobian.T @ here.residual)
-        gain = before - after
-        taken = gain > 0.0 and bool(np.all(np.isfinite(there.jacobian)))
-        if taken:
-            current, here, cost = trial, there, after
-            damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain / foreseen - 1.0) ** 3)
-            growth, refused = 2.0, 0
-        else:
-            damping, growth, refused = damping * growth, 2.0 * growth, refused + 1
-        if report:
-            report(step, current, 2.0 * cost)
-        change = np.max(np.abs(wanted / scale), initial=0.0)
-        flat = FLAT * max(before, 0.5 * stopping.noise_cost)
-        kink = refused >= REFUSED and change < SHORT
-        if change < stopping.tolerance or (taken and gain < flat) or kink:
-            return SearchResult(current, True)
-    return SearchResult(current, False)
+    # Scipy's first trust region is as large as the first point.  With that at ones, it allows about
+    # a unit along each axis, for most parameters a factor e.
+    shift, steps = start - 1.0, itertools.count()
+
+    def residual(point: Vector) -> Vector:
+        at = evaluate(shift + point)
+        known = bool(np.all(np.isfinite(at.jacobian)))
+        return at.residual if known else np.full_like(at.residual, np.inf)
+
+    def jacobian(point: Vector) -> Vector:
+        at, step = evaluate(shift + point), next(steps)
+        if report and step:
+            report(step, shift + point, at.cost)
+        return at.jacobian
+
+    if not np.all(np.isfinite(residual(start - shift))):
+        return SearchResult(start, False)
+    found = least_squares(
+        residual,
+        start - shift,
+        jacobian,
+        x_scale="jac",
+        ftol=FLAT,
+        xtol=stopping.tolerance,
+        gtol=GRADIENT,
+        max_nfev=stopping.max_iterations,
+    )
+    return SearchResult(shift + found.x, found.status > 0)
 
 
 def within_bounds(problem: Problem, start: Vector, stopping: StoppingRule) -> SearchResult:

@@ -197,7 +197,7 @@ class Uncertainty(NamedTuple):
         return np.where(sizes > 0.0, sizes, 1.0)
 
 
-def uncertainty_at(problem: Problem, point: Vector, jacobian: Vector) -> Uncertainty:
+def uncertainty_at(problem: Problem, point: Vector) -> Uncertainty:
     """Uncertainty at the minimum of a problem.
 
     What the model's own grid may leave in a residual is smooth and alike in all curves, so that all
@@ -207,9 +207,9 @@ def uncertainty_at(problem: Problem, point: Vector, jacobian: Vector) -> Uncerta
     ----------
     problem : least-squares problem
     point : (n,) minimum
-    jacobian : (rows, n) derivatives there, priors in the last rows
     """
-    space, experiment, residual = problem.space, problem.experiment, problem(point).residual
+    space, experiment, end = problem.space, problem.experiment, problem(point)
+    residual, jacobian = end.residual, end.jacobian  # priors are the last rows
     emphasis, relative = experiment.emphasis, experiment.relative
     values = space.values(point)
     pairs = zip(space.bijections, values.tolist(), strict=True)

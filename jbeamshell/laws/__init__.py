@@ -23,13 +23,9 @@ from jbeamshell.laws.lugre import LuGre as LuGre
 from jbeamshell.laws.masing import MasingLaw as MasingLaw
 from jbeamshell.laws.mindlin import Mindlin as Mindlin
 from jbeamshell.laws.parallel_iwan import sliders as sliders
-from jbeamshell.laws.power_law import PowerLaw as PowerLaw
-from jbeamshell.laws.series_iwan import SeriesIwan as SeriesIwan
-from jbeamshell.laws.strip_formula import iwan4_of_strip as iwan4_of_strip
 
 LAWS: dict[str, type[Law]] = {
-    law.heading: law
-    for law in (Jenkins, Iwan4, Bar, Mindlin, BoucWen, Dahl, LuGre, JangBarber, PowerLaw)
+    law.heading: law for law in (Jenkins, Iwan4, Bar, Mindlin, BoucWen, Dahl, LuGre, JangBarber)
 }
 """Laws by the names that ``--model`` knows, besides "sliders4" and the like, see `law_named`."""
 

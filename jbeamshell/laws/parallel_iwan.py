@@ -12,7 +12,6 @@ References
 ----------
 Iwan, W. D. (1966). A distributed-element model for hysteresis and its steady-state dynamic
     response. J. Appl. Mech. 33, 893-900.
-Krylov, N. & Bogoliubov, N. (1943). Introduction to non-linear mechanics. Princeton.
 """
 
 from __future__ import annotations
@@ -27,9 +26,7 @@ import numpy as np
 from jax import Array, lax
 from jax.typing import ArrayLike
 
-from jbeamshell.common.checks import is_traced, require, require_count, require_number
-from jbeamshell.common.pytrees import Tree
-from jbeamshell.common.summary import Summary, ranged
+from jbeamshell.common.checks import is_traced, require, require_count
 from jbeamshell.laws.law import Law
 from jbeamshell.laws.masing import MasingLaw
 from jbeamshell.scene.rows import number
@@ -42,32 +39,6 @@ LEAST = 1e-5  # displacement of the first of them, over the last one's
 NEARLY = 1.0 - 1e-6  # part of gross slip that the last of them reaches
 NO_MASING = "has no Masing memory, so no sliders hold it: take iwan4, bar, mindlin or sliders8"
 ENDLESS = "rises for ever: give the largest force, Joint.of(law, force)"
-
-
-class Equivalent(Tree):
-    """Spring and damper in place of a joint under a mass, at an amplitude; any shape.
-
-    Attributes
-    ----------
-    amplitude : displacement amplitude
-    stiffness : force over displacement, of the first harmonic
-    damping : damping coefficient, force over velocity
-    damping_ratio : half the loss factor
-    frequency : of the mass, cycles per time
-    """
-
-    amplitude: Array
-    stiffness: Array
-    damping: Array
-    damping_ratio: Array
-    frequency: Array
-
-    def __str__(self) -> str:
-        rows = [
-            (name.replace("_", " "), ranged(np.asarray(column)))
-            for name, column in vars(self).items()
-        ]
-        return Summary("spring and damper in place of a joint", rows).as_text()
 
 
 class ParallelIwan(MasingLaw):
@@ -136,34 +107,6 @@ class ParallelIwan(MasingLaw):
         """
         size = jnp.abs(jnp.asarray(amplitude))
         return self._where_known(size, self.harmonic(size))
-
-    def equivalent(self, amplitude: ArrayLike, mass: Any) -> Equivalent:
-        """Spring and damper of a mass that the joint holds, at a displacement amplitude; any shape.
-
-        They are the first harmonic of the loop (Krylov & Bogoliubov 1943).
-
-        Parameters
-        ----------
-        amplitude : displacement amplitude, positive
-        mass : mass on the joint
-
-        Raises
-        ------
-        InputError
-            for an amplitude beyond the `reach`, or a mass that is not positive
-
-        Examples
-        --------
-        >>> found = Joint([1.0, 3.0], [1.0, 2.0]).equivalent(2.0, mass=4.0)
-        >>> float(found.stiffness), round(float(found.damping_ratio), 4)
-        (0.75, 0.1061)
-        """
-        require_number("mass", mass)
-        complex_stiffness = self.first_harmonic(amplitude)
-        stiffness, loss = jnp.real(complex_stiffness), jnp.imag(complex_stiffness)
-        omega, size = jnp.sqrt(stiffness / mass), jnp.abs(jnp.asarray(amplitude))
-        frequency = omega / (2.0 * jnp.pi)
-        return Equivalent(size, stiffness, loss / omega, 0.5 * loss / stiffness, frequency)
 
     def line(self, u: Array) -> Array:
         """Backbone whose last slope goes on; any shape."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from jbeamshell.common.errors import InputError
+from jbeamshell.common.frames import frame
 from jbeamshell.common.summary import with_unit
 from jbeamshell.measured.findings import Finding, Level, of_columns, of_levels, of_loading
 from jbeamshell.measured.loop_files import FilePath, read_loops
@@ -118,6 +119,35 @@ class Inspection:
             for finding in view.findings:
                 if finding.grave:
                     raise InputError(f"{view.recording.label}: {finding.text}; {UNDO}")
+
+    def to_dataframe(self) -> Any:
+        """Cycles as a `pandas.DataFrame`, a row for every amplitude of every recording.
+
+        Columns are the recording's label and number of cycles, the ends of force and displacement,
+        the work and the secant stiffness of a cycle, and the kind of its shape.
+
+        Examples
+        --------
+        ::
+
+            jb.inspect("rig.csv").to_dataframe()
+        """
+        pairs = [(view, level) for view in self.views for level in view.levels]
+        ends: dict[str, Any] = {
+            f"{name}_{word}": [float(of(getattr(level.loop, name))) for _, level in pairs]
+            for name in ("force", "displacement")
+            for word, of in (("low", np.min), ("high", np.max))
+        }
+        columns = {
+            "recording": [view.recording.label for view, _ in pairs],
+            "driver": [view.driver for view, _ in pairs],
+            "cycles": [level.cycles for _, level in pairs],
+            **ends,
+            "work": [level.work for _, level in pairs],
+            "stiffness": [level.stiffness for _, level in pairs],
+            "kind": [level.shape.kind for _, level in pairs],
+        }
+        return frame(columns)
 
     def figures(self) -> dict[str, Any]:
         """Figures of all recordings, for JSON."""

@@ -38,7 +38,11 @@ KEPT = 16  # compiled functions that are kept for scenes of other numbers
 RESPONSES = (
     "force",
     "displacement",
-    *(n for n, value in inspect.getmembers(History) if isinstance(value, property) and n[0] != "_"),
+    *(
+        name
+        for name, value in inspect.getmembers(History)
+        if isinstance(value, property) and name[0] != "_" and name != "converged"
+    ),
 )
 
 

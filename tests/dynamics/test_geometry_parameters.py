@@ -5,7 +5,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.dynamics import Joint, four_parameters
-from jbeamshell.laws import Iwan4, iwan4_of_strip
+from jbeamshell.laws import Iwan4
 from jbeamshell.solving.steady_cycles import steady_cycles
 
 U = np.geomspace(1e-3, 3.0, 60)
@@ -45,7 +45,7 @@ def test_scenes_without_gross_slip_are_refused(values, complaint):
 
 @pytest.mark.slow
 class TestScenes:
-    def test_a_bolt_and_its_formula(self):
+    def test_a_bolt(self):
         rows = [[0.5, 0.0], [0.5, 20.0], [1.5, 20.0], [1.5, 0.0]]
         fine = {"model.section": "plane", "model.nodes": 129}  # for the smallest load
         scene = jb.Scene().replace(fine | {"contact.pressure": rows})
@@ -53,11 +53,6 @@ class TestScenes:
         assert float(found.law.slip_force) == pytest.approx(6.0)
         assert np.median(np.abs(found.dissipation_error)) < 0.12
         assert np.max(np.abs(found.displacement_error)) < 0.05
-        law = iwan4_of_strip(scene)
-        reached = law.displacement(found.force / 3.0)
-        off = np.abs(3.0 * np.asarray(law.dissipation(reached)) / found.dissipation - 1.0)
-        assert np.median(off) < 0.15
-        assert np.max(off) < 0.35
 
     def test_a_single_lap_joint_is_nearly_an_iwan_model(self):
         found = four_parameters(jb.library.single_lap())

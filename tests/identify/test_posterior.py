@@ -93,18 +93,6 @@ def test_flat_and_normal_priors_weigh_as_they_say():
     assert weight == pytest.approx(expected, rel=1e-6)
 
 
-def test_the_unit_cube_becomes_the_prior(known):
-    with pytest.raises(jb.InputError, match=r"strip.kappa_s: its prior is flat between 0 and inf"):
-        known.prior_transform([0.5, 0.5, 0.5])
-    free = [Parameter(MU, low=0.01, high=1.0), LINEAR]
-    whole = identify.fit(readings(NOISE), scene(**{ETA: 0.2}), free).posterior()
-    np.testing.assert_allclose(whole.prior_transform([0.5, 0.25]), [0.1, 1.25], rtol=1e-12)
-    prior = Parameter(KAPPA, prior=(0.45, 0.02))
-    fit = identify.fit(readings(NOISE, known=True), scene(**FIXED), prior)
-    (value,) = fit.posterior().prior_transform([0.975])
-    assert value == pytest.approx(0.45 + 1.959964 * 0.02, rel=1e-6)
-
-
 def test_a_value_at_its_bound_has_no_posterior():
     free = [Parameter(MU, low=0.12, high=0.5), ETA]
     data = readings(NOISE, known=True)

@@ -5,7 +5,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-import jbeamshell as jb
 from jbeamshell import laws, reference
 from jbeamshell.common.errors import InputError
 
@@ -112,63 +111,6 @@ def test_the_bar_is_the_closed_bar():
     np.testing.assert_allclose(law.dissipation_at_force(force), expected, rtol=1e-12)
 
 
-@pytest.mark.slow
-def test_a_row_of_sliders_tends_to_the_bar_with_order_two():
-    bar = laws.Bar.of(3.4e4, 1.0, 2.0)
-    errors = []
-    for count in (8, 16, 32, 64):
-        row = laws.SeriesIwan.of_bar(3.4e4, 1.0, 2.0, count)
-        force = jnp.array([0.61, 1.234])
-        errors.append(
-            float(
-                jnp.max(
-                    jnp.abs(row.dissipation_at_force(force) / bar.dissipation_at_force(force) - 1.0)
-                )
-            )
-        )
-    assert errors[-1] < 2e-3
-    assert np.log2(errors[0] / errors[-1]) / 3.0 > 1.7
-
-
-def chain(springs, limits, path):
-    """End displacements of a row of springs and sliders on a path of forces: all nodes, no rule.
-
-    A node whose force exceeds its limit moves until it no longer does; passes over all nodes end
-    where none moves.
-    """
-    n = len(limits)
-    v, found = np.zeros(n), []
-    for force in path:
-        for _ in range(20000):
-            before = v.copy()
-            for i in range(n):
-                pull = force if i == 0 else springs[i - 1] * (v[i - 1] - v[i])
-                pull -= (
-                    springs[i] * (v[i] - (v[i + 1] if i + 1 < n else 0.0))
-                    if i < len(springs)
-                    else 0.0
-                )
-                stiff = (springs[i] if i < len(springs) else 0.0) + (springs[i - 1] if i else 0.0)
-                if abs(pull) > limits[i]:
-                    v[i] += (pull - np.sign(pull) * limits[i]) / stiff
-            if np.max(np.abs(v - before)) < 1e-15:
-                break
-        found.append(v[0])
-    return np.array(found)
-
-
-@pytest.mark.slow
-def test_condensation_of_a_row_is_exact_along_nested_reversals():
-    springs, limits = np.array([3.0, 1.0, 2.0, 4.0]), np.array([0.3, 0.5, 0.2, 0.4, 0.6])
-    row = laws.SeriesIwan(springs, limits)
-    path = np.array([1.3, -0.4, 0.8, 0.1, 0.5, -1.4, 1.7])
-    np.testing.assert_allclose(
-        row.dissipation_at_force(1.3), row.dissipation(row.displacement(1.3)), rtol=1e-12
-    )
-    found = jax.jit(lambda row: row.path_displacements(path))(row)
-    np.testing.assert_allclose(found, chain(springs, limits, path), atol=1e-10)
-
-
 def test_sliders_by_name_have_a_number_each():
     law = laws.law_named("sliders4").started(1.0, 0.01, 0.01, 150.0)
     names = ("first", "last", "force1", "force2", "force3", "force4")
@@ -209,30 +151,9 @@ def test_bad_input_is_one_clear_line():
     node = laws.JangBarber(stiffness=4.0, friction=0.5, normal_force=2.0)
     with pytest.raises(InputError, match=r"^slope = 3.0: lifts the node off: take path_forces"):
         node.dissipation_in_phase(1.0, 3.0)
-    with pytest.raises(InputError, match=r"^power-law: knows the energy per cycle alone"):
-        laws.PowerLaw().path_forces([0.0, 1.0])
-    with pytest.raises(InputError, match=r"^series-iwan.limits = .*: give one per spring, or one"):
-        laws.SeriesIwan([1.0, 2.0], [1.0])
     with pytest.raises(InputError, match=r"^model = 'iwan5': choose jenkins, iwan4, "):
         laws.law_named("iwan5")
     with pytest.raises(InputError, match=r"^sliders = 1: must be a whole number, 2 to 32"):
         laws.law_named("sliders1")
     with pytest.raises(InputError, match=r"^lugre.breakaway = 0.5: "):
         laws.LuGre(breakaway=0.5)
-
-
-def test_the_power_law_has_its_exponent():
-    law = laws.PowerLaw(level=2.0, exponent=2.6, force=0.5)
-    np.testing.assert_allclose(law.dissipation_at_force([0.5, 1.0]), [2.0, 2.0 * 2.0**2.6])
-
-
-@pytest.mark.slow
-def test_a_row_of_sliders_is_the_strip_that_only_stretches():
-    scene = jb.Scene().replace({"model.section": "bar", "model.nodes": 161}).by_load_steps()
-    energy = float(jb.solve(scene.replace({"load.amplitude": 1.234})).dissipation)
-    rows = [laws.SeriesIwan.of_bar(3.4e4, 1.0, 2.0, count) for count in (20, 40, 80, 160)]
-    found = [float(row.dissipation_at_force(1.234)) for row in rows]
-    assert found[-1] == pytest.approx(energy, rel=1e-3)
-    exact = float(laws.Bar.of(3.4e4, 1.0, 2.0).dissipation_at_force(1.234))
-    errors = np.abs(np.array(found) / exact - 1.0)
-    assert np.polyfit(np.log([20, 40, 80, 160]), np.log(errors), 1)[0] < -1.7

@@ -362,3 +362,13 @@ def test_copies_of_one_cycle_tell_no_noise(csv):
     loops = jb.measured.steady_loops(jb.measured.read_loops(whole)[0])
     assert loops[0].deviations is None
     assert loops[0].but(scatter=None, noise=0.1).deviations is not None
+
+
+def test_the_cycles_of_all_recordings_are_a_table():
+    seen = inspect(example_loops())
+    table = seen.to_dataframe()
+    levels = [level for view in seen.views for level in view.levels]
+    assert len(table) == len(levels) > 1
+    np.testing.assert_array_equal(table["work"], [level.work for level in levels])
+    np.testing.assert_array_equal(table["force_high"], [level.loop.force.max() for level in levels])
+    assert set(table["recording"]) == {view.recording.label for view in seen.views}

@@ -7,6 +7,7 @@ import pytest
 
 import jbeamshell as jb
 from jbeamshell.common.checks import is_traced
+from jbeamshell.solving.response import RESPONSES
 
 FEW = {"model.nodes": 11, "load.cycles": 1, "load.steps_per_half_cycle": 2}
 SCENES = {
@@ -58,3 +59,14 @@ def test_a_number_may_be_of_any_kind(name):
     assert len({float(value) for value in found}) == 1
     within = jax.jit(lambda x: ask(x)["dissipation"])(1.0)
     np.testing.assert_allclose(within, found[0], rtol=1e-9)
+
+
+def test_every_figure_can_be_traced():
+    ask = jb.response(jb.Scene(), ("load.amplitude",), RESPONSES)
+    found = jax.eval_shape(ask, 0.5)
+    assert set(found) == {*RESPONSES, "status"}
+
+
+def test_whether_a_run_converged_is_its_status():
+    with pytest.raises(jb.InputError, match="figures = 'converged': choose 'force'"):
+        jb.response(jb.Scene(), ("load.amplitude",), ("converged",))

@@ -307,7 +307,7 @@ def test_a_sweep_wholly_outside_runs_nothing():
         ({"figures": ("traction",)}, "choose|no number"),
         ({"figures": ("slip",)}, "is no number"),
         ({"figures": ("loop",)}, "is no number"),
-        ({"figures": ("converged",)}, "give numbers|is no number"),
+        ({"figures": ("converged",)}, "choose 'force'"),
         ({"out": "sweep.txt"}, r"end the name in \.csv"),
         ({"out": "nowhere/sweep.csv"}, "there is no folder"),
     ],

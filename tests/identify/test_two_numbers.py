@@ -1,4 +1,4 @@
-"""Fits of two numbers of a strip: on along the weakest direction, and the truth in the interval."""
+"""Fits of two numbers of a strip: the truth in their intervals, and starts that are refused."""
 
 import itertools
 

@@ -1,12 +1,11 @@
-"""A mass on a strip without inertia: exact swings, energy, damping, and the choice of the model."""
+"""A mass on a strip, pulled and let go: energy, damping, and the choice of the model."""
 
 import numpy as np
 import pytest
 from toy import STRIP
 
 import jbeamshell as jb
-from jbeamshell import dynamics
-from jbeamshell.dynamics.light_strip import LightMotion, ring
+from jbeamshell.dynamics import Joint
 from jbeamshell.dynamics.release import LIGHT, let_go, on_contact_line
 
 SCENE = jb.Scene().replace({"model.section": "plane", "model.nodes": 33, "load.entry": "traction"})
@@ -14,54 +13,30 @@ CYCLES = 20.0
 
 
 @pytest.fixture(scope="module")
-def joint():
-    return dynamics.Joint.of(SCENE, 1.0)
+def study():
+    return let_go(SCENE, 1.0, cycles=CYCLES)
 
 
-def swinging(joint, pull, mass=20.0):
-    return ring(SCENE, joint, mass, pull, CYCLES, 2001)
+def test_energies_of_the_sliders_add_up(study):
+    motion = study.motion
+    assert np.abs(motion.imbalance).max() < 1e-5 * motion.stored[0]
+    assert np.all(np.diff(motion.friction_work) > -1e-12 * motion.stored[0])
+    assert motion.friction_work[-1] > 0.5 * motion.stored[0]
 
 
-class TestSwings:
-    def test_a_stuck_mass_is_a_harmonic_oscillator(self, joint):
-        motion = swinging(joint, 1e-7)
-        time = np.asarray(motion.time)
-        exact = np.cos(2.0 * np.pi * CYCLES * time / time[-1])
-        size = motion.displacement[0]
-        np.testing.assert_allclose(motion.displacement, size * exact, atol=1e-9 * size)
-        assert np.all(np.abs(motion.friction_work) < 1e-12 * motion.stored[0])
-
-    @pytest.mark.parametrize("pull", [0.3, 1.0, -1.0])
-    def test_energy_balances_to_round_off(self, joint, pull):
-        """Kinetic energy comes from the corners, stored energy and work from the sliders."""
-        motion = swinging(joint, pull)
-        assert np.abs(motion.imbalance).max() < 1e-12 * motion.stored[0]
-        assert np.all(np.diff(motion.friction_work) > -1e-12 * motion.stored[0])
-        assert motion.velocity[0] == 0.0
-
-    def test_the_velocity_is_the_rate_of_the_displacement(self, joint):
-        motion, errors = swinging(joint, 1.0), []
-        for apart in (2, 1):
-            u, time, velocity = (
-                np.asarray(column)[::apart]
-                for column in (motion.displacement, motion.time, motion.velocity)
-            )
-            rate = np.gradient(u, time)[1:-1]
-            errors.append(np.sqrt(np.mean((rate - velocity[1:-1]) ** 2)))
-        assert errors[1] < 1e-3 * np.abs(velocity).max()
-        # The acceleration has kinks, so that differences lose a part of their second order.
-        assert errors[0] / errors[1] > 3.0
-
-    def test_the_mass_only_scales_time(self, joint):
-        light, heavy = (swinging(joint, 1.0, mass) for mass in (5.0, 500.0))
-        np.testing.assert_allclose(heavy.time, 10.0 * light.time)
-        np.testing.assert_allclose(heavy.displacement, light.displacement, atol=1e-16)
+def test_the_first_swing_follows_the_branch_of_the_sliders(study):
+    """The mass is at rest at both turns, so the force of Masing's branch has done no work."""
+    motion, joint = study.motion, Joint.of(SCENE, 1.0)
+    u = np.asarray(motion.displacement)
+    turn = np.min(u[: u.size // 15])  # within the first period
+    half = np.linspace(0.0, 0.5 * (u[0] - turn), 4001)
+    force = 1.0 - 2.0 * np.asarray(joint.backbone(half))
+    work = np.trapezoid(force, 2.0 * half)
+    assert work == pytest.approx(0.0, abs=1e-3 * motion.stored[0])
 
 
 class TestLetGo:
-    def test_a_heavy_mass_takes_the_sliders_by_itself(self):
-        study = let_go(SCENE, 1.0, cycles=CYCLES)
-        assert isinstance(study.motion, LightMotion)
+    def test_a_heavy_mass_takes_the_sliders_by_itself(self, study):
         assert study.light
         assert study.share < LIGHT
         assert study.figures()["strip"] == "network of sliders"
